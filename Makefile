@@ -1,0 +1,56 @@
+# Everything runs in .venv, which the first target that needs it builds: python3 and make are enough.
+# Options: make demo DEMO_OPTIONS="--quick"   make test TEST_OPTIONS="-n 2 -k mesh"
+#          make venv PYTHON=/path/to/python3.12
+
+PYTHON ?=
+DEMO_OPTIONS ?=
+TEST_OPTIONS ?=
+BENCH_OPTIONS ?=
+MESH_OPTIONS ?=
+
+BIN := $(if $(filter Windows_NT,$(OS)),.venv/Scripts,.venv/bin)
+STAMP := .venv/stamp
+MESH_STAMP := .venv/stamp-mesh
+GMSH_PACKAGES := libglu1-mesa libgl1 libxcursor1 libxft2 libxinerama1 libgomp1
+
+# taichi aborts where HOME is not set.
+ifeq ($(strip $(HOME)),)
+export HOME := $(CURDIR)/.venv/home
+endif
+
+.PHONY: help venv demo test lint bench mesh clean
+
+help: ## print this list
+	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-6s %s\n", $$1, $$2}' Makefile
+
+venv: $(STAMP) ## set up .venv (about a minute; done by itself where needed)
+
+demo: $(STAMP) ## blast a block and show the fracture
+	$(BIN)/python experiments/blast_fracture.py $(DEMO_OPTIONS)
+
+test: $(STAMP) ## run the tests
+	$(BIN)/python -m pytest -q $(TEST_OPTIONS)
+
+lint: $(STAMP) ## check style and format
+	$(BIN)/python -m ruff check .
+	$(BIN)/python -m ruff format --check .
+
+bench: $(STAMP) ## measure speed
+	$(BIN)/python experiments/bench.py $(BENCH_OPTIONS)
+
+mesh: $(MESH_STAMP) ## make the meshes again (installs gmsh; the others do not need it)
+	$(BIN)/python experiments/make_meshes.py $(MESH_OPTIONS)
+
+clean: ## remove .venv, caches and build leftovers; results/ stays
+	rm -rf .venv build dist *.egg-info .pytest_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(STAMP): requirements.txt pyproject.toml
+	@PYTHON="$(PYTHON)" sh .ci/venv.sh
+
+$(MESH_STAMP): $(STAMP)
+	@echo "Installing gmsh (about 10 seconds)."
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[mesh]"
+	@$(BIN)/python -c "import gmsh" || { echo "gmsh lacks system libraries; on Debian or Ubuntu type:" \
+	  "sudo apt-get install --no-install-recommends $(GMSH_PACKAGES)"; exit 1; }
+	@touch $@

@@ -1,0 +1,23 @@
+"""Effects a scene may list; what it leaves out is not computed, allocated or compiled."""
+
+from taichi_dem.effects.bond_damping import BondDamping
+from taichi_dem.effects.friction import Friction
+from taichi_dem.effects.gas_pressure import GasPressure
+from taichi_dem.effects.gravity import Gravity
+from taichi_dem.effects.shear_slip import ShearSlip
+from taichi_dem.effects.softening import Softening
+from taichi_dem.effects.sphere_contact import SphereContact
+from taichi_dem.effects.supports import Fixed, PrescribedMotion, Roller
+
+__all__ = [
+    "BondDamping",
+    "Fixed",
+    "Friction",
+    "GasPressure",
+    "Gravity",
+    "PrescribedMotion",
+    "Roller",
+    "ShearSlip",
+    "Softening",
+    "SphereContact",
+]

@@ -1,0 +1,158 @@
+"""What an effect is, and the null objects that stand where a scene lists none.
+
+An effect owns its parameters (in fields, so that sweeping them compiles nothing anew) and its
+state. Its ``role`` says where ``step/advance.py`` asks for it:
+
+tension   ``traction(b, u, opening)`` [Pa], ``failed(u)``, ``stored(b, u, opening)``, ``spent(b, u)``
+shear     ``traction(b, u, sliding, pressure)`` -> (traction [Pa], energy slipped away [J/m^2]),
+          ``stored(b, u, sliding)``
+dashpot   ``traction(velocity)`` [Pa] of a contact unit
+load      ``acts_on(i)``, ``wrench(i, t, rotation)`` -> (force [N], torque about the centre [N m])
+support   ``acts_on(i)``, ``held(i, t, rotation, velocity, angular_momentum)`` -> both, corrected
+contact   sphere contacts between broken faces      friction  their sliding
+
+b is a bond, u one of its three contact units (3 b, 3 b + 1, 3 b + 2), i a body. Roles ``load`` and
+``support`` take any number of effects, the others at most one.
+"""
+
+import math
+
+import taichi as ti
+
+from taichi_dem.errors import InputError
+from taichi_dem.types import real, vec3
+
+MANY = ("load", "support")
+ROLES = ("tension", "shear", "dashpot", "contact", "friction", *MANY)
+
+
+class Effect:
+    """Base of all effects.
+
+    role: where the step asks for it. name: the word used in reports and on the command line.
+    """
+
+    role = ""
+    name = ""
+
+    def bind(self, model):
+        """Check the effect against the model and allocate its parameters and state there."""
+
+    def state(self):
+        """Fields that change in a run, by name; a checkpoint holds them."""
+        return {}
+
+
+def parameters(**values):
+    """Checked parameters in one field, in the order given; floats that kernels read."""
+    field = ti.field(real, shape=len(values))
+    for index, value in enumerate(values.values()):
+        field[index] = value
+    return field
+
+
+def positive(name, value, zero_allowed=False):
+    """The value as a float; InputError when it is no finite number above (or at) zero."""
+    limit = "zero or a positive" if zero_allowed else "a positive"
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise InputError(f"{name} must be {limit} finite number, got {value!r}")
+    if value < 0.0 or (value == 0.0 and not zero_allowed):
+        raise InputError(f"{name} must be {limit} finite number, got {value!r}")
+    return float(value)
+
+
+def direction(name, value):
+    """Three finite numbers as a tuple of floats; InputError otherwise."""
+    try:
+        numbers = tuple(float(x) for x in value)
+    except (TypeError, ValueError):
+        numbers = ()
+    if len(numbers) != 3 or not all(math.isfinite(x) for x in numbers):
+        raise InputError(f"{name} must be three finite numbers, got {value!r}")
+    return numbers
+
+
+@ti.data_oriented
+class ElasticTension(Effect):
+    """No softening: a unit stays elastic in tension and compression and never fails."""
+
+    role = "tension"
+
+    def bind(self, model):
+        """Take the bonds' stiffness from the model."""
+        self.model = model
+
+    @ti.func
+    def traction(self, b, u, opening):
+        """Linear traction [Pa] at a normal opening [m]."""
+        return self.model.bond_stiffness[b][0] * opening
+
+    @ti.func
+    def failed(self, u):
+        """An elastic unit never fails."""
+        return 0
+
+    @ti.func
+    def stored(self, b, u, opening):
+        """Elastic energy per area [J/m^2]."""
+        return 0.5 * self.model.bond_stiffness[b][0] * opening * opening
+
+    @ti.func
+    def spent(self, b, u):
+        """Nothing is spent by softening."""
+        return 0.0
+
+
+@ti.data_oriented
+class ElasticShear(Effect):
+    """No slip: a unit stays elastic in shear."""
+
+    role = "shear"
+
+    def bind(self, model):
+        """Take the bonds' stiffness from the model."""
+        self.model = model
+
+    @ti.func
+    def traction(self, b, u, sliding, pressure):
+        """Linear shear traction [Pa] (eq. 1) and no energy slipped away."""
+        return self.model.bond_stiffness[b][1] * sliding, 0.0
+
+    @ti.func
+    def stored(self, b, u, sliding):
+        """Elastic energy per area [J/m^2]."""
+        return 0.5 * self.model.bond_stiffness[b][1] * sliding.dot(sliding)
+
+
+@ti.data_oriented
+class NoDashpot(Effect):
+    """Bonds without damping."""
+
+    role = "dashpot"
+
+    @ti.func
+    def traction(self, velocity):
+        """No traction at any velocity."""
+        return vec3(0.0, 0.0, 0.0)
+
+
+@ti.data_oriented
+class NoFriction(Effect):
+    """Frictionless sphere contacts."""
+
+    role = "friction"
+
+    @ti.func
+    def force(self, damping, force_normal, slide):
+        """No force at any sliding velocity."""
+        return vec3(0.0, 0.0, 0.0)
+
+
+ABSENT = {
+    "tension": ElasticTension,
+    "shear": ElasticShear,
+    "dashpot": NoDashpot,
+    "friction": NoFriction,
+}
+
+__all__ = ["ABSENT", "MANY", "ROLES", "Effect", "direction", "parameters", "positive"]

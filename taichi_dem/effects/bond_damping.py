@@ -1,0 +1,25 @@
+"""Dashpots of bonds (Konno et al., 2.1, end; Table 1)."""
+
+import taichi as ti
+
+from taichi_dem.effects.base import Effect, parameters
+from taichi_dem.types import vec3
+
+
+@ti.data_oriented
+class BondDamping(Effect):
+    """Normal and tangential dashpots, at full strength until the face is released."""
+
+    role = "dashpot"
+    name = "bond_damping"
+
+    def bind(self, model):
+        """Take the damping coefficients [Pa s/m] from the material."""
+        self.law = parameters(
+            normal=model.material.normal_damping, shear=model.material.shear_damping
+        )
+
+    @ti.func
+    def traction(self, velocity):
+        """Traction [Pa] at a relative velocity in the face frame [m/s]."""
+        return vec3(self.law[0] * velocity[0], self.law[1] * velocity[1], self.law[1] * velocity[2])

@@ -1,0 +1,23 @@
+"""Sliding friction between contact spheres (Konno et al., 2.2)."""
+
+import taichi as ti
+
+from taichi_dem.effects.base import Effect, parameters
+from taichi_dem.physics.sphere_pair import friction_force
+
+
+@ti.data_oriented
+class Friction(Effect):
+    """Friction of sphere contacts with the material's coefficient; no tangential spring."""
+
+    role = "friction"
+    name = "friction"
+
+    def bind(self, model):
+        """Take the friction coefficient from the material."""
+        self.law = parameters(coefficient=model.material.friction)
+
+    @ti.func
+    def force(self, damping, force_normal, slide):
+        """Force [N] on the second sphere against its sliding velocity [m/s]."""
+        return friction_force(self.law[0], damping, force_normal, slide)

@@ -1,0 +1,104 @@
+"""Pressure of the blast gas on the wall of the hole (Konno et al., 4.1, eq. 4, Fig. 11)."""
+
+import math
+
+import numpy as np
+import taichi as ti
+
+from taichi_dem.effects.base import Effect, parameters, positive
+from taichi_dem.physics.rotation import zero3
+from taichi_dem.tetrahedra import area_vectors
+from taichi_dem.topology import face_vertices, faces_of_group
+from taichi_dem.types import vec3
+
+
+@ti.func
+def pulse(peak, rise, decay_ratio, t):
+    """Pressure [Pa] of eq. 4: a squared cosine up to the peak, a cosine down to zero."""
+    pressure = 0.0
+    s = t / rise - 1.0
+    if 0.0 <= t and s <= 0.0:
+        pressure = peak * ti.cos(0.5 * math.pi * s) ** 2
+    elif 0.0 < s and s <= decay_ratio:
+        pressure = peak * ti.cos(0.5 * math.pi * s / decay_ratio)
+    return pressure
+
+
+@ti.data_oriented
+class GasPressure(Effect):
+    """Pressure on the faces of a group along their current normal, also after they came loose.
+
+    group: name of the face group. peak [Pa]: 575 MPa. rise [s]: time to the peak. decay_ratio:
+    time from the peak to zero over the rise. The area stays the mesh's.
+    """
+
+    role = "load"
+    name = "gas_pressure"
+
+    def __init__(self, group="hole", peak=575e6, rise=1.33e-4, decay_ratio=2.75):
+        self.group = group
+        self.peak = positive("peak", peak)
+        self.rise = positive("rise", rise)
+        self.decay_ratio = positive("decay_ratio", decay_ratio)
+
+    def bind(self, model):
+        """Find the loaded faces; InputError when the mesh has no such group."""
+        self.law = parameters(peak=self.peak, rise=self.rise, decay_ratio=self.decay_ratio)
+        body, face = faces_of_group(model.mesh, model.topology, self.group)
+        order = np.argsort(body, kind="stable")
+        self.body = body[order]
+        corners = face_vertices(model.mesh, self.body, face[order])
+        arm = model.mesh.points[corners].mean(axis=1) - model.centre[self.body]
+        self._allocate(model.body_count, area_vectors(model.mesh.points, corners), arm)
+
+    def _allocate(self, body_count, area, arm):
+        first = np.searchsorted(self.body, np.arange(body_count + 1))
+        self.first = ti.field(ti.i32, shape=body_count + 1)
+        self.area = ti.Vector.field(3, ti.f64, shape=len(area))
+        self.arm = ti.Vector.field(3, ti.f64, shape=len(area))
+        self._load(first.astype(np.int32), area, arm)
+
+    @ti.kernel
+    def _load(
+        self,
+        first: ti.types.ndarray(dtype=ti.i32, ndim=1),
+        area: ti.types.ndarray(dtype=ti.f64, ndim=2),
+        arm: ti.types.ndarray(dtype=ti.f64, ndim=2),
+    ):
+        for i in range(first.shape[0]):
+            self.first[i] = first[i]
+        for k in range(area.shape[0]):
+            self.area[k] = vec3(area[k, 0], area[k, 1], area[k, 2])
+            self.arm[k] = vec3(arm[k, 0], arm[k, 1], arm[k, 2])
+
+    @ti.func
+    def acts_on(self, i):
+        """Nonzero for a body with a face in the group."""
+        return self.first[i + 1] - self.first[i]
+
+    @ti.func
+    def wrench(self, i, t, rotation):
+        """Force [N] and torque about the centre [N m] on body i at time t [s]."""
+        pressure = pulse(self.law[0], self.law[1], self.law[2], t)
+        force, torque = zero3(), zero3()
+        for k in range(self.first[i], self.first[i + 1]):
+            push = -pressure * self.area[k]
+            force += push
+            torque += self.arm[k].cross(push)
+        return rotation @ force, rotation @ torque
+
+    def pressure_at(self, times):
+        """Pressure [Pa] at an array of times [s], for pictures; the effect must be bound."""
+        times = np.ascontiguousarray(times, dtype=np.float64)
+        pressure = np.zeros_like(times)
+        self._sample(times, pressure)
+        return pressure
+
+    @ti.kernel
+    def _sample(
+        self,
+        times: ti.types.ndarray(dtype=ti.f64, ndim=1),
+        pressure: ti.types.ndarray(dtype=ti.f64, ndim=1),
+    ):
+        for k in range(times.shape[0]):
+            pressure[k] = pulse(self.law[0], self.law[1], self.law[2], times[k])

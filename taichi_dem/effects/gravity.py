@@ -1,0 +1,33 @@
+"""Weight."""
+
+import taichi as ti
+
+from taichi_dem.effects.base import Effect, direction
+from taichi_dem.physics.rotation import zero3
+
+
+@ti.data_oriented
+class Gravity(Effect):
+    """Uniform acceleration of all bodies [m/s^2]."""
+
+    role = "load"
+    name = "gravity"
+
+    def __init__(self, acceleration=(0.0, -9.81, 0.0)):
+        self._acceleration = direction("acceleration", acceleration)
+
+    def bind(self, model):
+        """Put the acceleration where kernels read it."""
+        self.model = model
+        self.acceleration = ti.Vector.field(3, ti.f64, shape=())
+        self.acceleration[None] = self._acceleration
+
+    @ti.func
+    def acts_on(self, i):
+        """Every body has weight."""
+        return 1
+
+    @ti.func
+    def wrench(self, i, t, rotation):
+        """Force [N] and torque about the centre [N m] on body i."""
+        return self.model.mass[i] * self.acceleration[None], zero3()

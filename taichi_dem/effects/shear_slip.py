@@ -1,0 +1,52 @@
+"""Coulomb slip of bonds (Konno et al., 2.1, eq. 1 and 2, Fig. 3)."""
+
+import taichi as ti
+
+from taichi_dem.effects.base import Effect, parameters
+from taichi_dem.physics.fracture import coulomb_limit, slip_beyond
+from taichi_dem.types import vec2
+
+
+@ti.data_oriented
+class ShearSlip(Effect):
+    """Shear traction is bounded by cohesion + friction * pressure; beyond it the unit slips.
+
+    The pressure is the spring's part alone and lowers the limit in tension, never below zero.
+    Cohesion does not degrade, and slip alone never releases a face.
+    """
+
+    role = "shear"
+    name = "shear_slip"
+
+    def bind(self, model):
+        """Allocate the residual slip of every contact unit."""
+        self.model = model
+        self.law = parameters(cohesion=model.material.cohesion, friction=model.material.friction)
+        self.slip = ti.Vector.field(2, ti.f64, shape=max(1, 3 * model.bond_count))
+        self.slip.fill(vec2(0.0, 0.0))
+
+    def state(self):
+        """Residual slip of every unit in the face frame [m]."""
+        return {"shear_slip": self.slip}
+
+    @ti.func
+    def traction(self, b, u, sliding, pressure):
+        """Shear traction [Pa] and the energy per area slipped away now [J/m^2]."""
+        stiffness = self.model.bond_stiffness[b][1]
+        limit = coulomb_limit(self.law[0], self.law[1], pressure)
+        elastic = sliding - self.slip[u]
+        spent = 0.0
+        # Squares first: almost every unit stays elastic and needs no root.
+        if stiffness * stiffness * elastic.dot(elastic) > limit * limit:
+            slip = slip_beyond(stiffness, limit, elastic)
+            # Mean of the tractions before and after, so that stored plus spent is exact.
+            spent = (stiffness * (elastic - 0.5 * slip)).dot(slip)
+            self.slip[u] += slip
+            elastic -= slip
+        return stiffness * elastic, spent
+
+    @ti.func
+    def stored(self, b, u, sliding):
+        """Elastic energy per area [J/m^2]."""
+        elastic = sliding - self.slip[u]
+        return 0.5 * self.model.bond_stiffness[b][1] * elastic.dot(elastic)

@@ -1,0 +1,76 @@
+"""Softening and fracture of bonds in tension (Konno et al., 2.1, Fig. 4)."""
+
+import taichi as ti
+
+from taichi_dem.effects.base import Effect, parameters
+from taichi_dem.physics.fracture import envelope_traction, softening_energy
+from taichi_dem.types import vec2
+
+
+@ti.data_oriented
+class Softening(Effect):
+    """Beyond the tensile strength a unit softens along a straight line and fails at zero traction.
+
+    Unloading goes to the origin and the elastic limit moves to where it began; compression keeps
+    the full stiffness. One failed unit releases the whole face. Strength and fracture energy are
+    the material's.
+    """
+
+    role = "tension"
+    name = "softening"
+
+    def bind(self, model):
+        """Allocate the elastic limit and secant stiffness of every contact unit."""
+        self.model = model
+        material = model.material
+        self.law = parameters(strength=material.tensile_strength, failure=material.failure_opening)
+        self.unit = ti.Vector.field(2, ti.f64, shape=max(1, 3 * model.bond_count))
+        self._reset()
+
+    def state(self):
+        """Elastic limit [m] and secant stiffness [Pa/m] of every unit."""
+        return {"softening_unit": self.unit}
+
+    @ti.kernel
+    def _reset(self):
+        for b in range(self.model.bond_count):
+            for q in range(3):
+                self.unit[3 * b + q] = vec2(self._onset(b), self.model.bond_stiffness[b][0])
+
+    @ti.func
+    def _onset(self, b):
+        return self.law[0] / self.model.bond_stiffness[b][0]
+
+    @ti.func
+    def traction(self, b, u, opening):
+        """Traction [Pa] at a normal opening [m]; moves the elastic limit on the way out."""
+        traction = self.model.bond_stiffness[b][0] * opening
+        if opening > 0.0:
+            if opening > self.unit[u][0]:
+                softened = envelope_traction(self.law[0], self._onset(b), self.law[1], opening)
+                self.unit[u] = vec2(opening, softened / opening)
+            traction = self.unit[u][1] * opening
+        return traction
+
+    @ti.func
+    def failed(self, u):
+        """1 once the unit has been opened to the failure opening, else 0."""
+        return ti.cast(self.unit[u][0] >= self.law[1], ti.i32)
+
+    @ti.func
+    def stored(self, b, u, opening):
+        """Elastic energy per area [J/m^2] at the present stiffness."""
+        stiffness = self.model.bond_stiffness[b][0]
+        if opening > 0.0:
+            stiffness = self.unit[u][1]
+        return 0.5 * stiffness * opening * opening
+
+    @ti.func
+    def spent(self, b, u):
+        """Energy per area [J/m^2] that softening has spent in this unit."""
+        return softening_energy(self.law[0], self._onset(b), self.law[1], self.unit[u][0])
+
+    @ti.func
+    def damage(self, b, u):
+        """Share of the fracture energy that is spent, 0 intact to 1 failed."""
+        return self.spent(b, u) / (0.5 * self.law[0] * self.law[1])

@@ -1,0 +1,58 @@
+"""Contact of fragments through spheres on their broken faces (Konno et al., 2.2, Fig. 5)."""
+
+import taichi as ti
+
+from taichi_dem.effects.base import Effect, parameters, positive
+from taichi_dem.errors import InputError
+from taichi_dem.physics.sphere_pair import normal_force
+
+
+@ti.data_oriented
+class SphereContact(Effect):
+    """Spheres inscribed behind broken faces repel each other, without attraction.
+
+    divisions: equal parts of a face's edges; 5 gives the paper's six spheres a face.
+    outer_faces: free outer faces carry spheres from the start too (the paper: no).
+    skin: how far apart spheres still enter the candidate list [m]; changes time, not results.
+    pairs_per_body, spheres_per_body: room of the candidate lists.
+    """
+
+    role = "contact"
+    name = "sphere_contact"
+
+    def __init__(
+        self, divisions=5, outer_faces=False, skin=2e-4, pairs_per_body=24, spheres_per_body=160
+    ):
+        if not isinstance(divisions, int) or not 3 <= divisions <= 20:
+            raise InputError(f"divisions must be a whole number from 3 to 20, got {divisions!r}")
+        self.divisions = divisions
+        self.outer_faces = bool(outer_faces)
+        self.skin = positive("skin", skin)
+        self.pairs_per_body = int(positive("pairs_per_body", pairs_per_body))
+        self.spheres_per_body = int(positive("spheres_per_body", spheres_per_body))
+
+    def bind(self, model):
+        """Take stiffness [N/m] and damping [N s/m] of a contact from the material."""
+        self.law = parameters(
+            stiffness=model.material.contact_stiffness, damping=model.material.contact_damping
+        )
+
+    @ti.func
+    def normal(self, overlap, opening_rate):
+        """Repulsion [N] at an overlap [m] of spheres that part at opening_rate [m/s]."""
+        return normal_force(self.law[0], self.law[1], overlap, opening_rate)
+
+    @ti.func
+    def elastic(self, overlap):
+        """Spring's part of the repulsion [N]."""
+        return self.law[0] * overlap
+
+    @ti.func
+    def damping(self):
+        """Damping coefficient of a contact [N s/m]; friction shares it (spec, section 2)."""
+        return self.law[1]
+
+    @ti.func
+    def stored(self, overlap):
+        """Elastic energy of a contact [J]."""
+        return 0.5 * self.law[0] * overlap * overlap

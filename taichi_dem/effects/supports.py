@@ -1,0 +1,106 @@
+"""Supports: bodies with a face in a group are fixed, held on a plane, or moved as prescribed."""
+
+import math
+
+import numpy as np
+import taichi as ti
+
+from taichi_dem.effects.base import Effect, direction, parameters, positive
+from taichi_dem.errors import InputError
+from taichi_dem.physics.rotation import zero3
+from taichi_dem.topology import faces_of_group
+from taichi_dem.types import vec3
+
+
+@ti.data_oriented
+class _Support(Effect):
+    """Marks the bodies that have a face in a group."""
+
+    role = "support"
+
+    def __init__(self, group):
+        self.group = group
+
+    def bind(self, model):
+        """Mark the supported bodies; InputError when the mesh has no such group."""
+        self.model = model
+        body, _ = faces_of_group(model.mesh, model.topology, self.group)
+        marks = np.zeros(model.body_count, dtype=np.int32)
+        marks[body] = 1
+        self.marked = ti.field(ti.i32, shape=model.body_count)
+        self.marked.from_numpy(marks)
+
+    @ti.func
+    def acts_on(self, i):
+        """1 for a supported body, else 0."""
+        return self.marked[i]
+
+
+@ti.data_oriented
+class Fixed(_Support):
+    """Bodies with a face in the group neither move nor turn."""
+
+    name = "fixed"
+
+    @ti.func
+    def held(self, i, t, rotation, velocity, angular_momentum):
+        """Zero velocity and angular momentum."""
+        return zero3(), zero3()
+
+
+@ti.data_oriented
+class Roller(_Support):
+    """Bodies with a face in the group slide on its plane and turn about its normal only.
+
+    normal: of the plane; its length does not matter.
+    """
+
+    name = "roller"
+
+    def __init__(self, group, normal):
+        super().__init__(group)
+        numbers = np.array(direction("normal", normal))
+        if not np.linalg.norm(numbers) > 0.0:
+            raise InputError(f"normal must be longer than zero, got {normal!r}")
+        self._normal = numbers / np.linalg.norm(numbers)
+
+    def bind(self, model):
+        """Mark the supported bodies and keep the unit normal."""
+        _Support.bind(self, model)
+        self.normal = parameters(x=self._normal[0], y=self._normal[1], z=self._normal[2])
+
+    @ti.func
+    def held(self, i, t, rotation, velocity, angular_momentum):
+        """Velocity within the plane, spin about its normal."""
+        normal = vec3(self.normal[0], self.normal[1], self.normal[2])
+        in_body = rotation.transpose() @ angular_momentum
+        spin = (rotation @ (self.model.inertia_inverse[i] @ in_body)).dot(normal) * normal
+        kept = rotation @ (self.model.inertia[i] @ (rotation.transpose() @ spin))
+        return velocity - velocity.dot(normal) * normal, kept
+
+
+@ti.data_oriented
+class PrescribedMotion(_Support):
+    """Bodies with a face in the group move with a given velocity and do not turn.
+
+    velocity [m/s]: v cos(2 pi frequency t); frequency [Hz], zero for a constant velocity.
+    """
+
+    name = "prescribed_motion"
+
+    def __init__(self, group, velocity, frequency=0.0):
+        super().__init__(group)
+        self._velocity = direction("velocity", velocity)
+        self._frequency = positive("frequency", frequency, zero_allowed=True)
+
+    def bind(self, model):
+        """Mark the supported bodies and keep the motion."""
+        _Support.bind(self, model)
+        x, y, z = self._velocity
+        self.motion = parameters(x=x, y=y, z=z, rate=2.0 * math.pi * self._frequency)
+
+    @ti.func
+    def held(self, i, t, rotation, velocity, angular_momentum):
+        """The prescribed velocity at time t [s] and no spin."""
+        amplitude = vec3(self.motion[0], self.motion[1], self.motion[2])
+        return amplitude * ti.cos(self.motion[3] * t), zero3()

@@ -1,0 +1,146 @@
+"""Energy and momentum account of a run, term by term (spec, section 6).
+
+work of loads and supports + energy at the start = kinetic + bond strain + sphere strain
++ bond dashpots + slip + softening + release + friction + sphere dashpots - injected + residual.
+"""
+
+import numpy as np
+import taichi as ti
+
+#: Terms of the account in the order of tables and files, all in J.
+TERMS = (
+    "kinetic",
+    "bond_strain",
+    "sphere_strain",
+    "bond_dashpot",
+    "softening",
+    "release",
+    "slip",
+    "sphere_dashpot",
+    "friction",
+    "injected",
+    "load_work",
+    "support_work",
+    "residual",
+)
+
+
+@ti.data_oriented
+class Ledger:
+    """Sums what the step has booked; stored energies are computed anew by the step's own laws."""
+
+    def __init__(self, model, state, advance, contacts):
+        self.model, self.state, self.advance, self.contacts = model, state, advance, contacts
+        self.start_energy = 0.0
+        first = self.account()
+        self.start_energy = first["kinetic"] + first["bond_strain"] + first["sphere_strain"]
+        self.start_momentum = self.momentum()
+
+    def account(self):
+        """All terms in J by name; residual is what the account cannot explain."""
+        n, bonds = self.model.body_count, self.model.bond_count
+        body, bond = np.zeros((n, 3)), np.zeros((max(1, bonds), 5))
+        self._read_bodies(body)
+        self._read_bonds(bond)
+        pair = np.zeros((self._pair_count() + 1, 4))
+        if self.contacts is not None:
+            self._read_pairs(pair)
+        terms = {
+            "kinetic": body[:, 0].sum(),
+            "bond_strain": bond[:, 0].sum(),
+            "sphere_strain": pair[:, 0].sum(),
+            "bond_dashpot": bond[:, 1].sum(),
+            "softening": bond[:, 4].sum(),
+            "release": bond[:, 3].sum(),
+            "slip": bond[:, 2].sum(),
+            "sphere_dashpot": pair[:, 1].sum(),
+            "friction": pair[:, 2].sum(),
+            "injected": pair[:, 3].sum(),
+            "load_work": body[:, 1].sum(),
+            "support_work": body[:, 2].sum(),
+        }
+        terms["residual"] = self._residual(terms)
+        return {name: float(value) for name, value in terms.items()}
+
+    def _residual(self, terms):
+        given = terms["load_work"] + terms["support_work"] + terms["injected"] + self.start_energy
+        return given - sum(
+            terms[name]
+            for name in TERMS
+            if name not in ("load_work", "support_work", "injected", "residual")
+        )
+
+    def load_work(self, index):
+        """Work of one load [J], by its place in the scene's list of loads."""
+        work = np.zeros(self.model.body_count)
+        self._read_load(index, work)
+        return float(work.sum())
+
+    def momentum(self):
+        """Linear [N s] and angular momentum about the origin [N m s] less what was given, (6,)."""
+        rows = np.zeros((self.model.body_count, 12))
+        self._read_momentum(rows)
+        return rows[:, :6].sum(axis=0) - rows[:, 6:].sum(axis=0)
+
+    def momentum_errors(self):
+        """Linear and angular momentum out of nothing, as shares of what the bodies exchanged.
+
+        The scale is the sum over bodies of the size of momentum and of load impulse.
+        """
+        rows = np.zeros((self.model.body_count, 12))
+        self._read_momentum(rows)
+        lost = rows[:, :6].sum(axis=0) - rows[:, 6:].sum(axis=0) - self.start_momentum
+        sizes = [np.linalg.norm(rows[:, k : k + 3], axis=1).sum() for k in (0, 3, 6, 9)]
+        linear, angular = max(sizes[0], sizes[2], 1e-300), max(sizes[1], sizes[3], 1e-300)
+        return np.linalg.norm(lost[:3]) / linear, np.linalg.norm(lost[3:]) / angular
+
+    def _pair_count(self):
+        return self.contacts.pair_count[None] if self.contacts is not None else 0
+
+    @ti.kernel
+    def _read_bodies(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
+        for i in range(self.model.body_count):
+            momentum = self.state.angular_momentum[i]
+            turning = momentum.dot(self.advance.spin(i, momentum))
+            moving = self.model.mass[i] * self.state.velocity[i].norm_sqr()
+            table[i, 0] = 0.5 * (moving + turning)
+            for e in ti.static(range(len(self.model.loads))):
+                table[i, 1] += self.state.load_work[i][e]
+            table[i, 2] = self.state.load_work[i][ti.static(len(self.model.loads))]
+
+    @ti.kernel
+    def _read_bonds(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
+        for b in range(self.model.bond_count):
+            table[b, 0] = self.advance.bond_energy(b)
+            for k in ti.static(range(3)):
+                table[b, 1 + k] = self.state.bond_heat[b][k]
+            for q in range(3):
+                spent = self.model.tension.spent(b, 3 * b + q)
+                table[b, 4] += self.model.unit_area[b] * spent
+
+    @ti.kernel
+    def _read_pairs(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
+        for p in range(self.contacts.pair_count[None]):
+            table[p, 0] = self.contacts.pair_energy(p)
+            for k in ti.static(range(3)):
+                table[p, 1 + k] = self.contacts.pair_heat[p][k]
+        for _ in range(1):
+            for k in ti.static(range(3)):
+                table[self.contacts.pair_count[None], 1 + k] = self.contacts.heat[None][k]
+
+    @ti.kernel
+    def _read_load(self, index: ti.i32, work: ti.types.ndarray(dtype=ti.f64, ndim=1)):
+        for i in range(self.model.body_count):
+            for e in ti.static(range(len(self.model.loads))):
+                if e == index:
+                    work[i] = self.state.load_work[i][e]
+
+    @ti.kernel
+    def _read_momentum(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
+        for i in range(self.model.body_count):
+            linear = self.model.mass[i] * self.state.velocity[i]
+            angular = self.state.angular_momentum[i] + self.state.position[i].cross(linear)
+            for k in ti.static(range(3)):
+                table[i, k], table[i, 3 + k] = linear[k], angular[k]
+            for k in ti.static(range(6)):
+                table[i, 6 + k] = self.state.load_impulse[i][k]

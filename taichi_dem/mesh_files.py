@@ -1,0 +1,158 @@
+"""Mesh files: read any of meshio's formats, write Gmsh, VTU and PVD; the only importer of meshio."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+from collections import defaultdict
+
+import meshio
+import numpy as np
+
+from taichi_dem.errors import InputError
+from taichi_dem.mesh import Mesh, checked_mesh
+
+#: Cell types of meshio that are read, with the number of their corner points.
+_TETRAHEDRA = {"tetra": 4, "tetra10": 4}
+_TRIANGLES = {"triangle": 3, "triangle6": 3}
+
+
+def read_mesh(path, *, scale=1.0, weld_tolerance=0.0) -> Mesh:
+    """Read tetrahedra and named face groups from a file (Gmsh 2.2 or 4.1, VTK, VTU, ...).
+
+    scale: length of one unit of the file [m], e.g. 0.001 for a drawing in mm.
+    weld_tolerance: points not farther apart [m] become one; 0 welds nothing.
+    Groups come from Gmsh's physical surfaces; in other formats from integer data on triangles,
+    as "data name_value".  Elements of second order are read as linear ones, with a note.
+
+    Raises InputError, in one sentence, for a file that is missing, cannot be read, holds no
+    tetrahedra, or whose mesh ``checked_mesh`` refuses.
+    """
+    if not (np.isscalar(scale) and 0.0 < scale < np.inf):
+        raise InputError(f"scale must be positive and finite, got {scale!r}")
+    path = os.fspath(path)
+    raw = _read_raw(path)
+    notes = []
+    tetrahedra = _corners(raw, _TETRAHEDRA, notes)
+    if len(tetrahedra) == 0:
+        kinds = ", ".join(sorted({block.type for block in raw.cells})) or "no cells"
+        raise InputError(f"mesh file {path} holds no tetrahedra (it holds: {kinds})")
+    try:
+        points = scale * np.asarray(raw.points, dtype=np.float64)
+        mesh = checked_mesh(points, tetrahedra, _groups(raw, notes), path, weld_tolerance)
+    except InputError as error:
+        raise InputError(f"mesh file {path}: {error}") from None
+    return Mesh(mesh.points, mesh.tetrahedra, mesh.groups, (*notes, *mesh.notes), path)
+
+
+def write_mesh(path, mesh) -> None:
+    """Write a mesh with its named groups as a Gmsh 2.2 text file (exact: 17 digits)."""
+    names = list(mesh.groups)
+    lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$PhysicalNames", str(len(names) + 1)]
+    lines += [f'2 {tag} "{name}"' for tag, name in enumerate(names, start=1)]
+    lines += [f'3 {len(names) + 1} "bodies"', "$EndPhysicalNames", "$Nodes", str(len(mesh.points))]
+    lines += [f"{k} {x:.17g} {y:.17g} {z:.17g}" for k, (x, y, z) in enumerate(mesh.points, 1)]
+    elements = [(2, tag, face) for tag, name in enumerate(names, 1) for face in mesh.groups[name]]
+    elements += [(4, len(names) + 1, corners) for corners in mesh.tetrahedra]
+    lines += ["$EndNodes", "$Elements", str(len(elements))]
+    for number, (kind, tag, corners) in enumerate(elements, start=1):
+        lines.append(f"{number} {kind} 2 {tag} {tag} " + " ".join(str(c + 1) for c in corners))
+    _write_text(path, "\n".join([*lines, "$EndElements", ""]))
+
+
+def write_vtu(path, points, tetrahedra, point_data=None, cell_data=None) -> None:
+    """Write tetrahedra with data as a compressed VTU file, for ParaView.
+
+    point_data: name -> (point_count, ...).  cell_data: name -> (body_count, ...).
+    """
+    cell_data = {name: [np.asarray(values)] for name, values in (cell_data or {}).items()}
+    content = meshio.Mesh(points, [("tetra", tetrahedra)], point_data or {}, cell_data)
+    with _renamed_when_done(path) as temporary:
+        meshio.write(temporary, content, file_format="vtu", compression="zlib")
+
+
+def write_pvd(path, times_s, file_names) -> None:
+    """Write the list of VTU files of a time series, which ParaView opens as one.
+
+    times_s: time of each file [s].  file_names: relative to the folder of ``path``.
+    """
+    sets = [
+        f'    <DataSet timestep="{time!r}" part="0" file="{name}"/>'
+        for time, name in zip(map(float, times_s), file_names)
+    ]
+    head = '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">'
+    lines = ['<?xml version="1.0"?>', head, "  <Collection>", *sets, "  </Collection>"]
+    _write_text(path, "\n".join([*lines, "</VTKFile>", ""]))
+
+
+def _read_raw(path):
+    """The file as meshio sees it; whatever goes wrong inside becomes one InputError."""
+    if not os.path.isfile(path):
+        raise InputError(f"mesh file {path} does not exist")
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+            return meshio.read(path)
+    except (Exception, SystemExit) as error:  # meshio raises anything, and exits on some files
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise InputError(f"mesh file {path} cannot be read: {reason}") from None
+
+
+def _corners(raw, kinds, notes):
+    """Corner points of all cells of the given kinds, (n, corners)."""
+    found = [np.empty((0, next(iter(kinds.values()))), dtype=np.int32)]
+    for block in raw.cells:
+        if block.type not in kinds or len(block.data) == 0:
+            continue
+        corners = kinds[block.type]
+        found.append(block.data[:, :corners].astype(np.int32))
+        if block.data.shape[1] > corners:
+            notes.append(f"read {len(block.data)} second-order elements as linear {block.type}")
+    return np.vstack(found)
+
+
+def _groups(raw, notes):
+    """Named groups of triangles, name -> (n, 3)."""
+    named = {tag: name for name, (tag, dim) in raw.field_data.items() if dim == 2}
+    found = defaultdict(list)
+    for key, blocks in raw.cell_data.items():
+        for block, values in zip(raw.cells, blocks):
+            values = np.asarray(values)
+            if block.type not in _TRIANGLES or values.ndim != 1 or values.dtype.kind not in "iu":
+                continue
+            for value in np.unique(values):
+                name = _group_name(key, value, named, gmsh="gmsh:physical" in raw.cell_data)
+                if name is not None:
+                    found[name].append(block.data[values == value, :3])
+    return {name: np.vstack(faces) for name, faces in found.items()}
+
+
+def _group_name(key, value, named, gmsh):
+    """Name of the triangles with ``value`` in the data ``key``; None when they are no group."""
+    if gmsh:
+        return named.get(value) if key == "gmsh:physical" else None
+    return f"{key}_{value}"
+
+
+def _write_text(path, text):
+    """Write a text file, atomically."""
+    with _renamed_when_done(path) as temporary:
+        with open(temporary, "w", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+
+
+@contextlib.contextmanager
+def _renamed_when_done(path):
+    """A temporary name beside ``path`` that becomes ``path`` only after a complete write."""
+    path = os.fspath(path)
+    folder, name = os.path.split(path)
+    temporary = os.path.join(folder, f".{name}.{os.getpid()}.part")
+    try:
+        yield temporary
+        os.replace(temporary, path)
+    except OSError as error:
+        raise InputError(f"cannot write {path}: {error.strerror or error}") from None
+    finally:
+        if os.path.exists(temporary):
+            os.remove(temporary)

@@ -1,0 +1,195 @@
+"""Meshes made with Gmsh; the only importer of gmsh, which nothing else needs."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from dataclasses import dataclass
+
+from taichi_dem.errors import InputError
+
+#: Everything that could make two runs of the same Gmsh differ, and what may shape the elements.
+_OPTIONS = {
+    "General.Terminal": 0,
+    "General.NumThreads": 1,
+    "Mesh.MaxNumThreads1D": 1,
+    "Mesh.MaxNumThreads2D": 1,
+    "Mesh.MaxNumThreads3D": 1,
+    "Mesh.RandomSeed": 1,
+    "Mesh.Algorithm": 6,
+    "Mesh.Algorithm3D": 1,
+    "Mesh.Optimize": 1,
+    "Mesh.OptimizeNetgen": 1,
+    "Mesh.MeshSizeFromPoints": 0,
+    "Mesh.MeshSizeFromCurvature": 0,
+    "Mesh.MeshSizeExtendFromBoundary": 0,
+    "Mesh.MshFileVersion": 4.1,
+    "Mesh.Binary": 0,
+}
+
+
+@dataclass(frozen=True)
+class _Block:
+    """Shape and element sizes of a block with a hole [m]; checked."""
+
+    width: float
+    height: float
+    depth: float
+    hole: tuple
+    hole_diameter: float
+    hole_segments: int
+    size_hole: float
+    size_far: float
+    distance_far: float
+
+    def __post_init__(self):
+        for name in ("width", "height", "depth", "hole_diameter", "size_hole", "size_far"):
+            _check_positive(name, getattr(self, name))
+        _check_positive("distance_far", self.distance_far)
+        if self.hole_segments < 4 or self.hole_segments % 4:
+            raise InputError(
+                f"hole_segments must be 4, 8, 12, ..., got {self.hole_segments} (four equal arcs)"
+            )
+        for name, value, limit in zip("xy", self.hole, (self.width, self.height)):
+            margin = 0.5 * self.hole_diameter
+            if not margin < value < limit - margin:
+                raise InputError(
+                    f"hole {name} must lie in ({margin:g}, {limit - margin:g}) m, got {value}"
+                )
+
+
+def block_with_hole(
+    path,
+    *,
+    width=2.0,
+    height=2.0,
+    depth=0.2,
+    hole=(1.6, 1.0),
+    hole_diameter=0.05,
+    hole_segments=8,
+    size_hole=0.05,
+    size_far=0.3,
+    distance_far=1.0,
+) -> None:
+    """Write a block with a round hole through its depth as a Gmsh 4.1 text file.
+
+    The block fills [0, width] x [0, height] x [0, depth] (x right, y up, z to the viewer), the
+    hole's axis runs along z through ``hole`` = (x, y); all lengths in m.  The hole is a polygon of
+    ``hole_segments`` chords; elements measure ``size_hole`` at its wall and grow linearly to
+    ``size_far`` at the distance ``distance_far`` from it.
+    Physical groups: volume block; faces hole, left, right, bottom, top, back, front.
+    The same Gmsh writes the same file every time.
+
+    Raises InputError for a shape that cannot be, and when gmsh is not installed.
+    Source of the defaults: Konno et al., section 4.1 and Fig 10.
+    """
+    block = _Block(
+        width,
+        height,
+        depth,
+        tuple(hole),
+        hole_diameter,
+        hole_segments,
+        size_hole,
+        size_far,
+        distance_far,
+    )
+    with _session() as gmsh:
+        _add_geometry(gmsh.model, block)
+        _add_sizes(gmsh.model.mesh.field, block)
+        gmsh.model.mesh.generate(3)
+        _write(gmsh, path)
+
+
+def _check_positive(name, value):
+    """Raise InputError unless ``value`` [m] is positive and finite."""
+    if not 0.0 < value < float("inf"):
+        raise InputError(f"{name} must be positive and finite [m], got {value}")
+
+
+@contextlib.contextmanager
+def _session():
+    """A Gmsh model of our own, removed afterwards; a session of the caller stays open."""
+    try:
+        import gmsh
+    except (ImportError, OSError) as error:
+        raise InputError(
+            f"making this mesh needs gmsh ({error}): pip install gmsh, or run make mesh"
+        ) from None
+    owned = not gmsh.isInitialized()
+    if owned:
+        gmsh.initialize(interruptible=False, readConfigFiles=False)
+    gmsh.model.add("block_with_hole")
+    try:
+        for name, value in _OPTIONS.items():
+            gmsh.option.setNumber(name, value)
+        yield gmsh
+    finally:
+        gmsh.model.remove()
+        if owned:
+            gmsh.finalize()
+
+
+def _add_geometry(model, block):
+    """Front view with its hole, drawn at z = 0 and drawn out along z; physical groups."""
+    geo = model.geo
+    outline = _outline(geo, block)
+    circle = _circle(geo, block)
+    back = geo.addPlaneSurface([geo.addCurveLoop(outline), geo.addCurveLoop(circle)])
+    drawn = geo.extrude([(2, back)], 0.0, 0.0, block.depth)
+    front, volume, *sides = [tag for _, tag in drawn]
+    geo.synchronize()
+    _divide_circles(model, sides[4:], block.hole_segments // 4)
+    faces = dict(zip(("bottom", "right", "top", "left"), ([tag] for tag in sides[:4])))
+    faces.update(hole=sides[4:], back=[back], front=[front])
+    model.addPhysicalGroup(3, [volume], name="block")
+    for name, tags in faces.items():
+        model.addPhysicalGroup(2, tags, name=name)
+
+
+def _outline(geo, block):
+    """Four lines anticlockwise, from the lower left corner: bottom, right, top, left."""
+    w, h = block.width, block.height
+    corners = [geo.addPoint(x, y, 0.0) for x, y in ((0, 0), (w, 0), (w, h), (0, h))]
+    return [geo.addLine(corners[k], corners[(k + 1) % 4]) for k in range(4)]
+
+
+def _circle(geo, block):
+    """Four quarter arcs."""
+    x, y = block.hole
+    r = 0.5 * block.hole_diameter
+    centre = geo.addPoint(x, y, 0.0)
+    ends = [geo.addPoint(x + a * r, y + b * r, 0.0) for a, b in ((1, 0), (0, 1), (-1, 0), (0, -1))]
+    return [geo.addCircleArc(ends[k], centre, ends[(k + 1) % 4]) for k in range(4)]
+
+
+def _divide_circles(model, walls, segments):
+    """Chords of every quarter arc of the hole's walls, at both of their ends."""
+    for _, curve in model.getBoundary([(2, wall) for wall in walls], combined=False):
+        if model.getType(1, abs(curve)) == "Circle":
+            model.mesh.setTransfiniteCurve(abs(curve), segments + 1)
+
+
+def _add_sizes(field, block):
+    """Element size: linear in the distance from the hole's wall."""
+    x, y = block.hole
+    radius = 0.5 * block.hole_diameter
+    growth = (block.size_far - block.size_hole) / block.distance_far
+    distance = f"Max(Sqrt((x-{x!r})^2+(y-{y!r})^2)-{radius!r}, 0)"
+    low, high = sorted((block.size_hole, block.size_far))
+    size = f"Min(Max({block.size_hole!r}+{growth!r}*{distance}, {low!r}), {high!r})"
+    tag = field.add("MathEval")
+    field.setString(tag, "F", size)
+    field.setAsBackgroundMesh(tag)
+
+
+def _write(gmsh, path):
+    """Write the file under a temporary name, then rename it: no half-written mesh."""
+    path = os.fspath(path)
+    temporary = os.path.join(os.path.dirname(path), f".{os.path.basename(path)}.{os.getpid()}.msh")
+    try:
+        gmsh.write(temporary)
+        os.replace(temporary, path)
+    finally:
+        if os.path.exists(temporary):
+            os.remove(temporary)

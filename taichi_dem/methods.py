@@ -1,0 +1,77 @@
+"""Time integration methods a user chooses from; each says how the schedule steps."""
+
+from dataclasses import dataclass
+from typing import Optional
+
+from taichi_dem.effects.base import positive
+from taichi_dem.errors import InputError
+from taichi_dem.step_control import Displacement, FixedStep
+
+NEIGHBOURS = ("held", "drifted")
+
+
+@dataclass(frozen=True)
+class Uniform:
+    """One step for all bodies, explicit.
+
+    dt0: largest step [s]. distance: l [m]; no body may move further in a step, so the step of
+    all falls to that of the fastest body. Without it the step is dt0 throughout.
+    Source: Konno et al., 3.1 and 4.3 ("same time increment for all elements").
+    """
+
+    dt0: float = 1e-8
+    distance: Optional[float] = None
+
+    uniform = True
+    neighbour = "held"
+
+    def __post_init__(self):
+        positive("dt0", self.dt0)
+        if self.distance is not None:
+            positive("distance", self.distance)
+
+    @property
+    def name(self):
+        """Short name for tables."""
+        return "uniform"
+
+    def criterion(self):
+        """Step rule for the schedule."""
+        if self.distance is None:
+            return FixedStep()
+        return Displacement(self.distance, self.dt0)
+
+
+@dataclass(frozen=True)
+class Multirate:
+    """Steps that differ by powers of two from body to body, explicit, with shared impulses.
+
+    dt0: largest step [s]. distance: l [m]; a body's step is the largest dt0 / 2^k in which it
+    moves by no more. neighbour: a body between its own times is "held" at its last position (the
+    paper) or "drifted" along to every time at which one of its bonds or contacts is evaluated,
+    and then takes the impulse at once.
+    Source: Konno et al., 3.1, eq. 3.
+    """
+
+    dt0: float = 1e-8
+    distance: float = 1e-8
+    neighbour: str = "held"
+
+    uniform = False
+
+    def __post_init__(self):
+        positive("dt0", self.dt0)
+        positive("distance", self.distance)
+        if self.neighbour not in NEIGHBOURS:
+            raise InputError(
+                f"neighbour must be one of {', '.join(NEIGHBOURS)}, got {self.neighbour!r}"
+            )
+
+    @property
+    def name(self):
+        """Short name for tables."""
+        return f"multirate_{self.neighbour}"
+
+    def criterion(self):
+        """Step rule for the schedule."""
+        return Displacement(self.distance, self.dt0)

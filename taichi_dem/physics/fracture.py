@@ -1,0 +1,41 @@
+"""Tension and shear laws of a contact unit (Konno et al., 2.1, Fig. 3 and 4, eq. 1 and 2).
+
+Tractions in Pa, openings in m, energies per area of the bond in J/m^2. The elastic limit of a
+unit is an opening that starts at the onset u_E = f_t / k_n and follows the largest opening seen.
+"""
+
+import taichi as ti
+
+from taichi_dem.types import vec2
+
+
+@ti.func
+def envelope_traction(strength, onset, failure, opening):
+    """Traction on the straight softening branch from the strength at onset to zero at failure."""
+    return ti.max(0.0, strength * (failure - opening) / (failure - onset))
+
+
+@ti.func
+def softening_energy(strength, onset, failure, limit):
+    """Energy spent by softening up to an elastic limit: area under the law less the triangle
+    that unloading to the origin gives back; the fracture energy once the unit has failed.
+    """
+    reached = ti.min(limit, failure)
+    traction = envelope_traction(strength, onset, failure, reached)
+    return 0.5 * (strength * reached - traction * onset)
+
+
+@ti.func
+def coulomb_limit(cohesion, friction, pressure):
+    """Largest shear traction at a normal pressure (negative in tension), never below zero."""
+    return ti.max(0.0, cohesion + friction * pressure)
+
+
+@ti.func
+def slip_beyond(stiffness, limit, sliding):
+    """Slip that brings an elastic sliding [m] back onto the limit (eq. 2); zero below it."""
+    slip = vec2(0.0, 0.0)
+    reach = sliding.norm()
+    if stiffness * reach > limit:
+        slip = sliding * ((reach - limit / stiffness) / reach)
+    return slip

@@ -1,0 +1,63 @@
+"""Rotation of rigid bodies by unit quaternions (scalar first)."""
+
+import taichi as ti
+
+from taichi_dem.types import mat3, vec3, vec4
+
+
+@ti.func
+def quaternion_product(p, q):
+    """Hamilton product p q: the rotation q followed by the rotation p."""
+    return vec4(
+        p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3],
+        p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2],
+        p[0] * q[2] - p[1] * q[3] + p[2] * q[0] + p[3] * q[1],
+        p[0] * q[3] + p[1] * q[2] - p[2] * q[1] + p[3] * q[0],
+    )
+
+
+@ti.func
+def rotation_matrix(q):
+    """Matrix that turns body coordinates into world coordinates, for a unit quaternion q."""
+    xx, yy, zz = q[1] * q[1], q[2] * q[2], q[3] * q[3]
+    xy, xz, yz = q[1] * q[2], q[1] * q[3], q[2] * q[3]
+    wx, wy, wz = q[0] * q[1], q[0] * q[2], q[0] * q[3]
+    return mat3(
+        [
+            [1.0 - 2.0 * (yy + zz), 2.0 * (xy - wz), 2.0 * (xz + wy)],
+            [2.0 * (xy + wz), 1.0 - 2.0 * (xx + zz), 2.0 * (yz - wx)],
+            [2.0 * (xz - wy), 2.0 * (yz + wx), 1.0 - 2.0 * (xx + yy)],
+        ]
+    )
+
+
+@ti.func
+def turned(q, spin, dt):
+    """Orientation after turning at constant world spin [rad/s] for dt [s]: exp(dt spin) q.
+
+    A quarter of the squared angle below 1e-3 takes the power series of sine and cosine, exact to
+    round-off there and several times cheaper: steps of a blast turn a body by 1e-6 rad.
+    """
+    half = 0.5 * dt * spin
+    angle2 = half.dot(half)
+    sinc = 1.0 - angle2 / 6.0 * (1.0 - angle2 / 20.0 * (1.0 - angle2 / 42.0))
+    cosine = 1.0 - angle2 / 2.0 * (1.0 - angle2 / 12.0 * (1.0 - angle2 / 30.0))
+    if angle2 > 1e-3:
+        angle = ti.sqrt(angle2)
+        sinc = ti.sin(angle) / angle
+        cosine = ti.cos(angle)
+    turn = quaternion_product(vec4(cosine, sinc * half[0], sinc * half[1], sinc * half[2]), q)
+    # One Newton step of 1/sqrt is exact here: the norm is 1 to round-off before and after.
+    return turn * (1.5 - 0.5 * turn.dot(turn))
+
+
+@ti.func
+def spin_of(rotation, inertia_inverse, angular_momentum):
+    """World spin R I^-1 R^T L [rad/s]; inertia_inverse [1/(kg m^2)] in the body frame."""
+    return rotation @ (inertia_inverse @ (rotation.transpose() @ angular_momentum))
+
+
+@ti.func
+def zero3():
+    """The zero vector, as a start for sums."""
+    return vec3(0.0, 0.0, 0.0)

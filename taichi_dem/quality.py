@@ -1,0 +1,193 @@
+"""How good the elements of a mesh are, and what the bad ones cost in time step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from taichi_dem import tetrahedra as geometry
+from taichi_dem.topology import body_properties, face_vertices, topology_of
+
+#: Elements listed in the printed table.
+_WORST = 10
+
+
+@dataclass(frozen=True, eq=False)
+class QualityReport:
+    """Per-body figures, each of shape (body_count,), and what the explicit step pays for them.
+
+    volume_m3; mass_kg; aspect_ratio, longest edge / smallest altitude (1.22 when regular);
+    smallest_altitude_m; dashpot_step_s and spring_step_s, the largest explicit step at which a
+    pair of two such bodies is stable under its bond dashpots and bond springs.
+    point_count, bond_count, outer_count: of the mesh.
+    """
+
+    volume_m3: np.ndarray
+    mass_kg: np.ndarray
+    aspect_ratio: np.ndarray
+    smallest_altitude_m: np.ndarray
+    dashpot_step_s: np.ndarray
+    spring_step_s: np.ndarray
+    point_count: int
+    bond_count: int
+    outer_count: int
+
+    @property
+    def body_count(self) -> int:
+        """Number of bodies."""
+        return len(self.volume_m3)
+
+    @property
+    def critical_step_s(self) -> np.ndarray:
+        """The smaller of both limits of every body [s], shape (body_count,)."""
+        return np.minimum(self.dashpot_step_s, self.spring_step_s)
+
+    def worst(self, count=_WORST) -> np.ndarray:
+        """The bodies of the smallest critical step, the worst first, shape (count,)."""
+        return np.argsort(self.critical_step_s, kind="stable")[:count]
+
+    def price(self, count=_WORST) -> np.ndarray:
+        """Gain in the step of the whole mesh without the k + 1 worst bodies, shape (count,).
+
+        Factors of at least 1, k = 0, 1, ...; without any body left the factor is infinite.
+        """
+        steps = np.append(np.sort(self.critical_step_s), np.inf)
+        return steps[1 : count + 1] / steps[0]
+
+    def __str__(self) -> str:
+        """Counts, ranges and the worst bodies as a table."""
+        return "\n".join([*self._summary(), "", *self._worst_lines()])
+
+    def _summary(self):
+        """Counts, ranges and limits."""
+        ranges = (
+            ("smallest altitude", self.smallest_altitude_m, "m"),
+            ("mass", self.mass_kg, "kg"),
+            ("aspect ratio", self.aspect_ratio, ""),
+            ("bond dashpot step", self.dashpot_step_s, "s"),
+            ("bond spring step", self.spring_step_s, "s"),
+        )
+        lines = [
+            f"{self.body_count} bodies, {self.point_count} points, {self.bond_count} bonds, "
+            f"{self.outer_count} outer faces, volume {self.volume_m3.sum():.6g} m3",
+            f"{'':20s}{'smallest':>12s}{'median':>12s}{'largest':>12s}",
+        ]
+        for name, values, unit in ranges:
+            figures = (values.min(), np.median(values), values.max())
+            cells = "".join(f"{figure:12.3g}" for figure in figures)
+            lines.append(f"{name:20s}{cells} {unit}".rstrip())
+        return lines
+
+    def _worst_lines(self):
+        """The worst bodies and what the step would gain without them."""
+        lines = [
+            "worst bodies; the last column is how much larger the step of the whole mesh would be",
+            "without this body and those above it",
+            f"{'body':>8s}{'altitude m':>12s}{'aspect':>8s}{'dashpot s':>12s}{'spring s':>12s}"
+            f"{'price':>8s}",
+        ]
+        for body, price in zip(self.worst(), self.price()):
+            lines.append(
+                f"{body:8d}{self.smallest_altitude_m[body]:12.3g}{self.aspect_ratio[body]:8.3g}"
+                f"{self.dashpot_step_s[body]:12.3g}{self.spring_step_s[body]:12.3g}{price:8.3f}"
+            )
+        return lines
+
+
+def quality_report(mesh, material) -> QualityReport:
+    """Shape and explicit step limits of every body of a mesh.
+
+    A pair of equal bodies moves against each other, so that its rate is twice that of one body:
+    dashpots (forward Euler) are stable to 2 / (2 rate), springs (symplectic Euler) to
+    2 / sqrt(2 omega^2).  A body without bonds has infinite limits.
+    """
+    topology = topology_of(mesh)
+    mass, _, _ = body_properties(mesh, material.density)
+    altitude = smallest_altitudes(mesh)
+    longest = geometry.edge_lengths(mesh.points, mesh.tetrahedra).max(axis=1)
+    damping = bond_rates(mesh, topology, material.density, dashpots_of(material))
+    springs = bond_rates(mesh, topology, material.density, springs_of(material))
+    with np.errstate(divide="ignore"):
+        dashpot_step, spring_step = 1.0 / damping, 2.0 / np.sqrt(2.0 * springs)
+    return QualityReport(
+        volume_m3=geometry.signed_volumes(mesh.points, mesh.tetrahedra),
+        mass_kg=mass,
+        aspect_ratio=longest / altitude,
+        smallest_altitude_m=altitude,
+        dashpot_step_s=dashpot_step,
+        spring_step_s=spring_step,
+        point_count=mesh.point_count,
+        bond_count=topology.bond_count,
+        outer_count=topology.outer_count,
+    )
+
+
+def dashpots_of(material):
+    """Normal and tangential damping per area of a bond [Pa s/m]."""
+    return material.normal_damping, material.shear_damping
+
+
+def springs_of(material):
+    """Normal and tangential stiffness per area of a bond [Pa/m]."""
+    return material.normal_stiffness, material.shear_stiffness
+
+
+def smallest_altitudes(mesh) -> np.ndarray:
+    """Smallest distance of a vertex from the opposite face, 3 V / A [m], shape (body_count,)."""
+    vectors = geometry.area_vectors(mesh.points, geometry.all_faces(mesh.tetrahedra))
+    area = np.linalg.norm(vectors, axis=1).reshape(-1, 4).max(axis=1)
+    return 3.0 * geometry.signed_volumes(mesh.points, mesh.tetrahedra) / area
+
+
+def bond_rates(mesh, topology, density, coefficients) -> np.ndarray:
+    """Largest eigenvalue of M^-1/2 G M^-1/2 of every body, shape (body_count,).
+
+    G is the 6x6 block with which the bonds of a body resist its velocity and spin when the
+    neighbours stand still: the sum of (A / 3) J^T diag(normal, tangential) J over the three
+    contact units of each bonded face, J the map from (velocity, spin) to the velocity at the
+    vertex (Konno et al., section 2.1, units at the vertices).  M holds mass and inertia.
+    coefficients: normal and tangential coefficient per area; [Pa s/m] gives rates [1/s],
+    [Pa/m] gives squared angular frequencies [1/s2].
+    """
+    mass, centre, inertia = body_properties(mesh, density)
+    body, face = np.nonzero(topology.body_bond >= 0)
+    blocks = _face_blocks(mesh, body, face, centre[body], coefficients)
+    total = np.zeros((mesh.body_count, 6, 6))
+    np.add.at(total, body, blocks)
+    root = _inverse_root(mass, inertia)
+    return np.linalg.eigvalsh(root @ total @ root)[:, -1]
+
+
+def _face_blocks(mesh, body, face, centre, coefficients):
+    """The block G of single faces, shape (n, 6, 6)."""
+    vertices = face_vertices(mesh, body, face)
+    vector = geometry.area_vectors(mesh.points, vertices)
+    area = np.linalg.norm(vector, axis=1)
+    normal = vector / area[:, None]
+    law = coefficients[1] * np.eye(3) + (coefficients[0] - coefficients[1]) * (
+        normal[:, :, None] * normal[:, None, :]
+    )
+    arms = mesh.points[vertices] - centre[:, None]
+    lever = np.zeros((*arms.shape[:2], 3, 6))
+    lever[..., :3] = np.eye(3)
+    lever[..., 3:] = -_cross_matrix(arms)  # w x r = -[r]x w
+    units = np.einsum("nuai,nab,nubj->nij", lever, law, lever)
+    return area[:, None, None] / 3.0 * units
+
+
+def _cross_matrix(vectors):
+    """Matrices [r]x with [r]x w = r x w, shape (..., 3, 3)."""
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    zero = np.zeros_like(x)
+    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def _inverse_root(mass, inertia):
+    """M^-1/2 of M = diag(mass, mass, mass, inertia), shape (n, 6, 6)."""
+    moments, axes = np.linalg.eigh(inertia)
+    root = np.zeros((len(mass), 6, 6))
+    root[:, :3, :3] = np.eye(3) / np.sqrt(mass)[:, None, None]
+    root[:, 3:, 3:] = np.einsum("nia,na,nja->nij", axes, moments**-0.5, axes)
+    return root

@@ -1,0 +1,123 @@
+"""The only place that starts Taichi: architecture, threads, and the settings that keep bits equal.
+
+Imported before any other module of the package, because two environment variables must stand
+before the first ``import taichi``: HOME (Taichi aborts without it) and the switch that keeps it
+from asking the network for a newer version.
+"""
+
+import contextlib
+import io
+import os
+import tempfile
+from dataclasses import dataclass
+
+os.environ.setdefault("TI_SKIP_VERSION_CHECK", "ON")
+os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
+# TI_ARCH would overrule the architecture that the caller asks for without a word.
+os.environ.pop("TI_ARCH", None)
+if not os.environ.get("HOME"):
+    os.environ["HOME"] = tempfile.mkdtemp(prefix="taichi-home-")
+
+import taichi as ti
+from taichi.lang import impl
+
+from taichi_dem.errors import InputError
+
+ARCHITECTURES = ("cpu", "cuda")
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What Taichi was started with.
+
+    arch: "cpu" or "cuda". threads: CPU threads of parallel loops. debug: bounds checks in kernels.
+    """
+
+    arch: str
+    threads: int
+    debug: bool
+
+
+_current = None
+_generation = 0
+
+
+def start(arch="cpu", threads=None, debug=False):
+    """Start Taichi, or do nothing when it already runs with these settings.
+
+    arch: "cpu" or "cuda". threads: number of CPU threads, all cores by default. debug: check
+    array bounds inside kernels (about three times slower).
+    Returns the settings in force. Raises InputError for an unknown or absent architecture, a
+    thread count below one, or a second start with other settings in the same process.
+    """
+    global _current, _generation
+    wanted = _checked(arch, threads, debug)
+    if _current is not None and impl.get_runtime().prog is not None:
+        if wanted != _current:
+            raise InputError(
+                f"Taichi already runs with {_current}, asked for {wanted}: call stop()"
+            )
+        return _current
+    _initialise(wanted)
+    _current = wanted
+    _generation += 1
+    return _current
+
+
+def stop():
+    """End the Taichi session; every model, state and result field made in it becomes invalid."""
+    global _current
+    ti.reset()
+    _current = None
+
+
+def generation():
+    """Number of the running session; objects that own fields remember the one they were made in.
+
+    Raises InputError when Taichi was not started.
+    """
+    if _current is None:
+        raise InputError("Taichi is not started: call runtime.start() first")
+    return _generation
+
+
+def settings():
+    """Settings of the running session, or None before the first start."""
+    return _current
+
+
+def _checked(arch, threads, debug):
+    if arch not in ARCHITECTURES:
+        raise InputError(f"arch must be one of {', '.join(ARCHITECTURES)}, got {arch!r}")
+    cores = os.cpu_count() or 1
+    if hasattr(os, "sched_getaffinity"):
+        cores = len(os.sched_getaffinity(0))
+    count = cores if threads is None else threads
+    if not isinstance(count, int) or isinstance(count, bool) or not 1 <= count <= 1024:
+        raise InputError(f"threads must be a whole number from 1 to 1024, got {threads!r}")
+    return Settings(arch, count, bool(debug))
+
+
+def _initialise(wanted):
+    # Taichi falls back to the CPU with a mere warning: ask first, and read back what it took.
+    if wanted.arch == "cuda" and not _cuda_present():
+        raise InputError("arch 'cuda' was asked for, but no CUDA device answers here: use 'cpu'")
+    with contextlib.redirect_stdout(io.StringIO()):
+        ti.init(
+            arch=ti.cuda if wanted.arch == "cuda" else ti.cpu,
+            default_fp=ti.f64,
+            default_ip=ti.i32,
+            fast_math=False,
+            cpu_max_num_threads=wanted.threads,
+            debug=wanted.debug,
+            log_level=ti.WARN,
+            random_seed=0,
+        )
+    got = impl.current_cfg().arch
+    if (got == ti.cuda) != (wanted.arch == "cuda"):
+        ti.reset()
+        raise InputError(f"arch {wanted.arch!r} was asked for, Taichi started {got}")
+
+
+def _cuda_present():
+    return bool(ti._lib.core.with_cuda())

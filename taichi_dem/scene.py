@@ -1,0 +1,61 @@
+"""What a user writes: mesh, material and the effects that the scene calls for."""
+
+from dataclasses import dataclass
+
+from taichi_dem.effects.base import MANY, Effect
+from taichi_dem.errors import InputError
+from taichi_dem.materials import Material
+from taichi_dem.mesh import Mesh
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A block of bonded bodies and what acts in it; checked once, here.
+
+    mesh: tetrahedra and face groups. material: its constants. effects: the effects that act; what
+    is not listed is not computed. max_speed: bound [m/s] beyond which a run counts as diverged.
+    Raises InputError for a wrong type, an effect listed twice in a role that takes one, friction
+    without contact, a group that the mesh does not have, or a bound that is no positive number.
+    """
+
+    mesh: Mesh
+    material: Material
+    effects: tuple = ()
+    max_speed: float = 1e4
+
+    def __post_init__(self):
+        object.__setattr__(self, "effects", tuple(self.effects))
+        _check_types(self)
+        _check_roles(self.effects)
+        for effect in self.effects:
+            if hasattr(effect, "group"):
+                self.mesh.group_faces(effect.group)
+        if not 0.0 < self.max_speed < float("inf"):
+            raise InputError(f"max_speed must be a positive finite number, got {self.max_speed!r}")
+
+    def has(self, name):
+        """Whether an effect of this name is listed."""
+        return any(effect.name == name for effect in self.effects)
+
+
+def _check_types(scene):
+    if not isinstance(scene.mesh, Mesh):
+        raise InputError(f"mesh must be a Mesh (see read_mesh), got {type(scene.mesh).__name__}")
+    if not isinstance(scene.material, Material):
+        raise InputError(f"material must be a Material, got {type(scene.material).__name__}")
+    for effect in scene.effects:
+        if not isinstance(effect, Effect):
+            raise InputError(f"effects must be objects from taichi_dem.effects, got {effect!r}")
+
+
+def _check_roles(effects):
+    single = [effect for effect in effects if effect.role not in MANY]
+    for effect in single:
+        others = [e.name for e in single if e.role == effect.role]
+        if len(others) > 1:
+            raise InputError(
+                f"effects {' and '.join(others)} both take the role {effect.role}: list one"
+            )
+    roles = {effect.role for effect in single}
+    if "friction" in roles and "contact" not in roles:
+        raise InputError("effect friction acts in sphere contacts: list SphereContact too")

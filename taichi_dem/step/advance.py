@@ -1,0 +1,266 @@
+"""What happens to one bond, one contact pair, one body: the only place that composes the physics.
+
+Drivers choose who is next and call these functions; no other file applies a force or moves a body.
+A bond or pair evaluated at a tick gives both bodies the impulse F * (smaller of their steps), with
+opposite signs; a body takes what has gathered at its own time (Konno et al., 3.1, eq. 3):
+v += S / m, L += T, then x += dt v and q = exp(dt w) q.
+"""
+
+import taichi as ti
+
+from taichi_dem.physics.bond import bond_motion, unit_arm, unit_opening, unit_velocity
+from taichi_dem.physics.rotation import rotation_matrix, spin_of, turned, zero3
+from taichi_dem.types import real, vec2, vec3
+
+
+@ti.data_oriented
+class Advance:
+    """The order in which physics and effects act; see the module."""
+
+    def __init__(self, model, state, schedule, contacts):
+        self.model, self.state, self.schedule = model, state, schedule
+        self.contacts = contacts
+        self.has_contact = contacts is not None
+
+    @ti.func
+    def bond(self, b):
+        """Evaluate the three contact units of a bond; release it when one of them fails."""
+        if self.state.broken_tick[b] < 0:
+            slots = self.model.bond_slots[b]
+            motion = self._motion(b, slots)
+            force, torque, failed = zero3(), zero3(), 0
+            dragged, slipped = 0.0, 0.0
+            for q in range(3):
+                u = 3 * b + q
+                arm = unit_arm(motion, self.model.vertex_slave[u])
+                opening = unit_opening(motion, arm, self.model.vertex_master[u])
+                velocity = unit_velocity(motion, arm)
+                pull = self.model.tension.traction(b, u, opening[0])
+                sliding = vec2(opening[1], opening[2])
+                shear, spent = self.model.shear.traction(b, u, sliding, -pull)
+                drag = self.model.dashpot.traction(velocity)
+                traction = vec3(pull, shear[0], shear[1]) + drag
+                force += traction
+                torque += arm.cross(traction)
+                dragged += drag.dot(velocity)
+                slipped += spent
+                failed |= self.model.tension.failed(u)
+            dt = self.schedule.pair_step(slots[0] >> 2, slots[1] >> 2)
+            area = self.model.unit_area[b]
+            if failed == 0:
+                self._pull_together(slots, motion, force * (area * dt), torque * (area * dt))
+                self.state.bond_heat[b] += area * vec3(dragged * dt, slipped, 0.0)
+            else:
+                self.state.bond_heat[b] += area * vec3(0.0, slipped, self._stored(b, motion))
+                self._release(b, slots)
+
+    @ti.func
+    def _motion(self, b, slots):
+        i, j = slots[0] >> 2, slots[1] >> 2
+        return bond_motion(
+            self.model.bond_frame[b],
+            self.state.position[j] - self.state.position[i],
+            self.state.rotation[i],
+            self.state.rotation[j],
+            self.state.velocity[j] - self.state.velocity[i],
+            self.state.spin[i],
+            self.state.spin[j],
+        )
+
+    @ti.func
+    def _pull_together(self, slots, motion, impulse, moment):
+        """Give master and slave opposite impulses; moment is about the slave's centre."""
+        turn_back = motion.axes.transpose()
+        linear, angular = turn_back @ impulse, turn_back @ moment
+        self._add(slots[0], linear, angular + motion.branch.cross(linear))
+        self._add(slots[1], -linear, -angular)
+
+    @ti.func
+    def _add(self, slot, linear, angular):
+        for k in ti.static(range(3)):
+            self.state.slot[slot][k] += linear[k]
+            self.state.slot[slot][3 + k] += angular[k]
+
+    @ti.func
+    def _stored(self, b, motion):
+        """Elastic energy per area summed over the units of a bond [J/m^2]."""
+        energy = 0.0
+        for q in range(3):
+            u = 3 * b + q
+            arm = unit_arm(motion, self.model.vertex_slave[u])
+            opening = unit_opening(motion, arm, self.model.vertex_master[u])
+            energy += self.model.tension.stored(b, u, opening[0])
+            energy += self.model.shear.stored(b, u, vec2(opening[1], opening[2]))
+        return energy
+
+    @ti.func
+    def bond_energy(self, b):
+        """Elastic energy stored in a bond now [J]; zero once it is released."""
+        energy = 0.0
+        if self.state.broken_tick[b] < 0:
+            motion = self._motion(b, self.model.bond_slots[b])
+            energy = self.model.unit_area[b] * self._stored(b, motion)
+        return energy
+
+    @ti.func
+    def bond_opening(self, b):
+        """Normal and shear opening of a bond's face at its middle [m], released or not."""
+        motion = self._motion(b, self.model.bond_slots[b])
+        mean = zero3()
+        for q in range(3):
+            arm = unit_arm(motion, self.model.vertex_slave[3 * b + q])
+            mean += unit_opening(motion, arm, self.model.vertex_master[3 * b + q]) / 3.0
+        return vec2(mean[0], ti.sqrt(mean[1] ** 2 + mean[2] ** 2))
+
+    @ti.func
+    def _release(self, b, slots):
+        """One unit has failed: the face transmits nothing from now on and carries spheres."""
+        tick = self.state.tick[None]
+        self.state.broken_tick[b] = tick
+        self.schedule.dirty[None] = 1
+        for side in ti.static(range(2)):
+            self.state.exposed_tick[slots[side]] = tick
+        if ti.static(self.has_contact):
+            self.contacts.search_due[None] = 1
+
+    @ti.func
+    def contact(self, p):
+        """Evaluate the spheres of a pair of bodies: repulsion, and friction of what slides."""
+        pair = self.contacts.pair_body[p]
+        i, j = pair[0], pair[1]
+        branch = self.state.position[j] - self.state.position[i]
+        force, moment_i, moment_j = zero3(), zero3(), zero3()
+        dragged, rubbed, deepest = 0.0, 0.0, 0.0
+        for k in range(self.contacts.pair_first[p], self.contacts.pair_first[p + 1]):
+            a, b = self.contacts.pair_sphere[k][0], self.contacts.pair_sphere[k][1]
+            arm_i, arm_j = self.contacts.arms(i, j, a, b)
+            apart = branch + arm_j - arm_i
+            radius = self.model.sphere[a][3]
+            reach = radius + self.model.sphere[b][3]
+            if apart.norm_sqr() < reach * reach:
+                distance = ti.max(apart.norm(), 1e-30)
+                normal, overlap = apart / distance, reach - distance
+                arm = arm_i + (radius - 0.5 * overlap) * normal
+                velocity = self._velocity_at(j, arm - branch) - self._velocity_at(i, arm)
+                rate = velocity.dot(normal)
+                slide = velocity - rate * normal
+                push = self.contacts.law.normal(overlap, rate)
+                rub = self.model.friction.force(self.contacts.law.damping(), push, slide)
+                pushed = push * normal + rub
+                force += pushed
+                moment_i -= arm.cross(pushed)
+                moment_j += (arm - branch).cross(pushed)
+                dragged += (self.contacts.law.elastic(overlap) - push) * rate
+                rubbed -= rub.dot(slide)
+                deepest = ti.max(deepest, overlap / ti.min(radius, reach - radius))
+        dt = self.schedule.pair_step(i, j)
+        self._push_apart(2 * p, -force * dt, moment_i * dt)
+        self._push_apart(2 * p + 1, force * dt, moment_j * dt)
+        self.contacts.pair_heat[p] += dt * vec3(dragged, rubbed, 0.0)
+        self.contacts.deepest[p] = deepest
+
+    @ti.func
+    def _velocity_at(self, i, arm):
+        return self.state.velocity[i] + self.state.spin[i].cross(arm)
+
+    @ti.func
+    def _push_apart(self, slot, linear, angular):
+        for k in ti.static(range(3)):
+            self.contacts.pair_slot[slot][k] += linear[k]
+            self.contacts.pair_slot[slot][3 + k] += angular[k]
+
+    @ti.func
+    def body(self, i):
+        """Bring a body to the present tick and let it choose its next step."""
+        elapsed = self.schedule.elapsed(i)
+        linear, angular = self._gathered(i)
+        velocity, momentum = self._kicked(i, elapsed, linear, angular)
+        velocity, momentum = self._supported(i, elapsed, velocity, momentum)
+        spin = self.spin(i, momentum)
+        orientation = turned(self.state.orientation[i], spin, elapsed)
+        self.state.velocity[i], self.state.angular_momentum[i] = velocity, momentum
+        self.state.spin[i], self.state.orientation[i] = spin, orientation
+        self.state.rotation[i] = rotation_matrix(orientation)
+        self.state.position[i] += elapsed * velocity
+        self.state.last_tick[i] = self.state.tick[None]
+        if ti.static(self.has_contact):
+            self.contacts.moved(i, velocity, spin, elapsed)
+        speed2 = velocity.norm_sqr()
+        # One comparison finds runaway, infinity and NaN; "v != v" would be folded away.
+        if not (speed2 + spin.norm_sqr() * self.model.radius[i] ** 2 < self.state.max_speed2[None]):
+            ti.atomic_min(self.state.bad_body[None], i)
+        self.schedule.choose_level(i, speed2)
+
+    @ti.func
+    def _gathered(self, i):
+        """Impulse and moment waiting in the slots of a body, always summed in one order."""
+        linear, angular = zero3(), zero3()
+        for f in range(4):
+            taken = self.state.slot[4 * i + f]
+            linear += taken[0:3]
+            angular += taken[3:6]
+            self.state.slot[4 * i + f] = 0.0 * taken
+        if ti.static(self.has_contact):
+            pushed, twisted = self.contacts.gather(i)
+            linear += pushed
+            angular += twisted
+        return linear, angular
+
+    @ti.func
+    def _kicked(self, i, elapsed, linear, angular):
+        """Velocity and angular momentum after all impulses; loads book their work.
+
+        The work of a load takes the mean of the velocities before and after the whole kick, with
+        which the change of kinetic energy is exact.
+        """
+        before, momentum = self.state.velocity[i], self.state.angular_momentum[i]
+        kick = ti.Matrix.zero(real, ti.static(max(1, len(self.model.loads))), 6)
+        half = self.schedule.seconds(self.state.tick[None]) - 0.5 * elapsed
+        for e in ti.static(range(len(self.model.loads))):
+            if self.model.loads[e].acts_on(i):
+                force, torque = self.model.loads[e].wrench(i, half, self.state.rotation[i])
+                linear += force * elapsed
+                angular += torque * elapsed
+                for k in ti.static(range(3)):
+                    kick[e, k], kick[e, 3 + k] = force[k] * elapsed, torque[k] * elapsed
+        velocity = before + linear / self.model.mass[i]
+        if ti.static(len(self.model.loads) > 0):
+            mean = 0.5 * (before + velocity)
+            spin = self.spin(i, momentum + 0.5 * angular)
+            for e in ti.static(range(len(self.model.loads))):
+                if self.model.loads[e].acts_on(i):
+                    push = vec3(kick[e, 0], kick[e, 1], kick[e, 2])
+                    twist = vec3(kick[e, 3], kick[e, 4], kick[e, 5])
+                    self._book(i, e, push.dot(mean) + twist.dot(spin), push, twist)
+        return velocity, momentum + angular
+
+    @ti.func
+    def spin(self, i, momentum):
+        """World spin of body i at an angular momentum, in its present orientation."""
+        return spin_of(self.state.rotation[i], self.model.inertia_inverse[i], momentum)
+
+    @ti.func
+    def _supported(self, i, elapsed, velocity, momentum):
+        """Velocity and angular momentum that the supports allow; their work is booked last."""
+        half = self.schedule.seconds(self.state.tick[None]) - 0.5 * elapsed
+        for effect in ti.static(self.model.supports):
+            if effect.acts_on(i):
+                after, momentum_after = effect.held(
+                    i, half, self.state.rotation[i], velocity, momentum
+                )
+                push = self.model.mass[i] * (after - velocity)
+                twist = momentum_after - momentum
+                spin = self.spin(i, 0.5 * (momentum + momentum_after))
+                work = 0.5 * push.dot(velocity + after) + twist.dot(spin)
+                self._book(i, ti.static(len(self.model.loads)), work, push, twist)
+                velocity, momentum = after, momentum_after
+        return velocity, momentum
+
+    @ti.func
+    def _book(self, i, account, work, push, twist):
+        """Book work [J] to an account, and impulse and moment about the origin to body i."""
+        self.state.load_work[i][account] += work
+        twist += self.state.position[i].cross(push)
+        for k in ti.static(range(3)):
+            self.state.load_impulse[i][k] += push[k]
+            self.state.load_impulse[i][3 + k] += twist[k]

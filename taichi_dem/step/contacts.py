@@ -1,0 +1,104 @@
+"""Pairs of bodies in contact: packed candidate lists and the impulses they exchange.
+
+A pair holds the sphere pairs that were nearer than the skin at the last search. Lists are sorted by
+(first body, second body), so that sums over a body's pairs have one order, whoever searched when.
+"""
+
+import taichi as ti
+
+from taichi_dem.types import real, vec3
+
+#: Most partners of higher index that one body may have near it.
+NEAR = 64
+
+
+@ti.data_oriented
+class Contacts:
+    """Candidate pairs of bodies with broken faces.
+
+    pair_body: the two bodies, first < second. pair_first[p] .. pair_first[p + 1]: sphere pairs in
+    pair_sphere. pair_slot[2 p + side]: impulse [N s] and moment about the body's centre [N m s]
+    gathered for that side. pair_heat: energy into dashpots, friction, and injected [J]; those of
+    pairs that have left the list are in heat. first_of[i]: first pair whose first body is i;
+    touch_first, touch: pairs whose second body is i. travel: bound of the way any point of a
+    body went since the search [m]. search_due: 1 when the list may miss a contact.
+    """
+
+    def __init__(self, model, state):
+        n, effect = model.body_count, model.contact
+        self.model, self.state, self.law, self.friction = model, state, effect, model.friction
+        self.capacity = n * effect.pairs_per_body + 64
+        self.sphere_capacity = n * effect.spheres_per_body + 4096
+        self.pair_count = ti.field(ti.i32, shape=())
+        self.pair_body = ti.Vector.field(2, ti.i32, shape=self.capacity)
+        self.pair_first = ti.field(ti.i32, shape=self.capacity + 1)
+        self.pair_sphere = ti.Vector.field(2, ti.i32, shape=self.sphere_capacity)
+        self.pair_slot = ti.Vector.field(6, real, shape=2 * self.capacity)
+        self.pair_heat = ti.Vector.field(3, real, shape=self.capacity)
+        self.heat = ti.Vector.field(3, real, shape=())
+        self.first_of = ti.field(ti.i32, shape=n + 1)
+        self.touch_first = ti.field(ti.i32, shape=n + 2)
+        self.touch = ti.field(ti.i32, shape=self.capacity)
+        self.travel = ti.field(real, shape=n)
+        self.skin = ti.field(real, shape=())
+        self.skin[None] = effect.skin
+        self.search_due = ti.field(ti.i32, shape=())
+        self.deepest = ti.field(real, shape=self.capacity)
+
+    @ti.func
+    def arms(self, i, j, a, b):
+        """World vectors [m]: centre i to sphere a, and centre j to sphere b."""
+        on_first = self.state.rotation[i] @ self.model.sphere[a].xyz
+        return on_first, self.state.rotation[j] @ self.model.sphere[b].xyz
+
+    @ti.func
+    def gap(self, i, j, a, b):
+        """Distance between the surfaces of spheres a of body i and b of body j [m]."""
+        on_first, on_second = self.arms(i, j, a, b)
+        apart = self.state.position[j] + on_second - self.state.position[i] - on_first
+        return apart.norm() - self.model.sphere[a][3] - self.model.sphere[b][3]
+
+    @ti.func
+    def pair_energy(self, p):
+        """Elastic energy of a pair's overlaps now [J]."""
+        energy = 0.0
+        pair = self.pair_body[p]
+        for k in range(self.pair_first[p], self.pair_first[p + 1]):
+            spheres = self.pair_sphere[k]
+            overlap = -self.gap(pair[0], pair[1], spheres[0], spheres[1])
+            energy += self.law.stored(ti.max(0.0, overlap))
+        return energy
+
+    @ti.func
+    def gather(self, i):
+        """Impulse and moment that contacts have given to body i; empties its slots."""
+        linear, angular = vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0)
+        for p in range(self.first_of[i], self.first_of[i + 1]):
+            linear, angular = self._take(2 * p, linear, angular)
+        for k in range(self.touch_first[i], self.touch_first[i + 1]):
+            linear, angular = self._take(2 * self.touch[k] + 1, linear, angular)
+        return linear, angular
+
+    @ti.func
+    def _take(self, slot, linear, angular):
+        taken = self.pair_slot[slot]
+        self.pair_slot[slot] = 0.0 * taken
+        return linear + taken[0:3], angular + taken[3:6]
+
+    @ti.func
+    def finest_partner(self, i):
+        """Finest level among the bodies in body i's pairs; -1 without any."""
+        level = -1
+        for p in range(self.first_of[i], self.first_of[i + 1]):
+            level = ti.max(level, self.state.level[self.pair_body[p][1]])
+        for k in range(self.touch_first[i], self.touch_first[i + 1]):
+            level = ti.max(level, self.state.level[self.pair_body[self.touch[k]][0]])
+        return level
+
+    @ti.func
+    def moved(self, i, velocity, spin, elapsed):
+        """Add to the way of body i and ask for a search once it may have left the skin."""
+        way = self.travel[i] + (velocity.norm() + spin.norm() * self.model.radius[i]) * elapsed
+        self.travel[i] = way
+        if way > 0.5 * self.skin[None]:
+            self.search_due[None] = 1

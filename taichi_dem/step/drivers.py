@@ -1,0 +1,135 @@
+"""Two ways to run the same phases: many substeps in one serial kernel, or a parallel loop a phase.
+
+Both read one tuple of phases, so that the order of a step is written once. They give the same bits:
+every item writes its own slots, and every sum has a fixed order.
+"""
+
+import time
+
+import taichi as ti
+
+#: A resident call is kept near this long [s], so that Ctrl-C, progress and health are prompt.
+CALL_SECONDS = 0.2
+_MAX_SUBSTEPS = 1 << 24
+
+
+@ti.data_oriented
+class Once:
+    """Stands for a list where a phase has none: it happens once a substep."""
+
+    @ti.func
+    def count(self, low):
+        """One."""
+        return 1
+
+    @ti.func
+    def pick(self, a):
+        """The place itself; nobody looks at it."""
+        return a
+
+
+@ti.data_oriented
+class Step:
+    """The phases of a substep, as (due list, what happens to one member) pairs.
+
+    A substep begins with the contacts of the present tick,
+    whose bonds are evaluated already, and ends with the bonds of the next: between substeps the
+    contact lists can be renewed.
+    """
+
+    def __init__(self, advance, schedule, contacts):
+        self.advance, self.schedule, self.contacts = advance, schedule, contacts
+        self.has_contact = contacts is not None
+        self.state = advance.state
+        touching = ((schedule.pairs, advance.contact),) if contacts is not None else ()
+        self.phases = (
+            *touching,
+            (Once(), schedule.tick_on),
+            (schedule.bodies, advance.body),
+            (Once(), schedule.put_in_order),
+            (schedule.bonds, advance.bond),
+        )
+
+    @ti.kernel
+    def prime(self):
+        """Choose the first levels, fill the lists and evaluate the bonds of the first tick."""
+        for _ in range(1):
+            self.schedule.low[None] = 0
+            self.schedule.wanted[None] = 0
+        for i in range(self.advance.model.body_count):
+            self.schedule.choose_level(i, self.state.velocity[i].norm_sqr())
+        for _ in range(1):
+            self.schedule.start_all()
+        for b in range(self.advance.model.bond_count):
+            self.advance.bond(b)
+
+    @ti.func
+    def halted(self):
+        """1 when the host must act: a contact search is due or a body left its bounds."""
+        halt = ti.cast(self.state.bad_body[None] < self.advance.model.body_count, ti.i32)
+        if ti.static(self.has_contact):
+            halt |= self.contacts.search_due[None]
+        return halt
+
+
+@ti.data_oriented
+class Resident:
+    """Many substeps in one serial kernel: the choice for small systems on a CPU."""
+
+    name = "resident"
+
+    def __init__(self, step):
+        self.step = step
+        self.substeps = 64
+
+    def run(self, end_tick):
+        """Advance to a tick, to the next halt, or for about CALL_SECONDS."""
+        start = time.perf_counter()
+        done = self._run(end_tick, self.substeps)
+        seconds = max(time.perf_counter() - start, 1e-5)
+        if done == self.substeps:
+            grown = int(done * CALL_SECONDS / seconds)
+            self.substeps = max(64, min(4 * self.substeps, grown, _MAX_SUBSTEPS))
+
+    @ti.kernel
+    def _run(self, end_tick: ti.i64, substeps: ti.i32) -> ti.i32:
+        done = 0
+        low = ti.static(self.step.schedule.low)
+        ti.loop_config(serialize=True)
+        for s in range(substeps):
+            for due, item in ti.static(self.step.phases):
+                for a in range(due.count(low[None])):
+                    item(due.pick(a))
+            done = s + 1
+            if self.step.state.tick[None] >= end_tick or self.step.halted() == 1:
+                break
+        return done
+
+
+@ti.data_oriented
+class Parallel:
+    """One substep a kernel, every phase a parallel loop: for large systems and for GPUs."""
+
+    name = "parallel"
+
+    def __init__(self, step):
+        self.step = step
+
+    def run(self, end_tick):
+        """Advance to a tick, to the next halt, or for about CALL_SECONDS."""
+        start = time.perf_counter()
+        while self._run(end_tick) == 0 and time.perf_counter() - start < CALL_SECONDS:
+            pass
+
+    @ti.kernel
+    def _run(self, end_tick: ti.i64) -> ti.i32:
+        low = ti.static(self.step.schedule.low)
+        for due, item in ti.static(self.step.phases):
+            for a in range(due.count(low[None])):
+                item(due.pick(a))
+        finished = ti.cast(self.step.state.tick[None] >= end_tick, ti.i32)
+        return finished | self.step.halted()
+
+
+#: Drivers by the name that users give.
+DRIVERS = {driver.name: driver for driver in (Resident, Parallel)}

@@ -1,0 +1,108 @@
+"""Geometry and connectivity of bare tetrahedron arrays (NumPy only).
+
+Everything here works on ``points`` (point_count, 3) [m] and ``tetrahedra`` (body_count, 4).
+Local face f of a tetrahedron is the face opposite its local vertex f.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+#: Local vertices of the four faces, in the order whose right-hand normal points outward
+#: for a tetrahedron of positive volume.
+LOCAL_FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]], dtype=np.int32)
+
+#: Local vertices of the six edges.
+LOCAL_EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]], dtype=np.int32)
+
+
+def signed_volumes(points, tetrahedra):
+    """Signed volumes det(p1 - p0, p2 - p0, p3 - p0) / 6 [m3], shape (body_count,)."""
+    corners = points[tetrahedra]
+    a, b, c = (corners[:, k] - corners[:, 0] for k in (1, 2, 3))
+    return np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0
+
+
+def edge_lengths(points, tetrahedra):
+    """Lengths of the six edges [m], shape (body_count, 6)."""
+    ends = points[tetrahedra[:, LOCAL_EDGES]]
+    return np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=-1)
+
+
+def area_vectors(points, faces):
+    """Right-hand normals times the area of triangles [m2], shape (n, 3).
+
+    faces: point indices, shape (n, 3).
+    """
+    corners = points[faces]
+    return 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
+def all_faces(tetrahedra):
+    """Every face of every body, outward order, shape (4 * body_count, 3); row 4 * body + f."""
+    return tetrahedra[:, LOCAL_FACES].reshape(-1, 3)
+
+
+def face_numbers(faces):
+    """Number every distinct vertex set of ``faces``; equal sets get equal numbers, shape (n,)."""
+    _, number = np.unique(np.sort(faces, axis=1), axis=0, return_inverse=True)
+    return number.reshape(-1)  # NumPy 2.0 returns a column
+
+
+def shared_faces(tetrahedra):
+    """Rows of ``all_faces`` that are one face of two bodies, shape (n, 2), smaller row first.
+
+    Call it only where no face is shared by three bodies.
+    """
+    number = face_numbers(all_faces(tetrahedra))
+    order = np.argsort(number, kind="stable")
+    same = number[order[1:]] == number[order[:-1]]
+    return np.column_stack([order[:-1][same], order[1:][same]])
+
+
+def components(count, pairs):
+    """Connected components of a graph: the smallest member of each node's part, shape (count,).
+
+    count: number of nodes.  pairs: linked nodes, shape (n, 2).
+    """
+    label = np.arange(count)
+    while True:
+        lowest = np.minimum(label[pairs[:, 0]], label[pairs[:, 1]])
+        merged = label.copy()
+        for side in (0, 1):
+            np.minimum.at(merged, label[pairs[:, side]], lowest)
+        while not np.array_equal(merged, merged[merged]):
+            merged = merged[merged]
+        if np.array_equal(merged, label):
+            return label
+        label = merged
+
+
+def close_pairs(points, distance):
+    """Pairs of points not farther apart than ``distance`` [m], shape (n, 2), first < second.
+
+    Two such points lie in one cell of at least one of eight cubic grids of cell size 4 distance,
+    shifted by half a cell along each axis; so sorting by cell finds them without all pairs.
+    """
+    found = [np.empty((0, 2), dtype=np.int64)]
+    cell = 4.0 * distance
+    low = points.min(axis=0)
+    for shift in np.ndindex(2, 2, 2):
+        index = np.floor((points - low) / cell + 0.5 * np.array(shift))
+        found.append(_pairs_in_cells(points, index, distance))
+    return np.unique(np.vstack(found), axis=0)
+
+
+def _pairs_in_cells(points, cell_index, distance):
+    """Close pairs among points of equal cell index (n, 3)."""
+    order = np.lexsort(cell_index.T)
+    in_order = cell_index[order]
+    found = [np.empty((0, 2), dtype=np.int64)]
+    for step in range(1, len(points)):
+        same = np.flatnonzero(np.all(in_order[step:] == in_order[:-step], axis=1))
+        if len(same) == 0:
+            break
+        pair = np.sort(np.column_stack([order[same], order[same + step]]), axis=1)
+        gap = np.linalg.norm(points[pair[:, 0]] - points[pair[:, 1]], axis=1)
+        found.append(pair[gap <= distance])
+    return np.vstack(found)

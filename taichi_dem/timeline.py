@@ -1,0 +1,48 @@
+"""Time as an integer: ticks, levels, and which level is due at a tick.
+
+Level k steps by dt0 / 2^k; one tick is the step of the finest level allowed. A level is due at
+the multiples of its own step, so a body may refine at any of its own times and coarsen only where
+the coarser grid passes (Konno et al., 3.1). Plain integers here, mirrored for kernels below.
+"""
+
+import taichi as ti
+
+#: Finest level. 2^20 ticks a macro step let steps fall to a millionth of the largest.
+MAX_LEVEL = 20
+#: Ticks in the largest step.
+MACRO_TICKS = 1 << MAX_LEVEL
+
+
+def ticks_of(level):
+    """Ticks in a step of a level."""
+    return 1 << (MAX_LEVEL - level)
+
+
+def coarsest_due(tick):
+    """Lowest level that is due at a tick; all finer levels are due too."""
+    rest = tick % MACRO_TICKS
+    return 0 if rest == 0 else MAX_LEVEL - ((rest & -rest).bit_length() - 1)
+
+
+def next_level(wanted, tick):
+    """Level a body that is due at a tick may take: what it wants, or the coarsest the grid has."""
+    return max(wanted, coarsest_due(tick))
+
+
+@ti.func
+def device_ticks_of(level):
+    """``ticks_of`` for kernels."""
+    return ti.cast(1, ti.i64) << (MAX_LEVEL - level)
+
+
+@ti.func
+def device_coarsest_due(tick):
+    """``coarsest_due`` for kernels."""
+    rest = ti.cast(tick & (MACRO_TICKS - 1), ti.i32)
+    level = 0
+    if rest != 0:
+        level = MAX_LEVEL
+        while rest & 1 == 0:
+            rest = rest >> 1
+            level -= 1
+    return level

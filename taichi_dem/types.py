@@ -1,0 +1,9 @@
+"""Number types shared by all kernels: double precision, small vectors and matrices."""
+
+import taichi as ti
+
+real = ti.f64
+vec2 = ti.types.vector(2, ti.f64)
+vec3 = ti.types.vector(3, ti.f64)
+vec4 = ti.types.vector(4, ti.f64)
+mat3 = ti.types.matrix(3, 3, ti.f64)
