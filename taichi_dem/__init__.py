@@ -1,1 +1,45 @@
-"""Blasting and breaking of blocks of bonded rigid tetrahedra, with steps that differ by body."""
+"""Blasting and breaking of blocks of bonded rigid tetrahedra, with steps that differ by body.
+
+A scene is a mesh, a material and the effects that act; ``simulate`` runs it::
+
+    from taichi_dem import CONCRETE, Multirate, Scene, effects, read_mesh, runtime, simulate
+
+    runtime.start()
+    scene = Scene(mesh=read_mesh("block.msh"), material=CONCRETE, effects=[...])
+    result = simulate(scene, method=Multirate(), until=1e-4)
+"""
+
+from taichi_dem import runtime  # first: prepares the environment for ``import taichi``
+from taichi_dem import effects, methods
+from taichi_dem.errors import InputError, SimulationDiverged
+from taichi_dem.materials import CONCRETE, Material
+from taichi_dem.mesh import Mesh, checked_mesh
+from taichi_dem.mesh_files import read_mesh
+from taichi_dem.methods import Multirate, Uniform
+from taichi_dem.quality import quality_report
+from taichi_dem.record import write_paraview
+from taichi_dem.scene import Scene
+from taichi_dem.simulate import simulate
+from taichi_dem.simulation import Simulation
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "CONCRETE",
+    "InputError",
+    "Material",
+    "Mesh",
+    "Multirate",
+    "Scene",
+    "Simulation",
+    "SimulationDiverged",
+    "Uniform",
+    "checked_mesh",
+    "effects",
+    "methods",
+    "quality_report",
+    "read_mesh",
+    "runtime",
+    "simulate",
+    "write_paraview",
+]

@@ -1,65 +1,140 @@
-"""The loop a user calls: build, step, watch, record."""
+"""The loop a user calls: step, sample, keep frames, and hand everything back as one result."""
 
-import time
+import json
+import os
+from dataclasses import dataclass
 
-from taichi_dem import runtime
-from taichi_dem.ledger import Ledger
-from taichi_dem.model import Model
-from taichi_dem.state import State
-from taichi_dem.step.advance import Advance
-from taichi_dem.step.broad_phase import BroadPhase
-from taichi_dem.step.contacts import Contacts
-from taichi_dem.step.drivers import DRIVERS, Step
-from taichi_dem.step.schedule import Schedule
-from taichi_dem.timeline import MACRO_TICKS
+import numpy as np
+
+from taichi_dem.errors import InputError, SimulationDiverged
+from taichi_dem.mesh_files import write_mesh
+from taichi_dem.record import (
+    Recorder,
+    output_folder,
+    write_atomically,
+    write_csv,
+    write_paraview,
+)
+from taichi_dem.simulation import Simulation, macro_steps
 
 
-class Simulation:
-    """A scene brought to the device, ready to step."""
+@dataclass(frozen=True)
+class Progress:
+    """How far a run is: time_s of until_s, and substeps done."""
 
-    def __init__(self, scene, method, driver="resident"):
-        runtime.generation()
-        self.scene, self.method = scene, method
-        self.model = Model(scene.mesh, scene.material, scene.effects)
-        self.state = State(self.model, scene.max_speed)
-        self.contacts = Contacts(self.model, self.state) if self.model.has_contact else None
-        self.schedule = Schedule(
-            self.model,
-            self.state,
-            self.contacts,
-            method.criterion(),
-            method.dt0,
-            method.uniform,
-            method.neighbour == "drifted",
-        )
-        self.broad_phase = BroadPhase(self.contacts, self.schedule) if self.contacts else None
-        self.advance = Advance(self.model, self.state, self.schedule, self.contacts)
-        self.step = Step(self.advance, self.schedule, self.contacts)
-        self.driver = DRIVERS[driver](self.step)
-        self.primed = False
-        self.searches = 0
-        self.search_seconds = 0.0
+    time_s: float
+    until_s: float
+    substeps: int
 
-    def prime(self):
-        self.step.prime()
-        if self.contacts:
-            self.search()
-        self.ledger = Ledger(self.model, self.state, self.advance, self.contacts)
-        self.primed = True
 
-    def search(self):
-        t = time.perf_counter()
-        self.broad_phase.search()
-        self.searches += 1
-        self.search_seconds += time.perf_counter() - t
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What a run produced.
 
-    def advance_to(self, macro_steps):
-        if not self.primed:
-            self.prime()
-        end = macro_steps * MACRO_TICKS
-        while self.state.tick[None] < end:
-            self.driver.run(end)
-            if self.contacts and self.contacts.search_due[None]:
-                self.search()
-            if self.state.bad_body[None] < self.model.body_count:
-                raise RuntimeError("bad body %d" % self.state.bad_body[None])
+    history: arrays by column name, one row a sample. frames: snapshots. broken_time: when each
+    bond was released [s], NaN while it holds. report: figures of the run. diverged: the sentence
+    of a run that left its bounds (all else then ends before that), else "".
+    """
+
+    scene: object
+    method: object
+    model: object
+    history: dict
+    frames: tuple
+    broken_time: np.ndarray
+    report: object
+    diverged: str = ""
+
+    def write(self, folder):
+        """Write history.csv, mesh.msh, report.json and the ParaView series to a folder.
+
+        Raises InputError when the folder cannot be written to.
+        """
+        output_folder(folder)
+        write_csv(os.path.join(folder, "history.csv"), self.history)
+        write_mesh(os.path.join(folder, "mesh.msh"), self.scene.mesh)
+        text = json.dumps({**self.report.as_dict(), "diverged": self.diverged}, indent=1)
+        write_atomically(os.path.join(folder, "report.json"), lambda handle: handle.write(text))
+        if self.frames:
+            write_paraview(os.path.join(folder, "paraview"), self.model, self.frames)
+
+
+def simulate(
+    scene, *, method, until, driver="auto", samples=200, frames=0, progress=None, output=None
+):
+    """Run a scene to a time and return the result.
+
+    method: from ``taichi_dem.methods``. until: simulated time [s], rounded up to whole largest
+    steps. samples, frames: how many evenly spaced rows of the time series, and snapshots, after
+    the one at the start. progress: called with a Progress about five times a second.
+    output: folder for the result, written at the end, or up to the last good sample when the
+    run diverges.
+    Raises InputError for bad arguments, SimulationDiverged when the run leaves its bounds.
+    """
+    if output is not None:
+        output_folder(output)
+    last = macro_steps(until, method.dt0)
+    _check_count("samples", samples, 1)
+    _check_count("frames", frames, 0)
+    simulation = Simulation(scene, method, driver)
+    recorder = Recorder(simulation, _watched_group(scene))
+    simulation.start()
+    sample_steps, frame_steps = _marks(last, samples), _marks(last, frames)
+    error = None
+    try:
+        _run(simulation, recorder, sample_steps, frame_steps, progress)
+    except SimulationDiverged as diverged:
+        error = diverged
+    result = _result(scene, method, simulation, recorder, error)
+    if output is not None:
+        result.write(output)
+    if error is not None:
+        error.result = result
+        raise error
+    return result
+
+
+def _run(simulation, recorder, sample_steps, frame_steps, progress):
+    """Step from mark to mark; every mark is sampled, photographed, or both."""
+    last = max(sample_steps)
+
+    def tell():
+        if progress is not None:
+            substeps = int(simulation.schedule.evaluations[0])
+            progress(Progress(simulation.time_s, last * simulation.method.dt0, substeps))
+
+    for step in sorted(sample_steps | frame_steps):
+        simulation.advance_to(step, tell)
+        if step in sample_steps:
+            simulation.watch.look(simulation.time_s)
+            recorder.sample()
+        if step in frame_steps:
+            recorder.snapshot()
+
+
+def _marks(last, count):
+    """Evenly spaced macro steps from 0 to last, count of them after the first; none for 0."""
+    return {round(last * k / count) for k in range(count + 1)} if count else set()
+
+
+def _check_count(name, value, least):
+    if isinstance(value, bool) or not isinstance(value, int) or value < least:
+        raise InputError(f"{name} must be a whole number of at least {least}, got {value!r}")
+
+
+def _watched_group(scene):
+    groups = [effect.group for effect in scene.effects if effect.name == "gas_pressure"]
+    return groups[0] if groups else None
+
+
+def _result(scene, method, simulation, recorder, error):
+    return Result(
+        scene=scene,
+        method=method,
+        model=simulation.model,
+        history=recorder.history(),
+        frames=tuple(recorder.frames),
+        broken_time=recorder.broken_time(),
+        report=simulation.report(),
+        diverged=str(error) if error else "",
+    )

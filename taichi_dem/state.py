@@ -87,19 +87,27 @@ class State:
                 self.model.inertia[i] @ (rotation.transpose() @ w)
             )
 
-    def motion(self):
-        """Arrays of the bodies' motion by name: position, orientation, velocity, spin, level.
+    def expose(self, topology):
+        """Let all outer faces carry contact spheres from the start."""
+        marks = np.full(4 * self.model.body_count, NEVER, dtype=np.int64)
+        marks[4 * topology.outer_body + topology.outer_face] = 0
+        self.exposed_tick.from_numpy(marks)
 
-        Shapes (n, 3), (n, 4), (n, 3), (n, 3), (n,); angular_momentum (n, 3) too.
+    def motion(self):
+        """Arrays of the bodies' motion by name.
+
+        position, velocity, spin, angular_momentum (n, 3), orientation (n, 4), rotation (n, 3, 3)
+        and level (n,).
         """
-        table = np.zeros((self.model.body_count, 17))
+        table = np.zeros((self.model.body_count, 26))
         self._read_motion(table)
-        names = (("position", 3), ("orientation", 4), ("velocity", 3), ("spin", 3))
+        widths = (("position", 3), ("orientation", 4), ("velocity", 3), ("spin", 3))
         parts, start = {}, 0
-        for name, width in (*names, ("angular_momentum", 3)):
+        for name, width in (*widths, ("angular_momentum", 3), ("rotation", 9), ("level", 1)):
             parts[name] = table[:, start : start + width].copy()
             start += width
-        parts["level"] = table[:, 16].astype(np.int32)
+        parts["rotation"] = parts["rotation"].reshape(-1, 3, 3)
+        parts["level"] = parts["level"][:, 0].astype(np.int32)
         return parts
 
     @ti.kernel
@@ -114,7 +122,9 @@ class State:
                 table[i, 13 + k] = self.angular_momentum[i][k]
             for k in ti.static(range(4)):
                 table[i, 3 + k] = self.orientation[i][k]
-            table[i, 16] = ti.cast(self.level[i], ti.f64)
+            for r, c in ti.static(ti.ndrange(3, 3)):
+                table[i, 16 + 3 * r + c] = rotation[r, c]
+            table[i, 25] = ti.cast(self.level[i], ti.f64)
 
     def fields(self):
         """Every field that changes, by name, the bound effects' state included."""

@@ -82,6 +82,10 @@ class Resident:
         self.step = step
         self.substeps = 64
 
+    def compile(self):
+        """Compile the kernel without stepping."""
+        self._run(0, 0)
+
     def run(self, end_tick):
         """Advance to a tick, to the next halt, or for about CALL_SECONDS."""
         start = time.perf_counter()
@@ -114,6 +118,9 @@ class Parallel:
 
     def __init__(self, step):
         self.step = step
+
+    def compile(self):
+        """Nothing to do ahead: the kernel is compiled by its first substep."""
 
     def run(self, end_tick):
         """Advance to a tick, to the next halt, or for about CALL_SECONDS."""

@@ -6,7 +6,7 @@ the part that is due needs sorting anew, so that keeping order costs less than u
 
 import taichi as ti
 
-from taichi_dem.timeline import MAX_LEVEL, device_coarsest_due, device_ticks_of
+from taichi_dem.timeline import MACRO_TICKS, MAX_LEVEL, device_coarsest_due, device_ticks_of
 from taichi_dem.types import real
 
 
@@ -91,6 +91,8 @@ class Schedule:
     criterion: rule from ``step_control``. uniform: all bodies share the finest level wanted.
     drifted: bodies next to a due one are brought to its time too, else only due bodies move.
     dt0 [s]: step of level 0. finest: finest level present. low: coarsest level now due.
+    evaluations: substeps, bodies advanced, bonds and pairs evaluated, and the bonds and pairs that
+    one step for all would have evaluated in the same substeps.
     """
 
     def __init__(self, model, state, contacts, criterion, dt0, uniform, drifted):
@@ -98,6 +100,7 @@ class Schedule:
         self.criterion, self.uniform, self.drifted = criterion, uniform, drifted
         self.has_contact = contacts is not None
         self.dt0 = dt0
+        self.tick_seconds = dt0 / MACRO_TICKS
         self.step_seconds = ti.field(real, shape=MAX_LEVEL + 1)
         for k in range(MAX_LEVEL + 1):
             self.step_seconds[k] = dt0 / 2.0**k
@@ -109,7 +112,7 @@ class Schedule:
         self.dirty = ti.field(ti.i32, shape=())
         self.waiting = ti.field(ti.i32, shape=())
         self.wanted = ti.field(ti.i32, shape=())
-        self.evaluations = ti.field(ti.i64, shape=4)
+        self.evaluations = ti.field(ti.i64, shape=5)
 
     @ti.func
     def pair_step(self, i, j):
@@ -132,6 +135,7 @@ class Schedule:
         """Move the clock to the next tick at which a body is due."""
         if ti.static(self.has_contact):
             self.evaluations[3] += self.pairs.end[self.low[None]]
+            self.evaluations[4] += self.pairs.end[0]
         self.state.tick[None] += device_ticks_of(self.finest[None])
         self.low[None] = device_coarsest_due(self.state.tick[None])
         self.wanted[None] = 0
@@ -211,6 +215,7 @@ class Schedule:
         self.evaluations[0] += 1
         self.evaluations[1] += self.bodies.end[low]
         self.evaluations[2] += self.bonds.end[low]
+        self.evaluations[4] += self.bonds.end[0]
 
     @ti.func
     def _bond_key(self, b):

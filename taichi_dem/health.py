@@ -1,0 +1,103 @@
+"""Finds runs that have left the range where their numbers mean anything, and says why."""
+
+import numpy as np
+
+from taichi_dem.errors import SimulationDiverged
+from taichi_dem.quality import quality_report
+
+#: Energy that may appear from nowhere before a run counts as diverged, as a share of what is there.
+ENERGY_FROM_NOWHERE = 0.5
+#: Overlap of two contact spheres, in radii of the smaller, that no contact recovers from.
+DEEPEST_OVERLAP = 1.9
+
+
+class Health:
+    """Looks at a run after every resident call; raises SimulationDiverged with the place."""
+
+    def __init__(self, model, state, schedule, contacts, ledger):
+        self.model, self.state, self.schedule = model, state, schedule
+        self.contacts, self.ledger = contacts, ledger
+
+    def check(self):
+        """Raise SimulationDiverged when a body ran away, spheres swallowed, or energy appeared."""
+        body = self.state.bad_body[None]
+        if body < self.model.body_count:
+            motion = self.state.motion()
+            speed = np.linalg.norm(motion["velocity"][body])
+            raise SimulationDiverged(self._sentence(body, motion, f"moves at {speed:.3g} m/s"))
+        self._check_overlap()
+        self._check_energy()
+
+    def _check_overlap(self):
+        if self.contacts is None or not self.contacts.pair_count[None]:
+            return
+        deepest = self.contacts.deepest.to_numpy()[: self.contacts.pair_count[None]]
+        pair = int(deepest.argmax())
+        if deepest[pair] > DEEPEST_OVERLAP:
+            body, other = (int(k) for k in self.contacts.pair_body[pair])
+            what = f"has a contact sphere inside one of body {other} ({deepest[pair]:.2f} radii)"
+            raise SimulationDiverged(self._sentence(body, self.state.motion(), what))
+
+    def _check_energy(self):
+        account = self.ledger.account()
+        present = account["kinetic"] + account["bond_strain"] + account["sphere_strain"]
+        given = self.ledger.start_energy + abs(account["load_work"]) + abs(account["support_work"])
+        if -account["residual"] > ENERGY_FROM_NOWHERE * max(given, 1e-300) and present > given:
+            motion = self.state.motion()
+            body = int(np.linalg.norm(motion["velocity"], axis=1).argmax())
+            what = f"is the fastest while {-account['residual']:.3g} J came from nowhere"
+            raise SimulationDiverged(self._sentence(body, motion, what))
+
+    def _sentence(self, body, motion, what):
+        level = int(motion["level"][body])
+        time_s = self.state.tick[None] * self.schedule.tick_seconds
+        step = self.schedule.dt0 / 2.0**level
+        limit, cause = self._limit(body)
+        return (
+            f"diverged at t = {time_s:.6g} s: body {body} {what}; {self._partner(body, motion)}; "
+            f"its step was {step:.3g} s (level {level}), {cause} allow {limit:.3g} s: "
+            f"try a step of {0.5 * limit:.2g} s"
+        )
+
+    def _partner(self, body, motion):
+        """The neighbour that moves fastest against the body, and how they are tied."""
+        top = self.model.topology
+        intact = self.state.broken_tick.to_numpy() < 0
+        links = [
+            (int(top.master[b] + top.slave[b] - body), f"bond {b} to body")
+            for b in top.body_bond[body]
+            if b >= 0 and intact[b]
+        ]
+        for first, second in self._pairs():
+            if body in (first, second):
+                links.append((int(first + second - body), "contact with body"))
+        if not links:
+            return "it touches nothing"
+        apart = [
+            np.linalg.norm(motion["velocity"][other] - motion["velocity"][body])
+            for other, _ in links
+        ]
+        other, tie = links[int(np.nanargmax(np.nan_to_num(apart, nan=np.inf)))]
+        return f"the fastest against it is {tie} {other}"
+
+    def _pairs(self):
+        if self.contacts is None:
+            return np.zeros((0, 2), dtype=int)
+        return self.contacts.pair_body.to_numpy()[: self.contacts.pair_count[None]]
+
+    def _limit(self, body):
+        """Largest stable explicit step at a body [s], and what sets it."""
+        model = self.model
+        steps = quality_report(model.mesh, model.material)
+        limit, cause = steps.spring_step_s[body], "its bond springs"
+        if model.dashpot.name and steps.dashpot_step_s[body] < limit:
+            limit, cause = steps.dashpot_step_s[body], "its bond dashpots"
+        if self.contacts is not None:
+            first = self.contacts.pair_first.to_numpy()
+            for pair, (i, j) in enumerate(self._pairs()):
+                if body in (i, j):
+                    rate = model.material.contact_damping * sum(1.0 / model.body_mass[[i, j]])
+                    rate *= max(1, first[pair + 1] - first[pair])
+                    if rate > 0.0 and 2.0 / rate < limit:
+                        limit, cause = 2.0 / rate, "its sphere dashpots"
+        return limit, cause

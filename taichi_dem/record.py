@@ -1,0 +1,196 @@
+"""What a run leaves behind: time series, snapshots, ParaView files; written whole or not at all."""
+
+import csv
+import os
+from dataclasses import dataclass
+
+import numpy as np
+import taichi as ti
+
+from taichi_dem.errors import InputError
+from taichi_dem.mesh_files import write_pvd, write_vtu
+from taichi_dem.monitor import HoleMonitor
+from taichi_dem.state import NEVER
+from taichi_dem.timeline import MAX_LEVEL
+
+#: Ledger terms that have a column of their own in the time series, in its order.
+ENERGY_COLUMNS = (
+    "kinetic",
+    "bond_strain",
+    "sphere_strain",
+    "gas_work",
+    "bond_dashpot",
+    "softening",
+    "release",
+    "slip",
+    "sphere_dashpot",
+    "friction",
+    "injected",
+    "residual",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """The block at one time.
+
+    time_s; position, displacement, velocity (n, 3) in m and m/s; rotation (n, 3, 3), body to world; level (n,);
+    damage (n,) in [0, 1], the mean over a body's bonds.
+    """
+
+    time_s: float
+    position: np.ndarray
+    rotation: np.ndarray
+    displacement: np.ndarray
+    velocity: np.ndarray
+    level: np.ndarray
+    damage: np.ndarray
+
+    @property
+    def speed(self):
+        """Speed of every body [m/s], (n,)."""
+        return np.linalg.norm(self.velocity, axis=1)
+
+
+@ti.data_oriented
+class Recorder:
+    """Collects samples and frames of a simulation.
+
+    group: face group of the hole whose displacement is followed, None for none.
+    """
+
+    def __init__(self, simulation, group):
+        self.simulation = simulation
+        self.model, self.state = simulation.model, simulation.state
+        self.hole = HoleMonitor(self.model, group) if group else None
+        self.rows = []
+        self.frames = []
+
+    def sample(self):
+        """Add a row to the time series."""
+        sim = self.simulation
+        motion = self.state.motion()
+        account = sim.ledger.account()
+        account["gas_work"] = sim.gas_work()
+        row = {"time_s": sim.time_s}
+        if self.hole is not None:
+            radial = self.hole.radial_displacement(motion["position"])
+            row["hole_radial_displacement_mm"] = 1e3 * radial
+            monitor = self.hole.monitor_displacement(motion["position"])
+            row["monitor_displacement_mm"] = 1e3 * monitor
+        row["broken_faces"] = int((self.state.broken_tick.to_numpy() != NEVER).sum())
+        row.update({f"{name}_J": account[name] for name in ENERGY_COLUMNS})
+        row["smallest_step_s"] = sim.method.dt0 / 2.0 ** int(motion["level"].max())
+        row["load_work_J"], row["support_work_J"] = account["load_work"], account["support_work"]
+        row["largest_speed_m_s"] = float(np.linalg.norm(motion["velocity"], axis=1).max())
+        self.rows.append(row)
+
+    def snapshot(self):
+        """Keep the block as it is now."""
+        motion = self.state.motion()
+        damage = np.zeros(max(1, self.model.bond_count))
+        self._read_damage(damage)
+        self.frames.append(
+            Frame(
+                time_s=self.simulation.time_s,
+                position=motion["position"],
+                rotation=motion["rotation"],
+                displacement=motion["position"] - self.model.centre,
+                velocity=motion["velocity"],
+                level=motion["level"],
+                damage=self._body_damage(damage),
+            )
+        )
+
+    @ti.kernel
+    def _read_damage(self, damage: ti.types.ndarray(dtype=ti.f64, ndim=1)):
+        for b in range(self.model.bond_count):
+            damage[b] = 1.0
+            if self.state.broken_tick[b] < 0:
+                damage[b] = 0.0
+                for q in range(3):
+                    damage[b] += self.model.tension.damage(b, 3 * b + q) / 3.0
+
+    def _body_damage(self, damage):
+        bond = self.model.topology.body_bond
+        own = np.where(bond >= 0, damage[np.maximum(bond, 0)], 0.0)
+        return own.sum(axis=1) / np.maximum(1, (bond >= 0).sum(axis=1))
+
+    def history(self):
+        """Time series as arrays by column name."""
+        names = self.rows[0].keys() if self.rows else ()
+        return {name: np.array([row[name] for row in self.rows]) for name in names}
+
+    def broken_time(self):
+        """When each bond was released [s], (bond_count,); NaN while it holds."""
+        tick = self.state.broken_tick.to_numpy()[: self.model.bond_count]
+        seconds = tick * (self.simulation.method.dt0 / 2.0**MAX_LEVEL)
+        return np.where(tick == NEVER, np.nan, seconds)
+
+
+def body_corners(model, frame):
+    """World positions of the corners of all bodies in a frame [m], (n, 4, 3)."""
+    arms = model.mesh.points[model.mesh.tetrahedra] - model.centre[:, None]
+    return frame.position[:, None] + np.einsum("nij,nkj->nki", frame.rotation, arms)
+
+
+def output_folder(path):
+    """Make a folder for output and return its path.
+
+    Raises InputError when it cannot be made or written to.
+    """
+    try:
+        os.makedirs(path, exist_ok=True)
+        probe = os.path.join(path, ".write-test")
+        with open(probe, "w") as handle:
+            handle.write("x")
+        os.remove(probe)
+    except OSError as error:
+        reason = error.strerror or error
+        raise InputError(f"output folder {path} must be writable: {reason}") from None
+    return os.fspath(path)
+
+
+def write_atomically(path, write):
+    """Write a file through ``write(handle)`` under a temporary name, then rename it."""
+    temporary = f"{path}.part"
+    try:
+        with open(temporary, "w", newline="") as handle:
+            write(handle)
+        os.replace(temporary, path)
+    finally:
+        if os.path.exists(temporary):
+            os.remove(temporary)
+
+
+def write_csv(path, columns):
+    """Write columns of equal length, a dict of name to sequence, as a CSV file."""
+
+    def write(handle):
+        rows = csv.writer(handle, lineterminator="\n")
+        rows.writerow(columns)
+        rows.writerows(zip(*(np.asarray(values).tolist() for values in columns.values())))
+
+    write_atomically(path, write)
+
+
+def write_paraview(folder, model, frames, name="blast"):
+    """Write frames as a ParaView series: folder/name.pvd and a VTU file a frame.
+
+    Cells carry body_id, level, speed_m_s, displacement_m and damage.
+    """
+    output_folder(folder)
+    cells = np.arange(4 * model.body_count, dtype=np.int32).reshape(-1, 4)
+    names = []
+    for number, frame in enumerate(frames):
+        names.append(f"{name}_{number:04d}.vtu")
+        data = {
+            "body_id": np.arange(model.body_count, dtype=np.int32),
+            "level": frame.level,
+            "speed_m_s": frame.speed,
+            "displacement_m": frame.displacement,
+            "damage": frame.damage,
+        }
+        points = body_corners(model, frame).reshape(-1, 3)
+        write_vtu(os.path.join(folder, names[-1]), points, cells, {}, data)
+    write_pvd(os.path.join(folder, f"{name}.pvd"), [frame.time_s for frame in frames], names)

@@ -1,0 +1,92 @@
+"""The short report at the end of a run."""
+
+from dataclasses import asdict, dataclass
+
+
+@dataclass(frozen=True)
+class Report:
+    """What a run did and what it cost.
+
+    method, driver, effects: what was run. until_s: simulated time. substeps: ticks at which
+    something was due. body_updates, bond_evaluations, pair_evaluations: work done.
+    uniform_evaluations: bonds and pairs that one step for all would have evaluated in the same
+    substeps. ideal_gain: bodies times substeps over body updates, what the different steps would
+    save if a pair cost nothing; boundary_gain: uniform over actual evaluations, what they save
+    with every pair evaluated at the finer body's step. searches: rebuilt contact lists.
+    ledger: energy terms [J]; ledger_residual_fraction: residual over the work put in.
+    linear_momentum_error, angular_momentum_error: out of nothing, as shares of what was
+    exchanged. compile_seconds, run_seconds, run_cpu_seconds: cost. needs: effects missed.
+    """
+
+    method: str
+    driver: str
+    effects: tuple
+    until_s: float
+    body_count: int
+    bond_count: int
+    broken_faces: int
+    smallest_step_s: float
+    substeps: int
+    body_updates: int
+    bond_evaluations: int
+    pair_evaluations: int
+    uniform_evaluations: int
+    searches: int
+    ledger: dict
+    linear_momentum_error: float
+    angular_momentum_error: float
+    compile_seconds: float
+    run_seconds: float
+    run_cpu_seconds: float
+    needs: tuple
+
+    @property
+    def contact_evaluations(self):
+        """Bonds and contact pairs evaluated."""
+        return self.bond_evaluations + self.pair_evaluations
+
+    @property
+    def ideal_gain(self):
+        """Bodies times substeps over body updates."""
+        return self.body_count * self.substeps / max(1, self.body_updates)
+
+    @property
+    def boundary_gain(self):
+        """Evaluations of one step for all over those made."""
+        return self.uniform_evaluations / max(1, self.contact_evaluations)
+
+    @property
+    def ledger_residual_fraction(self):
+        """Energy that the account cannot explain, over the work put in or the energy held."""
+        given = abs(self.ledger["load_work"]) + abs(self.ledger["support_work"])
+        held = self.ledger["kinetic"] + self.ledger["bond_strain"]
+        return abs(self.ledger["residual"]) / max(given, held, 1e-300)
+
+    def as_dict(self):
+        """All figures, for a JSON file."""
+        derived = ("contact_evaluations", "ideal_gain", "boundary_gain", "ledger_residual_fraction")
+        return {**asdict(self), **{name: getattr(self, name) for name in derived}}
+
+    def __str__(self):
+        """A table of a dozen lines, then one line for every effect that was missed."""
+        rows = [
+            ("method", f"{self.method}, {self.driver} driver"),
+            ("effects", ", ".join(self.effects) or "none"),
+            ("simulated", f"{self.until_s:.4g} s, {self.broken_faces} of {self.bond_count} "
+             f"bonds broken"),
+            ("smallest step", f"{self.smallest_step_s:.3g} s"),
+            ("substeps", f"{self.substeps:,}"),
+            ("evaluations", f"{self.bond_evaluations:,} bonds, {self.pair_evaluations:,} pairs, "
+             f"{self.body_updates:,} bodies"),
+            ("gain over uniform", f"{self.ideal_gain:.2f} ideal, {self.boundary_gain:.2f} with "
+             f"the pairs at the finer step"),
+            ("contact searches", f"{self.searches:,}"),
+            ("work put in", f"{self.ledger['load_work'] + self.ledger['support_work']:.6g} J"),
+            ("ledger residual", f"{100 * self.ledger_residual_fraction:.3g} % of it"),
+            ("momentum error", f"{self.linear_momentum_error:.1e} linear, "
+             f"{self.angular_momentum_error:.1e} angular"),
+            ("time", f"{self.compile_seconds:.1f} s before the first step, "
+             f"{self.run_seconds:.1f} s run ({self.run_cpu_seconds:.1f} s of CPU)"),
+        ]
+        lines = [f"{name:18s} {text}" for name, text in rows]
+        return "\n".join([*lines, *(f"warning: {need}" for need in self.needs)])

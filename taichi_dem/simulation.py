@@ -1,0 +1,164 @@
+"""A scene on the device, ready to step: builds every part once and ties them together."""
+
+import math
+import time
+
+from taichi_dem import runtime
+from taichi_dem.errors import InputError, SimulationDiverged
+from taichi_dem.health import Health
+from taichi_dem.ledger import Ledger
+from taichi_dem.model import Model
+from taichi_dem.report import Report
+from taichi_dem.state import NEVER, State
+from taichi_dem.step.advance import Advance
+from taichi_dem.step.broad_phase import BroadPhase
+from taichi_dem.step.contacts import Contacts
+from taichi_dem.step.drivers import DRIVERS, Step
+from taichi_dem.step.schedule import Schedule
+from taichi_dem.timeline import MACRO_TICKS
+from taichi_dem.watch import Watch
+
+#: Bonds from which on a CPU with several threads the parallel driver is the faster one.
+PARALLEL_FROM = 20000
+
+
+class Simulation:
+    """One scene, one method, one driver.
+
+    driver: "resident", "parallel", or "auto": parallel on a GPU and for large scenes.
+    brute_force: contact search without cells, for tests.
+    Raises InputError for an unknown driver, or "resident" on a GPU.
+    """
+
+    def __init__(self, scene, method, driver="auto", brute_force=False):
+        self.generation = runtime.generation()
+        started = time.perf_counter()
+        self.scene, self.method = scene, method
+        self.model = Model(scene.mesh, scene.material, scene.effects)
+        self.state = State(self.model, scene.max_speed)
+        self._build_contacts(brute_force)
+        self.advance = Advance(self.model, self.state, self.schedule, self.contacts)
+        step = Step(self.advance, self.schedule, self.contacts)
+        self.driver = DRIVERS[_driver_name(driver, self.model.bond_count)](step)
+        self.step = step
+        self.ledger = None
+        self.searches = 0
+        self.compile_seconds = time.perf_counter() - started
+        self.run_seconds = self.run_cpu_seconds = 0.0
+
+    def _build_contacts(self, brute_force):
+        model, state, method = self.model, self.state, self.method
+        self.contacts = Contacts(model, state) if model.has_contact else None
+        drifted = method.neighbour == "drifted"
+        self.schedule = Schedule(
+            model, state, self.contacts, method.criterion(), method.dt0, method.uniform, drifted
+        )
+        self.broad_phase = None
+        if self.contacts is not None:
+            self.broad_phase = BroadPhase(self.contacts, self.schedule, brute_force)
+
+    @property
+    def time_s(self):
+        """Present time [s]."""
+        return self.state.tick[None] * self.schedule.tick_seconds
+
+    def start(self):
+        """Choose the first steps, evaluate the bonds and open the account; done once.
+
+        Compiles everything, so that stepping afterwards is all that is timed as the run.
+        """
+        if self.ledger is not None:
+            return
+        started = time.perf_counter()
+        if self.model.has_contact and self.model.contact.outer_faces:
+            self.state.expose(self.model.topology)
+        self.step.prime()
+        if self.contacts is not None:
+            self.broad_phase.search()
+        self.ledger = Ledger(self.model, self.state, self.advance, self.contacts)
+        self.health = Health(self.model, self.state, self.schedule, self.contacts, self.ledger)
+        self.watch = Watch(self.model, self.state, self.advance)
+        self.watch.look(0.0)
+        self.driver.compile()
+        self.compile_seconds += time.perf_counter() - started
+
+    def advance_to(self, macro_step, on_call=None):
+        """Step until a number of largest steps; on_call() is called about five times a second.
+
+        Raises SimulationDiverged with place and reason when the run leaves its bounds.
+        """
+        if self.generation != runtime.generation():
+            raise InputError("this simulation belongs to a Taichi session that has been stopped")
+        self.start()
+        end = macro_step * MACRO_TICKS
+        wall, cpu = time.perf_counter(), time.process_time()
+        try:
+            while self.state.tick[None] < end:
+                self.driver.run(end)
+                if self.contacts is not None and self.contacts.search_due[None]:
+                    self.broad_phase.search()
+                    self.searches += 1
+                self.health.check()
+                if on_call is not None:
+                    on_call()
+        finally:
+            self.run_seconds += time.perf_counter() - wall
+            self.run_cpu_seconds += time.process_time() - cpu
+
+    def gas_work(self):
+        """Work of the gas pressure [J], zero without it."""
+        places = [k for k, load in enumerate(self.model.loads) if load.name == "gas_pressure"]
+        return sum(self.ledger.load_work(place) for place in places)
+
+    def report(self):
+        """Report of the run so far."""
+        counts = [int(value) for value in self.schedule.evaluations.to_numpy()]
+        linear, angular = self.ledger.momentum_errors()
+        levels = self.state.level.to_numpy()
+        return Report(
+            method=self.method.name,
+            driver=self.driver.name,
+            effects=tuple(effect.name for effect in self.model.effects if effect.name),
+            until_s=self.time_s,
+            body_count=self.model.body_count,
+            bond_count=self.model.bond_count,
+            broken_faces=int((self.state.broken_tick.to_numpy() != NEVER).sum()),
+            smallest_step_s=self.method.dt0 / 2.0 ** int(levels.max()),
+            substeps=counts[0],
+            body_updates=counts[1],
+            bond_evaluations=counts[2],
+            pair_evaluations=counts[3],
+            uniform_evaluations=counts[4],
+            searches=self.searches,
+            ledger=self.ledger.account(),
+            linear_momentum_error=float(linear),
+            angular_momentum_error=float(angular),
+            compile_seconds=self.compile_seconds,
+            run_seconds=self.run_seconds,
+            run_cpu_seconds=self.run_cpu_seconds,
+            needs=self.watch.findings(),
+        )
+
+
+def _driver_name(name, bond_count):
+    arch = runtime.settings().arch
+    if name == "auto":
+        large = bond_count >= PARALLEL_FROM and runtime.settings().threads > 1
+        return "parallel" if arch == "cuda" or large else "resident"
+    if name not in DRIVERS:
+        raise InputError(f"driver must be one of auto, {', '.join(DRIVERS)}, got {name!r}")
+    if name == "resident" and arch == "cuda":
+        raise InputError("driver 'resident' runs on a CPU only: use 'parallel' with arch 'cuda'")
+    return name
+
+
+def macro_steps(until, dt0):
+    """Number of largest steps that reach a time [s]; InputError unless it is positive, finite."""
+    if isinstance(until, bool) or not isinstance(until, (int, float)):
+        raise InputError(f"until must be a positive time in s, got {until!r}")
+    if not (math.isfinite(until) and until > 0.0):
+        raise InputError(f"until must be a positive time in s, got {until!r}")
+    return max(1, math.ceil(until / dt0 - 1e-9))
+
+
+__all__ = ["Simulation", "SimulationDiverged", "macro_steps"]
