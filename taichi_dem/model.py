@@ -14,7 +14,7 @@ from taichi_dem.types import mat3, real, vec4
 class Model:
     """Constant tables of a scene and the effects bound to them.
 
-    mass [kg], inertia [kg m^2] and its inverse, radius (of the ball around the body, [m]) have
+    mass [kg] and inertia [kg m^2] with their inverses, and radius (of the ball around the body, [m]) have
     one entry a body. bond_slots names the two faces of a bond as 4 * body + local face, master
     first; bond_frame has rows normal, xi, eta in the master's body frame; bond_stiffness normal
     and shear [Pa/m]. vertex_master (face frame) and vertex_slave (body frame) [m] have one
@@ -54,6 +54,7 @@ class Model:
     def _allocate_bodies(self):
         n = self.body_count
         self.mass = ti.field(real, shape=n)
+        self.mass_inverse = ti.field(real, shape=n)
         self.radius = ti.field(real, shape=n)
         self.inertia = ti.Matrix.field(3, 3, real, shape=n)
         self.inertia_inverse = ti.Matrix.field(3, 3, real, shape=n)
@@ -75,7 +76,7 @@ class Model:
         inverse: ti.types.ndarray(dtype=ti.f64, ndim=3),
     ):
         for i in range(self.body_count):
-            self.mass[i] = mass[i]
+            self.mass[i], self.mass_inverse[i] = mass[i], 1.0 / mass[i]
             self.radius[i] = radius[i]
             for r, c in ti.static(ti.ndrange(3, 3)):
                 self.inertia[i][r, c] = inertia[i, r, c]

@@ -223,15 +223,14 @@ class Advance:
                 angular += torque * elapsed
                 for k in ti.static(range(3)):
                     kick[e, k], kick[e, 3 + k] = force[k] * elapsed, torque[k] * elapsed
-        velocity = before + linear / self.model.mass[i]
-        if ti.static(len(self.model.loads) > 0):
-            mean = 0.5 * (before + velocity)
-            spin = self.spin(i, momentum + 0.5 * angular)
-            for e in ti.static(range(len(self.model.loads))):
-                if self.model.loads[e].acts_on(i):
-                    push = vec3(kick[e, 0], kick[e, 1], kick[e, 2])
-                    twist = vec3(kick[e, 3], kick[e, 4], kick[e, 5])
-                    self._book(i, e, push.dot(mean) + twist.dot(spin), push, twist)
+        velocity = before + linear * self.model.mass_inverse[i]
+        for e in ti.static(range(len(self.model.loads))):
+            if self.model.loads[e].acts_on(i):
+                push = vec3(kick[e, 0], kick[e, 1], kick[e, 2])
+                twist = vec3(kick[e, 3], kick[e, 4], kick[e, 5])
+                spin = self.spin(i, momentum + 0.5 * angular)
+                work = 0.5 * push.dot(before + velocity) + twist.dot(spin)
+                self._book(i, e, work, push, twist)
         return velocity, momentum + angular
 
     @ti.func

@@ -84,6 +84,7 @@ class BroadPhase:
             for f in range(4):
                 exposed = exposed or self.state.exposed_tick[4 * i + f] >= 0
             if exposed:
+                self.contacts.rough[i] = 1
                 self.rough[count] = i
                 count += 1
         self.rough_count[None] = count

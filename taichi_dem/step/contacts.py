@@ -20,7 +20,7 @@ class Contacts:
     pair_sphere. pair_slot[2 p + side]: impulse [N s] and moment about the body's centre [N m s]
     gathered for that side. pair_heat: energy into dashpots, friction, and injected [J]; those of
     pairs that have left the list are in heat. first_of[i]: first pair whose first body is i;
-    touch_first, touch: pairs whose second body is i. travel: bound of the way any point of a
+    touch_first, touch: pairs whose second body is i. rough: 1 for a body with spheres. travel: bound of the way any point of a
     body went since the search [m]. search_due: 1 when the list may miss a contact.
     """
 
@@ -39,6 +39,7 @@ class Contacts:
         self.first_of = ti.field(ti.i32, shape=n + 1)
         self.touch_first = ti.field(ti.i32, shape=n + 2)
         self.touch = ti.field(ti.i32, shape=self.capacity)
+        self.rough = ti.field(ti.i32, shape=n)
         self.travel = ti.field(real, shape=n)
         self.skin = ti.field(real, shape=())
         self.skin[None] = effect.skin
@@ -98,7 +99,9 @@ class Contacts:
     @ti.func
     def moved(self, i, velocity, spin, elapsed):
         """Add to the way of body i and ask for a search once it may have left the skin."""
-        way = self.travel[i] + (velocity.norm() + spin.norm() * self.model.radius[i]) * elapsed
-        self.travel[i] = way
-        if way > 0.5 * self.skin[None]:
-            self.search_due[None] = 1
+        if self.rough[i] == 1:
+            speed = velocity.norm() + spin.norm() * self.model.radius[i]
+            way = self.travel[i] + speed * elapsed
+            self.travel[i] = way
+            if way > 0.5 * self.skin[None]:
+                self.search_due[None] = 1

@@ -147,7 +147,9 @@ class Schedule:
         if level >= low:
             wanted = self.criterion.wanted(level, speed2, low)
             if ti.static(self.uniform):
-                ti.atomic_max(self.wanted[None], wanted)
+                # Ask first: an atomic for every body costs as much as its rotation.
+                if wanted > self.wanted[None]:
+                    ti.atomic_max(self.wanted[None], wanted)
             elif wanted != level:
                 self.state.level[i] = wanted
                 self.dirty[None] = 1
