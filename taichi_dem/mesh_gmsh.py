@@ -67,16 +67,16 @@ def block_with_hole(
     hole=(1.6, 1.0),
     hole_diameter=0.05,
     hole_segments=8,
-    size_hole=0.05,
-    size_far=0.3,
-    distance_far=1.0,
+    size_hole=0.055,
+    size_far=0.5,
+    distance_far=1.11,
 ) -> None:
     """Write a block with a round hole through its depth as a Gmsh 4.1 text file.
 
     The block fills [0, width] x [0, height] x [0, depth] (x right, y up, z to the viewer), the
     hole's axis runs along z through ``hole`` = (x, y); all lengths in m.  The hole is a polygon of
-    ``hole_segments`` chords; elements measure ``size_hole`` at its wall and grow linearly to
-    ``size_far`` at the distance ``distance_far`` from it.
+    ``hole_segments`` chords, its wall regular triangles in layers of about ``size_hole``; elements
+    grow linearly from there to ``size_far`` at the distance ``distance_far``.
     Physical groups: volume block; faces hole, left, right, bottom, top, back, front.
     The same Gmsh writes the same file every time.
 
@@ -139,7 +139,7 @@ def _add_geometry(model, block):
     drawn = geo.extrude([(2, back)], 0.0, 0.0, block.depth)
     front, volume, *sides = [tag for _, tag in drawn]
     geo.synchronize()
-    _divide_circles(model, sides[4:], block.hole_segments // 4)
+    _divide_walls(model, sides[4:], block)
     faces = dict(zip(("bottom", "right", "top", "left"), ([tag] for tag in sides[:4])))
     faces.update(hole=sides[4:], back=[back], front=[front])
     model.addPhysicalGroup(3, [volume], name="block")
@@ -163,11 +163,16 @@ def _circle(geo, block):
     return [geo.addCircleArc(ends[k], centre, ends[(k + 1) % 4]) for k in range(4)]
 
 
-def _divide_circles(model, walls, segments):
-    """Chords of every quarter arc of the hole's walls, at both of their ends."""
-    for _, curve in model.getBoundary([(2, wall) for wall in walls], combined=False):
-        if model.getType(1, abs(curve)) == "Circle":
-            model.mesh.setTransfiniteCurve(abs(curve), segments + 1)
+def _divide_walls(model, walls, block):
+    """Regular triangles on the hole's walls: chords around it, layers of size_hole along it."""
+    chords = block.hole_segments // 4
+    layers = max(1, round(block.depth / block.size_hole))
+    for wall in walls:
+        for _, curve in model.getBoundary([(2, wall)], combined=False):
+            arc = model.getType(1, abs(curve)) == "Circle"
+            model.mesh.setTransfiniteCurve(abs(curve), (chords if arc else layers) + 1)
+        # Alternating diagonals: all of one hand would give the block a twist.
+        model.mesh.setTransfiniteSurface(wall, "AlternateRight")
 
 
 def _add_sizes(field, block):

@@ -72,21 +72,35 @@ class Report:
         rows = [
             ("method", f"{self.method}, {self.driver} driver"),
             ("effects", ", ".join(self.effects) or "none"),
-            ("simulated", f"{self.until_s:.4g} s, {self.broken_faces} of {self.bond_count} "
-             f"bonds broken"),
+            (
+                "simulated",
+                f"{self.until_s:.4g} s, {self.broken_faces} of {self.bond_count} bonds broken",
+            ),
             ("smallest step", f"{self.smallest_step_s:.3g} s"),
             ("substeps", f"{self.substeps:,}"),
-            ("evaluations", f"{self.bond_evaluations:,} bonds, {self.pair_evaluations:,} pairs, "
-             f"{self.body_updates:,} bodies"),
-            ("gain over uniform", f"{self.ideal_gain:.2f} ideal, {self.boundary_gain:.2f} with "
-             f"the pairs at the finer step"),
+            (
+                "evaluations",
+                f"{self.bond_evaluations:,} bonds, {self.pair_evaluations:,} pairs, "
+                f"{self.body_updates:,} bodies",
+            ),
+            (
+                "gain over uniform",
+                f"{self.ideal_gain:.2f} ideal, {self.boundary_gain:.2f} with "
+                f"the pairs at the finer step",
+            ),
             ("contact searches", f"{self.searches:,}"),
             ("work put in", f"{self.ledger['load_work'] + self.ledger['support_work']:.6g} J"),
             ("ledger residual", f"{100 * self.ledger_residual_fraction:.3g} % of it"),
-            ("momentum error", f"{self.linear_momentum_error:.1e} linear, "
-             f"{self.angular_momentum_error:.1e} angular"),
-            ("time", f"{self.compile_seconds:.1f} s before the first step, "
-             f"{self.run_seconds:.1f} s run ({self.run_cpu_seconds:.1f} s of CPU)"),
+            (
+                "momentum error",
+                f"{self.linear_momentum_error:.1e} linear, "
+                f"{self.angular_momentum_error:.1e} angular",
+            ),
+            (
+                "time",
+                f"{self.compile_seconds:.1f} s before the first step, "
+                f"{self.run_seconds:.1f} s run ({self.run_cpu_seconds:.1f} s of CPU)",
+            ),
         ]
         lines = [f"{name:18s} {text}" for name, text in rows]
         return "\n".join([*lines, *(f"warning: {need}" for need in self.needs)])
