@@ -9,7 +9,9 @@ A scene is a mesh, a material and the effects that act; ``simulate`` runs it::
     result = simulate(scene, method=Multirate(), until=1e-4)
 """
 
-from taichi_dem import runtime  # first: prepares the environment for ``import taichi``
+# First, out of order: it prepares the environment for ``import taichi``.
+from taichi_dem import runtime  # isort: skip
+
 from taichi_dem import effects, methods
 from taichi_dem.errors import InputError, SimulationDiverged
 from taichi_dem.materials import CONCRETE, Material

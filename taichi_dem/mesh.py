@@ -168,8 +168,8 @@ def _refuse_coincident(points):
         first = points[pairs[0, 0]]
         raise InputError(
             f"{len(np.unique(pairs[:, 1]))} points coincide with another, the first at "
-            f"({first[0]:g}, {first[1]:g}, {first[2]:g}) m; pass weld_tolerance={2.0 * distance:.1e} "
-            "to join them"
+            f"({first[0]:g}, {first[1]:g}, {first[2]:g}) m; pass "
+            f"weld_tolerance={2.0 * distance:.1e} to join them"
         )
 
 

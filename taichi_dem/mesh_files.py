@@ -1,4 +1,4 @@
-"""Mesh files: read any of meshio's formats, write Gmsh, VTU and PVD; the only importer of meshio."""
+"""Mesh files: read all that meshio can, write Gmsh, VTU and PVD; the only importer of meshio."""
 
 from __future__ import annotations
 

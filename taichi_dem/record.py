@@ -34,8 +34,8 @@ ENERGY_COLUMNS = (
 class Frame:
     """The block at one time.
 
-    time_s; position, displacement, velocity (n, 3) in m and m/s; rotation (n, 3, 3), body to world; level (n,);
-    damage (n,) in [0, 1], the mean over a body's bonds.
+    time_s; position, displacement, velocity (n, 3) in m and m/s; rotation (n, 3, 3), body to
+    world; level (n,); damage (n,) in [0, 1], the mean over a body's bonds.
     """
 
     time_s: float

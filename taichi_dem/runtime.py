@@ -108,6 +108,8 @@ def _initialise(wanted):
             default_fp=ti.f64,
             default_ip=ti.i32,
             fast_math=False,
+            # Three times the compile time for nothing: LLVM optimises these kernels as well alone.
+            advanced_optimization=False,
             cpu_max_num_threads=wanted.threads,
             debug=wanted.debug,
             log_level=ti.WARN,

@@ -13,7 +13,7 @@ from taichi_dem.state import NEVER, State
 from taichi_dem.step.advance import Advance
 from taichi_dem.step.broad_phase import BroadPhase
 from taichi_dem.step.contacts import Contacts
-from taichi_dem.step.drivers import DRIVERS, Step
+from taichi_dem.step.drivers import CALL_SECONDS, DRIVERS, Step
 from taichi_dem.step.schedule import Schedule
 from taichi_dem.timeline import MACRO_TICKS
 from taichi_dem.watch import Watch
@@ -94,16 +94,23 @@ class Simulation:
         wall, cpu = time.perf_counter(), time.process_time()
         try:
             while self.state.tick[None] < end:
-                self.driver.run(end)
-                if self.contacts is not None and self.contacts.search_due[None]:
-                    self.broad_phase.search()
-                    self.searches += 1
+                self._run_for_a_while(end)
                 self.health.check()
                 if on_call is not None:
                     on_call()
         finally:
             self.run_seconds += time.perf_counter() - wall
             self.run_cpu_seconds += time.process_time() - cpu
+
+    def _run_for_a_while(self, end):
+        """Run the driver, and the searches it halts for, for about CALL_SECONDS."""
+        started = time.perf_counter()
+        while self.state.tick[None] < end and time.perf_counter() - started < CALL_SECONDS:
+            self.driver.run(end)
+            self.health.check_speed()
+            if self.contacts is not None and self.contacts.search_due[None]:
+                self.broad_phase.search()
+                self.searches += 1
 
     def gas_work(self):
         """Work of the gas pressure [J], zero without it."""

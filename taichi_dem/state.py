@@ -23,8 +23,9 @@ class State:
     broken_tick: when a bond was released, NEVER while it holds. exposed_tick: since when a face
     carries contact spheres.
     bond_heat: energy that dashpots, slip and release have taken from each bond [J].
-    load_work [J], one component a load and a last one for supports, and load_impulse of all of
-    them (linear, and angular about the origin), one entry a body. tick: present time. bad_body: lowest body out of bounds, body_count if none.
+    load_work: work [J], one component a load and a last one for supports; load_impulse: what all
+    of them gave a body (linear, and angular about the origin). tick: present time. bad_body:
+    lowest body out of bounds, body_count if none.
     """
 
     def __init__(self, model, max_speed):

@@ -39,7 +39,7 @@ _NEEDS = (
 
 @ti.data_oriented
 class Watch:
-    """Counts the places where an absent effect would have acted; costs nothing between recordings."""
+    """Counts the places where an absent effect would have acted, at recording times."""
 
     def __init__(self, model, state, advance):
         self.model, self.state, self.advance = model, state, advance

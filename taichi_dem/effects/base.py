@@ -3,8 +3,8 @@
 An effect owns its parameters (in fields, so that sweeping them compiles nothing anew) and its
 state. Its ``role`` says where ``step/advance.py`` asks for it:
 
-tension   ``traction(b, u, opening)`` [Pa], ``failed(u)``, ``stored(b, u, opening)``, ``spent(b, u)`` [J/m^2],
-          ``damage(b, u)``
+tension   ``traction(b, u, opening)`` [Pa], ``failed(u)``, ``stored(b, u, opening)`` and
+          ``spent(b, u)`` [J/m^2], ``damage(b, u)``
 shear     ``traction(b, u, sliding, pressure)`` -> (traction [Pa], energy slipped away [J/m^2]),
           ``stored(b, u, sliding)``
 dashpot   ``traction(velocity)`` [Pa] of a contact unit

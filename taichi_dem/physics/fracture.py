@@ -17,8 +17,10 @@ def envelope_traction(strength, onset, failure, opening):
 
 @ti.func
 def softening_energy(strength, onset, failure, limit):
-    """Energy spent by softening up to an elastic limit: area under the law less the triangle
-    that unloading to the origin gives back; the fracture energy once the unit has failed.
+    """Energy spent by softening up to an elastic limit.
+
+    The area under the law less the triangle that unloading to the origin gives back; the fracture
+    energy once the unit has failed.
     """
     reached = ti.min(limit, failure)
     traction = envelope_traction(strength, onset, failure, reached)

@@ -20,8 +20,9 @@ class Contacts:
     pair_sphere. pair_slot[2 p + side]: impulse [N s] and moment about the body's centre [N m s]
     gathered for that side. pair_heat: energy into dashpots, friction, and injected [J]; those of
     pairs that have left the list are in heat. first_of[i]: first pair whose first body is i;
-    touch_first, touch: pairs whose second body is i. rough: 1 for a body with spheres. travel: bound of the way any point of a
-    body went since the search [m]. search_due: 1 when the list may miss a contact.
+    touch_first, touch: pairs whose second body is i. rough: 1 for a body with spheres. travel:
+    bound of the way any point of a body went since the search [m]. search_due: 1 when the list
+    may miss a contact. deepest: overlap of a pair in radii of the smaller sphere.
     """
 
     def __init__(self, model, state):
