@@ -129,18 +129,22 @@ class Advance:
         pair = self.contacts.pair_body[p]
         i, j = pair[0], pair[1]
         branch = self.state.position[j] - self.state.position[i]
+        # Most candidates do not touch: find out in the first body's frame, where it costs half.
+        back = self.state.rotation[i].transpose()
+        turn, offset = back @ self.state.rotation[j], back @ branch
         force, moment_i, moment_j = zero3(), zero3(), zero3()
         dragged, rubbed, deepest = 0.0, 0.0, 0.0
         for k in range(self.contacts.pair_first[p], self.contacts.pair_first[p + 1]):
             a, b = self.contacts.pair_sphere[k][0], self.contacts.pair_sphere[k][1]
-            arm_i, arm_j = self.contacts.arms(i, j, a, b)
-            apart = branch + arm_j - arm_i
-            radius = self.model.sphere[a][3]
-            reach = radius + self.model.sphere[b][3]
+            first, second = self.model.sphere[a], self.model.sphere[b]
+            apart = turn @ second.xyz + offset - first.xyz
+            reach = first[3] + second[3]
             if apart.norm_sqr() < reach * reach:
                 distance = ti.max(apart.norm(), 1e-30)
-                normal, overlap = apart / distance, reach - distance
-                arm = arm_i + (radius - 0.5 * overlap) * normal
+                overlap = reach - distance
+                normal = self.state.rotation[i] @ apart / distance
+                depth = first[3] - 0.5 * overlap
+                arm = self.state.rotation[i] @ first.xyz + depth * normal
                 velocity = self._velocity_at(j, arm - branch) - self._velocity_at(i, arm)
                 rate = velocity.dot(normal)
                 slide = velocity - rate * normal
@@ -152,11 +156,12 @@ class Advance:
                 moment_j += (arm - branch).cross(pushed)
                 dragged += (self.contacts.law.elastic(overlap) - push) * rate
                 rubbed -= rub.dot(slide)
-                deepest = ti.max(deepest, overlap / ti.min(radius, reach - radius))
-        dt = self.schedule.pair_step(i, j)
-        self._push_apart(2 * p, -force * dt, moment_i * dt)
-        self._push_apart(2 * p + 1, force * dt, moment_j * dt)
-        self.contacts.pair_heat[p] += dt * vec3(dragged, rubbed, 0.0)
+                deepest = ti.max(deepest, overlap / ti.min(first[3], second[3]))
+        if deepest > 0.0:
+            dt = self.schedule.pair_step(i, j)
+            self._push_apart(2 * p, -force * dt, moment_i * dt)
+            self._push_apart(2 * p + 1, force * dt, moment_j * dt)
+            self.contacts.pair_heat[p] += dt * vec3(dragged, rubbed, 0.0)
         self.contacts.deepest[p] = deepest
 
     @ti.func

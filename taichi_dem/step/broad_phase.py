@@ -41,6 +41,8 @@ class BroadPhase:
         self.old_slot = ti.Vector.field(6, real, shape=2 * contacts.capacity)
         self.old_first_of = ti.field(ti.i32, shape=n + 1)
         self.full = ti.field(ti.i32, shape=())
+        self.cluster = ti.Vector.field(3, real, shape=4 * n)
+        self.sphere = ti.Vector.field(3, real, shape=4 * n * self.model.spheres_per_face)
 
     def search(self):
         """Rebuild the lists. Raises InputError when they outgrow the room the scene gave them."""
@@ -56,6 +58,8 @@ class BroadPhase:
         for _ in range(1):
             self._list_rough()
             self._fill_cells()
+        for a in range(self.rough_count[None]):
+            self._place_spheres(self.rough[a])
         for a in range(self.rough_count[None]):
             self._list_near(self.rough[a])
         for p in range(self.contacts.pair_count[None]):
@@ -89,6 +93,17 @@ class BroadPhase:
                 count += 1
         self.rough_count[None] = count
         self.full[None] = 0
+
+    @ti.func
+    def _place_spheres(self, i):
+        """World positions of a body's spheres, computed once for the many that ask."""
+        size = ti.static(self.model.spheres_per_face)
+        position, rotation = self.state.position[i], self.state.rotation[i]
+        for face in range(4 * i, 4 * i + 4):
+            if self.state.exposed_tick[face] >= 0:
+                self.cluster[face] = position + rotation @ self.model.cluster[face].xyz
+                for s in range(size * face, size * face + size):
+                    self.sphere[s] = position + rotation @ self.model.sphere[s].xyz
 
     @ti.func
     def _fill_cells(self):
@@ -173,12 +188,9 @@ class BroadPhase:
         """Whether two faces carry spheres and the balls around these come within the skin."""
         near = False
         if self.state.exposed_tick[face_i] >= 0 and self.state.exposed_tick[face_j] >= 0:
-            i, j = face_i >> 2, face_j >> 2
-            a, b = self.model.cluster[face_i], self.model.cluster[face_j]
-            apart = self.state.position[j] + self.state.rotation[j] @ b.xyz
-            apart -= self.state.position[i] + self.state.rotation[i] @ a.xyz
-            reach = a[3] + b[3] + self.contacts.skin[None]
-            near = apart.norm_sqr() < reach * reach
+            reach = self.model.cluster[face_i][3] + self.model.cluster[face_j][3]
+            reach += self.contacts.skin[None]
+            near = (self.cluster[face_j] - self.cluster[face_i]).norm_sqr() < reach * reach
         return near
 
     @ti.func
@@ -229,7 +241,9 @@ class BroadPhase:
             if not bonded and self._faces_near(face_i, face_j):
                 for ab in range(size * size):
                     a, b = size * face_i + ab // size, size * face_j + ab % size
-                    if self.contacts.gap(i, j, a, b) < self.contacts.skin[None]:
+                    reach = self.model.sphere[a][3] + self.model.sphere[b][3]
+                    reach += self.contacts.skin[None]
+                    if (self.sphere[b] - self.sphere[a]).norm_sqr() < reach * reach:
                         if write:
                             self.contacts.pair_sphere[start + count] = [a, b]
                         count += 1

@@ -48,15 +48,10 @@ class Contacts:
         self.deepest = ti.field(real, shape=self.capacity)
 
     @ti.func
-    def arms(self, i, j, a, b):
-        """World vectors [m]: centre i to sphere a, and centre j to sphere b."""
-        on_first = self.state.rotation[i] @ self.model.sphere[a].xyz
-        return on_first, self.state.rotation[j] @ self.model.sphere[b].xyz
-
-    @ti.func
     def gap(self, i, j, a, b):
         """Distance between the surfaces of spheres a of body i and b of body j [m]."""
-        on_first, on_second = self.arms(i, j, a, b)
+        on_first = self.state.rotation[i] @ self.model.sphere[a].xyz
+        on_second = self.state.rotation[j] @ self.model.sphere[b].xyz
         apart = self.state.position[j] + on_second - self.state.position[i] - on_first
         return apart.norm() - self.model.sphere[a][3] - self.model.sphere[b][3]
 

@@ -1,0 +1,203 @@
+"""What all experiments share: options, exit codes, progress, summary.json."""
+
+import argparse
+import json
+import math
+import os
+import platform
+import subprocess
+import sys
+from importlib.metadata import version
+
+from taichi_dem import InputError, SimulationDiverged, runtime
+from taichi_dem.record import output_folder, write_atomically
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+PAPER_BLOCK = os.path.join(HERE, "meshes", "paper_block.msh")
+
+
+class Parser(argparse.ArgumentParser):
+    """An argument parser whose complaints are one sentence."""
+
+    def error(self, message):
+        """Turn a wrong command line into an InputError."""
+        raise InputError(message)
+
+
+def number(low, high, *, open_low=True):
+    """Type of an option that is a number in a range; the range stands in the complaint."""
+    left = "(" if open_low else "["
+
+    def parse(text):
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        inside = low < value < high or (value == low and not open_low)
+        if not inside:
+            raise argparse.ArgumentTypeError(
+                f"must be a number in {left}{low:g}, {high:g}), got {text!r}"
+            )
+        return value
+
+    return parse
+
+
+def whole(low, high):
+    """Type of an option that is a whole number in a range."""
+
+    def parse(text):
+        try:
+            value = int(text)
+        except ValueError:
+            value = low - 1
+        if not low <= value <= high:
+            raise argparse.ArgumentTypeError(
+                f"must be a whole number from {low} to {high}, got {text!r}"
+            )
+        return value
+
+    return parse
+
+
+def parser(name, description):
+    """Parser with the options every experiment has."""
+    made = Parser(prog=f"python experiments/{name}.py", description=description)
+    made.add_argument("--quick", action="store_true", help="a smaller job of under a minute")
+    made.add_argument("--out", default=os.path.join("results", name), help="folder for the output")
+    made.add_argument("--arch", default="cpu", choices=runtime.ARCHITECTURES)
+    made.add_argument("--driver", default="auto", choices=("auto", "resident", "parallel"))
+    made.add_argument("--threads", type=whole(1, 1024), default=None, help="CPU threads")
+    return made
+
+
+def main(run, made, arguments=None):
+    """Parse, start Taichi, run; returns the exit code.
+
+    0 done, 2 bad input, 3 diverged, 130 interrupted: each of the latter with one line on stderr.
+    """
+    try:
+        options = made.parse_args(arguments)
+        runtime.start(options.arch, options.threads)
+        output_folder(options.out)
+        run(options)
+    except InputError as error:
+        return _say(error, 2)
+    except SimulationDiverged as error:
+        return _say(error, 3)
+    except KeyboardInterrupt:
+        return _say("interrupted", 130)
+    return 0
+
+
+def _say(message, code):
+    print(" ".join(str(message).split()), file=sys.stderr)
+    return code
+
+
+class ProgressBar:
+    """Progress with time left and speed on a terminal; silent in a pipe."""
+
+    def __init__(self, title):
+        self.title = title
+        self.bar = None
+
+    def __enter__(self):
+        if sys.stderr.isatty():
+            from rich.console import Console
+            from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+            self.bar = Progress(
+                TextColumn("{task.description}"),
+                BarColumn(),
+                TextColumn("{task.percentage:>3.0f} %  {task.fields[speed]}"),
+                TimeRemainingColumn(),
+                console=Console(stderr=True),
+                transient=True,
+            )
+            self.bar.start()
+            self.task = self.bar.add_task(self.title, total=1.0, speed="compiling")
+        return self
+
+    def __call__(self, progress):
+        """Show a ``taichi_dem.simulate.Progress``."""
+        if self.bar is not None:
+            elapsed = max(self.bar.tasks[0].elapsed or 0.0, 1e-9)
+            speed = f"{1e6 * progress.time_s / elapsed:.3g} us/s, {progress.substeps:,} substeps"
+            share = progress.time_s / progress.until_s
+            self.bar.update(self.task, completed=share, speed=speed)
+
+    def __exit__(self, *_):
+        if self.bar is not None:
+            self.bar.stop()
+
+
+def figure(value, unit, paper=None):
+    """One figure of summary.json."""
+    return {"value": value, "unit": unit, "paper": paper}
+
+
+def write_summary(folder, name, figures, *, compile_seconds, run_seconds):
+    """Write summary.json: figures, machine, versions, seconds; see ``figure``."""
+    settings = runtime.settings()
+    content = {
+        "experiment": name,
+        "figures": figures,
+        "machine": {
+            "processor": processor(),
+            "cores": os.cpu_count(),
+            "arch": settings.arch,
+            "threads": settings.threads,
+            "system": platform.platform(),
+        },
+        "versions": versions(),
+        "seconds": {"compile": compile_seconds, "run": run_seconds},
+        "command": " ".join([f"experiments/{name}.py", *sys.argv[1:]]),
+    }
+    text = json.dumps(content, indent=1)
+    write_atomically(os.path.join(folder, "summary.json"), lambda handle: handle.write(text))
+
+
+def processor():
+    """Name of the processor, as the system gives it."""
+    try:
+        with open("/proc/cpuinfo") as lines:
+            names = [line.split(":", 1)[1].strip() for line in lines if "model name" in line]
+    except OSError:
+        names = []
+    return names[0] if names else platform.processor() or platform.machine()
+
+
+def versions():
+    """Versions of what computes, and the commit where there is one."""
+    found = {name: version(name) for name in ("taichi", "numpy", "taichi-dem")}
+    found["python"] = platform.python_version()
+    git = ["git", "-C", HERE, "rev-parse", "--short", "HEAD"]
+    try:
+        found["commit"] = subprocess.run(git, capture_output=True, text=True).stdout.strip()
+    except OSError:
+        found["commit"] = ""
+    return found
+
+
+def print_table(rows, header):
+    """Print rows of cells under a header, columns as wide as they need to be."""
+    cells = [header, *[[str(cell) for cell in row] for row in rows]]
+    widths = [max(len(row[k]) for row in cells) for k in range(len(header))]
+    for row in cells:
+        print("  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip())
+
+
+def print_figures(figures):
+    """Print the figures of summary.json beside the paper's values."""
+    rows = [
+        (name, _short(item["value"]), item["unit"], _short(item["paper"]))
+        for name, item in figures.items()
+    ]
+    print_table(rows, ["figure", "value", "unit", "paper"])
+
+
+def _short(value):
+    if value is None:
+        return ""
+    return f"{value:,}" if isinstance(value, int) else f"{value:.4g}"
