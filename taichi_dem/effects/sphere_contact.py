@@ -21,7 +21,7 @@ class SphereContact(Effect):
     name = "sphere_contact"
 
     def __init__(
-        self, divisions=5, outer_faces=False, skin=2e-4, pairs_per_body=24, spheres_per_body=160
+        self, divisions=5, outer_faces=False, skin=4e-4, pairs_per_body=24, spheres_per_body=160
     ):
         if not isinstance(divisions, int) or not 3 <= divisions <= 20:
             raise InputError(f"divisions must be a whole number from 3 to 20, got {divisions!r}")

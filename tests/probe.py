@@ -1,0 +1,161 @@
+"""One bond or one contact pair moved by hand: forces as ``Advance`` computes them."""
+
+import numpy as np
+import taichi as ti
+
+from taichi_dem import CONCRETE, Multirate, Scene, Simulation
+
+#: Step by which the probes divide impulses; a power of two loses no bit.
+STEP = 2.0**-20
+
+
+@ti.data_oriented
+class BondProbe:
+    """A bonded pair whose motion is prescribed; every call evaluates its bond once.
+
+    mesh: two bodies that share a face. Displacements [m], rotations and velocities are those of
+    the slave, the master rests, unless ``move`` is given both.
+    """
+
+    def __init__(self, mesh, effects, material=CONCRETE):
+        simulation = Simulation(Scene(mesh, material, effects), Multirate(STEP, 1.0))
+        self.simulation = simulation
+        self.model, self.state, self.advance = (
+            simulation.model,
+            simulation.state,
+            simulation.advance,
+        )
+        self.area = 3.0 * self.model.unit_area[0]
+        self.frame = self.model.bond_frame[0].to_numpy()
+        self.centre = self.model.centre
+        self._slots = self.model.bond_slots[0].to_numpy()
+        fields = self.state.fields()
+        names = ("softening_unit", "shear_slip", "broken_tick", "exposed_tick", "bond_heat")
+        self._changing = [(fields[n], fields[n].to_numpy()) for n in names if n in fields]
+
+    def reset(self):
+        """Undo all history of the bond."""
+        for field, first in self._changing:
+            field.from_numpy(first)
+        self.state.tick[None] = 0
+
+    def move(self, position, orientation=None, velocity=None, spin=None):
+        """Place both bodies, arrays (2, ...), and evaluate the bond; see ``evaluate``."""
+        still = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
+        self.state.place(position, still if orientation is None else orientation, velocity, spin)
+        return self.evaluate()
+
+    def open(self, opening, velocity=(0.0, 0.0, 0.0), spin=(0.0, 0.0, 0.0)):
+        """Displace the slave by an opening in the face frame [m] and evaluate.
+
+        velocity [m/s] and spin [rad/s] of the slave are in the face frame too. Returns the force
+        on the master per area in the face frame [Pa].
+        """
+        position = self.centre + np.outer([0.0, 1.0], self.frame.T @ opening)
+        motion = [np.outer([0.0, 1.0], self.frame.T @ np.asarray(v)) for v in (velocity, spin)]
+        wrench = self.move(position, None, *motion)
+        return self.frame @ wrench[0, :3] / self.area
+
+    def evaluate(self):
+        """Force [N] and torque about the own centre [N m] on master and slave, (2, 6)."""
+        wrench = np.zeros((2, 6))
+        self._evaluate(wrench)
+        return wrench / STEP
+
+    def stored(self):
+        """Elastic energy of the bond [J]."""
+        return self._stored()
+
+    def spent(self):
+        """Energy per area that softening has spent in the three units [J/m^2]."""
+        spent = np.zeros(3)
+        self._spent(spent)
+        return spent
+
+    @property
+    def heat(self):
+        """Energy taken by dashpots, slip and release [J]."""
+        return self.state.bond_heat[0].to_numpy()
+
+    @property
+    def broken(self):
+        """Whether the face is released."""
+        return self.state.broken_tick[0] >= 0
+
+    @ti.kernel
+    def _evaluate(self, wrench: ti.types.ndarray(dtype=ti.f64, ndim=2)):
+        for _ in range(1):
+            slots = self.model.bond_slots[0]
+            for side in ti.static(range(2)):
+                self.state.slot[slots[side]] = 0.0 * self.state.slot[slots[side]]
+            self.advance.bond(0)
+            for side in ti.static(range(2)):
+                for k in ti.static(range(6)):
+                    wrench[side, k] = self.state.slot[slots[side]][k]
+
+    @ti.kernel
+    def _stored(self) -> ti.f64:
+        return self.advance.bond_energy(0)
+
+    @ti.kernel
+    def _spent(self, spent: ti.types.ndarray(dtype=ti.f64, ndim=1)):
+        for q in range(3):
+            spent[q] = self.model.tension.spent(0, q)
+
+
+@ti.data_oriented
+class ContactProbe:
+    """Two loose bodies with spheres on every face; one chosen sphere pair is evaluated.
+
+    mesh: two bodies without a common face.
+    """
+
+    def __init__(self, mesh, effects, material=CONCRETE):
+        simulation = Simulation(Scene(mesh, material, effects), Multirate(STEP, 1.0))
+        self.model, self.state, self.advance = (
+            simulation.model,
+            simulation.state,
+            simulation.advance,
+        )
+        self.contacts = simulation.contacts
+        self.centre = self.model.centre
+        self.sphere = self.model.sphere.to_numpy()
+
+    def evaluate(self, spheres, position, orientation=None, velocity=None, spin=None, swap=False):
+        """Force [N] and torque [N m] on both bodies (2, 6), and the three heats per STEP [W].
+
+        spheres: sphere numbers on body 0 and body 1. swap: let body 1 be the first of the pair.
+        """
+        still = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
+        self.state.place(position, still if orientation is None else orientation, velocity, spin)
+        wrench, heat = np.zeros((2, 6)), np.zeros(3)
+        self._evaluate(spheres[0], spheres[1], int(swap), wrench, heat)
+        return wrench / STEP, heat / STEP
+
+    @ti.kernel
+    def _evaluate(
+        self,
+        a: ti.i32,
+        b: ti.i32,
+        swap: ti.i32,
+        wrench: ti.types.ndarray(dtype=ti.f64, ndim=2),
+        heat: ti.types.ndarray(dtype=ti.f64, ndim=1),
+    ):
+        for _ in range(1):
+            self.contacts.pair_count[None] = 1
+            self.contacts.pair_body[0] = [0, 1]
+            self.contacts.pair_sphere[0] = [a, b]
+            if swap == 1:
+                self.contacts.pair_body[0] = [1, 0]
+                self.contacts.pair_sphere[0] = [b, a]
+            self.contacts.pair_first[0], self.contacts.pair_first[1] = 0, 1
+            self.contacts.pair_heat[0] = 0.0 * self.contacts.pair_heat[0]
+            for side in ti.static(range(2)):
+                self.contacts.pair_slot[side] = 0.0 * self.contacts.pair_slot[side]
+            self.advance.contact(0)
+            for side in ti.static(range(2)):
+                place = side if swap == 0 else 1 - side
+                for k in ti.static(range(6)):
+                    wrench[side, k] = self.contacts.pair_slot[place][k]
+            for k in ti.static(range(3)):
+                heat[k] = self.contacts.pair_heat[0][k]
