@@ -12,7 +12,7 @@ A scene is a mesh, a material and the effects that act; ``simulate`` runs it::
 # First, out of order: it prepares the environment for ``import taichi``.
 from taichi_dem import runtime  # isort: skip
 
-from taichi_dem import effects, methods, plot
+from taichi_dem import effects, methods
 from taichi_dem.errors import InputError, SimulationDiverged
 from taichi_dem.materials import CONCRETE, Material
 from taichi_dem.mesh import Mesh, checked_mesh
@@ -39,7 +39,6 @@ __all__ = [
     "checked_mesh",
     "effects",
     "methods",
-    "plot",
     "quality_report",
     "read_mesh",
     "runtime",

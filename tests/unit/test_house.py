@@ -29,7 +29,9 @@ LAYERS = {
         ("state",),
         ("step",),
         ("ledger",),
-        ("record",),
+        ("health", "watch", "report"),
+        ("simulation",),
+        ("monitor", "record"),
         ("simulate",),
         ("plot",),
         ("__init__",),
@@ -49,7 +51,7 @@ ACROSS = {"ca_damper": ("taichi_dem.runtime",)}
 
 # Libraries and the only places that import them.
 OWNERS = {
-    "matplotlib": ("taichi_dem/plot.py", "ca_damper/plot.py"),
+    "matplotlib": ("taichi_dem/plot/", "ca_damper/plot.py"),
     "gmsh": ("taichi_dem/mesh_gmsh.py",),
     "meshio": ("taichi_dem/mesh_files.py",),
     "scipy": ("experiments/",),
@@ -314,7 +316,7 @@ GOOD = {
     STARTER: "import taichi as ti\nti.init(fast_math=False)\nimport taichi_dem.errors",
     PHYSICS: "from taichi_dem.types import real\nfrom . import rotation\nti.atomic_max(n[0], 1)",
     "taichi_dem/model.py": "from .physics.bond import motion\nfrom taichi_dem import materials",
-    "taichi_dem/plot.py": "import matplotlib\ndef _hidden():\n    pass",
+    "taichi_dem/plot/style.py": "import matplotlib\ndef _hidden():\n    pass",
     "taichi_dem/__init__.py": "from taichi_dem.simulate import simulate",
     "ca_damper/scene.py": "from taichi_dem import runtime\nfrom ca_damper.lattice import x",
     SCRIPT: "import _cli\nfrom taichi_dem import CONCRETE, plot\nimport scipy\nplot.init()",

@@ -1,0 +1,111 @@
+"""The contact search against all spheres compared with all, in NumPy."""
+
+import numpy as np
+import pytest
+
+from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects
+from taichi_dem.mesh_shapes import bar
+
+
+def scattered(skin, spread, brute_force=False, seed=2):
+    """A bar whose bodies are thrown about by `spread` [m], half of its faces broken."""
+    scene = Scene(bar(0.6, 0.2, (6, 2, 2)), CONCRETE, [effects.SphereContact(skin=skin)])
+    simulation = Simulation(scene, Uniform(1e-9), brute_force=brute_force)
+    random = np.random.default_rng(seed)
+    model, state = simulation.model, simulation.state
+    turn = random.standard_normal((model.body_count, 4))
+    turn /= np.linalg.norm(turn, axis=1, keepdims=True)
+    place = model.centre + spread * random.standard_normal((model.body_count, 3))
+    state.place(place, turn)
+    broken = random.random(model.bond_count) < 0.5
+    state.broken_tick.from_numpy(np.where(broken, 0, -1).astype(np.int64))
+    exposed = np.full(4 * model.body_count, -1, dtype=np.int64)
+    exposed[model.bond_slots.to_numpy()[broken].ravel()] = 0
+    state.exposed_tick.from_numpy(exposed)
+    simulation.start()
+    return simulation
+
+
+def listed(simulation):
+    """Sphere pairs in the lists of the search."""
+    contacts = simulation.contacts
+    last = contacts.pair_first[contacts.pair_count[None]]
+    return [tuple(pair) for pair in contacts.pair_sphere.to_numpy()[:last].tolist()]
+
+
+def expected(simulation, skin):
+    """Every pair of exposed spheres of two unbonded bodies with a gap below the skin."""
+    model, motion = simulation.model, simulation.state.motion()
+    size = model.spheres_per_face
+    sphere = model.sphere.to_numpy()
+    body = np.arange(len(sphere)) // (4 * size)
+    turned = np.einsum("nij,nj->ni", motion["rotation"][body], sphere[:, :3])
+    place = turned + motion["position"][body]
+    shown = np.flatnonzero(simulation.state.exposed_tick.to_numpy().repeat(size) >= 0)
+    intact = simulation.state.broken_tick.to_numpy() < 0
+    top = model.topology
+    bonded = set(zip(top.master[intact].tolist(), top.slave[intact].tolist()))
+    pairs = set()
+    for a in shown:
+        later = shown[body[shown] > body[a]]
+        gap = np.linalg.norm(place[later] - place[a], axis=1) - sphere[later, 3] - sphere[a, 3]
+        pairs |= {(int(a), int(b)) for b in later[gap < skin]}
+    return {(a, b) for a, b in pairs if (int(body[a]), int(body[b])) not in bonded}
+
+
+@pytest.mark.parametrize(("skin", "spread"), [(2e-4, 0.01), (3e-3, 0.03)])
+def test_the_search_lists_all_near_spheres_and_no_others(skin, spread):
+    simulation = scattered(skin, spread)
+    found = listed(simulation)
+    wanted = expected(simulation, skin)
+    assert len(wanted) > 200
+    assert len(found) == len(set(found))
+    assert set(found) == wanted
+
+
+def test_pairs_stand_in_order_and_are_indexed_from_both_bodies():
+    """Sums over a body's pairs have one order only if the lists do."""
+    contacts = scattered(2e-4, 0.01).contacts
+    count = contacts.pair_count[None]
+    bodies = contacts.pair_body.to_numpy()[:count]
+    assert np.all(bodies[:, 0] < bodies[:, 1])
+    assert bodies.tolist() == sorted(bodies.tolist())
+    first, touch_first = contacts.first_of.to_numpy(), contacts.touch_first.to_numpy()
+    touch = contacts.touch.to_numpy()
+    for i in range(contacts.model.body_count):
+        assert list(range(first[i], first[i + 1])) == np.flatnonzero(bodies[:, 0] == i).tolist()
+        seconds = touch[touch_first[i] : touch_first[i + 1]].tolist()
+        assert seconds == np.flatnonzero(bodies[:, 1] == i).tolist()
+
+
+def test_waiting_impulses_survive_a_search():
+    """A slot keeps its bits, also when its pair has moved out of reach."""
+    simulation = scattered(2e-4, 0.01)
+    contacts = simulation.contacts
+    count = contacts.pair_count[None]
+    slots = np.zeros((2 * contacts.capacity, 6))
+    slots[: 2 * count] = np.random.default_rng(0).standard_normal((2 * count, 6))
+    contacts.pair_slot.from_numpy(slots)
+    before = dict(zip(map(tuple, contacts.pair_body.to_numpy()[:count].tolist()), range(count)))
+    motion = simulation.state.motion()
+    motion["position"][::3] += 5.0
+    simulation.state.place(motion["position"], motion["orientation"])
+    simulation.broad_phase.search()
+    after = contacts.pair_body.to_numpy()[: contacts.pair_count[None]].tolist()
+    kept = contacts.pair_slot.to_numpy()
+    assert set(before) <= {tuple(pair) for pair in after}
+    for place, pair in enumerate(after):
+        old = before.get(tuple(pair))
+        rows = np.zeros((2, 6)) if old is None else slots[2 * old : 2 * old + 2]
+        assert np.array_equal(kept[2 * place : 2 * place + 2], rows)
+
+
+def test_too_little_room_is_said_in_words():
+    scene = Scene(
+        bar(0.6, 0.2, (6, 2, 2)),
+        CONCRETE,
+        [effects.SphereContact(outer_faces=True, skin=0.05, pairs_per_body=1)],
+    )
+    simulation = Simulation(scene, Uniform(1e-9))
+    with pytest.raises(ValueError, match="larger pairs_per_body"):
+        simulation.start()
