@@ -10,7 +10,7 @@ import sys
 from importlib.metadata import version
 
 from taichi_dem import InputError, SimulationDiverged, runtime
-from taichi_dem.record import output_folder, write_atomically
+from taichi_dem.record import write_atomically
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 PAPER_BLOCK = os.path.join(HERE, "meshes", "paper_block.msh")
@@ -62,7 +62,12 @@ def whole(low, high):
 
 def parser(name, description):
     """Parser with the options every experiment has."""
-    made = Parser(prog=f"python experiments/{name}.py", description=description)
+    made = Parser(
+        prog=f"python experiments/{name}.py",
+        description=description,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
     made.add_argument("--quick", action="store_true", help="a smaller job of under a minute")
     made.add_argument("--out", default=os.path.join("results", name), help="folder for the output")
     made.add_argument("--arch", default="cpu", choices=runtime.ARCHITECTURES)
@@ -79,7 +84,6 @@ def main(run, made, arguments=None):
     try:
         options = made.parse_args(arguments)
         runtime.start(options.arch, options.threads)
-        output_folder(options.out)
         run(options)
     except InputError as error:
         return _say(error, 2)

@@ -122,4 +122,6 @@ def _initialise(wanted):
 
 
 def _cuda_present():
+    # Taichi would say on stderr that it finds no libcuda; the caller says it in a sentence.
+    ti.set_logging_level(ti.ERROR)
     return bool(ti._lib.core.with_cuda())

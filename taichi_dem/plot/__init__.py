@@ -2,13 +2,20 @@
 
 from taichi_dem.plot.animation import save_animation
 from taichi_dem.plot.block import plot_cracks, plot_steps
-from taichi_dem.plot.series import plot_energy, plot_history, plot_levels, plot_pressure
+from taichi_dem.plot.series import (
+    plot_energy,
+    plot_history,
+    plot_levels,
+    plot_methods,
+    plot_pressure,
+)
 
 __all__ = [
     "plot_cracks",
     "plot_energy",
     "plot_history",
     "plot_levels",
+    "plot_methods",
     "plot_pressure",
     "plot_steps",
     "save_animation",

@@ -3,13 +3,15 @@
 import matplotlib
 import numpy as np
 from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.colors import BoundaryNorm
+from matplotlib.colors import BoundaryNorm, ListedColormap
 
 from taichi_dem.plot.style import figure, save
 from taichi_dem.record import body_corners
 from taichi_dem.tetrahedra import LOCAL_FACES
 
-_STONE = "#D9D4C7"
+_STONE = "#E4E0D6"
+# The bright end of the map would not stand out against the stone.
+_AGES = ListedColormap(matplotlib.colormaps["plasma"](np.linspace(0.0, 0.86, 256)))
 
 
 class View:
@@ -55,6 +57,7 @@ def prepare(axes, model, plane, margin=0.12):
     axes.set_ylim(low[plane[1]] - margin, high[plane[1]] + margin)
     axes.set_aspect("equal")
     axes.grid(False)
+    axes.locator_params(nbins=5)
     axes.set(xlabel=f"{'xyz'[plane[0]]} [m]", ylabel=f"{'xyz'[plane[1]]} [m]")
 
 
@@ -68,7 +71,7 @@ def plot_cracks(path, model, frame, broken_time, magnify=1.0, axis=2):
     moved = start + magnify * (body_corners(model, frame) - start)
     broken = np.flatnonzero(~np.isnan(broken_time))
     broken = broken[np.argsort(broken_time[broken], kind="stable")]
-    fig, panels = figure(1, 2, size=(12.4, 6.0))
+    fig, panels = figure(1, 2, size=(12.0, 5.8))
     scale = "true scale" if magnify == 1.0 else f"displacement x {magnify:g}"
     titles = ("Cracks on the block at rest", f"Deformed block, {scale}")
     for axes, corners, title in zip(panels, (start, moved), titles):
@@ -76,13 +79,15 @@ def plot_cracks(path, model, frame, broken_time, magnify=1.0, axis=2):
         axes.add_collection(
             PolyCollection(polygons, facecolor=_STONE, edgecolor="#B8B2A2", linewidth=0.3)
         )
-        lines = LineCollection(view.crack_lines(corners, broken), cmap="plasma", linewidth=1.5)
+        lines = LineCollection(
+            view.crack_lines(corners, broken), cmap=_AGES, linewidth=1.5, capstyle="round"
+        )
         lines.set_array(1e3 * broken_time[broken])
         lines.set_clim(0.0, 1e3 * max(frame.time_s, 1e-30))
         axes.add_collection(lines)
         axes.set_title(f"{title}, t = {1e3 * frame.time_s:.3g} ms")
         prepare(axes, model, view.plane)
-    fig.colorbar(lines, ax=panels, label="time of breaking [ms]", shrink=0.8, pad=0.02)
+    fig.colorbar(lines, ax=panels, label="time of breaking [ms]", shrink=0.9, pad=0.02)
     save(fig, path)
 
 
@@ -91,7 +96,7 @@ def plot_steps(path, model, frames, dt0, axis=2):
     view = View(model, axis)
     rows = 1 if len(frames) <= 3 else 2
     columns = -(-len(frames) // rows)
-    fig, panels = figure(rows, columns, size=(4.3 * columns, 4.4 * rows), squeeze=False)
+    fig, panels = figure(rows, columns, size=(3.8 * columns + 1.0, 3.8 * rows), squeeze=False)
     top = max(int(frame.level.max()) for frame in frames)
     colours = matplotlib.colormaps["viridis_r"].resampled(top + 1)
     norm = BoundaryNorm(np.arange(-0.5, top + 1.5), top + 1)
@@ -104,7 +109,7 @@ def plot_steps(path, model, frames, dt0, axis=2):
         prepare(axes, model, view.plane)
     for axes in panels.flat[len(frames) :]:
         axes.set_axis_off()
-    bar = fig.colorbar(drawn, ax=panels, ticks=range(top + 1), shrink=0.8, pad=0.02)
+    bar = fig.colorbar(drawn, ax=panels, ticks=range(top + 1), shrink=0.9, pad=0.02)
     bar.set_label("step [s]")
     bar.set_ticklabels([f"{dt0 / 2.0**k:.2g}" for k in range(top + 1)])
     save(fig, path)

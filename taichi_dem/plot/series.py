@@ -46,7 +46,7 @@ def plot_energy(path, history):
     given = history["load_work_J"] + history["support_work_J"] + history["injected_J"]
     upper.plot(time, 1e-3 * given, color="black", linestyle="--", label="work put in + injected")
     upper.set(ylabel="energy [kJ]", title="Energy account")
-    upper.legend(loc="upper left", fontsize=8.5)
+    upper.legend(loc="upper left", fontsize=8.5, frameon=False)
     scale = np.maximum(np.abs(history["load_work_J"]).max(), 1e-300)
     lower.plot(time, 100.0 * history["residual_J"] / scale, color=COLOURS[1])
     lower.axhline(0.0, color="black", linewidth=0.7)
@@ -60,8 +60,8 @@ def plot_history(path, history):
     time = 1e3 * history["time_s"]
     if "hole_radial_displacement_mm" in history:
         top.plot(time, history["hole_radial_displacement_mm"], label="mean of the hole's bodies")
-        top.plot(time, history["monitor_displacement_mm"], label="towards the free face")
-        top.legend()
+        top.plot(time, history["monitor_displacement_mm"], label="body nearest to the free face")
+        top.legend(frameon=False)
     top.set(ylabel="displacement [mm]", title="Motion, fracture and step over time")
     middle.step(time, history["broken_faces"], where="post", color=COLOURS[1])
     middle.set(ylabel="broken faces")
@@ -81,5 +81,22 @@ def plot_levels(path, time_s, shares, dt0):
     colours = [(0.1 + 0.85 * f, 0.25 + 0.68 * f, 0.45 + 0.5 * f) for f in fade]
     axes.stackplot(1e3 * np.asarray(time_s), 100.0 * shares.T, labels=labels, colors=colours)
     axes.set(xlabel="time [ms]", ylabel="share of bodies [%]", title="Steps in use", ylim=(0, 100))
-    axes.legend(title="step", loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8.5)
+    place = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
+    axes.legend(title="step", reverse=True, fontsize=8.5, frameon=False, **place)
+    save(fig, path)
+
+
+def plot_methods(path, series):
+    """What each method spends over time, and how far its displacement lies from the uniform one.
+
+    series: name -> columns with time_s, cpu_s, evaluations and monitor_displacement_mm.
+    """
+    fig, (left, right) = figure(1, 2, size=(9.6, 3.6))
+    for colour, (name, made) in zip(COLOURS, series.items()):
+        time = 1e3 * np.asarray(made["time_s"])
+        left.plot(time, 1e-6 * np.asarray(made["evaluations"]), color=colour, label=name)
+        right.plot(time, made["monitor_displacement_mm"], color=colour, label=name)
+    left.set(xlabel="time [ms]", ylabel="evaluations [millions]", yscale="log")
+    right.set(xlabel="time [ms]", ylabel="displacement [mm]")
+    left.legend(frameon=False)
     save(fig, path)

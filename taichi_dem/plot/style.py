@@ -1,25 +1,12 @@
-"""One look for all pictures."""
+"""One look for all pictures; touches no setting of matplotlib that a caller may have made."""
 
 import os
 
 import matplotlib
+from cycler import cycler
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 
-matplotlib.use("Agg")
-
-import matplotlib.pyplot as plt
-
-_STYLE = {
-    "figure.dpi": 130,
-    "savefig.bbox": "tight",
-    "font.size": 10,
-    "axes.titlesize": 10.5,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.alpha": 0.25,
-    "legend.frameon": False,
-    "lines.linewidth": 1.6,
-}
 #: Okabe and Ito's colours, told apart by colour-blind readers too.
 COLOURS = (
     "#0072B2",
@@ -35,17 +22,29 @@ COLOURS = (
     "#17BECF",
 )
 
+_STYLE = {
+    "font.size": 10,
+    "axes.titlesize": 10.5,
+    "axes.prop_cycle": cycler(color=COLOURS),
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.alpha": 0.25,
+    "lines.linewidth": 1.6,
+}
 
-def figure(rows=1, columns=1, size=(6.4, 4.2), **options):
+
+def figure(rows=1, columns=1, size=(6.4, 4.2), dpi=130, layout="constrained", **options):
     """A figure and its axes in the common style; size in inches."""
-    with plt.rc_context(_STYLE):
-        return plt.subplots(rows, columns, figsize=size, **options)
+    with matplotlib.rc_context(_STYLE):
+        fig = Figure(figsize=size, dpi=dpi, layout=layout)
+        FigureCanvasAgg(fig)
+        return fig, fig.subplots(rows, columns, **options)
 
 
 def save(fig, path):
     """Write a picture as a whole: under a temporary name first."""
     temporary = f"{path}.part.png"
-    with plt.rc_context(_STYLE):
-        fig.savefig(temporary)
-    plt.close(fig)
+    with matplotlib.rc_context(_STYLE):
+        fig.savefig(temporary, bbox_inches="tight")
     os.replace(temporary, path)

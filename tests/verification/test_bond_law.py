@@ -9,6 +9,7 @@ import pytest
 
 from taichi_dem import CONCRETE, effects, mesh_shapes
 from tests.probe import BondProbe
+from tests.turns import matrix, product, quaternion
 
 EDGE = 0.05
 EPS = np.finfo(float).eps
@@ -38,19 +39,6 @@ def envelope(opening):
     """Traction of the first opening: linear to the strength, then straight down to zero."""
     fall = STRENGTH * (FAILURE - opening) / (FAILURE - ONSET)
     return np.where(opening <= ONSET, K_N * opening, fall)
-
-
-def quaternion(axis, angle):
-    """Unit quaternion of a rotation about an axis."""
-    axis = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
-    return np.array([np.cos(angle / 2), *(np.sin(angle / 2) * axis)])
-
-
-def matrix(q):
-    """Rotation matrix of a unit quaternion, by Rodrigues' formula."""
-    cosine, sine = q[0] ** 2 - q[1:] @ q[1:], 2 * q[0] * q[1:]
-    cross = np.array([[0, -sine[2], sine[1]], [sine[2], 0, -sine[0]], [-sine[1], sine[0], 0]])
-    return cosine * np.eye(3) + cross + 2 * np.outer(q[1:], q[1:])
 
 
 def test_material_gives_the_numbers_of_the_paper():
@@ -201,19 +189,13 @@ def test_strained_and_slipped_pair_turns_with_its_force(pair):
     resting = pair.move(position, orientation)
     q = quaternion([1.0, -2.0, 0.7], 2.0)
     turn, spin, drift = matrix(q), np.array([3.0, -1.0, 2.0]), np.array([0.4, 5.0, -2.0])
-    turned = np.array([q, _product(q, tilt)])
+    turned = np.array([q, product(q, tilt)])
     velocity = drift + np.cross(spin, position @ turn.T)
     wrench = pair.move(position @ turn.T, turned, velocity, np.tile(spin, (2, 1)))
     expected = (resting.reshape(-1, 3) @ turn.T).reshape(2, 6)
     force, torque = np.abs(resting[:, :3]).max(), np.abs(resting[:, 3:]).max()
     assert np.abs(wrench - expected)[:, :3].max() < 1e-11 * force
     assert np.abs(wrench - expected)[:, 3:].max() < 1e-11 * torque
-
-
-def _product(p, q):
-    """Hamilton product."""
-    vector = p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:])
-    return np.array([p[0] * q[0] - p[1:] @ q[1:], *vector])
 
 
 def test_pair_force_acts_at_one_point(pair):
@@ -250,11 +232,10 @@ def test_dashpots_act_with_their_full_coefficient(pair, opening):
 
 def test_dashpots_resist_twist_about_the_normal(pair):
     """Torque c_s w A r^2, with r = edge / sqrt(3) the distance of the units from the centroid."""
-    wrench_slave_torque = None
     spin = 5.0
     pair.open([0, 0, 0], spin=(spin, 0, 0))
     wrench = pair.evaluate()
-    wrench_slave_torque = pair.frame @ wrench[1, 3:]
+    torque = pair.frame @ wrench[1, 3:]
     expected = -TANGENT * spin * pair.area * EDGE**2 / 3
-    assert wrench_slave_torque[0] == pytest.approx(expected, rel=PRODUCT)
-    assert np.abs(wrench_slave_torque[1:]).max() < abs(expected) * 1e-9
+    assert torque[0] == pytest.approx(expected, rel=PRODUCT)
+    assert np.abs(torque[1:]).max() < abs(expected) * 1e-9
