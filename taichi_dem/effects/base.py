@@ -3,10 +3,10 @@
 An effect owns its parameters (in fields, so that sweeping them compiles nothing anew) and its
 state. Its ``role`` says where ``step/advance.py`` asks for it:
 
-tension   ``traction(b, u, opening)`` [Pa], ``failed(u)``, ``stored(b, u, opening)`` and
+tension   ``traction(stiffness, u, opening)`` [Pa], ``failed(u)``, ``stored(b, u, opening)`` and
           ``spent(b, u)`` [J/m^2], ``damage(b, u)``
-shear     ``traction(b, u, sliding, pressure)`` -> (traction [Pa], energy slipped away [J/m^2]),
-          ``stored(b, u, sliding)``
+shear     ``traction(stiffness, u, sliding, pressure)`` -> (traction [Pa], energy slipped away
+          [J/m^2]), ``stored(b, u, sliding)``
 dashpot   ``traction(velocity)`` [Pa] of a contact unit
 load      ``acts_on(i)``, ``wrench(i, t, rotation)`` -> (force [N], torque about the centre [N m])
 support   ``acts_on(i)``, ``held(i, t, rotation, velocity, angular_momentum)`` -> both, corrected
@@ -84,9 +84,9 @@ class ElasticTension(Effect):
         self.model = model
 
     @ti.func
-    def traction(self, b, u, opening):
+    def traction(self, stiffness, u, opening):
         """Linear traction [Pa] at a normal opening [m]."""
-        return self.model.bond_stiffness[b][0] * opening
+        return stiffness * opening
 
     @ti.func
     def failed(self, u):
@@ -120,9 +120,9 @@ class ElasticShear(Effect):
         self.model = model
 
     @ti.func
-    def traction(self, b, u, sliding, pressure):
+    def traction(self, stiffness, u, sliding, pressure):
         """Linear shear traction [Pa] (eq. 1) and no energy slipped away."""
-        return self.model.bond_stiffness[b][1] * sliding, 0.0
+        return stiffness * sliding, 0.0
 
     @ti.func
     def stored(self, b, u, sliding):

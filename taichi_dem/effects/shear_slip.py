@@ -30,9 +30,8 @@ class ShearSlip(Effect):
         return {"shear_slip": self.slip}
 
     @ti.func
-    def traction(self, b, u, sliding, pressure):
+    def traction(self, stiffness, u, sliding, pressure):
         """Shear traction [Pa] and the energy per area slipped away now [J/m^2]."""
-        stiffness = self.model.bond_stiffness[b][1]
         limit = coulomb_limit(self.law[0], self.law[1], pressure)
         elastic = sliding - self.slip[u]
         spent = 0.0

@@ -42,14 +42,17 @@ class Softening(Effect):
         return self.law[0] / self.model.bond_stiffness[b][0]
 
     @ti.func
-    def traction(self, b, u, opening):
+    def traction(self, stiffness, u, opening):
         """Traction [Pa] at a normal opening [m]; moves the elastic limit on the way out."""
-        traction = self.model.bond_stiffness[b][0] * opening
+        traction = stiffness * opening
         if opening > 0.0:
-            if opening > self.unit[u][0]:
-                softened = envelope_traction(self.law[0], self._onset(b), self.law[1], opening)
-                self.unit[u] = vec2(opening, softened / opening)
-            traction = self.unit[u][1] * opening
+            unit = self.unit[u]
+            if opening > unit[0]:
+                onset = self.law[0] / stiffness
+                softened = envelope_traction(self.law[0], onset, self.law[1], opening)
+                unit = vec2(opening, softened / opening)
+                self.unit[u] = unit
+            traction = unit[1] * opening
         return traction
 
     @ti.func

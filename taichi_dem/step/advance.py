@@ -28,6 +28,7 @@ class Advance:
         if self.state.broken_tick[b] < 0:
             slots = self.model.bond_slots[b]
             motion = self._motion(b, slots)
+            stiffness = self.model.bond_stiffness[b]
             force, torque, failed = zero3(), zero3(), 0
             dragged, slipped = 0.0, 0.0
             for q in range(3):
@@ -35,9 +36,9 @@ class Advance:
                 arm = unit_arm(motion, self.model.vertex_slave[u])
                 opening = unit_opening(motion, arm, self.model.vertex_master[u])
                 velocity = unit_velocity(motion, arm)
-                pull = self.model.tension.traction(b, u, opening[0])
+                pull = self.model.tension.traction(stiffness[0], u, opening[0])
                 sliding = vec2(opening[1], opening[2])
-                shear, spent = self.model.shear.traction(b, u, sliding, -pull)
+                shear, spent = self.model.shear.traction(stiffness[1], u, sliding, -pull)
                 drag = self.model.dashpot.traction(velocity)
                 traction = vec3(pull, shear[0], shear[1]) + drag
                 force += traction
