@@ -126,8 +126,9 @@ class ProgressBar:
     def __call__(self, progress):
         """Show a ``taichi_dem.simulate.Progress``."""
         if self.bar is not None:
-            elapsed = max(self.bar.tasks[0].elapsed or 0.0, 1e-9)
-            speed = f"{1e6 * progress.time_s / elapsed:.3g} us/s, {progress.substeps:,} substeps"
+            seconds = max(progress.run_seconds, 1e-9)
+            rate = 1e-6 * progress.evaluations / seconds
+            speed = f"{1e6 * progress.time_s / seconds:.3g} us/s, {rate:.3g} M evaluations/s"
             share = progress.time_s / progress.until_s
             self.bar.update(self.task, completed=share, speed=speed)
 

@@ -43,7 +43,7 @@ from taichi_dem import (
     read_mesh,
 )
 from taichi_dem.record import Recorder, output_folder, write_csv
-from taichi_dem.simulate import Progress
+from taichi_dem.simulate import progress_of
 from taichi_dem.simulation import macro_steps
 
 NAME = "blast_multirate"
@@ -109,11 +109,6 @@ def follow(name, options, mesh):
     series = {**recorder.history(), **costs}
     series["row_early"] = sorted(marks | {early}).index(early)
     return reports[early], reports[last], series
-
-
-def progress_of(simulation, until):
-    """How far a simulation is."""
-    return Progress(simulation.time_s, until, int(simulation.schedule.evaluations[0]))
 
 
 def run(options):

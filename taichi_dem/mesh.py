@@ -5,6 +5,8 @@ x points to the right, y up, z towards the viewer.
 
 from __future__ import annotations
 
+import math
+import numbers
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,6 +65,12 @@ def group_area(mesh, name) -> float:
     """Area of the faces of a group [m2]."""
     vectors = geometry.area_vectors(mesh.points, mesh.group_faces(name))
     return float(np.linalg.norm(vectors, axis=1).sum())
+
+
+def check_positive(name, value, unit="m"):
+    """Raise InputError unless ``value`` is a positive finite number."""
+    if not (isinstance(value, numbers.Real) and 0.0 < value < math.inf):
+        raise InputError(f"{name} must be positive and finite [{unit}], got {value!r}")
 
 
 def checked_mesh(points, tetrahedra, groups, source="", weld_tolerance=0.0) -> Mesh:
@@ -132,7 +140,7 @@ def _checked_tolerance(tolerance, points, tetrahedra):
     """Refuse a tolerance that would weld the ends of an edge."""
     lengths = geometry.edge_lengths(points, tetrahedra)
     shortest = lengths[lengths > COINCIDENT * np.ptp(points, axis=0).max()].min(initial=np.inf)
-    if not (np.isscalar(tolerance) and 0.0 <= tolerance < shortest):
+    if not (isinstance(tolerance, numbers.Real) and 0.0 <= tolerance < shortest):
         raise InputError(
             f"weld_tolerance must lie in [0, {shortest:.6g}) m, the shortest edge, "
             f"got {tolerance!r}"

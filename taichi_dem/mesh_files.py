@@ -6,12 +6,13 @@ import contextlib
 import io
 import os
 from collections import defaultdict
+from xml.sax.saxutils import quoteattr
 
 import meshio
 import numpy as np
 
 from taichi_dem.errors import InputError
-from taichi_dem.mesh import Mesh, checked_mesh
+from taichi_dem.mesh import Mesh, check_positive, checked_mesh
 
 #: Cell types of meshio that are read, with the number of their corner points.
 _TETRAHEDRA = {"tetra": 4, "tetra10": 4}
@@ -23,14 +24,14 @@ def read_mesh(path, *, scale=1.0, weld_tolerance=0.0) -> Mesh:
 
     scale: length of one unit of the file [m], e.g. 0.001 for a drawing in mm.
     weld_tolerance: points not farther apart [m] become one; 0 welds nothing.
-    Groups come from Gmsh's physical surfaces; in other formats from integer data on triangles,
-    as "data name_value".  Elements of second order are read as linear ones, with a note.
+    Groups come from Gmsh's physical surfaces ("physical_TAG" where they have no name); in other
+    formats from integer data on triangles, as "data name_value".
+    Elements of second order are read as linear ones, with a note.
 
     Raises InputError, in one sentence, for a file that is missing, cannot be read, holds no
     tetrahedra, or whose mesh ``checked_mesh`` refuses.
     """
-    if not (np.isscalar(scale) and 0.0 < scale < np.inf):
-        raise InputError(f"scale must be positive and finite, got {scale!r}")
+    check_positive("scale", scale, "m per unit of the file")
     path = os.fspath(path)
     raw = _read_raw(path)
     notes = []
@@ -40,7 +41,7 @@ def read_mesh(path, *, scale=1.0, weld_tolerance=0.0) -> Mesh:
         raise InputError(f"mesh file {path} holds no tetrahedra (it holds: {kinds})")
     try:
         points = scale * np.asarray(raw.points, dtype=np.float64)
-        mesh = checked_mesh(points, tetrahedra, _groups(raw, notes), path, weld_tolerance)
+        mesh = checked_mesh(points, tetrahedra, _groups(raw), path, weld_tolerance)
     except InputError as error:
         raise InputError(f"mesh file {path}: {error}") from None
     return Mesh(mesh.points, mesh.tetrahedra, mesh.groups, (*notes, *mesh.notes), path)
@@ -68,7 +69,7 @@ def write_vtu(path, points, tetrahedra, point_data=None, cell_data=None) -> None
     """
     cell_data = {name: [np.asarray(values)] for name, values in (cell_data or {}).items()}
     content = meshio.Mesh(points, [("tetra", tetrahedra)], point_data or {}, cell_data)
-    with _renamed_when_done(path) as temporary:
+    with renamed_when_done(path) as temporary:
         meshio.write(temporary, content, file_format="vtu", compression="zlib")
 
 
@@ -77,8 +78,10 @@ def write_pvd(path, times_s, file_names) -> None:
 
     times_s: time of each file [s].  file_names: relative to the folder of ``path``.
     """
+    if len(times_s) != len(file_names):
+        raise InputError(f"{path}: {len(times_s)} times, but {len(file_names)} file names")
     sets = [
-        f'    <DataSet timestep="{time!r}" part="0" file="{name}"/>'
+        f'    <DataSet timestep="{time!r}" part="0" file={quoteattr(str(name))}/>'
         for time, name in zip(map(float, times_s), file_names)
     ]
     head = '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">'
@@ -112,42 +115,58 @@ def _corners(raw, kinds, notes):
     return np.vstack(found)
 
 
-def _groups(raw, notes):
+def _groups(raw):
     """Named groups of triangles, name -> (n, 3)."""
-    named = {tag: name for name, (tag, dim) in raw.field_data.items() if dim == 2}
     found = defaultdict(list)
-    for key, blocks in raw.cell_data.items():
-        for block, values in zip(raw.cells, blocks):
-            values = np.asarray(values)
-            if block.type not in _TRIANGLES or values.ndim != 1 or values.dtype.kind not in "iu":
-                continue
-            for value in np.unique(values):
-                name = _group_name(key, value, named, gmsh="gmsh:physical" in raw.cell_data)
-                if name is not None:
-                    found[name].append(block.data[values == value, :3])
+    if "gmsh:physical" in raw.cell_data:
+        names = {tag: name for name, (tag, dim) in raw.field_data.items() if dim == 2}
+        for faces, value in _labelled(raw, raw.cell_data["gmsh:physical"]):
+            if value > 0:  # 0: in no physical group
+                found[names.get(value, f"physical_{value}")].append(faces)
+        # A surface in two groups: Gmsh 4.1 keeps one number a face, but the sets know of both.
+        found.update(_sets(raw, names.values()))
+    else:
+        for key in raw.cell_data:
+            if not key.startswith("gmsh:"):  # numbers of drawn entities, no choice of the user
+                for faces, value in _labelled(raw, raw.cell_data[key]):
+                    found[f"{key}_{value}"].append(faces)
     return {name: np.vstack(faces) for name, faces in found.items()}
 
 
-def _group_name(key, value, named, gmsh):
-    """Name of the triangles with ``value`` in the data ``key``; None when they are no group."""
-    if gmsh:
-        return named.get(value) if key == "gmsh:physical" else None
-    return f"{key}_{value}"
+def _labelled(raw, data):
+    """Triangles that carry one integer value, as (faces (n, 3), value), for every value."""
+    for block, values in zip(raw.cells, map(np.asarray, data)):
+        if block.type in _TRIANGLES and values.ndim == 1 and values.dtype.kind in "iu":
+            for value in np.unique(values):
+                yield block.data[values == value, :3], value
+
+
+def _sets(raw, names):
+    """Triangles of meshio's cell sets of the given names, name -> list of (n, 3)."""
+    found = defaultdict(list)
+    for name in names:
+        for block, members in zip(raw.cells, raw.cell_sets.get(name, ())):
+            if block.type in _TRIANGLES and members is not None and len(members):
+                found[name].append(block.data[members, :3])
+    return found
 
 
 def _write_text(path, text):
     """Write a text file, atomically."""
-    with _renamed_when_done(path) as temporary:
+    with renamed_when_done(path) as temporary:
         with open(temporary, "w", encoding="utf-8", newline="\n") as file:
             file.write(text)
 
 
 @contextlib.contextmanager
-def _renamed_when_done(path):
+def renamed_when_done(path):
     """A temporary name beside ``path`` that becomes ``path`` only after a complete write."""
     path = os.fspath(path)
     folder, name = os.path.split(path)
-    temporary = os.path.join(folder, f".{name}.{os.getpid()}.part")
+    if not os.path.isdir(folder or "."):
+        raise InputError(f"cannot write {path}: there is no folder {folder}")
+    root, ending = os.path.splitext(name)  # kept, since it tells some writers the format
+    temporary = os.path.join(folder, f".{root}.{os.getpid()}.part{ending}")
     try:
         yield temporary
         os.replace(temporary, path)

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import numbers
 import os
 from dataclasses import dataclass
 
 from taichi_dem.errors import InputError
+from taichi_dem.mesh import check_positive
+from taichi_dem.mesh_files import renamed_when_done
 
 #: Everything that could make two runs of the same Gmsh differ, and what may shape the elements.
 _OPTIONS = {
@@ -43,19 +46,25 @@ class _Block:
     distance_far: float
 
     def __post_init__(self):
-        for name in ("width", "height", "depth", "hole_diameter", "size_hole", "size_far"):
-            _check_positive(name, getattr(self, name))
-        _check_positive("distance_far", self.distance_far)
+        sizes = ("size_hole", "size_far", "distance_far")
+        for name in ("width", "height", "depth", "hole_diameter", *sizes):
+            check_positive(name, getattr(self, name))
         if self.hole_segments < 4 or self.hole_segments % 4:
             raise InputError(
                 f"hole_segments must be 4, 8, 12, ..., got {self.hole_segments} (four equal arcs)"
             )
-        for name, value, limit in zip("xy", self.hole, (self.width, self.height)):
-            margin = 0.5 * self.hole_diameter
-            if not margin < value < limit - margin:
-                raise InputError(
-                    f"hole {name} must lie in ({margin:g}, {limit - margin:g}) m, got {value}"
-                )
+        self._check_hole()
+
+    def _check_hole(self):
+        """Raise InputError unless the hole's axis leaves a wall on all four sides."""
+        margin = 0.5 * self.hole_diameter
+        right, top = self.width - margin, self.height - margin
+        numeric = len(self.hole) == 2 and all(isinstance(c, numbers.Real) for c in self.hole)
+        if not (numeric and margin < self.hole[0] < right and margin < self.hole[1] < top):
+            raise InputError(
+                f"hole must be (x, y) with x in ({margin:g}, {right:g}) m and "
+                f"y in ({margin:g}, {top:g}) m, got {self.hole}"
+            )
 
 
 def block_with_hole(
@@ -80,14 +89,17 @@ def block_with_hole(
     Physical groups: volume block; faces hole, left, right, bottom, top, back, front.
     The same Gmsh writes the same file every time.
 
-    Raises InputError for a shape that cannot be, and when gmsh is not installed.
+    path ends in .msh.  Raises InputError for a shape that cannot be, a path that cannot be
+    written, and when gmsh is not installed or fails.
     Source of the defaults: Konno et al., section 4.1 and Fig 10.
     """
+    if not os.fspath(path).endswith(".msh"):
+        raise InputError(f"the name of the mesh file must end in .msh, got {path}")
     block = _Block(
         width,
         height,
         depth,
-        tuple(hole),
+        hole,
         hole_diameter,
         hole_segments,
         size_hole,
@@ -98,13 +110,8 @@ def block_with_hole(
         _add_geometry(gmsh.model, block)
         _add_sizes(gmsh.model.mesh.field, block)
         gmsh.model.mesh.generate(3)
-        _write(gmsh, path)
-
-
-def _check_positive(name, value):
-    """Raise InputError unless ``value`` [m] is positive and finite."""
-    if not 0.0 < value < float("inf"):
-        raise InputError(f"{name} must be positive and finite [m], got {value}")
+        with renamed_when_done(path) as temporary:
+            gmsh.write(temporary)
 
 
 @contextlib.contextmanager
@@ -124,6 +131,10 @@ def _session():
         for name, value in _OPTIONS.items():
             gmsh.option.setNumber(name, value)
         yield gmsh
+    except InputError:
+        raise
+    except Exception as error:  # gmsh knows no other class
+        raise InputError(f"gmsh failed: {error}") from None
     finally:
         gmsh.model.remove()
         if owned:
@@ -186,15 +197,3 @@ def _add_sizes(field, block):
     tag = field.add("MathEval")
     field.setString(tag, "F", size)
     field.setAsBackgroundMesh(tag)
-
-
-def _write(gmsh, path):
-    """Write the file under a temporary name, then rename it: no half-written mesh."""
-    path = os.fspath(path)
-    temporary = os.path.join(os.path.dirname(path), f".{os.path.basename(path)}.{os.getpid()}.msh")
-    try:
-        gmsh.write(temporary)
-        os.replace(temporary, path)
-    finally:
-        if os.path.exists(temporary):
-            os.remove(temporary)

@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 
 from taichi_dem.errors import InputError
-from taichi_dem.mesh import Mesh, checked_mesh
+from taichi_dem.mesh import Mesh, check_positive, checked_mesh
 
 #: Groups of a bar: name -> (axis, 0 low or 1 high end).
 _SIDES = {
@@ -67,25 +67,19 @@ def bar(length, width, cells) -> Mesh:
 
 def _base(edge, height):
     """Equilateral triangle in x = 0 about the origin, normal +x, and the apex height [m]."""
+    check_positive("edge", edge)
     height = edge * np.sqrt(2.0 / 3.0) if height is None else height
-    for name, value in (("edge", edge), ("height", height)):
-        _check_length(name, value)
+    check_positive("height", height)
     angle = 2.0 * np.pi / 3.0 * np.arange(3)
     radius = edge / np.sqrt(3.0)
     triangle = np.column_stack([np.zeros(3), radius * np.cos(angle), radius * np.sin(angle)])
     return triangle, height
 
 
-def _check_length(name, value):
-    """Raise InputError unless ``value`` [m] is positive and finite."""
-    if not 0.0 < value < np.inf:
-        raise InputError(f"{name} must be positive and finite [m], got {value}")
-
-
 def _checked_cells(length, width, cells):
     """Numbers of boxes as an array (3,)."""
     for name, value in (("length", length), ("width", width)):
-        _check_length(name, value)
+        check_positive(name, value)
     cells = np.asarray(cells)
     if cells.shape != (3,) or cells.dtype.kind not in "iu" or cells.min() < 1:
         raise InputError(f"cells must be three integers of at least 1, got {cells.tolist()}")

@@ -48,12 +48,14 @@ class QualityReport:
         return np.argsort(self.critical_step_s, kind="stable")[:count]
 
     def price(self, count=_WORST) -> np.ndarray:
-        """Gain in the step of the whole mesh without the k + 1 worst bodies, shape (count,).
+        """Gain in the step of the whole mesh without the k + 1 worst bodies, k < count.
 
-        Factors of at least 1, k = 0, 1, ...; without any body left the factor is infinite.
+        Factors of at least 1, as many as there are bodies to leave out; infinite where nothing
+        is left that limits the step, 1 where nothing limited it before.
         """
         steps = np.append(np.sort(self.critical_step_s), np.inf)
-        return steps[1 : count + 1] / steps[0]
+        gained = steps[1 : count + 1]
+        return gained / steps[0] if np.isfinite(steps[0]) else np.ones_like(gained)
 
     def __str__(self) -> str:
         """Counts, ranges and the worst bodies as a table."""

@@ -20,11 +20,12 @@ from taichi_dem.simulation import Simulation, macro_steps
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a run is: time_s of until_s, and substeps done."""
+    """How far a run is: time_s of until_s; bonds and pairs evaluated, in run_seconds."""
 
     time_s: float
     until_s: float
-    substeps: int
+    evaluations: int
+    run_seconds: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,8 +101,7 @@ def _run(simulation, recorder, sample_steps, frame_steps, progress):
 
     def tell():
         if progress is not None:
-            substeps = int(simulation.schedule.evaluations[0])
-            progress(Progress(simulation.time_s, last * simulation.method.dt0, substeps))
+            progress(progress_of(simulation, last * simulation.method.dt0))
 
     for step in sorted(sample_steps | frame_steps):
         simulation.advance_to(step, tell)
@@ -110,6 +110,12 @@ def _run(simulation, recorder, sample_steps, frame_steps, progress):
             recorder.sample()
         if step in frame_steps:
             recorder.snapshot()
+
+
+def progress_of(simulation, until):
+    """Progress of a simulation towards a time [s]."""
+    done, seconds = simulation.evaluations(), simulation.running_seconds()
+    return Progress(simulation.time_s, until, done, seconds)
 
 
 def _marks(last, count):
@@ -123,7 +129,9 @@ def _check_count(name, value, least):
 
 
 def _watched_group(scene):
+    """The group under gas pressure; without gas, one called hole if the mesh has it."""
     groups = [effect.group for effect in scene.effects if effect.name == "gas_pressure"]
+    groups += [name for name in scene.mesh.groups if name == "hole"]
     return groups[0] if groups else None
 
 

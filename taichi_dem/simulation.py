@@ -45,6 +45,7 @@ class Simulation:
         self.searches = 0
         self.compile_seconds = time.perf_counter() - started
         self.run_seconds = self.run_cpu_seconds = 0.0
+        self.started = None
 
     def _build_contacts(self, brute_force):
         model, state, method = self.model, self.state, self.method
@@ -92,6 +93,7 @@ class Simulation:
         self.start()
         end = macro_step * MACRO_TICKS
         wall, cpu = time.perf_counter(), time.process_time()
+        self.started = wall
         try:
             while self.state.tick[None] < end:
                 self._run_for_a_while(end)
@@ -99,6 +101,7 @@ class Simulation:
                 if on_call is not None:
                     on_call()
         finally:
+            self.started = None
             self.run_seconds += time.perf_counter() - wall
             self.run_cpu_seconds += time.process_time() - cpu
 
@@ -111,6 +114,15 @@ class Simulation:
             if self.contacts is not None and self.contacts.search_due[None]:
                 self.broad_phase.search()
                 self.searches += 1
+
+    def evaluations(self):
+        """Bonds and contact pairs evaluated so far."""
+        return int(self.schedule.evaluations[2] + self.schedule.evaluations[3])
+
+    def running_seconds(self):
+        """Wall time spent stepping so far [s], compile time apart."""
+        present = time.perf_counter() - self.started if self.started is not None else 0.0
+        return self.run_seconds + present
 
     def gas_work(self):
         """Work of the gas pressure [J], zero without it."""

@@ -1,68 +1,103 @@
 """Animations small enough for a web page."""
 
-import os
+import math
 
+import matplotlib
 import numpy as np
-from matplotlib.collections import PolyCollection
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.figure import Figure
 from PIL import Image
 
-from taichi_dem.plot.block import View, prepare
-from taichi_dem.plot.style import figure
-from taichi_dem.record import body_corners
+from taichi_dem.plot.block import break_times, displaced, frame_block
+from taichi_dem.plot.style import STYLE, write_whole
+from taichi_dem.plot.view import View, surface, traces
+
+#: Half decades of speed that are told apart; what is slower has one colour.
+_STEPS = 7
 
 
-def save_animation(path, model, frames, magnify=1.0, axis=2, colours=32, milliseconds=90):
-    """Write the deforming block, coloured by speed, as a GIF of one shared palette.
+def save_animation(
+    path,
+    model,
+    frames,
+    broken_time=None,
+    magnify=5.0,
+    axis=(0.0, 0.0, 1.0),
+    milliseconds=100,
+):
+    """Write the deforming block, coloured by speed, as a GIF below a megabyte.
 
-    frames: at least two. magnify: of the displacement. One palette for all frames and no
-    dithering keep 40 frames under a megabyte.
+    frames: at least one. broken_time: (bond_count,) [s], NaN while a bond holds; its
+    cracks are drawn and open. magnify: of the
+    displacement. One palette for all frames, no dithering and few colours keep 40 frames small.
     """
-    view = View(model, axis)
-    start = model.mesh.points[model.mesh.tetrahedra]
-    fastest = max(max(float(frame.speed.max()) for frame in frames), 1e-12)
-    # Room by hand: a layout found anew for every frame would let the block jump.
-    fig, axes = figure(size=(4.0, 3.3), dpi=100, layout=None)
-    fig.subplots_adjust(left=0.14, right=0.92, bottom=0.15, top=0.91)
-    drawn = PolyCollection([], cmap="inferno_r", linewidth=0)
-    drawn.set_clim(0.0, 1.0)
+    with matplotlib.rc_context({**STYLE, "font.size": 8.5}):
+        times = break_times(model, broken_time)
+        images = _images(model, frames, times, magnify, View(axis))
+    write_whole(path, lambda name: _write_gif(name, images, milliseconds))
+
+
+def _images(model, frames, broken_time, magnify, view):
+    """One RGB image a frame; a single collection changes, nothing else is drawn anew."""
+    figure = Figure(figsize=(4.0, 3.4), dpi=100, layout="constrained")
+    canvas = FigureCanvasAgg(figure)
+    axes = figure.subplots()
+    frame_block(axes, view, model, 0.08)
+    axes.set_axis_off()
+    drawn = _empty_collection(frames)
+    cracks = LineCollection([], colors="black", linewidth=0.5)
     axes.add_collection(drawn)
-    prepare(axes, model, view.plane)
-    bar = fig.colorbar(drawn, ax=axes, label="speed [m/s]", shrink=0.85)
-    ticks = np.array([0.0, 0.01, 0.05, 0.2, 0.5, 1.0])
-    # A root shows the wave far off and the fragments at the hole in one scale.
-    bar.set_ticks(np.sqrt(ticks))
-    bar.set_ticklabels([_plain(fastest * tick) for tick in ticks])
-    scale = "" if magnify == 1.0 else f", displacement x {magnify:g}"
+    axes.add_collection(cracks)
+    bar = figure.colorbar(drawn, ax=axes, label="speed [m/s]", aspect=25)
+    bar.ax.set_yticks(drawn.norm.boundaries, [f"{v:g}" for v in drawn.norm.boundaries])
+    lips, ends, times = traces(model.mesh, model.topology, view, broken_time)
     images = []
     for frame in frames:
-        corners = start + magnify * (body_corners(model, frame) - start)
-        polygons, body = view.front_faces(corners)
+        corners = displaced(model, frame, magnify)
+        polygons, body, _ = surface(model.topology, view, corners, broken_time <= frame.time_s)
         drawn.set_verts(polygons)
-        drawn.set_array(np.round(24.0 * np.sqrt(frame.speed[body] / fastest)) / 24.0)
-        axes.set_title(f"t = {1e3 * frame.time_s:.3f} ms{scale}")
-        images.append(_picture(fig))
-    _write_gif(path, images, colours, milliseconds)
+        drawn.set_array(frame.speed[body])
+        open_now = times <= frame.time_s
+        cracks.set_segments(view.project(corners[lips[open_now, None], ends[open_now]]))
+        text = "true scale" if magnify == 1.0 else f"displacement × {magnify:g}"
+        axes.set_title(f"t = {1e3 * frame.time_s:.3f} ms, {text}", fontsize=9)
+        canvas.draw()
+        images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())[:, :, :3].copy()))
+        figure.set_layout_engine("none")  # keep the panel where the first frame put it
+    return images
 
 
-def _plain(value):
-    """A speed to two digits without an exponent where it has a few digits."""
-    return f"{float(f'{value:.2g}'):g}"
+def _empty_collection(frames):
+    """A collection coloured by half decades of speed up to the fastest body of all frames."""
+    fastest = max(max(float(frame.speed.max()) for frame in frames), 1e-12)
+    top = math.ceil(2.0 * math.log10(fastest))
+    edges = np.array([_nice(k) for k in range(top - _STEPS, top + 1)])
+    shades = matplotlib.colormaps["magma_r"](np.linspace(0.04, 0.9, len(edges)))
+    norm = BoundaryNorm(edges, len(edges), extend="min")
+    return PolyCollection([], cmap=ListedColormap(shades), norm=norm, linewidth=0)
 
 
-def _picture(fig):
-    fig.canvas.draw()
-    return Image.fromarray(np.asarray(fig.canvas.buffer_rgba())[:, :, :3].copy())
+def _nice(half_decades):
+    """1, 3, 10, 30, ... for 0, 1, 2, 3, ..."""
+    decade, rest = divmod(half_decades, 2)
+    return (3.0 if rest else 1.0) * 10.0**decade
 
 
-def _write_gif(path, images, colours, milliseconds):
+def _write_gif(name, images, milliseconds, colours=32):
+    """Write images with one palette, made from the first, the middle and the last of them."""
     width, height = images[0].size
     sample = Image.new("RGB", (width, 3 * height))
     for row, index in enumerate((0, len(images) // 2, len(images) - 1)):
         sample.paste(images[index], (0, row * height))
     palette = sample.quantize(colours, dither=Image.Dither.NONE)
     reduced = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
-    temporary = f"{path}.part.gif"
     reduced[0].save(
-        temporary, save_all=True, append_images=reduced[1:], duration=milliseconds, loop=0
+        name,
+        format="GIF",
+        save_all=True,
+        append_images=reduced[1:],
+        duration=milliseconds,
+        loop=0,
     )
-    os.replace(temporary, path)

@@ -1,115 +1,154 @@
-"""The block seen along an axis: faces towards the viewer, cracks, steps."""
+"""Pictures of the block: cracks (Konno et al., Fig 12) and steps (Fig 13)."""
 
 import matplotlib
 import numpy as np
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap
 
-from taichi_dem.plot.style import figure, save
+from taichi_dem.plot.style import picture, seconds
+from taichi_dem.plot.view import View, surface, traces
 from taichi_dem.record import body_corners
-from taichi_dem.tetrahedra import LOCAL_FACES
 
-_STONE = "#E4E0D6"
-# The bright end of the map would not stand out against the stone.
-_AGES = ListedColormap(matplotlib.colormaps["plasma"](np.linspace(0.0, 0.86, 256)))
+_STONE, _JOINT, _INSIDE = "#E4E0D6", "#C9C3B5", "#B5AD9C"
 
 
-class View:
-    """Projection of a block along one coordinate axis, faces sorted from back to front.
-
-    axis: 0, 1 or 2, the direction of looking; the viewer stands at its far positive end.
-    """
-
-    def __init__(self, model, axis=2):
-        self.model = model
-        self.plane = [k for k in range(3) if k != axis]
-        self.axis = axis
-
-    def front_faces(self, corners):
-        """Triangles towards the viewer, (n, 3, 2) [m], and their bodies, the nearest last.
-
-        corners: world positions (body_count, 4, 3) [m].
-        """
-        faces = corners[:, LOCAL_FACES]
-        normal = np.cross(faces[:, :, 1] - faces[:, :, 0], faces[:, :, 2] - faces[:, :, 0])
-        body, face = np.nonzero(normal[:, :, self.axis] > 0.0)
-        shown = faces[body, face]
-        order = np.argsort(shown[:, :, self.axis].mean(axis=1), kind="stable")
-        return shown[order][:, :, self.plane], body[order]
-
-    def crack_lines(self, corners, broken):
-        """Traces of broken faces on the front, (n, 2, 2) [m]; corners as above, broken: bonds.
-
-        A face is drawn by the edge of it that lies nearest to the viewer.
-        """
-        topology = self.model.topology
-        body, face = topology.master[broken], topology.master_face[broken]
-        triangle = corners[body[:, None], LOCAL_FACES[face]]
-        nearest = np.argsort(-triangle[:, :, self.axis], axis=1, kind="stable")[:, :2]
-        ends = np.take_along_axis(triangle, nearest[:, :, None], axis=1)
-        return ends[:, :, self.plane]
+def displaced(model, frame, magnify):
+    """Corners of all bodies (body_count, 4, 3) [m], their displacement magnified."""
+    rest = model.mesh.points[model.mesh.tetrahedra]
+    return rest + magnify * (body_corners(model, frame) - rest)
 
 
-def prepare(axes, model, plane, margin=0.12):
-    """Limits, equal scales and labels for a view of a block in a plane of two coordinates."""
-    low, high = model.mesh.points.min(axis=0), model.mesh.points.max(axis=0)
-    axes.set_xlim(low[plane[0]] - margin, high[plane[0]] + margin)
-    axes.set_ylim(low[plane[1]] - margin, high[plane[1]] + margin)
+def break_times(model, broken_time):
+    """The times of breaking [s], (bond_count,); all NaN, unbroken, where none are given."""
+    return np.full(model.bond_count, np.nan) if broken_time is None else broken_time
+
+
+def frame_block(axes, view, model, margin=0.05):
+    """Limits, equal scales and labels of a view of the whole block; margin: share of its size."""
+    flat = view.project(model.mesh.points)
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    pad = margin * (high - low).max()
+    axes.set(xlim=(low[0] - pad, high[0] + pad), ylim=(low[1] - pad, high[1] + pad))
     axes.set_aspect("equal")
-    axes.grid(False)
     axes.locator_params(nbins=5)
-    axes.set(xlabel=f"{'xyz'[plane[0]]} [m]", ylabel=f"{'xyz'[plane[1]]} [m]")
+    axes.grid(False)
 
 
-def plot_cracks(path, model, frame, broken_time, magnify=1.0, axis=2):
-    """Cracks by time of breaking, on the block as it was and as it is (Konno et al., Fig 12).
+def plot_cracks(path, model, frame, broken_time, magnify=5.0, axis=(0.0, 0.0, 1.0)):
+    """Broken faces by time of breaking, in the block at rest and as it is (Konno et al., Fig 12).
 
-    broken_time: (bond_count,) [s], NaN while a bond holds. magnify: of the displacement.
+    frame: the block at one time. broken_time: (bond_count,) [s], NaN while a bond holds. magnify:
+    of the displacement in the middle panel; the last one shows the most broken part, true to scale.
+    axis: towards the viewer.
     """
-    view = View(model, axis)
-    start = model.mesh.points[model.mesh.tetrahedra]
-    moved = start + magnify * (body_corners(model, frame) - start)
+    view = View(axis)
+    broken_time = np.where(broken_time <= frame.time_s, broken_time, np.nan)
+    with picture(path, 1, 3, size=(13.2, 4.6)) as (figure, panels):
+        drawn = _all_breaks(panels[0], view, model, broken_time)
+        panels[0].set_title(f"{np.sum(~np.isnan(broken_time))} broken faces, block at rest")
+        for axes, factor in ((panels[1], magnify), (panels[2], 1.0)):
+            lines = _deformed(axes, view, model, displaced(model, frame, factor), broken_time)
+            for collection in (drawn, lines):
+                collection.set_clim(0.0, 1e3 * frame.time_s or 1.0)
+        scale = "true scale" if magnify == 1.0 else f"displacement × {magnify:g}"
+        panels[1].set_title(f"t = {1e3 * frame.time_s:.3g} ms, {scale}")
+        panels[2].set_title(f"t = {1e3 * frame.time_s:.3g} ms, close up, true scale")
+        for axes in panels:
+            frame_block(axes, view, model)
+            axes.set(xlabel=view.labels()[0], ylabel=view.labels()[1])
+        _close_up(panels[2], view, model, frame, broken_time)
+        figure.colorbar(drawn, ax=panels, label="time of breaking [ms]", shrink=0.8, aspect=25)
+
+
+def _all_breaks(axes, view, model, broken_time):
+    """Every broken face of the block at rest, also inside it; the earliest on top."""
+    rest = model.mesh.points[model.mesh.tetrahedra]
+    polygons, _, _ = surface(model.topology, view, rest, np.zeros(model.bond_count, dtype=bool))
+    axes.add_collection(PolyCollection(polygons, facecolor=_STONE, edgecolor=_JOINT, linewidth=0.4))
     broken = np.flatnonzero(~np.isnan(broken_time))
-    broken = broken[np.argsort(broken_time[broken], kind="stable")]
-    fig, panels = figure(1, 2, size=(12.0, 5.8))
-    scale = "true scale" if magnify == 1.0 else f"displacement x {magnify:g}"
-    titles = ("Cracks on the block at rest", f"Deformed block, {scale}")
-    for axes, corners, title in zip(panels, (start, moved), titles):
-        polygons, _ = view.front_faces(corners)
-        axes.add_collection(
-            PolyCollection(polygons, facecolor=_STONE, edgecolor="#B8B2A2", linewidth=0.3)
-        )
-        lines = LineCollection(
-            view.crack_lines(corners, broken), cmap=_AGES, linewidth=1.5, capstyle="round"
-        )
-        lines.set_array(1e3 * broken_time[broken])
-        lines.set_clim(0.0, 1e3 * max(frame.time_s, 1e-30))
-        axes.add_collection(lines)
-        axes.set_title(f"{title}, t = {1e3 * frame.time_s:.3g} ms")
-        prepare(axes, model, view.plane)
-    fig.colorbar(lines, ax=panels, label="time of breaking [ms]", shrink=0.9, pad=0.02)
-    save(fig, path)
+    broken = broken[np.argsort(-broken_time[broken], kind="stable")]
+    triangles = view.project(model.mesh.points[model.topology.vertices[broken]])
+    lines = LineCollection(np.concatenate([triangles, triangles[:, :1]], axis=1), linewidth=0.9)
+    return _by_time(axes, lines, broken_time[broken])
 
 
-def plot_steps(path, model, frames, dt0, axis=2):
-    """Step of every body at several times (Konno et al., Fig 13); dt0: step of level 0 [s]."""
-    view = View(model, axis)
+def _deformed(axes, view, model, corners, broken_time):
+    """The block as it is, its inside dark where it opens, and crack lips by time of breaking."""
+    polygons, _, crack = surface(model.topology, view, corners, ~np.isnan(broken_time))
+    colours = np.where(crack, _INSIDE, _STONE)
+    axes.add_collection(
+        PolyCollection(polygons, facecolor=colours, edgecolor=_JOINT, linewidth=0.3)
+    )
+    body, ends, time_s = traces(model.mesh, model.topology, view, broken_time)
+    order = np.argsort(-time_s, kind="stable")
+    segments = view.project(corners[body[:, None], ends])[order]
+    return _by_time(axes, LineCollection(segments, linewidth=1.1), time_s[order])
+
+
+def _by_time(axes, lines, time_s):
+    """Colour lines by time [ms], dark first; light yellow would vanish on the stone."""
+    shades = matplotlib.colormaps["plasma"](np.linspace(0.0, 0.88, 256))
+    lines.set_cmap(ListedColormap(shades))
+    lines.set_array(1e3 * time_s)
+    lines.set_capstyle("round")
+    axes.add_collection(lines)
+    return lines
+
+
+def _close_up(axes, view, model, frame, broken_time):
+    """Limits around the first half of the breaks, where the block is crushed."""
+    broken = np.flatnonzero(~np.isnan(broken_time))
+    if len(broken) == 0:
+        return
+    early = broken[broken_time[broken] <= np.median(broken_time[broken])]
+    flat = view.project(model.mesh.points[model.topology.vertices[early]]).reshape(-1, 2)
+    middle = np.median(flat, axis=0)
+    half = 1.3 * np.percentile(np.abs(flat - middle), 95)
+    axes.set(xlim=(middle[0] - half, middle[0] + half), ylim=(middle[1] - half, middle[1] + half))
+
+
+def plot_steps(path, model, frames, dt0, broken_time=None, axis=(0.0, 0.0, 1.0)):
+    """Step of every body at several times, at most six (Konno et al., Fig 13).
+
+    dt0: step of level 0 [s]. broken_time: (bond_count,) [s], NaN while a bond holds; lets one see
+    into open cracks. axis: towards the viewer.
+    """
+    view, broken_time = View(axis), break_times(model, broken_time)
     rows = 1 if len(frames) <= 3 else 2
     columns = -(-len(frames) // rows)
-    fig, panels = figure(rows, columns, size=(3.8 * columns + 1.0, 3.8 * rows), squeeze=False)
-    top = max(int(frame.level.max()) for frame in frames)
-    colours = matplotlib.colormaps["viridis_r"].resampled(top + 1)
-    norm = BoundaryNorm(np.arange(-0.5, top + 1.5), top + 1)
-    for axes, frame in zip(panels.flat, frames):
-        polygons, body = view.front_faces(body_corners(model, frame))
-        drawn = PolyCollection(polygons, cmap=colours, norm=norm, edgecolor="white", linewidth=0.2)
-        drawn.set_array(frame.level[body])
-        axes.add_collection(drawn)
-        axes.set_title(f"t = {1e3 * frame.time_s:.3g} ms")
-        prepare(axes, model, view.plane)
-    for axes in panels.flat[len(frames) :]:
-        axes.set_axis_off()
-    bar = fig.colorbar(drawn, ax=panels, ticks=range(top + 1), shrink=0.9, pad=0.02)
-    bar.set_label("step [s]")
-    bar.set_ticklabels([f"{dt0 / 2.0**k:.2g}" for k in range(top + 1)])
-    save(fig, path)
+    top = max(1, *(int(frame.level.max()) for frame in frames))
+    shades = ListedColormap(matplotlib.colormaps["magma_r"](np.linspace(0.02, 0.92, top + 1)))
+    norm = BoundaryNorm(np.arange(-0.5, top + 1), top + 1)
+    extent = np.ptp(view.project(model.mesh.points), axis=0)
+    height = 2.9 * np.clip(extent[1] / extent[0], 0.15, 2.0)
+    size = (2.9 * columns + 1.2, (height + 0.1) * rows + 0.6)
+    with picture(path, rows, columns, size=size, squeeze=False, sharex=True, sharey=True) as (
+        figure,
+        panels,
+    ):
+        figure.get_layout_engine().set(h_pad=0.08)
+        for axes, frame in zip(panels.flat, frames):
+            drawn = _levels(axes, view, model, frame, broken_time, shades, norm)
+        for axes in panels.flat[len(frames) :]:
+            axes.set_axis_off()
+        for axes in panels[-1]:
+            axes.set_xlabel(view.labels()[0])
+        for axes in panels[:, 0]:
+            axes.set_ylabel(view.labels()[1])
+        bar = figure.colorbar(drawn, ax=panels, ticks=range(top + 1), pad=0.02, aspect=30)
+        bar.ax.set_yticklabels([seconds(dt0 / 2.0**k) for k in range(top + 1)])
+        bar.ax.tick_params(length=0)
+        bar.ax.invert_yaxis()
+        bar.set_label("step")
+
+
+def _levels(axes, view, model, frame, broken_time, shades, norm):
+    corners = body_corners(model, frame)
+    polygons, body, _ = surface(model.topology, view, corners, broken_time <= frame.time_s)
+    drawn = PolyCollection(polygons, cmap=shades, norm=norm, edgecolor="#00000030", linewidth=0.3)
+    drawn.set_array(frame.level[body])
+    axes.add_collection(drawn)
+    smallest = int(frame.level.max())
+    axes.set_title(f"t = {1e3 * frame.time_s:.3g} ms, finest level {smallest}")
+    frame_block(axes, view, model, 0.03)
+    return drawn

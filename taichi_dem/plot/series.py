@@ -1,102 +1,183 @@
-"""Curves over time: pressure, displacement, energy, levels."""
+"""Curves over time: pressure (Konno et al., Fig 11), motion, energy, levels."""
 
+import matplotlib
 import numpy as np
 
-from taichi_dem.plot.style import COLOURS, figure, save
+from taichi_dem.plot.style import BLUE, GREEN, PURPLE, RED, picture, seconds
 
-_STORED = (
-    ("kinetic_J", "kinetic"),
-    ("bond_strain_J", "bond strain"),
-    ("sphere_strain_J", "sphere strain"),
-)
-_SPENT = (
-    ("bond_dashpot_J", "bond dashpots"),
-    ("slip_J", "slip"),
-    ("softening_J", "softening"),
-    ("release_J", "release"),
-    ("sphere_dashpot_J", "sphere dashpots"),
-    ("friction_J", "friction"),
-)
-
-
-def plot_pressure(path, time_s, pressure_pa):
-    """Pressure of the blast gas over time (Konno et al., Fig 11)."""
-    fig, axes = figure(size=(5.6, 3.2))
-    axes.plot(1e3 * np.asarray(time_s), 1e-6 * np.asarray(pressure_pa), color=COLOURS[1])
-    axes.set(xlabel="time [ms]", ylabel="pressure [MPa]", title="Gas pressure on the hole")
-    axes.set_ylim(bottom=0.0)
-    save(fig, path)
+#: Ledger terms from the bottom of the stack up: blue is held, red lost in bonds, green in contacts.
+_TERMS = {
+    "kinetic_J": ("kinetic", "#08306B"),
+    "bond_strain_J": ("bond strain", "#3A87C2"),
+    "sphere_strain_J": ("sphere strain", "#A6CEE8"),
+    "bond_dashpot_J": ("bond dashpots", "#FDBE85"),
+    "slip_J": ("slip", "#E6700F"),
+    "softening_J": ("softening", "#A63603"),
+    "release_J": ("release", "#5C1A00"),
+    "sphere_dashpot_J": ("sphere dashpots", "#C7E5B4"),
+    "friction_J": ("friction", "#3E9B52"),
+}
+#: Colour and line of methods that are compared.
+_STROKES = ((BLUE, "-"), (RED, "--"), (GREEN, ":"), (PURPLE, "-."))
+_GIVEN = {
+    "gas_work_J": ("gas work", "black", "--"),
+    "injected_J": ("injected at release", PURPLE, ":"),
+}
 
 
-def plot_energy(path, history):
-    """Where the work of the gas went, stacked, and what the account cannot explain."""
-    fig, (upper, lower) = figure(
-        2, 1, size=(6.8, 6.2), sharex=True, gridspec_kw={"height_ratios": [3, 1]}
-    )
-    time = 1e3 * history["time_s"]
-    terms = [term for term in (*_STORED, *_SPENT) if np.abs(history[term[0]]).max() > 0.0]
-    upper.stackplot(
-        time,
-        [1e-3 * history[name] for name, _ in terms],
-        labels=[label for _, label in terms],
-        colors=COLOURS,
-        alpha=0.85,
-        linewidth=0,
-    )
-    given = history["load_work_J"] + history["support_work_J"] + history["injected_J"]
-    upper.plot(time, 1e-3 * given, color="black", linestyle="--", label="work put in + injected")
-    upper.set(ylabel="energy [kJ]", title="Energy account")
-    upper.legend(loc="upper left", fontsize=8.5, frameon=False)
-    scale = np.maximum(np.abs(history["load_work_J"]).max(), 1e-300)
-    lower.plot(time, 100.0 * history["residual_J"] / scale, color=COLOURS[1])
-    lower.axhline(0.0, color="black", linewidth=0.7)
-    lower.set(xlabel="time [ms]", ylabel="residual\n[% of work]")
-    save(fig, path)
+def _span(axes, time):
+    """Limit an axis to the times there are; a run that ended at its start has but one."""
+    axes.set_xlim(0.0, time[-1] if time[-1] > 0.0 else 1.0)
+
+
+def plot_pressure(path, time_s, pressure_pa, until_s=None):
+    """Pressure of the blast gas over time (Konno et al., Fig 11); until_s: end of the run."""
+    with picture(path, size=(5.6, 3.2)) as (_, axes):
+        time_ms, pressure = 1e3 * np.asarray(time_s), 1e-6 * np.asarray(pressure_pa)
+        axes.plot(time_ms, pressure, color=RED)
+        axes.fill_between(time_ms, pressure, color=RED, alpha=0.12, linewidth=0)
+        peak = int(pressure.argmax())
+        axes.annotate(
+            f"{pressure[peak]:.4g} MPa at {time_ms[peak]:.3g} ms",
+            (time_ms[peak], pressure[peak]),
+            xytext=(6, 6),
+            textcoords="offset points",
+        )
+        if until_s is not None:
+            axes.axvline(1e3 * until_s, color="black", linewidth=0.8, linestyle=":")
+            side = "right" if 1e3 * until_s > 0.7 * time_ms[-1] else "left"
+            axes.text(1e3 * until_s, 0.9 * pressure[peak], " end of run ", ha=side)
+        axes.set(xlabel="time [ms]", ylabel="pressure on the hole [MPa]")
+        axes.set(xlim=(0.0, time_ms[-1]), ylim=(0.0, 1.12 * pressure[peak]))
 
 
 def plot_history(path, history):
     """Displacement at the hole, broken faces and the smallest step over time."""
-    fig, (top, middle, bottom) = figure(3, 1, size=(6.4, 6.8), sharex=True)
     time = 1e3 * history["time_s"]
-    if "hole_radial_displacement_mm" in history:
-        top.plot(time, history["hole_radial_displacement_mm"], label="mean of the hole's bodies")
-        top.plot(time, history["monitor_displacement_mm"], label="body nearest to the free face")
-        top.legend(frameon=False)
-    top.set(ylabel="displacement [mm]", title="Motion, fracture and step over time")
-    middle.step(time, history["broken_faces"], where="post", color=COLOURS[1])
-    middle.set(ylabel="broken faces")
-    bottom.step(time, history["smallest_step_s"], where="post", color=COLOURS[2])
-    bottom.set(xlabel="time [ms]", ylabel="smallest step [s]", yscale="log")
-    save(fig, path)
+    with picture(path, 3, 1, size=(6.2, 6.6), sharex=True) as (_, (top, middle, bottom)):
+        if "hole_radial_displacement_mm" in history:
+            top.plot(
+                time,
+                history["monitor_displacement_mm"],
+                color=RED,
+                label="body of the hole nearest to the free face",
+            )
+            top.plot(
+                time,
+                history["hole_radial_displacement_mm"],
+                color=BLUE,
+                linestyle="--",
+                label="outward, mean over the hole's bodies",
+            )
+            top.legend(loc="upper left")
+        top.set(ylabel="displacement [mm]", ylim=(0.0, None))
+        middle.step(time, history["broken_faces"], where="post", color=BLUE)
+        middle.set(ylabel="broken faces", ylim=(0.0, None))
+        bottom.step(time, history["smallest_step_s"], where="post", color=GREEN)
+        bottom.set(xlabel="time [ms]", ylabel="smallest step [s]", yscale="log")
+        _span(bottom, time)
+
+
+def plot_energy(path, history):
+    """Energy account: where the work went, every term by size, and what is unexplained."""
+    time = 1e3 * history["time_s"]
+    terms = {key: look for key, look in _TERMS.items() if np.abs(history[key]).max() > 0.0}
+    with picture(
+        path, 2, 2, size=(10.8, 5.6), sharex=True, gridspec_kw={"height_ratios": [3.2, 1]}
+    ) as (figure, panels):
+        _stack(panels[0, 0], time, history, terms)
+        _lines(panels[0, 1], time, history, terms)
+        _residual(panels[1, 0], time, history)
+        _momentary(panels[1, 1], time, history)
+        for axes in panels[1]:
+            axes.set(xlabel="time [ms]")
+            _span(axes, time)
+        handles, labels = panels[0, 1].get_legend_handles_labels()
+        figure.legend(handles[::-1], labels[::-1], loc="outside right upper")
+
+
+def _stack(axes, time, history, terms):
+    values = [1e-3 * history[key] for key in terms]
+    colours = [colour for _, colour in terms.values()]
+    axes.stackplot(time, values, colors=colours, edgecolor="white", linewidth=0.3)
+    given = history["load_work_J"] + history["support_work_J"] + history["injected_J"]
+    axes.plot(time, 1e-3 * given, color="black", linestyle="--", linewidth=1.2)
+    axes.set(ylabel="energy [kJ]", title="Held and lost; dashed: gas work + injected")
+
+
+def _lines(axes, time, history, terms):
+    for key, (label, colour) in terms.items():
+        axes.plot(time, _positive(history[key]), color=colour, label=label, linewidth=2.0)
+    for key, (label, colour, line) in _GIVEN.items():
+        if np.abs(history[key]).max() > 0.0:
+            axes.plot(time, _positive(history[key]), color=colour, label=label, linestyle=line)
+    largest = max(1e-12, *(float(history[key].max()) for key in (*terms, *_GIVEN)))
+    axes.set(yscale="log", ylim=(1e-6 * largest, 2.0 * largest))
+    axes.set(ylabel="energy [J]", title="Every term of the account")
+
+
+def _positive(values):
+    """Values for a logarithmic axis, NaN where there is nothing to show."""
+    return np.where(values > 0.0, values, np.nan)
+
+
+def _residual(axes, time, history):
+    axes.plot(time, 1e-3 * history["residual_J"], color=RED)
+    axes.axhline(0.0, color="black", linewidth=0.6)
+    axes.set(ylabel="residual [kJ]")
+
+
+def _momentary(axes, time, history):
+    """Residual as a share of the work done so far."""
+    work = np.abs(history["load_work_J"]) + np.abs(history["support_work_J"])
+    late = work > 1e-3 * work.max()
+    share = np.where(
+        late, 100.0 * np.abs(history["residual_J"]) / np.where(late, work, 1.0), np.nan
+    )
+    axes.plot(time, share, color=RED)
+    axes.set(ylabel="residual\n[% of work so far]", ylim=(0.0, None))
 
 
 def plot_levels(path, time_s, shares, dt0):
-    """Share of bodies on each level over time.
+    """Share of bodies on each level over time, the coarsest at the bottom.
 
     shares: (sample_count, level_count), rows summing to 1. dt0: step of level 0 [s].
     """
-    fig, axes = figure(size=(6.8, 4.0))
-    labels = [f"{dt0 / 2.0**level:.2g} s" for level in range(shares.shape[1])]
-    fade = np.linspace(0.92, 0.05, max(2, shares.shape[1]))
-    colours = [(0.1 + 0.85 * f, 0.25 + 0.68 * f, 0.45 + 0.5 * f) for f in fade]
-    axes.stackplot(1e3 * np.asarray(time_s), 100.0 * shares.T, labels=labels, colors=colours)
-    axes.set(xlabel="time [ms]", ylabel="share of bodies [%]", title="Steps in use", ylim=(0, 100))
-    place = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
-    axes.legend(title="step", reverse=True, fontsize=8.5, frameon=False, **place)
-    save(fig, path)
+    depth = shares.shape[1]
+    shades = matplotlib.colormaps["magma_r"](np.linspace(0.02, 0.92, max(2, depth)))
+    time = 1e3 * np.asarray(time_s)
+    with picture(path, size=(6.4, 3.6)) as (figure, axes):
+        areas = axes.stackplot(time, 100.0 * shares.T, colors=shades)
+        axes.set(xlabel="time [ms]", ylabel="share of bodies [%]")
+        axes.set(ylim=(0.0, 100.0))
+        _span(axes, time)
+        names = [seconds(dt0 / 2.0**level) for level in range(depth)]
+        figure.legend(areas[::-1], names[::-1], title="step", loc="outside right center")
 
 
 def plot_methods(path, series):
-    """What each method spends over time, and how far its displacement lies from the uniform one.
+    """What methods cost over time, and how far their displacement lies apart.
 
-    series: name -> columns with time_s, cpu_s, evaluations and monitor_displacement_mm.
+    series: title -> columns time_s, cpu_s, evaluations and monitor_displacement_mm; the first is
+    the one the others are compared with.
     """
-    fig, (left, right) = figure(1, 2, size=(9.6, 3.6))
-    for colour, (name, made) in zip(COLOURS, series.items()):
-        time = 1e3 * np.asarray(made["time_s"])
-        left.plot(time, 1e-6 * np.asarray(made["evaluations"]), color=colour, label=name)
-        right.plot(time, made["monitor_displacement_mm"], color=colour, label=name)
-    left.set(xlabel="time [ms]", ylabel="evaluations [millions]", yscale="log")
-    right.set(xlabel="time [ms]", ylabel="displacement [mm]")
-    left.legend(frameon=False)
-    save(fig, path)
+    with picture(path, 1, 3, size=(11.0, 3.4)) as (_, (cost, work, moved)):
+        first = next(iter(series.values()))
+        for (title, made), (colour, line) in zip(series.items(), _STROKES):
+            look = {"color": colour, "linestyle": line, "label": title}
+            time = 1e3 * np.asarray(made["time_s"])
+            cost.plot(time, made["cpu_s"], **look)
+            work.plot(time, 1e-6 * np.asarray(made["evaluations"]), **look)
+            here = np.asarray(made["monitor_displacement_mm"])
+            there = np.asarray(first["monitor_displacement_mm"])
+            share = np.where(
+                there > 1e-3 * there.max(), here / np.where(there > 0, there, 1), np.nan
+            )
+            moved.plot(time, 100.0 * (share - 1.0), **look)
+        cost.set(ylabel="CPU time of stepping [s]", ylim=(0.0, None))
+        work.set(ylabel="evaluations [millions]", ylim=(0.0, None))
+        moved.set(ylabel=f"displacement, difference\nfrom {next(iter(series))} [%]")
+        for axes in (cost, work, moved):
+            axes.set(xlabel="time [ms]")
+            _span(axes, time)
+        cost.legend(loc="upper left")

@@ -1,0 +1,96 @@
+"""What a viewer sees of a block along an axis: facing faces from back to front, crack traces.
+
+NumPy only. Corners are world positions (body_count, 4, 3) [m], as ``record.body_corners`` gives.
+"""
+
+import numpy as np
+
+from taichi_dem.tetrahedra import LOCAL_FACES
+
+#: Faces that lean away from the viewer by less than this sine count as seen edge on.
+_EDGE_ON = 1e-6
+
+
+class View:
+    """Projection along an axis.
+
+    axis: direction from the block to the viewer, any length. right, up, toward (3,): unit vectors
+    of the picture, right-handed; looking down a coordinate axis, the next two are right and up.
+    """
+
+    def __init__(self, axis=(0.0, 0.0, 1.0)):
+        axis = np.asarray(axis, dtype=float)
+        main = int(np.abs(axis).argmax())
+        self.toward = axis / np.linalg.norm(axis) * np.sign(axis[main])
+        right = np.cross(np.eye(3)[(main + 2) % 3], self.toward)
+        self.right = right / np.linalg.norm(right)
+        self.up = np.cross(self.toward, self.right)
+
+    def project(self, points):
+        """Picture coordinates [m] of points (..., 3), shape (..., 2)."""
+        return points @ np.column_stack([self.right, self.up])
+
+    def labels(self):
+        """Labels of the two picture axes: a coordinate's name where the axis is one."""
+        return tuple(self._label(vector) for vector in (self.right, self.up))
+
+    def _label(self, vector):
+        axis = int(np.abs(vector).argmax())
+        along = abs(vector[axis]) > 1.0 - 1e-6
+        return f"{'xyz'[axis]} [m]" if along else "in the picture [m]"
+
+    def facing(self, triangles):
+        """Indices of triangles (n, 3, 3) whose normal points to the viewer, the farthest first."""
+        normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+        seen = np.flatnonzero(normal @ self.toward > _EDGE_ON * np.linalg.norm(normal, axis=1))
+        depth = triangles[seen].mean(axis=1) @ self.toward
+        return seen[np.argsort(depth, kind="stable")]
+
+
+def skin(topology, broken):
+    """Faces that show: outer ones and both sides of broken bonds.
+
+    broken: (bond_count,) bool. Returns body, local face (n,) and whether it is a crack face (n,).
+    """
+    bodies = (topology.outer_body, topology.master[broken], topology.slave[broken])
+    faces = (topology.outer_face, topology.master_face[broken], topology.slave_face[broken])
+    body = np.concatenate(bodies)
+    return body, np.concatenate(faces), np.arange(len(body)) >= topology.outer_count
+
+
+def surface(topology, view, corners, broken):
+    """Visible polygons (n, 3, 2) [m] from back to front, their bodies, which are crack faces."""
+    body, face, crack = skin(topology, broken)
+    triangles = corners[body[:, None], LOCAL_FACES[face]]
+    seen = view.facing(triangles)
+    return view.project(triangles[seen]), body[seen], crack[seen]
+
+
+def traces(mesh, topology, view, broken_time):
+    """Where broken faces reach the outer faces that the viewer sees of the block at rest.
+
+    broken_time: (bond_count,) [s], NaN while a bond holds. A crack has two lips, each an edge of
+    one body. Returns body (n,), its local ends (n, 2), and time [s] (n,) of the first break there.
+    """
+    body, face, _ = skin(topology, np.zeros(topology.bond_count, dtype=bool))
+    seen = view.facing(mesh.points[mesh.tetrahedra[body[:, None], LOCAL_FACES[face]]])
+    body = np.repeat(body[seen], 3)
+    ends = _edges(LOCAL_FACES[face[seen]])
+    broken = ~np.isnan(broken_time)
+    cracked = _edge_keys(_edges(topology.vertices[broken]), mesh.point_count)
+    order = np.lexsort((np.repeat(broken_time[broken], 3), cracked))
+    keys, first = np.unique(cracked[order], return_index=True)
+    wanted = _edge_keys(np.take_along_axis(mesh.tetrahedra[body], ends, axis=1), mesh.point_count)
+    hit = np.isin(wanted, keys)
+    place = order[first[np.searchsorted(keys, wanted[hit])]]
+    return body[hit], ends[hit], broken_time[broken][place // 3]
+
+
+def _edges(triangles):
+    """The three edges of every triangle, (3 n, 2)."""
+    return triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+
+
+def _edge_keys(edges, point_count):
+    """One number for every edge, whichever way round it is given."""
+    return edges.min(axis=1).astype(np.int64) * point_count + edges.max(axis=1)
