@@ -113,12 +113,13 @@ def doubled(gap=0.0):
     return points, [[0, 1, 2, 3], [5, 7, 6, 4]]
 
 
-def test_coincident_points_are_refused_with_the_way_out():
-    words = refused(*doubled())
+@pytest.mark.parametrize("gap", [0.0, 1.9e-9])  # m; below 1e-9 of the extent
+def test_coincident_points_are_refused_with_the_way_out(gap):
+    words = refused(*doubled(gap))
     assert words.startswith("3 points coincide with another, the first at (0, 0, 0) m")
     # The tolerance it names does join them.
     tolerance = float(words.split("weld_tolerance=")[1].split()[0])
-    assert built(*doubled(), weld_tolerance=tolerance).point_count == 5
+    assert built(*doubled(gap), weld_tolerance=tolerance).point_count == 5
 
 
 def test_near_points_are_welded_and_said():
