@@ -4,7 +4,8 @@
 
 PYTHON ?=
 DEMO_OPTIONS ?=
-TEST_OPTIONS ?=
+# One worker a core; tests of a file share what they build.
+TEST_OPTIONS ?= -n 2 --dist loadfile
 BENCH_OPTIONS ?=
 MESH_OPTIONS ?=
 

@@ -21,6 +21,9 @@ class Advance:
         self.model, self.state, self.schedule = model, state, schedule
         self.contacts = contacts
         self.has_contact = contacts is not None
+        # Without fast_math a product with zero is not folded: what is absent must not be written.
+        self.has_dashpot = bool(model.dashpot.name)
+        self.has_heat = self.has_dashpot or bool(model.shear.name)
 
     @ti.func
     def bond(self, b):
@@ -35,22 +38,25 @@ class Advance:
                 u = 3 * b + q
                 arm = unit_arm(motion, self.model.vertex_slave[u])
                 opening = unit_opening(motion, arm, self.model.vertex_master[u])
-                velocity = unit_velocity(motion, arm)
                 pull = self.model.tension.traction(stiffness[0], u, opening[0])
                 sliding = vec2(opening[1], opening[2])
                 shear, spent = self.model.shear.traction(stiffness[1], u, sliding, -pull)
-                drag = self.model.dashpot.traction(velocity)
-                traction = vec3(pull, shear[0], shear[1]) + drag
+                traction = vec3(pull, shear[0], shear[1])
+                if ti.static(self.has_dashpot):
+                    velocity = unit_velocity(motion, arm)
+                    drag = self.model.dashpot.traction(velocity)
+                    traction += drag
+                    dragged += drag.dot(velocity)
                 force += traction
                 torque += arm.cross(traction)
-                dragged += drag.dot(velocity)
                 slipped += spent
                 failed |= self.model.tension.failed(u)
             dt = self.schedule.pair_step(slots[0] >> 2, slots[1] >> 2)
             area = self.model.unit_area[b]
             if failed == 0:
                 self._pull_together(slots, motion, force * (area * dt), torque * (area * dt))
-                self.state.bond_heat[b] += area * vec3(dragged * dt, slipped, 0.0)
+                if ti.static(self.has_heat):
+                    self.state.bond_heat[b] += area * vec3(dragged * dt, slipped, 0.0)
             else:
                 self.state.bond_heat[b] += area * vec3(0.0, slipped, self._stored(b, motion))
                 self._release(b, slots)

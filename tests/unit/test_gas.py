@@ -49,7 +49,7 @@ def test_a_free_body_takes_the_impulse_of_the_pulse(body):
     that the torque gives; the rest is the midpoint rule: dt^2 / 24 of the jump of the slope, which
     is P0 pi / (2 b a) at the end of the pulse and none elsewhere.
     """
-    # A thousand times heavier inertia keeps the turning below a microradian.
+    # Without inverse inertia the body does not turn, and the force keeps its direction.
     push, _ = push_of(body)
     exact = PEAK * RISE * (0.5 + 2.0 * RATIO / np.pi)
     quadrature = STEP**2 / 24.0 * PEAK * np.pi / (2.0 * RATIO * RISE)

@@ -1,0 +1,233 @@
+"""Waves, spall, supports and weight in bonded bars."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects
+from taichi_dem.mesh_shapes import bar, single
+from taichi_dem.topology import faces_of_group
+
+EPS = np.finfo(float).eps
+LENGTH, WIDTH, CELLS = 4.0, 0.1, 40
+STEP = 1e-6
+#: Relative slowness (k h)^2 / 24 of a pulse of 4e-4 s, 0.76 m long, on cells of 0.1 m.
+DISPERSION = (2.0 * np.pi * 0.1 / 0.76) ** 2 / 24.0
+STILL = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+def stiffness_matrix(model):
+    """Forces on all bodies against their small displacements and turns, (6 n, 6 n), from scratch.
+
+    Every contact unit is a spring at its vertex between two rigid bodies.
+    """
+    top, points, n = model.topology, model.mesh.points, model.body_count
+    matrix = np.zeros((6 * n, 6 * n))
+    for b in range(top.bond_count):
+        corners = points[top.vertices[b]]
+        area = 0.5 * np.cross(corners[1] - corners[0], corners[2] - corners[0])
+        size = np.linalg.norm(area)
+        normal = area / size
+        spring = CONCRETE.shear_stiffness * np.eye(3)
+        spring += (CONCRETE.normal_stiffness - CONCRETE.shear_stiffness) * np.outer(normal, normal)
+        at = np.r_[
+            6 * top.master[b] : 6 * top.master[b] + 6, 6 * top.slave[b] : 6 * top.slave[b] + 6
+        ]
+        for corner in corners:
+            move = np.hstack(
+                [
+                    sign * np.hstack([np.eye(3), -_cross(corner - model.centre[body])])
+                    for sign, body in ((-1, top.master[b]), (1, top.slave[b]))
+                ]
+            )
+            matrix[np.ix_(at, at)] += size / 3 * move.T @ spring @ move
+    return matrix
+
+
+def _cross(a):
+    return np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
+
+
+def axial_stiffness(model):
+    """E A of a bar [N]: held at its left, pulled at its right; strain of the middle half."""
+    matrix = stiffness_matrix(model)
+    left, _ = faces_of_group(model.mesh, model.topology, "left")
+    right, _ = faces_of_group(model.mesh, model.topology, "right")
+    free = np.setdiff1d(np.arange(model.body_count), left)
+    dof = (6 * free[:, None] + np.arange(6)).ravel()
+    load = np.zeros(6 * model.body_count)
+    load[6 * right] = 1.0 / len(right)
+    moved = np.zeros(6 * model.body_count)
+    moved[dof] = np.linalg.solve(matrix[np.ix_(dof, dof)], load[dof])
+    # Six bodies a cell: their mean knows nothing of the pattern inside the cell.
+    cell = moved[::6].reshape(-1, 6).mean(axis=1)
+    quarter = len(cell) // 4
+    slope = (cell[-1 - quarter] - cell[quarter]) / (len(cell) - 1 - 2 * quarter)
+    return model.mesh.points[:, 0].max() / len(cell) / slope
+
+
+@pytest.fixture(scope="module")
+def wave_speed():
+    """Speed of long waves [m/s] from the statics of the same bar."""
+    model = Simulation(Scene(bar(LENGTH, WIDTH, (CELLS, 1, 1)), CONCRETE), Uniform(STEP)).model
+    per_length = model.body_mass.sum() / LENGTH
+    return np.sqrt(axial_stiffness(model) / per_length)
+
+
+@pytest.fixture(scope="module")
+def pulse(wave_speed):
+    """Mean axial velocity of cells 10, 25 and of the end, by time, as a pulse of 0.8 m runs by."""
+    load = effects.GasPressure("left", peak=1e4, rise=2e-4, decay_ratio=1.0)
+    scene = Scene(bar(LENGTH, WIDTH, (CELLS, 1, 1)), CONCRETE, [load])
+    simulation = Simulation(scene, Uniform(STEP))
+    model = simulation.model
+    end, _ = faces_of_group(model.mesh, model.topology, "right")
+    steps = np.arange(0, 2600, 10)
+    rows = []
+    for step in steps.tolist():
+        simulation.advance_to(step)
+        velocity = simulation.state.velocity.to_numpy()[:, 0]
+        rows.append([*velocity.reshape(-1, 6).mean(axis=1)[[10, 25]], velocity[end].mean()])
+    return steps * STEP, np.array(rows)
+
+
+def test_a_wave_runs_as_fast_as_the_static_stiffness_says(pulse, wave_speed):
+    """c = sqrt(E A / (m / l)), E A from the statics of the same bonds.
+
+    Delay between two cells where their records agree best. A chain of cells of length h changes
+    speed by (k h)^2 / 24 at the wave number k of the pulse.
+    """
+    time, velocity = pulse
+    fine = np.arange(0.0, time[-1], STEP)
+    first, second = (np.interp(fine, time, velocity[:, k]) for k in (0, 1))
+    likeness = np.correlate(second, first, mode="full")[len(fine) - 1 :]
+    speed = 15 * LENGTH / CELLS / (likeness.argmax() * STEP)
+    assert speed == pytest.approx(wave_speed, rel=DISPERSION)
+
+
+def test_a_free_end_doubles_the_velocity(pulse):
+    """Twice the peak in the bar, less dispersion, and less what a depth of h / 4 makes of it.
+
+    The bodies at the end have their centres there: the wave and its echo, half that way apart in
+    time, add up to 2 cos(k h / 4).
+    """
+    _, velocity = pulse
+    _, second, end = velocity.max(axis=0)
+    assert 2.0 * (1.0 - DISPERSION - 24.0 / 32.0 * DISPERSION) < end / second < 2.0 + 2 * DISPERSION
+
+
+def test_a_triangular_pulse_spalls_where_its_tension_first_suffices(wave_speed):
+    """First break at lambda sigma_t / (2 s0) from the free end.
+
+    A pulse with a steep front of s0 and a linear tail of length lambda comes back as tension
+    2 s0 z / lambda at depth z. s0 is what arrives at the free end, half of its peak velocity. A
+    rise over four cells and a twentieth of the dashpots keep the grid from ringing, which breaks
+    bonds too early; more of them would smear the pulse. A cell is the finest place there is.
+    """
+    length, ratio, front, share = 2.4, 1.5, 0.4, 0.05
+    damped = replace(
+        CONCRETE,
+        normal_damping=CONCRETE.normal_damping * share,
+        shear_damping=CONCRETE.shear_damping * share,
+    )
+    scene = Scene(
+        bar(LENGTH, WIDTH, (CELLS, 1, 1)), damped, [effects.Softening(), effects.BondDamping()]
+    )
+    simulation = Simulation(scene, Uniform(STEP))
+    model = simulation.model
+    speed = ratio * CONCRETE.tensile_strength / (CONCRETE.density * wave_speed)
+    depth = LENGTH - model.centre[:, 0]
+    grid = np.linspace(0, LENGTH, 4001)
+    shape = np.interp(grid, [0, front, front + length], [0, 1, 0])
+    moved = speed / wave_speed * np.interp(depth, grid, np.cumsum(shape) * grid[1])
+    along = speed * np.interp(depth, grid, shape)
+    still = np.zeros((model.body_count, 2))
+    place = model.centre + np.column_stack([moved, still])
+    turn = np.tile(STILL, (model.body_count, 1))
+    simulation.state.place(place, turn, np.column_stack([along, still]))
+    broken, end = np.zeros(model.bond_count, dtype=bool), 0.0
+    while not broken.any():
+        simulation.advance_to(int(simulation.state.tick[None]) // 2**20 + 20)
+        broken = simulation.state.broken_tick.to_numpy() >= 0
+        end = max(end, simulation.state.velocity.to_numpy()[-6:, 0].mean())
+        assert simulation.time_s < 2.0 * LENGTH / wave_speed
+    arrived = CONCRETE.density * wave_speed * 0.5 * end
+    expected = length * CONCRETE.tensile_strength / (2.0 * arrived)
+    corners = model.mesh.points[model.topology.vertices[broken]]
+    found = LENGTH - corners[..., 0].mean()
+    assert found == pytest.approx(expected, abs=LENGTH / CELLS)
+
+
+def supported(step):
+    """A bar driven at its left, on rollers below, fixed at its right, after 2e-5 s."""
+    listed = [
+        effects.BondDamping(),
+        effects.Fixed("right"),
+        effects.Roller("bottom", (0.0, 2.0, 0.0)),
+        effects.PrescribedMotion("left", (0.3, 0.0, 0.1), frequency=2e4),
+    ]
+    simulation = Simulation(Scene(bar(0.3, 0.1, (3, 1, 1)), CONCRETE, listed), Uniform(step))
+    simulation.advance_to(round(2e-5 / step))
+    return simulation
+
+
+@pytest.fixture(scope="module")
+def held():
+    """The supported bar at two steps."""
+    return [supported(step) for step in (2e-8, 1e-8)]
+
+
+def test_supports_hold_what_they_say(held):
+    """Fixed: nothing moves. Roller: no velocity and only spin along the normal. Driven: v cos."""
+    simulation = held[0]
+    model, motion = simulation.model, simulation.state.motion()
+    groups = ("right", "bottom", "left")
+    bodies = {name: faces_of_group(model.mesh, model.topology, name)[0] for name in groups}
+    right = bodies["right"]
+    assert np.array_equal(motion["position"][right], model.centre[right])
+    assert np.array_equal(motion["spin"][right], np.zeros((len(right), 3)))
+    rolling = np.setdiff1d(bodies["bottom"], np.concatenate([right, bodies["left"]]))
+    assert len(rolling)
+    assert np.array_equal(motion["velocity"][rolling, 1], np.zeros(len(rolling)))
+    spin = motion["spin"][rolling]
+    assert np.abs(spin[:, 1]).max() > 0.0
+    # The kept momentum is that of the turn at the start of the step; the step turns on by w dt.
+    assert np.abs(spin[:, [0, 2]]).max() < 2e-8 * np.abs(spin).max() ** 2
+    # Velocities are those of the middle of the last step, at cosines of angles of size 2.
+    phase = np.cos(2.0 * np.pi * 2e4 * (2e-5 - 1e-8))
+    driven = motion["velocity"][bodies["left"]]
+    assert np.abs(driven - phase * np.array([0.3, 0.0, 0.1])).max() < 16 * EPS
+    # Midpoint sums of a cosine: the way is exact but for (w dt)^2 / 24.
+    rate = 2.0 * np.pi * 2e4
+    way = np.sin(rate * 2e-5) / rate * np.array([0.3, 0.0, 0.1])
+    moved = motion["position"][bodies["left"]] - model.centre[bodies["left"]]
+    assert np.abs(moved - way).max() < (rate * 2e-8) ** 2 / 20 * 0.3 / rate + 1000 * EPS * 0.1
+
+
+def test_work_and_impulse_of_supports_are_booked(held):
+    """The ledger closes at first order, momentum to sqrt(updates) eps."""
+    coarse, fine = (simulation.report() for simulation in held)
+    assert abs(coarse.ledger["support_work"]) > 0.0 and coarse.ledger["load_work"] == 0.0
+    ratio = fine.ledger["residual"] / coarse.ledger["residual"]
+    # w dt of the driving and of the fastest dashpot, 0.04: second order is that share of it.
+    assert ratio == pytest.approx(0.5, abs=0.02)
+    assert coarse.ledger_residual_fraction < 0.05
+    bound = EPS * np.sqrt(fine.substeps)
+    assert fine.linear_momentum_error < bound
+    assert fine.angular_momentum_error < bound
+
+
+def test_free_fall_is_late_by_exactly_half_a_step():
+    """v += g dt, then x += v dt: x_n = g t^2 / 2 + g dt t / 2, and v = g t."""
+    gravity, step, steps = np.array([1.0, -9.81, 0.5]), 2.0**-10, 512
+    scene = Scene(single(), CONCRETE, [effects.Gravity(tuple(gravity))])
+    simulation = Simulation(scene, Uniform(step))
+    simulation.advance_to(steps)
+    motion, time = simulation.state.motion(), step * steps
+    fallen = motion["position"][0] - simulation.model.centre[0]
+    exact = gravity * time * (time + step) / 2.0
+    assert np.abs(fallen - exact).max() < steps * EPS * np.abs(exact).max()
+    assert np.abs(motion["velocity"][0] - gravity * time).max() < steps * EPS * 9.81 * time
+    account = simulation.ledger.account()
+    assert account["load_work"] == pytest.approx(account["kinetic"], rel=steps * EPS)

@@ -1,0 +1,162 @@
+"""Order of the step: with neighbours held, drifted, and with one step for all."""
+
+import numpy as np
+import pytest
+import taichi as ti
+
+from taichi_dem import CONCRETE, Scene, Simulation, effects, quality_report
+from taichi_dem.mesh_shapes import bar
+from taichi_dem.timeline import MACRO_TICKS, MAX_LEVEL
+
+UNTIL = 1e-5
+#: Macro steps in a run; the step halves from one to the next.
+STEPS = (100, 200, 400, 800)
+
+
+@ti.data_oriented
+class Unchanged:
+    """Every body keeps the level it started with."""
+
+    @ti.func
+    def wanted(self, level, speed2, low):
+        """The present level."""
+        return level
+
+
+class FixedLevels:
+    """Multirate without a rule: the order of a scheme shows where its steps do not jump."""
+
+    name, uniform = "fixed_levels", False
+
+    def __init__(self, neighbour):
+        self.neighbour, self.dt0 = neighbour, UNTIL / STEPS[0]
+
+    def criterion(self):
+        """Step rule for the schedule."""
+        return Unchanged()
+
+
+class MovingBar:
+    """18 bodies, unstrained, with random velocities and spins; runs again at any step.
+
+    The kernels are compiled once: steps and dashpots are numbers in fields.
+    """
+
+    def __init__(self, neighbour):
+        scene = Scene(bar(0.3, 0.1, (3, 1, 1)), CONCRETE, [effects.BondDamping()])
+        self.simulation = Simulation(scene, FixedLevels(neighbour))
+        model, state = self.simulation.model, self.simulation.state
+        random = np.random.default_rng(3)
+        turn = np.tile([1.0, 0.0, 0.0, 0.0], (model.body_count, 1))
+        velocity, spin = random.standard_normal((2, model.body_count, 3))
+        state.place(model.centre, turn, velocity, 10.0 * spin)
+        self.mixed = random.integers(0, 4, model.body_count).astype(np.int32)
+        self.fields = state.fields()
+        self.first = {name: field.to_numpy() for name, field in self.fields.items()}
+        self.simulation.start()
+
+    def position_after(self, steps, levels, damped):
+        """Positions at UNTIL [m]."""
+        simulation, state = self.simulation, self.simulation.state
+        for name, field in self.fields.items():
+            field.from_numpy(self.first[name])
+        state.level.from_numpy(levels)
+        material = simulation.model.material
+        for k, value in enumerate((material.normal_damping, material.shear_damping)):
+            simulation.model.dashpot.law[k] = value if damped else 0.0
+        dt0 = UNTIL / steps
+        simulation.schedule.dt0, simulation.schedule.tick_seconds = dt0, dt0 / MACRO_TICKS
+        for k in range(MAX_LEVEL + 1):
+            simulation.schedule.step_seconds[k] = dt0 / 2.0**k
+        simulation.step.prime()
+        simulation.advance_to(steps)
+        assert np.array_equal(state.level.to_numpy(), levels)
+        return state.motion()["position"]
+
+
+@pytest.fixture(scope="module")
+def bars():
+    """A bar for each treatment of the neighbours."""
+    return {neighbour: MovingBar(neighbour) for neighbour in ("held", "drifted")}
+
+
+def orders(moving, levels, damped):
+    """Observed orders: with x = x0 + C dt^p, differences of successive runs fall 2^p-fold."""
+    runs = [moving.position_after(steps, levels, damped) for steps in STEPS]
+    gaps = [np.linalg.norm(a - b) for a, b in zip(runs, runs[1:])]
+    return np.log2(np.array(gaps[:-1]) / gaps[1:])
+
+
+def slack(moving, damped):
+    """How far an order may be off: the next term of the error, in the finest step compared.
+
+    It is smaller than the first by a step times the fastest rate, of a spring or a dashpot, both
+    from the stability limit 2 / rate.
+    """
+    limits = quality_report(moving.simulation.model.mesh, CONCRETE)
+    limit = limits.dashpot_step_s.min() if damped else limits.spring_step_s.min()
+    return np.log2(1.0 + 2.0 / limit * UNTIL / STEPS[-2])
+
+
+def check_order(moving, levels, damped, order):
+    """The order at the finest steps, within its slack."""
+    error = slack(moving, damped)
+    assert error < 0.5
+    assert orders(moving, levels, damped)[-1] == pytest.approx(order, abs=error)
+
+
+def test_one_step_for_all_is_leapfrog(bars):
+    """v += dt F(x) / m, then x += dt v: positions of second order.
+
+    These are the positions of the leapfrog whose velocities live half a step earlier. The one at
+    the start is off by dt F / 2 m, which is nothing for an unstrained bar.
+    """
+    still = np.zeros_like(bars["held"].mixed)
+    check_order(bars["held"], still, False, 2.0)
+
+
+def test_held_neighbours_cost_the_second_order(bars):
+    """A bond sees the coarse body where it was up to a step ago: an opening wrong by v dt."""
+    moving = bars["held"]
+    assert len(np.unique(moving.mixed)) == 4
+    check_order(moving, moving.mixed, False, 1.0)
+
+
+def test_drifted_neighbours_keep_the_second_order(bars):
+    """Each bond kicks both bodies at its own times: an asynchronous variational integrator."""
+    moving = bars["drifted"]
+    check_order(moving, moving.mixed, False, 2.0)
+
+
+def test_all_schemes_approach_one_answer(bars):
+    """Extrapolated to no step at all they agree, to what the last halving still moved by it.
+
+    Errors C dt^p: the limit is x_fine + (x_fine - x_coarse) / (2^p - 1), known to the next term.
+    """
+    held, drifted = bars["held"], bars["drifted"]
+    kinds = [(held, np.zeros_like(held.mixed), 2), (held, held.mixed, 1), (drifted, held.mixed, 2)]
+    limits, doubts = [], []
+    for moving, levels, order in kinds:
+        coarse, fine = (moving.position_after(n, levels, False) for n in STEPS[-2:])
+        limits.append(fine + (fine - coarse) / (2**order - 1))
+        doubts.append(slack(moving, False) * np.linalg.norm(fine - coarse))
+    for k in (1, 2):
+        assert np.linalg.norm(limits[k] - limits[0]) < doubts[k] + doubts[0]
+
+
+def test_drifting_is_worth_its_name(bars):
+    """At equal steps the drifted run lies ten times nearer to the answer than the held one."""
+    levels = bars["held"].mixed
+    exact = bars["drifted"].position_after(8 * STEPS[-2], levels, False)
+    error = {
+        name: np.linalg.norm(moving.position_after(STEPS[-2], levels, False) - exact)
+        for name, moving in bars.items()
+    }
+    assert error["drifted"] < 0.1 * error["held"]
+
+
+@pytest.mark.parametrize("neighbour", ["held", "drifted"])
+def test_explicit_dashpots_are_of_first_order(bars, neighbour):
+    """A dashpot takes the velocity before the kick, half a step old, in every scheme."""
+    moving = bars[neighbour]
+    check_order(moving, moving.mixed, True, 1.0)
