@@ -66,7 +66,7 @@ FILES = {
 def start(name, *arguments):
     """Run an experiment in a process of its own; two threads, output in pipes."""
     line = [sys.executable, str(FOLDER / f"{name}.py"), "--threads", "2", *map(str, arguments)]
-    return subprocess.run(line, capture_output=True, text=True, timeout=300)
+    return subprocess.run(line, capture_output=True, text=True, timeout=1800)
 
 
 @pytest.fixture(scope="module", params=NAMES)
