@@ -177,6 +177,8 @@ class Schedule:
     @ti.func
     def start_all(self):
         """Fill all lists anew and sort them, as if level 0 were due."""
+        if ti.static(self.uniform):
+            self._level_all()
         self.bodies.fill(self.model.body_count)
         self.bonds.fill(self.model.bond_count)
         self.waiting[None] = -1
