@@ -9,7 +9,9 @@ import contextlib
 import io
 import os
 import tempfile
+import time
 from dataclasses import dataclass
+from pathlib import Path
 
 os.environ.setdefault("TI_SKIP_VERSION_CHECK", "ON")
 os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
@@ -37,6 +39,9 @@ class Settings:
     threads: int
     debug: bool
 
+
+# Taichi holds the lock of its kernel cache for well under a second.
+_STALE_LOCK_S = 10.0
 
 _current = None
 _generation = 0
@@ -102,6 +107,7 @@ def _initialise(wanted):
     # Taichi falls back to the CPU with a mere warning: ask first, and read back what it took.
     if wanted.arch == "cuda" and not _cuda_present():
         raise InputError("arch 'cuda' was asked for, but no CUDA device answers here: use 'cpu'")
+    _remove_stale_lock()
     with contextlib.redirect_stdout(io.StringIO()):
         ti.init(
             arch=ti.cuda if wanted.arch == "cuda" else ti.cpu,
@@ -112,13 +118,27 @@ def _initialise(wanted):
             advanced_optimization=False,
             cpu_max_num_threads=wanted.threads,
             debug=wanted.debug,
-            log_level=ti.WARN,
+            # Below errors Taichi only tells of a cache that another process is writing.
+            log_level=ti.ERROR,
             random_seed=0,
         )
     got = impl.current_cfg().arch
     if (got == ti.cuda) != (wanted.arch == "cuda"):
         ti.reset()
         raise InputError(f"arch {wanted.arch!r} was asked for, Taichi started {got}")
+
+
+def _remove_stale_lock():
+    """Remove the lock that a killed process left on Taichi's kernel cache.
+
+    With it, every later process would compile all its kernels anew and say so on stderr.
+    """
+    default = impl.default_cfg().offline_cache_file_path
+    folder = os.environ.get("TI_OFFLINE_CACHE_FILE_PATH", default)
+    lock = Path(folder, "ticache.lock")
+    with contextlib.suppress(OSError):
+        if time.time() - lock.stat().st_mtime > _STALE_LOCK_S:
+            lock.unlink()
 
 
 def _cuda_present():

@@ -4,6 +4,9 @@ import json
 import os
 import subprocess
 import sys
+import time
+
+import pytest
 
 from tests.scenes import ROOT
 
@@ -56,6 +59,7 @@ def answers(tmp_path, text=_SCRIPT, **environment):
         [sys.executable, str(script)], capture_output=True, text=True, cwd=tmp_path, env=variables
     )
     assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
     return json.loads(done.stdout.splitlines()[-1])
 
 
@@ -72,3 +76,26 @@ def test_sessions_start_once_and_say_why_they_refuse(tmp_path):
     assert "has been stopped" in said["older session"]
     assert said["threads"] == [1, 2]
     assert said["time"] == 1e-8
+
+
+_SILENT_START = """
+import json
+from taichi_dem import CONCRETE, Scene, Simulation, Uniform, runtime
+from taichi_dem.mesh_shapes import pair
+
+runtime.start(threads=1)
+Simulation(Scene(pair(), CONCRETE), Uniform()).advance_to(1)
+print(json.dumps("done"))
+"""
+
+
+@pytest.mark.parametrize("age_s, removed", [(3600.0, True), (0.0, False)])
+def test_only_a_lock_left_by_a_killed_process_is_removed(tmp_path, age_s, removed):
+    lock = tmp_path / "ticache.lock"
+    lock.touch()
+    left_at = time.time() - age_s
+    os.utime(lock, (left_at, left_at))
+    answers(tmp_path, _SILENT_START, TI_OFFLINE_CACHE_FILE_PATH=str(tmp_path))
+    assert lock.exists() != removed
+    # With the lock free, the next process finds this one's kernels compiled.
+    assert bool(list(lock.parent.glob("*.tic"))) == removed
