@@ -56,9 +56,9 @@ def cpu_seconds(simulation, steps):
     return time.process_time() - start
 
 
-def bonded_phase(repeats, steps=500):
+def bonded_phase(repeats, steps=4000):
     """Million contact units a second while all bonds hold: whole steps, bodies included."""
-    simulation = paper_simulation(Uniform(1e-8))
+    simulation = paper_simulation(Uniform(1e-9))
     simulation.advance_to(steps)
     rates = []
     for k in range(repeats):

@@ -23,6 +23,9 @@ class State:
     broken_tick: when a bond was released, NEVER while it holds. exposed_tick: since when a face
     carries contact spheres.
     bond_heat: energy that dashpots, slip and release have taken from each bond [J].
+    contact_heat: energy that sphere dashpots and friction have taken, and energy that releases
+    have injected [J], booked to the first body of a pair; with contact only.
+    injected_tick: last tick whose releases have been booked there.
     load_work: work [J], one component a load and a last one for supports; load_impulse: what all
     of them gave a body (linear, and angular about the origin). tick: present time. bad_body:
     lowest body out of bounds, body_count if none.
@@ -43,6 +46,9 @@ class State:
         self.broken_tick = ti.field(ti.i64, shape=bonds)
         self.exposed_tick = ti.field(ti.i64, shape=4 * n)
         self.bond_heat = ti.Vector.field(3, real, shape=bonds)
+        if model.has_contact:
+            self.contact_heat = ti.Vector.field(3, real, shape=n)
+            self.injected_tick = ti.field(ti.i64, shape=())
         self.load_work = ti.Vector.field(len(model.loads) + 1, real, shape=n)
         self.load_impulse = ti.Vector.field(6, real, shape=n)
         self.tick = ti.field(ti.i64, shape=())

@@ -124,9 +124,9 @@ class Advance:
         """One unit has failed: the face transmits nothing from now on and carries spheres."""
         tick = self.state.tick[None]
         self.state.broken_tick[b] = tick
-        self.schedule.dirty[None] = 1
         for side in ti.static(range(2)):
             self.state.exposed_tick[slots[side]] = tick
+            self.schedule.note_change(slots[side] >> 2)
         if ti.static(self.has_contact):
             self.contacts.search_due[None] = 1
 
