@@ -3,6 +3,7 @@
 import numpy as np
 import taichi as ti
 
+from taichi_dem.fields import then
 from taichi_dem.physics.rotation import rotation_matrix, spin_of
 from taichi_dem.types import real, vec3, vec4
 
@@ -54,11 +55,11 @@ class State:
         self.tick = ti.field(ti.i64, shape=())
         self.bad_body = ti.field(ti.i32, shape=())
         self.max_speed2 = ti.field(real, shape=())
-        self.max_speed2[None] = max_speed**2
-        self.broken_tick.fill(NEVER)
-        self.exposed_tick.fill(NEVER)
-        self.bad_body[None] = n
-        self.place(model.centre, np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)))
+        then(self.max_speed2.fill, max_speed**2)
+        then(self.broken_tick.fill, NEVER)
+        then(self.exposed_tick.fill, NEVER)
+        then(self.bad_body.fill, n)
+        then(self.place, model.centre, np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)))
 
     def place(self, position, orientation, velocity=None, spin=None):
         """Set the motion of all bodies.

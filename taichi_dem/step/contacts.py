@@ -6,6 +6,7 @@ A pair holds the sphere pairs that were nearer than the skin at the last search.
 
 import taichi as ti
 
+from taichi_dem.fields import then
 from taichi_dem.types import real, vec3
 
 
@@ -39,7 +40,7 @@ class Contacts:
         self.rough = ti.field(ti.i32, shape=n)
         self.travel = ti.field(real, shape=n)
         self.skin = ti.field(real, shape=())
-        self.skin[None] = effect.skin
+        then(self.skin.fill, effect.skin)
         self.search_due = ti.field(ti.i32, shape=())
         self.deepest = ti.field(real, shape=self.capacity)
 

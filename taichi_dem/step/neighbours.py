@@ -5,6 +5,7 @@ It reaches several skins and takes in every face, broken or not, so one list ser
 
 import taichi as ti
 
+from taichi_dem.fields import then
 from taichi_dem.step.cells import CellGrid
 from taichi_dem.types import real
 
@@ -34,8 +35,8 @@ class Neighbours:
         self.placed_at = ti.Vector.field(3, real, shape=n)
         self.turned_to = ti.Matrix.field(3, 3, real, shape=n)
         self.stale = ti.field(ti.i32, shape=())
-        self.stale[None] = 1
         self.full = ti.field(ti.i32, shape=())
+        then(self.stale.fill, 1)
 
     @ti.func
     def place(self, i):

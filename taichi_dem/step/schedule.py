@@ -4,8 +4,10 @@ A list in order of level makes the members due at a tick its first part. Levels 
 against how often they are used, so a body that changes its own moves just its own entries.
 """
 
+import numpy as np
 import taichi as ti
 
+from taichi_dem.fields import then
 from taichi_dem.timeline import MACRO_TICKS, MAX_LEVEL, device_coarsest_due, device_ticks_of
 from taichi_dem.types import real
 
@@ -104,8 +106,7 @@ class Schedule:
         self.dt0 = dt0
         self.tick_seconds = dt0 / MACRO_TICKS
         self.step_seconds = ti.field(real, shape=MAX_LEVEL + 1)
-        for k in range(MAX_LEVEL + 1):
-            self.step_seconds[k] = dt0 / 2.0**k
+        then(self.step_seconds.from_numpy, dt0 / 2.0 ** np.arange(MAX_LEVEL + 1))
         self.bodies = DueList(model.body_count)
         self.bonds = DueList(model.bond_count)
         self.pairs = DueList(contacts.capacity if contacts else 1)

@@ -17,6 +17,7 @@ ROOT = Path(__file__).resolve().parents[2]
 LAYERS = {
     "taichi_dem": (
         ("errors", "types", "runtime"),
+        ("fields",),
         (
             *("tetrahedra", "mesh", "mesh_files", "mesh_shapes", "mesh_gmsh"),
             *("topology", "quality", "contact_spheres", "materials"),
