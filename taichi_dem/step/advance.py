@@ -177,6 +177,7 @@ class Advance:
 
     @ti.func
     def _push_apart(self, slot, linear, angular):
+        self.contacts.pair_full[slot] = 1
         for k in ti.static(range(3)):
             self.contacts.pair_slot[slot][k] += linear[k]
             self.contacts.pair_slot[slot][3 + k] += angular[k]

@@ -33,6 +33,7 @@ class BroadPhase:
         self.pair_faces = ti.field(ti.i32, shape=contacts.capacity)
         self.old_body = ti.Vector.field(2, ti.i32, shape=contacts.capacity)
         self.old_slot = ti.Vector.field(6, real, shape=2 * contacts.capacity)
+        self.old_full = ti.field(ti.i32, shape=2 * contacts.capacity)
         self.old_heat = ti.Vector.field(3, real, shape=contacts.capacity)
         self.fresh = ti.field(ti.i32, shape=())
         self.old_first_of = ti.field(ti.i32, shape=n + 1)
@@ -123,6 +124,7 @@ class BroadPhase:
         self.old_body[p] = self.contacts.pair_body[p]
         for side in ti.static(range(2)):
             self.old_slot[2 * p + side] = self.contacts.pair_slot[2 * p + side]
+            self.old_full[2 * p + side] = self.contacts.pair_full[2 * p + side]
         self.old_heat[p] = self.contacts.pair_heat[p]
 
     @ti.func
@@ -195,9 +197,7 @@ class BroadPhase:
         while old < last and self.old_body[ti.min(old, last - 1)][1] <= j:
             partner = self.old_body[old][1]
             if partner < j:
-                if _anything(
-                    self.old_slot[2 * old], self.old_slot[2 * old + 1], self.old_heat[old]
-                ):
+                if self.old_full[2 * old] == 1 or self.old_full[2 * old + 1] == 1:
                     self._number(i, partner, 0, 0)
             old += 1
         return old
@@ -230,16 +230,19 @@ class BroadPhase:
         """Write a pair's spheres, take over what waited for it, book what its birth injects."""
         i, j = self.contacts.pair_body[p][0], self.contacts.pair_body[p][1]
         self._spheres_near(i, j, self.pair_faces[p], self.contacts.pair_first[p], True)
-        old = self._old_pair(i, j)
+        old, injected = self._old_pair(i, j), self._injected(p, i, j)
         for side in ti.static(range(2)):
-            waiting = 0.0 * self.contacts.pair_slot[2 * p + side]
+            waiting, full = 0.0 * self.contacts.pair_slot[2 * p + side], 0
             if old >= 0:
-                waiting = self.old_slot[2 * old + side]
+                waiting, full = self.old_slot[2 * old + side], self.old_full[2 * old + side]
             self.contacts.pair_slot[2 * p + side] = waiting
-        heat = vec3(0.0, 0.0, self._injected(p, i, j))
+            self.contacts.pair_full[2 * p + side] = full
+        heat = vec3(0.0, 0.0, injected)
         if old >= 0:
             heat += self.old_heat[old]
         self.contacts.pair_heat[p] = heat
+        if injected > 0.0:
+            self.contacts.pair_full[2 * p] = 1
 
     @ti.func
     def _injected(self, p, i, j):
@@ -275,10 +278,3 @@ class BroadPhase:
     @ti.func
     def _second_of(self, p):
         return self.contacts.pair_body[p][1]
-
-
-@ti.func
-def _anything(first, second, heat):
-    """Whether a pair's slots or its heat hold anything."""
-    waiting = ti.max(ti.abs(first).max(), ti.abs(second).max())
-    return ti.max(waiting, ti.abs(heat).max()) > 0.0

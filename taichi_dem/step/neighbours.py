@@ -10,7 +10,7 @@ from taichi_dem.step.cells import CellGrid
 from taichi_dem.types import real
 
 #: Reach of the list in skins of the search: a longer list against fewer of them.
-REACH = 8.0
+REACH = 16.0
 
 
 @ti.data_oriented
@@ -120,10 +120,17 @@ class Neighbours:
         reach = self.model.radius[i] + self.model.radius[j] + wide
         if (self.state.position[j] - self.state.position[i]).norm_sqr() < reach * reach:
             for f in range(4):
-                for g in range(4):
-                    if self.clusters_near(4 * i + f, 4 * j + g, wide):
-                        faces |= 1 << (4 * f + g)
+                if self._cluster_near(4 * i + f, j, wide):
+                    for g in range(4):
+                        if self.clusters_near(4 * i + f, 4 * j + g, wide):
+                            faces |= 1 << (4 * f + g)
         return faces
+
+    @ti.func
+    def _cluster_near(self, face, j, wide):
+        """Whether the ball around the spheres of a face comes near the ball around a body."""
+        reach = self.model.cluster[face][3] + self.model.radius[j] + wide
+        return (self.state.position[j] - self.cluster[face]).norm_sqr() < reach * reach
 
     @ti.func
     def clusters_near(self, face_i, face_j, wide):
