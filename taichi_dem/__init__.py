@@ -23,6 +23,8 @@ from taichi_dem.record import write_paraview
 from taichi_dem.scene import Scene
 from taichi_dem.simulate import simulate
 from taichi_dem.simulation import Simulation
+from taichi_dem.step_control import StepControl
+from taichi_dem.step_report import step_report
 
 __version__ = "0.1.0"
 
@@ -35,6 +37,7 @@ __all__ = [
     "Scene",
     "Simulation",
     "SimulationDiverged",
+    "StepControl",
     "Uniform",
     "checked_mesh",
     "effects",
@@ -43,5 +46,6 @@ __all__ = [
     "read_mesh",
     "runtime",
     "simulate",
+    "step_report",
     "write_paraview",
 ]

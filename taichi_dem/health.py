@@ -4,6 +4,7 @@ import numpy as np
 
 from taichi_dem.errors import SimulationDiverged
 from taichi_dem.quality import quality_report
+from taichi_dem.step_control import CRITERIA
 
 #: Energy that may appear from nowhere before a run counts as diverged, as a share of what is there.
 ENERGY_FROM_NOWHERE = 0.5
@@ -92,6 +93,10 @@ class Health:
     def _limit(self, body):
         """Largest stable explicit step at a body [s], and what sets it."""
         model = self.model
+        if self.schedule.controlled:
+            rates = self.schedule.rates
+            cause = CRITERIA[rates.limit_by[body]].replace("_", " ")
+            return rates.limit[body] / rates.safety, f"its limits (first {cause})"
         steps = quality_report(model.mesh, model.material)
         limit, cause = steps.spring_step_s[body], "its bond springs"
         if model.dashpot.name and steps.dashpot_step_s[body] < limit:

@@ -5,9 +5,23 @@ from typing import Optional
 
 from taichi_dem.effects.base import positive
 from taichi_dem.errors import InputError
-from taichi_dem.step_control import Displacement, FixedStep
+from taichi_dem.step_control import Displacement, FixedStep, StepControl
 
 NEIGHBOURS = ("held", "drifted")
+DASHPOTS = ("full", "limited")
+
+
+def _check_options(method):
+    if method.control is not None and not isinstance(method.control, StepControl):
+        raise InputError(f"control must be a StepControl or None, got {method.control!r}")
+    if method.dashpot not in DASHPOTS:
+        raise InputError(f"dashpot must be one of {', '.join(DASHPOTS)}, got {method.dashpot!r}")
+
+
+def _suffix(method):
+    """What a name adds for control and limited dashpots."""
+    controlled = "_controlled" if method.control is not None else ""
+    return controlled + ("_limited" if method.dashpot == "limited" else "")
 
 
 @dataclass(frozen=True)
@@ -16,11 +30,15 @@ class Uniform:
 
     dt0: largest step [s]. distance: l [m]; no body may move further in a step, so the step of
     all falls to that of the fastest body. Without it the step is dt0 throughout.
+    control: further limits of the step, a ``StepControl``. dashpot: "full", or "limited": a
+    dashpot keeps the share of its coefficient that the steps of its bodies bear.
     Source: Konno et al., 3.1 and 4.3 ("same time increment for all elements").
     """
 
     dt0: float = 1e-8
     distance: Optional[float] = None
+    control: Optional[StepControl] = None
+    dashpot: str = "full"
 
     uniform = True
     neighbour = "held"
@@ -29,11 +47,12 @@ class Uniform:
         positive("dt0", self.dt0)
         if self.distance is not None:
             positive("distance", self.distance)
+        _check_options(self)
 
     @property
     def name(self):
         """Short name for tables."""
-        return "uniform"
+        return f"uniform{_suffix(self)}"
 
     def criterion(self):
         """Step rule for the schedule."""
@@ -49,13 +68,15 @@ class Multirate:
     dt0: largest step [s]. distance: l [m]; a body's step is the largest dt0 / 2^k in which it
     moves by no more. neighbour: a body between its own times is "held" at its last position (the
     paper) or "drifted" along to every time at which one of its bonds or contacts is evaluated,
-    and then takes the impulse at once.
+    and then takes the impulse at once. control, dashpot: as in ``Uniform``.
     Source: Konno et al., 3.1, eq. 3.
     """
 
     dt0: float = 1e-8
     distance: float = 1e-8
     neighbour: str = "held"
+    control: Optional[StepControl] = None
+    dashpot: str = "full"
 
     uniform = False
 
@@ -66,11 +87,12 @@ class Multirate:
             raise InputError(
                 f"neighbour must be one of {', '.join(NEIGHBOURS)}, got {self.neighbour!r}"
             )
+        _check_options(self)
 
     @property
     def name(self):
         """Short name for tables."""
-        return f"multirate_{self.neighbour}"
+        return f"multirate_{self.neighbour}{_suffix(self)}"
 
     def criterion(self):
         """Step rule for the schedule."""

@@ -98,31 +98,44 @@ class QualityReport:
 
 
 def quality_report(mesh, material) -> QualityReport:
-    """Shape and explicit step limits of every body of a mesh.
-
-    A pair of equal bodies moves against each other, so that its rate is twice that of one body:
-    dashpots (forward Euler) are stable to 2 / (2 rate), springs (symplectic Euler) to
-    2 / sqrt(2 omega^2).  A body without bonds has infinite limits.
-    """
+    """Shape and explicit step limits of every body of a mesh; infinite for one without bonds."""
     topology = topology_of(mesh)
     mass, _, _ = body_properties(mesh, material.density)
     altitude = smallest_altitudes(mesh)
     longest = geometry.edge_lengths(mesh.points, mesh.tetrahedra).max(axis=1)
     damping = bond_rates(mesh, topology, material.density, dashpots_of(material))
     springs = bond_rates(mesh, topology, material.density, springs_of(material))
-    with np.errstate(divide="ignore"):
-        dashpot_step, spring_step = 1.0 / damping, 2.0 / np.sqrt(2.0 * springs)
     return QualityReport(
         volume_m3=geometry.signed_volumes(mesh.points, mesh.tetrahedra),
         mass_kg=mass,
         aspect_ratio=longest / altitude,
         smallest_altitude_m=altitude,
-        dashpot_step_s=dashpot_step,
-        spring_step_s=spring_step,
+        dashpot_step_s=dashpot_step(damping),
+        spring_step_s=spring_step(springs),
         point_count=mesh.point_count,
         bond_count=topology.bond_count,
         outer_count=topology.outer_count,
     )
+
+
+def dashpot_step(rate):
+    """Largest step [s] at which dashpots are stable that slow a body at a rate [1/s].
+
+    A pair of equal bodies moves against each other at twice the rate of one, and forward Euler
+    is stable to 2 / (2 rate). Infinite where the rate is zero.
+    """
+    with np.errstate(divide="ignore"):
+        return 1.0 / np.asarray(rate)
+
+
+def spring_step(rate2):
+    """Largest step [s] at which springs are stable that hold a body at a squared rate [1/s2].
+
+    As for dashpots a pair has twice that of one, and symplectic Euler is stable to
+    2 / sqrt(2 omega^2). Infinite where it is zero.
+    """
+    with np.errstate(divide="ignore"):
+        return 2.0 / np.sqrt(2.0 * np.asarray(rate2))
 
 
 def dashpots_of(material):
@@ -152,13 +165,25 @@ def bond_rates(mesh, topology, density, coefficients) -> np.ndarray:
     coefficients: normal and tangential coefficient per area; [Pa s/m] gives rates [1/s],
     [Pa/m] gives squared angular frequencies [1/s2].
     """
+    return subset_rates(mesh, topology, density, coefficients, subsets=(15,))[:, 0]
+
+
+def subset_rates(mesh, topology, density, coefficients, subsets=range(16)) -> np.ndarray:
+    """``bond_rates`` with only some of a body's bonds intact, shape (body_count, len(subsets)).
+
+    subsets: bit f of each stands for the bond at local face f; the default is all sixteen.
+    """
     mass, centre, inertia = body_properties(mesh, density)
     body, face = np.nonzero(topology.body_bond >= 0)
     blocks = _face_blocks(mesh, body, face, centre[body], coefficients)
-    total = np.zeros((mesh.body_count, 6, 6))
-    np.add.at(total, body, blocks)
-    root = _inverse_root(mass, inertia)
-    return np.linalg.eigvalsh(root @ total @ root)[:, -1]
+    root = inverse_root(mass, inertia)
+    rates = np.zeros((mesh.body_count, len(subsets)))
+    for column, subset in enumerate(subsets):
+        total = np.zeros((mesh.body_count, 6, 6))
+        kept = (subset >> face) & 1 == 1
+        np.add.at(total, body[kept], blocks[kept])
+        rates[:, column] = np.linalg.eigvalsh(root @ total @ root)[:, -1]
+    return np.maximum(rates, 0.0)
 
 
 def _face_blocks(mesh, body, face, centre, coefficients):
@@ -171,11 +196,19 @@ def _face_blocks(mesh, body, face, centre, coefficients):
         normal[:, :, None] * normal[:, None, :]
     )
     arms = mesh.points[vertices] - centre[:, None]
+    return area[:, None, None] / 3.0 * point_blocks(arms, law)
+
+
+def point_blocks(arms, law):
+    """Sum over points of J^T law J, J the map from (velocity, spin) to the point's velocity.
+
+    arms: points from the centre [m], shape (n, points, 3). law: what resists their velocity,
+    shape (n, 3, 3). Returns (n, 6, 6).
+    """
     lever = np.zeros((*arms.shape[:2], 3, 6))
     lever[..., :3] = np.eye(3)
     lever[..., 3:] = -_cross_matrix(arms)  # w x r = -[r]x w
-    units = np.einsum("nuai,nab,nubj->nij", lever, law, lever)
-    return area[:, None, None] / 3.0 * units
+    return np.einsum("nuai,nab,nubj->nij", lever, law, lever)
 
 
 def _cross_matrix(vectors):
@@ -186,7 +219,7 @@ def _cross_matrix(vectors):
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def _inverse_root(mass, inertia):
+def inverse_root(mass, inertia):
     """M^-1/2 of M = diag(mass, mass, mass, inertia), shape (n, 6, 6)."""
     moments, axes = np.linalg.eigh(inertia)
     root = np.zeros((len(mass), 6, 6))

@@ -35,7 +35,8 @@ class Frame:
     """The block at one time.
 
     time_s; position, displacement, velocity (n, 3) in m and m/s; rotation (n, 3, 3), body to
-    world; level (n,); damage (n,) in [0, 1], the mean over a body's bonds.
+    world; level (n,); damage (n,) in [0, 1], the mean over a body's bonds; bound (n,): what
+    asked for the level, a place in ``step_control.CRITERIA``.
     """
 
     time_s: float
@@ -45,6 +46,7 @@ class Frame:
     velocity: np.ndarray
     level: np.ndarray
     damage: np.ndarray
+    bound: np.ndarray
 
     @property
     def speed(self):
@@ -99,6 +101,7 @@ class Recorder:
                 velocity=motion["velocity"],
                 level=motion["level"],
                 damage=self._body_damage(damage),
+                bound=self.state.bound.to_numpy(),
             )
         )
 
@@ -179,7 +182,8 @@ def write_csv(path, columns):
 def write_paraview(folder, model, frames, name="blast"):
     """Write frames as a ParaView series: folder/name.pvd and a VTU file a frame.
 
-    Cells carry body_id, level, speed_m_s, displacement_m and damage.
+    Cells carry body_id, level, speed_m_s, displacement_m, damage and step_bound_by, the place
+    in ``step_control.CRITERIA`` of what bounds a body's step.
     """
     output_folder(folder)
     cells = np.arange(4 * model.body_count, dtype=np.int32).reshape(-1, 4)
@@ -192,6 +196,7 @@ def write_paraview(folder, model, frames, name="blast"):
             "speed_m_s": frame.speed,
             "displacement_m": frame.displacement,
             "damage": frame.damage,
+            "step_bound_by": frame.bound,
         }
         points = body_corners(model, frame).reshape(-1, 3)
         write_vtu(os.path.join(folder, names[-1]), points, cells, {}, data)

@@ -16,6 +16,7 @@ class Report:
     ledger: energy terms [J]; ledger_residual_fraction: residual over the work put in.
     linear_momentum_error, angular_momentum_error: out of nothing, as shares of what was
     exchanged. compile_seconds, run_seconds, run_cpu_seconds: cost. needs: effects missed.
+    bound_by: bodies at the end by what bounds their step, see ``step_control.CRITERIA``.
     """
 
     method: str
@@ -39,6 +40,7 @@ class Report:
     run_seconds: float
     run_cpu_seconds: float
     needs: tuple
+    bound_by: dict
 
     @property
     def contact_evaluations(self):
@@ -77,6 +79,7 @@ class Report:
                 f"{self.until_s:.4g} s, {self.broken_faces} of {self.bond_count} bonds broken",
             ),
             ("smallest step", f"{self.smallest_step_s:.3g} s"),
+            ("steps bound by", ", ".join(f"{n} {name}" for name, n in self.bound_by.items())),
             ("substeps", f"{self.substeps:,}"),
             (
                 "evaluations",

@@ -15,7 +15,9 @@ from taichi_dem.step.advance import Advance
 from taichi_dem.step.broad_phase import BroadPhase
 from taichi_dem.step.contacts import Contacts
 from taichi_dem.step.drivers import CALL_SECONDS, DRIVERS, Step
+from taichi_dem.step.rates import rates_for
 from taichi_dem.step.schedule import Schedule
+from taichi_dem.step_control import counted_criteria
 from taichi_dem.timeline import MACRO_TICKS
 from taichi_dem.watch import Watch
 
@@ -53,8 +55,16 @@ class Simulation:
         model, state, method = self.model, self.state, self.method
         self.contacts = Contacts(model, state) if model.has_contact else None
         drifted = method.neighbour == "drifted"
+        rates = rates_for(model, state, self.contacts, method)
         self.schedule = Schedule(
-            model, state, self.contacts, method.criterion(), method.dt0, method.uniform, drifted
+            model,
+            state,
+            self.contacts,
+            method.criterion(),
+            method.dt0,
+            method.uniform,
+            drifted,
+            rates,
         )
         self.broad_phase = None
         if self.contacts is not None:
@@ -158,6 +168,7 @@ class Simulation:
             run_seconds=self.run_seconds,
             run_cpu_seconds=self.run_cpu_seconds,
             needs=self.watch.findings(),
+            bound_by=counted_criteria(self.state.bound.to_numpy()),
         )
 
 

@@ -18,7 +18,8 @@ class State:
     position [m], velocity [m/s], orientation (unit quaternion, scalar first), angular_momentum
     [kg m^2/s] in world axes; rotation (matrix) and spin [rad/s] follow from them and are kept so
     that neighbours need not compute them. A body's motion is that of its own last tick.
-    level: step dt0 / 2^level. last_tick: when the body was last advanced.
+    level: step dt0 / 2^level. bound: what asked for it, a place in ``step_control.CRITERIA``.
+    last_tick: when the body was last advanced.
     slot: impulse [N s] and its moment about the body's centre [N m s] that face f of body i has
     gathered since then, entry 4 i + f.
     broken_tick: when a bond was released, NEVER while it holds. exposed_tick: since when a face
@@ -42,6 +43,7 @@ class State:
         self.spin = ti.Vector.field(3, real, shape=n)
         self.angular_momentum = ti.Vector.field(3, real, shape=n)
         self.level = ti.field(ti.i32, shape=n)
+        self.bound = ti.field(ti.i32, shape=n)
         self.last_tick = ti.field(ti.i64, shape=n)
         self.slot = ti.Vector.field(6, real, shape=4 * n)
         self.broken_tick = ti.field(ti.i64, shape=bonds)

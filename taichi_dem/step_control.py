@@ -1,11 +1,76 @@
 """Which step a body may take: one object a rule, asked by the schedule at the body's own times."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import taichi as ti
 
+from taichi_dem.errors import InputError
 from taichi_dem.fields import then
 from taichi_dem.timeline import MAX_LEVEL
 from taichi_dem.types import real
+
+#: What may bound the step of a body; the state holds a place in this tuple for each of them.
+CRITERIA = (
+    "largest_step",
+    "displacement",
+    "rotation",
+    "bond_stiffness",
+    "bond_dashpot",
+    "contact_stiffness",
+    "contact_dashpot",
+    "load",
+    "neighbour",
+)
+LARGEST, DISPLACEMENT, ROTATION, BOND_K, BOND_C, CONTACT_K, CONTACT_C, LOAD, NEIGHBOUR = range(9)
+#: The criteria that a user may leave out, to see what happens then.
+OPTIONAL = CRITERIA[2:8]
+#: Events that bring a body to the present time and let it choose its step anew.
+EVENTS = ("hit", "release", "neighbour")
+
+
+@dataclass(frozen=True)
+class StepControl:
+    """Limits of a body's step beside the way that it may go.
+
+    safety: share of each stability limit that a step may take, in (0, 1]. angle: largest turn
+    in a step [rad]. criteria: names out of ``OPTIONAL`` that count. wake: events out of ``EVENTS``
+    at which a body between its own times is brought to the present and takes its new step at
+    once: "hit" (a contact comes near), "release" (a bond near it breaks), "neighbour" (a body
+    it touches went to a much shorter step). level_jump: levels by which a body may be coarser
+    than one it touches, None for any number.
+    Raises InputError for a value out of its range or an unknown name.
+    """
+
+    safety: float = 0.8
+    angle: float = 0.02
+    criteria: tuple = OPTIONAL
+    wake: tuple = EVENTS
+    level_jump: int = 2
+
+    def __post_init__(self):
+        for name, top in (("safety", 1.0), ("angle", 1.0)):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, (int, float)):
+                raise InputError(f"{name} must be a number in (0, {top:g}], got {value!r}")
+            if not 0.0 < value <= top:
+                raise InputError(f"{name} must be a number in (0, {top:g}], got {value!r}")
+        for name, known in (("criteria", OPTIONAL), ("wake", EVENTS)):
+            for entry in getattr(self, name):
+                if entry not in known:
+                    raise InputError(f"{name} must be out of {', '.join(known)}, got {entry!r}")
+        jump = self.level_jump
+        if jump is not None and (isinstance(jump, bool) or not isinstance(jump, int) or jump < 0):
+            raise InputError(f"level_jump must be a whole number of at least 0, got {jump!r}")
+
+
+def counted_criteria(bound):
+    """Number of bodies by the name of what bounds their step, for those that occur.
+
+    bound: places in CRITERIA, shape (body_count,).
+    """
+    counts = np.bincount(bound, minlength=len(CRITERIA))
+    return {name: int(n) for name, n in zip(CRITERIA, counts) if n}
 
 
 @ti.data_oriented
@@ -40,3 +105,34 @@ class Displacement:
         while k > low and speed2 <= self.speed2[ti.max(k - 1, 0)]:
             k -= 1
         return k
+
+
+@ti.func
+def level_of(step, dt0):
+    """Lowest level k whose step dt0 / 2^k is no longer than a step [s], and is allowed."""
+    k = 0
+    length = dt0
+    while length > step and k < MAX_LEVEL:
+        k += 1
+        length *= 0.5
+    return k
+
+
+@ti.func
+def shorter(step, bound, other, criterion):
+    """The shorter of two steps [s] with what bounds it."""
+    if other < step:
+        step, bound = other, criterion
+    return step, bound
+
+
+@ti.func
+def dashpot_limit(rate):
+    """``quality.dashpot_step`` for kernels: seconds, huge where the rate [1/s] is zero."""
+    return 1.0 / ti.max(rate, 1e-200)
+
+
+@ti.func
+def spring_limit(rate2):
+    """``quality.spring_step`` for kernels: seconds, huge where the squared rate is zero."""
+    return 2.0 / ti.sqrt(2.0 * ti.max(rate2, 1e-200))

@@ -10,6 +10,7 @@ import taichi as ti
 
 from taichi_dem.physics.bond import bond_motion, unit_arm, unit_opening, unit_velocity
 from taichi_dem.physics.rotation import rotation_matrix, spin_of, turned, zero3
+from taichi_dem.step.rates import RELEASE
 from taichi_dem.types import real, vec2, vec3
 
 
@@ -23,13 +24,20 @@ class Advance:
         self.has_contact = contacts is not None
         # Without fast_math a product with zero is not folded: what is absent must not be written.
         self.has_dashpot = bool(model.dashpot.name)
+        self.rates, self.retimes = schedule.rates, schedule.retimes
+        self.has_rates = schedule.has_rates
+        self.limited = self.has_rates and schedule.rates.limited
         self.has_heat = self.has_dashpot or bool(model.shear.name)
 
     @ti.func
     def bond(self, b):
         """Evaluate the three contact units of a bond; release it when one of them fails."""
-        if self.state.broken_tick[b] < 0:
-            slots = self.model.bond_slots[b]
+        slots = self.model.bond_slots[b]
+        dt = self._bond_step(b, slots[0] >> 2, slots[1] >> 2)
+        if dt > 0.0:
+            scale = 1.0
+            if ti.static(self.limited):
+                scale = self._bond_share(slots[0] >> 2, slots[1] >> 2)
             motion = self._motion(b, slots)
             stiffness = self.model.bond_stiffness[b]
             force, torque, failed = zero3(), zero3(), 0
@@ -45,13 +53,14 @@ class Advance:
                 if ti.static(self.has_dashpot):
                     velocity = unit_velocity(motion, arm)
                     drag = self.model.dashpot.traction(velocity)
+                    if ti.static(self.limited):
+                        drag *= scale
                     traction += drag
                     dragged += drag.dot(velocity)
                 force += traction
                 torque += arm.cross(traction)
                 slipped += spent
                 failed |= self.model.tension.failed(u)
-            dt = self.schedule.pair_step(slots[0] >> 2, slots[1] >> 2)
             area = self.model.unit_area[b]
             if failed == 0:
                 self._pull_together(slots, motion, force * (area * dt), torque * (area * dt))
@@ -60,6 +69,31 @@ class Advance:
             else:
                 self.state.bond_heat[b] += area * vec3(0.0, slipped, self._stored(b, motion))
                 self._release(b, slots)
+
+    @ti.func
+    def _bond_step(self, b, i, j):
+        """Seconds for which a bond gives its impulse now; 0 when it is released or has given it."""
+        dt = 0.0
+        if self.state.broken_tick[b] < 0:
+            if ti.static(self.retimes):
+                dt = self.schedule.unpaid(self.schedule.paid[b], i, j)
+                if dt > 0.0:
+                    self.schedule.paid[b] = self.schedule.paid_until(i, j)
+            else:
+                dt = self.schedule.pair_step(i, j)
+        return dt
+
+    @ti.func
+    def _bond_share(self, i, j):
+        """Share of its coefficient that a bond's dashpot keeps: what both bodies bear."""
+        first = self.rates.bond_share(i, self.schedule.own_step(i))
+        return ti.min(first, self.rates.bond_share(j, self.schedule.own_step(j)))
+
+    @ti.func
+    def _contact_share(self, i, j):
+        """The same for the dashpots of a pair in contact."""
+        first = self.rates.contact_share(i, self.schedule.own_step(i))
+        return ti.min(first, self.rates.contact_share(j, self.schedule.own_step(j)))
 
     @ti.func
     def _motion(self, b, slots):
@@ -127,6 +161,8 @@ class Advance:
         for side in ti.static(range(2)):
             self.state.exposed_tick[slots[side]] = tick
             self.schedule.note_change(slots[side] >> 2)
+            if ti.static(self.has_rates):
+                self.rates.notice(slots[side] >> 2, RELEASE)
         if ti.static(self.has_contact):
             self.contacts.search_due[None] = 1
 
@@ -141,11 +177,18 @@ class Advance:
         turn, offset = back @ self.state.rotation[j], back @ branch
         force, moment_i, moment_j = zero3(), zero3(), zero3()
         dragged, rubbed, deepest = 0.0, 0.0, 0.0
+        scale, margin, near = 1.0, 0.0, 0
+        if ti.static(self.limited):
+            scale = self._contact_share(i, j)
+        if ti.static(self.has_rates):
+            margin = self.rates.near.margin(i, j)
         for k in range(self.contacts.pair_first[p], self.contacts.pair_first[p + 1]):
             a, b = self.contacts.pair_sphere[k][0], self.contacts.pair_sphere[k][1]
             first, second = self.model.sphere[a], self.model.sphere[b]
             apart = turn @ second.xyz + offset - first.xyz
             reach = first[3] + second[3]
+            if ti.static(self.has_rates):
+                near += ti.cast(apart.norm_sqr() < (reach + margin) * (reach + margin), ti.i32)
             if apart.norm_sqr() < reach * reach:
                 distance = ti.max(apart.norm(), 1e-30)
                 overlap = reach - distance
@@ -155,8 +198,9 @@ class Advance:
                 velocity = self._velocity_at(j, arm - branch) - self._velocity_at(i, arm)
                 rate = velocity.dot(normal)
                 slide = velocity - rate * normal
-                push = self.contacts.law.normal(overlap, rate)
-                rub = self.model.friction.force(self.contacts.law.damping(), push, slide)
+                push = self.contacts.law.normal(overlap, self._limited(rate, scale))
+                drag = self._limited(self.contacts.law.damping(), scale)
+                rub = self.model.friction.force(drag, push, slide)
                 pushed = push * normal + rub
                 force += pushed
                 moment_i -= arm.cross(pushed)
@@ -165,11 +209,31 @@ class Advance:
                 rubbed -= rub.dot(slide)
                 deepest = ti.max(deepest, overlap / ti.min(first[3], second[3]))
         if deepest > 0.0:
-            dt = self.schedule.pair_step(i, j)
+            dt = self._pair_step(p, i, j)
             self._push_apart(2 * p, -force * dt, moment_i * dt)
             self._push_apart(2 * p + 1, force * dt, moment_j * dt)
             self.contacts.pair_heat[p] += dt * vec3(dragged, rubbed, 0.0)
         self.contacts.deepest[p] = deepest
+        if ti.static(self.has_rates):
+            self.rates.notice_pair(p, near)
+
+    @ti.func
+    def _limited(self, value, scale):
+        """A dashpot's coefficient or rate times its share, where dashpots are limited."""
+        if ti.static(self.limited):
+            value *= scale
+        return value
+
+    @ti.func
+    def _pair_step(self, p, i, j):
+        """Seconds for which a touching pair gives its impulse now; 0 when it has given it."""
+        dt = self.schedule.pair_step(i, j)
+        if ti.static(self.retimes):
+            dt = self.schedule.unpaid(self.rates.near.paid[p], i, j)
+            self.rates.near.paid[p] = ti.max(
+                self.rates.near.paid[p], self.schedule.paid_until(i, j)
+            )
+        return dt
 
     @ti.func
     def _velocity_at(self, i, arm):
@@ -188,6 +252,11 @@ class Advance:
         elapsed = self.schedule.elapsed(i)
         linear, angular = self._gathered(i)
         velocity, momentum = self._kicked(i, elapsed, linear, angular)
+        self._moved(i, elapsed, velocity, momentum)
+
+    @ti.func
+    def _moved(self, i, elapsed, velocity, momentum):
+        """Let body i go on for elapsed [s], as its supports allow, and choose its next step."""
         velocity, momentum = self._supported(i, elapsed, velocity, momentum)
         spin = self.spin(i, momentum)
         orientation = turned(self.state.orientation[i], spin, elapsed)
@@ -221,12 +290,16 @@ class Advance:
 
     @ti.func
     def _kicked(self, i, elapsed, linear, angular):
-        """Velocity and angular momentum after all impulses; loads book their work.
-
-        The work of a load takes the mean of the velocities before and after the whole kick, with
-        which the change of kinetic energy is exact.
-        """
+        """Velocity and angular momentum after all impulses; loads book their work."""
         before, momentum = self.state.velocity[i], self.state.angular_momentum[i]
+        linear, angular, kick = self._loaded(i, elapsed, linear, angular)
+        velocity = before + linear * self.model.mass_inverse[i]
+        self._book_loads(i, kick, 0.5 * (before + velocity), momentum + 0.5 * angular)
+        return velocity, momentum + angular
+
+    @ti.func
+    def _loaded(self, i, elapsed, linear, angular):
+        """Impulse and moment with those of the loads added, and each load's own, a row each."""
         kick = ti.Matrix.zero(real, ti.static(max(1, len(self.model.loads))), 6)
         half = self.schedule.seconds(self.state.tick[None]) - 0.5 * elapsed
         for e in ti.static(range(len(self.model.loads))):
@@ -236,15 +309,21 @@ class Advance:
                 angular += torque * elapsed
                 for k in ti.static(range(3)):
                     kick[e, k], kick[e, 3 + k] = force[k] * elapsed, torque[k] * elapsed
-        velocity = before + linear * self.model.mass_inverse[i]
+        return linear, angular, kick
+
+    @ti.func
+    def _book_loads(self, i, kick, velocity, momentum):
+        """Book what the loads gave body i.
+
+        With the means of its velocity and angular momentum before and after the whole kick, the
+        change of kinetic energy is exact.
+        """
         for e in ti.static(range(len(self.model.loads))):
             if self.model.loads[e].acts_on(i):
                 push = vec3(kick[e, 0], kick[e, 1], kick[e, 2])
                 twist = vec3(kick[e, 3], kick[e, 4], kick[e, 5])
-                spin = self.spin(i, momentum + 0.5 * angular)
-                work = 0.5 * push.dot(before + velocity) + twist.dot(spin)
+                work = push.dot(velocity) + twist.dot(self.spin(i, momentum))
                 self._book(i, e, work, push, twist)
-        return velocity, momentum + angular
 
     @ti.func
     def spin(self, i, momentum):

@@ -126,6 +126,8 @@ class BroadPhase:
             self.old_slot[2 * p + side] = self.contacts.pair_slot[2 * p + side]
             self.old_full[2 * p + side] = self.contacts.pair_full[2 * p + side]
         self.old_heat[p] = self.contacts.pair_heat[p]
+        if ti.static(self.schedule.has_rates):
+            self.schedule.rates.near.keep(p)
 
     @ti.func
     def _count_spheres(self, i):
@@ -243,6 +245,16 @@ class BroadPhase:
         self.contacts.pair_heat[p] = heat
         if injected > 0.0:
             self.contacts.pair_full[2 * p] = 1
+        if ti.static(self.schedule.has_rates):
+            self.schedule.rates.take_pair(p, old, self._exposed_now(i) | self._exposed_now(j))
+
+    @ti.func
+    def _exposed_now(self, i):
+        """1 when a face of body i has got its spheres at this tick."""
+        exposed = 0
+        for face in range(4 * i, 4 * i + 4):
+            exposed |= ti.cast(self.state.exposed_tick[face] == self.state.tick[None], ti.i32)
+        return exposed
 
     @ti.func
     def _injected(self, p, i, j):

@@ -8,6 +8,8 @@ import time
 
 import taichi as ti
 
+from taichi_dem.step.wake import Wake
+
 #: A resident call is kept near this long [s], so that Ctrl-C, progress and health are prompt.
 CALL_SECONDS = 0.2
 _MAX_SUBSTEPS = 1 << 24
@@ -43,6 +45,7 @@ class Step:
         self.state = advance.state
         touching = ((schedule.pairs, advance.contact),) if contacts is not None else ()
         self.phases = (
+            *self._retimed(),
             *touching,
             (Once(), schedule.tick_on),
             (schedule.bodies, advance.body),
@@ -50,12 +53,25 @@ class Step:
             (schedule.bonds, advance.bond),
         )
 
+    def _retimed(self):
+        """Phases in which bodies take new rates, and are woken, where the method asks for it."""
+        rates = self.schedule.rates
+        if rates is None:
+            return ()
+        phases = ((rates, rates.refresh),)
+        if self.schedule.retimes:
+            phases += ((rates, Wake(self.advance, self.schedule).rouse),)
+        return (*phases, (Once(), self.schedule.settle))
+
     @ti.kernel
     def prime(self):
         """Choose the first levels, fill the lists and evaluate the bonds of the first tick."""
         for _ in range(1):
             self.schedule.low[None] = 0
             self.schedule.wanted[None] = 0
+        if ti.static(self.schedule.has_rates):
+            for i in range(self.advance.model.body_count):
+                self.schedule.rates.refresh(i)
         for i in range(self.advance.model.body_count):
             self.schedule.choose_level(i, self.state.velocity[i].norm_sqr())
         for _ in range(1):

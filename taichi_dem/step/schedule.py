@@ -8,6 +8,8 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem.fields import then
+from taichi_dem.step.rates import CLOSE
+from taichi_dem.step_control import DISPLACEMENT, LARGEST, NEIGHBOUR
 from taichi_dem.timeline import MACRO_TICKS, MAX_LEVEL, device_coarsest_due, device_ticks_of
 from taichi_dem.types import real
 
@@ -95,12 +97,24 @@ class Schedule:
     drifted: bodies next to a due one are brought to its time too, else only due bodies move.
     dt0 [s]: step of level 0. finest: finest level present. low: coarsest level now due.
     changed: bodies whose own level or bonds changed since the lists were put in order.
+    rates: a ``Rates`` that knows stable steps, None where the rule needs none. retimes: whether
+    bodies may be brought to the present between their own times; bonds and pairs then keep in
+    paid the tick up to which they have given their impulse. known: levels at the last ordering.
     evaluations: substeps, bodies advanced, bonds and pairs evaluated, and the bonds and pairs that
     one step for all would have evaluated in the same substeps.
     """
 
-    def __init__(self, model, state, contacts, criterion, dt0, uniform, drifted):
-        self.model, self.state, self.contacts = model, state, contacts
+    def __init__(self, model, state, contacts, criterion, dt0, uniform, drifted, rates=None):
+        self.model, self.state, self.contacts, self.rates = model, state, contacts, rates
+        self.has_rates = rates is not None
+        self.controlled = self.has_rates and rates.control is not None
+        self.retimes = self.controlled and rates.wakes != 0
+        self.jump = rates.jump if self.controlled and not uniform else None
+        if self.retimes:
+            self.paid = ti.field(ti.i64, shape=max(1, model.bond_count))
+        self.spreads = self.jump is not None
+        if self.spreads:
+            self.known = ti.field(ti.i32, shape=model.body_count)
         self.criterion, self.uniform, self.drifted = criterion, uniform, drifted
         self.has_contact = contacts is not None
         self.dt0 = dt0
@@ -113,7 +127,7 @@ class Schedule:
         self.low = ti.field(ti.i32, shape=())
         self.finest = ti.field(ti.i32, shape=())
         self.wanted = ti.field(ti.i32, shape=())
-        self.changed = ti.field(ti.i32, shape=model.body_count + 2 * model.bond_count)
+        self.changed = ti.field(ti.i32, shape=2 * model.body_count + 2 * model.bond_count)
         self.changed_count = ti.field(ti.i32, shape=())
         self.evaluations = ti.field(ti.i64, shape=5)
 
@@ -121,6 +135,26 @@ class Schedule:
     def pair_step(self, i, j):
         """Seconds until two bodies are looked at again: the smaller of their steps."""
         return self.step_seconds[ti.max(self.state.level[i], self.state.level[j])]
+
+    @ti.func
+    def own_step(self, i):
+        """Step of body i [s]."""
+        return self.step_seconds[self.state.level[i]]
+
+    @ti.func
+    def unpaid(self, paid, i, j):
+        """Seconds of the coming pair step that are not paid yet; paid: tick, may lie behind."""
+        start, end = self._present(), self.paid_until(i, j)
+        return ti.cast(ti.max(0, end - ti.max(paid, start)), real) * self.step_seconds[MAX_LEVEL]
+
+    @ti.func
+    def paid_until(self, i, j):
+        """Tick at which two bodies are looked at again."""
+        return self._present() + device_ticks_of(ti.max(self.state.level[i], self.state.level[j]))
+
+    @ti.func
+    def _present(self):
+        return self.state.tick[None]
 
     @ti.func
     def elapsed(self, i):
@@ -148,7 +182,14 @@ class Schedule:
         """Let body i, if it is its own time, take the step it wants."""
         low, level = self.low[None], self.state.level[i]
         if level >= low:
-            wanted = self.criterion.wanted(level, speed2, low)
+            wanted = low
+            if ti.static(self.controlled):
+                wanted, bound = self.controlled_level(i)
+                wanted = ti.max(wanted, low)
+                self.state.bound[i] = bound
+            else:
+                wanted = self.criterion.wanted(level, speed2, low)
+                self.state.bound[i] = ti.select(wanted > 0, DISPLACEMENT, LARGEST)
             if ti.static(self.uniform):
                 # Ask first: an atomic for every body costs as much as its rotation.
                 if wanted > self.wanted[None]:
@@ -158,6 +199,62 @@ class Schedule:
                 self.note_change(i)
 
     @ti.func
+    def controlled_level(self, i):
+        """Level that the rates and the neighbours of body i ask for, and which criterion does."""
+        wanted, bound = self.rates.wanted(i, self.seconds(self.state.tick[None]))
+        if ti.static(self.spreads):
+            floor = self._finest_neighbour(i) - self.jump
+            if floor > wanted:
+                wanted, bound = floor, NEIGHBOUR
+        return wanted, bound
+
+    @ti.func
+    def _finest_neighbour(self, i):
+        """Finest level among the bodies that body i touches, at the last ordering; -1 for none."""
+        finest = -1
+        for f in range(4):
+            if self._bonded(4 * i + f):
+                finest = ti.max(finest, self.known[self.model.neighbour[4 * i + f]])
+        if ti.static(self.has_contact):
+            for p in range(self.contacts.first_of[i], self.contacts.first_of[i + 1]):
+                if self.rates.near.count[p] > 0:
+                    finest = ti.max(finest, self.known[self.contacts.pair_body[p][1]])
+            for k in range(self.contacts.touch_first[i], self.contacts.touch_first[i + 1]):
+                p = self.contacts.touch[k]
+                if self.rates.near.count[p] > 0:
+                    finest = ti.max(finest, self.known[self.contacts.pair_body[p][0]])
+        return finest
+
+    @ti.func
+    def _bonded(self, face):
+        bonded = False
+        if self.model.neighbour[face] >= 0:
+            bonded = self.state.broken_tick[self.model.face_bond[face]] < 0
+        return bonded
+
+    @ti.func
+    def _spread(self, i):
+        """Tell the bodies that body i touches of its level, where they are too much coarser."""
+        level = self.state.level[i]
+        self.known[i] = level
+        for f in range(4):
+            if self._bonded(4 * i + f):
+                self._tell(self.model.neighbour[4 * i + f], level)
+        if ti.static(self.has_contact):
+            for p in range(self.contacts.first_of[i], self.contacts.first_of[i + 1]):
+                if self.rates.near.count[p] > 0:
+                    self._tell(self.contacts.pair_body[p][1], level)
+            for k in range(self.contacts.touch_first[i], self.contacts.touch_first[i + 1]):
+                p = self.contacts.touch[k]
+                if self.rates.near.count[p] > 0:
+                    self._tell(self.contacts.pair_body[p][0], level)
+
+    @ti.func
+    def _tell(self, j, level):
+        if self.state.level[j] < level - self.jump:
+            self.rates.notice(j, CLOSE)
+
+    @ti.func
     def note_change(self, i):
         """Body i has taken another level, or lost a bond."""
         self.changed[ti.atomic_add(self.changed_count[None], 1)] = i
@@ -165,13 +262,26 @@ class Schedule:
     @ti.func
     def put_in_order(self, one):
         """Move the entries of the bodies that changed, and count what this tick evaluates."""
+        self._rearrange()
+        self._count()
+
+    @ti.func
+    def settle(self, one):
+        """The same after bodies have been brought to the present; their list is done with."""
+        self.rates.done()
+        if ti.static(self.retimes):
+            self._rearrange()
+
+    @ti.func
+    def _rearrange(self):
         if ti.static(self.uniform):
             self._level_all()
         for a in range(self.changed_count[None]):
             self._move_entries(self.changed[a])
+            if ti.static(self.spreads):
+                self._spread(self.changed[a])
         self.changed_count[None] = 0
         self._find_finest()
-        self._count()
 
     @ti.func
     def _move_entries(self, i):
@@ -204,6 +314,9 @@ class Schedule:
         if ti.static(self.uniform):
             self._level_all()
         self.changed_count[None] = 0
+        if ti.static(self.spreads):
+            for i in range(self.model.body_count):
+                self.known[i] = self.state.level[i]
         self.bodies.fill(self.model.body_count, self._body_key)
         self.bonds.fill(self.model.bond_count, self._bond_key)
         if ti.static(self.has_contact):

@@ -30,7 +30,7 @@ LAYERS = {
         ("state",),
         ("step",),
         ("ledger",),
-        ("health", "watch", "report"),
+        ("health", "watch", "report", "step_report"),
         ("simulation",),
         ("monitor", "record"),
         ("simulate",),

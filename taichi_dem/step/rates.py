@@ -1,0 +1,238 @@
+"""How fast springs and dashpots act on each body, and the step that this allows.
+
+A body's rates change only where a bond breaks or a contact comes near or leaves. Such bodies are
+listed, and their rates found anew at the start of the next substep.
+"""
+
+import numpy as np
+import taichi as ti
+
+from taichi_dem.fields import then
+from taichi_dem.quality import dashpots_of, springs_of, subset_rates
+from taichi_dem.step.near import FRESH, Near
+from taichi_dem.step_control import (
+    BOND_C,
+    BOND_K,
+    CONTACT_C,
+    CONTACT_K,
+    CRITERIA,
+    DISPLACEMENT,
+    EVENTS,
+    LARGEST,
+    LOAD,
+    ROTATION,
+    StepControl,
+    dashpot_limit,
+    level_of,
+    shorter,
+    spring_limit,
+)
+from taichi_dem.types import real
+
+HIT, RELEASE, CLOSE = (1 << k for k in range(len(EVENTS)))
+#: With c min(1, LIMITED / X) no dashpot takes more than this in a step (X = 2 is unstable).
+LIMITED = 1.7
+#: Part of it that near contacts get at least.
+FOR_CONTACTS = 0.5
+
+
+@ti.data_oriented
+class Rates:
+    """Rates of every body, and the list of those whose rates must be found anew.
+
+    dashpot_table, spring_table: largest eigenvalue of the bonds' block by the set of intact
+    bonds, [1/s] and [1/s^2]. bond_damping, contact_damping: rates of a body's dashpots [1/s].
+    limit, limit_by: longest stable step [s], and the criterion that sets it. listed,
+    listed_count: bodies to look at; events: why, as bits. woken: how many bodies were brought to
+    the present between their times.
+    control: a StepControl, None for a method that only limits dashpots; distance: l [m] or None.
+    """
+
+    def __init__(self, model, state, contacts, method):
+        self.model, self.state, self.contacts = model, state, contacts
+        self.control = method.control
+        self.controlled = method.control is not None
+        self.has_contact = contacts is not None
+        self.has_distance = method.distance is not None
+        rule = self.control or StepControl()
+        self.dt0, self.distance, self.safety = method.dt0, method.distance, rule.safety
+        self.limited = method.dashpot == "limited"
+        self.angle, self.jump = rule.angle, rule.level_jump
+        self.counts = {name: name in rule.criteria for name in CRITERIA}
+        self.has_load = self.counts["load"] and self.has_distance and bool(model.loads)
+        self.wakes = 0
+        if self.control is not None:
+            self.wakes = sum(1 << k for k, event in enumerate(EVENTS) if event in rule.wake)
+        self.near = Near(model, state, contacts, method.dt0) if contacts is not None else None
+        n = model.body_count
+        self.dashpot_table = ti.field(real, shape=(n, 16))
+        self.spring_table = ti.field(real, shape=(n, 16))
+        then(self._load_tables)
+        self.bond_damping = ti.field(real, shape=n)
+        self.contact_damping = ti.field(real, shape=n)
+        self.limit = ti.field(real, shape=n)
+        self.limit_by = ti.field(ti.i32, shape=n)
+        self.events = ti.field(ti.i32, shape=n)
+        self.listed = ti.field(ti.i32, shape=n)
+        self.listed_count = ti.field(ti.i32, shape=())
+        self.woken = ti.field(ti.i32, shape=())
+
+    def _load_tables(self):
+        model, material = self.model, self.model.material
+        shape = model.mesh, model.topology, material.density
+        if model.dashpot.name:
+            self.dashpot_table.from_numpy(subset_rates(*shape, dashpots_of(material)))
+        self.spring_table.from_numpy(
+            np.ascontiguousarray(subset_rates(*shape, springs_of(material)))
+        )
+
+    @ti.func
+    def count(self, low):
+        """Bodies whose rates must be found anew."""
+        return self.listed_count[None]
+
+    @ti.func
+    def pick(self, a):
+        """One of them."""
+        return self.listed[a]
+
+    @ti.func
+    def notice(self, i, event):
+        """List body i, once, and remember what happened to it."""
+        if ti.atomic_or(self.events[i], event) == 0:
+            self.listed[ti.atomic_add(self.listed_count[None], 1)] = i
+
+    @ti.func
+    def notice_pair(self, p, count):
+        """Note how many contacts of a pair are near; list both bodies if that is news."""
+        if count != self.near.count[p]:
+            event = HIT
+            if self.near.count[p] == FRESH:
+                event = RELEASE
+            self.near.count[p] = count
+            for side in ti.static(range(2)):
+                self.notice(self.contacts.pair_body[p][side], event)
+
+    @ti.func
+    def take_pair(self, p, old, fresh):
+        """Take over what is known of a pair from its former place; list both bodies if nothing."""
+        self.near.renew(p, old, fresh)
+        if self.near.count[p] < 0:
+            event = HIT
+            if fresh != 0:
+                event = RELEASE
+            for side in ti.static(range(2)):
+                self.notice(self.contacts.pair_body[p][side], event)
+
+    @ti.func
+    def done(self):
+        """Empty the list."""
+        for a in range(self.listed_count[None]):
+            self.events[self.listed[a]] = 0
+        self.listed_count[None] = 0
+
+    @ti.func
+    def refresh(self, i):
+        """Find the rates of body i, and the longest stable step."""
+        intact = 0
+        for f in range(4):
+            b = self.model.face_bond[4 * i + f]
+            if b >= 0:
+                if self.state.broken_tick[b] < 0:
+                    intact |= 1 << f
+        dashpot, spring = self.dashpot_table[i, intact], self.spring_table[i, intact]
+        contact_c, contact_k = 0.0, 0.0
+        if ti.static(self.has_contact):
+            share = self.near.eigenvalue(i)
+            contact_c = self.contacts.law.damping() * share
+            contact_k = self.contacts.law.elastic(1.0) * share
+        self.bond_damping[i], self.contact_damping[i] = dashpot, contact_c
+        if ti.static(self.controlled):
+            self._limit(i, dashpot, contact_c, spring, contact_k)
+
+    @ti.func
+    def _limit(self, i, bond_c, contact_c, bond_k, contact_k):
+        """Rates of bonds and contacts add up; the larger one of the two counts as the cause.
+
+        A criterion that the user left out does not add.
+        """
+        step, by = self.dt0, LARGEST
+        if ti.static(not self.counts["bond_dashpot"]):
+            bond_c = 0.0
+        if ti.static(not self.counts["contact_dashpot"]):
+            contact_c = 0.0
+        if ti.static(not self.counts["bond_stiffness"]):
+            bond_k = 0.0
+        if ti.static(not self.counts["contact_stiffness"]):
+            contact_k = 0.0
+        cause = BOND_K
+        if contact_k > bond_k:
+            cause = CONTACT_K
+        step, by = shorter(step, by, self.safety * spring_limit(bond_k + contact_k), cause)
+        cause = BOND_C
+        if contact_c > bond_c:
+            cause = CONTACT_C
+        step, by = shorter(step, by, self.safety * dashpot_limit(bond_c + contact_c), cause)
+        self.limit[i], self.limit_by[i] = step, by
+
+    @ti.func
+    def wanted(self, i, now):
+        """Level that body i wants at a time [s], and the criterion that asks for it."""
+        step, by = self.limit[i], self.limit_by[i]
+        if ti.static(self.has_distance):
+            way = self.distance / ti.max(self.state.velocity[i].norm(), 1e-200)
+            step, by = shorter(step, by, way, DISPLACEMENT)
+        if ti.static(self.counts["rotation"]):
+            turn = self.angle / ti.max(self.state.spin[i].norm(), 1e-200)
+            step, by = shorter(step, by, turn, ROTATION)
+        if ti.static(self.has_load):
+            step, by = shorter(step, by, self._load_step(i, now), LOAD)
+        return level_of(step, self.dt0), by
+
+    @ti.func
+    def _load_step(self, i, now):
+        """Step [s] in which the loads alone move body i by the distance: F / m dt^2 <= l.
+
+        The force is the larger one of now and a largest step ahead: a body does not leap into a
+        load that sets in while it sleeps.
+        """
+        push2 = 0.0
+        for e in ti.static(range(len(self.model.loads))):
+            if self.model.loads[e].acts_on(i):
+                for ahead in ti.static(range(2)):
+                    force, _ = self.model.loads[e].wrench(
+                        i, now + ahead * self.dt0, self.state.rotation[i]
+                    )
+                    push2 = ti.max(push2, force.norm_sqr())
+        return ti.sqrt(self.distance * self.model.mass[i] / ti.max(ti.sqrt(push2), 1e-200))
+
+    @ti.func
+    def bond_share(self, i, step):
+        """Share of its bonds' dashpots that a step [s] of body i bears: c min(1, 1.7 / X).
+
+        X = 2 dt lambda, lambda the rate of the bonds' dashpots. With contacts near they get a
+        part of the 1.7 and the bonds the rest: one share for both would all but switch off the
+        bonds of a body in contact, whose dashpots are most of the physics.
+        """
+        x = 2.0 * step * self.bond_damping[i]
+        return ti.min(1.0, self._bonds_get(i) / ti.max(x, 1e-200))
+
+    @ti.func
+    def contact_share(self, i, step):
+        """Share of its contacts' dashpots that a step [s] of body i bears, beside its bonds."""
+        used = ti.min(2.0 * step * self.bond_damping[i], self._bonds_get(i))
+        x = 2.0 * step * self.contact_damping[i]
+        return ti.min(1.0, (LIMITED - used) / ti.max(x, 1e-200))
+
+    @ti.func
+    def _bonds_get(self, i):
+        bonds = LIMITED
+        if self.contact_damping[i] > 0.0:
+            bonds -= FOR_CONTACTS
+        return bonds
+
+
+def rates_for(model, state, contacts, method):
+    """The Rates that a method needs; None where it neither controls steps nor limits dashpots."""
+    wanted = getattr(method, "control", None) or getattr(method, "dashpot", "full") == "limited"
+    return Rates(model, state, contacts, method) if wanted else None

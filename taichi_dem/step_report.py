@@ -1,0 +1,150 @@
+"""What limits the explicit step of a mesh and material, element by element, before any run."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from taichi_dem.contact_spheres import spheres_of_faces
+from taichi_dem.errors import InputError
+from taichi_dem.materials import Material
+from taichi_dem.mesh import Mesh
+from taichi_dem.quality import (
+    bond_rates,
+    dashpot_step,
+    dashpots_of,
+    inverse_root,
+    point_blocks,
+    spring_step,
+    springs_of,
+)
+from taichi_dem.scene import Scene
+from taichi_dem.tetrahedra import all_faces, area_vectors
+from taichi_dem.topology import body_properties, topology_of
+
+#: Elements listed in the printed table.
+_WORST = 10
+
+
+@dataclass(frozen=True, eq=False)
+class StepReport:
+    """Largest stable steps of every body by criterion, and which of them binds.
+
+    limits: arrays (body_count,) in s by criterion: bond_stiffness, bond_dashpot,
+    contact_stiffness and contact_dashpot (every sphere of the worst face in one contact),
+    contact_dashpot_single (one sphere in contact, which binds nothing by itself); a criterion
+    whose effect a scene leaves out is missing.
+    """
+
+    limits: dict
+
+    @property
+    def binding(self):
+        """Name of the criterion that binds each body, array (body_count,)."""
+        names = self._names()
+        place = np.argmin([self.limits[name] for name in names], axis=0)
+        return np.array(names)[place]
+
+    @property
+    def step_s(self):
+        """Largest stable step of each body [s], (body_count,)."""
+        return np.min([self.limits[name] for name in self._names()], axis=0)
+
+    def _names(self):
+        return [name for name in self.limits if not name.endswith("single")]
+
+    def worst(self, count=_WORST):
+        """Bodies of the smallest step, the worst first."""
+        return np.argsort(self.step_s, kind="stable")[:count]
+
+    def price(self, count=_WORST):
+        """Gain in the step of all without the count worst bodies, a factor of at least 1."""
+        steps = np.append(np.sort(self.step_s), np.inf)
+        return float(steps[min(count, len(steps) - 1)] / steps[0])
+
+    def work_share(self, count=_WORST):
+        """Share of the body updates, each at its own step, that the count worst bodies take."""
+        updates = 1.0 / self.step_s
+        return float(updates[self.worst(count)].sum() / max(updates.sum(), 1e-300))
+
+    def __str__(self):
+        """Which criterion binds how many bodies, the worst bodies, and what they cost."""
+        binding, step = self.binding, self.step_s
+        lines = [f"{'step bound by':24s}{'bodies':>8s}{'smallest s':>12s}{'median s':>12s}"]
+        for name, values in self.limits.items():
+            bodies = int((binding == name).sum())
+            lines.append(f"{name:24s}{bodies:8d}{values.min():12.3g}{np.median(values):12.3g}")
+        lines.append(f"{'worst body':>10s}{'step s':>12s}  bound by")
+        lines += [f"{body:10d}{step[body]:12.3g}  {binding[body]}" for body in self.worst()]
+        lines.append(
+            f"without the worst {_WORST} the step of all would be {self.price():.3g} times longer; "
+            f"with steps of their own they take {100 * self.work_share():.3g} % of the updates"
+        )
+        return "\n".join(lines)
+
+
+def step_report(scene, material=None):
+    """Judge a scene, or a mesh and a material with all effects, before a run.
+
+    scene: a Scene, or a Mesh if material is given. Limits hold for a pair of equal bodies that
+    move against each other (``quality.dashpot_step``, ``quality.spring_step``).
+    Raises InputError for anything else.
+    """
+    if isinstance(scene, Scene) and material is None:
+        effects = {effect.name: effect for effect in scene.effects}
+        contact = effects.get("sphere_contact")
+        divisions = contact.divisions if contact is not None else None
+        damped, friction = "bond_damping" in effects, "friction" in effects
+        return _report(scene.mesh, scene.material, damped, friction, divisions)
+    if isinstance(scene, Mesh) and isinstance(material, Material):
+        return _report(scene, material, True, True, 5)
+    raise InputError(
+        f"step_report needs a Scene, or a Mesh and a Material, got {type(scene).__name__} and "
+        f"{type(material).__name__}"
+    )
+
+
+def _report(mesh, material, damped, friction, divisions):
+    topology = topology_of(mesh)
+    rates = bond_rates(mesh, topology, material.density, springs_of(material))
+    limits = {"bond_stiffness": spring_step(rates)}
+    if damped:
+        rates = bond_rates(mesh, topology, material.density, dashpots_of(material))
+        limits["bond_dashpot"] = dashpot_step(rates)
+    if divisions is not None:
+        one, whole = contact_eigenvalues(mesh, material.density, divisions, friction)
+        limits["contact_stiffness"] = spring_step(material.contact_stiffness * whole)
+        limits["contact_dashpot"] = dashpot_step(material.contact_damping * whole)
+        limits["contact_dashpot_single"] = dashpot_step(material.contact_damping * one)
+    return StepReport(limits)
+
+
+def contact_eigenvalues(mesh, density, divisions, friction):
+    """Largest eigenvalues of M^-1/2 (J^T D J) M^-1/2 of each body [1/kg], two arrays (n,).
+
+    The first is for the worst of its spheres in contact, the second for all of the worst face.
+    D is the identity with friction, n n^T without; contacts act where a sphere touches its face.
+    The step finds the same from the contacts that are near (``step/near.py``).
+    """
+    mass, centre, inertia = body_properties(mesh, density)
+    spheres = spheres_of_faces(mesh, centre, divisions)
+    root = inverse_root(mass, inertia)
+    one, whole = np.zeros(len(mass)), np.zeros(len(mass))
+    for face in range(4):
+        outward = _outward(mesh, face)
+        arms = spheres.centre[:, face] + spheres.radius[:, face, :, None] * outward[:, None]
+        along = np.einsum("ni,nj->nij", outward, outward)
+        law = np.broadcast_to(np.eye(3), along.shape) if friction else along
+        whole = np.maximum(whole, _largest(root, point_blocks(arms, law)))
+        for k in range(spheres.per_face):
+            one = np.maximum(one, _largest(root, point_blocks(arms[:, k : k + 1], law)))
+    return one, whole
+
+
+def _outward(mesh, face):
+    """Outward unit normals of local face of every body, (n, 3)."""
+    vector = area_vectors(mesh.points, all_faces(mesh.tetrahedra).reshape(-1, 4, 3)[:, face])
+    return vector / np.linalg.norm(vector, axis=1, keepdims=True)
+
+
+def _largest(root, blocks):
+    return np.linalg.eigvalsh(root @ blocks @ root)[:, -1]

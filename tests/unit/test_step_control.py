@@ -1,0 +1,155 @@
+"""What limits a step: options, the report before a run, what a run records, limited dashpots."""
+
+import numpy as np
+import pytest
+
+from taichi_dem import (
+    CONCRETE,
+    InputError,
+    Multirate,
+    Scene,
+    Simulation,
+    StepControl,
+    Uniform,
+    effects,
+    read_mesh,
+    simulate,
+    step_report,
+)
+from taichi_dem.mesh_shapes import bar, pair
+from taichi_dem.quality import bond_rates, dashpot_step, dashpots_of, subset_rates
+from taichi_dem.step_control import CRITERIA
+from taichi_dem.topology import topology_of
+from tests.scenes import PAPER_BLOCK
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        lambda: StepControl(safety=0.0),
+        lambda: StepControl(safety=1.5),
+        lambda: StepControl(angle="much"),
+        lambda: StepControl(criteria=("colour",)),
+        lambda: StepControl(wake=("noise",)),
+        lambda: StepControl(level_jump=-1),
+        lambda: Uniform(dashpot="half"),
+        lambda: Multirate(control="all"),
+        lambda: step_report(pair()),
+    ],
+)
+def test_wrong_options_are_refused_in_a_sentence(wrong):
+    with pytest.raises(InputError, match=r"must be|needs"):
+        wrong()
+
+
+def test_report_names_the_limit_of_each_element_and_what_the_worst_cost():
+    """A bar with spheres of six a face: its contact dashpots bind; without them its bonds'."""
+    mesh = bar(0.4, 0.1, (4, 1, 1))
+    report = step_report(mesh, CONCRETE)
+    assert set(report.binding) == {"contact_dashpot"}
+    assert np.all(report.limits["contact_dashpot_single"] > report.limits["contact_dashpot"])
+    bonded = step_report(Scene(mesh, CONCRETE, [effects.BondDamping()]))
+    assert set(bonded.binding) == {"bond_dashpot"} and set(bonded.limits) == {
+        "bond_stiffness",
+        "bond_dashpot",
+    }
+    rates = bond_rates(mesh, topology_of(mesh), CONCRETE.density, dashpots_of(CONCRETE))
+    assert np.array_equal(bonded.step_s, dashpot_step(rates))
+    steps = np.sort(bonded.step_s)
+    assert bonded.price(10) == pytest.approx(steps[10] / steps[0])
+    assert bonded.work_share(10) == pytest.approx((1 / steps[:10]).sum() / (1 / steps).sum())
+    assert "bond_dashpot" in str(bonded) and str(bonded.worst()[0]) in str(bonded)
+
+
+def test_a_body_that_lost_bonds_is_as_slow_as_those_that_hold():
+    """Fewer bonds never make a body faster; none make it free."""
+    mesh = bar(0.2, 0.1, (2, 1, 1))
+    rates = subset_rates(mesh, topology_of(mesh), CONCRETE.density, dashpots_of(CONCRETE))
+    assert np.all(rates[:, 0] == 0.0)
+    for subset in range(16):
+        for more in (subset | 1 << f for f in range(4)):
+            assert np.all(rates[:, subset] <= rates[:, more] * (1 + 1e-12))
+
+
+def damped_block():
+    """The paper's block, elements of many sizes, damped and pressed at its hole."""
+    return Scene(read_mesh(PAPER_BLOCK), CONCRETE, [effects.BondDamping(), effects.GasPressure()])
+
+
+def test_steps_obey_the_limits_and_what_binds_is_recorded_counted_and_drawn(tmp_path):
+    """Every body takes the longest dt0 / 2^k below 0.8 of its limit; its cause is in the state."""
+    dt0 = 4e-6
+    method = Multirate(dt0, 1.0, control=StepControl(level_jump=None))
+    result = simulate(damped_block(), method=method, until=4e-6, frames=1, output=str(tmp_path))
+    limit = 0.8 * step_report(damped_block()).step_s
+    step = dt0 / 2.0 ** result.frames[-1].level
+    assert np.all(step <= limit) and np.all(2.0 * step > limit)
+    assert len(np.unique(step)) > 1
+    assert set(result.frames[-1].bound) == {CRITERIA.index("bond_dashpot")}
+    assert result.report.bound_by == {"bond_dashpot": result.model.body_count}
+    assert "bond_dashpot" in str(result.report)
+    assert "step_bound_by" in (tmp_path / "paraview" / "blast_0000.vtu").read_text()
+
+
+@pytest.mark.parametrize(
+    "criterion, options, spin",
+    [
+        ("displacement", {"distance": 1e-8}, 0.0),
+        ("rotation", {"distance": 1.0}, 1e6),
+        ("bond_stiffness", {"distance": 1.0}, 0.0),
+        ("largest_step", {"distance": 1.0, "dt0": 1e-8}, 0.0),
+    ],
+)
+def test_each_criterion_binds_where_it_is_the_shortest(criterion, options, spin):
+    method = Multirate(**{"dt0": 1e-5, "control": StepControl(), **options})
+    simulation = Simulation(Scene(pair(), CONCRETE), method)
+    still = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
+    velocity = np.tile([0.1, 0.0, 0.0], (2, 1))
+    turning = np.tile([spin, 0.0, 0.0], (2, 1))
+    simulation.state.place(simulation.model.centre, still, velocity, turning)
+    simulation.start()
+    assert simulation.report().bound_by == {criterion: 2}
+
+
+def test_load_criterion_looks_a_largest_step_ahead():
+    """F / m dt^2 <= l for the force of the coming step, though the pulse starts at t = 0."""
+    distance, peak = 1e-9, 1e6
+    listed = [effects.GasPressure("left", peak=peak, rise=1e-6)]
+    scene = Scene(bar(0.4, 0.1, (4, 1, 1)), CONCRETE, listed)
+    control = StepControl(level_jump=None)
+    simulation = Simulation(scene, Multirate(1e-6, distance, control=control))
+    simulation.start()
+    loaded = np.unique(listed[0].body)
+    bound = simulation.state.bound.to_numpy()
+    assert np.all(bound[loaded] == CRITERIA.index("load"))
+    area = 0.1 * 0.1 / 2
+    force = peak * area
+    expected = np.sqrt(distance * simulation.model.body_mass[loaded] / force)
+    step = 1e-6 / 2.0 ** simulation.state.level.to_numpy()[loaded]
+    assert np.all(step <= expected) and np.all(2.0 * step > expected)
+
+
+def decay_in_a_step(dt, dashpot):
+    """Factor of the normal velocity of a bonded pair after a step, springs apart."""
+    simulation = Simulation(
+        Scene(pair(), CONCRETE, [effects.BondDamping()]), Uniform(dt, None, None, dashpot)
+    )
+    still = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
+    velocity = np.array([[-1e-3, 0.0, 0.0], [1e-3, 0.0, 0.0]])
+    simulation.state.place(simulation.model.centre, still, velocity)
+    simulation.advance_to(1)
+    rate = 2.0 * 3.0 * simulation.model.unit_area[0] * CONCRETE.normal_damping
+    fastest = simulation.schedule.rates.bond_damping[0] if dashpot == "limited" else 0.0
+    return simulation.state.velocity[0][0] / -1e-3, rate / simulation.model.body_mass[0], fastest
+
+
+def test_limited_dashpots_take_the_share_that_the_step_bears():
+    """1 - s rate dt in a step, s = min(1, 1.7 / X) with X = 2 dt lambda of the 6x6 bond block."""
+    for dt in (1e-7, 2e-6):
+        factor, rate, fastest = decay_in_a_step(dt, "limited")
+        share = min(1.0, 1.7 / (2.0 * dt * fastest))
+        assert (share < 1.0) == (dt > 1e-6)
+        assert factor == pytest.approx(1.0 - share * rate * dt, rel=1e-9)
+        assert -1.0 < factor
+    full, rate, _ = decay_in_a_step(1e-7, "full")
+    assert full == decay_in_a_step(1e-7, "limited")[0]

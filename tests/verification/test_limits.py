@@ -1,0 +1,178 @@
+"""Stability limits of the explicit step, found by bisection and compared with their formulas."""
+
+import numpy as np
+import pytest
+import taichi as ti
+
+from taichi_dem import CONCRETE, Scene, Simulation, StepControl, Uniform, effects
+from taichi_dem.mesh import checked_mesh
+from taichi_dem.mesh_shapes import pair, single
+from taichi_dem.quality import bond_rates, dashpot_step, dashpots_of, spring_step, springs_of
+from taichi_dem.step_report import contact_eigenvalues
+from taichi_dem.timeline import MACRO_TICKS, MAX_LEVEL
+from taichi_dem.topology import topology_of
+
+STILL = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
+#: Steps of a run that must grow: at 1.004 of a limit a mode grows by 1.008 a step, 1e10 in all.
+STEPS = 3000
+HALVINGS = 9
+
+
+class Rig:
+    """A scene of two bodies that is run again and again with other steps, compiled once."""
+
+    def __init__(self, mesh, listed, method=None, material=CONCRETE):
+        self.simulation = Simulation(Scene(mesh, material, listed), method or Uniform(1e-9))
+        self.simulation.start()
+        self.state, self.centre = self.simulation.state, self.simulation.model.centre
+        # Spheres on the bases alone: those of other faces would touch there too.
+        self.state.exposed_tick.from_numpy(np.array([0, -1, -1, -1] * 2, dtype=np.int64))
+
+    def speeds(self, step, steps, position, velocity, spin):
+        """Root of the sum of squared speeds after some steps of a length [s]."""
+        self.simulation.schedule.step_seconds.from_numpy(step / 2.0 ** np.arange(MAX_LEVEL + 1))
+        self.state.place(position, STILL, velocity, spin)
+        self.state.slot.fill(0.0)
+        self.state.tick[None] = 0
+        self.state.last_tick.fill(0)
+        self.simulation.step.prime()
+        if self.simulation.contacts is not None:
+            self.simulation.broad_phase.search()
+        while self.state.tick[None] < steps * MACRO_TICKS:
+            self.simulation.driver.run(steps * MACRO_TICKS)
+            if self.state.bad_body[None] < 2:
+                self.state.bad_body[None] = 2
+                return np.inf
+        return np.linalg.norm(self.state.motion()["velocity"])
+
+
+def bisected(stable, low, high):
+    """Largest stable step between a stable and an unstable one, to 2^-HALVINGS of their gap."""
+    assert stable(low) and not stable(high)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if stable(middle) else (low, middle)
+    return 0.5 * (low + high)
+
+
+def pair_eigenvalue(model, coefficients):
+    """Largest eigenvalue of both bodies against each other: J of 12 columns, masses of both."""
+    mesh, top = model.mesh, model.topology
+    corners = mesh.points[top.vertices[0]]
+    normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+    area = 0.5 * np.linalg.norm(normal)
+    normal /= 2.0 * area
+    along = np.outer(normal, normal)
+    law = area / 3.0 * (coefficients[1] * np.eye(3) + (coefficients[0] - coefficients[1]) * along)
+    mass, block = np.zeros((12, 12)), np.zeros((12, 12))
+    for body in range(2):
+        mass[6 * body : 6 * body + 3, 6 * body : 6 * body + 3] = model.body_mass[body] * np.eye(3)
+        mass[6 * body + 3 : 6 * body + 6, 6 * body + 3 : 6 * body + 6] = model.body_inertia[body]
+    for corner in corners:
+        row = np.zeros((3, 12))
+        for body, sign in ((0, -1.0), (1, 1.0)):
+            arm = corner - model.centre[body]
+            row[:, 6 * body : 6 * body + 3] = sign * np.eye(3)
+            row[:, 6 * body + 3 : 6 * body + 6] = sign * np.cross(np.eye(3), arm).T
+        block += row.T @ law @ row
+    return np.linalg.eigvals(np.linalg.solve(mass, block)).real.max()
+
+
+def grown(rig, seed):
+    """A test whether tiny random motion of a bonded pair stays small at a step."""
+    random = np.random.default_rng(seed)
+    velocity, spin = 1e-7 * random.standard_normal((2, 3)), 1e-6 * random.standard_normal((2, 3))
+    return lambda step: rig.speeds(step, STEPS, rig.centre, velocity, spin) < 1e-5
+
+
+@pytest.mark.parametrize("kind", ["springs", "dashpots"])
+def test_bond_limits_are_where_motion_begins_to_grow(kind):
+    """Symplectic Euler: 2 / w of the pair's fastest mode; forward Euler: 2 / rate of it.
+
+    The formula for a mesh takes twice the rate of one body against a neighbour that stands still,
+    a bound for all neighbours: never longer than the true limit, here shorter by 2 at most.
+    For the dashpots the springs are made so soft that they add less than (w dt)^2 / 4 = 1e-6.
+    """
+    listed, material = [], CONCRETE
+    if kind == "dashpots":
+        soft = {"normal_stiffness": 450e5, "shear_stiffness": 90e5, "fracture_energy": 1e9}
+        material = type(CONCRETE)(**{**vars(CONCRETE), **soft})
+        listed = [effects.BondDamping()]
+    rig = Rig(pair(), listed, material=material)
+    model = rig.simulation.model
+    of, limit = (springs_of, spring_step) if kind == "springs" else (dashpots_of, dashpot_step)
+    rate = pair_eigenvalue(model, of(material))
+    exact = 2.0 / np.sqrt(rate) if kind == "springs" else 2.0 / rate
+    found = bisected(grown(rig, 3), 0.5 * exact, 1.5 * exact)
+    # Bisection to 1 / 512 of the bracket, and growth too slow to see within 0.4 % of the limit.
+    assert found == pytest.approx(exact, rel=0.007), found / exact
+    formula = limit(bond_rates(model.mesh, topology_of(model.mesh), CONCRETE.density, of(material)))
+    assert formula.max() <= exact * (1 + 1e-9) < 2.0 * formula.min()
+
+
+def facing(gap):
+    """Two equal tetrahedra without a bond, base against base across a gap [m]."""
+    mesh = single()
+    points = mesh.points
+    other = points * [-1.0, 1.0, 1.0] + [gap, 0.0, 0.0]
+    return checked_mesh(np.vstack([points, other]), [[0, 1, 2, 3], [4, 6, 5, 7]], {})
+
+
+GAP = 1e-6
+
+
+@pytest.mark.parametrize("divisions, contacts", [(3, 1), (5, 6)])
+def test_sphere_dashpots_kick_back_from_their_limit_on(divisions, contacts):
+    """Head on, n contacts change the approach speed by the factor 1 - 2 n c dt / m in a step.
+
+    A pair leaves faster than it came from dt = m / (n c) on. The formula is that for one contact;
+    for six it allows for tilting too, and may be shorter, but not by more than 3.
+    The overlap is 1e-9 of a radius: springs add 1e-4 of the dashpots at this speed.
+    """
+    rig = Rig(facing(GAP), [effects.SphereContact(divisions, outer_faces=True)])
+    model = rig.simulation.model
+    position = rig.centre - np.outer([0.0, 1.0], [GAP + 1e-10, 0.0, 0.0])
+    velocity = np.array([[0.5, 0.0, 0.0], [-0.5, 0.0, 0.0]])
+    before = np.linalg.norm(velocity)
+
+    def calm(step):
+        return rig.speeds(step, 1, position, velocity, np.zeros((2, 3))) <= before
+
+    exact = model.body_mass[0] / (contacts * CONCRETE.contact_damping)
+    found = bisected(calm, 0.3 * exact, 1.9 * exact)
+    assert found == pytest.approx(exact, rel=0.005)
+    one, whole = contact_eigenvalues(model.mesh, CONCRETE.density, divisions, False)
+    formula = dashpot_step(CONCRETE.contact_damping * (whole if contacts > 1 else one)).min()
+    if contacts == 1:
+        assert formula == pytest.approx(exact, rel=1e-6)
+    assert exact / 3.0 < formula <= exact * (1 + 1e-6)
+
+
+@ti.kernel
+def _refresh(rates: ti.template(), count: ti.i32):
+    for i in range(count):
+        rates.refresh(i)
+
+
+@pytest.mark.parametrize("friction", [False, True])
+def test_near_contacts_are_counted_before_they_touch_and_limit_as_the_report_says(friction):
+    """Six spheres that will meet within twice the largest step, none of which touches yet.
+
+    The step's eigenvalue bound is above the exact one by at most 6^(1/32) = 1.06.
+    """
+    listed = [effects.SphereContact(outer_faces=True)] + [effects.Friction()] * friction
+    control = StepControl(safety=1.0)
+    rig = Rig(facing(GAP), listed, Uniform(1e-6, control=control))
+    velocity = np.array([[0.5, 0.0, 0.0], [-0.5, 0.0, 0.0]])
+    rig.state.place(rig.centre, STILL, velocity)
+    rig.simulation.broad_phase.search()
+    rates = rig.simulation.schedule.rates
+    _refresh(rates, 2)
+    # All faces of a regular body are alike, so that the worst is the base that meets.
+    _, whole = contact_eigenvalues(rig.simulation.model.mesh, CONCRETE.density, 5, friction)
+    exact = dashpot_step(CONCRETE.contact_damping * whole)
+    for body in range(2):
+        assert exact[body] / 1.06 < rates.limit[body] < exact[body] * (1 + 1e-6)
+    rig.state.place(rig.centre, STILL, -velocity * 1e-6)
+    _refresh(rates, 2)
+    assert rates.limit[0] == 1e-6
