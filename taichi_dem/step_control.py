@@ -38,7 +38,9 @@ class StepControl:
     at which a body between its own times is brought to the present and takes its new step at
     once: "hit" (a contact comes near), "release" (a bond near it breaks), "neighbour" (a body
     it touches went to a much shorter step). level_jump: levels by which a body may be coarser
-    than one it touches, None for any number.
+    than one it touches, None for any number. ahead: largest steps before a contact could touch
+    from which on it counts; from 1 on a sleeping body always has a time of its own before it is
+    hit, below that only "hit" wakes it in time, and at 0 contacts count when they touch.
     Raises InputError for a value out of its range or an unknown name.
     """
 
@@ -47,6 +49,7 @@ class StepControl:
     criteria: tuple = OPTIONAL
     wake: tuple = EVENTS
     level_jump: int = 2
+    ahead: float = 2.0
 
     def __post_init__(self):
         for name, top in (("safety", 1.0), ("angle", 1.0)):
@@ -55,6 +58,10 @@ class StepControl:
                 raise InputError(f"{name} must be a number in (0, {top:g}], got {value!r}")
             if not 0.0 < value <= top:
                 raise InputError(f"{name} must be a number in (0, {top:g}], got {value!r}")
+        if isinstance(self.ahead, bool) or not isinstance(self.ahead, (int, float)):
+            raise InputError(f"ahead must be a number from 0 to 100, got {self.ahead!r}")
+        if not 0.0 <= self.ahead <= 100.0:
+            raise InputError(f"ahead must be a number from 0 to 100, got {self.ahead!r}")
         for name, known in (("criteria", OPTIONAL), ("wake", EVENTS)):
             for entry in getattr(self, name):
                 if entry not in known:

@@ -38,15 +38,15 @@ def cross_matrix(r):
 class Near:
     """Which sphere pairs count as contacts, and the block they form on each body.
 
-    A pair counts from the moment at which it could touch within twice the largest step.
+    A sphere pair counts from the moment at which it could touch within some seconds.
     count: how many of the sphere pairs of a body pair count; UNSEEN for a pair that is new in the
     list, FRESH for one that a break has given new spheres, until it is evaluated. paid: tick up
     to which a pair has given its impulse.
     """
 
-    def __init__(self, model, state, contacts, dt0):
+    def __init__(self, model, state, contacts, seconds):
         self.model, self.state, self.contacts = model, state, contacts
-        self.twice_dt0 = 2.0 * dt0
+        self.seconds = seconds
         self.count = ti.field(ti.i32, shape=contacts.capacity)
         self.old_count = ti.field(ti.i32, shape=contacts.capacity)
         self.paid = ti.field(ti.i64, shape=contacts.capacity)
@@ -60,11 +60,11 @@ class Near:
 
     @ti.func
     def margin(self, i, j):
-        """Gap [m] that two bodies can close within twice the largest step."""
+        """Gap [m] that two bodies can close in the time that is looked ahead."""
         speed = (self.state.velocity[j] - self.state.velocity[i]).norm()
         speed += self.state.spin[i].norm() * self.model.radius[i]
         speed += self.state.spin[j].norm() * self.model.radius[j]
-        return self.twice_dt0 * speed
+        return self.seconds * speed
 
     @ti.func
     def keep(self, p):

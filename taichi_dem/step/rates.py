@@ -63,7 +63,9 @@ class Rates:
         self.wakes = 0
         if self.control is not None:
             self.wakes = sum(1 << k for k, event in enumerate(EVENTS) if event in rule.wake)
-        self.near = Near(model, state, contacts, method.dt0) if contacts is not None else None
+        self.near = None
+        if self.has_contact:
+            self.near = Near(model, state, contacts, rule.ahead * method.dt0)
         n = model.body_count
         self.dashpot_table = ti.field(real, shape=(n, 16))
         self.spring_table = ti.field(real, shape=(n, 16))
