@@ -1,0 +1,259 @@
+"""Many scenes, run together in launches of bounded length.
+
+A launch takes every scene the same share of its way and lasts about a sixth of a second, so that
+Ctrl-C, progress and the look at diverged scenes are prompt.
+"""
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+import taichi as ti
+
+from ca_damper import measures
+from ca_damper.checks import choice, positive, whole
+from ca_damper.clock import Clock, steps_per_cycle
+from ca_damper.container import DrivenContainer, SprungContainer
+from ca_damper.coupling import LOST, Coupling
+from ca_damper.errors import SimulationDiverged
+from ca_damper.oscillator import Oscillator
+from taichi_dem import runtime
+from taichi_dem.errors import InputError
+
+MOUNTS = ("spring", "base")
+STARTS = ("rest", "empty", "rigid")
+
+#: A launch is kept near this long [s].
+LAUNCH_SECONDS = 0.15
+_MOST_STEPS = 2**31 - 1
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a run is.
+
+    share: done, in [0, 1]. seconds: since it began, without compiling. steps: scene-steps done.
+    """
+
+    share: float
+    seconds: float
+    steps: int
+
+    @property
+    def seconds_left(self):
+        """Time expected until the end [s]; infinite at the beginning."""
+        return self.seconds * (1.0 / self.share - 1.0) if self.share > 0.0 else np.inf
+
+
+class Batch:
+    """A filling, a table of scenes and the container's mount, ready to run.
+
+    table.dt holds the largest step of every scene; it is shortened so that a whole number of steps
+    makes a cycle of the base: ``steps_per_cycle``, (scenes,).
+    mount: "spring", or "base" for a container that moves like the base whatever the filling does.
+    measured_cycles: most cycles that one run may measure. rtol, atol: of RK45, on the spring.
+    ``run_seconds`` and ``compile_seconds`` tell what was spent.
+    Raises InputError for a scene that the filling refuses or a step out of range.
+    """
+
+    def __init__(self, filling, table, *, mount="spring", measured_cycles=1, rtol=1e-9, atol=1e-12):
+        self.generation = runtime.generation()
+        choice("mount", mount, MOUNTS)
+        self.measured_cycles = whole("measured_cycles", measured_cycles, 0, 100_000)
+        positive("rtol", rtol, zero_allowed=True)
+        positive("atol", atol)
+        self.filling, self.table, self.count = filling, table, table.count
+        self.largest_dt, self.clock = table.dt.to_numpy(), Clock(table)
+        frequency = table.frequency.to_numpy()
+        dt = self._fit_steps(frequency)
+        container = DrivenContainer(table, self.clock)
+        if mount == "spring":
+            container = SprungContainer(table, self.clock, filling.gravity, rtol, atol)
+        bound = filling.bind(table)
+        self.bound = bound
+        self.coupling = Coupling(
+            table, self.clock, container, bound, filling.gravity, self.measured_cycles
+        )
+        self._set_pace(frequency, dt)
+        self.time_origin = np.zeros(self.count)
+        self.run_seconds = self.compile_seconds = 0.0
+        self._slice = 1e-6
+
+    def start(self, start="rest"):
+        """Place the particles anew and begin at time zero, the base passing upwards through zero.
+
+        start: the container begins at "rest", or in the steady state of the "empty" container, or
+        in that of a container with the particles as "rigid" mass.
+        """
+        self._check_session()
+        choice("start", start, STARTS)
+        self.coupling.start(np.ascontiguousarray(self._initial(start)))
+        self.time_origin[:] = 0.0
+        self._check_health()
+
+    def drive(self, frequency):
+        """Go on at another frequency [Hz], a scalar or (scenes,), at the end of a cycle.
+
+        The base keeps its place and changes its speed. Raises InputError within a cycle.
+        """
+        self._check_cycle_is_full()
+        before, frequency = self.time_s, np.broadcast_to(frequency, self.count)
+        self._set_pace(frequency, self._fit_steps(frequency))
+        self.coupling.renew()
+        self.time_origin += before - self.time_s
+
+    def run(self, transient_cycles, measured_cycles, progress=None):
+        """Run whole cycles and measure the last of them; returns ``measures.Cycles``.
+
+        progress: called with a Progress about six times a second.
+        Raises InputError for numbers of cycles that are none, or within a cycle;
+        SimulationDiverged.
+        """
+        transient = whole("transient_cycles", transient_cycles, 0, 10_000_000)
+        measured = whole("measured_cycles", measured_cycles, 0, self.measured_cycles)
+        self._check_cycle_is_full()
+        steps = self.steps_per_cycle.astype(np.int64)
+        self._go((transient + measured) * steps, transient * steps, progress)
+        record = self.coupling.record.to_numpy()[:, :measured]
+        return measures.Cycles(self.table.frequency.to_numpy(), self.steps_per_cycle, record)
+
+    def advance(self, steps, progress=None):
+        """Advance every scene by a number of steps, one for all or (scenes,), without measuring."""
+        self._check_session()
+        steps = np.broadcast_to(np.asarray(steps, dtype=np.int64), self.count)
+        self._go(steps, steps, progress)
+
+    @property
+    def time_s(self):
+        """Present time of every scene [s], (scenes,)."""
+        return self.time_origin + self.coupling.step.to_numpy() * self.table.dt.to_numpy()
+
+    def sample(self):
+        """The present state: arrays (scenes,) by name.
+
+        time_s; x [m], v [m/s], a [m/s^2] of the container, y [m] of the base; force [N]: mean of
+        the filling on the container in the last step; energy [J], momentum [kg m/s] of the
+        particles.
+        """
+        self._check_session()
+        values = np.empty((len(measures.SAMPLE), self.count))
+        self.coupling.sample(values)
+        return {"time_s": self.time_s, **dict(zip(measures.SAMPLE, values))}
+
+    def snapshot(self, s):
+        """Positions and velocities of the particles of scene s, as the filling gives them."""
+        self._check_session()
+        return self.bound.snapshot(s)
+
+    def attempts(self):
+        """Steps that RK45 has tried since the start, (scenes,); one a step while none is refused."""
+        return self.coupling.attempts.to_numpy()
+
+    def _check_session(self):
+        if self.generation != runtime.generation():
+            raise InputError("this batch belongs to a Taichi session that has been stopped")
+
+    def _check_cycle_is_full(self):
+        self._check_session()
+        position = self.clock.position.to_numpy()
+        if position.any():
+            late = int(position.argmax())
+            raise InputError(
+                f"a cycle must be full here, scene {late} stands at step {position[late]} of "
+                f"{self.steps_per_cycle[late]}: advance it first"
+            )
+
+    def _fit_steps(self, frequency):
+        """Fit the steps to the cycle, have the filling check them, and return them [s]."""
+        scenes = zip(frequency, self.largest_dt)
+        self.steps_per_cycle = np.array([steps_per_cycle(f, dt) for f, dt in scenes], np.int32)
+        dt = 1.0 / (frequency * self.steps_per_cycle)
+        for particles, step in sorted(set(zip(self.table.particles.to_numpy().tolist(), dt))):
+            self.filling.check(particles, float(step))
+        return dt
+
+    def _set_pace(self, frequency, dt):
+        self.table.drive(frequency, dt)
+        self.clock.set(self.steps_per_cycle)
+        cost = (1 + self.table.particles.to_numpy()) * self.steps_per_cycle.astype(np.int64)
+        self.coupling.order.from_numpy(dealt(cost, runtime.settings().threads))
+
+    def _initial(self, start):
+        """(x, v) of the container at the beginning, shape (scenes, 2)."""
+        state = np.zeros((self.count, 2))
+        if start == "rest":
+            return state
+        for s in range(self.count):
+            row = self.table.row(s)
+            fixed = row["particles"] * self.filling.particle_mass if start == "rigid" else 0.0
+            numbers = (row[name] for name in ("mass", "stiffness", "damping", "base_amplitude"))
+            oscillator = Oscillator(*numbers)
+            state[s] = oscillator.steady_state(row["frequency"], fixed, self.filling.gravity)
+        return state
+
+    def _go(self, steps, before_measuring, progress):
+        """Take every scene a number of steps on, in launches of bounded length."""
+        begin = self.coupling.step.to_numpy().astype(np.int64)
+        if (begin + steps).max() > _MOST_STEPS:
+            raise InputError(f"steps since the start must stay below {_MOST_STEPS}: run fewer")
+        ends = (begin, begin + steps, begin + before_measuring)
+        self.coupling.aim(*(np.ascontiguousarray(end, dtype=np.int32) for end in ends))
+        started = time.perf_counter()
+        # Nothing is left to do for a share of zero, but the kernel gets compiled.
+        self.coupling.advance(0.0)
+        self.compile_seconds += time.perf_counter() - started
+        self._launch_until_done(int(steps.sum()), progress)
+
+    def _launch_until_done(self, total, progress):
+        done, started = 0.0, time.perf_counter()
+        try:
+            while done < 1.0:
+                done = self._launch(done)
+                if progress is not None:
+                    progress(Progress(done, time.perf_counter() - started, round(done * total)))
+        finally:
+            self.run_seconds += time.perf_counter() - started
+
+    def _launch(self, done):
+        """One launch from a share of the way; returns the share reached."""
+        share = min(1.0, done + self._slice)
+        started = time.perf_counter()
+        self.coupling.advance(share)
+        ti.sync()
+        seconds = max(time.perf_counter() - started, 1e-9)
+        self._slice *= min(4.0, max(0.25, LAUNCH_SECONDS / seconds))
+        self._check_health()
+        return share
+
+    def _check_health(self):
+        status = self.coupling.status.to_numpy()
+        if status.any():
+            # Scenes stop where they diverge: the first of them in time speaks for all.
+            self._report_divergence(int(np.argmin(np.where(status != 0, self.time_s, np.inf))))
+
+    def _report_divergence(self, s):
+        row, step, now = self.table.row(s), self.coupling.step[s], float(self.time_s[s])
+        code, dt = self.coupling.status[s], row["dt"]
+        words, allowed = "lost its container, whose motion is no finite number", 0.5 * dt
+        if code != LOST:
+            words, allowed = self.filling.divergence(code, row["particles"], dt)
+        raise SimulationDiverged(
+            f"the scene with {row['particles']} particles and seed {row['seed']} at "
+            f"{row['frequency']:.5g} Hz diverged by step {step}, t = {now:.4g} s: it {words}; "
+            f"dt must be at most {allowed:.3g} s, was {dt:.3g} s",
+            scene=row,
+            step=step,
+            time_s=now,
+            dt=dt,
+            dt_allowed=allowed,
+        )
+
+
+def dealt(cost, threads):
+    """Scene numbers in an order that gives each thread the same cost, (scenes,) i32.
+
+    A thread takes a contiguous part of the loop, so dear and cheap scenes are dealt out like cards.
+    """
+    dear_first = np.argsort(-cost, kind="stable")
+    hands = [dear_first[k::threads] for k in range(threads)]
+    return np.concatenate(hands).astype(np.int32)
