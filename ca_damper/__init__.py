@@ -1,4 +1,4 @@
-"""The granular damper: a container of grains on a vibrating structure, by automaton or by spheres."""
+"""The granular damper: a container of grains on a spring, by automaton or by spheres."""
 
 # First, out of order: it prepares the environment for ``import taichi``.
 from taichi_dem import runtime  # isort: skip

@@ -146,7 +146,7 @@ class Batch:
         return self.bound.snapshot(s)
 
     def attempts(self):
-        """Steps that RK45 has tried since the start, (scenes,); one a step while none is refused."""
+        """Steps that RK45 has tried since the start, (scenes,); one a step unless some failed."""
         return self.coupling.attempts.to_numpy()
 
     def _check_session(self):

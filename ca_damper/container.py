@@ -59,17 +59,19 @@ class SprungContainer:
     def _forcing(self, s, action):
         """Forcing over the step that begins now; (K + i w C) y0 turned by the present phase."""
         table, circle = self.table, self.clock.circle[s]
+        per_mass = 1.0 / (table.mass[s] + action.carried)
         omega = 2.0 * ti.math.pi * table.frequency[s]
-        by_spring = table.stiffness[s] * table.base_amplitude[s]
-        by_dashpot = omega * table.damping[s] * table.base_amplitude[s]
+        stiffness, damping = table.stiffness[s] * per_mass, table.damping[s] * per_mass
+        by_spring = stiffness * table.base_amplitude[s]
+        by_dashpot = damping * omega * table.base_amplitude[s]
+        force = action.impulse / table.dt[s] - action.carried * self.gravity[None]
         return Forcing(
-            mass=table.mass[s] + action.carried,
-            stiffness=table.stiffness[s],
-            damping=table.damping[s],
+            stiffness=stiffness,
+            damping=damping,
             omega=omega,
             drive=by_spring * circle[0] + by_dashpot * circle[1],
             quadrature=by_spring * circle[1] - by_dashpot * circle[0],
-            force=action.impulse / table.dt[s] - action.carried * self.gravity[None],
+            constant=force * per_mass,
         )
 
     @ti.func
@@ -79,11 +81,11 @@ class SprungContainer:
             self._take_up(s, action)
         forcing = self._forcing(s, action)
         dt, rtol, atol = self.table.dt[s], self.tolerance[0], self.tolerance[1]
-        y, change, _, attempts = rk45.integrate(
-            slope, forcing, 0.0, dt, self.state[s], self.slope[s], dt, rtol, atol, _MOST_ATTEMPTS
+        y, change, attempts = rk45.cross(
+            slope, forcing, 0.0, dt, self.state[s], self.slope[s], rtol, atol, _MOST_ATTEMPTS
         )
         self.state[s], self.slope[s] = y, change
-        self.blow[s] = action.impulse / (dt * forcing.mass)
+        self.blow[s] = action.impulse / (dt * (self.table.mass[s] + action.carried))
         return attempts
 
 

@@ -43,7 +43,7 @@ class Oscillator:
         return self.damping / (2.0 * math.sqrt(self.stiffness * self.mass))
 
     def transfer(self, frequency, added_mass=0.0):
-        """x / y, complex, in the steady state at a frequency [Hz] with more mass [kg]; arrays."""
+        """Complex x / y of the steady state at a frequency [Hz] with more mass [kg]; or arrays."""
         omega = 2.0 * np.pi * np.asarray(frequency, dtype=np.float64)
         held = self.stiffness + 1j * omega * self.damping
         return held / (held - (self.mass + added_mass) * omega**2)
@@ -60,18 +60,19 @@ class Oscillator:
 
 @ti.dataclass
 class Forcing:
-    """What acts on the container during a step, time counted from the step's beginning.
+    """What acts on the container during a step, per mass; time counts from the step's beginning.
 
-    The base pushes with drive cos(omega t) + quadrature sin(omega t) [N]; force [N] is constant.
+    stiffness [1/s^2], damping [1/s]. The base pushes with drive cos(omega t) + quadrature
+    sin(omega t) [m/s^2], omega [rad/s]; constant [m/s^2] is the rest. Per mass, so that the right
+    hand side divides by nothing.
     """
 
-    mass: ti.f64
     stiffness: ti.f64
     damping: ti.f64
     omega: ti.f64
     drive: ti.f64
     quadrature: ti.f64
-    force: ti.f64
+    constant: ti.f64
 
 
 @ti.func
@@ -90,6 +91,6 @@ def sine_and_cosine(angle):
 def slope(forcing, t, y):
     """d(x, v)/dt of the container for y = (x, v): the right-hand side that RK45 integrates."""
     sine, cosine = sine_and_cosine(forcing.omega * t)
-    pushed = forcing.drive * cosine + forcing.quadrature * sine + forcing.force
+    pushed = forcing.drive * cosine + forcing.quadrature * sine + forcing.constant
     held = forcing.stiffness * y[0] + forcing.damping * y[1]
-    return ti.Vector([y[1], (pushed - held) / forcing.mass])
+    return ti.Vector([y[1], pushed - held])
