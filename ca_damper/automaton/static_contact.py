@@ -1,0 +1,106 @@
+"""Static contact: what lies on the floor moves with it and weighs on it.
+
+The paper names the absence of it as the reason why its response peak moves the wrong way (6.2).
+A particle that stands on the floor, or on one that is held already, and has almost its velocity is
+held: it moves as one with the container and its mass is carried by it. That lasts while the heap is
+pressed on the floor. When the container's acceleration falls below -g the heap lifts off as it
+stands. To particles under way the heap is wall.
+"""
+
+import taichi as ti
+
+from ca_damper.lattice import DOWN, HELD, UP, WALL
+
+
+@ti.data_oriented
+class StaticContact:
+    """Particles held by the container.
+
+    held: number of them, shape (scenes,). threshold: of the relative speed, in units of g dt.
+    """
+
+    active = True
+
+    def __init__(self, cells, scenes, threshold):
+        self.cells = cells
+        self.held = ti.field(ti.i32, shape=scenes)
+        self.threshold = ti.field(ti.f64, shape=())
+        self.threshold[None] = threshold
+
+    @ti.func
+    def clear(self, s):
+        """Nobody is held."""
+        self.held[s] = 0
+
+    @ti.func
+    def count(self, s):
+        """Particles held."""
+        return self.held[s]
+
+    @ti.func
+    def supported(self, s, cell):
+        """Whether floor or a held particle is straight below."""
+        return self.cells.at(s, cell - 1) >= WALL
+
+    @ti.func
+    def noticed(self, s, cell, kind):
+        """Whether a rising particle has its support below; a falling one looks at it anyway."""
+        return kind == UP and self.supported(s, cell)
+
+    @ti.func
+    def joins(self, s, cell, velocity, pull, pressed):
+        """Whether a particle is to be held; velocity: of the container, pull: g dt [m/s]."""
+        kind = self.cells.at(s, cell)
+        slow = abs(self.cells.vertical_speed(s, cell) - velocity) < self.threshold[None] * pull
+        upright = kind == UP or kind == DOWN
+        return pressed and slow and upright and self.supported(s, cell)
+
+    @ti.func
+    def hold(self, s, cell):
+        """Hold a particle from now on."""
+        self.cells.put(s, cell, HELD, 0.0, 0.0)
+        self.held[s] += 1
+
+    @ti.func
+    def release(self, s, velocity):
+        """Let the heap go with the velocity of the container [m/s]."""
+        if self.held[s] > 0:
+            for k in range(self.cells.traversal.size(s)):
+                cell = self.cells.traversal.cell(s, k)
+                if self.cells.at(s, cell) == HELD:
+                    self.cells.put(s, cell, UP if velocity > 0.0 else DOWN, abs(velocity), 0.0)
+            self.held[s] = 0
+
+
+@ti.data_oriented
+class NoStaticContact:
+    """No particle is ever held; the compiler removes every question about it."""
+
+    active = False
+
+    @ti.func
+    def clear(self, s):
+        """Nothing to clear."""
+
+    @ti.func
+    def count(self, s):
+        """Nobody."""
+        return 0
+
+    @ti.func
+    def noticed(self, s, cell, kind):
+        """Support is not looked at."""
+        return False
+
+    @ti.func
+    def joins(self, s, cell, velocity, pull, pressed):
+        """Nobody joins."""
+        return False
+
+    @ti.func
+    def hold(self, s, cell):
+        """Never called."""
+
+    @ti.func
+    def release(self, s, velocity):
+        """Nothing to release."""
