@@ -30,7 +30,10 @@ DIVERGENCES = {
 
 @ti.data_oriented
 class BoundSpheres:
-    """The spheres of all scenes of a table, on the device; see ``ca_damper.filling``."""
+    """The spheres of all scenes of a table, on the device; see ``ca_damper.filling``.
+
+    crushed: whether spheres of a scene lay in each other by a radius when ``health`` looked last.
+    """
 
     def __init__(self, options, table):
         self.table = table
@@ -38,6 +41,7 @@ class BoundSpheres:
         self.law = ContactLaw(options.damping)
         self.rotation = Rotation() if options.rotation else NoRotation()
         self.search = make_search(options.search, options.radius)
+        self.crushed = ti.field(ti.i32, shape=table.count)
         self.rotation.bind(self.bodies)
         self.search.bind(self.bodies)
         share = self.rotation.tangential_share
@@ -164,20 +168,25 @@ class BoundSpheres:
     def health(self, s):
         """0, or a code of DIVERGENCES; "not" lets NaN fail a test."""
         body, dt = self.bodies.body[None], self.table.dt[s]
-        code = OVERLAP if self.search.crowded(s) else FINE
+        self.crushed[s] = self.search.crowded(s)
+        self.search.each_pair(s, self.contact_of_pair[None], self._look)
+        code = OVERLAP if self.crushed[s] > 0 else FINE
         for i in range(self.bodies.first(s), self.bodies.last(s)):
             place, speed = self.bodies.place(s, i), self.bodies.velocity[i].norm()
-            inside = (place > 0.0).all() and (place < vec2(body.width, body.height)).all()
-            for j in range(i + 1, self.bodies.last(s)):
-                if (self.bodies.place(s, j) - place).norm_sqr() < body.radius * body.radius:
-                    inside = False
-            if not inside:
+            if (place < 0.0).any() or (place > vec2(body.width, body.height)).any():
                 code = OVERLAP
             if not (speed * dt < body.radius):
                 code = RUNAWAY
             if not (speed < ti.math.inf):
                 code = NOT_FINITE
         return code
+
+    @ti.func
+    def _look(self, i, j, contact):
+        """Note spheres that overlap by more than a radius, half of their reach."""
+        branch = self.bodies.position[j] - self.bodies.position[i]
+        if branch.norm_sqr() < 0.25 * contact.reach * contact.reach:
+            self.crushed[i // self.bodies.stride] = 1
 
     def snapshot(self, s):
         """Places and velocities of the spheres of scene s, and their spins [rad/s] if they turn."""
