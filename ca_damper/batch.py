@@ -26,6 +26,7 @@ STARTS = ("rest", "empty", "rigid")
 #: A launch is kept near this long [s].
 LAUNCH_SECONDS = 0.15
 _MOST_STEPS = 2**31 - 1
+_STRUCTURE = ("mass", "stiffness", "damping", "base_amplitude")
 
 
 @dataclass(frozen=True)
@@ -63,8 +64,9 @@ class Batch:
         positive("rtol", rtol, zero_allowed=True)
         positive("atol", atol)
         self.filling, self.table, self.count = filling, table, table.count
-        self.largest_dt, self.clock = table.dt.to_numpy(), Clock(table)
-        frequency = table.frequency.to_numpy()
+        self.oscillators = [Oscillator(*row) for row in zip(*map(table.column, _STRUCTURE))]
+        self.largest_dt, self.clock = table.column("dt"), Clock(table)
+        frequency = table.column("frequency")
         dt = self._fit_steps(frequency)
         container = DrivenContainer(table, self.clock)
         if mount == "spring":
@@ -77,7 +79,9 @@ class Batch:
         self._set_pace(frequency, dt)
         self.time_origin = np.zeros(self.count)
         self.run_seconds = self.compile_seconds = 0.0
-        self._slice = 1e-6
+        # Scene-steps a launch; one each to begin with, as nobody knows yet what a step costs.
+        self._pace = float(self.count)
+        self._compiled = False
 
     def start(self, start="rest"):
         """Place the particles anew and begin at time zero, the base passing upwards through zero.
@@ -114,8 +118,10 @@ class Batch:
         self._check_cycle_is_full()
         steps = self.steps_per_cycle.astype(np.int64)
         self._go((transient + measured) * steps, transient * steps, progress)
-        record = self.coupling.record.to_numpy()[:, :measured]
-        return measures.Cycles(self.table.frequency.to_numpy(), self.steps_per_cycle, record)
+        record = np.empty((self.count, measured, len(measures.COLUMNS)))
+        if measured:
+            self.coupling.read(record)
+        return measures.Cycles(self.table.column("frequency"), self.steps_per_cycle, record)
 
     def advance(self, steps, progress=None):
         """Advance every scene by a number of steps, one for all or (scenes,), without measuring."""
@@ -126,7 +132,7 @@ class Batch:
     @property
     def time_s(self):
         """Present time of every scene [s], (scenes,)."""
-        return self.time_origin + self.coupling.step.to_numpy() * self.table.dt.to_numpy()
+        return self.time_origin + self._look()[0] * self.table.column("dt")
 
     def sample(self):
         """The present state: arrays (scenes,) by name.
@@ -153,9 +159,15 @@ class Batch:
         if self.generation != runtime.generation():
             raise InputError("this batch belongs to a Taichi session that has been stopped")
 
+    def _look(self):
+        """Step, position in the cycle, and status of all scenes, (3, scenes)."""
+        seen = np.empty((3, self.count), dtype=np.int32)
+        self.coupling.look(seen)
+        return seen
+
     def _check_cycle_is_full(self):
         self._check_session()
-        position = self.clock.position.to_numpy()
+        position = self._look()[1]
         if position.any():
             late = int(position.argmax())
             raise InputError(
@@ -168,65 +180,65 @@ class Batch:
         scenes = zip(frequency, self.largest_dt)
         self.steps_per_cycle = np.array([steps_per_cycle(f, dt) for f, dt in scenes], np.int32)
         dt = 1.0 / (frequency * self.steps_per_cycle)
-        for particles, step in sorted(set(zip(self.table.particles.to_numpy().tolist(), dt))):
+        for particles, step in sorted(set(zip(self.table.column("particles").tolist(), dt))):
             self.filling.check(particles, float(step))
         return dt
 
     def _set_pace(self, frequency, dt):
         self.table.drive(frequency, dt)
         self.clock.set(self.steps_per_cycle)
-        cost = (1 + self.table.particles.to_numpy()) * self.steps_per_cycle.astype(np.int64)
-        self.coupling.order.from_numpy(dealt(cost, runtime.settings().threads))
 
     def _initial(self, start):
         """(x, v) of the container at the beginning, shape (scenes, 2)."""
         state = np.zeros((self.count, 2))
         if start == "rest":
             return state
-        for s in range(self.count):
+        for s, oscillator in enumerate(self.oscillators):
             row = self.table.row(s)
             fixed = row["particles"] * self.filling.particle_mass if start == "rigid" else 0.0
-            numbers = (row[name] for name in ("mass", "stiffness", "damping", "base_amplitude"))
-            oscillator = Oscillator(*numbers)
             state[s] = oscillator.steady_state(row["frequency"], fixed, self.filling.gravity)
         return state
 
     def _go(self, steps, before_measuring, progress):
         """Take every scene a number of steps on, in launches of bounded length."""
-        begin = self.coupling.step.to_numpy().astype(np.int64)
+        begin = self._look()[0].astype(np.int64)
         if (begin + steps).max() > _MOST_STEPS:
             raise InputError(f"steps since the start must stay below {_MOST_STEPS}: run fewer")
-        ends = (begin, begin + steps, begin + before_measuring)
-        self.coupling.aim(*(np.ascontiguousarray(end, dtype=np.int32) for end in ends))
-        started = time.perf_counter()
-        # Nothing is left to do for a share of zero, but the kernel gets compiled.
-        self.coupling.advance(0.0)
-        self.compile_seconds += time.perf_counter() - started
-        self._launch_until_done(int(steps.sum()), progress)
+        order = dealt((1 + self.table.column("particles")) * steps, runtime.settings().threads)
+        plan = np.stack([begin, begin + steps, begin + before_measuring, order])
+        self.coupling.aim(plan.astype(np.int32))
+        if not self._compiled:
+            started = time.perf_counter()
+            self.coupling.advance(0.0)
+            self.compile_seconds += time.perf_counter() - started
+            self._compiled = True
+        self._launch_until_done(max(1, int(steps.sum())), progress)
 
     def _launch_until_done(self, total, progress):
         done, started = 0.0, time.perf_counter()
         try:
             while done < 1.0:
-                done = self._launch(done)
+                done = self._launch(done, total)
                 if progress is not None:
                     progress(Progress(done, time.perf_counter() - started, round(done * total)))
         finally:
             self.run_seconds += time.perf_counter() - started
 
-    def _launch(self, done):
-        """One launch from a share of the way; returns the share reached."""
-        share = min(1.0, done + self._slice)
+    def _launch(self, done, total):
+        """One launch from a share of the way, total scene-steps long; returns the share reached."""
+        share = min(1.0, done + self._pace / total)
         started = time.perf_counter()
         self.coupling.advance(share)
         ti.sync()
-        seconds = max(time.perf_counter() - started, 1e-9)
-        self._slice *= min(4.0, max(0.25, LAUNCH_SECONDS / seconds))
+        seconds = time.perf_counter() - started
+        # What a short way allowed to see says nothing of how fast a long one may go.
+        if share < 1.0:
+            self._pace *= min(4.0, max(0.25, LAUNCH_SECONDS / seconds))
         self._check_health()
         return share
 
     def _check_health(self):
-        status = self.coupling.status.to_numpy()
+        status = self._look()[2]
         if status.any():
             # Scenes stop where they diverge: the first of them in time speaks for all.
             self._report_divergence(int(np.argmin(np.where(status != 0, self.time_s, np.inf))))
@@ -256,4 +268,4 @@ def dealt(cost, threads):
     """
     dear_first = np.argsort(-cost, kind="stable")
     hands = [dear_first[k::threads] for k in range(threads)]
-    return np.concatenate(hands).astype(np.int32)
+    return np.concatenate(hands)

@@ -50,9 +50,19 @@ class Clock:
     def set(self, steps):
         """Give every scene its steps a cycle, (scenes,); the phase stays as it is."""
         angle = 2.0 * np.pi / np.asarray(steps, dtype=np.float64)
-        self.steps.from_numpy(np.asarray(steps, dtype=np.int32))
-        self.turn.from_numpy(np.column_stack([np.sin(angle), np.cos(angle)]))
-        self.half_turn.from_numpy(np.column_stack([np.sin(angle / 2), np.cos(angle / 2)]))
+        turns = [f(a) for a in (angle, angle / 2) for f in (np.sin, np.cos)]
+        self._set(np.ascontiguousarray(steps, dtype=np.int32), np.stack(turns))
+
+    @ti.kernel
+    def _set(
+        self,
+        steps: ti.types.ndarray(dtype=ti.i32, ndim=1),
+        turns: ti.types.ndarray(dtype=ti.f64, ndim=2),
+    ):
+        for s in range(self.table.count):
+            self.steps[s] = steps[s]
+            self.turn[s] = ti.Vector([turns[0, s], turns[1, s]])
+            self.half_turn[s] = ti.Vector([turns[2, s], turns[3, s]])
 
     @ti.func
     def start(self, s):

@@ -81,8 +81,8 @@ class SprungContainer:
             self._take_up(s, action)
         forcing = self._forcing(s, action)
         dt, rtol, atol = self.table.dt[s], self.tolerance[0], self.tolerance[1]
-        y, change, attempts = rk45.cross(
-            slope, forcing, 0.0, dt, self.state[s], self.slope[s], rtol, atol, _MOST_ATTEMPTS
+        y, change, attempts = rk45.integrate(
+            slope, forcing, 0.0, dt, self.state[s], self.slope[s], dt, rtol, atol, _MOST_ATTEMPTS
         )
         self.state[s], self.slope[s] = y, change
         self.blow[s] = action.impulse / (dt * (self.table.mass[s] + action.carried))

@@ -19,7 +19,7 @@ SUM_COUNT = len(measures.SUMS)
 # that many and uses one. On a GPU every iteration has a thread of its own.
 _CPU_BLOCK = 512
 
-_I32 = ti.types.ndarray(dtype=ti.i32, ndim=1)
+_I32 = ti.types.ndarray(dtype=ti.i32, ndim=2)
 _F64 = ti.types.ndarray(dtype=ti.f64, ndim=2)
 
 
@@ -65,11 +65,11 @@ class Coupling:
             self.container.renew(s)
 
     @ti.kernel
-    def aim(self, begin: _I32, goal: _I32, measure_from: _I32):
-        """Set where each scene begins, ends, and from which step on it measures."""
+    def aim(self, plan: _I32):
+        """Set from plan[:, s]: step to begin at, to end at, to measure from; and the k-th scene."""
         for s in range(self.count):
-            self.begin[s], self.goal[s] = begin[s], goal[s]
-            self.measure_from[s] = measure_from[s]
+            self.begin[s], self.goal[s], self.measure_from[s] = plan[0, s], plan[1, s], plan[2, s]
+            self.order[s] = plan[3, s]
             self.cycle[s] = 0
             self._clear(s)
 
@@ -151,3 +151,17 @@ class Coupling:
             values[0, s], values[1, s], values[2, s] = motion.x, motion.v, motion.a
             values[3, s], values[4, s] = y, self.force[s]
             values[5, s], values[6, s] = self.bound.energy(s), self.bound.momentum(s)
+
+    @ti.kernel
+    def look(self, seen: _I32):
+        """Fill seen[:, s] with step, position in the cycle, and status."""
+        for s in range(self.count):
+            seen[0, s], seen[1, s] = self.step[s], self.clock.position[s]
+            seen[2, s] = self.status[s]
+
+    @ti.kernel
+    def read(self, cycles: ti.types.ndarray(dtype=ti.f64, ndim=3)):
+        """Copy the first cycles[s, c] of the record, all columns."""
+        for s in range(self.count):
+            for c, k in ti.ndrange(cycles.shape[1], cycles.shape[2]):
+                cycles[s, c, k] = self.record[s, c, k]

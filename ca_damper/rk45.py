@@ -91,23 +91,20 @@ def first_step(rhs: ti.template(), context, t, y, slope, rtol, atol):
 def attempt(rhs: ti.template(), context, t, t_end, y, slope, h, rtol, atol):
     """Try a step of length h, or what is left to t_end.
 
-    Returns (t, y, dy/dt, length to try next, accepted): where the step leads when it is accepted,
-    where it began when it is not.
+    Returns (t, y, dy/dt, length tried, error in units of the tolerance): where the step leads when
+    its error is at most 1, where it began when it is not.
     """
-    size = min(h, t_end - t)
+    left = t_end - t
+    size = min(h, left)
     y_new, slope_new, gap = step(rhs, context, t, y, slope, size)
     error = scaled_norm(gap, y, y_new, rtol, atol)
-    h_next = size * growth(error)
-    accepted = error <= 1.0
     t_after, y_after, slope_after = 1.0 * t, y, slope
-    if accepted:
+    if error <= 1.0:
         y_after, slope_after = y_new, slope_new
         t_after = t + size
-        if size < h or t_after > t_end:
-            # Land on the end itself, and let a step cut short by it shorten no later one.
+        if size == left or t_after > t_end:
             t_after = 1.0 * t_end
-            h_next = max(h, h_next)
-    return t_after, y_after, slope_after, h_next, accepted
+    return t_after, y_after, slope_after, size, error
 
 
 @ti.pyfunc
@@ -115,37 +112,23 @@ def integrate(rhs: ti.template(), context, t, t_end, y, slope, h, rtol, atol, mo
     """Take y from t to t_end >= t with steps chosen by the error.
 
     slope: dy/dt at t. h: first step to try, positive.
-    Returns (y, dy/dt, length to try next, attempts). attempts is -1 when the end was not reached
-    within most_attempts or the step fell to nothing, as it does at a singularity or a NaN.
+    Returns (y, dy/dt, attempts). attempts is -1 when the end was not reached within most_attempts
+    or the step fell to nothing, as it does at a singularity or a NaN.
     """
     now, state, change, length, attempts = 1.0 * t, y, slope, 1.0 * h, 0
+    error = 1.0
     while now < t_end and attempts >= 0:
-        now, state, change, length, _ = attempt(
+        # Chosen here and not after the attempt: the last one needs no successor, and the power in
+        # ``growth`` costs as much as half a step.
+        if attempts > 0:
+            length *= growth(error)
+        now, state, change, length, error = attempt(
             rhs, context, now, t_end, state, change, length, rtol, atol
         )
         attempts += 1
         if now < t_end and stuck(now, t_end, length, attempts, most_attempts):
             attempts = -1
-    return state, change, length, attempts
-
-
-@ti.pyfunc
-def cross(rhs: ti.template(), context, t, t_end, y, slope, rtol, atol, most_attempts):
-    """Take y from t to t_end > t in one step if its error allows, else by ``integrate``.
-
-    For short ways on which one step nearly always does: the choice of a next step that nobody
-    takes would double the cost in a kernel. Returns (y, dy/dt, attempts or -1).
-    """
-    h = t_end - t
-    y_after, slope_after, gap = step(rhs, context, t, y, slope, h)
-    error = scaled_norm(gap, y, y_after, rtol, atol)
-    attempts = 1
-    if not error <= 1.0:
-        y_after, slope_after, _, attempts = integrate(
-            rhs, context, t, t_end, y, slope, h * growth(error), rtol, atol, most_attempts
-        )
-        attempts += 1 if attempts > 0 else 0
-    return y_after, slope_after, attempts
+    return state, change, attempts
 
 
 @ti.pyfunc
@@ -168,11 +151,13 @@ class Solution:
     evaluations: int
 
 
-def solve(rhs, span, y0, *, rtol=1e-6, atol=1e-9, first=None, most_attempts=MOST_ATTEMPTS):
+def solve(rhs, span, y0, *, rtol=1e-6, atol=1e-9, at=None, first=None, most_attempts=MOST_ATTEMPTS):
     """Solve dy/dt = rhs(t, y) from y(span[0]) = y0 to span[1] in Python.
 
     y0: (k,) numbers. rtol, atol: local error allowed, |error| <= atol + rtol |y| in the Euclidean
-    mean. first: first step to try, chosen by itself if None.
+    mean. at: ascending times in the span at which y is wanted; the steps land on them, so they are
+    as exact as the rest. All accepted steps are given if None. first: first step to try, chosen by
+    itself if None.
     Raises InputError for a bad argument or when the end is not reached within most_attempts.
     """
     t, t_end = _checked_span(span)
@@ -181,6 +166,7 @@ def solve(rhs, span, y0, *, rtol=1e-6, atol=1e-9, first=None, most_attempts=MOST
         raise InputError(f"y0 must be finite numbers, got {y0!r}")
     rtol = positive("rtol", rtol, zero_allowed=True)
     atol = positive("atol", atol)
+    wanted = None if at is None else _checked_times(at, t, t_end)
 
     def derivative(_, time, state):
         return np.asarray(rhs(time, state), dtype=np.float64)
@@ -189,20 +175,56 @@ def solve(rhs, span, y0, *, rtol=1e-6, atol=1e-9, first=None, most_attempts=MOST
     h = positive("first", first) if first is not None else None
     extra = 1 if h is not None else 2
     h = h or first_step(derivative, None, t, y, slope, rtol, atol)
-    times, states, attempts = [t], [y], 0
-    while t < t_end:
-        t, y, slope, h, accepted = attempt(derivative, None, t, t_end, y, slope, h, rtol, atol)
-        attempts += 1
-        if accepted:
-            times.append(t)
-            states.append(y)
-        if t < t_end and stuck(t, t_end, h, attempts, most_attempts):
-            raise InputError(
-                f"rhs must be smooth up to t = {t_end:g} for these tolerances: after {attempts} "
-                f"attempts the solver is stuck at t = {t:.6g} with steps of {h:.3g}"
+    inner = () if wanted is None else wanted[(wanted > t) & (wanted < t_end)]
+    path = _Path(derivative, t, y, slope, h, most_attempts)
+    for stop in (*inner, t_end):
+        path.go(stop, rtol, atol)
+    times, states = np.array(path.times), np.array(path.states)
+    rejected, evaluations = path.attempts - len(times) + 1, 6 * path.attempts + extra
+    if wanted is not None:
+        times, states = wanted, states[np.searchsorted(times, wanted)]
+    return Solution(times, states, rejected, evaluations)
+
+
+class _Path:
+    """Accepted times and states on the way."""
+
+    def __init__(self, derivative, t, y, slope, h, most_attempts):
+        self.derivative, self.slope, self.h = derivative, slope, h
+        self.times, self.states = [t], [y]
+        self.attempts, self.most_attempts = 0, most_attempts
+
+    def go(self, stop, rtol, atol):
+        """Go on to a time and land on it."""
+        t, y = self.times[-1], self.states[-1]
+        while t < stop:
+            t, y, self.slope, size, error = attempt(
+                self.derivative, None, t, stop, y, self.slope, self.h, rtol, atol
             )
-    rejected = attempts - len(times) + 1
-    return Solution(np.array(times), np.array(states), rejected, 6 * attempts + extra)
+            self.attempts += 1
+            if error <= 1.0:
+                self.times.append(t)
+                self.states.append(y)
+            # A step cut short by the stop shortens no later one.
+            least = self.h if size < self.h and error <= 1.0 else 0.0
+            self.h = max(least, size * growth(error))
+            self._refuse_if_stuck(t, stop)
+
+    def _refuse_if_stuck(self, t, stop):
+        if t < stop and stuck(t, stop, self.h, self.attempts, self.most_attempts):
+            raise InputError(
+                f"rhs must be smooth up to t = {stop:g} for these tolerances: after "
+                f"{self.attempts} attempts the solver is stuck at t = {t:.6g} with steps of "
+                f"{self.h:.3g}"
+            )
+
+
+def _checked_times(at, t, t_end):
+    times = np.array(at, dtype=np.float64).ravel()
+    inside = np.isfinite(times).all() and (times >= t).all() and (times <= t_end).all()
+    if not inside or (np.diff(times) < 0.0).any():
+        raise InputError(f"at must be ascending times in [{t:g}, {t_end:g}], got {at!r}")
+    return times
 
 
 def _checked_span(span):

@@ -37,6 +37,7 @@ class SceneTable:
         values = (particles, seed, dt, frequency, base_amplitude, mass, stiffness, damping)
         rows = np.broadcast_arrays(*(np.atleast_1d(value) for value in values))
         self.count = len(rows[0])
+        self._host = dict(zip(self.COLUMNS, (row.copy() for row in rows)))
         for name in self.COLUMNS:
             kind = ti.i32 if name in ("particles", "seed") else ti.f64
             setattr(self, name, ti.field(kind, shape=self.count))
@@ -45,11 +46,16 @@ class SceneTable:
     def drive(self, frequency, dt):
         """Change frequency [Hz] and step [s] of all scenes, each a scalar or (scenes,)."""
         pair = np.stack([np.broadcast_to(x, self.count) for x in (frequency, dt)])
+        self._host["frequency"], self._host["dt"] = pair.astype(np.float64)
         self._drive(np.ascontiguousarray(pair, dtype=np.float64))
+
+    def column(self, name):
+        """What the table says under a name, (scenes,); reads no field."""
+        return self._host[name]
 
     def row(self, s):
         """Numbers of scene s by name."""
-        return {name: getattr(self, name)[s] for name in self.COLUMNS}
+        return {name: self._host[name][s].item() for name in self.COLUMNS}
 
     @ti.kernel
     def _load(self, rows: _ROWS):

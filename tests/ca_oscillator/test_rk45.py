@@ -83,6 +83,43 @@ def test_tolerance_is_kept_on_an_exact_solution():
     assert np.abs(solution.y - wanted).max() < steps * (1e-9 + 1e-8)
 
 
+def test_wanted_times_are_landed_on_and_cost_no_accuracy():
+    wanted = np.linspace(0.0, 10.0, 7)
+    solution = rk45.solve(
+        lambda t, y: np.array([y[1], -y[0]]), (0.0, 10.0), [0.0, 1.0], rtol=1e-8, at=wanted
+    )
+    assert np.array_equal(solution.t, wanted)
+    steps = solution.evaluations / 6
+    assert np.abs(solution.y[:, 0] - np.sin(wanted)).max() < steps * (1e-9 + 1e-8)
+
+
+def test_stops_shorten_no_later_step():
+    def decay(t, y):
+        return -y
+
+    free = rk45.solve(decay, (0.0, 10.0), [1.0])
+    stopped = rk45.solve(decay, (0.0, 10.0), [1.0], at=[4.0, 4.0 + 1e-9])
+    # Two stops cut at most two steps each in two.
+    assert stopped.evaluations <= free.evaluations + 4 * 6
+
+
+def test_halving_the_tolerance_halves_the_error():
+    # The estimate grows like h^5, so h goes like the tolerance^(1/5), and the error at the end like
+    # h^5: in proportion to the tolerance. Ten halvings average over how the steps happen to fit.
+    def error(tolerance):
+        solution = rk45.solve(
+            *(lambda t, y: np.array([y[1], -y[0]]), (0.0, 20.0), [0.0, 1.0]),
+            rtol=tolerance,
+            atol=tolerance,
+        )
+        return np.hypot(*(solution.y[-1] - [math.sin(20.0), math.cos(20.0)]))
+
+    tolerances = 1e-6 * 0.5 ** np.arange(11)
+    errors = [error(tolerance) for tolerance in tolerances]
+    assert slope_of(tolerances, errors) == pytest.approx(1.0, abs=0.1)
+    assert (np.diff(errors) < 0.0).all()
+
+
 @pytest.mark.parametrize("error", [1e-9, 1e-3, 0.5, 1.0, 40.0])
 def test_growth_aims_at_nine_tenths_of_the_tolerance_limit(error):
     assert rk45.growth(error) == pytest.approx(np.clip(0.9 * error**-0.2, 0.2, 5.0), rel=1e-14)
@@ -106,9 +143,7 @@ def turning_in_python(rate, t, y):
 def turn(rate: ti.f64, t_end: ti.f64, rtol: ti.f64) -> ti.types.vector(3, ti.f64):
     y = ti.Vector([0.0, 1.0])
     slope = turning(rate, 0.0, y)
-    y, _, _, attempts = rk45.integrate(
-        turning, rate, 0.0, t_end, y, slope, 1e-3, rtol, 1e-12, 100000
-    )
+    y, _, attempts = rk45.integrate(turning, rate, 0.0, t_end, y, slope, 1e-3, rtol, 1e-12, 100000)
     return ti.Vector([y[0], y[1], ti.cast(attempts, ti.f64)])
 
 
@@ -137,7 +172,7 @@ def test_integration_in_a_kernel_and_in_python_agree():
     kernel = turn(2.0, 10.0, 1e-6).to_numpy()
     y = np.array([0.0, 1.0])
     slope = turning_in_python(2.0, 0.0, y)
-    y, _, _, attempts = rk45.integrate(
+    y, _, attempts = rk45.integrate(
         turning_in_python, 2.0, 0.0, 10.0, y, slope, 1e-3, 1e-6, 1e-12, 100000
     )
     assert attempts == int(kernel[2])
@@ -160,6 +195,9 @@ def test_a_singular_solution_is_refused_in_words():
         ({"rtol": -1.0}, "rtol"),
         ({"atol": 0.0}, "atol"),
         ({"first": 0.0}, "first"),
+        ({"at": [0.5, 0.2]}, "at"),
+        ({"at": [0.5, 1.2]}, "at"),
+        ({"at": [math.nan]}, "at"),
     ],
 )
 def test_bad_arguments_are_named(changes, name):
