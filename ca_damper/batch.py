@@ -5,7 +5,6 @@ Ctrl-C, progress and the look at diverged scenes are prompt.
 """
 
 import time
-from dataclasses import dataclass
 
 import numpy as np
 import taichi as ti
@@ -17,6 +16,7 @@ from ca_damper.container import DrivenContainer, SprungContainer
 from ca_damper.coupling import LOST, Coupling
 from ca_damper.errors import SimulationDiverged
 from ca_damper.oscillator import Oscillator
+from ca_damper.progress import Progress
 from taichi_dem import runtime
 from taichi_dem.errors import InputError
 
@@ -26,24 +26,9 @@ STARTS = ("rest", "empty", "rigid")
 #: A launch is kept near this long [s].
 LAUNCH_SECONDS = 0.15
 _MOST_STEPS = 2**31 - 1
+#: Largest field of measured sums: 1 GiB, half of what Taichi can count.
+_MOST_NUMBERS = 2**27
 _STRUCTURE = ("mass", "stiffness", "damping", "base_amplitude")
-
-
-@dataclass(frozen=True)
-class Progress:
-    """How far a run is.
-
-    share: done, in [0, 1]. seconds: since it began, without compiling. steps: scene-steps done.
-    """
-
-    share: float
-    seconds: float
-    steps: int
-
-    @property
-    def seconds_left(self):
-        """Time expected until the end [s]; infinite at the beginning."""
-        return self.seconds * (1.0 / self.share - 1.0) if self.share > 0.0 else np.inf
 
 
 class Batch:
@@ -73,6 +58,7 @@ class Batch:
             container = SprungContainer(table, self.clock, filling.gravity, rtol, atol)
         bound = filling.bind(table)
         self.bound = bound
+        _check_record_fits(self.count * max(1, self.measured_cycles) * len(measures.COLUMNS))
         self.coupling = Coupling(
             table, self.clock, container, bound, filling.gravity, self.measured_cycles
         )
@@ -258,6 +244,14 @@ class Batch:
             time_s=now,
             dt=dt,
             dt_allowed=allowed,
+        )
+
+
+def _check_record_fits(numbers):
+    if numbers > _MOST_NUMBERS:
+        raise InputError(
+            f"scenes x measured_cycles must stay below {_MOST_NUMBERS // len(measures.COLUMNS)} "
+            f"in one batch, got {numbers // len(measures.COLUMNS)}: measure fewer cycles"
         )
 
 

@@ -39,3 +39,16 @@ def choice(name, value, allowed):
     if value not in tuple(allowed):
         raise InputError(f"{name} must be one of {', '.join(allowed)}, got {value!r}")
     return value
+
+
+def several(name, values, check):
+    """One value or a sequence as a tuple, each of them passed through check(name, value).
+
+    InputError for an empty sequence, or for what check refuses.
+    """
+    if isinstance(values, (str, bytes)) or not hasattr(values, "__iter__"):
+        values = (values,)
+    checked = tuple(check(name, value) for value in values)
+    if not checked:
+        raise InputError(f"{name} must hold at least one value, got none")
+    return checked

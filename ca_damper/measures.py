@@ -82,7 +82,7 @@ class Cycles:
         """Of the filling, -F / V = c + i w m [N s/m]; NaN where the container does not move."""
         force, speed = self.harmonic("f"), self.harmonic("v")
         still = speed == 0.0
-        return np.where(still, np.nan, -force / np.where(still, 1.0, speed))
+        return np.where(still, np.nan, 0.0 - force / np.where(still, 1.0, speed))
 
     @property
     def apparent_mass(self):
