@@ -35,7 +35,7 @@ class BoundAutomaton:
 
     def _choose_effects(self, options, scenes):
         self.ledger = Ledger(scenes) if options.ledger else NoLedger()
-        self.resting = NoStaticContact()
+        self.resting = NoStaticContact(options.static_threshold)
         if options.accounting == "static":
             self.resting = StaticContact(self.cells, scenes, options.static_threshold)
         self.placement = DrawnCells(self.cells, self.table)

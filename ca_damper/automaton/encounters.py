@@ -8,7 +8,7 @@ part in two events of a step. Then the winners act; no two of them touch the sam
 import taichi as ti
 
 from ca_damper.automaton.laws import deflected, speed_after_pair, speed_after_wall
-from ca_damper.automaton.ledger import PAIRS, quanta
+from ca_damper.automaton.ledger import PAIRS, REST, quanta
 from ca_damper.automaton.rivals import ahead_of_others, rank
 from ca_damper.lattice import EMPTY, WALL, mirrored, turned_back
 from ca_damper.random_numbers import DEFLECT, EVENT, bits, unit
@@ -122,8 +122,13 @@ class Encounters:
             gained = quanta(velocity - before - pull)
             self.resting.hold(s, cell)
         else:
+            approach = self.cells.speed[s, cell] - other
             self.rebound(s, cell, event, other)
-            gained = quanta(self.cells.vertical_speed(s, cell) - before)
+            gain = self.cells.vertical_speed(s, cell) - before
+            if self.resting.counts(approach, pull):
+                gained = quanta(gain)
+            else:
+                self.ledger.add(s, REST, gain)
         return gained
 
     @ti.func

@@ -9,8 +9,8 @@ import taichi as ti
 
 #: Unit of sums of velocities [m/s]; 2^-40 leaves room for 8 million m/s in an i64.
 QUANTUM = 2.0**-40
-ITEMS = ("gravity", "pairs", "ejections")
-GRAVITY, PAIRS, EJECTIONS = range(3)
+ITEMS = ("gravity", "pairs", "ejections", "rest")
+GRAVITY, PAIRS, EJECTIONS, REST = range(4)
 
 
 @ti.func

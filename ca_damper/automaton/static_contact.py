@@ -56,6 +56,11 @@ class StaticContact:
         return pressed and slow and upright and self.supported(s, cell)
 
     @ti.func
+    def counts(self, approach, pull):
+        """Every blow acts on the container."""
+        return True
+
+    @ti.func
     def hold(self, s, cell):
         """Hold a particle from now on."""
         self.cells.put(s, cell, HELD, 0.0, 0.0)
@@ -74,9 +79,21 @@ class StaticContact:
 
 @ti.data_oriented
 class NoStaticContact:
-    """No particle is ever held; the compiler removes every question about it."""
+    """No particle is ever held, and blows as slow as those of a heap at rest do not count.
+
+    The compiler removes every question about what is held.
+    """
 
     active = False
+
+    def __init__(self, threshold):
+        self.threshold = ti.field(ti.f64, shape=())
+        self.threshold[None] = threshold
+
+    @ti.func
+    def counts(self, approach, pull):
+        """Whether a blow acts on the container: the paper gives it only to moving particles."""
+        return approach >= self.threshold[None] * pull
 
     @ti.func
     def clear(self, s):
