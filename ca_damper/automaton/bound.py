@@ -3,6 +3,7 @@
 import numpy as np
 import taichi as ti
 
+from ca_damper.automaton.accounting import EveryBlow, Landings
 from ca_damper.automaton.accumulator import Accumulator
 from ca_damper.automaton.ejection import Ejection
 from ca_damper.automaton.encounters import Encounters
@@ -27,30 +28,41 @@ class BoundAutomaton:
         scenes = table.count
         self.table, self.numbers = table, Numbers(options)
         self.lattice = Lattice(Geometry(options.columns, options.rows))
-        traversal = Scan if options.traversal == "scan" else ParticleList
-        self.cells = Cells(self.lattice, traversal(self.lattice, table), scenes)
         self.velocity = ti.field(ti.f64, shape=scenes)
-        self._choose_effects(options, scenes)
+        self._choose(options, scenes)
         self._build_rules(options, scenes)
 
-    def _choose_effects(self, options, scenes):
-        self.ledger = Ledger(scenes) if options.ledger else NoLedger()
-        self.resting = NoStaticContact(options.static_threshold)
+    def _choose(self, options, scenes):
+        traversal = Scan if options.traversal == "scan" else ParticleList
+        self.accounting, self.resting = EveryBlow(), NoStaticContact()
+        if options.accounting != "static":
+            pushes = options.accounting == "landing+ejection"
+            self.accounting = Landings(self.lattice, scenes, pushes)
+        self.cells = Cells(
+            self.lattice, traversal(self.lattice, self.table), self.accounting, scenes
+        )
         if options.accounting == "static":
             self.resting = StaticContact(self.cells, scenes, options.static_threshold)
+        self.ledger = Ledger(scenes) if options.ledger else NoLedger()
         self.placement = DrawnCells(self.cells, self.table)
         if options.start is not None:
             self.placement = NamedCells(self.cells, self.table, options.start)
 
     def _build_rules(self, options, scenes):
-        accumulator = Accumulator(options.accumulator, self.lattice)
         self.rivals = Rivals(self.lattice, scenes)
-        shared = (self.cells, self.rivals, accumulator, self.resting, self.ledger, self.numbers)
-        self.flight = Flight(*shared)
+        shared = {
+            "cells": self.cells,
+            "rivals": self.rivals,
+            "accumulator": Accumulator(options.accumulator, self.lattice),
+            "resting": self.resting,
+            "accounting": self.accounting,
+            "ledger": self.ledger,
+            "numbers": self.numbers,
+        }
+        self.flight = Flight(shared)
         both, pairs_first = options.pair_rule == "both", options.priority == "pairs_first"
-        self.encounters = Encounters(*shared, both, pairs_first)
-        counts = options.accounting != "landing"
-        self.ejection = Ejection(self.cells, self.ledger, self.numbers, counts)
+        self.encounters = Encounters(shared, both, pairs_first)
+        self.ejection = Ejection(shared)
 
     @ti.func
     def reset(self, s):
@@ -58,6 +70,7 @@ class BoundAutomaton:
         self.cells.clear(s)
         self.rivals.clear(s)
         self.resting.clear(s)
+        self.accounting.clear(s)
         self.ledger.clear(s)
         self.placement.place(s)
         self.velocity[s] = 0.0

@@ -17,14 +17,14 @@ from ca_damper.lattice import DIRECTIONS, DOWN, HELD, UP
 class Ejection:
     """Follow the container's staircase.
 
-    counts: whether the pushes act on the container. pushed: 1 for a cell in the cluster, shape
+    pushed: 1 for a cell in the cluster, shape
     (scenes, cells + 1). border: cells of the cluster still to look around, shape (scenes, cells).
     """
 
-    def __init__(self, cells, ledger, numbers, counts):
-        self.cells, self.lattice, self.ledger = cells, cells.lattice, ledger
-        self.numbers, self.counts = numbers, counts
-        scenes, size = cells.kind.shape
+    def __init__(self, shared):
+        vars(self).update(shared)
+        self.lattice = self.cells.lattice
+        scenes, size = self.cells.kind.shape
         self.pushed = ti.field(ti.i8, shape=(scenes, size))
         self.border = ti.field(ti.i16, shape=(scenes, size))
 
@@ -94,7 +94,7 @@ class Ejection:
             gain = 0.0
             self.cells.travelled[s, cell] = 0.0
         result = ti.cast(0, ti.i64)
-        if ti.static(self.counts):
+        if ti.static(self.accounting.pushes):
             result = quanta(gain)
         else:
             self.ledger.add(s, EJECTIONS, gain)

@@ -26,11 +26,10 @@ class Encounters:
     both: whether both of a pair are updated. pairs_first: whether pairs come before walls.
     """
 
-    def __init__(self, cells, rivals, accumulator, resting, ledger, numbers, both, pairs_first):
-        self.cells, self.lattice, self.rivals = cells, cells.lattice, rivals
-        self.accumulator, self.resting, self.ledger = accumulator, resting, ledger
-        self.numbers, self.both, self.pairs_first = numbers, both, pairs_first
-        shape = (cells.kind.shape[0], self.lattice.cells)
+    def __init__(self, shared, both, pairs_first):
+        vars(self).update(shared)
+        self.lattice, self.both, self.pairs_first = self.cells.lattice, both, pairs_first
+        shape = (self.cells.kind.shape[0], self.lattice.cells)
         self.contacts = ti.field(ti.i32, shape=shape)
         self.other = ti.field(ti.f64, shape=shape)
 
@@ -122,10 +121,9 @@ class Encounters:
             gained = quanta(velocity - before - pull)
             self.resting.hold(s, cell)
         else:
-            approach = self.cells.speed[s, cell] - other
             self.rebound(s, cell, event, other)
             gain = self.cells.vertical_speed(s, cell) - before
-            if self.resting.counts(approach, pull):
+            if self.accounting.counts(s, cell):
                 gained = quanta(gain)
             else:
                 self.ledger.add(s, REST, gain)

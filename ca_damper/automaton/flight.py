@@ -15,11 +15,10 @@ class Flight:
     due: cells of particles that may change their cell, shape (scenes, cells).
     """
 
-    def __init__(self, cells, rivals, accumulator, resting, ledger, numbers):
-        self.cells, self.lattice, self.rivals = cells, cells.lattice, rivals
-        self.accumulator, self.resting, self.ledger = accumulator, resting, ledger
-        self.numbers = numbers
-        self.due = ti.field(ti.i16, shape=(cells.kind.shape[0], self.lattice.cells))
+    def __init__(self, shared):
+        vars(self).update(shared)
+        self.lattice = self.cells.lattice
+        self.due = ti.field(ti.i16, shape=(self.cells.kind.shape[0], self.lattice.cells))
 
     @ti.func
     def fly_all(self, s, dt, pull, contacts: ti.template()):
@@ -96,3 +95,4 @@ class Flight:
             if self.rivals.holds(s, target, rank(step, shared, cell, MOVE)):
                 left = self.cells.travelled[s, cell] - self.numbers.width[None]
                 self.cells.relocate(s, cell, target, left)
+                self.accounting.arrive(s, target)

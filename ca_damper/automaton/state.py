@@ -16,8 +16,9 @@ class Cells:
     container.
     """
 
-    def __init__(self, lattice, traversal, scenes):
+    def __init__(self, lattice, traversal, accounting, scenes):
         self.lattice, self.traversal = lattice, traversal
+        self.followers = (traversal, accounting)
         shape = (scenes, lattice.cells + 1)
         self.kind = ti.field(ti.i8, shape=shape)
         self.speed = ti.field(ti.f64, shape=shape)
@@ -47,7 +48,8 @@ class Cells:
         """Take what stands in one cell to another, empty one."""
         self.put(s, target, self.at(s, origin), self.speed[s, origin], travelled)
         self.put(s, origin, EMPTY, 0.0, 0.0)
-        self.traversal.moved(s, origin, target)
+        for follower in ti.static(self.followers):
+            follower.moved(s, origin, target)
 
     @ti.func
     def vertical_speed(self, s, cell):

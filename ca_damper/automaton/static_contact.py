@@ -19,8 +19,6 @@ class StaticContact:
     held: number of them, shape (scenes,). threshold: of the relative speed, in units of g dt.
     """
 
-    active = True
-
     def __init__(self, cells, scenes, threshold):
         self.cells = cells
         self.held = ti.field(ti.i32, shape=scenes)
@@ -56,11 +54,6 @@ class StaticContact:
         return pressed and slow and upright and self.supported(s, cell)
 
     @ti.func
-    def counts(self, approach, pull):
-        """Every blow acts on the container."""
-        return True
-
-    @ti.func
     def hold(self, s, cell):
         """Hold a particle from now on."""
         self.cells.put(s, cell, HELD, 0.0, 0.0)
@@ -79,21 +72,7 @@ class StaticContact:
 
 @ti.data_oriented
 class NoStaticContact:
-    """No particle is ever held, and blows as slow as those of a heap at rest do not count.
-
-    The compiler removes every question about what is held.
-    """
-
-    active = False
-
-    def __init__(self, threshold):
-        self.threshold = ti.field(ti.f64, shape=())
-        self.threshold[None] = threshold
-
-    @ti.func
-    def counts(self, approach, pull):
-        """Whether a blow acts on the container: the paper gives it only to moving particles."""
-        return approach >= self.threshold[None] * pull
+    """No particle is ever held; the compiler removes every question about it."""
 
     @ti.func
     def clear(self, s):
