@@ -66,7 +66,8 @@ class Spheres:
         """InputError for a number or word outside its range."""
         choice("damping", self.damping, POWERS)
         choice("search", self.search, SEARCHES)
-        choice("rotation", self.rotation, (False, True))
+        if not isinstance(self.rotation, bool):
+            raise InputError(f"rotation must be True or False, got {self.rotation!r}")
         for name in ("reference_speed", "young", "wall_young", "diameter", "particle_mass"):
             positive(name, getattr(self, name))
         for name in ("friction", "wall_friction", "gravity"):
