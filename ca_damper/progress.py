@@ -24,6 +24,10 @@ class Progress:
         """Time expected until the end [s]; infinite at the beginning."""
         return self.seconds * (1.0 / self.share - 1.0) if self.share > 0.0 else math.inf
 
+    def __str__(self):
+        """How fast it goes."""
+        return f"{1e-6 * self.steps / max(self.seconds, 1e-9):.3g} M scene steps/s"
+
 
 class Stages:
     """Passes the progress of stages on as that of the whole.

@@ -124,13 +124,9 @@ class ProgressBar:
         return self
 
     def __call__(self, progress):
-        """Show a ``taichi_dem.simulate.Progress``."""
+        """Show a Progress of either package: its share, and what it says of its speed."""
         if self.bar is not None:
-            seconds = max(progress.run_seconds, 1e-9)
-            rate = 1e-6 * progress.evaluations / seconds
-            speed = f"{1e6 * progress.time_s / seconds:.3g} us/s, {rate:.3g} M evaluations/s"
-            share = progress.time_s / progress.until_s
-            self.bar.update(self.task, completed=share, speed=speed)
+            self.bar.update(self.task, completed=progress.share, speed=str(progress))
 
     def __exit__(self, *_):
         if self.bar is not None:

@@ -27,6 +27,17 @@ class Progress:
     evaluations: int
     run_seconds: float
 
+    @property
+    def share(self):
+        """Of the way, in [0, 1]."""
+        return self.time_s / self.until_s
+
+    def __str__(self):
+        """How fast it goes."""
+        seconds = max(self.run_seconds, 1e-9)
+        rate = 1e-6 * self.evaluations / seconds
+        return f"{1e6 * self.time_s / seconds:.3g} us/s, {rate:.3g} M evaluations/s"
+
 
 @dataclass(frozen=True, eq=False)
 class Result:
