@@ -52,6 +52,7 @@ class Ejection:
             if self.pushed[s, cell] == 1 and self.cells.at(s, cell) != HELD:
                 gained += self.push(s, cell, way, velocity)
         self.shift(s, way)
+        self.cells.traversal.sort(s, self.cells)
         return gained
 
     @ti.func

@@ -23,6 +23,7 @@ class Encounters:
 
     contacts: cells of touching particles, then cell and event in one number, shape (scenes, cells).
     other: speed of what is met, along the direction of the particle that meets it [m/s].
+    ranks: of the events among their rivals.
     both: whether both of a pair are updated. pairs_first: whether pairs come before walls.
     """
 
@@ -32,6 +33,7 @@ class Encounters:
         shape = (self.cells.kind.shape[0], self.lattice.cells)
         self.contacts = ti.field(ti.i32, shape=shape)
         self.other = ti.field(ti.f64, shape=shape)
+        self.ranks = ti.field(ti.i64, shape=shape)
 
     @ti.func
     def happen(self, s, step, shared, count, velocity, pull, pressed):
@@ -44,7 +46,7 @@ class Encounters:
         for k in range(events):
             entry = self.contacts[s, k]
             cell, event = entry & ((1 << _CELL_BITS) - 1), entry >> _CELL_BITS
-            if self.wins(s, step, shared, cell, event):
+            if self.wins(s, cell, event, self.ranks[s, k]):
                 gained += self.act(s, shared, cell, event, self.other[s, k], velocity, pull)
         return gained
 
@@ -58,8 +60,13 @@ class Encounters:
             if event != NOTHING:
                 self.contacts[s, events] = cell | (event << _CELL_BITS)
                 self.other[s, events] = other
+                ranked = rank(step, shared, cell, EVENT)
+                if ti.static(self.pairs_first):
+                    if event == PAIR:
+                        ranked = ahead_of_others(ranked)
+                self.ranks[s, events] = ranked
+                self.claim(s, cell, event, ranked)
                 events += 1
-                self.claim(s, step, shared, cell, event)
         return events
 
     @ti.func
@@ -80,33 +87,22 @@ class Encounters:
         return event, other
 
     @ti.func
-    def ranked(self, step, shared, cell, event):
-        """Rank of an event, named by the particle that looks at the other."""
-        result = rank(step, shared, cell, EVENT)
-        if ti.static(self.pairs_first):
-            if event == PAIR:
-                result = ahead_of_others(result)
-        return result
-
-    @ti.func
-    def claim(self, s, step, shared, cell, event):
+    def claim(self, s, cell, event, ranked):
         """Claim the particles that an event changes."""
         if ti.static(self.both):
-            ranked = self.ranked(step, shared, cell, event)
             self.rivals.claim(s, cell, ranked)
             if event == PAIR:
                 self.rivals.claim(s, self.lattice.ahead(cell, self.cells.at(s, cell)), ranked)
 
     @ti.func
-    def wins(self, s, step, shared, cell, event):
+    def wins(self, s, cell, event, ranked):
         """Whether the event takes place; where each particle updates itself only, it does."""
         result = True
         if ti.static(self.both):
-            ranked = self.ranked(step, shared, cell, event)
             result = self.rivals.holds(s, cell, ranked)
-            if event == PAIR:
+            if event == PAIR and result:
                 ahead = self.lattice.ahead(cell, self.cells.at(s, cell))
-                result = result and self.rivals.holds(s, ahead, ranked)
+                result = self.rivals.holds(s, ahead, ranked)
         return result
 
     @ti.func

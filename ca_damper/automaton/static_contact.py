@@ -49,9 +49,12 @@ class StaticContact:
     def joins(self, s, cell, velocity, pull, pressed):
         """Whether a particle is to be held; velocity: of the container, pull: g dt [m/s]."""
         kind = self.cells.at(s, cell)
-        slow = abs(self.cells.vertical_speed(s, cell) - velocity) < self.threshold[None] * pull
-        upright = kind == UP or kind == DOWN
-        return pressed and slow and upright and self.supported(s, cell)
+        result = False
+        if pressed and (kind == UP or kind == DOWN):
+            relative = self.cells.vertical_speed(s, cell) - velocity
+            if abs(relative) < self.threshold[None] * pull:
+                result = self.supported(s, cell)
+        return result
 
     @ti.func
     def hold(self, s, cell):

@@ -6,6 +6,8 @@ their random numbers, and impulses are summed as integers.
 
 import taichi as ti
 
+from ca_damper.lattice import EMPTY, WALL
+
 
 @ti.data_oriented
 class Scan:
@@ -32,6 +34,10 @@ class Scan:
     def moved(self, s, origin, target):
         """A scan finds it by itself."""
 
+    @ti.func
+    def sort(self, s, cells: ti.template()):
+        """A scan is always in order."""
+
 
 @ti.data_oriented
 class ParticleList:
@@ -42,7 +48,7 @@ class ParticleList:
     """
 
     def __init__(self, lattice, table):
-        self.table = table
+        self.lattice, self.table = lattice, table
         capacity = lattice.columns * lattice.rows
         self.cells = ti.field(ti.i16, shape=(table.count, capacity))
         self.number = ti.field(ti.i16, shape=(table.count, lattice.cells + 1))
@@ -67,3 +73,13 @@ class ParticleList:
     def moved(self, s, origin, target):
         """Follow a particle to another cell."""
         self.placed(s, ti.cast(self.number[s, origin], ti.i32), target)
+
+    @ti.func
+    def sort(self, s, cells: ti.template()):
+        """Number the particles by their cells again: neighbours then mostly do alike, and fast."""
+        count = 0
+        for cell in range(self.lattice.first, self.lattice.end):
+            kind = cells.at(s, cell)
+            if kind != EMPTY and kind != WALL:
+                self.placed(s, count, cell)
+                count += 1
