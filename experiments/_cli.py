@@ -13,6 +13,7 @@ from taichi_dem import InputError, SimulationDiverged, runtime
 from taichi_dem.record import write_atomically
 
 HERE = os.path.dirname(os.path.abspath(__file__))
+BLAST_DRIVERS = ("auto", "resident", "parallel")
 PAPER_BLOCK = os.path.join(HERE, "meshes", "paper_block.msh")
 
 
@@ -60,8 +61,8 @@ def whole(low, high):
     return parse
 
 
-def parser(name, description):
-    """Parser with the options every experiment has."""
+def parser(name, description, drivers=()):
+    """Parser with the options every experiment has; drivers: to choose from, where there are."""
     made = Parser(
         prog=f"python experiments/{name}.py",
         description=description,
@@ -71,7 +72,8 @@ def parser(name, description):
     made.add_argument("--quick", action="store_true", help="a smaller job of under a minute")
     made.add_argument("--out", default=os.path.join("results", name), help="folder for the output")
     made.add_argument("--arch", default="cpu", choices=runtime.ARCHITECTURES)
-    made.add_argument("--driver", default="auto", choices=("auto", "resident", "parallel"))
+    if drivers:
+        made.add_argument("--driver", default=drivers[0], choices=drivers)
     made.add_argument("--threads", type=whole(1, 1024), default=None, help="CPU threads")
     return made
 
