@@ -190,3 +190,34 @@ def test_spheres_never_pull_each_other():
         assert approach <= before + 20 * 1e-16
         before = approach
     assert before < 0.0
+
+
+def test_stiffness_is_that_of_equations_5_and_6():
+    # Written as in the paper, with moduli and Poisson's ratios that differ.
+    e, e0, s, s0, r = 2e9, 0.7e9, 0.25, 0.4, 4e-3
+    options = Spheres(young=e, wall_young=e0, poisson=s, wall_poisson=s0, diameter=2 * r)
+    wall = 4 * np.sqrt(r) / 3 * e * e0 / ((1 - s**2) * e0 + (1 - s0**2) * e)
+    pair = np.sqrt(2 * r) / 3 * e / (1 - s**2)
+    assert wall_numbers(options)["stiffness"] == pytest.approx(wall, rel=1e-14)
+    assert pair_numbers(options)["stiffness"] == pytest.approx(pair, rel=1e-14)
+
+
+@pytest.mark.parametrize("partner", CASES)
+def test_energy_in_a_contact_goes_to_its_spring_and_back(partner):
+    # Half a contact on, all speed is gone; the leapfrog swings by h^2 about the energy it keeps.
+    place, _, numbers = CASES[partner]
+    options, dt = Spheres(restitution=1.0, wall_restitution=1.0, **place), 1e-6
+    numbers = numbers(options)
+    half = 0.5 * contact_duration(numbers["mass"], numbers["stiffness"], 0.5)
+    gap = 0.5e-3 if partner == "wall" else 1e-3
+    rig = Rig(options, len(place["start"]), dt)
+    rig.throw([[0.0, -0.5]] if partner == "wall" else [[0.25, 0.0], [-0.25, 0.0]])
+    before = 0.5 * numbers["mass"] * 0.5**2
+    rig.run(round((gap / 0.5 + half) / dt))
+    # The turning point is missed by a step at most: by the largest deceleration times dt in speed.
+    deepest = (1.25 * numbers["mass"] * 0.5**2 / numbers["stiffness"]) ** 0.4
+    fastest = numbers["stiffness"] * deepest**1.5 / numbers["mass"] * dt
+    assert np.abs(rig.state()[1]).max() < fastest
+    bound = (dt / scale(numbers, 0.5)) ** 2
+    assert rig.energy() == pytest.approx(before, rel=bound)
+    assert rig.run(round(half / dt) + 5).energy() == pytest.approx(before, rel=bound)
