@@ -48,6 +48,20 @@ class Oscillator:
         held = self.stiffness + 1j * omega * self.damping
         return held / (held - (self.mass + added_mass) * omega**2)
 
+    def peak(self, added_mass=0.0):
+        """Where the steady state peaks with more mass [kg], and how high: (ratio, RMS [m]).
+
+        The ratio is that of the frequency to the natural one of the empty container. For a
+        damping ratio z, the peak lies at r with r^2 = (sqrt(1 + 8 z^2) - 1) / (4 z^2).
+        """
+        mass = self.mass + added_mass
+        square = self.damping**2 / (4.0 * self.stiffness * mass)
+        # The same without a difference of equals, and without a division by zero damping.
+        own = math.sqrt(2.0 / (math.sqrt(1.0 + 8.0 * square) + 1.0))
+        ratio = own * math.sqrt(self.mass / mass)
+        high = abs(self.transfer(ratio * self.natural_frequency, added_mass))
+        return ratio, float(self.base_amplitude * high / math.sqrt(2.0))
+
     def steady_state(self, frequency, added_mass=0.0, gravity=0.0):
         """(x, v) in m and m/s of the steady state when the base passes upwards through zero.
 

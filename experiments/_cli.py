@@ -61,6 +61,18 @@ def whole(low, high):
     return parse
 
 
+def several(kind):
+    """Type of an option that is a comma-separated list of a type, without repetitions."""
+
+    def parse(text):
+        values = [kind(part) for part in text.split(",")]
+        if len(set(values)) < len(values):
+            raise argparse.ArgumentTypeError(f"must not name a value twice, got {text!r}")
+        return values
+
+    return parse
+
+
 def parser(name, description, drivers=()):
     """Parser with the options every experiment has; drivers: to choose from, where there are."""
     made = Parser(
