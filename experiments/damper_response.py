@@ -1,13 +1,14 @@
 """Response of the damped structure over frequency: spheres and three automata (Figs. 3 and 11).
 
-    python experiments/damper_response.py                      # about six minutes on two cores
-    python experiments/damper_response.py --fillings ca_static # the best automaton alone: one minute
+    python experiments/damper_response.py                       # about six minutes on two cores
+    python experiments/damper_response.py --fillings ca_static  # the best automaton: a minute
     python experiments/damper_response.py --quick
 
-Every particle number, frequency and seed is a scene; all scenes of a filling run as one batch. Bands
-are the lowest and highest of the seeds, lines their median. A rigid mass of the particles' weight is
-drawn for scale: what the particles take off its peak is damping, what they shift beside it is
-apparent mass. A sweep up and down with the state carried on shows where two motions are possible.
+Every particle number, frequency and seed is a scene; all scenes of a filling run as one batch.
+Bands are the lowest and highest of the seeds, lines their median. A rigid mass of the particles'
+weight is drawn for scale: what the particles take off its peak is damping, what they shift beside
+it is apparent mass. A sweep up and down, the state carried on, shows where two motions are
+possible.
 """
 
 import os

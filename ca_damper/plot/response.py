@@ -1,10 +1,8 @@
 """Pictures of responses over frequency: curves with bands over seeds, measures, hysteresis."""
 
 import numpy as np
-
-from matplotlib import colormaps
-
 from ca_damper.plot.style import picture
+from matplotlib import colormaps
 
 #: Titles of the fillings in words.
 TITLES = {
