@@ -3,20 +3,14 @@
 import numpy as np
 import taichi as ti
 
-from ca_damper.automaton.accounting import EveryBlow, Landings
-from ca_damper.automaton.accumulator import Accumulator
 from ca_damper.automaton.ejection import Ejection
 from ca_damper.automaton.encounters import Encounters
 from ca_damper.automaton.flight import Flight
-from ca_damper.automaton.ledger import QUANTUM, Ledger, NoLedger
-from ca_damper.automaton.numbers import Numbers
+from ca_damper.automaton.ledger import QUANTUM
+from ca_damper.automaton.parts import assembled
 from ca_damper.automaton.placement import DrawnCells, NamedCells
-from ca_damper.automaton.rivals import Rivals
-from ca_damper.automaton.state import Cells
-from ca_damper.automaton.static_contact import NoStaticContact, StaticContact
-from ca_damper.automaton.traversal import ParticleList, Scan
 from ca_damper.filling import Action
-from ca_damper.lattice import DIRECTIONS, EMPTY, HELD, WALL, Geometry, Lattice, unit_vectors
+from ca_damper.lattice import DIRECTIONS, EMPTY, HELD, WALL, unit_vectors
 from ca_damper.random_numbers import stream
 
 
@@ -25,44 +19,17 @@ class BoundAutomaton:
     """Automata of all scenes of a table; the protocol is in ``ca_damper.filling``."""
 
     def __init__(self, options, table):
-        scenes = table.count
-        self.table, self.numbers = table, Numbers(options)
-        self.lattice = Lattice(Geometry(options.columns, options.rows))
-        self.velocity = ti.field(ti.f64, shape=scenes)
-        self._choose(options, scenes)
-        self._build_rules(options, scenes)
-
-    def _choose(self, options, scenes):
-        traversal = Scan if options.traversal == "scan" else ParticleList
-        self.accounting, self.resting = EveryBlow(), NoStaticContact()
-        if options.accounting != "static":
-            pushes = options.accounting == "landing+ejection"
-            self.accounting = Landings(self.lattice, scenes, pushes)
-        self.cells = Cells(
-            self.lattice, traversal(self.lattice, self.table), self.accounting, scenes
-        )
-        if options.accounting == "static":
-            self.resting = StaticContact(self.cells, scenes, options.static_threshold)
-        self.ledger = Ledger(scenes) if options.ledger else NoLedger()
-        self.placement = DrawnCells(self.cells, self.table)
-        if options.start is not None:
-            self.placement = NamedCells(self.cells, self.table, options.start)
-
-    def _build_rules(self, options, scenes):
-        self.rivals = Rivals(self.lattice, scenes)
-        shared = {
-            "cells": self.cells,
-            "rivals": self.rivals,
-            "accumulator": Accumulator(options.accumulator, self.lattice),
-            "resting": self.resting,
-            "accounting": self.accounting,
-            "ledger": self.ledger,
-            "numbers": self.numbers,
-        }
-        self.flight = Flight(shared)
+        parts = assembled(options, table)
+        self.table, self.numbers, self.lattice = table, parts.numbers, parts.lattice
+        self.cells, self.rivals, self.accounting = parts.cells, parts.rivals, parts.accounting
+        self.resting, self.ledger = parts.resting, parts.ledger
+        self.flight, self.ejection = Flight(parts), Ejection(parts)
         both, pairs_first = options.pair_rule == "both", options.priority == "pairs_first"
-        self.encounters = Encounters(shared, both, pairs_first)
-        self.ejection = Ejection(shared)
+        self.encounters = Encounters(parts, both, pairs_first)
+        self.placement = DrawnCells(self.cells, table)
+        if options.start is not None:
+            self.placement = NamedCells(self.cells, table, options.start)
+        self.velocity = ti.field(ti.f64, shape=table.count)
 
     @ti.func
     def reset(self, s):

@@ -21,9 +21,9 @@ class Ejection:
     (scenes, cells + 1). border: cells of the cluster still to look around, shape (scenes, cells).
     """
 
-    def __init__(self, shared):
-        vars(self).update(shared)
-        self.lattice = self.cells.lattice
+    def __init__(self, parts):
+        self.cells, self.lattice, self.numbers = parts.cells, parts.lattice, parts.numbers
+        self.accounting, self.ledger = parts.accounting, parts.ledger
         scenes, size = self.cells.kind.shape
         self.pushed = ti.field(ti.i8, shape=(scenes, size))
         self.border = ti.field(ti.i16, shape=(scenes, size))

@@ -27,9 +27,11 @@ class Encounters:
     both: whether both of a pair are updated. pairs_first: whether pairs come before walls.
     """
 
-    def __init__(self, shared, both, pairs_first):
-        vars(self).update(shared)
-        self.lattice, self.both, self.pairs_first = self.cells.lattice, both, pairs_first
+    def __init__(self, parts, both, pairs_first):
+        self.cells, self.lattice, self.rivals = parts.cells, parts.lattice, parts.rivals
+        self.accumulator, self.resting = parts.accumulator, parts.resting
+        self.accounting, self.ledger, self.numbers = parts.accounting, parts.ledger, parts.numbers
+        self.both, self.pairs_first = both, pairs_first
         shape = (self.cells.kind.shape[0], self.lattice.cells)
         self.contacts = ti.field(ti.i32, shape=shape)
         self.other = ti.field(ti.f64, shape=shape)

@@ -15,9 +15,10 @@ class Flight:
     due: cells of particles that may change their cell, shape (scenes, cells).
     """
 
-    def __init__(self, shared):
-        vars(self).update(shared)
-        self.lattice = self.cells.lattice
+    def __init__(self, parts):
+        self.cells, self.lattice, self.rivals = parts.cells, parts.lattice, parts.rivals
+        self.accumulator, self.resting = parts.accumulator, parts.resting
+        self.accounting, self.ledger, self.numbers = parts.accounting, parts.ledger, parts.numbers
         self.due = ti.field(ti.i16, shape=(self.cells.kind.shape[0], self.lattice.cells))
 
     @ti.func

@@ -19,9 +19,9 @@ class StaticContact:
     held: number of them, shape (scenes,). threshold: of the relative speed, in units of g dt.
     """
 
-    def __init__(self, cells, scenes, threshold):
+    def __init__(self, cells, threshold):
         self.cells = cells
-        self.held = ti.field(ti.i32, shape=scenes)
+        self.held = ti.field(ti.i32, shape=cells.kind.shape[0])
         self.threshold = ti.field(ti.f64, shape=())
         self.threshold[None] = threshold
 

@@ -1,0 +1,71 @@
+"""What the rules of an automaton share."""
+
+from dataclasses import dataclass
+
+import taichi as ti
+
+from ca_damper.automaton.accounting import EveryBlow, Landings
+from ca_damper.automaton.accumulator import Accumulator
+from ca_damper.automaton.ledger import Ledger, NoLedger
+from ca_damper.automaton.rivals import Rivals
+from ca_damper.automaton.state import Cells
+from ca_damper.automaton.static_contact import NoStaticContact, StaticContact
+from ca_damper.automaton.traversal import ParticleList, Scan
+from ca_damper.lattice import Geometry, Lattice
+
+
+@ti.data_oriented
+class Numbers:
+    """Numbers that kernels read; in fields, so that another value compiles nothing anew.
+
+    width of a cell [m], mass of a particle [kg], gravity [m/s^2], restitution of particle and wall.
+    """
+
+    def __init__(self, options):
+        values = {
+            "width": options.width,
+            "mass": options.particle_mass,
+            "gravity": options.gravity,
+            "particle": options.restitution,
+            "wall": options.wall_restitution,
+        }
+        for name, value in values.items():
+            field = ti.field(ti.f64, shape=())
+            field[None] = value
+            setattr(self, name, field)
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """State and choices of an automaton, put together by ``assembled``."""
+
+    numbers: Numbers
+    lattice: Lattice
+    cells: Cells
+    rivals: Rivals
+    accumulator: Accumulator
+    accounting: object
+    resting: object
+    ledger: object
+
+
+def assembled(options, table):
+    """The parts that a user's options ask for; what they leave out is neither stored nor asked."""
+    scenes = table.count
+    static = options.accounting == "static"
+    lattice = Lattice(Geometry(options.columns, options.rows))
+    traversal = (Scan if options.traversal == "scan" else ParticleList)(lattice, table)
+    accounting = EveryBlow()
+    if not static:
+        accounting = Landings(lattice, scenes, options.accounting == "landing+ejection")
+    cells = Cells(lattice, traversal, accounting, scenes)
+    return Parts(
+        numbers=Numbers(options),
+        lattice=lattice,
+        cells=cells,
+        rivals=Rivals(lattice, scenes),
+        accumulator=Accumulator(options.accumulator, lattice),
+        accounting=accounting,
+        resting=StaticContact(cells, options.static_threshold) if static else NoStaticContact(),
+        ledger=Ledger(scenes) if options.ledger else NoLedger(),
+    )
