@@ -220,6 +220,7 @@ class Batch:
         # What a short way allowed to see says nothing of how fast a long one may go.
         if share < 1.0:
             self._pace *= min(4.0, max(0.25, LAUNCH_SECONDS / seconds))
+            self._pace = max(self._pace, float(self.count))
         self._check_health()
         return share
 

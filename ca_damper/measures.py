@@ -20,6 +20,8 @@ COLUMNS = (*SUMS, "x_max", "x_min", "energy")
 #: What ``Batch.sample`` gives beside the time.
 SAMPLE = ("x", "v", "a", "y", "force", "energy", "momentum")
 
+_NOT_A_NUMBER = complex(np.nan, np.nan)
+
 
 @dataclass(frozen=True, eq=False)
 class Cycles:
@@ -82,7 +84,7 @@ class Cycles:
         """Of the filling, -F / V = c + i w m [N s/m]; NaN where the container does not move."""
         force, speed = self.harmonic("f"), self.harmonic("v")
         still = speed == 0.0
-        return np.where(still, np.nan, 0.0 - force / np.where(still, 1.0, speed))
+        return np.where(still, _NOT_A_NUMBER, 0.0 - force / np.where(still, 1.0, speed))
 
     @property
     def apparent_mass(self):
