@@ -12,25 +12,28 @@ TITLES = {
     "ca_static": "automaton: static contact",
 }
 _SHADES = colormaps["viridis"]
+#: Okabe and Ito's, one a filling.
+_COLOURS = ("#D55E00", "#E69F00", "#009E73", "#0072B2", "#CC79A7")
 _FINE = 400
 
 
 def picture_responses(path, responses, particle_mass):
-    """A panel a filling: RMS over frequency for every particle number (Figs. 3 and 11), and peaks.
+    """A panel a filling: RMS over frequency for every particle number (Figs. 3 and 11); the peaks.
 
     responses: Response by label. particle_mass [kg], for the rigid mass drawn for scale.
     """
-    count = len(responses) + 1
-    rows = (count + 1) // 2
-    size = (9.0, 3.1 * rows)
-    with picture(path, rows, 2, size, squeeze=False) as (_, axes):
+    count = len(responses)
+    columns = 2 if count < 4 else 3
+    rows = (count + 2 + columns - 1) // columns
+    size = (4.2 * columns, 3.3 * rows)
+    with picture(path, rows, columns, size, squeeze=False) as (_, axes):
         panels = axes.ravel()
         for axis, (label, response) in zip(panels, responses.items()):
             _draw_curves(axis, response)
             axis.set_title(TITLES.get(label, label))
-        _share_height(panels[: count - 1])
-        _draw_peaks(panels[count - 1], responses, particle_mass)
-        for axis in panels[count:]:
+        _share_height(panels[:count])
+        _draw_peaks(panels[count], panels[count + 1], responses, particle_mass)
+        for axis in panels[count + 2 :]:
             axis.set_axis_off()
 
 
@@ -66,28 +69,21 @@ def _share_height(panels):
         axis.set_ylim(0.0, 1.08 * highest)
 
 
-def _draw_peaks(axis, responses, particle_mass):
-    """Where each curve peaks against how high; the rigid mass for scale."""
-    for mark, (label, response) in zip("osD^v", responses.items()):
-        ratio, rms = (np.median(values, axis=1) for values in response.peaks())
-        axis.plot(ratio, 1e3 * rms, marker=mark, ms=5, lw=1.0, label=TITLES.get(label, label))
-        axis.annotate(f"N = {response.particles[-1]}", (ratio[-1], 1e3 * rms[-1]), fontsize=7)
+def _draw_peaks(place, height, responses, particle_mass):
+    """Where the curves peak and how high, over the particle number; bars from seed to seed."""
+    for mark, colour, (label, response) in zip("osD^v", _COLOURS, responses.items()):
+        ratio, rms = response.peaks()
+        for axis, values in ((place, ratio), (height, 1e3 * rms)):
+            middle = np.median(values, axis=1)
+            bars = [middle - values.min(axis=1), values.max(axis=1) - middle]
+            look = {"marker": mark, "ms": 4.5, "color": colour, "label": TITLES.get(label, label)}
+            axis.errorbar(response.particles, middle, yerr=bars, lw=1.2, **look)
     first = next(iter(responses.values()))
-    rigid = [first.oscillator.peak(n * particle_mass)[0] for n in first.particles]
-    for place, particles in zip(rigid, first.particles):
-        axis.axvline(place, color="0.75", lw=0.8, zorder=0)
-        axis.annotate(
-            f"{particles}",
-            (place, 1.0),
-            xycoords=("data", "axes fraction"),
-            fontsize=7,
-            color="0.5",
-            ha="center",
-            va="bottom",
-        )
-    axis.set(xlabel="peak at f / f$_0$ (grey: N particles as rigid mass)")
-    axis.set(ylabel="peak RMS [mm]")
-    axis.legend()
+    rigid = [first.oscillator.peak(n * particle_mass) for n in first.particles]
+    place.plot(first.particles, [r for r, _ in rigid], color="0.5", ls=":", label="rigid mass")
+    place.set(title="where they peak", xlabel="particles N", ylabel="f / f$_0$ of the peak")
+    height.set(title="how high", xlabel="particles N", ylabel="peak RMS [mm]", ylim=(0, None))
+    place.legend()
 
 
 def picture_measures(path, responses, particle_mass):
