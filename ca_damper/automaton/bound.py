@@ -49,9 +49,9 @@ class BoundAutomaton:
         shared = stream(self.table.seed[s], step)
         self.velocity[s] = motion.v
         pressed = motion.a > -self.numbers.gravity[None]
+        gained = self.ejection.follow(s, step, motion)
         if not pressed:
             self.resting.release(s, motion.v)
-        gained = self.ejection.follow(s, step, motion)
         contacts, due = self.flight.fly_all(s, self.table.dt[s], pull, self.encounters.contacts)
         gained += self.encounters.happen(s, step, shared, contacts, motion.v, pull, pressed)
         self.flight.move_all(s, step, shared, due)

@@ -23,7 +23,8 @@ class Ejection:
 
     def __init__(self, parts):
         self.cells, self.lattice, self.numbers = parts.cells, parts.lattice, parts.numbers
-        self.accounting, self.ledger = parts.accounting, parts.ledger
+        self.accumulator, self.accounting = parts.accumulator, parts.accounting
+        self.ledger = parts.ledger
         scenes, size = self.cells.kind.shape
         self.pushed = ti.field(ti.i8, shape=(scenes, size))
         self.border = ti.field(ti.i16, shape=(scenes, size))
@@ -31,20 +32,25 @@ class Ejection:
     @ti.func
     def follow(self, s, step, motion):
         """Take the staircase along; returns counted gain of velocity along x [quanta]."""
-        stair = ti.cast(ti.floor(motion.x / self.numbers.width[None] + 0.5), ti.i32)
-        gained = ti.cast(0, ti.i64)
+        width = self.numbers.width[None]
+        stair = ti.cast(ti.floor(motion.x / width + 0.5), ti.i32)
+        way = 0
         if step == 0:
             self.cells.stair[s] = stair
-        if stair > self.cells.stair[s]:
-            gained = self.advance(s, 1, motion.v)
+        elif stair > self.cells.stair[s]:
+            way = 1
         elif stair < self.cells.stair[s]:
-            gained = self.advance(s, -1, motion.v)
+            way = -1
+        self.cells.stair[s] += way
+        self.cells.offset[s] = motion.x - width * self.cells.stair[s]
+        gained = ti.cast(0, ti.i64)
+        if way != 0:
+            gained = self.advance(s, way, motion.v)
         return gained
 
     @ti.func
     def advance(self, s, way, velocity):
         """One cell up (way 1) or down (-1); returns counted gain of velocity along x [quanta]."""
-        self.cells.stair[s] += way
         self.mark(s, way)
         gained = ti.cast(0, ti.i64)
         for k in range(self.cells.traversal.size(s)):
@@ -88,12 +94,17 @@ class Ejection:
     @ti.func
     def push(self, s, cell, way, velocity):
         """Push one particle along; returns its counted gain of velocity along x [quanta]."""
+        kind = self.cells.at(s, cell)
         gain = velocity - self.cells.vertical_speed(s, cell)
         if gain * way > 0.0:
-            self.cells.put(s, cell, UP if velocity > 0.0 else DOWN, abs(velocity), 0.0)
+            kind = UP if velocity > 0.0 else DOWN
+            travelled = self.accumulator.at_wall(kind, self.cells.offset[s])
+            self.cells.put(s, cell, kind, abs(velocity), travelled)
         else:
             gain = 0.0
-            self.cells.travelled[s, cell] = 0.0
+            self.cells.travelled[s, cell] = self.accumulator.ahead_of_wall(
+                self.cells.travelled[s, cell], kind, way, self.numbers.width[None]
+            )
         result = ti.cast(0, ti.i64)
         if ti.static(self.accounting.pushes):
             result = quanta(gain)

@@ -84,6 +84,8 @@ class Encounters:
                 event, other = SIDE, 0.0
         if self.cells.speed[s, cell] <= other or met == EMPTY:
             event = NOTHING
+        if self.resting.caught(s, cell, velocity):
+            event, other = FLOOR, velocity
         if self.resting.joins(s, cell, velocity, pull, pressed):
             event = JOIN
         return event, other
@@ -136,7 +138,9 @@ class Encounters:
         if event == SIDE:
             back = mirrored(kind)
         after = back if speed < 0.0 else kind
-        travelled = self.accumulator.after_wall(self.cells.travelled[s, cell], kind, after)
+        # Side walls do not move; the place of the others is that of the floor.
+        place = 0.0 if event == SIDE else self.cells.offset[s]
+        travelled = self.accumulator.after_wall(self.cells.travelled[s, cell], kind, after, place)
         self.cells.put(s, cell, after, abs(speed), travelled)
 
     @ti.func

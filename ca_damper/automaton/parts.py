@@ -59,13 +59,17 @@ def assembled(options, table):
     if not static:
         accounting = Landings(lattice, scenes, options.accounting == "landing+ejection")
     cells = Cells(lattice, traversal, accounting, scenes)
+    accumulator = Accumulator(options.accumulator, lattice)
+    resting = NoStaticContact()
+    if static:
+        resting = StaticContact(cells, accumulator, options.static_threshold)
     return Parts(
         numbers=Numbers(options),
         lattice=lattice,
         cells=cells,
         rivals=Rivals(lattice, scenes),
-        accumulator=Accumulator(options.accumulator, lattice),
+        accumulator=accumulator,
         accounting=accounting,
-        resting=StaticContact(cells, options.static_threshold) if static else NoStaticContact(),
+        resting=resting,
         ledger=Ledger(scenes) if options.ledger else NoLedger(),
     )

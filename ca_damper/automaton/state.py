@@ -12,8 +12,8 @@ class Cells:
     kind: direction of a particle, or EMPTY, WALL, HELD. speed: along that direction, >= 0 [m/s].
     travelled: part of the way to the next cell [m], negative while short of the own cell's centre.
     Speed and way are zero in cells without a particle under way.
-    stair: displacement of the container in cells. Velocities are those of the room, not of the
-    container.
+    stair: displacement of the container in whole cells, (scenes,); offset: what is left of it [m].
+    Velocities are those of the room, not of the container.
     """
 
     def __init__(self, lattice, traversal, accounting, scenes):
@@ -24,6 +24,7 @@ class Cells:
         self.speed = ti.field(ti.f64, shape=shape)
         self.travelled = ti.field(ti.f64, shape=shape)
         self.stair = ti.field(ti.i32, shape=scenes)
+        self.offset = ti.field(ti.f64, shape=scenes)
 
     @ti.func
     def clear(self, s):

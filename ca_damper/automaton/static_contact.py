@@ -19,8 +19,8 @@ class StaticContact:
     held: number of them, shape (scenes,). threshold: of the relative speed, in units of g dt.
     """
 
-    def __init__(self, cells, threshold):
-        self.cells = cells
+    def __init__(self, cells, accumulator, threshold):
+        self.cells, self.accumulator = cells, accumulator
         self.held = ti.field(ti.i32, shape=cells.kind.shape[0])
         self.threshold = ti.field(ti.f64, shape=())
         self.threshold[None] = threshold
@@ -63,13 +63,21 @@ class StaticContact:
         self.held[s] += 1
 
     @ti.func
+    def caught(self, s, cell, velocity):
+        """Whether the floor, or the heap on it, rises into a particle that rises slower."""
+        rising = self.cells.at(s, cell) == UP and self.cells.speed[s, cell] < velocity
+        return rising and self.supported(s, cell)
+
+    @ti.func
     def release(self, s, velocity):
-        """Let the heap go with the velocity of the container [m/s]."""
+        """Let the heap go from where it is, with the velocity of the container [m/s]."""
         if self.held[s] > 0:
+            kind = UP if velocity > 0.0 else DOWN
+            travelled = self.accumulator.at_wall(kind, self.cells.offset[s])
             for k in range(self.cells.traversal.size(s)):
                 cell = self.cells.traversal.cell(s, k)
                 if self.cells.at(s, cell) == HELD:
-                    self.cells.put(s, cell, UP if velocity > 0.0 else DOWN, abs(velocity), 0.0)
+                    self.cells.put(s, cell, kind, abs(velocity), travelled)
             self.held[s] = 0
 
 
@@ -94,6 +102,11 @@ class NoStaticContact:
     @ti.func
     def joins(self, s, cell, velocity, pull, pressed):
         """Nobody joins."""
+        return False
+
+    @ti.func
+    def caught(self, s, cell, velocity):
+        """Only the staircase of the floor catches up with particles."""
         return False
 
     @ti.func
