@@ -1,8 +1,9 @@
 """Pictures of responses over frequency: curves with bands over seeds, measures, hysteresis."""
 
 import numpy as np
-from ca_damper.plot.style import picture
 from matplotlib import colormaps
+
+from ca_damper.plot.style import picture
 
 #: Titles of the fillings in words.
 TITLES = {
