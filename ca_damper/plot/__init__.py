@@ -1,6 +1,8 @@
 """Pictures of the damper; the only part of the package that imports matplotlib."""
 
+from ca_damper.plot.animation import animate_patterns
 from ca_damper.plot.box import Box
+from ca_damper.plot.patterns import plot_cycle, plot_patterns
 from ca_damper.plot.rebound import plot_rebound
 
-__all__ = ["Box", "plot_rebound"]
+__all__ = ["Box", "animate_patterns", "plot_cycle", "plot_patterns", "plot_rebound"]
