@@ -89,7 +89,7 @@ class Forcing:
     constant: ti.f64
 
 
-@ti.func
+@ti.pyfunc
 def sine_and_cosine(angle):
     """Of an angle up to a sixth, by their series to round-off (angle^11 / 11! < 1e-16).
 
