@@ -33,7 +33,7 @@ class Spheres:
     and container, whose modulus and Poisson's ratio these are.
     diameter [m], particle_mass [kg]. width, height [m]: of the box inside. gravity [m/s^2].
     rotation: whether spheres turn; the paper leaves it out.
-    search: "cells", or "all_pairs" as in the paper; the same bits, but slower from 10 spheres on.
+    search: "cells", or "all_pairs" as in the paper; the same bits, but slower above 10 spheres.
     start: places of the spheres [m], shape (particles, 2), from the lower left inner corner, for
     all scenes alike; by default random ones from each scene's seed.
 

@@ -7,30 +7,49 @@ from ca_damper import SimulationDiverged
 from ca_damper.batch import Batch
 from ca_damper.oscillator import Oscillator
 from ca_damper.spheres import Spheres
+from ca_damper.spheres.contact_law import wall_numbers
 from ca_damper.table import SceneTable
 
 G, MASS, STIFFNESS = 9.8, 0.2e-3, 123.4
 
 
 def test_heap_that_never_lifts_is_a_rigid_mass():
-    """While x_amp w^2 < g: the transfer function with M + N m, hanging lower by N m g / K, to 2e-3.
+    """While x_amp w^2 < g: the transfer function with M + N m, hanging lower by N m g / K.
 
-    About the resonance of either number, where a lag of dt / 2 in the force, a damping of
-    N m w^2 dt / 2 = 1.5e-4 N s/m of 0.08, would already take those 2e-3.
+    The fall of the spheres at the start fades like exp(-C t / 2 (M + N m)): after 230 cycles, 40 s,
+    e^-17 of it is left. 2e-3 are asked for; 1e-3 at the resonance, the second frequency of three,
+    exclude a force late by half a step, whose damping N m w^2 dt / 2 takes 1.6e-3 for N = 50.
     """
     particles = np.repeat([10, 50], 3)
-    frequency = np.array([5.6, 5.96, 6.2, 5.5, 5.706, 5.9])
+    frequency = np.array([5.6, 5.960, 6.2, 5.5, 5.706, 5.9])
     oscillator = Oscillator(base_amplitude=0.05e-3)
     table = SceneTable(particles, 1, 2e-5, frequency, oscillator.base_amplitude)
     batch = Batch(Spheres(), table, measured_cycles=20)
     batch.start("rigid")
-    cycles = batch.run(130, 20)
+    cycles = batch.run(230, 20)
     mass = particles * MASS
     wanted = oscillator.base_amplitude * np.abs(oscillator.transfer(frequency, mass))
     assert np.all(wanted * cycles.omega**2 < 0.5 * G)
-    assert np.sqrt(2.0) * cycles.rms == pytest.approx(wanted, rel=2e-3)
+    assert np.sqrt(2.0) * cycles.rms == pytest.approx(wanted, rel=1e-3)
     assert cycles.mean == pytest.approx(-mass * G / STIFFNESS, rel=2e-3)
     assert cycles.mean_force == pytest.approx(-mass * G, rel=1e-3)
+
+
+def test_a_sphere_at_rest_on_a_moving_floor_neither_lags_nor_leads():
+    # Driven at 2 mm and 6 Hz, below g. A force late by half a step would have the apparent damping
+    # m w^2 dt / 2; one out by less than a thousandth of a step has less than 1/500 of that. The
+    # sphere rests on a spring whose frequency W = sqrt(3 g / (2 d)), d = (m g / k)^(2/3) = 2e-7 m,
+    # lets its mass appear larger by (w / W)^2 = 2e-5.
+    table = SceneTable(1, 1, 2e-5, 6.0, 2e-3)
+    batch = Batch(Spheres(), table, mount="base", measured_cycles=20)
+    batch.start()
+    cycles = batch.run(15, 20)
+    (omega,), (damping,), (mass,) = cycles.omega, cycles.apparent_damping, cycles.apparent_mass
+    assert abs(damping) < MASS * omega**2 * 2e-5 / 2.0 / 500.0
+    k = wall_numbers(Spheres())["stiffness"]
+    spring = np.sqrt(1.5 * G / (MASS * G / k) ** (2.0 / 3.0))
+    # 2 mm w^2 is 0.29 g: the spring of d^(3/2) is as much softer and stiffer in turn.
+    assert mass / MASS - 1.0 == pytest.approx((omega / spring) ** 2, rel=0.29)
 
 
 def test_no_spheres_leave_the_container_to_its_transfer_function():
