@@ -2,8 +2,9 @@
 
 20 and 40 particles over one cycle of a container that moves by +-4 cells (24 mm) at 6 Hz, whatever
 the particles do (Komatsuzaki et al., Figs. 9 and 10). Expect particles that the floor throws up,
-that come apart in the air and are caught again. The automaton throws and catches them a tenth of a
-cycle earlier than the spheres: its walls push a whole cluster as soon as one of it touches them.
+that come apart in the air and are caught again. The automaton throws and catches them up to a
+tenth of a cycle earlier than the spheres: its walls push a whole cluster as soon as one particle
+of it touches them.
 
     python experiments/damper_patterns.py                  # about half a minute
     python experiments/damper_patterns.py --amplitude 10 --accounting landing
@@ -26,8 +27,8 @@ from ca_damper.record import write_csv
 from taichi_dem.record import output_folder
 
 NAME = "damper_patterns"
-QUICK = {"transient": 5, "cycles": 2}
-FULL = {"transient": 30, "cycles": 10}
+QUICK = {"transient": 5, "cycles": 1, "seeds": 2}
+FULL = {"transient": 30, "cycles": 4, "seeds": 5}
 PARTICLES = (20, 40)
 TITLES = {"ca": "automaton", "dem": "spheres"}
 #: Frames a cycle of the animation and the measures; the pictures show every fourth of them.
@@ -40,20 +41,24 @@ SCALE = 1.2
 
 @dataclass(frozen=True, eq=False)
 class Shaken:
-    """Scenes of a filling in the shaken container: frames[scene][cycle][k], its Box, its Batch."""
+    """Scenes of a filling in the shaken container: its Box, its Batch, and what was filmed.
+
+    frames: particles -> cycles of all seeds, the first seed's first, each a tuple of Frames.
+    """
 
     box: plot.Box
-    frames: tuple
+    frames: dict
+    seeds: int
     batch: Batch
 
-    def measures(self, scene):
-        """Arrays (cycles, frames) by name; heights [mm] and shares of the particles.
+    def measures(self, particles):
+        """Arrays (cycles of all seeds, frames) by name; heights [mm] and shares of the particles.
 
         height_mm: mean over the particles, in the room, less that of particles at rest on the
         floor of a container in its middle. above_floor_mm: the same over the container's floor.
         floor, ceiling: share of the particles less than half a diameter away from it.
         """
-        rows = [[self._measure(frame) for frame in cycle] for cycle in self.frames[scene]]
+        rows = [[self._measure(frame) for frame in cycle] for cycle in self.frames[particles]]
         names = ("height_mm", "above_floor_mm", "floor", "ceiling")
         return dict(zip(names, np.moveaxis(np.array(rows), 2, 0)))
 
@@ -72,13 +77,15 @@ def options_parser():
     made.add_argument("--frequency", type=number(0.5, 100), default=6.0, help="[Hz], 6")
     made.add_argument("--accounting", choices=ACCOUNTINGS, default="static", help="static")
     made.add_argument("--dt", type=number(0, 1), help="spheres' step [s], 2e-5")
-    made.add_argument("--seed", type=whole(0, 2**31 - 1), default=1, help="of the first places, 1")
+    made.add_argument("--seeds", type=whole(1, 100), help="starts that are averaged, 5")
     return made
 
 
 def shake(filling, box, dt, options, settings, progress):
     """Shake the container through a transient, then film some cycles; returns a Shaken."""
-    table = SceneTable(PARTICLES, options.seed, dt, options.frequency, 1e-3 * options.amplitude)
+    seeds = options.seeds or settings["seeds"]
+    particles, seed = np.repeat(PARTICLES, seeds), np.tile(np.arange(seeds) + 1, len(PARTICLES))
+    table = SceneTable(particles, seed, dt, options.frequency, 1e-3 * options.amplitude)
     batch = Batch(filling, table, mount="base", measured_cycles=0)
     batch.start()
     count = settings["transient"] + settings["cycles"]
@@ -86,12 +93,13 @@ def shake(filling, box, dt, options, settings, progress):
     tell = Stages(progress, ends)
     batch.run(settings["transient"], 0, tell)
     steps = int(batch.steps_per_cycle[0])
-    cycles = []
+    frames = {count: [] for count in PARTICLES}
     for _ in range(settings["cycles"]):
         every = steps // FRAMES
         shot = film(batch, steps, sample_every=steps, frame_every=every, progress=tell)
-        cycles.append([frames[:FRAMES] for frames in shot.frames])
-    return Shaken(box, tuple(zip(*cycles)), batch)
+        for count, cycle in zip(particles, shot.frames):
+            frames[count].append(cycle[:FRAMES])
+    return Shaken(box, frames, seeds, batch)
 
 
 def run(options):
@@ -108,8 +116,8 @@ def run(options):
         with ProgressBar(TITLES[name]) as progress:
             runs[name] = shake(filling, box, dt, options, settings, progress)
     measures = {
-        particles: {name: made.measures(scene) for name, made in runs.items()}
-        for scene, particles in enumerate(PARTICLES)
+        particles: {name: made.measures(particles) for name, made in runs.items()}
+        for particles in PARTICLES
     }
     phase = phases(runs["ca"].batch)
     picture(runs, measures, phase, options)
@@ -171,13 +179,14 @@ def picture(runs, measures, phase, options):
     amplitude = 1e-3 * options.amplitude
     fastest = SCALE * 2.0 * np.pi * options.frequency * amplitude
     rows = {}
-    for scene, particles in enumerate(PARTICLES):
+    for particles in PARTICLES:
         lines = {
-            TITLES[name]: (made.box, made.frames[scene][0][::SHOWN]) for name, made in runs.items()
+            TITLES[name]: (made.box, made.frames[particles][0][::SHOWN])
+            for name, made in runs.items()
         }
         plot.plot_patterns(at(f"patterns_{particles}.png"), lines, amplitude, fastest)
         for name, made in runs.items():
-            rows[f"{TITLES[name]}, {particles}"] = made.box, made.frames[scene][0]
+            rows[f"{TITLES[name]}, {particles}"] = made.box, made.frames[particles][0]
     plot.animate_patterns(at("patterns.gif"), rows, amplitude, fastest)
     cycles = {
         particles: {TITLES[name]: over_cycle(phase, one) for name, one in fillings.items()}
@@ -199,20 +208,21 @@ def over_cycle(phase, measured):
 def write_tables(runs, measures, phase, folder):
     """The measures of every frame, and the places of all particles in the first cycle."""
     rows = []
-    for scene, particles in enumerate(PARTICLES):
+    for particles in PARTICLES:
         for name, made in runs.items():
             one = measures[particles][name]
-            for cycle, frames in enumerate(made.frames[scene]):
+            for row, frames in enumerate(made.frames[particles]):
+                start = row % made.seeds + 1, row // made.seeds
                 for k, frame in enumerate(frames):
-                    values = (one[key][cycle, k] for key in one)
-                    rows.append((particles, name, cycle, phase[k], 1e3 * frame.x, *values))
-    names = ("particles", "filling", "cycle", "phase", "container_mm", *one)
+                    values = (one[key][row, k] for key in one)
+                    rows.append((particles, name, *start, phase[k], 1e3 * frame.x, *values))
+    names = ("particles", "filling", "seed", "cycle", "phase", "container_mm", *one)
     write_csv(os.path.join(folder, "cycles.csv"), dict(zip(names, zip(*rows))))
     rows = [
         (particles, name, phase[k], *1e3 * place, *velocity)
-        for scene, particles in enumerate(PARTICLES)
+        for particles in PARTICLES
         for name, made in runs.items()
-        for k, frame in enumerate(made.frames[scene][0])
+        for k, frame in enumerate(made.frames[particles][0])
         for place, velocity in zip(frame.position, frame.velocity)
     ]
     names = ("particles", "filling", "phase", "across_mm", "up_mm", "across_m_s", "up_m_s")
