@@ -56,18 +56,17 @@ class Batch:
         container = DrivenContainer(table, self.clock)
         if mount == "spring":
             container = SprungContainer(table, self.clock, filling.gravity, rtol, atol)
-        bound = filling.bind(table)
-        self.bound = bound
+        self.bound = filling.bind(table)
         _check_record_fits(self.count * max(1, self.measured_cycles) * len(measures.COLUMNS))
         self.coupling = Coupling(
-            table, self.clock, container, bound, filling.gravity, self.measured_cycles
+            table, self.clock, container, self.bound, filling.gravity, self.measured_cycles
         )
         self._set_pace(frequency, dt)
         self.time_origin = np.zeros(self.count)
         self.run_seconds = self.compile_seconds = 0.0
         # Scene-steps a launch; one each to begin with, as nobody knows yet what a step costs.
         self._pace = float(self.count)
-        self._compiled = False
+        self._compiled = self._started = False
 
     def start(self, start="rest"):
         """Place the particles anew and begin at time zero, the base passing upwards through zero.
@@ -78,6 +77,7 @@ class Batch:
         self._check_session()
         choice("start", start, STARTS)
         self.coupling.start(np.ascontiguousarray(self._initial(start)))
+        self._started = True
         self.time_origin[:] = 0.0
         self._check_health()
 
@@ -110,9 +110,15 @@ class Batch:
         return measures.Cycles(self.table.column("frequency"), self.steps_per_cycle, record)
 
     def advance(self, steps, progress=None):
-        """Advance every scene by a number of steps, one for all or (scenes,), without measuring."""
-        self._check_session()
-        steps = np.broadcast_to(np.asarray(steps, dtype=np.int64), self.count)
+        """Advance every scene by a number of steps, one for all or (scenes,), without measuring.
+
+        Raises InputError unless they are whole numbers from zero, SimulationDiverged.
+        """
+        self._check_started()
+        steps = np.asarray(steps)
+        if steps.dtype.kind not in "iu" or (steps < 0).any():
+            raise InputError(f"steps must be whole numbers from 0, got {steps.tolist()}")
+        steps = np.broadcast_to(steps.astype(np.int64), self.count)
         self._go(steps, steps, progress)
 
     @property
@@ -127,14 +133,14 @@ class Batch:
         the filling on the container in the last step; energy [J], momentum [kg m/s] of the
         particles.
         """
-        self._check_session()
+        self._check_started()
         values = np.empty((len(measures.SAMPLE), self.count))
         self.coupling.sample(values)
         return {"time_s": self.time_s, **dict(zip(measures.SAMPLE, values))}
 
     def snapshot(self, s):
         """Positions and velocities of the particles of scene s, as the filling gives them."""
-        self._check_session()
+        self._check_started()
         return self.bound.snapshot(s)
 
     def attempts(self):
@@ -151,8 +157,13 @@ class Batch:
         self.coupling.look(seen)
         return seen
 
-    def _check_cycle_is_full(self):
+    def _check_started(self):
         self._check_session()
+        if not self._started:
+            raise InputError("this batch has no state yet: call start() first")
+
+    def _check_cycle_is_full(self):
+        self._check_started()
         position = self._look()[1]
         if position.any():
             late = int(position.argmax())
