@@ -98,9 +98,12 @@ class Lattice:
         self.neighbour = ti.field(ti.i16, shape=(self.cells + 1, KINDS))
         self.blank = ti.field(ti.i8, shape=self.cells + 1)
         self.cosine = ti.field(ti.f64, shape=(KINDS, DIRECTIONS))
+
+    def load(self):
+        """Fill the tables; apart from making them, as every first use of new fields is dear."""
         cosines = np.zeros((KINDS, DIRECTIONS))
         cosines[:DIRECTIONS] = alignments()
-        self._load(geometry.neighbours(), geometry.blank()[:, None], cosines)
+        self._load(self.geometry.neighbours(), self.geometry.blank()[:, None], cosines)
 
     @ti.kernel
     def _load(self, neighbours: _TABLE, blank: _TABLE, cosines: _COSINES):

@@ -28,8 +28,10 @@ class BoundAutomaton:
         self.encounters = Encounters(parts, both, pairs_first)
         self.placement = DrawnCells(self.cells, table)
         if options.start is not None:
-            self.placement = NamedCells(self.cells, table, options.start)
+            self.placement = NamedCells(self.cells, options.start)
         self.velocity = ti.field(ti.f64, shape=table.count)
+        for loaded in (self.lattice, self.numbers, self.placement):
+            loaded.load()
 
     @ti.func
     def reset(self, s):

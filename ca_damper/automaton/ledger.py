@@ -11,6 +11,7 @@ import taichi as ti
 QUANTUM = 2.0**-40
 ITEMS = ("gravity", "pairs", "ejections", "rest")
 GRAVITY, PAIRS, EJECTIONS, REST = range(4)
+_COUNT = len(ITEMS)
 
 
 @ti.func
@@ -26,12 +27,12 @@ class Ledger:
     active = True
 
     def __init__(self, scenes):
-        self.gained = ti.field(ti.i64, shape=(scenes, len(ITEMS)))
+        self.gained = ti.field(ti.i64, shape=(scenes, _COUNT))
 
     @ti.func
     def clear(self, s):
         """Start anew."""
-        for item in range(len(ITEMS)):
+        for item in range(_COUNT):
             self.gained[s, item] = ti.cast(0, ti.i64)
 
     @ti.func

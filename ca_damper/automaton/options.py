@@ -85,6 +85,8 @@ class Automaton:
             object.__setattr__(self, "start", self._checked_start())
 
     def _checked_start(self):
+        if not isinstance(self.start, (tuple, list)):
+            raise InputError(f"start must be a tuple of (column, row), got {self.start!r}")
         cells = [tuple(cell) if isinstance(cell, (tuple, list)) else cell for cell in self.start]
         for cell in cells:
             if not (isinstance(cell, tuple) and len(cell) == 2 and self._inside(*cell)):

@@ -18,21 +18,31 @@ from ca_damper.lattice import Geometry, Lattice
 class Numbers:
     """Numbers that kernels read; in fields, so that another value compiles nothing anew.
 
-    width of a cell [m], mass of a particle [kg], gravity [m/s^2], restitution of particle and wall.
+    width of a cell [m], mass of a particle [kg], gravity [m/s^2], restitution of particle and wall;
+    threshold of static contact in units of g dt.
     """
 
     def __init__(self, options):
-        values = {
-            "width": options.width,
-            "mass": options.particle_mass,
-            "gravity": options.gravity,
-            "particle": options.restitution,
-            "wall": options.wall_restitution,
-        }
-        for name, value in values.items():
-            field = ti.field(ti.f64, shape=())
-            field[None] = value
-            setattr(self, name, field)
+        self.options = options
+        for name in ("width", "mass", "gravity", "particle", "wall", "threshold"):
+            setattr(self, name, ti.field(ti.f64, shape=()))
+
+    def load(self):
+        """Take the values from the options."""
+        options = self.options
+        self._load(options.width, options.particle_mass, options.gravity)
+        self._load_collisions(
+            options.restitution, options.wall_restitution, options.static_threshold
+        )
+
+    @ti.kernel
+    def _load(self, width: ti.f64, mass: ti.f64, gravity: ti.f64):
+        self.width[None], self.mass[None], self.gravity[None] = width, mass, gravity
+
+    @ti.kernel
+    def _load_collisions(self, particle: ti.f64, wall: ti.f64, threshold: ti.f64):
+        self.particle[None], self.wall[None] = particle, wall
+        self.threshold[None] = threshold
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,12 +69,13 @@ def assembled(options, table):
     if not static:
         accounting = Landings(lattice, scenes, options.accounting == "landing+ejection")
     cells = Cells(lattice, traversal, accounting, scenes)
+    numbers = Numbers(options)
     accumulator = Accumulator(options.accumulator, lattice)
     resting = NoStaticContact()
     if static:
-        resting = StaticContact(cells, accumulator, options.static_threshold)
+        resting = StaticContact(cells, accumulator, numbers)
     return Parts(
-        numbers=Numbers(options),
+        numbers=numbers,
         lattice=lattice,
         cells=cells,
         rivals=Rivals(lattice, scenes),

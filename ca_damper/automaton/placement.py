@@ -1,5 +1,6 @@
 """Where the particles of a scene stand at its start."""
 
+import numpy as np
 import taichi as ti
 
 from ca_damper.lattice import DOWN
@@ -16,6 +17,9 @@ class DrawnCells:
 
     def __init__(self, cells, table):
         self.cells, self.lattice, self.table = cells, cells.lattice, table
+
+    def load(self):
+        """Nothing to load."""
 
     @ti.func
     def place(self, s):
@@ -36,11 +40,20 @@ class DrawnCells:
 class NamedCells:
     """Cells named by the user, the same in every scene."""
 
-    def __init__(self, cells, table, named):
+    def __init__(self, cells, named):
         self.cells, self.count = cells, len(named)
+        geometry = cells.lattice.geometry
+        self.chosen = np.array([geometry.cell_of(*cell) for cell in named], dtype=np.int32)
         self.named = ti.field(ti.i32, shape=max(1, self.count))
-        for k, (column, row) in enumerate(named):
-            self.named[k] = cells.lattice.geometry.cell_of(column, row)
+
+    def load(self):
+        """Take over the user's cells."""
+        self._load(self.chosen)
+
+    @ti.kernel
+    def _load(self, chosen: ti.types.ndarray(dtype=ti.i32, ndim=1)):
+        for k in range(self.count):
+            self.named[k] = chosen[k]
 
     @ti.func
     def place(self, s):

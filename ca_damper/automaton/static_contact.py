@@ -16,14 +16,12 @@ from ca_damper.lattice import DOWN, HELD, UP, WALL
 class StaticContact:
     """Particles held by the container.
 
-    held: number of them, shape (scenes,). threshold: of the relative speed, in units of g dt.
+    held: number of them, shape (scenes,).
     """
 
-    def __init__(self, cells, accumulator, threshold):
-        self.cells, self.accumulator = cells, accumulator
+    def __init__(self, cells, accumulator, numbers):
+        self.cells, self.accumulator, self.numbers = cells, accumulator, numbers
         self.held = ti.field(ti.i32, shape=cells.kind.shape[0])
-        self.threshold = ti.field(ti.f64, shape=())
-        self.threshold[None] = threshold
 
     @ti.func
     def clear(self, s):
@@ -52,7 +50,7 @@ class StaticContact:
         result = False
         if pressed and (kind == UP or kind == DOWN):
             relative = self.cells.vertical_speed(s, cell) - velocity
-            if abs(relative) < self.threshold[None] * pull:
+            if abs(relative) < self.numbers.threshold[None] * pull:
                 result = self.supported(s, cell)
         return result
 

@@ -17,9 +17,9 @@ class Shaken:
 
     def __init__(self, filling, particles, seed=1, dt=1e-4, amplitude=0.0, frequency=6.0, traced=0):
         self.table = SceneTable(particles, seed, dt, frequency, amplitude)
-        self.bound = filling.bind(self.table)
         self.trace = ti.Vector.field(4, ti.f64, shape=(max(1, traced), self.table.count))
         self.traced = traced
+        self.bound = filling.bind(self.table)
         self.step = 0
         self._reset()
 
