@@ -81,40 +81,42 @@ def options_parser():
     return made
 
 
-def shake(filling, box, dt, options, settings, progress):
-    """Shake the container through a transient, then film some cycles; returns a Shaken."""
-    seeds = options.seeds or settings["seeds"]
+def shaken_batch(filling, dt, seeds, options):
+    """Batch of all numbers of particles and seeds; InputError for a step that cannot be meant."""
     particles, seed = np.repeat(PARTICLES, seeds), np.tile(np.arange(seeds) + 1, len(PARTICLES))
     table = SceneTable(particles, seed, dt, options.frequency, 1e-3 * options.amplitude)
-    batch = Batch(filling, table, mount="base", measured_cycles=0)
+    return Batch(filling, table, mount="base", measured_cycles=0)
+
+
+def shake(batch, box, settings, progress):
+    """Shake the container through a transient, then film some cycles; returns a Shaken."""
     batch.start()
     count = settings["transient"] + settings["cycles"]
-    ends = np.arange(settings["transient"], count + 1) / count
-    tell = Stages(progress, ends)
+    tell = Stages(progress, np.arange(settings["transient"], count + 1) / count)
     batch.run(settings["transient"], 0, tell)
     steps = int(batch.steps_per_cycle[0])
     frames = {count: [] for count in PARTICLES}
     for _ in range(settings["cycles"]):
         every = steps // FRAMES
         shot = film(batch, steps, sample_every=steps, frame_every=every, progress=tell)
-        for count, cycle in zip(particles, shot.frames):
+        for count, cycle in zip(batch.table.column("particles").tolist(), shot.frames):
             frames[count].append(cycle[:FRAMES])
-    return Shaken(box, frames, seeds, batch)
+    return Shaken(box, frames, settings["seeds"], batch)
 
 
 def run(options):
     """Shake both fillings, compare, picture."""
-    settings = QUICK if options.quick else FULL
+    settings = dict(QUICK if options.quick else FULL)
+    settings["seeds"] = options.seeds or settings["seeds"]
     automaton, spheres = Automaton(accounting=options.accounting), Spheres()
-    jobs = {
-        "ca": (automaton, plot.Box.of_automaton(automaton), CA_DT),
-        "dem": (spheres, plot.Box.of_spheres(spheres), options.dt or CA_DT / STEPS_IN_ONE),
-    }
+    boxes = {"ca": plot.Box.of_automaton(automaton), "dem": plot.Box.of_spheres(spheres)}
+    jobs = {"ca": (automaton, CA_DT), "dem": (spheres, options.dt or CA_DT / STEPS_IN_ONE)}
+    batches = {name: shaken_batch(*job, settings["seeds"], options) for name, job in jobs.items()}
     output_folder(options.out)
     runs = {}
-    for name, (filling, box, dt) in jobs.items():
+    for name, batch in batches.items():
         with ProgressBar(TITLES[name]) as progress:
-            runs[name] = shake(filling, box, dt, options, settings, progress)
+            runs[name] = shake(batch, boxes[name], settings, progress)
     measures = {
         particles: {name: made.measures(particles) for name, made in runs.items()}
         for particles in PARTICLES

@@ -88,7 +88,6 @@ class Run:
     height_m: np.ndarray
     impacts_s: np.ndarray
     apexes_m: np.ndarray
-    batch: Batch
 
     def impact_errors_ms(self):
         """Time of the first impacts less the closed form's [ms]."""
@@ -125,27 +124,25 @@ def fillings(restitution):
     return made
 
 
-def drop(filling, fall, dt, settings, progress):
+def drop(batch, fall, settings, progress):
     """Let the particle fall until it has made its impacts and risen once more; returns a Run."""
-    table = SceneTable(1, 1, dt, FREQUENCY, 0.0)
-    batch = Batch(filling, table, mount="base")
     batch.start()
-    dt = float(table.column("dt")[0])
+    dt = float(batch.table.column("dt")[0])
     last = settings["impacts"]
     until = 0.5 * (fall.impact_s(last) + fall.impact_s(last + 1)) + 0.1 * fall.first_s
     every = max(1, round(settings["every_s"] / dt))
     steps = every * math.ceil(until / (every * dt))
     recorded = film(batch, steps, sample_every=every, progress=progress).history
-    return analysed(batch, fall, filling, {name: v[:, 0] for name, v in recorded.items()})
+    return analysed(batch, fall, {name: v[:, 0] for name, v in recorded.items()})
 
 
-def analysed(batch, fall, filling, history):
+def analysed(batch, fall, history):
     """Impacts and apexes of a recorded fall.
 
     Height and velocity of the only particle follow from energy and momentum. Two flights of equal
     gravity cross once: where those before and after an impact do, there the particle turned.
     """
-    mass, gravity = filling.particle_mass, filling.gravity
+    mass, gravity = batch.filling.particle_mass, batch.filling.gravity
     flying = history["force"] == 0.0
     time, velocity = history["time_s"][flying], history["momentum"][flying] / mass
     height = history["energy"][flying] / (mass * gravity) - 0.5 * velocity**2 / gravity
@@ -156,31 +153,30 @@ def analysed(batch, fall, filling, history):
     lost = h[before + 1] - h[before] - gap * (v[before + 1] + 0.5 * gravity * gap)
     impacts = time[before] + lost / (v[before] - v[before + 1] - gravity * gap)
     apexes = [part.max() for part in np.split(height, before + 1)[1:]]
-    return Run(fall, time, height, impacts, np.array(apexes), batch)
+    return Run(fall, time, height, impacts, np.array(apexes))
 
 
 def run(options):
     """Drop the particle in every filling, compare, picture."""
     settings = QUICK if options.quick else FULL
-    made = fillings(options.restitution)
-    for title, (filling, _) in made.items():
-        filling.check(1, options.dt if title == "dem" else options.ca_dt)
+    batches, falls = {}, {}
+    for title, (filling, height) in fillings(options.restitution).items():
+        dt = options.dt if title == "dem" else options.ca_dt
+        batches[title] = Batch(filling, SceneTable(1, 1, dt, FREQUENCY, 0.0), mount="base")
+        falls[title] = Fall(height, options.restitution, filling.gravity)
     output_folder(options.out)
     runs = {}
-    for title, (filling, height) in made.items():
-        fall = Fall(height, options.restitution, filling.gravity)
-        dt = options.dt if title == "dem" else options.ca_dt
+    for title, batch in batches.items():
         with ProgressBar(title) as progress:
-            runs[title] = drop(filling, fall, dt, settings, progress)
+            runs[title] = drop(batch, falls[title], settings, progress)
     write(runs, options.out)
     figures = figures_of(runs)
-    batches = [made.batch for made in runs.values()]
     write_summary(
         options.out,
         NAME,
         figures,
-        compile_seconds=sum(batch.compile_seconds for batch in batches),
-        run_seconds=sum(batch.run_seconds for batch in batches),
+        compile_seconds=sum(batch.compile_seconds for batch in batches.values()),
+        run_seconds=sum(batch.run_seconds for batch in batches.values()),
     )
     show(runs, options.out)
 

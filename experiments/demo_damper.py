@@ -31,8 +31,8 @@ FILLINGS = {
     "automaton": (Automaton, plot.Box.of_automaton),
     "spheres": (Spheres, plot.Box.of_spheres),
 }
-#: Cycles of the animation and frames in each; samples a cycle of the curves.
-SHOWN, FRAMES, SAMPLES = 2, 20, 40
+#: Cycles of the animation, the first ones, and frames in each; samples a cycle of the curves.
+SHOWN, FRAMES, SAMPLES = 3, 13, 40
 #: Ends of the colour scale as a share of the larger container's largest speed.
 SCALE = 1.2
 
@@ -61,23 +61,29 @@ def options_parser():
     return made
 
 
-def swing(filling, particles, dt, oscillator, options, settings, progress):
-    """Let a container swing, measure whole cycles and film the last two; returns a Run."""
-    o, frequency = oscillator, options.frequency * oscillator.natural_frequency
+def hung_batch(filling, particles, oscillator, options, measured):
+    """Batch of one container; InputError for a step that cannot be meant."""
+    o, dt = oscillator, options.dt or FILLINGS[options.filling][0]().default_dt
     structure = (o.base_amplitude, o.mass, o.stiffness, o.damping)
+    frequency = options.frequency * o.natural_frequency
     table = SceneTable(particles, options.seed, dt, frequency, *structure)
-    batch = Batch(filling, table, measured_cycles=settings["measured"])
+    return Batch(filling, table, measured_cycles=measured)
+
+
+def swing(batch, settings, progress):
+    """Let a container swing, film its first cycles and measure the last; returns a Run."""
     batch.start("empty")
     steps = int(batch.steps_per_cycle[0])
-    parts = np.cumsum([settings["begin"], settings["measured"], SHOWN])
+    parts = np.cumsum([SHOWN, settings["begin"] - SHOWN, settings["measured"]])
     tell = Stages(progress, parts / parts[-1])
-    begin = settings["begin"] * steps
-    history = film(batch, begin, sample_every=steps // SAMPLES, progress=tell).history
+    sample, frame = steps // SAMPLES, steps // FRAMES
+    shown = film(batch, SHOWN * steps, sample_every=sample, frame_every=frame, progress=tell)
+    later = film(batch, (settings["begin"] - SHOWN) * steps, sample_every=sample, progress=tell)
     cycles = batch.run(0, settings["measured"], tell)
-    every = steps // FRAMES
-    shot = film(batch, SHOWN * steps, sample_every=steps, frame_every=every, progress=tell)
-    one = {name: values[:, 0] for name, values in history.items()}
-    return Run(one, cycles, shot.frames[0][: SHOWN * FRAMES], batch)
+    parts = zip(shown.history.values(), later.history.values())
+    columns = [np.concatenate([early, late])[:, 0] for early, late in parts]
+    history = dict(zip(shown.history, columns))
+    return Run(history, cycles, shown.frames[0][: SHOWN * FRAMES], batch)
 
 
 def run(options):
@@ -85,12 +91,16 @@ def run(options):
     settings = QUICK if options.quick else FULL
     oscillator = Oscillator(base_amplitude=1e-3 * options.amplitude)
     filling = FILLINGS[options.filling][0]()
-    dt = options.dt or filling.default_dt
+    jobs = {"full": (filling, options.particles), "empty": (Empty(), 0)}
+    batches = {
+        title: hung_batch(*job, oscillator, options, settings["measured"])
+        for title, job in jobs.items()
+    }
     output_folder(options.out)
     runs = {}
-    for title, job in {"full": (filling, options.particles), "empty": (Empty(), 0)}.items():
+    for title, batch in batches.items():
         with ProgressBar(f"{title} container") as progress:
-            runs[title] = swing(*job, dt, oscillator, options, settings, progress)
+            runs[title] = swing(batch, settings, progress)
     figures = figures_of(runs["full"], runs["empty"], oscillator)
     picture(runs["full"], runs["empty"], oscillator, filling, options)
     write_summary(
@@ -134,10 +144,15 @@ def series(made, oscillator):
     }
 
 
+def counted(particles):
+    """Number of particles in words."""
+    return f"{particles} particle{'' if particles == 1 else 's'}"
+
+
 def picture(full, empty, oscillator, filling, options):
     """Write the curves, their table and the animation."""
     curves, bare = series(full, oscillator), series(empty, oscillator)
-    title = f"{options.particles} particle{'' if options.particles == 1 else 's'}"
+    title = counted(options.particles)
     plot.plot_motion(os.path.join(options.out, "motion.png"), title, curves, bare)
     columns = {"x_empty_mm": bare["x_mm"], "energy_empty_mJ": bare["energy_mJ"]}
     write_csv(os.path.join(options.out, "motion.csv"), {**curves, **columns})
@@ -158,7 +173,7 @@ def tell(figures, filling, oscillator, options):
     print(f"Its base shakes it at {frequency:.2f} Hz, by {options.amplitude:g} mm up and down.")
     print(f"Empty, it then swings by {value['amplitude_empty_mm']:.1f} mm.")
     print(
-        f"With {options.particles} particles ({load:g} g, {share:.0f} % of its mass) it swings by "
+        f"With {counted(options.particles)} ({load:g} g, {share:.0f} % of its mass) it swings by "
         f"{value['amplitude_mm']:.1f} mm: {100.0 * value['amplitude_left']:.0f} % of that."
     )
     print(

@@ -4,10 +4,12 @@ import numpy as np
 
 from ca_damper.plot.animation import moving_picture
 from ca_damper.plot.box import Box, DrawnBox
-from ca_damper.plot.style import BLACK, BLUE, GREY, ORANGE, RED, picture
+from ca_damper.plot.style import BLACK, BLUE, GREY, RED, picture
 
 #: The spring hangs from the base, this far over a box in its middle [mm]; its coils and half width.
-_HANGS, _COILS, _HALF = 75.0, 7, 7.0
+_HANGS, _COILS, _HALF = 75.0, 9, 7.0
+#: Straight end of the spring [mm]; it reaches over the steps of a staggered box.
+_LEAD = 6.0
 
 
 def plot_motion(path, title, full, empty):
@@ -69,9 +71,10 @@ class _Hung:
         self.drawn.show(frame)
         top = self.top + _HANGS + 1e3 * frame.y
         bottom = self.top + 1e3 * self.drawn.box.lift(frame.x)
-        along = np.linspace(top, bottom, 2 * _COILS + 2)
-        across = np.tile([_HALF, -_HALF], _COILS + 1)
-        across[[0, -1]] = 0.0
+        coils = np.linspace(top - _LEAD, bottom + _LEAD, 2 * _COILS)
+        along = np.concatenate([[top], coils, [bottom]])
+        across = np.tile([0.0, _HALF, 0.0, -_HALF], _COILS)[: len(along)]
+        across[-2:] = 0.0
         self.spring.set_data(self.middle + across, along)
         self.base.set_data([self.middle - 20.0, self.middle + 20.0], [top, top])
 
@@ -92,7 +95,7 @@ def _curves(axes, frames, empty_frames, swing):
     for shots, colour in ((frames, BLUE), (empty_frames, GREY)):
         time = [frame.time_s - frames[0].time_s for frame in shots]
         axes.plot(time, [1e3 * frame.x for frame in shots], color=colour, linewidth=0.9)
-        dots += axes.plot([], [], "o", color=ORANGE if colour == BLUE else colour, markersize=4)
+        dots += axes.plot([], [], "o", color=colour, markersize=4)
     axes.set(ylim=(-1e3 * swing, 1e3 * swing), xlabel="time [s]")
     axes.set_title("displacement [mm]")
     return dots
