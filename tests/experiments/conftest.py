@@ -1,11 +1,26 @@
-"""Experiments run inside the test process."""
+"""Runs of experiments: in processes of their own, each made once a file, and inside this one."""
 
 import importlib.util
 import sys
 
 import pytest
 
-from tests.experiments.contract import FOLDER
+from tests.experiments.contract import FOLDER, start
+
+
+@pytest.fixture(scope="module")
+def quick_run(tmp_path_factory):
+    """``quick_run(name, *options)``: (folder, finished process)."""
+    made = {}
+
+    def run(name, *options):
+        key = (name, *options)
+        if key not in made:
+            folder = tmp_path_factory.mktemp(name)
+            made[key] = folder, start(name, "--quick", "--out", folder, *options)
+        return made[key]
+
+    return run
 
 
 @pytest.fixture(scope="module")

@@ -29,12 +29,11 @@ def start(name, *arguments):
 
 
 def quick_runs(names):
-    """A fixture of quick runs, each once a file: (name, folder, finished process)."""
+    """A fixture of the quick runs of experiments: (name, folder, finished process)."""
 
     @pytest.fixture(scope="module", params=names)
-    def quick(request, tmp_path_factory):
-        folder = tmp_path_factory.mktemp(request.param)
-        return request.param, folder, start(request.param, "--quick", "--out", folder)
+    def quick(request, quick_run):
+        return request.param, *quick_run(request.param)
 
     return quick
 

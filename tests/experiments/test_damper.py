@@ -61,26 +61,21 @@ class TestQuickRun(QuickRun):
 
 
 @pytest.fixture(scope="module")
-def quick_run(tmp_path_factory):
-    """``quick_run(name, *options)``: a quick run, made once; (folder, figures)."""
-    made = {}
+def shown(quick_run):
+    """``shown(name, *options)``: folder of a quick run, and its figures' values."""
 
     def run(name, *options):
-        key = (name, *options)
-        if key not in made:
-            folder = tmp_path_factory.mktemp(name)
-            done = start(name, "--quick", "--out", folder, *options)
-            assert done.returncode == 0, done.stderr
-            figures = json.loads((folder / "summary.json").read_text())["figures"]
-            made[key] = folder, {name: figure["value"] for name, figure in figures.items()}
-        return made[key]
+        folder, done = quick_run(name, *options)
+        assert done.returncode == 0, done.stderr
+        figures = json.loads((folder / "summary.json").read_text())["figures"]
+        return folder, {name: figure["value"] for name, figure in figures.items()}
 
     return run
 
 
 @pytest.mark.slow
-def test_rebound_stays_within_two_milliseconds_to_the_fourth_impact(quick_run):
-    folder, figures = quick_run("damper_rebound")
+def test_rebound_stays_within_two_milliseconds_to_the_fourth_impact(shown):
+    folder, figures = shown("damper_rebound")
     assert figures["impact_error_ms"] < 2.0
     assert figures["impact_error_ms_dem"] < 2.0
     # The readings differ, or comparing them would say nothing.
@@ -96,19 +91,19 @@ def test_rebound_stays_within_two_milliseconds_to_the_fourth_impact(quick_run):
 
 
 @pytest.mark.slow
-def test_rebound_error_falls_with_the_step(quick_run):
+def test_rebound_error_falls_with_the_step(shown):
     # The blow falls one to two steps late, and a particle 1.5 dt late is 1.5 g dt too fast, which
     # lengthens the next flight by 2 e 1.5 dt: three blows make at most 3 (2 + 3 e) dt, plus the
     # scatter of the last by as much as a step.
     for dt in (1e-4, 2.5e-5):
         options = ("--ca-dt", dt) if dt != 1e-4 else ()
-        _, figures = quick_run("damper_rebound", *options)
+        _, figures = shown("damper_rebound", *options)
         assert figures["impact_error_ms"] <= 1e3 * dt * (3.0 * (2.0 + 3.0 * 0.75) + 1.0)
 
 
 @pytest.mark.slow
-def test_patterns_show_all_particles_inside_the_box(quick_run):
-    folder, figures = quick_run("damper_patterns")
+def test_patterns_show_all_particles_inside_the_box(shown):
+    folder, figures = shown("damper_patterns")
     rows = rows_of(folder / "particles.csv")
     across, up = (np.array([float(row[name]) for row in rows]) for name in ("across_mm", "up_mm"))
     # 32 frames of 20 and 40 particles in two fillings.
@@ -125,8 +120,8 @@ def test_patterns_show_all_particles_inside_the_box(quick_run):
 
 
 @pytest.mark.slow
-def test_demo_damps(quick_run):
-    folder, figures = quick_run("demo_damper")
+def test_demo_damps(shown):
+    folder, figures = shown("demo_damper")
     # The empty container at its natural frequency: |x / y| = sqrt(1 + (2 z)^2) / (2 z).
     ratio = 0.08 / (2.0 * math.sqrt(123.4 * 0.086))
     magnified = 0.6 * math.sqrt(1.0 + (2.0 * ratio) ** 2) / (2.0 * ratio)
@@ -138,8 +133,8 @@ def test_demo_damps(quick_run):
 
 
 @pytest.mark.slow
-def test_demo_without_particles_is_the_empty_container(quick_run):
-    _, figures = quick_run("demo_damper", "--particles", "0")
+def test_demo_without_particles_is_the_empty_container(shown):
+    _, figures = shown("demo_damper", "--particles", "0")
     assert figures["amplitude_left"] == pytest.approx(1.0, abs=1e-9)
     assert figures["apparent_mass_g"] == 0.0
 
