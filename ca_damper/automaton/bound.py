@@ -6,7 +6,7 @@ import taichi as ti
 from ca_damper.automaton.ejection import Ejection
 from ca_damper.automaton.encounters import Encounters
 from ca_damper.automaton.flight import Flight
-from ca_damper.automaton.ledger import QUANTUM
+from ca_damper.automaton.ledger import GRAVITY, QUANTUM
 from ca_damper.automaton.parts import assembled
 from ca_damper.automaton.placement import DrawnCells, NamedCells
 from ca_damper.filling import Action
@@ -40,7 +40,6 @@ class BoundAutomaton:
         self.rivals.clear(s)
         self.resting.clear(s)
         self.accounting.clear(s)
-        self.ledger.clear(s)
         self.placement.place(s)
         self.velocity[s] = 0.0
 
@@ -54,8 +53,12 @@ class BoundAutomaton:
         gained = self.ejection.follow(s, step, motion)
         if not pressed:
             self.resting.release(s, motion.v)
-        contacts, due = self.flight.fly_all(s, self.table.dt[s], pull, self.encounters.contacts)
+        contacts, due, oblique = self.flight.fly_all(
+            s, self.table.dt[s], pull, self.encounters.contacts
+        )
         gained += self.encounters.happen(s, step, shared, contacts, motion.v, pull, pressed)
+        # On an oblique flight gravity acts by a quarter: what it lacks, the lattice holds.
+        gained += self.accounting.lattice_gave(s, GRAVITY, 0.75 * pull * oblique)
         self.flight.move_all(s, step, shared, due)
         mass = self.numbers.mass[None]
         return Action(-mass * QUANTUM * ti.cast(gained, ti.f64), mass * self.resting.count(s))

@@ -9,7 +9,6 @@ stays in the room has nothing pushed in its way, or it would touch it and be pus
 
 import taichi as ti
 
-from ca_damper.automaton.ledger import EJECTIONS, quanta
 from ca_damper.lattice import DIRECTIONS, DOWN, HELD, UP
 
 
@@ -24,7 +23,6 @@ class Ejection:
     def __init__(self, parts):
         self.cells, self.lattice, self.numbers = parts.cells, parts.lattice, parts.numbers
         self.accumulator, self.accounting = parts.accumulator, parts.accounting
-        self.ledger = parts.ledger
         scenes, size = self.cells.kind.shape
         self.pushed = ti.field(ti.i8, shape=(scenes, size))
         self.border = ti.field(ti.i16, shape=(scenes, size))
@@ -105,12 +103,7 @@ class Ejection:
             self.cells.travelled[s, cell] = self.accumulator.ahead_of_wall(
                 self.cells.travelled[s, cell], kind, way, self.numbers.width[None]
             )
-        result = ti.cast(0, ti.i64)
-        if ti.static(self.accounting.pushes):
-            result = quanta(gain)
-        else:
-            self.ledger.add(s, EJECTIONS, gain)
-        return result
+        return self.accounting.push(s, gain)
 
     @ti.func
     def shift(self, s, way):

@@ -8,7 +8,7 @@ part in two events of a step. Then the winners act; no two of them touch the sam
 import taichi as ti
 
 from ca_damper.automaton.laws import deflected, speed_after_pair, speed_after_wall
-from ca_damper.automaton.ledger import PAIRS, REST, quanta
+from ca_damper.automaton.ledger import PAIRS, quanta
 from ca_damper.automaton.rivals import ahead_of_others, rank
 from ca_damper.lattice import EMPTY, WALL, mirrored, turned_back
 from ca_damper.random_numbers import DEFLECT, EVENT, bits, unit
@@ -30,7 +30,7 @@ class Encounters:
     def __init__(self, parts, both, pairs_first):
         self.cells, self.lattice, self.rivals = parts.cells, parts.lattice, parts.rivals
         self.accumulator, self.resting = parts.accumulator, parts.resting
-        self.accounting, self.ledger, self.numbers = parts.accounting, parts.ledger, parts.numbers
+        self.accounting, self.numbers = parts.accounting, parts.numbers
         self.both, self.pairs_first = both, pairs_first
         shape = (self.cells.kind.shape[0], self.lattice.cells)
         self.contacts = ti.field(ti.i32, shape=shape)
@@ -115,7 +115,8 @@ class Encounters:
         before = self.cells.vertical_speed(s, cell)
         gained = ti.cast(0, ti.i64)
         if event == PAIR:
-            self.collide(s, shared, cell, other)
+            gain = self.collide(s, shared, cell, other)
+            gained = self.accounting.lattice_gave(s, PAIRS, gain)
         elif event == JOIN:
             # The container carries the particle over this whole step, its weight with it.
             gained = quanta(velocity - before - pull)
@@ -123,10 +124,7 @@ class Encounters:
         else:
             self.rebound(s, cell, event, other)
             gain = self.cells.vertical_speed(s, cell) - before
-            if self.accounting.counts(s, cell):
-                gained = quanta(gain)
-            else:
-                self.ledger.add(s, REST, gain)
+            gained = self.accounting.blow(s, cell, gain)
         return gained
 
     @ti.func
@@ -145,7 +143,11 @@ class Encounters:
 
     @ti.func
     def collide(self, s, shared, cell, other):
-        """Two particles meet along the line from ``cell`` to what is ahead of it (eq. 9)."""
+        """Two particles meet along the line from ``cell`` to what is ahead of it (eq. 9).
+
+        Returns the gain of velocity along x that is not theirs: of the deflections, and of what one
+        that came from aside had across the line [m/s].
+        """
         line = self.cells.at(s, cell)
         speed = self.cells.speed[s, cell]
         restitution = self.numbers.particle[None]
@@ -155,7 +157,7 @@ class Encounters:
         if ti.static(self.both):
             self.go_on(s, shared, ahead, line, speed_after_pair(other, speed, restitution))
         after = self.cells.vertical_speed(s, cell) + self.cells.vertical_speed(s, ahead)
-        self.ledger.add(s, PAIRS, after - before)
+        return after - before
 
     @ti.func
     def go_on(self, s, shared, cell, line, speed):

@@ -2,9 +2,8 @@
 
 import taichi as ti
 
-from ca_damper.automaton.ledger import GRAVITY
 from ca_damper.automaton.rivals import rank
-from ca_damper.lattice import DIRECTIONS, DOWN, EMPTY
+from ca_damper.lattice import DOWN, EMPTY
 from ca_damper.random_numbers import MOVE
 
 
@@ -18,38 +17,46 @@ class Flight:
     def __init__(self, parts):
         self.cells, self.lattice, self.rivals = parts.cells, parts.lattice, parts.rivals
         self.accumulator, self.resting = parts.accumulator, parts.resting
-        self.accounting, self.ledger, self.numbers = parts.accounting, parts.ledger, parts.numbers
+        self.accounting, self.numbers = parts.accounting, parts.numbers
         self.due = ti.field(ti.i16, shape=(self.cells.kind.shape[0], self.lattice.cells))
 
     @ti.func
     def fly_all(self, s, dt, pull, contacts: ti.template()):
-        """One step of all particles; returns how many have something ahead, how many are due."""
-        contact_count, due_count = 0, 0
+        """One step of all particles.
+
+        Returns how many touch something, how many may move on, and how many fly obliquely.
+        """
+        contact_count, due_count, oblique = 0, 0, 0
         for k in range(self.cells.traversal.size(s)):
             cell = self.cells.traversal.cell(s, k)
-            touches, free = self.fly(s, cell, dt, pull)
+            touches, free, upward = self.fly(s, cell, dt, pull)
             if touches:
                 contacts[s, contact_count] = cell
                 contact_count += 1
             if free:
                 self.due[s, due_count] = ti.cast(cell, ti.i16)
                 due_count += 1
-        return contact_count, due_count
+            if ti.static(self.accounting.asks_for_lattice):
+                if upward * upward == 0.25:
+                    oblique += 1
+        return contact_count, due_count, oblique
 
     @ti.func
     def fly(self, s, cell, dt, pull):
-        """One step of what stands in a cell; returns whether it touches something, may move on.
+        """One step of what stands in a cell.
 
         Gravity acts by its projection. A particle that has risen as far as it can turns straight
         down. Empty cells and walls go the same way: their speed and their pull are zero.
+        Returns whether it touches something, whether it may move on, and the vertical part of the
+        direction in which gravity found it.
         """
         kind = self.cells.at(s, cell)
-        speed = self.cells.speed[s, cell] - pull * self.lattice.upward(kind)
+        upward = self.lattice.upward(kind)
+        speed = self.cells.speed[s, cell] - pull * upward
         travelled = self.cells.travelled[s, cell]
-        self.note_gravity(s, kind, pull)
         if speed < 0.0:
-            self.note_turn(s, kind, speed)
-            speed = -speed
+            # Of an oblique flight only the vertical part is left: momentum along x is kept.
+            speed = -speed * upward
             travelled = self.accumulator.turned(travelled, kind, DOWN)
             kind = DOWN
             self.cells.kind[s, cell] = ti.cast(DOWN, ti.i8)
@@ -61,21 +68,8 @@ class Flight:
             travelled = self.numbers.width[None]
         self.cells.speed[s, cell] = speed
         self.cells.travelled[s, cell] = travelled
-        return blocked or self.resting.noticed(s, cell, kind), due and not blocked
-
-    @ti.func
-    def note_gravity(self, s, kind, pull):
-        """Enter what gravity gives to an oblique flight less than to a straight one."""
-        if ti.static(self.ledger.active):
-            if kind < DIRECTIONS:
-                upward = self.lattice.upward(kind)
-                self.ledger.add(s, GRAVITY, pull * (1.0 - upward * upward))
-
-    @ti.func
-    def note_turn(self, s, kind, speed):
-        """Enter what turning straight down at the top of an oblique flight changes."""
-        if ti.static(self.ledger.active):
-            self.ledger.add(s, GRAVITY, speed - speed * self.lattice.upward(kind))
+        touches = blocked or self.resting.noticed(s, cell, kind)
+        return touches, due and not blocked, upward
 
     @ti.func
     def move_all(self, s, step, shared, due_count):

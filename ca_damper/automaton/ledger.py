@@ -1,7 +1,7 @@
 """Where momentum along x goes that no counted blow carries off.
 
 Six directions cannot hold every momentum: gravity acts on oblique flights by its projection only,
-a random deflection turns momentum out of its line, and the accounting may leave ejections out.
+a random deflection turns momentum out of its line, and an accounting leaves some blows out.
 Sums are integers, so that no order of execution reaches their bits.
 """
 

@@ -66,6 +66,11 @@ class Automaton:
     def _check_rules(self):
         if not isinstance(self.ledger, bool):
             raise InputError(f"ledger must be True or False, got {self.ledger!r}")
+        if self.ledger and self.accounting == "static":
+            raise InputError(
+                "ledger must be False with accounting 'static', where everything acts on the "
+                "container and nothing is left to write down, got True"
+            )
         if self.pair_rule == "one_sided" and self.priority != "random":
             raise InputError(
                 "priority must be 'random' with pair_rule 'one_sided', where each particle changes "

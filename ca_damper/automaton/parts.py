@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import taichi as ti
 
-from ca_damper.automaton.accounting import EveryBlow, Landings
+from ca_damper.automaton.accounting import Everything, Landings
 from ca_damper.automaton.accumulator import Accumulator
 from ca_damper.automaton.ledger import Ledger, NoLedger
 from ca_damper.automaton.rivals import Rivals
@@ -65,9 +65,11 @@ def assembled(options, table):
     static = options.accounting == "static"
     lattice = Lattice(Geometry(options.columns, options.rows))
     traversal = (Scan if options.traversal == "scan" else ParticleList)(lattice, table)
-    accounting = EveryBlow()
+    ledger = Ledger(scenes) if options.ledger else NoLedger()
+    accounting = Everything()
     if not static:
-        accounting = Landings(lattice, scenes, options.accounting == "landing+ejection")
+        pushes = options.accounting == "landing+ejection"
+        accounting = Landings(lattice, scenes, ledger, pushes)
     cells = Cells(lattice, traversal, accounting, scenes)
     numbers = Numbers(options)
     accumulator = Accumulator(options.accumulator, lattice)
@@ -82,5 +84,5 @@ def assembled(options, table):
         accumulator=accumulator,
         accounting=accounting,
         resting=resting,
-        ledger=Ledger(scenes) if options.ledger else NoLedger(),
+        ledger=ledger,
     )
