@@ -4,7 +4,8 @@ One particle falls from the top of a container at rest. Four readings of what th
 with the way travelled when a particle turns are compared, and the spheres, each with the closed
 form for its own gravity (10 m/s^2 on the lattice, 9.8 m/s^2 for the spheres). Expect "signed" and
 "signed_through_walls" within a millisecond, the other two off by tens of them. A blow costs the
-default about two steps: it falls in the step after the particle reached its last cell.
+default about two steps: it falls in the step after the particle reached its last cell. Where the
+particle no longer rises by a cell, the automaton's static contact holds it: there its bounces end.
 
     python experiments/damper_rebound.py                    # about half a minute
     python experiments/damper_rebound.py --restitution 0.5
@@ -89,15 +90,20 @@ class Run:
     impacts_s: np.ndarray
     apexes_m: np.ndarray
 
+    @property
+    def compared(self):
+        """Impacts that are compared: the first four, or as many as there were."""
+        return min(COUNTED, len(self.impacts_s))
+
     def impact_errors_ms(self):
         """Time of the first impacts less the closed form's [ms]."""
-        theory = [self.fall.impact_s(k + 1) for k in range(COUNTED)]
-        return 1e3 * (self.impacts_s[:COUNTED] - theory)
+        theory = [self.fall.impact_s(k + 1) for k in range(self.compared)]
+        return 1e3 * (self.impacts_s[: self.compared] - theory)
 
     def apex_errors_mm(self):
         """Height of the first apexes less the closed form's [mm]."""
-        theory = [self.fall.apex_m(k + 1) for k in range(COUNTED)]
-        return 1e3 * (self.apexes_m[:COUNTED] - theory)
+        theory = [self.fall.apex_m(k + 1) for k in range(self.compared)]
+        return 1e3 * (self.apexes_m[: self.compared] - theory)
 
 
 def options_parser():
@@ -182,7 +188,7 @@ def run(options):
 
 
 def figures_of(runs):
-    """Largest errors over the first four impacts: of the default reading, and of all."""
+    """Largest errors over the impacts compared: of the default reading, and of all."""
     default = Automaton().accumulator
     figures = {}
     for title, made in {"": runs[default], **runs}.items():
@@ -235,7 +241,8 @@ def show(runs, folder):
     rows = []
     for title, made in runs.items():
         pairs = zip(made.impact_errors_ms(), made.apex_errors_mm())
-        rows.append((title, *(f"{late:+.3f} / {high:+.3f}" for late, high in pairs)))
+        cells = [f"{late:+.3f} / {high:+.3f}" for late, high in pairs]
+        rows.append((title, *cells, *["at rest"] * (COUNTED - len(cells))))
     print_table(rows, ["filling", *(str(k + 1) for k in range(COUNTED))])
     print(f"\nPicture and tables are in {folder}")
 

@@ -14,7 +14,8 @@ def plot_rebound(path, falls, errors, allowed_ms):
     """Height over time beside the closed form, and errors of the times of impact.
 
     falls: title -> (time [s], height [m], time and height of the closed form, its title).
-    errors: title -> errors of the impacts [ms]. allowed_ms: the largest that passes, a line.
+    errors: title -> errors of the impacts [ms], as many as there were. allowed_ms: the largest
+    that passes, a line.
     """
     mosaic = [["first", "errors"], ["second", "errors"]]
     with picture(path, 0, 0, size=(10.4, 4.6)) as (figure, _):
@@ -43,8 +44,9 @@ def _plot_errors(axes, errors, allowed_ms):
     titles = list(errors)
     count = max(len(values) for values in errors.values())
     for k in range(count):
-        values = [max(_SHORTEST, abs(errors[title][k])) for title in titles]
-        rows = np.arange(len(titles)) + 0.19 * (k - 0.5 * (count - 1))
+        there = [row for row, title in enumerate(titles) if k < len(errors[title])]
+        values = [max(_SHORTEST, abs(errors[titles[row]][k])) for row in there]
+        rows = np.array(there) + 0.19 * (k - 0.5 * (count - 1))
         axes.barh(rows, values, 0.17, color=_SHADES[k % len(_SHADES)], label=f"impact {k + 1}")
     axes.axvline(allowed_ms, color=GREY, linewidth=1.0, linestyle="--", label=f"{allowed_ms:g} ms")
     axes.set_yticks(range(len(titles)), titles)

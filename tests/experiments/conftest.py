@@ -24,21 +24,31 @@ def quick_run(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def main():
-    """``main(name, arguments)`` of an experiment inside this process; returns the exit code."""
+def script():
+    """``script(name)``: the module of an experiment, loaded into this process."""
+
+    def load(name):
+        spec = importlib.util.spec_from_file_location(name, FOLDER / f"{name}.py")
+        module = importlib.util.module_from_spec(spec)
+        # A dataclass looks its module up.
+        sys.modules[name] = module
+        spec.loader.exec_module(module)
+        return module
+
     sys.path.insert(0, str(FOLDER))
-    try:
+    yield load
+    sys.path.remove(str(FOLDER))
+
+
+@pytest.fixture(scope="module")
+def main(script):
+    """``main(name, arguments)`` of an experiment inside this process; returns the exit code."""
+
+    def run(name, arguments):
+        module = script(name)
         import _cli
 
-        def run(name, arguments):
-            spec = importlib.util.spec_from_file_location(name, FOLDER / f"{name}.py")
-            module = importlib.util.module_from_spec(spec)
-            # A dataclass looks its module up.
-            sys.modules[name] = module
-            spec.loader.exec_module(module)
-            given = ["--threads", "2", *map(str, arguments)]
-            return _cli.main(module.run, module.options_parser(), given)
+        given = ["--threads", "2", *map(str, arguments)]
+        return _cli.main(module.run, module.options_parser(), given)
 
-        yield run
-    finally:
-        sys.path.remove(str(FOLDER))
+    return run

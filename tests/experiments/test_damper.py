@@ -2,10 +2,13 @@
 
 import json
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from ca_damper import Automaton, Spheres, plot
+from ca_damper.lattice import Geometry
 from tests.experiments.contract import (
     NAMES,
     QuickRun,
@@ -137,6 +140,67 @@ def test_demo_without_particles_is_the_empty_container(shown):
     _, figures = shown("demo_damper", "--particles", "0")
     assert figures["amplitude_left"] == pytest.approx(1.0, abs=1e-9)
     assert figures["apparent_mass_g"] == 0.0
+
+
+def test_impacts_are_found_between_samples(script):
+    rebound = script("damper_rebound")
+    fall = rebound.Fall(height=0.09, restitution=0.75, gravity=10.0)
+    # Samples of the closed form itself; the times are none of its impacts.
+    time = np.arange(0.0, 0.7, 1.7e-3)
+    starts = np.array([-fall.first_s, *(fall.impact_s(k) for k in range(1, 8))])
+    flight = np.searchsorted(starts, time, side="right") - 1
+    speed = 10.0 * (fall.first_s * 0.75**flight - (time - starts[flight]))
+    mass, height = 2e-4, fall.heights(time)
+    history = {
+        "time_s": time,
+        "force": np.zeros(len(time)),
+        "momentum": mass * speed,
+        "energy": mass * (0.5 * speed**2 + 10.0 * height),
+    }
+    batch = SimpleNamespace(filling=SimpleNamespace(particle_mass=mass, gravity=10.0))
+    made = rebound.analysed(batch, fall, history)
+    # Two parabolas cross where they do: nothing but rounding, 1e-16 over speeds near 1 m/s.
+    assert np.abs(made.impact_errors_ms()).max() < 1e-9
+    # The highest sample misses the apex by g (half a sample)^2 / 2 at most.
+    assert np.abs(made.apex_errors_mm()).max() <= 1e3 * 0.5 * 10.0 * (0.5 * 1.7e-3) ** 2
+
+
+@pytest.mark.slow
+def test_particle_that_comes_to_rest_early_is_compared_as_far_as_it_bounced(shown):
+    # The second apex, 0.09 x 0.5^4 m = 5.6 mm, lies within the lowest cell: held there.
+    _, figures = shown("damper_rebound", "--restitution", "0.5")
+    # Two blows, by the bound of the test above with e = 0.5.
+    assert figures["impact_error_ms"] <= 0.1 * (2.0 * (2.0 + 3.0 * 0.5) + 1.0)
+
+
+def test_harmonic_gives_amplitude_and_lag(script):
+    harmonic = script("damper_patterns").harmonic
+    phase = np.arange(32) * 52 / 1667
+    lag = np.radians(47.0)
+    values = 3.0 + 2.0 * np.sin(2.0 * np.pi * phase - lag)
+    amplitude, degrees = harmonic(phase, values)
+    assert amplitude == pytest.approx(2.0, rel=1e-12)
+    assert degrees == pytest.approx(47.0, rel=1e-12)
+
+
+def test_box_of_the_automaton_is_staggered_and_moves_by_cells():
+    box = plot.Box.of_automaton(Automaton())
+    plain = plot.Box.of_spheres(Spheres())
+    assert (box.width, box.height) == pytest.approx((plain.width, plain.height), rel=1e-12)
+    displaced = np.array([-0.0031, -0.0029, 0.0, 0.0029, 0.0031])
+    assert box.lift(displaced) == pytest.approx([-6e-3, 0.0, 0.0, 0.0, 6e-3], abs=1e-15)
+    assert np.array_equal(plain.lift(displaced), displaced)
+    # Lowest and highest cells of the first two columns, as the lattice places them.
+    lattice = Geometry(10, 16)
+    cells = [lattice.cell_of(*place) for place in ((0, 0), (1, 0), (0, 15), (1, 15))]
+    below, above = box.gaps(lattice.centres(6e-3)[cells])
+    assert below == pytest.approx([0.0, 0.0, 0.09, 0.09], abs=1e-15)
+    assert above == pytest.approx([0.09, 0.09, 0.0, 0.0], abs=1e-15)
+    # A closed line around 10 x 16 cells: area by the shoelace formula.
+    for one in (box, plain):
+        x, y = one.outline().T
+        area = 0.5 * abs(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1]))
+        assert area == pytest.approx(60e-3 * 96e-3, rel=1e-12)
 
 
 @pytest.mark.slow
