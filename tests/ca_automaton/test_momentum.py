@@ -20,10 +20,16 @@ def rise(step):
 
 
 def shaken(steps, **options):
-    """Boxes of all numbers of particles, with a ledger."""
-    automaton = Automaton(ledger=True, **options)
+    """Boxes of all numbers of particles, with a ledger where momentum goes astray."""
+    automaton = Automaton(ledger=options.get("accounting", "static") != "static", **options)
     box = Shaken(automaton, PARTICLES, 3, DT, AMPLITUDE, FREQUENCY, traced=steps)
     return box.run(steps)
+
+
+def ledger(box):
+    """Velocity along x gained uncounted [m/s], shape (scenes, items)."""
+    entries = getattr(box.bound.accounting, "ledger", None)
+    return entries.gained.to_numpy() * QUANTUM if entries else np.zeros((len(PARTICLES), 1))
 
 
 def forces(trace):
@@ -50,54 +56,38 @@ def test_momentum_is_accounted_for(options):
     box = shaken(steps, **options)
     trace = box.traces()
     momentum = trace[-1, :, 2] + trace[-1, :, 1] * rise(steps - 1)
-    ledger = box.bound.ledger.gained.to_numpy().sum(axis=1) * QUANTUM
     weight = PARTICLES * MASS * GRAVITY * DT * steps
-    balance = -weight - forces(trace).sum(axis=0) + MASS * ledger
+    balance = -weight - forces(trace).sum(axis=0) + MASS * ledger(box).sum(axis=1)
     tolerance = PARTICLES * MASS * steps * (1.5 * QUANTUM + 4 * EPS)
     assert np.all(abs(momentum - balance) < tolerance)
 
 
-def test_one_particle_straight_up_and_down_needs_no_ledger():
-    """Without oblique flights and pairs, blows alone balance weight."""
-    box = shaken(3000, accounting="static")
-    assert not box.bound.ledger.gained.to_numpy()[0].any()
-
-
-def test_both_of_a_pair_changed_keep_momentum_in_their_line():
-    """A column meets head-on only: what pairs take is what deflection takes.
-
-    With restitution 0 no particle is sent back, so nothing is deflected and nothing taken, beyond
-    the rounding of two speeds below 4 m/s and of the entry, for each of the ten at each step.
-    """
-    automaton = Automaton(ledger=True, restitution=0.0, start=tuple((4, 6 + k) for k in range(10)))
-    box = Shaken(automaton, 10, amplitude=AMPLITUDE).run(5000)
-    taken = box.bound.ledger.gained.to_numpy()[0] * QUANTUM
-    assert abs(taken[ITEMS.index("pairs")]) < 10 * 5000 * (QUANTUM + 4 * EPS)
-
-
-def test_only_static_contact_has_all_blows_count():
-    """Landing leaves pushes and the heap's rest to the ledger; static contact has none of both."""
-    left = {
-        name: shaken(3000, accounting=name).bound.ledger.gained.to_numpy()[2] != 0
-        for name in ACCOUNTINGS
-    }
+def test_what_is_left_to_the_ledger():
+    """Landing leaves pushes and the heap's rest to it; one particle alone meets none but walls."""
+    left = {name: ledger(shaken(3000, accounting=name)) != 0 for name in list(ACCOUNTINGS)[:2]}
     pushes, rest = ITEMS.index("ejections"), ITEMS.index("rest")
-    assert left["landing"][[pushes, rest]].tolist() == [True, True]
-    assert left["landing+ejection"][[pushes, rest]].tolist() == [False, True]
-    assert left["static"][[pushes, rest]].tolist() == [False, False]
+    assert left["landing"][2, [pushes, rest]].tolist() == [True, True]
+    assert left["landing+ejection"][2, [pushes, rest]].tolist() == [False, True]
+    assert not left["landing"][0, [ITEMS.index("gravity"), ITEMS.index("pairs")]].any()
 
 
 @pytest.mark.parametrize("amplitude", [5e-3, 15e-3, 24e-3])
 def test_mean_force_is_the_weight(amplitude):
-    """-N m g to 4 % over 24 cycles with static contact, heap at rest or thrown.
+    """-N m g over 20 cycles with static contact, heap at rest or thrown.
 
-    What oblique flights and deflection take is not the container's: hence not to round-off.
+    What is left is the change of the particles' momentum: below 2 m/s times N m in 3.3 s.
     """
-    steps = round(24 / FREQUENCY / DT)
-    box = Shaken(Automaton(), [10, 30, 50, 100], 2, DT, amplitude, FREQUENCY, traced=steps)
+    steps, late = round(24 / FREQUENCY / DT), round(4 / FREQUENCY / DT)
+    particles = np.array([10, 30, 50, 100])
+    box = Shaken(Automaton(), particles, 2, DT, amplitude, FREQUENCY, traced=steps)
     trace = box.run(steps).traces()
-    late = slice(round(4 / FREQUENCY / DT), None)
-    wave = OMEGA * amplitude * np.cos(OMEGA * DT * np.arange(steps + 1))
-    force = trace[:, :, 0] - trace[:, :, 1] * (np.diff(wave)[:, None] + GRAVITY * DT)
-    weight = np.array([10, 30, 50, 100]) * MASS * GRAVITY
-    assert force[late].mean(axis=0) / DT == pytest.approx(-weight, rel=0.04)
+    speed = OMEGA * amplitude * np.cos(OMEGA * DT * np.arange(steps + 1))
+    force = trace[:, :, 0] - trace[:, :, 1] * (np.diff(speed)[:, None] + GRAVITY * DT)
+    weight = particles * MASS * GRAVITY
+    change = 2.0 / ((steps - late) * DT * GRAVITY)
+    assert change < 0.07
+    assert force[late:].mean(axis=0) / DT == pytest.approx(-weight, rel=change)
+    drift = trace[-1, :, 2] - trace[late - 1, :, 2]
+    # With that change taken into account the mean is the weight to a step's worth of momentum.
+    corrected = force[late:].sum(axis=0) + drift
+    assert corrected == pytest.approx(-weight * DT * (steps - late), rel=1e-3)

@@ -46,6 +46,12 @@ def test_priority_without_rivals_is_refused():
         Automaton(pair_rule="one_sided", priority="pairs_first")
 
 
+def test_ledger_without_anything_to_write_down_is_refused():
+    """With static contact everything acts on the container."""
+    with pytest.raises(InputError, match="ledger must be False"):
+        Automaton(ledger=True)
+
+
 @pytest.mark.parametrize("particles", [-1, 161, 1.5, math.nan, True])
 def test_particles_must_fit(particles):
     with pytest.raises(InputError, match="particles must be a whole number from 0 to 160"):
