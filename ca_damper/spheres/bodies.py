@@ -38,15 +38,12 @@ class Bodies:
     """
 
     def __init__(self, options, table):
-        self.table = table
+        self.options, self.table = options, table
         self.lattice = options.lattice
         self.stride = options.capacity
         self.scenes = table.count
         self.room = self.scenes * self.stride
         self.body = Body.field(shape=())
-        for name in ("radius", "width", "height", "gravity"):
-            setattr(self.body[None], name, getattr(options, name))
-        self.body[None].mass = options.particle_mass
         self.position = ti.Vector.field(2, ti.f64, shape=self.room)
         self.velocity = ti.Vector.field(2, ti.f64, shape=self.room)
         self.force = ti.Vector.field(2, ti.f64, shape=self.room)
@@ -55,7 +52,14 @@ class Bodies:
         self.given = options.start is not None
         if self.given:
             self.start = ti.Vector.field(2, ti.f64, shape=len(options.start))
-            self.start.from_numpy(np.array(options.start))
+
+    def load(self):
+        """Write the numbers of the options to the device, when all fields are allocated."""
+        for name in ("radius", "width", "height", "gravity"):
+            setattr(self.body[None], name, getattr(self.options, name))
+        self.body[None].mass = self.options.particle_mass
+        if self.given:
+            self.start.from_numpy(np.array(self.options.start))
 
     @ti.func
     def first(self, s):

@@ -96,17 +96,15 @@ class ContactLaw:
     def __init__(self, name):
         self.printed = name == "printed"
 
-    def field(self, numbers, tangential_share):
-        """Field of shape () with the numbers of a contact, before a step is known.
+    def load(self, field, numbers, tangential_share):
+        """Write the numbers of a contact, before a step is known, to a Contact field of shape ().
 
         tangential_share: part of the effective mass that resists a tangential blow.
         """
-        field = Contact.field(shape=())
         for name in ("stiffness", "damping", "friction", "reach"):
             setattr(field[None], name, numbers[name])
         field[None].yielding = 0.5 / numbers["mass"]
         field[None].grip = SLIP_SHARE * tangential_share * numbers["mass"]
-        return field
 
     @ti.func
     def over_step(self, contact, dt):

@@ -15,7 +15,7 @@ import taichi as ti
 
 from ca_damper.filling import Action
 from ca_damper.spheres.bodies import Bodies, vec2
-from ca_damper.spheres.contact_law import ContactLaw, pair_numbers, wall_numbers
+from ca_damper.spheres.contact_law import Contact, ContactLaw, pair_numbers, wall_numbers
 from ca_damper.spheres.rotation import NoRotation, Rotation
 from ca_damper.spheres.search import make_search
 
@@ -44,9 +44,21 @@ class BoundSpheres:
         self.crushed = ti.field(ti.i32, shape=table.count)
         self.rotation.bind(self.bodies)
         self.search.bind(self.bodies)
+        self.contact_of_pair = Contact.field(shape=())
+        self.contact_of_wall = Contact.field(shape=())
+        self._load(options)
+
+    def _load(self, options):
+        """Write all numbers, after the last field is allocated.
+
+        Taichi puts the fields allocated since the last use of any into one tree, and a session
+        ends in a crash at some 512 trees: a batch should take one and not seven.
+        """
         share = self.rotation.tangential_share
-        self.contact_of_pair = self.law.field(pair_numbers(options), share)
-        self.contact_of_wall = self.law.field(wall_numbers(options), share)
+        self.bodies.load()
+        self.search.load()
+        self.law.load(self.contact_of_pair, pair_numbers(options), share)
+        self.law.load(self.contact_of_wall, wall_numbers(options), share)
 
     @ti.func
     def reset(self, s):

@@ -22,6 +22,9 @@ class AllPairs:
         """Nothing to allocate."""
         self.bodies = bodies
 
+    def load(self):
+        """Nothing to write."""
+
     @ti.func
     def forget(self, s):
         """Nothing was remembered."""
@@ -59,13 +62,11 @@ class CellList:
     def bind(self, bodies):
         """Allocate cells and list for all scenes, as large as the container needs."""
         self.bodies = bodies
-        body = bodies.body[None]
-        size = 2.0 * body.radius + self._skin
-        self.columns = max(1, int(body.width / size))
-        self.rows = max(1, int(body.height / size))
+        size = bodies.options.diameter + self._skin
+        self.columns = max(1, int(bodies.options.width / size))
+        self.rows = max(1, int(bodies.options.height / size))
         self.list_room = _PAIRS_PER_SPHERE * bodies.stride
         self.skin = ti.field(ti.f64, shape=())
-        self.skin[None] = self._skin
         # Cells of a scene hold chains of spheres: the first of a cell, then each one's next.
         self.cell_first = ti.field(ti.i32, shape=bodies.scenes * self.columns * self.rows)
         self.next = ti.field(ti.i32, shape=bodies.room)
@@ -74,6 +75,10 @@ class CellList:
         self.pair_first = ti.field(ti.i32, shape=bodies.scenes)
         self.travel = ti.field(ti.f64, shape=bodies.scenes)
         self.full = ti.field(ti.i32, shape=bodies.scenes)
+
+    def load(self):
+        """Write the skin to the device."""
+        self.skin[None] = self._skin
 
     @ti.func
     def forget(self, s):

@@ -21,10 +21,10 @@ class Rig:
 
     def __init__(self, options, particles, dt, seed=1, frequency=0.0, amplitude=0.0):
         self.table = SceneTable(particles, seed, dt, frequency, amplitude)
-        self.bound = options.bind(self.table)
         self.count = self.table.count
         self.done = 0
         self.impulse = ti.field(ti.f64, shape=self.count)
+        self.bound = options.bind(self.table)
         self._reset()
 
     @ti.kernel
