@@ -2,9 +2,9 @@
 
 20 and 40 particles over one cycle of a container that moves by +-4 cells (24 mm) at 6 Hz, whatever
 the particles do (Komatsuzaki et al., Figs. 9 and 10). Expect particles that the floor throws up,
-that come apart in the air and are caught again. The automaton throws and catches them up to a
-tenth of a cycle earlier than the spheres: its walls push a whole cluster as soon as one particle
-of it touches them.
+that come apart in the air and are caught again. The automaton's swing further than the spheres, as
+its ceiling takes down a whole cluster when one particle of it touches, and up to a tenth of a
+cycle earlier.
 
     python experiments/damper_patterns.py                  # about half a minute
     python experiments/damper_patterns.py --amplitude 10 --accounting landing
