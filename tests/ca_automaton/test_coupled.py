@@ -35,7 +35,7 @@ def peaks(filling, particles, ratios, seeds=1):
 def test_an_empty_automaton_is_an_empty_container():
     """N = 0: the same bits."""
     ratios = np.array([0.9, 1.0, 1.1])
-    nothing = run(Empty(gravity=GRAVITY), [0], ratios)[0]
+    nothing = run(Empty(), [0], ratios)[0]
     automaton = run(Automaton(), [0], ratios)[0]
     assert np.array_equal(nothing.rms, automaton.rms)
     assert np.array_equal(nothing.mean_force, automaton.mean_force)
@@ -62,10 +62,13 @@ def test_rigid_limit(particles):
 @pytest.mark.slow
 @pytest.mark.parametrize("accounting", ["landing+ejection", "static"])
 def test_damping_grows_with_the_particles(accounting):
-    """The peak of the mean over five seeds falls from N = 10 to N = 50."""
-    ratios = np.arange(0.93, 1.0051, 0.01)
-    heights = peaks(Automaton(accounting=accounting), [10, 20, 30, 40, 50], ratios, 5)[:, 1]
-    assert np.all(np.diff(heights) < 0)
+    """The highest response of five seeds falls from N = 10 to N = 50.
+
+    The highest and not the mean: near N = 10 a seed decides between a high and a low branch.
+    """
+    particles, ratios = [10, 20, 30, 40, 50], np.arange(0.93, 1.0051, 0.01)
+    cycles, shape = run(Automaton(accounting=accounting), particles, ratios, 5)
+    assert np.all(np.diff(cycles.rms.reshape(shape).max(axis=(1, 2))) < 0)
 
 
 @pytest.mark.slow

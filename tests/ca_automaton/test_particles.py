@@ -7,7 +7,7 @@ import pytest
 
 from ca_damper.automaton import ACCOUNTINGS, Automaton
 from ca_damper.automaton.accumulator import READINGS
-from ca_damper.lattice import EMPTY, WALL
+from ca_damper.lattice import DOWN_LEFT, DOWN_RIGHT, EMPTY, WALL
 from tests.ca_automaton.shaken import Shaken
 
 PARTICLES = [0, 1, 2, 10, 50, 120, 159, 160]
@@ -47,6 +47,24 @@ def test_particles_stay(accounting):
 @pytest.mark.parametrize("accounting, pairs, accumulator", EVERY)
 def test_particles_stay_in_every_combination_of_options(accounting, pairs, accumulator):
     check(accounting, pairs, accumulator)
+
+
+def test_one_of_two_claimants_moves_and_each_as_often():
+    """Fig. 5(b): two particles due for one cell in 2000 seeds; 5 sigma of a fair coin."""
+    automaton = Automaton(accounting="landing", start=((3, 9), (5, 9)))
+    box = Shaken(automaton, [2] * 2000, seed=np.arange(2000))
+    geometry = box.bound.lattice.geometry
+    left, right = geometry.cell_of(3, 9), geometry.cell_of(5, 9)
+    target = geometry.neighbours()[left, DOWN_RIGHT]
+    assert target == geometry.neighbours()[right, DOWN_LEFT]
+    kind, _, travelled = box.state()
+    kind[:, left], kind[:, right] = DOWN_RIGHT, DOWN_LEFT
+    travelled[:, [left, right]] = 6e-3
+    box.bound.cells.kind.from_numpy(kind)
+    box.bound.cells.travelled.from_numpy(travelled)
+    stands = box.run(1).state()[0][:, [left, right, target]] != EMPTY
+    assert np.all(stands.sum(axis=1) == 2) and np.all(stands[:, 2])
+    assert abs(stands[:, 0].sum() - 1000) < 5 * np.sqrt(2000) / 2
 
 
 def test_start_draws_every_number_of_cells():
