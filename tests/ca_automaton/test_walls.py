@@ -58,7 +58,7 @@ def test_the_heap_lifts_off_where_the_container_falls_faster():
     carried = box.traces()[:, 0, 1]
     lifted = amplitude * np.sin(OMEGA * DT * np.arange(steps)) * OMEGA**2 > GRAVITY
     assert not carried[lifted].any()
-    # Blows without rebound: in each later cycle the heap has come together again by the time it is let go.
+    # Without rebound the heap is together again whenever it is let go.
     releases = np.flatnonzero(np.diff(lifted.astype(int)) == 1)[2:]
     assert len(releases) >= 3
     assert carried[releases] == pytest.approx(20 * MASS, rel=1e-9)
