@@ -99,14 +99,18 @@ def follow(name, options, mesh):
     early = min(last, macro_steps(options.early, method.dt0))
     marks = {round(last * k / options.samples) for k in range(options.samples + 1)}
     reports, costs = {}, {"cpu_s": [], "evaluations": [], "level": []}
-    with ProgressBar(name) as progress:
-        for step in sorted(marks | {early}):
-            simulation.advance_to(step, lambda: progress(progress_of(simulation, options.until)))
-            reports[step] = simulation.report()
-            recorder.sample()
-            costs["cpu_s"].append(simulation.run_cpu_seconds)
-            costs["evaluations"].append(reports[step].contact_evaluations)
-            costs["level"].append(simulation.state.level.to_numpy())
+    try:
+        with ProgressBar(name) as bar:
+            for step in sorted(marks | {early}):
+                simulation.advance_to(step, lambda: bar(progress_of(simulation, options.until)))
+                reports[step] = simulation.report()
+                recorder.sample()
+                costs["cpu_s"].append(simulation.run_cpu_seconds)
+                costs["evaluations"].append(reports[step].contact_evaluations)
+                costs["level"].append(simulation.state.level.to_numpy())
+    finally:
+        # Also what a run that diverged, or was interrupted, had reached.
+        write_csv(os.path.join(options.out, f"history_{name}.csv"), recorder.history())
     series = {**recorder.history(), **costs}
     series["row_early"] = sorted(marks | {early}).index(early)
     return reports[early], reports[last], series

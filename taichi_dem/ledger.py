@@ -39,10 +39,10 @@ class Ledger:
     def account(self):
         """All terms in J by name; residual is what the account cannot explain."""
         n, bonds = self.model.body_count, self.model.bond_count
-        body, bond = np.zeros((n, 3)), np.zeros((max(1, bonds), 5))
+        body, bond = np.zeros((n, 6)), np.zeros((max(1, bonds), 5))
         self._read_bodies(body)
         self._read_bonds(bond)
-        pair = np.zeros((self._pair_count() + 1, 4))
+        pair = np.zeros((self._pair_count(), 4))
         if self.contacts is not None:
             self._read_pairs(pair)
         terms = {
@@ -53,9 +53,9 @@ class Ledger:
             "softening": bond[:, 4].sum(),
             "release": bond[:, 3].sum(),
             "slip": bond[:, 2].sum(),
-            "sphere_dashpot": pair[:, 1].sum(),
-            "friction": pair[:, 2].sum(),
-            "injected": pair[:, 3].sum(),
+            "sphere_dashpot": body[:, 3].sum() + pair[:, 1].sum(),
+            "friction": body[:, 4].sum() + pair[:, 2].sum(),
+            "injected": body[:, 5].sum() + pair[:, 3].sum(),
             "load_work": body[:, 1].sum(),
             "support_work": body[:, 2].sum(),
         }
@@ -107,6 +107,9 @@ class Ledger:
             for e in ti.static(range(len(self.model.loads))):
                 table[i, 1] += self.state.load_work[i][e]
             table[i, 2] = self.state.load_work[i][ti.static(len(self.model.loads))]
+            if ti.static(self.model.has_contact):
+                for k in ti.static(range(3)):
+                    table[i, 3 + k] = self.state.contact_heat[i][k]
 
     @ti.kernel
     def _read_bonds(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
@@ -124,9 +127,6 @@ class Ledger:
             table[p, 0] = self.contacts.pair_energy(p)
             for k in ti.static(range(3)):
                 table[p, 1 + k] = self.contacts.pair_heat[p][k]
-        for _ in range(1):
-            for k in ti.static(range(3)):
-                table[self.contacts.pair_count[None], 1 + k] = self.contacts.heat[None][k]
 
     @ti.kernel
     def _read_load(self, index: ti.i32, work: ti.types.ndarray(dtype=ti.f64, ndim=1)):

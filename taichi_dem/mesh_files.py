@@ -92,7 +92,8 @@ def write_pvd(path, times_s, file_names) -> None:
 def _read_raw(path):
     """The file as meshio sees it; whatever goes wrong inside becomes one InputError."""
     if not os.path.isfile(path):
-        raise InputError(f"mesh file {path} does not exist")
+        problem = "is a folder" if os.path.isdir(path) else "does not exist"
+        raise InputError(f"mesh file {path} {problem}")
     said = io.StringIO()
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):

@@ -5,6 +5,7 @@ import taichi as ti
 
 from taichi_dem.contact_spheres import spheres_of_faces
 from taichi_dem.effects.base import ABSENT, MANY, ROLES
+from taichi_dem.fields import then
 from taichi_dem.tetrahedra import area_vectors
 from taichi_dem.topology import body_properties, topology_of
 from taichi_dem.types import mat3, real, vec4
@@ -60,7 +61,8 @@ class Model:
         self.inertia_inverse = ti.Matrix.field(3, 3, real, shape=n)
         corners = self.mesh.points[self.mesh.tetrahedra] - self.centre[:, None]
         self.body_radius = np.linalg.norm(corners, axis=-1).max(axis=1)
-        self._load_bodies(
+        then(
+            self._load_bodies,
             self.body_mass,
             self.body_radius,
             self.body_inertia,
@@ -92,10 +94,10 @@ class Model:
         self.vertex_slave = ti.Vector.field(3, real, shape=units)
         self.neighbour = ti.field(ti.i32, shape=4 * self.body_count)
         self.face_bond = ti.field(ti.i32, shape=4 * self.body_count)
-        self.neighbour.fill(-1)
-        self.face_bond.fill(-1)
+        then(self.neighbour.fill, -1)
+        then(self.face_bond.fill, -1)
         if self.bond_count:
-            self._load_bonds(*self._bond_tables())
+            then(self._load_bonds, *self._bond_tables())
 
     def _bond_tables(self):
         """Slots, frames, areas and vertices of all bonds as arrays, in the order of the loader."""
@@ -149,7 +151,7 @@ class Model:
         self.sphere = ti.Vector.field(4, real, shape=faces * spheres.per_face)
         self.cluster = ti.Vector.field(4, real, shape=faces)
         ball = np.concatenate([spheres.centre, spheres.radius[..., None]], axis=-1)
-        self._load_spheres(ball.reshape(-1, 4), spheres.cluster.reshape(-1, 4))
+        then(self._load_spheres, ball.reshape(-1, 4), spheres.cluster.reshape(-1, 4))
 
     @ti.kernel
     def _load_spheres(

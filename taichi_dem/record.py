@@ -139,6 +139,8 @@ def output_folder(path):
 
     Raises InputError when it cannot be made or written to.
     """
+    if not os.fspath(path):
+        raise InputError("output folder must be the name of a folder, got ''")
     try:
         os.makedirs(path, exist_ok=True)
         probe = os.path.join(path, ".write-test")

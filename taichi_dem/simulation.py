@@ -5,6 +5,7 @@ import time
 
 from taichi_dem import runtime
 from taichi_dem.errors import InputError, SimulationDiverged
+from taichi_dem.fields import fields_first
 from taichi_dem.health import Health
 from taichi_dem.ledger import Ledger
 from taichi_dem.model import Model
@@ -34,9 +35,10 @@ class Simulation:
         self.generation = runtime.generation()
         started = time.perf_counter()
         self.scene, self.method = scene, method
-        self.model = Model(scene.mesh, scene.material, scene.effects)
-        self.state = State(self.model, scene.max_speed)
-        self._build_contacts(brute_force)
+        with fields_first():
+            self.model = Model(scene.mesh, scene.material, scene.effects)
+            self.state = State(self.model, scene.max_speed)
+            self._build_contacts(brute_force)
         self.advance = Advance(self.model, self.state, self.schedule, self.contacts)
         step = Step(self.advance, self.schedule, self.contacts)
         self.driver = DRIVERS[_driver_name(driver, self.model.bond_count)](step)

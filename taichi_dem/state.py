@@ -3,6 +3,7 @@
 import numpy as np
 import taichi as ti
 
+from taichi_dem.fields import then
 from taichi_dem.physics.rotation import rotation_matrix, spin_of
 from taichi_dem.types import real, vec3, vec4
 
@@ -23,6 +24,9 @@ class State:
     broken_tick: when a bond was released, NEVER while it holds. exposed_tick: since when a face
     carries contact spheres.
     bond_heat: energy that dashpots, slip and release have taken from each bond [J].
+    contact_heat: energy that sphere dashpots and friction have taken, and energy that releases
+    have injected [J], booked to the first body of a pair; with contact only.
+    injected_tick: last tick whose releases have been booked there.
     load_work: work [J], one component a load and a last one for supports; load_impulse: what all
     of them gave a body (linear, and angular about the origin). tick: present time. bad_body:
     lowest body out of bounds, body_count if none.
@@ -43,16 +47,19 @@ class State:
         self.broken_tick = ti.field(ti.i64, shape=bonds)
         self.exposed_tick = ti.field(ti.i64, shape=4 * n)
         self.bond_heat = ti.Vector.field(3, real, shape=bonds)
+        if model.has_contact:
+            self.contact_heat = ti.Vector.field(3, real, shape=n)
+            self.injected_tick = ti.field(ti.i64, shape=())
         self.load_work = ti.Vector.field(len(model.loads) + 1, real, shape=n)
         self.load_impulse = ti.Vector.field(6, real, shape=n)
         self.tick = ti.field(ti.i64, shape=())
         self.bad_body = ti.field(ti.i32, shape=())
         self.max_speed2 = ti.field(real, shape=())
-        self.max_speed2[None] = max_speed**2
-        self.broken_tick.fill(NEVER)
-        self.exposed_tick.fill(NEVER)
-        self.bad_body[None] = n
-        self.place(model.centre, np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)))
+        then(self.max_speed2.fill, max_speed**2)
+        then(self.broken_tick.fill, NEVER)
+        then(self.exposed_tick.fill, NEVER)
+        then(self.bad_body.fill, n)
+        then(self.place, model.centre, np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)))
 
     def place(self, position, orientation, velocity=None, spin=None):
         """Set the motion of all bodies.

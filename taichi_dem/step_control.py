@@ -3,6 +3,7 @@
 import numpy as np
 import taichi as ti
 
+from taichi_dem.fields import then
 from taichi_dem.timeline import MAX_LEVEL
 from taichi_dem.types import real
 
@@ -28,9 +29,7 @@ class Displacement:
     def __init__(self, distance, dt0):
         steps = dt0 / 2.0 ** np.arange(MAX_LEVEL + 1)
         self.speed2 = ti.field(real, shape=MAX_LEVEL + 2)
-        for k, value in enumerate((distance / steps) ** 2):
-            self.speed2[k] = value
-        self.speed2[MAX_LEVEL + 1] = np.inf
+        then(self.speed2.from_numpy, np.append((distance / steps) ** 2, np.inf))
 
     @ti.func
     def wanted(self, level, speed2, low):

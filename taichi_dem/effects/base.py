@@ -18,9 +18,11 @@ b is a bond, u one of its three contact units (3 b, 3 b + 1, 3 b + 2), i a body.
 
 import math
 
+import numpy as np
 import taichi as ti
 
 from taichi_dem.errors import InputError
+from taichi_dem.fields import then
 from taichi_dem.types import real, vec3
 
 MANY = ("load", "support")
@@ -47,8 +49,7 @@ class Effect:
 def parameters(**values):
     """Checked parameters in one field, in the order given; floats that kernels read."""
     field = ti.field(real, shape=len(values))
-    for index, value in enumerate(values.values()):
-        field[index] = value
+    then(field.from_numpy, np.array(list(values.values()), dtype=np.float64))
     return field
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem.effects.base import Effect, parameters, positive
+from taichi_dem.fields import then
 from taichi_dem.physics.rotation import zero3
 from taichi_dem.tetrahedra import area_vectors
 from taichi_dem.topology import face_vertices, faces_of_group
@@ -56,7 +57,7 @@ class GasPressure(Effect):
         self.first = ti.field(ti.i32, shape=body_count + 1)
         self.area = ti.Vector.field(3, ti.f64, shape=len(area))
         self.arm = ti.Vector.field(3, ti.f64, shape=len(area))
-        self._load(first.astype(np.int32), area, arm)
+        then(self._load, first.astype(np.int32), area, arm)
 
     @ti.kernel
     def _load(

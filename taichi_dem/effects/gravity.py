@@ -3,6 +3,7 @@
 import taichi as ti
 
 from taichi_dem.effects.base import Effect, direction
+from taichi_dem.fields import then
 from taichi_dem.physics.rotation import zero3
 
 
@@ -20,7 +21,7 @@ class Gravity(Effect):
         """Put the acceleration where kernels read it."""
         self.model = model
         self.acceleration = ti.Vector.field(3, ti.f64, shape=())
-        self.acceleration[None] = self._acceleration
+        then(self.acceleration.fill, ti.Vector(self._acceleration))
 
     @ti.func
     def acts_on(self, i):

@@ -14,20 +14,27 @@ class SphereContact(Effect):
     divisions: equal parts of a face's edges; 5 gives the paper's six spheres a face.
     outer_faces: free outer faces carry spheres from the start too (the paper: no).
     skin: how far apart spheres still enter the candidate list [m]; changes time, not results.
-    pairs_per_body, spheres_per_body: room of the candidate lists.
+    neighbours_per_body, pairs_per_body, spheres_per_body: room of the lists, on average.
     """
 
     role = "contact"
     name = "sphere_contact"
 
     def __init__(
-        self, divisions=5, outer_faces=False, skin=4e-4, pairs_per_body=24, spheres_per_body=160
+        self,
+        divisions=5,
+        outer_faces=False,
+        skin=4e-4,
+        neighbours_per_body=64,
+        pairs_per_body=24,
+        spheres_per_body=160,
     ):
         if not isinstance(divisions, int) or not 3 <= divisions <= 20:
             raise InputError(f"divisions must be a whole number from 3 to 20, got {divisions!r}")
         self.divisions = divisions
         self.outer_faces = bool(outer_faces)
         self.skin = positive("skin", skin)
+        self.neighbours_per_body = int(positive("neighbours_per_body", neighbours_per_body))
         self.pairs_per_body = int(positive("pairs_per_body", pairs_per_body))
         self.spheres_per_body = int(positive("spheres_per_body", spheres_per_body))
 

@@ -7,6 +7,7 @@ import taichi as ti
 
 from taichi_dem.effects.base import Effect, direction, parameters, positive
 from taichi_dem.errors import InputError
+from taichi_dem.fields import then
 from taichi_dem.physics.rotation import zero3
 from taichi_dem.topology import faces_of_group
 from taichi_dem.types import vec3
@@ -28,7 +29,7 @@ class _Support(Effect):
         marks = np.zeros(model.body_count, dtype=np.int32)
         marks[body] = 1
         self.marked = ti.field(ti.i32, shape=model.body_count)
-        self.marked.from_numpy(marks)
+        then(self.marked.from_numpy, marks)
 
     @ti.func
     def acts_on(self, i):

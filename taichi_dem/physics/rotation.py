@@ -4,6 +4,9 @@ import taichi as ti
 
 from taichi_dem.types import mat3, vec3, vec4
 
+# A chain of divisions would take as long as all else that turns a body.
+_6TH, _12TH, _20TH, _30TH, _42TH = (1.0 / n for n in (6, 12, 20, 30, 42))
+
 
 @ti.func
 def quaternion_product(p, q):
@@ -40,8 +43,8 @@ def turned(q, spin, dt):
     """
     half = 0.5 * dt * spin
     angle2 = half.dot(half)
-    sinc = 1.0 - angle2 / 6.0 * (1.0 - angle2 / 20.0 * (1.0 - angle2 / 42.0))
-    cosine = 1.0 - angle2 / 2.0 * (1.0 - angle2 / 12.0 * (1.0 - angle2 / 30.0))
+    sinc = 1.0 - _6TH * angle2 * (1.0 - _20TH * angle2 * (1.0 - _42TH * angle2))
+    cosine = 1.0 - 0.5 * angle2 * (1.0 - _12TH * angle2 * (1.0 - _30TH * angle2))
     if angle2 > 1e-3:
         angle = ti.sqrt(angle2)
         sinc = ti.sin(angle) / angle

@@ -124,9 +124,9 @@ class Advance:
         """One unit has failed: the face transmits nothing from now on and carries spheres."""
         tick = self.state.tick[None]
         self.state.broken_tick[b] = tick
-        self.schedule.dirty[None] = 1
         for side in ti.static(range(2)):
             self.state.exposed_tick[slots[side]] = tick
+            self.schedule.note_change(slots[side] >> 2)
         if ti.static(self.has_contact):
             self.contacts.search_due[None] = 1
 
@@ -177,6 +177,7 @@ class Advance:
 
     @ti.func
     def _push_apart(self, slot, linear, angular):
+        self.contacts.pair_full[slot] = 1
         for k in ti.static(range(3)):
             self.contacts.pair_slot[slot][k] += linear[k]
             self.contacts.pair_slot[slot][3 + k] += angular[k]

@@ -6,10 +6,8 @@ A pair holds the sphere pairs that were nearer than the skin at the last search.
 
 import taichi as ti
 
+from taichi_dem.fields import then
 from taichi_dem.types import real, vec3
-
-#: Most partners of higher index that one body may have near it.
-NEAR = 64
 
 
 @ti.data_oriented
@@ -18,11 +16,12 @@ class Contacts:
 
     pair_body: the two bodies, first < second. pair_first[p] .. pair_first[p + 1]: sphere pairs in
     pair_sphere. pair_slot[2 p + side]: impulse [N s] and moment about the body's centre [N m s]
-    gathered for that side. pair_heat: energy into dashpots, friction, and injected [J]; those of
-    pairs that have left the list are in heat. first_of[i]: first pair whose first body is i;
-    touch_first, touch: pairs whose second body is i. rough: 1 for a body with spheres. travel:
-    bound of the way any point of a body went since the search [m]. search_due: 1 when the list
-    may miss a contact. deepest: overlap of a pair in radii of the smaller sphere.
+    gathered for that side. pair_heat: energy into dashpots, friction, and injected [J], until the
+    first body takes it. pair_full[2 p + side]: 1 while something waits there; most pairs do not
+    touch, and to ask is cheaper than to add zeros. first_of[i]: first pair whose first body is i;
+    touch_first, touch: pairs whose second body is i. rough: bit f for a broken face f.
+    travel: bound of the way any point of a body went since the search [m]. search_due: 1 when the
+    list may miss a contact. deepest: overlap of a pair in radii of the smaller sphere.
     """
 
     def __init__(self, model, state):
@@ -35,15 +34,15 @@ class Contacts:
         self.pair_first = ti.field(ti.i32, shape=self.capacity + 1)
         self.pair_sphere = ti.Vector.field(2, ti.i32, shape=self.sphere_capacity)
         self.pair_slot = ti.Vector.field(6, real, shape=2 * self.capacity)
+        self.pair_full = ti.field(ti.i32, shape=2 * self.capacity)
         self.pair_heat = ti.Vector.field(3, real, shape=self.capacity)
-        self.heat = ti.Vector.field(3, real, shape=())
         self.first_of = ti.field(ti.i32, shape=n + 1)
         self.touch_first = ti.field(ti.i32, shape=n + 2)
         self.touch = ti.field(ti.i32, shape=self.capacity)
         self.rough = ti.field(ti.i32, shape=n)
         self.travel = ti.field(real, shape=n)
         self.skin = ti.field(real, shape=())
-        self.skin[None] = effect.skin
+        then(self.skin.fill, effect.skin)
         self.search_due = ti.field(ti.i32, shape=())
         self.deepest = ti.field(real, shape=self.capacity)
 
@@ -68,18 +67,27 @@ class Contacts:
 
     @ti.func
     def gather(self, i):
-        """Impulse and moment that contacts have given to body i; empties its slots."""
+        """Impulse and moment that contacts have given to body i; empties its slots.
+
+        The heat of the pairs in which it is first is booked to it.
+        """
         linear, angular = vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0)
         for p in range(self.first_of[i], self.first_of[i + 1]):
-            linear, angular = self._take(2 * p, linear, angular)
+            if self.pair_full[2 * p] == 1:
+                linear, angular = self._take(2 * p, linear, angular)
+                self.state.contact_heat[i] += self.pair_heat[p]
+                self.pair_heat[p] = vec3(0.0)
         for k in range(self.touch_first[i], self.touch_first[i + 1]):
-            linear, angular = self._take(2 * self.touch[k] + 1, linear, angular)
+            slot = 2 * self.touch[k] + 1
+            if self.pair_full[slot] == 1:
+                linear, angular = self._take(slot, linear, angular)
         return linear, angular
 
     @ti.func
     def _take(self, slot, linear, angular):
         taken = self.pair_slot[slot]
         self.pair_slot[slot] = 0.0 * taken
+        self.pair_full[slot] = 0
         return linear + taken[0:3], angular + taken[3:6]
 
     @ti.func
@@ -95,7 +103,7 @@ class Contacts:
     @ti.func
     def moved(self, i, velocity, spin, elapsed):
         """Add to the way of body i and ask for a search once it may have left the skin."""
-        if self.rough[i] == 1:
+        if self.rough[i] != 0:
             speed = velocity.norm() + spin.norm() * self.model.radius[i]
             way = self.travel[i] + speed * elapsed
             self.travel[i] = way

@@ -1,11 +1,13 @@
 """Who is due: levels of bodies, and lists of bodies, bonds and pairs in order of falling level.
 
-A list sorted by level makes the members due at a tick its first part. When a level changes, only
-the part that is due needs sorting anew, so that keeping order costs less than using it.
+A list in order of level makes the members due at a tick its first part. Levels change seldom
+against how often they are used, so a body that changes its own moves just its own entries.
 """
 
+import numpy as np
 import taichi as ti
 
+from taichi_dem.fields import then
 from taichi_dem.timeline import MACRO_TICKS, MAX_LEVEL, device_coarsest_due, device_ticks_of
 from taichi_dem.types import real
 
@@ -14,15 +16,16 @@ from taichi_dem.types import real
 class DueList:
     """Indices in order of falling key; end[k] counts the members with a key of at least k.
 
-    The order within a key does not matter: nothing that is computed depends on it.
+    order: the members; place: where in it each one is; key: each one's key, -1 for one that is
+    not listed. The order within a key does not matter: nothing that is computed depends on it.
     """
 
     def __init__(self, capacity):
-        self.order = ti.field(ti.i32, shape=max(1, capacity))
+        room = max(1, capacity)
+        self.order = ti.field(ti.i32, shape=room)
+        self.place = ti.field(ti.i32, shape=room)
+        self.key = ti.field(ti.i32, shape=room)
         self.end = ti.field(ti.i32, shape=MAX_LEVEL + 2)
-        self.member = ti.field(ti.i32, shape=max(1, capacity))
-        self.key = ti.field(ti.i32, shape=max(1, capacity))
-        self.start = ti.field(ti.i32, shape=MAX_LEVEL + 1)
 
     @ti.func
     def count(self, low):
@@ -35,53 +38,53 @@ class DueList:
         return self.order[a]
 
     @ti.func
-    def fill(self, count):
-        """Take in the members 0 .. count - 1 in any order, as if all had key 0."""
-        for a in range(count):
-            self.order[a] = a
+    def fill(self, count, key_of: ti.template()):
+        """List those of 0 .. count - 1 whose key is not negative. key_of: function of a member."""
         for k in range(MAX_LEVEL + 2):
             self.end[k] = 0
-        self.end[0] = count
-
-    @ti.func
-    def sort_due(self, low, key_of: ti.template()):
-        """Sort the members of key >= low by their present keys.
-
-        A member whose key fell below low cannot leave the due part: it stays at low and is
-        moved on at the next tick where a lower level is due. Returns 1 if there is one.
-        A negative key at low 0 leaves the list. key_of: function of a member.
-        """
-        count = self.end[low]
-        for k in range(low, MAX_LEVEL + 1):
-            self.start[k] = 0
-        waiting = 0
-        for a in range(count):
-            key = key_of(self.order[a])
-            if key < low and low > 0:
-                key = low
-                waiting = 1
-            self.member[a] = self.order[a]
-            self.key[a] = key
+        for m in range(count):
+            key = key_of(m)
+            self.key[m] = key
             if key >= 0:
-                self.start[key] += 1
-        self._number(low)
-        for a in range(count):
-            key = self.key[a]
-            if key >= 0:
-                self.order[self.start[key]] = self.member[a]
-                self.start[key] += 1
-        return waiting
-
-    @ti.func
-    def _number(self, low):
-        """Turn counts by key into first places and ends, finest first."""
+                self.end[key] += 1
         total = 0
-        for back in range(MAX_LEVEL + 1 - low):
-            k = MAX_LEVEL - back
-            members = self.start[k]
-            self.start[k] = total
+        for back in range(MAX_LEVEL + 1):
+            members = self.end[MAX_LEVEL - back]
+            self.end[MAX_LEVEL - back] = total
             total += members
-            self.end[k] = total
+        for m in range(count):
+            key = self.key[m]
+            if key >= 0:
+                self._put(m, self.end[key])
+                self.end[key] += 1
+
+    @ti.func
+    def move(self, m, key):
+        """Give a listed member another key; a negative one takes it off the list.
+
+        It changes places with the first, or last, of each key that it passes.
+        """
+        present = self.key[m]
+        self.key[m] = key
+        while present < key and present >= 0:
+            present += 1
+            self._swap(m, self.end[present])
+            self.end[present] += 1
+        while present > key:
+            self.end[present] -= 1
+            self._swap(m, self.end[present])
+            present -= 1
+
+    @ti.func
+    def _swap(self, m, place):
+        other, old = self.order[place], self.place[m]
+        self._put(other, old)
+        self._put(m, place)
+
+    @ti.func
+    def _put(self, m, place):
+        self.order[place] = m
+        self.place[m] = place
 
 
 @ti.data_oriented
@@ -91,6 +94,7 @@ class Schedule:
     criterion: rule from ``step_control``. uniform: all bodies share the finest level wanted.
     drifted: bodies next to a due one are brought to its time too, else only due bodies move.
     dt0 [s]: step of level 0. finest: finest level present. low: coarsest level now due.
+    changed: bodies whose own level or bonds changed since the lists were put in order.
     evaluations: substeps, bodies advanced, bonds and pairs evaluated, and the bonds and pairs that
     one step for all would have evaluated in the same substeps.
     """
@@ -102,16 +106,15 @@ class Schedule:
         self.dt0 = dt0
         self.tick_seconds = dt0 / MACRO_TICKS
         self.step_seconds = ti.field(real, shape=MAX_LEVEL + 1)
-        for k in range(MAX_LEVEL + 1):
-            self.step_seconds[k] = dt0 / 2.0**k
+        then(self.step_seconds.from_numpy, dt0 / 2.0 ** np.arange(MAX_LEVEL + 1))
         self.bodies = DueList(model.body_count)
         self.bonds = DueList(model.bond_count)
         self.pairs = DueList(contacts.capacity if contacts else 1)
         self.low = ti.field(ti.i32, shape=())
         self.finest = ti.field(ti.i32, shape=())
-        self.dirty = ti.field(ti.i32, shape=())
-        self.waiting = ti.field(ti.i32, shape=())
         self.wanted = ti.field(ti.i32, shape=())
+        self.changed = ti.field(ti.i32, shape=model.body_count + 2 * model.bond_count)
+        self.changed_count = ti.field(ti.i32, shape=())
         self.evaluations = ti.field(ti.i64, shape=5)
 
     @ti.func
@@ -152,38 +155,57 @@ class Schedule:
                     ti.atomic_max(self.wanted[None], wanted)
             elif wanted != level:
                 self.state.level[i] = wanted
-                self.dirty[None] = 1
+                self.note_change(i)
+
+    @ti.func
+    def note_change(self, i):
+        """Body i has taken another level, or lost a bond."""
+        self.changed[ti.atomic_add(self.changed_count[None], 1)] = i
 
     @ti.func
     def put_in_order(self, one):
-        """Sort what is due by its new levels, if any has changed."""
+        """Move the entries of the bodies that changed, and count what this tick evaluates."""
         if ti.static(self.uniform):
             self._level_all()
-        low = self.low[None]
-        if self.dirty[None] == 1 or low <= self.waiting[None]:
-            self.dirty[None] = 0
-            waiting = self.bonds.sort_due(low, self._bond_key)
-            if ti.static(self.has_contact):
-                waiting |= self.pairs.sort_due(low, self._pair_key)
-            waiting |= self.bodies.sort_due(low, self._body_key)
-            # A member that waits for a still coarser tick goes on waiting.
-            if low <= self.waiting[None]:
-                self.waiting[None] = -1
-            if waiting == 1:
-                self.waiting[None] = low - 1
-            self._find_finest()
+        for a in range(self.changed_count[None]):
+            self._move_entries(self.changed[a])
+        self.changed_count[None] = 0
+        self._find_finest()
         self._count()
 
     @ti.func
+    def _move_entries(self, i):
+        """Move body i, its bonds and its pairs to their present keys."""
+        self.bodies.move(i, self._body_key(i))
+        for f in range(4):
+            b = self.model.face_bond[4 * i + f]
+            if b >= 0:
+                if self.bonds.key[b] >= 0:
+                    self.bonds.move(b, self._bond_key(b))
+                if ti.static(self.drifted):
+                    j = self.model.neighbour[4 * i + f]
+                    self.bodies.move(j, self._body_key(j))
+        if ti.static(self.has_contact):
+            for p in range(self.contacts.first_of[i], self.contacts.first_of[i + 1]):
+                self._move_pair(p, 1)
+            for k in range(self.contacts.touch_first[i], self.contacts.touch_first[i + 1]):
+                self._move_pair(self.contacts.touch[k], 0)
+
+    @ti.func
+    def _move_pair(self, p, partner):
+        self.pairs.move(p, self._pair_key(p))
+        if ti.static(self.drifted):
+            j = self.contacts.pair_body[p][partner]
+            self.bodies.move(j, self._body_key(j))
+
+    @ti.func
     def start_all(self):
-        """Fill all lists anew and sort them, as if level 0 were due."""
+        """Fill all lists anew."""
         if ti.static(self.uniform):
             self._level_all()
-        self.bodies.fill(self.model.body_count)
-        self.bonds.fill(self.model.bond_count)
-        self.waiting[None] = -1
-        self.bodies.sort_due(0, self._body_key)
-        self.bonds.sort_due(0, self._bond_key)
+        self.changed_count[None] = 0
+        self.bodies.fill(self.model.body_count, self._body_key)
+        self.bonds.fill(self.model.bond_count, self._bond_key)
         if ti.static(self.has_contact):
             self.start_pairs()
         self._find_finest()
@@ -191,34 +213,34 @@ class Schedule:
     @ti.func
     def start_pairs(self):
         """Take in the pairs of a new contact search; neighbours may now reach further."""
-        self.pairs.fill(self.contacts.pair_count[None])
-        self.pairs.sort_due(0, self._pair_key)
+        self.pairs.fill(self.contacts.pair_count[None], self._pair_key)
         if ti.static(self.drifted):
-            self.bodies.fill(self.model.body_count)
-            self.bodies.sort_due(0, self._body_key)
+            self.bodies.fill(self.model.body_count, self._body_key)
 
     @ti.func
     def _level_all(self):
         """Give every body the finest level that any of them wants."""
         if self.wanted[None] != self.state.level[0]:
-            self.dirty[None] = 1
             for i in range(self.model.body_count):
                 self.state.level[i] = self.wanted[None]
 
     @ti.func
     def _find_finest(self):
-        finest = MAX_LEVEL
-        while finest > 0 and self.bodies.end[finest] == 0:
-            finest -= 1
-        self.finest[None] = finest
+        if ti.static(self.uniform):
+            self.finest[None] = self.wanted[None]
+        else:
+            finest = MAX_LEVEL
+            while finest > 0 and self.bodies.end[finest] == 0:
+                finest -= 1
+            self.finest[None] = finest
 
     @ti.func
     def _count(self):
         """Count what this tick evaluates: substeps, bodies, bonds, contact pairs."""
         low = self.low[None]
         self.evaluations[0] += 1
-        self.evaluations[1] += self.bodies.end[low]
-        self.evaluations[2] += self.bonds.end[low]
+        self.evaluations[1] += self.bodies.count(low)
+        self.evaluations[2] += self.bonds.count(low)
         self.evaluations[4] += self.bonds.end[0]
 
     @ti.func
@@ -226,18 +248,18 @@ class Schedule:
         key = -1
         if self.state.broken_tick[b] < 0:
             slots = self.model.bond_slots[b]
-            key = ti.max(self.state.level[slots[0] >> 2], self.state.level[slots[1] >> 2])
+            key = self._key(slots[0] >> 2, slots[1] >> 2)
         return key
 
     @ti.func
     def _pair_key(self, p):
         pair = self.contacts.pair_body[p]
-        return ti.max(self.state.level[pair[0]], self.state.level[pair[1]])
+        return self._key(pair[0], pair[1])
 
     @ti.func
     def _body_key(self, i):
         """Own level, or the finest level among those it touches where neighbours drift along."""
-        key = self.state.level[i]
+        key = self._key(i, i)
         if ti.static(self.drifted):
             for f in range(4):
                 j = self.model.neighbour[4 * i + f]
@@ -246,4 +268,12 @@ class Schedule:
                         key = ti.max(key, self.state.level[j])
             if ti.static(self.has_contact):
                 key = ti.max(key, self.contacts.finest_partner(i))
+        return key
+
+    @ti.func
+    def _key(self, i, j):
+        """Finer level of two bodies; where all step alike, all are due at every tick."""
+        key = MAX_LEVEL
+        if ti.static(not self.uniform):
+            key = ti.max(self.state.level[i], self.state.level[j])
         return key

@@ -48,7 +48,6 @@ def test_a_run_continues_from_its_state_with_the_same_bits(runs):
     assert [name for name in last if not np.array_equal(last[name], again[name])] == []
 
 
-@pytest.mark.xfail(strict=True, reason="energy accounts of contact pairs are not in the state yet")
 def test_a_run_continues_from_its_state_with_the_same_account(runs):
     """Each term of the ledger, those of the sphere contacts included.
 

@@ -89,14 +89,22 @@ def test_history_has_the_columns_in_order(blast):
 
 
 @pytest.mark.slow
-def test_diverging_run_names_body_and_step_and_keeps_the_last_good_output(tmp_path):
-    options = ("--method", "fixed", "--dt0", "1e-6", "--out", tmp_path)
-    done = start("blast_fracture", *options)
+@pytest.mark.parametrize(
+    ("name", "options", "history"),
+    [
+        ("blast_fracture", ("--method", "fixed"), "history.csv"),
+        ("blast_multirate", ("--l", "1e-3", "--until", "2e-5"), "history_uniform.csv"),
+    ],
+)
+def test_diverging_run_names_body_and_step_and_keeps_the_last_good_output(
+    tmp_path, name, options, history
+):
+    done = start(name, *options, "--dt0", "1e-6", "--out", tmp_path)
     assert done.returncode == 3, done.stderr
     assert len(done.stderr.splitlines()) == 1
     for word in ("diverged at t = ", "body ", "level ", "try a step of "):
         assert word in done.stderr
-    rows = rows_of(tmp_path / "history.csv")
+    rows = rows_of(tmp_path / history)
     assert list(rows[0])[: len(HISTORY)] == HISTORY
     assert all(math.isfinite(float(value)) for row in rows for value in row.values())
     assert not (tmp_path / "summary.json").exists()
@@ -168,6 +176,14 @@ def test_folder_below_a_file_is_refused_before_anything_runs(main, capsys, tmp_p
     folder = tmp_path / "file" / "out"
     code = main(name, ["--until", "1e-3", "--out", folder])
     assert_refused(code, capsys.readouterr(), folder, str(folder), "writable")
+
+
+@pytest.mark.parametrize("name", ["blast_fracture", "blast_multirate"])
+def test_empty_folder_name_is_refused(main, capsys, name):
+    code = main(name, ["--out", ""])
+    captured = capsys.readouterr()
+    assert code == 2
+    assert captured.err == "output folder must be the name of a folder, got ''\n"
 
 
 @pytest.mark.parametrize(

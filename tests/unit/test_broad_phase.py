@@ -86,6 +86,7 @@ def test_waiting_impulses_survive_a_search():
     slots = np.zeros((2 * contacts.capacity, 6))
     slots[: 2 * count] = np.random.default_rng(0).standard_normal((2 * count, 6))
     contacts.pair_slot.from_numpy(slots)
+    contacts.pair_full.from_numpy(slots.any(axis=1).astype(np.int32))
     before = dict(zip(map(tuple, contacts.pair_body.to_numpy()[:count].tolist()), range(count)))
     motion = simulation.state.motion()
     motion["position"][::3] += 5.0
@@ -100,12 +101,59 @@ def test_waiting_impulses_survive_a_search():
         assert np.array_equal(kept[2 * place : 2 * place + 2], rows)
 
 
-def test_too_little_room_is_said_in_words():
-    scene = Scene(
-        bar(0.6, 0.2, (6, 2, 2)),
-        CONCRETE,
-        [effects.SphereContact(outer_faces=True, skin=0.05, pairs_per_body=1)],
-    )
+def neighbouring_faces(near):
+    """Pairs of faces in the list of neighbours."""
+    first, faces = near.first.to_numpy(), near.faces.to_numpy()[: near.first[near.model.body_count]]
+    one = np.repeat(np.arange(near.model.body_count), np.diff(first))
+    other = near.body.to_numpy()[: len(faces)]
+    return {
+        (4 * i + fg // 4, 4 * j + fg % 4)
+        for i, j, mask in zip(one.tolist(), other.tolist(), faces.tolist())
+        for fg in range(16)
+        if mask >> fg & 1
+    }
+
+
+def near_faces(simulation, skin):
+    """Pairs of faces of two bodies whose balls around the spheres are nearer than the skin."""
+    motion, ball = simulation.state.motion(), simulation.model.cluster.to_numpy()
+    body = np.arange(len(ball)) // 4
+    place = np.einsum("nij,nj->ni", motion["rotation"][body], ball[:, :3])
+    place += motion["position"][body]
+    apart = np.linalg.norm(place[:, None] - place[None], axis=-1)
+    near = apart < ball[:, None, 3] + ball[None, :, 3] + skin
+    return {(a, b) for a, b in np.argwhere(near).tolist() if a // 4 < b // 4}
+
+
+@pytest.mark.parametrize(("drift", "turn"), [(0.8, 1e-4), (0.0, 2e-3)])
+def test_one_list_of_neighbours_serves_until_a_body_has_left_its_reach(drift, turn):
+    """Bodies drift and turn, each its own way, in small steps: whatever is near is in the list.
+
+    It is made anew when two bodies may have come REACH - 1 skins nearer, not at every search.
+    """
+    skin, random = 2e-3, np.random.default_rng(7)
+    simulation = scattered(skin, 0.1)
+    near, motion = simulation.broad_phase.near, simulation.state.motion()
+    way = random.standard_normal(motion["position"].shape)
+    way *= drift * skin / np.linalg.norm(way, axis=1, keepdims=True)
+    spin = turn * random.standard_normal(motion["orientation"].shape)
+    lists = {near.turned_to.to_numpy().tobytes()}
+    for step in range(1, 41):
+        turned = motion["orientation"] + step * spin
+        turned /= np.linalg.norm(turned, axis=1, keepdims=True)
+        simulation.state.place(motion["position"] + step * way, turned)
+        simulation.broad_phase.search()
+        assert near_faces(simulation, skin) <= neighbouring_faces(near)
+        lists.add(near.turned_to.to_numpy().tobytes())
+    assert 3 < len(lists) < 20
+
+
+@pytest.mark.parametrize("room", ["neighbours_per_body", "pairs_per_body", "spheres_per_body"])
+def test_too_little_room_is_said_in_words(room):
+    """The lists have some room for small scenes whatever the options; the mesh has to exceed it."""
+    rooms = {"neighbours_per_body": 1000, room: 1}
+    contact = effects.SphereContact(outer_faces=True, skin=0.05, **rooms)
+    scene = Scene(bar(0.6, 0.2, (12, 4, 4)), CONCRETE, [contact])
     simulation = Simulation(scene, Uniform(1e-9))
-    with pytest.raises(ValueError, match="larger pairs_per_body"):
+    with pytest.raises(ValueError, match=f"larger {room}"):
         simulation.start()

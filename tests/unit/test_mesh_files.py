@@ -202,7 +202,7 @@ def test_weld_tolerance_reaches_the_check(tmp_path):
 def test_missing_file_is_refused(tmp_path):
     path = tmp_path / "no.msh"
     assert refused(path) == f"mesh file {path} does not exist"
-    assert refused(tmp_path) == f"mesh file {tmp_path} does not exist"
+    assert refused(tmp_path) == f"mesh file {tmp_path} is a folder"
 
 
 @pytest.mark.parametrize("name", ["mesh.msh", "mesh.vtu", "mesh.vtk", "mesh.xyz", "mesh"])

@@ -12,10 +12,11 @@ from taichi_dem.timeline import MAX_LEVEL, coarsest_due
 class Sorter:
     """A due list over keys that a test sets."""
 
-    def __init__(self, count):
-        self.count = count
-        self.keys = ti.field(ti.i32, shape=count)
-        self.list = DueList(count)
+    def __init__(self, keys):
+        self.keys = ti.field(ti.i32, shape=len(keys))
+        self.keys.from_numpy(keys)
+        self.list = DueList(len(keys))
+        self.fill(len(keys))
 
     @ti.func
     def key_of(self, member):
@@ -23,70 +24,61 @@ class Sorter:
         return self.keys[member]
 
     @ti.kernel
-    def fill(self):
-        """Take in all members."""
+    def fill(self, count: ti.i32):
+        """Take in the first count members."""
         for _ in range(1):
-            self.list.fill(self.count)
+            self.list.fill(count, self.key_of)
 
     @ti.kernel
-    def sort(self, low: ti.i32) -> ti.i32:
-        """Sort what is due at a level."""
-        waiting = 0
-        ti.loop_config(serialize=True)
+    def move(self, member: ti.i32, key: ti.i32):
+        """Give a member another key."""
         for _ in range(1):
-            waiting = self.list.sort_due(low, self.key_of)
-        return waiting
+            self.list.move(member, key)
 
-    def members(self, level):
-        """Members listed with a key of at least a level."""
-        return set(self.list.order.to_numpy()[: self.list.end[level]].tolist())
+    def check(self, keys):
+        """end[k] counts the keys >= k, the first end[k] places hold just those members."""
+        order, end = self.list.order.to_numpy(), self.list.end.to_numpy()
+        place = self.list.place.to_numpy()
+        for level in reversed(range(MAX_LEVEL + 1)):
+            listed = np.flatnonzero(keys >= level)
+            assert end[level] == len(listed)
+            assert sorted(order[: end[level]]) == listed.tolist()
+        assert np.array_equal(order[place[listed]], listed)
 
 
-def test_full_sort_puts_every_member_behind_its_key():
-    """end[k] counts the keys >= k, and the first end[k] places hold just those members."""
-    sorter = Sorter(300)
-    keys = np.random.default_rng(0).integers(-1, MAX_LEVEL + 1, 300).astype(np.int32)
+def test_a_full_list_puts_every_member_behind_its_key():
+    """Also when it is filled a second time, with fewer members and other keys."""
+    random = np.random.default_rng(0)
+    keys = random.integers(-1, MAX_LEVEL + 1, 300).astype(np.int32)
+    sorter = Sorter(keys)
+    sorter.check(keys)
+    keys = random.integers(-1, MAX_LEVEL + 1, 300).astype(np.int32)
     sorter.keys.from_numpy(keys)
-    sorter.fill()
-    assert sorter.sort(0) == 0
-    for level in range(MAX_LEVEL + 1):
-        assert sorter.members(level) == set(np.flatnonzero(keys >= level).tolist())
+    sorter.fill(100)
+    sorter.check(keys[:100])
 
 
-def test_partial_sorts_follow_changing_keys():
-    """Members that are due change keys within the due range; all lists stay exact."""
+def test_moves_keep_the_list_exact_at_every_level():
+    """500 moves of random members to random keys, up and down and not at all."""
     random = np.random.default_rng(1)
-    sorter = Sorter(200)
-    keys = random.integers(0, 9, 200).astype(np.int32)
-    sorter.keys.from_numpy(keys)
-    sorter.fill()
-    sorter.sort(0)
-    for _ in range(200):
-        low = int(random.integers(0, 9))
-        due = np.flatnonzero(keys >= low)
-        some = due[random.random(len(due)) < 0.3]
-        keys[some] = random.integers(low, 9, len(some))
-        sorter.keys.from_numpy(keys)
-        assert sorter.sort(low) == 0
-        for level in range(10):
-            assert sorter.members(level) == set(np.flatnonzero(keys >= level).tolist())
+    keys = random.integers(0, MAX_LEVEL + 1, 60).astype(np.int32)
+    sorter = Sorter(keys)
+    for _ in range(500):
+        member = int(random.integers(60))
+        keys[member] = random.integers(0, MAX_LEVEL + 1)
+        sorter.move(member, keys[member])
+        sorter.check(keys)
 
 
-def test_a_member_that_fell_below_waits_at_the_due_level_and_leaves_at_a_coarser_tick():
-    """At low 3 a key of 1 cannot be placed: it stays among the due, said by the return value."""
-    sorter = Sorter(4)
-    sorter.keys.from_numpy(np.array([5, 4, 3, 0], dtype=np.int32))
-    sorter.fill()
-    sorter.sort(0)
-    sorter.keys.from_numpy(np.array([5, 1, 3, 0], dtype=np.int32))
-    assert sorter.sort(3) == 1
-    assert sorter.members(3) == {0, 1, 2}
-    assert sorter.sort(1) == 0
-    assert sorter.members(3) == {0, 2}
-    assert sorter.members(1) == {0, 1, 2}
-    sorter.keys.from_numpy(np.array([5, -1, 3, 0], dtype=np.int32))
-    assert sorter.sort(0) == 0
-    assert sorter.members(0) == {0, 2, 3}
+def test_a_negative_key_takes_a_member_off_the_list():
+    """Members leave one by one, from whatever key they had; the others stay."""
+    keys = np.array([5, MAX_LEVEL, 3, 0, 0, 5], dtype=np.int32)
+    sorter = Sorter(keys)
+    for member in (3, 1, 5, 0, 2, 4):
+        keys[member] = -1
+        sorter.move(member, -1)
+        sorter.check(keys)
+    assert sorter.list.end[0] == 0
 
 
 @ti.data_oriented

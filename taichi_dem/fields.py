@@ -1,0 +1,55 @@
+"""Fields first, their values after: Taichi bears 512 groups of fields in a session, then crashes.
+
+A group is what is declared between two uses of any field. A model that wrote each field as soon as
+it was made would take twenty groups, and the thirtieth model of a notebook would end it.
+"""
+
+import contextlib
+
+from taichi.lang import impl
+
+from taichi_dem.errors import InputError
+
+#: Groups after which nothing new is begun; what has begun needs some more.
+MOST_GROUPS = 480
+
+_waiting = None
+
+
+@contextlib.contextmanager
+def fields_first():
+    """Hold back what is given to ``then`` until the end of the block, in its order.
+
+    Blocks may nest; the outermost counts. Raises InputError when the session has no room left.
+    """
+    global _waiting
+    if _waiting is not None:
+        yield
+        return
+    _check_room()
+    _waiting = []
+    try:
+        yield
+        loads = _waiting
+    finally:
+        _waiting = None
+    for load, arguments in loads:
+        load(*arguments)
+
+
+def then(load, *arguments):
+    """Call load(*arguments), which uses fields: now, or at the end of a ``fields_first`` block."""
+    if _waiting is None:
+        load(*arguments)
+    else:
+        _waiting.append((load, arguments))
+
+
+def _check_room():
+    program = impl.get_runtime().prog
+    groups = program.get_snode_tree_size() if program is not None else 0
+    if groups > MOST_GROUPS:
+        raise InputError(
+            f"groups of fields in a Taichi session must stay below {MOST_GROUPS}, got {groups}: "
+            "call runtime.stop() and runtime.start() after some hundred simulations"
+        )
