@@ -10,7 +10,6 @@ import numpy as np
 import taichi as ti
 
 from ca_damper import measures
-from ca_damper.checks import choice, positive, whole
 from ca_damper.clock import Clock, steps_per_cycle
 from ca_damper.container import DrivenContainer, SprungContainer
 from ca_damper.coupling import LOST, Coupling
@@ -18,6 +17,7 @@ from ca_damper.errors import SimulationDiverged
 from ca_damper.oscillator import Oscillator
 from ca_damper.progress import Progress
 from taichi_dem import runtime
+from taichi_dem.checks import choice, positive, whole
 from taichi_dem.errors import InputError
 
 MOUNTS = ("spring", "base")

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import taichi as ti
 
-from ca_damper.checks import positive
+from taichi_dem.checks import positive
 from taichi_dem.errors import InputError
 
 #: Fewer would leave first harmonics, and the series of ``oscillator``, to chance.

@@ -33,7 +33,7 @@ from typing import ClassVar
 import numpy as np
 import taichi as ti
 
-from ca_damper.checks import positive
+from taichi_dem.checks import positive
 from taichi_dem.errors import InputError
 
 

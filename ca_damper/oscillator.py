@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import taichi as ti
 
-from ca_damper.checks import positive
+from taichi_dem.checks import positive
 
 
 @dataclass(frozen=True)

@@ -1,14 +1,11 @@
 """What a run leaves behind: time series, frames for pictures, CSV files, whole or not at all."""
 
-import csv
-import os
 from dataclasses import dataclass
 
 import numpy as np
 
-from ca_damper.checks import whole
 from ca_damper.progress import Stages
-from taichi_dem.errors import InputError
+from taichi_dem.checks import whole
 
 _MOST_STEPS = 2**31 - 1
 
@@ -74,22 +71,3 @@ def _frame(batch, present, s):
     time_s, x, y = (float(present[name][s]) for name in ("time_s", "x", "y"))
     shot = batch.snapshot(s)
     return Frame(time_s, x, y, shot["position"], shot["velocity"])
-
-
-def write_csv(path, columns):
-    """Write columns of equal length, a dict of name to sequence, as a CSV file.
-
-    Under a temporary name first, then renamed. Raises InputError when it cannot be written.
-    """
-    temporary = f"{os.fspath(path)}.part"
-    try:
-        with open(temporary, "w", newline="") as handle:
-            rows = csv.writer(handle, lineterminator="\n")
-            rows.writerow(columns)
-            rows.writerows(zip(*(np.asarray(values).tolist() for values in columns.values())))
-        os.replace(temporary, path)
-    except OSError as error:
-        raise InputError(f"path {path} must be writable: {error.strerror or error}") from None
-    finally:
-        if os.path.exists(temporary):
-            os.remove(temporary)

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ca_damper.batch import Batch
-from ca_damper.checks import positive, several, whole
 from ca_damper.measures import peak
 from ca_damper.oscillator import Oscillator
-from ca_damper.record import write_csv
 from ca_damper.table import SceneTable
+from taichi_dem.checks import positive, several, whole
 from taichi_dem.errors import InputError
+from taichi_dem.files import write_csv
 
 #: Measures of a response and the unit that a CSV file says behind their names.
 UNITS = {

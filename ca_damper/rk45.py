@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 import taichi as ti
 
-from ca_damper.checks import positive
+from taichi_dem.checks import positive
 from taichi_dem.errors import InputError
 
 #: Attempts after which an integration counts as stuck, unless the caller says otherwise.

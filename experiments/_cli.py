@@ -10,7 +10,7 @@ import sys
 from importlib.metadata import version
 
 from taichi_dem import InputError, SimulationDiverged, runtime
-from taichi_dem.record import write_atomically
+from taichi_dem.files import write_text
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 BLAST_DRIVERS = ("auto", "resident", "parallel")
@@ -170,7 +170,7 @@ def write_summary(folder, name, figures, *, compile_seconds, run_seconds):
         "command": " ".join([f"experiments/{name}.py", *sys.argv[1:]]),
     }
     text = json.dumps(content, indent=1)
-    write_atomically(os.path.join(folder, "summary.json"), lambda handle: handle.write(text))
+    write_text(os.path.join(folder, "summary.json"), text)
 
 
 def processor():

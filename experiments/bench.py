@@ -17,7 +17,7 @@ import _bench_blast
 import _bench_damper
 from _cli import main, parser, print_table, processor, versions
 from taichi_dem import runtime
-from taichi_dem.record import output_folder, write_atomically
+from taichi_dem.files import output_folder, write_text
 
 NAME = "bench"
 
@@ -40,7 +40,7 @@ def run(options):
     content["threads"] = runtime.settings().threads
     text = json.dumps(content, indent=1)
     path = os.path.join(options.out, "bench.json")
-    write_atomically(path, lambda handle: handle.write(text))
+    write_text(path, text)
     print(f"written to {path}")
 
 

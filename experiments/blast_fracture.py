@@ -41,7 +41,7 @@ from taichi_dem import (
     read_mesh,
     simulate,
 )
-from taichi_dem.record import write_csv
+from taichi_dem.files import write_csv
 
 NAME = "blast_fracture"
 METHODS = {

@@ -43,7 +43,8 @@ from taichi_dem import (
     plot,
     read_mesh,
 )
-from taichi_dem.record import Recorder, output_folder, write_csv
+from taichi_dem.files import output_folder, write_csv
+from taichi_dem.record import Recorder
 from taichi_dem.simulate import progress_of
 from taichi_dem.simulation import macro_steps
 

@@ -28,9 +28,8 @@ from _timing import Timing
 from ca_damper import Automaton, Batch, SceneTable, SimulationDiverged, Spheres
 from ca_damper.plot.cost import picture_cost, picture_steps
 from ca_damper.progress import Progress
-from ca_damper.record import write_csv
 from taichi_dem import InputError
-from taichi_dem.record import output_folder
+from taichi_dem.files import output_folder, write_csv
 
 NAME = "damper_cost"
 FREQUENCY = 6.0

@@ -23,8 +23,7 @@ from _cli import ProgressBar, figure, main, number, parser, print_table, whole, 
 from ca_damper import Automaton, Batch, SceneTable, Spheres, film, plot
 from ca_damper.automaton import ACCOUNTINGS
 from ca_damper.progress import Stages
-from ca_damper.record import write_csv
-from taichi_dem.record import output_folder
+from taichi_dem.files import output_folder, write_csv
 
 NAME = "damper_patterns"
 QUICK = {"transient": 5, "cycles": 1, "seeds": 2}

@@ -24,9 +24,8 @@ from _cli import ProgressBar, figure, main, number, parser, print_table, write_s
 from ca_damper import Batch, SceneTable, film, plot
 from ca_damper.automaton import Automaton
 from ca_damper.automaton.accumulator import READINGS
-from ca_damper.record import write_csv
 from ca_damper.spheres import Spheres
-from taichi_dem.record import output_folder
+from taichi_dem.files import output_folder, write_csv
 
 NAME = "damper_rebound"
 QUICK = {"impacts": 4, "every_s": 1e-3}

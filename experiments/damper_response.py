@@ -32,9 +32,8 @@ from _cli import (
 )
 from ca_damper import Automaton, Response, Spheres, Sweep, frequency_response, sweep_up_and_down
 from ca_damper.plot.response import picture_hysteresis, picture_measures, picture_responses
-from ca_damper.record import write_csv
 from taichi_dem import InputError
-from taichi_dem.record import output_folder
+from taichi_dem.files import output_folder, write_csv
 
 NAME = "damper_response"
 #: 33 ratios f/f0, every 0.005 where the peaks of 0 to 50 particles lie.

@@ -21,8 +21,7 @@ import numpy as np
 from _cli import ProgressBar, figure, main, number, parser, whole, write_summary
 from ca_damper import Automaton, Batch, Empty, Oscillator, SceneTable, Spheres, film, plot
 from ca_damper.progress import Stages
-from ca_damper.record import write_csv
-from taichi_dem.record import output_folder
+from taichi_dem.files import output_folder, write_csv
 
 NAME = "demo_damper"
 QUICK = {"begin": 10, "measured": 5}

@@ -6,7 +6,7 @@ from numbers import Integral
 from ca_damper.automaton.accumulator import READINGS
 from ca_damper.automaton.bound import BoundAutomaton
 from ca_damper.automaton.rivals import MOST_CELLS
-from ca_damper.checks import choice, fraction, positive, whole
+from taichi_dem.checks import choice, fraction, positive, whole
 from taichi_dem.errors import InputError
 
 ACCOUNTINGS = {"landing": "ca_landing", "landing+ejection": "ca_ejection", "static": "ca_static"}

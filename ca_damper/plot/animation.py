@@ -9,7 +9,8 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from ca_damper.plot.box import DrawnBox, frame_panel
-from ca_damper.plot.style import STYLE, write_whole
+from taichi_dem.files import write_whole
+from taichi_dem.plot_style import STYLE
 
 _DPI = 100
 _SMALL = {**STYLE, "font.size": 7.5, "axes.titlesize": 7.5, "xtick.labelsize": 6.5}

@@ -1,6 +1,6 @@
 """Pictures of what a cycle costs (Fig. 12), and of the steps that fillings bear."""
 
-from ca_damper.plot.style import picture
+from taichi_dem.plot_style import picture
 
 TITLES = {
     "dem_pairs": "spheres, all pairs, 2e-5 s",

@@ -4,7 +4,7 @@ import numpy as np
 
 from ca_damper.plot.animation import moving_picture
 from ca_damper.plot.box import Box, DrawnBox
-from ca_damper.plot.style import BLACK, BLUE, GREY, RED, picture
+from taichi_dem.plot_style import BLACK, BLUE, GREY, RED, picture
 
 #: The spring hangs from the base, this far over a box in its middle [mm]; its coils and half width.
 _HANGS, _COILS, _HALF = 75.0, 9, 7.0

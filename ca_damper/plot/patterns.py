@@ -3,7 +3,7 @@
 import numpy as np
 
 from ca_damper.plot.box import DrawnBox, frame_panel
-from ca_damper.plot.style import BLACK, BLUE, GREY, RED, picture
+from taichi_dem.plot_style import BLACK, BLUE, GREY, RED, picture
 
 _COLOURS = (RED, BLUE)
 #: A container slower than this share of its fastest gets no arrow.

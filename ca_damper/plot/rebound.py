@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ca_damper.plot.style import BLACK, BLUE, GREY, ORANGE, RED, picture
+from taichi_dem.plot_style import BLACK, BLUE, GREY, ORANGE, RED, picture
 
 #: Errors below this [ms] would lengthen a logarithmic axis for nothing.
 _SHORTEST = 5e-3

@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib import colormaps
 
-from ca_damper.plot.style import picture
+from taichi_dem.plot_style import picture
 
 #: Titles of the fillings in words.
 TITLES = {

@@ -6,10 +6,10 @@ from typing import ClassVar, Optional
 
 import numpy as np
 
-from ca_damper.checks import choice, fraction, positive, whole
 from ca_damper.spheres.contact_law import POWERS, contact_duration, pair_numbers
 from ca_damper.spheres.dynamics import DIVERGENCES, BoundSpheres
 from ca_damper.spheres.search import SEARCHES
+from taichi_dem.checks import choice, fraction, positive, whole
 from taichi_dem.errors import InputError
 
 # Spheres part ever more slowly the stronger the dashpot, but none keeps them from parting.

@@ -10,9 +10,10 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from PIL import Image
 
+from taichi_dem.files import write_whole
 from taichi_dem.plot.block import break_times, displaced, frame_block
-from taichi_dem.plot.style import STYLE, write_whole
 from taichi_dem.plot.view import View, surface, traces
+from taichi_dem.plot_style import STYLE
 
 #: Half decades of speed that are told apart; what is slower has one colour.
 _STEPS = 7

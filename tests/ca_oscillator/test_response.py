@@ -82,7 +82,7 @@ def test_csv_has_a_row_for_every_scene(tmp_path):
 
 
 def test_csv_that_cannot_be_written_is_refused(tmp_path):
-    with pytest.raises(InputError, match="must be writable"):
+    with pytest.raises(InputError, match="cannot write"):
         rigid_response().write_csv(tmp_path / "nowhere" / "curve.csv")
 
 

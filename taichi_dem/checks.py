@@ -52,3 +52,14 @@ def several(name, values, check):
     if not checked:
         raise InputError(f"{name} must hold at least one value, got none")
     return checked
+
+
+def direction(name, value):
+    """Three finite numbers as a tuple of floats; InputError otherwise."""
+    try:
+        three = tuple(float(x) for x in value)
+    except (TypeError, ValueError):
+        three = ()
+    if len(three) != 3 or not all(math.isfinite(x) for x in three):
+        raise InputError(f"{name} must be three finite numbers, got {value!r}")
+    return three
