@@ -19,6 +19,7 @@ from ca_damper.progress import Progress
 from taichi_dem import runtime
 from taichi_dem.checks import choice, positive, whole
 from taichi_dem.errors import InputError
+from taichi_dem.fields import check_room
 
 MOUNTS = ("spring", "base")
 STARTS = ("rest", "empty", "rigid")
@@ -44,6 +45,7 @@ class Batch:
 
     def __init__(self, filling, table, *, mount="spring", measured_cycles=1, rtol=1e-9, atol=1e-12):
         self.generation = runtime.generation()
+        check_room()
         choice("mount", mount, MOUNTS)
         self.measured_cycles = whole("measured_cycles", measured_cycles, 0, 100_000)
         positive("rtol", rtol, zero_allowed=True)
@@ -248,7 +250,7 @@ class Batch:
         if code != LOST:
             words, allowed = self.filling.divergence(code, row["particles"], dt)
         raise SimulationDiverged(
-            f"the scene with {row['particles']} particles and seed {row['seed']} at "
+            f"the scene of particles = {row['particles']} and seed {row['seed']} at "
             f"{row['frequency']:.5g} Hz diverged by step {step}, t = {now:.4g} s: it {words}; "
             f"dt must be at most {allowed:.3g} s, was {dt:.3g} s",
             scene=row,

@@ -188,7 +188,7 @@ def test_divergence_of_a_filling_is_told_in_its_words():
     assert error.time_s == pytest.approx(error.step * dt)
     assert error.dt == pytest.approx(dt)
     assert error.dt_allowed == pytest.approx(0.25 * dt)
-    assert f"5 particles and seed {BAD_SEED} at 6 Hz" in str(error)
+    assert f"particles = 5 and seed {BAD_SEED} at 6 Hz" in str(error)
     assert f"it went wrong with code {CODE}; dt must be at most 0.00025 s" in str(error)
     assert "\n" not in str(error)
 

@@ -41,6 +41,20 @@ FIGURES = {
             for figure in ("amplitude_difference_mm", "lag_difference_deg", "height_difference_mm")
         ),
     },
+    "damper_response": {
+        f"{figure}_{label}_N{count}"
+        for figure in ("peak_ratio", "peak_rms_mm")
+        for label in ("dem", "ca_landing", "ca_ejection", "ca_static")
+        for count in (10, 30)
+    },
+    "damper_cost": {
+        *(f"longest_step_{label}" for label in ("dem", "ca_static", "ca_landing")),
+        *(
+            f"growth_{label}"
+            for label in ("dem_pairs", "dem_cells", "ca_scan_1e-4", "ca_list_1e-4")
+        ),
+        *(f"cycle_ms_{label}_N50" for label in ("dem_pairs", "dem_cells", "ca_scan_2e-5")),
+    },
     "demo_damper": {
         *("amplitude_mm", "amplitude_empty_mm", "amplitude_left", "rms_mm", "power_mW"),
         *("apparent_damping_N_s_m", "apparent_mass_g", "damping_ratio", "damping_ratio_empty"),
@@ -53,6 +67,11 @@ FILES = {
         *("patterns_20.png", "patterns_40.png", "cycle.png", "patterns.gif"),
         *("cycles.csv", "particles.csv"),
     ),
+    "damper_response": (
+        *("response.png", "measures.png", "hysteresis.png", "peaks.csv", "response_dem.csv"),
+        *("response_ca_static.csv", "sweep_up_ca_static.csv", "sweep_down_dem.csv"),
+    ),
+    "damper_cost": ("cost.png", "steps.png", "cost.csv", "steps.csv"),
     "demo_damper": ("damper.gif", "motion.png", "motion.csv"),
 }
 
