@@ -38,7 +38,7 @@ def picture_cost(path, particles, costs):
                 axis.errorbar(particles, middle, yerr=[low, high], lw=1.2, **look)
         axes[1].set(yscale="log", xlabel="particles N")
         axes[0].set(xlabel="particles N", ylabel="CPU time of a cycle [ms]", ylim=(0, None))
-        axes[0].legend()
+        axes[0].legend(loc="upper left")
 
 
 def picture_steps(path, borne):

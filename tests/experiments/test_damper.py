@@ -49,10 +49,7 @@ FIGURES = {
     },
     "damper_cost": {
         *(f"longest_step_{label}" for label in ("dem", "ca_static", "ca_landing")),
-        *(
-            f"growth_{label}"
-            for label in ("dem_pairs", "dem_cells", "ca_scan_1e-4", "ca_list_1e-4")
-        ),
+        *(f"growth_{label}" for label in ("dem_pairs", "dem_cells", "ca_scan_1e-4")),
         *(f"cycle_ms_{label}_N50" for label in ("dem_pairs", "dem_cells", "ca_scan_2e-5")),
     },
     "demo_damper": {
