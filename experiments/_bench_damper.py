@@ -38,7 +38,8 @@ class OneScene:
         table = SceneTable(list(numbers), 1, dt, FREQUENCY, BASE_AMPLITUDE)
         self.numbers = list(numbers)
         self.batch = Batch(filling, table)
-        self.batch.start("rest")
+        # Swinging fully, so that the particles fly.
+        self.batch.start("empty")
         self.cycle = int(self.batch.steps_per_cycle[0])
         # Long enough to be shaken through, with all compiled.
         self.batch.advance(3 * self.cycle)
