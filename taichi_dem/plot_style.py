@@ -3,8 +3,10 @@
 import contextlib
 
 import matplotlib
+import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from PIL import Image
 
 from taichi_dem.files import write_whole
 
@@ -53,3 +55,20 @@ def seconds(value):
         if value >= size:
             return f"{value / size:.3g} {unit}"
     return f"{value / 1e-9:.3g} ns"
+
+
+def write_gif(path, images, milliseconds, colours=64, samples=8):
+    """Write RGB images as a GIF with one palette, made from some of them, evenly over the whole.
+
+    milliseconds: a frame. Raises InputError when the file cannot be written.
+    """
+    width, height = images[0].size
+    picked = np.linspace(0, len(images) - 1, samples).round().astype(int)
+    sheet = Image.new("RGB", (width, samples * height))
+    for row, index in enumerate(picked):
+        sheet.paste(images[index], (0, row * height))
+    # Median cut counts pixels, and nearly all are white: the octree keeps rare colours.
+    palette = sheet.quantize(colours, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+    reduced = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
+    options = {"append_images": reduced[1:], "duration": milliseconds, "loop": 0}
+    write_whole(path, lambda name: reduced[0].save(name, format="GIF", save_all=True, **options))

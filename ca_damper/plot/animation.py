@@ -9,8 +9,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from ca_damper.plot.box import DrawnBox, frame_panel
-from taichi_dem.files import write_whole
-from taichi_dem.plot_style import STYLE
+from taichi_dem.plot_style import STYLE, write_gif
 
 _DPI = 100
 _SMALL = {**STYLE, "font.size": 7.5, "axes.titlesize": 7.5, "xtick.labelsize": 6.5}
@@ -33,7 +32,7 @@ def moving_picture(path, size, milliseconds):
             figure.set_layout_engine("none")
 
         yield figure, shoot
-    write_whole(path, lambda name: _write_gif(name, images, milliseconds))
+    write_gif(path, images, milliseconds)
 
 
 def animate_patterns(path, rows, amplitude, fastest, milliseconds=60):
@@ -52,23 +51,3 @@ def animate_patterns(path, rows, amplitude, fastest, milliseconds=60):
             for one, frame in zip(drawn, shots):
                 one.show(frame)
             shoot()
-
-
-def _write_gif(name, images, milliseconds, colours=64, samples=8):
-    """Write images with one palette, made from some of them, evenly over the whole."""
-    width, height = images[0].size
-    picked = np.linspace(0, len(images) - 1, samples).round().astype(int)
-    sheet = Image.new("RGB", (width, samples * height))
-    for row, index in enumerate(picked):
-        sheet.paste(images[index], (0, row * height))
-    # Median cut counts pixels, and nearly all are white: the octree keeps rare colours.
-    palette = sheet.quantize(colours, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
-    reduced = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
-    reduced[0].save(
-        name,
-        format="GIF",
-        save_all=True,
-        append_images=reduced[1:],
-        duration=milliseconds,
-        loop=0,
-    )
