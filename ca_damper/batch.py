@@ -27,6 +27,7 @@ STARTS = ("rest", "empty", "rigid")
 #: A launch is kept near this long [s].
 LAUNCH_SECONDS = 0.15
 _MOST_STEPS = 2**31 - 1
+_LOST_IN_WORDS = "lost its container, whose motion is no finite number"
 #: Largest field of measured sums: 1 GiB, half of what Taichi can count.
 _MOST_NUMBERS = 2**27
 _STRUCTURE = ("mass", "stiffness", "damping", "base_amplitude")
@@ -246,9 +247,10 @@ class Batch:
     def _report_divergence(self, s):
         row, step, now = self.table.row(s), self.coupling.step[s], float(self.time_s[s])
         code, dt = self.coupling.status[s], row["dt"]
-        words, allowed = "lost its container, whose motion is no finite number", 0.5 * dt
-        if code != LOST:
-            words, allowed = self.filling.divergence(code, row["particles"], dt)
+        words, allowed = self.filling.divergence(max(code, 1), row["particles"], dt)
+        if code == LOST:
+            # What the filling bears at most is still the best advice.
+            words, allowed = _LOST_IN_WORDS, min(allowed, 0.5 * dt)
         raise SimulationDiverged(
             f"the scene of particles = {row['particles']} and seed {row['seed']} at "
             f"{row['frequency']:.5g} Hz diverged by step {step}, t = {now:.4g} s: it {words}; "

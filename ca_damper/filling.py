@@ -20,7 +20,7 @@ What ``bind`` returns is data oriented and has the ti.funcs
 ``energy(s)``              kinetic and potential energy of the particles [J], heights counted from
                            the container's floor
 ``momentum(s)``            momentum of the particles along x [kg m/s]
-``health(s)``              0, or the code of a divergence; asked every few steps
+``health(s)``              0, or the code of a divergence, 1 and up; asked every few steps
 
 and in Python ``snapshot(s)``, a dict with ``position`` [m] and ``velocity`` [m/s], both (particles,
 2) as (horizontal, vertical), positions from the container's lower left inner corner.

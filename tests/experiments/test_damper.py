@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -234,6 +235,9 @@ def test_spheres_beyond_their_limit_end_as_diverged(tmp_path, name, options):
     assert len(done.stderr.splitlines()) == 1
     for word in ("diverged by step", "dt must be at most", "was 0.0002 s"):
         assert word in done.stderr
+    # A step of which a contact at the speed of a fall through the box has five.
+    advised = float(re.search(r"dt must be at most ([0-9.e-]+) s", done.stderr).group(1))
+    assert advised == Spheres().safe_step()
     assert not (tmp_path / "summary.json").exists()
 
 
