@@ -10,9 +10,10 @@ import sys
 from importlib.metadata import version
 
 from taichi_dem import InputError, SimulationDiverged, runtime
-from taichi_dem.record import write_atomically
+from taichi_dem.files import write_text
 
 HERE = os.path.dirname(os.path.abspath(__file__))
+BLAST_DRIVERS = ("auto", "resident", "parallel")
 PAPER_BLOCK = os.path.join(HERE, "meshes", "paper_block.msh")
 
 
@@ -60,8 +61,20 @@ def whole(low, high):
     return parse
 
 
-def parser(name, description):
-    """Parser with the options every experiment has."""
+def several(kind):
+    """Type of an option that is a comma-separated list of a type, without repetitions."""
+
+    def parse(text):
+        values = [kind(part) for part in text.split(",")]
+        if len(set(values)) < len(values):
+            raise argparse.ArgumentTypeError(f"must not name a value twice, got {text!r}")
+        return values
+
+    return parse
+
+
+def parser(name, description, drivers=()):
+    """Parser with the options every experiment has; drivers: to choose from, where there are."""
     made = Parser(
         prog=f"python experiments/{name}.py",
         description=description,
@@ -71,7 +84,8 @@ def parser(name, description):
     made.add_argument("--quick", action="store_true", help="a smaller job of under a minute")
     made.add_argument("--out", default=os.path.join("results", name), help="folder for the output")
     made.add_argument("--arch", default="cpu", choices=runtime.ARCHITECTURES)
-    made.add_argument("--driver", default="auto", choices=("auto", "resident", "parallel"))
+    if drivers:
+        made.add_argument("--driver", default=drivers[0], choices=drivers)
     made.add_argument("--threads", type=whole(1, 1024), default=None, help="CPU threads")
     return made
 
@@ -124,13 +138,9 @@ class ProgressBar:
         return self
 
     def __call__(self, progress):
-        """Show a ``taichi_dem.simulate.Progress``."""
+        """Show a Progress of either package: its share, and what it says of its speed."""
         if self.bar is not None:
-            seconds = max(progress.run_seconds, 1e-9)
-            rate = 1e-6 * progress.evaluations / seconds
-            speed = f"{1e6 * progress.time_s / seconds:.3g} us/s, {rate:.3g} M evaluations/s"
-            share = progress.time_s / progress.until_s
-            self.bar.update(self.task, completed=share, speed=speed)
+            self.bar.update(self.task, completed=progress.share, speed=str(progress))
 
     def __exit__(self, *_):
         if self.bar is not None:
@@ -160,7 +170,7 @@ def write_summary(folder, name, figures, *, compile_seconds, run_seconds):
         "command": " ".join([f"experiments/{name}.py", *sys.argv[1:]]),
     }
     text = json.dumps(content, indent=1)
-    write_atomically(os.path.join(folder, "summary.json"), lambda handle: handle.write(text))
+    write_text(os.path.join(folder, "summary.json"), text)
 
 
 def processor():

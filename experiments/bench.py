@@ -1,129 +1,46 @@
-"""How fast is it? Contact units a second, the paper's problem by its own rule, and the first wait.
+"""How fast is it? Rates of both packages, the papers' problems, and the first wait.
 
-    make bench                          # about four minutes; writes results/bench.json
-    python experiments/bench.py --quick # half a minute
+    make bench                          # about eight minutes; writes results/bench.json
+    python experiments/bench.py --quick # a minute
 
-Every figure is CPU time of one core, compile time apart: median of repeats, and their spread.
+Figures are CPU time of one core unless they say otherwise, compile time apart: median of repeats,
+and their spread.
 """
 
 import json
 import os
-import subprocess
 import sys
-import tempfile
-import time
 
 import numpy as np
 
-from _cli import PAPER_BLOCK, main, parser, print_table, processor, versions
-from taichi_dem import CONCRETE, Multirate, Scene, Simulation, Uniform, effects, read_mesh, runtime
-from taichi_dem.record import output_folder, write_atomically
-from taichi_dem.simulation import macro_steps
+import _bench_blast
+import _bench_damper
+from _cli import main, parser, print_table, processor, versions
+from taichi_dem import runtime
+from taichi_dem.files import output_folder, write_text
 
 NAME = "bench"
-UNTIL = 5e-4
-#: Everything up to the end of the first step, in a process of its own.
-FIRST_STEP = """
-import sys, time
-start = time.perf_counter()
-sys.path.insert(0, sys.argv[1])
-from taichi_dem import runtime
-runtime.start(threads=1)
-from bench import paper_simulation
-from taichi_dem import Multirate
-paper_simulation(Multirate()).advance_to(1)
-print(time.perf_counter() - start)
-"""
-
-
-def paper_simulation(method, driver="resident"):
-    """The paper's block with all of its effects."""
-    listed = [
-        effects.BondDamping(),
-        effects.Softening(),
-        effects.ShearSlip(),
-        effects.SphereContact(),
-        effects.Friction(),
-        effects.GasPressure(),
-    ]
-    return Simulation(Scene(read_mesh(PAPER_BLOCK), CONCRETE, listed), method, driver)
-
-
-def cpu_seconds(simulation, steps):
-    """CPU time of advancing to a macro step [s]."""
-    start = time.process_time()
-    simulation.advance_to(steps)
-    return time.process_time() - start
-
-
-def bonded_phase(repeats, steps=4000):
-    """Million contact units a second while all bonds hold: whole steps, bodies included."""
-    simulation = paper_simulation(Uniform(1e-9))
-    simulation.advance_to(steps)
-    rates = []
-    for k in range(repeats):
-        seconds = cpu_seconds(simulation, (k + 2) * steps)
-        rates.append(3e-6 * simulation.model.bond_count * steps / seconds)
-    return rates
-
-
-def paper_problem(distance, repeats):
-    """CPU seconds of the paper's problem to 5e-4 s by its own rule, compile time apart."""
-    seconds = []
-    for _ in range(repeats):
-        simulation = paper_simulation(Multirate(1e-8, distance))
-        simulation.start()
-        seconds.append(cpu_seconds(simulation, macro_steps(UNTIL, 1e-8)))
-    return seconds
-
-
-def first_step(cache):
-    """Seconds from the start of Python to the end of the first step, with a given cache folder."""
-    environment = {**os.environ, "TI_OFFLINE_CACHE_FILE_PATH": cache}
-    here = os.path.dirname(os.path.abspath(__file__))
-    command = [sys.executable, "-c", FIRST_STEP, here]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
-    return float(done.stdout.split()[-1])
-
-
-def waits(folder, repeats):
-    """Cold and warm waits for the first step [s]: an empty cache folder, then the filled one."""
-    cold, warm = [], []
-    for k in range(repeats):
-        cache = os.path.join(folder, f"cache-{os.getpid()}-{k}")
-        os.makedirs(cache)
-        cold.append(first_step(cache))
-        warm.append(first_step(cache))
-    return cold, warm
 
 
 def run(options):
     """Measure, print, write."""
     results = []
+    output_folder(options.out)
 
     def note(name, unit, values, bound):
         results.append({"name": name, "unit": unit, "values": values, "bound": bound})
         print(f"  {name}: {np.median(values):.3g} {unit}", flush=True)
 
-    repeats = 3 if options.quick else 7
-    note("bonded phase", "million units/s", bonded_phase(repeats), ">= 30")
-    with tempfile.TemporaryDirectory() as folder:
-        cold, warm = waits(folder, 1 if options.quick else 3)
-    note("first step, cold cache", "s", cold, "<= 15")
-    note("first step, warm cache", "s", warm, "<= 3")
-    note(
-        "paper's problem, l = 1e-7 m", "s", paper_problem(1e-7, 1 if options.quick else 3), "<= 20"
-    )
-    if not options.quick:
-        note("paper's problem, l = 1e-8 m", "s", paper_problem(1e-8, 1), "<= 130")
+    for part in (_bench_damper, _bench_blast):
+        part.measure(note, options.quick)
     print_table(
         [_row(result) for result in results], ["figure", "median", "spread", "unit", "bound"]
     )
     content = {"figures": results, "processor": processor(), "versions": versions()}
     content["threads"] = runtime.settings().threads
     text = json.dumps(content, indent=1)
-    path = os.path.join(output_folder(options.out), "bench.json")
-    write_atomically(path, lambda handle: handle.write(text))
+    path = os.path.join(options.out, "bench.json")
+    write_text(path, text)
     print(f"written to {path}")
 
 

@@ -17,6 +17,7 @@ import sys
 import numpy as np
 
 from _cli import (
+    BLAST_DRIVERS,
     PAPER_BLOCK,
     ProgressBar,
     figure,
@@ -40,7 +41,7 @@ from taichi_dem import (
     read_mesh,
     simulate,
 )
-from taichi_dem.record import write_csv
+from taichi_dem.files import write_csv
 
 NAME = "blast_fracture"
 METHODS = {
@@ -65,7 +66,7 @@ FULL = {"until": 5e-4, "l": 1e-7, "frames": 40, "samples": 200}
 
 def options_parser():
     """Options of this experiment."""
-    made = parser(NAME, __doc__)
+    made = parser(NAME, __doc__, BLAST_DRIVERS)
     made.add_argument("--mesh", default=PAPER_BLOCK, help="tetrahedra with a face group hole")
     made.add_argument("--until", type=number(0, 1), help="simulated time [s], 5e-4")
     made.add_argument("--l", type=number(0, 1), help="largest way of a body in a step [m], 1e-7")

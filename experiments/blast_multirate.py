@@ -20,6 +20,7 @@ import sys
 import numpy as np
 
 from _cli import (
+    BLAST_DRIVERS,
     PAPER_BLOCK,
     ProgressBar,
     figure,
@@ -42,7 +43,8 @@ from taichi_dem import (
     plot,
     read_mesh,
 )
-from taichi_dem.record import Recorder, output_folder, write_csv
+from taichi_dem.files import output_folder, write_csv
+from taichi_dem.record import Recorder
 from taichi_dem.simulate import progress_of
 from taichi_dem.simulation import macro_steps
 
@@ -64,7 +66,7 @@ PAPER_MM = {"uniform": {5e-4: 2.16}, "multirate_held": {5e-4: 1.93}}
 
 def options_parser():
     """Options of this experiment."""
-    made = parser(NAME, __doc__)
+    made = parser(NAME, __doc__, BLAST_DRIVERS)
     made.add_argument("--mesh", default=PAPER_BLOCK, help="tetrahedra with a face group hole")
     made.add_argument("--l", type=number(0, 1), help="largest way of a body in a step [m], 1e-7")
     made.add_argument("--dt0", type=number(0, 1), default=1e-8, help="largest step [s]")

@@ -26,7 +26,7 @@ def fields_first():
     if _waiting is not None:
         yield
         return
-    _check_room()
+    check_room()
     _waiting = []
     try:
         yield
@@ -45,7 +45,8 @@ def then(load, *arguments):
         _waiting.append((load, arguments))
 
 
-def _check_room():
+def check_room():
+    """Raise InputError when the session has no room for more fields."""
     program = impl.get_runtime().prog
     groups = program.get_snode_tree_size() if program is not None else 0
     if groups > MOST_GROUPS:

@@ -12,6 +12,7 @@ import meshio
 import numpy as np
 
 from taichi_dem.errors import InputError
+from taichi_dem.files import renamed_when_done, write_text
 from taichi_dem.mesh import Mesh, check_positive, checked_mesh
 
 #: Cell types of meshio that are read, with the number of their corner points.
@@ -59,7 +60,7 @@ def write_mesh(path, mesh) -> None:
     lines += ["$EndNodes", "$Elements", str(len(elements))]
     for number, (kind, tag, corners) in enumerate(elements, start=1):
         lines.append(f"{number} {kind} 2 {tag} {tag} " + " ".join(str(c + 1) for c in corners))
-    _write_text(path, "\n".join([*lines, "$EndElements", ""]))
+    write_text(path, "\n".join([*lines, "$EndElements", ""]))
 
 
 def write_vtu(path, points, tetrahedra, point_data=None, cell_data=None) -> None:
@@ -86,7 +87,7 @@ def write_pvd(path, times_s, file_names) -> None:
     ]
     head = '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">'
     lines = ['<?xml version="1.0"?>', head, "  <Collection>", *sets, "  </Collection>"]
-    _write_text(path, "\n".join([*lines, "</VTKFile>", ""]))
+    write_text(path, "\n".join([*lines, "</VTKFile>", ""]))
 
 
 def _read_raw(path):
@@ -150,29 +151,3 @@ def _sets(raw, names):
             if block.type in _TRIANGLES and members is not None and len(members):
                 found[name].append(block.data[members, :3])
     return found
-
-
-def _write_text(path, text):
-    """Write a text file, atomically."""
-    with renamed_when_done(path) as temporary:
-        with open(temporary, "w", encoding="utf-8", newline="\n") as file:
-            file.write(text)
-
-
-@contextlib.contextmanager
-def renamed_when_done(path):
-    """A temporary name beside ``path`` that becomes ``path`` only after a complete write."""
-    path = os.fspath(path)
-    folder, name = os.path.split(path)
-    if not os.path.isdir(folder or "."):
-        raise InputError(f"cannot write {path}: there is no folder {folder}")
-    root, ending = os.path.splitext(name)  # kept, since it tells some writers the format
-    temporary = os.path.join(folder, f".{root}.{os.getpid()}.part{ending}")
-    try:
-        yield temporary
-        os.replace(temporary, path)
-    except OSError as error:
-        raise InputError(f"cannot write {path}: {error.strerror or error}") from None
-    finally:
-        if os.path.exists(temporary):
-            os.remove(temporary)

@@ -8,8 +8,8 @@ import os
 from dataclasses import dataclass
 
 from taichi_dem.errors import InputError
+from taichi_dem.files import renamed_when_done
 from taichi_dem.mesh import check_positive
-from taichi_dem.mesh_files import renamed_when_done
 
 #: Everything that could make two runs of the same Gmsh differ, and what may shape the elements.
 _OPTIONS = {

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Optional
 
-from taichi_dem.effects.base import positive
+from taichi_dem.checks import positive
 from taichi_dem.errors import InputError
 from taichi_dem.step_control import Displacement, FixedStep, StepControl
 

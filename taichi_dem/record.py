@@ -1,13 +1,12 @@
 """What a run leaves behind: time series, snapshots, ParaView files; written whole or not at all."""
 
-import csv
 import os
 from dataclasses import dataclass
 
 import numpy as np
 import taichi as ti
 
-from taichi_dem.errors import InputError
+from taichi_dem.files import output_folder
 from taichi_dem.mesh_files import write_pvd, write_vtu
 from taichi_dem.monitor import HoleMonitor
 from taichi_dem.state import NEVER
@@ -135,48 +134,6 @@ def body_corners(model, frame):
     """World positions of the corners of all bodies in a frame [m], (n, 4, 3)."""
     arms = model.mesh.points[model.mesh.tetrahedra] - model.centre[:, None]
     return frame.position[:, None] + np.einsum("nij,nkj->nki", frame.rotation, arms)
-
-
-def output_folder(path):
-    """Make a folder for output and return its path.
-
-    Raises InputError when it cannot be made or written to.
-    """
-    if not os.fspath(path):
-        raise InputError("output folder must be the name of a folder, got ''")
-    try:
-        os.makedirs(path, exist_ok=True)
-        probe = os.path.join(path, ".write-test")
-        with open(probe, "w") as handle:
-            handle.write("x")
-        os.remove(probe)
-    except OSError as error:
-        reason = error.strerror or error
-        raise InputError(f"output folder {path} must be writable: {reason}") from None
-    return os.fspath(path)
-
-
-def write_atomically(path, write):
-    """Write a file through ``write(handle)`` under a temporary name, then rename it."""
-    temporary = f"{path}.part"
-    try:
-        with open(temporary, "w", newline="") as handle:
-            write(handle)
-        os.replace(temporary, path)
-    finally:
-        if os.path.exists(temporary):
-            os.remove(temporary)
-
-
-def write_csv(path, columns):
-    """Write columns of equal length, a dict of name to sequence, as a CSV file."""
-
-    def write(handle):
-        rows = csv.writer(handle, lineterminator="\n")
-        rows.writerow(columns)
-        rows.writerows(zip(*(np.asarray(values).tolist() for values in columns.values())))
-
-    write_atomically(path, write)
 
 
 def write_paraview(folder, model, frames, name="blast"):

@@ -7,12 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichi_dem.errors import InputError, SimulationDiverged
+from taichi_dem.files import output_folder, write_csv, write_text
 from taichi_dem.mesh_files import write_mesh
 from taichi_dem.record import (
     Recorder,
-    output_folder,
-    write_atomically,
-    write_csv,
     write_paraview,
 )
 from taichi_dem.simulation import Simulation, macro_steps
@@ -26,6 +24,17 @@ class Progress:
     until_s: float
     evaluations: int
     run_seconds: float
+
+    @property
+    def share(self):
+        """Of the way, in [0, 1]."""
+        return self.time_s / self.until_s
+
+    def __str__(self):
+        """How fast it goes."""
+        seconds = max(self.run_seconds, 1e-9)
+        rate = 1e-6 * self.evaluations / seconds
+        return f"{1e6 * self.time_s / seconds:.3g} us/s, {rate:.3g} M evaluations/s"
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +64,7 @@ class Result:
         write_csv(os.path.join(folder, "history.csv"), self.history)
         write_mesh(os.path.join(folder, "mesh.msh"), self.scene.mesh)
         text = json.dumps({**self.report.as_dict(), "diverged": self.diverged}, indent=1)
-        write_atomically(os.path.join(folder, "report.json"), lambda handle: handle.write(text))
+        write_text(os.path.join(folder, "report.json"), text)
         if self.frames:
             write_paraview(os.path.join(folder, "paraview"), self.model, self.frames)
 

@@ -25,7 +25,8 @@ class BondProbe:
             simulation.state,
             simulation.advance,
         )
-        self.area = 3.0 * self.model.unit_area[0]
+        corners = mesh.points[self.model.topology.vertices[0]]
+        self.area = 0.5 * np.linalg.norm(np.cross(*(corners[1:] - corners[0])))
         self.frame = self.model.bond_frame[0].to_numpy()
         self.centre = self.model.centre
         self._slots = self.model.bond_slots[0].to_numpy()

@@ -16,12 +16,9 @@ b is a bond, u one of its three contact units (3 b, 3 b + 1, 3 b + 2), i a body.
 ``support`` take any number of effects, the others at most one.
 """
 
-import math
-
 import numpy as np
 import taichi as ti
 
-from taichi_dem.errors import InputError
 from taichi_dem.fields import then
 from taichi_dem.types import real, vec3
 
@@ -51,27 +48,6 @@ def parameters(**values):
     field = ti.field(real, shape=len(values))
     then(field.from_numpy, np.array(list(values.values()), dtype=np.float64))
     return field
-
-
-def positive(name, value, zero_allowed=False):
-    """The value as a float; InputError when it is no finite number above (or at) zero."""
-    limit = "zero or a positive" if zero_allowed else "a positive"
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise InputError(f"{name} must be {limit} finite number, got {value!r}")
-    if value < 0.0 or (value == 0.0 and not zero_allowed):
-        raise InputError(f"{name} must be {limit} finite number, got {value!r}")
-    return float(value)
-
-
-def direction(name, value):
-    """Three finite numbers as a tuple of floats; InputError otherwise."""
-    try:
-        numbers = tuple(float(x) for x in value)
-    except (TypeError, ValueError):
-        numbers = ()
-    if len(numbers) != 3 or not all(math.isfinite(x) for x in numbers):
-        raise InputError(f"{name} must be three finite numbers, got {value!r}")
-    return numbers
 
 
 @ti.data_oriented
@@ -162,4 +138,4 @@ ABSENT = {
     "friction": NoFriction,
 }
 
-__all__ = ["ABSENT", "MANY", "ROLES", "Effect", "direction", "parameters", "positive"]
+__all__ = ["ABSENT", "MANY", "ROLES", "Effect", "parameters"]

@@ -5,7 +5,8 @@ import math
 import numpy as np
 import taichi as ti
 
-from taichi_dem.effects.base import Effect, parameters, positive
+from taichi_dem.checks import positive
+from taichi_dem.effects.base import Effect, parameters
 from taichi_dem.fields import then
 from taichi_dem.physics.rotation import zero3
 from taichi_dem.tetrahedra import area_vectors

@@ -2,7 +2,8 @@
 
 import taichi as ti
 
-from taichi_dem.effects.base import Effect, direction
+from taichi_dem.checks import direction
+from taichi_dem.effects.base import Effect
 from taichi_dem.fields import then
 from taichi_dem.physics.rotation import zero3
 

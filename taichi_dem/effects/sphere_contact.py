@@ -2,7 +2,8 @@
 
 import taichi as ti
 
-from taichi_dem.effects.base import Effect, parameters, positive
+from taichi_dem.checks import positive
+from taichi_dem.effects.base import Effect, parameters
 from taichi_dem.errors import InputError
 from taichi_dem.physics.sphere_pair import normal_force
 

@@ -5,7 +5,8 @@ import math
 import numpy as np
 import taichi as ti
 
-from taichi_dem.effects.base import Effect, direction, parameters, positive
+from taichi_dem.checks import direction, positive
+from taichi_dem.effects.base import Effect, parameters
 from taichi_dem.errors import InputError
 from taichi_dem.fields import then
 from taichi_dem.physics.rotation import zero3

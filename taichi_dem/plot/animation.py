@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from taichi_dem.plot.block import break_times, displaced, frame_block
-from taichi_dem.plot.style import STYLE, write_whole
 from taichi_dem.plot.view import View, surface, traces
+from taichi_dem.plot_style import STYLE, write_gif
 
 #: Half decades of speed that are told apart; what is slower has one colour.
 _STEPS = 7
@@ -36,7 +36,7 @@ def save_animation(
     with matplotlib.rc_context({**STYLE, "font.size": 8.5}):
         times = break_times(model, broken_time)
         images = _images(model, frames, times, magnify, View(axis))
-    write_whole(path, lambda name: _write_gif(name, images, milliseconds))
+    write_gif(path, images, milliseconds, colours=32)
 
 
 def _images(model, frames, broken_time, magnify, view):
@@ -83,21 +83,3 @@ def _nice(half_decades):
     """1, 3, 10, 30, ... for 0, 1, 2, 3, ..."""
     decade, rest = divmod(half_decades, 2)
     return (3.0 if rest else 1.0) * 10.0**decade
-
-
-def _write_gif(name, images, milliseconds, colours=32):
-    """Write images with one palette, made from the first, the middle and the last of them."""
-    width, height = images[0].size
-    sample = Image.new("RGB", (width, 3 * height))
-    for row, index in enumerate((0, len(images) // 2, len(images) - 1)):
-        sample.paste(images[index], (0, row * height))
-    palette = sample.quantize(colours, dither=Image.Dither.NONE)
-    reduced = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
-    reduced[0].save(
-        name,
-        format="GIF",
-        save_all=True,
-        append_images=reduced[1:],
-        duration=milliseconds,
-        loop=0,
-    )

@@ -5,8 +5,8 @@ import numpy as np
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap
 
-from taichi_dem.plot.style import picture, seconds
 from taichi_dem.plot.view import View, surface, traces
+from taichi_dem.plot_style import picture, seconds
 from taichi_dem.record import body_corners
 
 _STONE, _JOINT, _INSIDE = "#E4E0D6", "#C9C3B5", "#B5AD9C"

@@ -1,28 +1,23 @@
-"""Every experiment with --quick in a process of its own, and what each refuses."""
+"""Every experiment of blasting with --quick, and what each refuses."""
 
-import csv
-import importlib.util
-import json
 import math
 import os
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from taichi_dem import mesh_shapes
 from taichi_dem.mesh_files import read_mesh, write_mesh
-
-FOLDER = Path(__file__).resolve().parents[2] / "experiments"
-NO_EXPERIMENTS = ("make_meshes", "bench")
-NAMES = sorted(
-    path.stem
-    for path in FOLDER.glob("*.py")
-    if not path.stem.startswith("_") and path.stem not in NO_EXPERIMENTS
+from tests.experiments.contract import (
+    FOLDER,
+    NAMES,
+    QuickRun,
+    assert_refused,
+    quick_runs,
+    rows_of,
+    start,
 )
+
 HISTORY = (
     "time_s,hole_radial_displacement_mm,monitor_displacement_mm,broken_faces,kinetic_J,"
     "bond_strain_J,sphere_strain_J,gas_work_J,bond_dashpot_J,softening_J,release_J,slip_J,"
@@ -63,72 +58,11 @@ FILES = {
 }
 
 
-def start(name, *arguments):
-    """Run an experiment in a process of its own; two threads, output in pipes."""
-    line = [sys.executable, str(FOLDER / f"{name}.py"), "--threads", "2", *map(str, arguments)]
-    return subprocess.run(line, capture_output=True, text=True, timeout=1800)
+quick = quick_runs([name for name in NAMES if "damper" not in name])
 
 
-@pytest.fixture(scope="module", params=NAMES)
-def quick(request, tmp_path_factory):
-    """One quick run of an experiment: (name, folder, finished process)."""
-    folder = tmp_path_factory.mktemp(request.param)
-    return request.param, folder, start(request.param, "--quick", "--out", folder)
-
-
-def rows_of(path):
-    with open(path, newline="") as handle:
-        return list(csv.DictReader(handle))
-
-
-@pytest.mark.slow
-def test_quick_run_succeeds_and_keeps_the_pipe_clean(quick):
-    _, _, done = quick
-    assert done.returncode == 0, done.stderr
-    # No progress bar, no colours, no banner: nothing at all on stderr.
-    assert done.stderr == ""
-    assert "\x1b" not in done.stdout
-    assert "\r" not in done.stdout
-    assert len(done.stdout.splitlines()) > 5
-
-
-@pytest.mark.slow
-def test_quick_run_leaves_its_files_whole(quick):
-    name, folder, _ = quick
-    for file in (*FILES.get(name, ()), "summary.json"):
-        assert (folder / file).is_file(), file
-    assert not list(folder.rglob("*.part*"))
-
-
-@pytest.mark.slow
-def test_summary_keeps_the_contract(quick):
-    name, folder, _ = quick
-    summary = json.loads((folder / "summary.json").read_text())
-    assert summary["experiment"] == name
-    assert set(summary) >= {"experiment", "figures", "machine", "versions", "seconds"}
-    assert set(summary["seconds"]) == {"compile", "run"}
-    assert min(summary["seconds"].values()) > 0.0
-    assert {"taichi", "numpy", "python"} <= set(summary["versions"])
-    assert set(summary["figures"]) >= FIGURES.get(name, set())
-    for figure in summary["figures"].values():
-        assert set(figure) == {"value", "unit", "paper"}
-        assert math.isfinite(figure["value"])
-
-
-@pytest.mark.slow
-def test_pictures_are_neither_tiny_nor_empty(quick):
-    _, folder, _ = quick
-    for path in folder.glob("*.png"):
-        with Image.open(path) as image:
-            assert 400 <= image.width <= 2500, path.name
-            assert 300 <= image.height <= 2500, path.name
-            # A blank canvas has one colour.
-            assert len(np.unique(np.asarray(image.convert("L")))) > 20, path.name
-    for path in folder.glob("*.gif"):
-        with Image.open(path) as image:
-            assert 2 <= image.n_frames <= 41
-            assert max(image.size) <= 400
-        assert path.stat().st_size < 1_000_000
+class TestQuickRun(QuickRun):
+    figures, files = FIGURES, FILES
 
 
 @pytest.fixture(scope="module")
@@ -176,25 +110,6 @@ def test_diverging_run_names_body_and_step_and_keeps_the_last_good_output(
     assert not (tmp_path / "summary.json").exists()
 
 
-@pytest.fixture(scope="module")
-def main():
-    """``main(name, arguments)`` of an experiment inside this process; returns the exit code."""
-    sys.path.insert(0, str(FOLDER))
-    try:
-        import _cli
-
-        def run(name, arguments):
-            spec = importlib.util.spec_from_file_location(name, FOLDER / f"{name}.py")
-            module = importlib.util.module_from_spec(spec)
-            spec.loader.exec_module(module)
-            given = ["--threads", "2", *map(str, arguments)]
-            return _cli.main(module.run, module.options_parser(), given)
-
-        yield run
-    finally:
-        sys.path.remove(str(FOLDER))
-
-
 @pytest.fixture
 def bad_mesh(tmp_path):
     """Writes a file that is refused as the blast's mesh; returns its path."""
@@ -212,15 +127,6 @@ def bad_mesh(tmp_path):
         return path
 
     return write
-
-
-def assert_refused(code, captured, folder, *words):
-    assert code == 2
-    assert len(captured.err.splitlines()) == 1, captured.err
-    assert "Traceback" not in captured.err
-    for word in words:
-        assert word in captured.err
-    assert not os.path.exists(folder), "something was written"
 
 
 BAD_OPTIONS = [

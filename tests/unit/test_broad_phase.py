@@ -101,6 +101,42 @@ def test_waiting_impulses_survive_a_search():
         assert np.array_equal(kept[2 * place : 2 * place + 2], rows)
 
 
+def overlap_energy(simulation, born_after):
+    """Elastic energy [J] of the overlaps of listed spheres of which one is younger than a tick."""
+    model, motion = simulation.model, simulation.state.motion()
+    size, sphere = model.spheres_per_face, model.sphere.to_numpy()
+    exposed, energy = simulation.state.exposed_tick.to_numpy(), 0.0
+    for pair in listed(simulation):
+        body = [one // (4 * size) for one in pair]
+        place = [
+            motion["position"][i] + motion["rotation"][i] @ sphere[one, :3]
+            for i, one in zip(body, pair)
+        ]
+        gap = np.linalg.norm(place[1] - place[0]) - sphere[list(pair), 3].sum()
+        if max(exposed[one // size] for one in pair) > born_after:
+            energy += 0.5 * CONCRETE.contact_stiffness * max(0.0, -gap) ** 2
+    return energy
+
+
+def test_a_break_injects_the_energy_of_the_overlaps_that_it_brings_once():
+    """Faces that break now bring k d^2 / 2 an overlap; a second search at the tick nothing."""
+    simulation = scattered(2e-4, 0.02)
+    state, contacts = simulation.state, simulation.contacts
+    assert not contacts.pair_heat.to_numpy().any()
+    exposed = state.exposed_tick.to_numpy()
+    free = np.flatnonzero(exposed < 0)
+    exposed[free[: len(free) // 2]] = 7
+    state.exposed_tick.from_numpy(exposed)
+    state.tick[None] = 7
+    simulation.broad_phase.search()
+    wanted = overlap_energy(simulation, 0)
+    assert 0.0 < wanted < 0.9 * overlap_energy(simulation, -1)
+    for _ in range(2):
+        injected = contacts.pair_heat.to_numpy()[:, 2].sum()
+        assert injected == pytest.approx(wanted, rel=1e-9)
+        simulation.broad_phase.search()
+
+
 def neighbouring_faces(near):
     """Pairs of faces in the list of neighbours."""
     first, faces = near.first.to_numpy(), near.faces.to_numpy()[: near.first[near.model.body_count]]

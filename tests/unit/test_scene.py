@@ -38,6 +38,7 @@ REFUSED = {
     "no group": (lambda: scene(effects.GasPressure("hole")), "hole", "base"),
     "support group": (lambda: scene(effects.Fixed("wall")), "wall", "base"),
     "max_speed": (lambda: scene(max_speed=-1.0), "max_speed must be a positive", "-1.0"),
+    "max_speed zero": (lambda: scene(max_speed=0.0), "max_speed must be a positive", "0.0"),
     "max_speed NaN": (lambda: scene(max_speed=NAN), "max_speed must be a positive", "nan"),
     "peak": (lambda: effects.GasPressure(peak=-5.0), "peak must be a positive", "-5.0"),
     "rise": (lambda: effects.GasPressure(rise=NAN), "rise must be a positive", "nan"),

@@ -1,13 +1,14 @@
-"""One look for all pictures, and a writer that leaves no half-written file."""
+"""One look for all pictures of both packages."""
 
 import contextlib
-import os
 
 import matplotlib
+import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from PIL import Image
 
-from taichi_dem.errors import InputError
+from taichi_dem.files import write_whole
 
 STYLE = {
     "savefig.dpi": 150,
@@ -18,6 +19,7 @@ STYLE = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
+    "axes.axisbelow": True,
     "grid.alpha": 0.25,
     "grid.linewidth": 0.6,
     "legend.frameon": False,
@@ -29,36 +31,22 @@ STYLE = {
 
 #: Okabe and Ito's colours, told apart by colour-blind readers too.
 BLUE, RED, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
+ORANGE, SKY, BLACK, GREY = "#E69F00", "#56B4E9", "#222222", "#8A8A8A"
 
 
 @contextlib.contextmanager
 def picture(path, rows=1, columns=1, size=(6.4, 4.2), **options):
     """A figure and its axes in the common style, written as PNG when the block ends well.
 
-    size: in inches. options: of ``Figure.subplots``. The Agg canvas needs no display.
+    size: in inches. rows: 0 for no axes, which the block then makes. options: of
+    ``Figure.subplots``. The Agg canvas needs no display.
     Raises InputError when the file cannot be written.
     """
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=size, layout="constrained")
         FigureCanvasAgg(figure)
-        yield figure, figure.subplots(rows, columns, **options)
+        yield figure, figure.subplots(rows, columns, **options) if rows else None
         write_whole(path, lambda name: figure.savefig(name, format="png"))
-
-
-def write_whole(path, write):
-    """Write a file through ``write(name)`` under a temporary name, then rename it.
-
-    Raises InputError when the file cannot be written.
-    """
-    temporary = f"{path}.part"
-    try:
-        write(temporary)
-        os.replace(temporary, path)
-    except OSError as error:
-        raise InputError(f"cannot write {path}: {error.strerror or error}") from None
-    finally:
-        if os.path.exists(temporary):
-            os.remove(temporary)
 
 
 def seconds(value):
@@ -67,3 +55,20 @@ def seconds(value):
         if value >= size:
             return f"{value / size:.3g} {unit}"
     return f"{value / 1e-9:.3g} ns"
+
+
+def write_gif(path, images, milliseconds, colours=64, samples=8):
+    """Write RGB images as a GIF with one palette, made from some of them, evenly over the whole.
+
+    milliseconds: a frame. Raises InputError when the file cannot be written.
+    """
+    width, height = images[0].size
+    picked = np.linspace(0, len(images) - 1, samples).round().astype(int)
+    sheet = Image.new("RGB", (width, samples * height))
+    for row, index in enumerate(picked):
+        sheet.paste(images[index], (0, row * height))
+    # Median cut counts pixels, and nearly all are white: the octree keeps rare colours.
+    palette = sheet.quantize(colours, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+    reduced = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
+    options = {"append_images": reduced[1:], "duration": milliseconds, "loop": 0}
+    write_whole(path, lambda name: reduced[0].save(name, format="GIF", save_all=True, **options))

@@ -1,0 +1,35 @@
+"""The granular damper: a container of grains on a spring, by automaton or by spheres."""
+
+# First, out of order: it prepares the environment for ``import taichi``.
+from taichi_dem import runtime  # isort: skip
+
+from ca_damper.automaton import Automaton
+from ca_damper.batch import Batch
+from ca_damper.errors import InputError, SimulationDiverged
+from ca_damper.filling import Empty, RigidMass
+from ca_damper.oscillator import Oscillator
+from ca_damper.progress import Progress
+from ca_damper.record import film
+from ca_damper.response import Response, frequency_response
+from ca_damper.spheres import Spheres
+from ca_damper.sweep import Sweep, sweep_up_and_down
+from ca_damper.table import SceneTable
+
+__all__ = [
+    "Automaton",
+    "Batch",
+    "Empty",
+    "InputError",
+    "Oscillator",
+    "Progress",
+    "Response",
+    "RigidMass",
+    "SceneTable",
+    "SimulationDiverged",
+    "Spheres",
+    "Sweep",
+    "film",
+    "frequency_response",
+    "runtime",
+    "sweep_up_and_down",
+]

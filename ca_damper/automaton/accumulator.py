@@ -1,0 +1,60 @@
+"""What becomes of the way travelled when a particle turns: four readings of a rule left open.
+
+The paper says that way is summed up to a cell's width (eq. 8), not what a turn does to the sum.
+``signed`` takes the sum for a place: the way on along the new direction is what the old way has
+along it, so that a turn straight back changes its sign, and a wall sets it to where the wall
+stands, which is zero while the container does not move.
+``signed_through_walls`` leaves walls out, ``reset`` starts from zero at every turn, and ``kept``
+takes the sum over as it is.
+"""
+
+import taichi as ti
+
+READINGS = ("signed", "signed_through_walls", "reset", "kept")
+
+
+@ti.data_oriented
+class Accumulator:
+    """One of the readings."""
+
+    def __init__(self, reading, lattice):
+        self.reading, self.lattice = reading, lattice
+
+    @ti.func
+    def turned(self, travelled, old, new):
+        """Way travelled [m] after a turn from direction old to new."""
+        result = travelled
+        if ti.static(self.reading.startswith("signed")):
+            result = travelled * self.lattice.cosine[old, new]
+        elif ti.static(self.reading == "reset"):
+            if old != new:
+                result = 0.0
+        return result
+
+    @ti.func
+    def after_wall(self, travelled, old, new, place):
+        """Way travelled [m] after meeting a wall that stands ``place`` [m] above its cells."""
+        result = self.at_wall(new, place)
+        if ti.static(self.reading != "signed"):
+            result = self.turned(travelled, old, new)
+        return result
+
+    @ti.func
+    def at_wall(self, kind, place):
+        """Way travelled [m] of a particle that leaves a wall."""
+        result = 0.0
+        if ti.static(self.reading == "signed"):
+            result = place * self.lattice.upward(kind)
+        return result
+
+    @ti.func
+    def ahead_of_wall(self, travelled, kind, way, width):
+        """Way travelled [m] of a particle that flies ahead of a wall that pushes its cell along.
+
+        Whoever flies straight (up for way 1, down for -1) keeps its place in the room.
+        """
+        result = 0.0
+        if ti.static(self.reading == "signed"):
+            if self.lattice.upward(kind) * way == 1.0:
+                result = max(travelled - width, -width)
+        return result

@@ -1,0 +1,108 @@
+"""The automaton on the device: the one order in which its rules act."""
+
+import numpy as np
+import taichi as ti
+
+from ca_damper.automaton.ejection import Ejection
+from ca_damper.automaton.encounters import Encounters
+from ca_damper.automaton.flight import Flight
+from ca_damper.automaton.ledger import GRAVITY, QUANTUM
+from ca_damper.automaton.parts import assembled
+from ca_damper.automaton.placement import DrawnCells, NamedCells
+from ca_damper.filling import Action
+from ca_damper.lattice import DIRECTIONS, EMPTY, HELD, WALL, unit_vectors
+from ca_damper.random_numbers import stream
+
+
+@ti.data_oriented
+class BoundAutomaton:
+    """Automata of all scenes of a table; the protocol is in ``ca_damper.filling``."""
+
+    def __init__(self, options, table):
+        parts = assembled(options, table)
+        self.table, self.numbers, self.lattice = table, parts.numbers, parts.lattice
+        self.cells, self.rivals, self.accounting = parts.cells, parts.rivals, parts.accounting
+        self.resting, self.ledger = parts.resting, parts.ledger
+        self.flight, self.ejection = Flight(parts), Ejection(parts)
+        both, pairs_first = options.pair_rule == "both", options.priority == "pairs_first"
+        self.encounters = Encounters(parts, both, pairs_first)
+        self.placement = DrawnCells(self.cells, table)
+        if options.start is not None:
+            self.placement = NamedCells(self.cells, options.start)
+        self.velocity = ti.field(ti.f64, shape=table.count)
+        for loaded in (self.lattice, self.numbers, self.placement):
+            loaded.load()
+
+    @ti.func
+    def reset(self, s):
+        """Particles at rest in their first cells, headed down."""
+        self.cells.clear(s)
+        self.rivals.clear(s)
+        self.resting.clear(s)
+        self.accounting.clear(s)
+        self.placement.place(s)
+        self.velocity[s] = 0.0
+
+    @ti.func
+    def act(self, s, step, motion):
+        """One step: the walls move, particles fly, meet, and change cells."""
+        pull = self.numbers.gravity[None] * self.table.dt[s]
+        shared = stream(self.table.seed[s], step)
+        self.velocity[s] = motion.v
+        pressed = motion.a > -self.numbers.gravity[None]
+        gained = self.ejection.follow(s, step, motion)
+        if not pressed:
+            self.resting.release(s, motion.v)
+        contacts, due, oblique = self.flight.fly_all(
+            s, self.table.dt[s], pull, self.encounters.contacts
+        )
+        gained += self.encounters.happen(s, step, shared, contacts, motion.v, pull, pressed)
+        # On an oblique flight gravity acts by a quarter: what it lacks, the lattice holds.
+        gained += self.accounting.lattice_gave(s, GRAVITY, 0.75 * pull * oblique)
+        self.flight.move_all(s, step, shared, due)
+        mass = self.numbers.mass[None]
+        return Action(-mass * QUANTUM * ti.cast(gained, ti.f64), mass * self.resting.count(s))
+
+    @ti.func
+    def energy(self, s):
+        """Kinetic and potential energy [J]; what is held moves as the container did last."""
+        total = 0.0
+        for cell in range(self.lattice.cells):
+            kind = self.cells.at(s, cell)
+            if kind != EMPTY and kind != WALL:
+                speed = self.velocity[s] if kind == HELD else self.cells.speed[s, cell]
+                height = self.lattice.height_of(cell) * self.numbers.width[None]
+                height += self.cells.travelled[s, cell] * self.lattice.upward(kind)
+                total += 0.5 * speed * speed + self.numbers.gravity[None] * height
+        return self.numbers.mass[None] * total
+
+    @ti.func
+    def momentum(self, s):
+        """Momentum along x [kg m/s]; what is held moves as the container did last."""
+        total = self.resting.count(s) * self.velocity[s]
+        for cell in range(self.lattice.cells):
+            total += self.cells.vertical_speed(s, cell)
+        return self.numbers.mass[None] * total
+
+    @ti.func
+    def health(self, s):
+        """1 when a particle needs more than one cell a step, which no rule gives it."""
+        fastest = 0.0
+        for cell in range(self.lattice.cells):
+            fastest = max(fastest, self.cells.speed[s, cell])
+        return 0 if fastest * self.table.dt[s] < self.numbers.width[None] else 1
+
+    def snapshot(self, s):
+        """Positions and velocities of the particles, by cell (see ``ca_damper.filling``)."""
+        kind = self._row(self.cells.kind, s)
+        flying, present = kind < DIRECTIONS, (kind != EMPTY) & (kind != WALL)
+        way = np.zeros((len(kind), 2))
+        way[flying] = unit_vectors()[kind[flying]]
+        position = self.lattice.geometry.centres(self.numbers.width[None])
+        position = position + way * self._row(self.cells.travelled, s)[:, None]
+        velocity = way * self._row(self.cells.speed, s)[:, None]
+        velocity[kind == HELD, 1] = self.velocity[s]
+        return {"position": position[present], "velocity": velocity[present]}
+
+    def _row(self, field, s):
+        return np.array([field[s, cell] for cell in range(self.lattice.cells)])

@@ -1,0 +1,116 @@
+"""The container's steps on the lattice, and whom its walls push along (Komatsuzaki et al., Fig. 7).
+
+The lattice goes with the container, whose displacement is rounded to whole cells. When that
+staircase steps, particles under way stay where they are in the room: one cell the other way. Those
+that touch the wall behind them, and the cluster that touches these, are pushed along: they keep
+their cell, and those slower than the wall take its velocity. A column always has room for it: what
+stays in the room has nothing pushed in its way, or it would touch it and be pushed.
+"""
+
+import taichi as ti
+
+from ca_damper.lattice import DIRECTIONS, DOWN, HELD, UP
+
+
+@ti.data_oriented
+class Ejection:
+    """Follow the container's staircase.
+
+    pushed: 1 for a cell in the cluster, shape
+    (scenes, cells + 1). border: cells of the cluster still to look around, shape (scenes, cells).
+    """
+
+    def __init__(self, parts):
+        self.cells, self.lattice, self.numbers = parts.cells, parts.lattice, parts.numbers
+        self.accumulator, self.accounting = parts.accumulator, parts.accounting
+        scenes, size = self.cells.kind.shape
+        self.pushed = ti.field(ti.i8, shape=(scenes, size))
+        self.border = ti.field(ti.i16, shape=(scenes, size))
+
+    @ti.func
+    def follow(self, s, step, motion):
+        """Take the staircase along; returns counted gain of velocity along x [quanta]."""
+        width = self.numbers.width[None]
+        stair = ti.cast(ti.floor(motion.x / width + 0.5), ti.i32)
+        way = 0
+        if step == 0:
+            self.cells.stair[s] = stair
+        elif stair > self.cells.stair[s]:
+            way = 1
+        elif stair < self.cells.stair[s]:
+            way = -1
+        self.cells.stair[s] += way
+        self.cells.offset[s] = motion.x - width * self.cells.stair[s]
+        gained = ti.cast(0, ti.i64)
+        if way != 0:
+            gained = self.advance(s, way, motion.v)
+        return gained
+
+    @ti.func
+    def advance(self, s, way, velocity):
+        """One cell up (way 1) or down (-1); returns counted gain of velocity along x [quanta]."""
+        self.mark(s, way)
+        gained = ti.cast(0, ti.i64)
+        for k in range(self.cells.traversal.size(s)):
+            cell = self.cells.traversal.cell(s, k)
+            if self.pushed[s, cell] == 1 and self.cells.at(s, cell) != HELD:
+                gained += self.push(s, cell, way, velocity)
+        self.shift(s, way)
+        self.cells.traversal.sort(s, self.cells)
+        return gained
+
+    @ti.func
+    def mark(self, s, way):
+        """Mark the particles that touch the wall behind and all that hang together with them."""
+        size = 0
+        for cell in range(self.lattice.cells + 1):
+            self.pushed[s, cell] = ti.cast(0, ti.i8)
+        for column in range(self.lattice.columns):
+            row = 0 if way > 0 else self.lattice.rows - 1
+            size = self.reach(s, self.lattice.cell_of(column, row), way, size)
+        while size > 0:
+            size -= 1
+            cell = ti.cast(self.border[s, size], ti.i32)
+            for direction in range(DIRECTIONS):
+                size = self.reach(s, self.lattice.ahead(cell, direction), way, size)
+
+    @ti.func
+    def reach(self, s, cell, way, size):
+        """Mark a particle, unless it is, and put it on the border; returns the border's new size.
+
+        The floor pushes through the heap that it holds; the ceiling pushes against no heap.
+        """
+        result = size
+        kind = self.cells.at(s, cell)
+        found = kind < DIRECTIONS or (kind == HELD and way > 0)
+        if found and self.pushed[s, cell] == 0:
+            self.pushed[s, cell] = ti.cast(1, ti.i8)
+            self.border[s, size] = ti.cast(cell, ti.i16)
+            result = size + 1
+        return result
+
+    @ti.func
+    def push(self, s, cell, way, velocity):
+        """Push one particle along; returns its counted gain of velocity along x [quanta]."""
+        kind = self.cells.at(s, cell)
+        gain = velocity - self.cells.vertical_speed(s, cell)
+        if gain * way > 0.0:
+            kind = UP if velocity > 0.0 else DOWN
+            travelled = self.accumulator.at_wall(kind, self.cells.offset[s])
+            self.cells.put(s, cell, kind, abs(velocity), travelled)
+        else:
+            gain = 0.0
+            self.cells.travelled[s, cell] = self.accumulator.ahead_of_wall(
+                self.cells.travelled[s, cell], kind, way, self.numbers.width[None]
+            )
+        return self.accounting.push(s, gain)
+
+    @ti.func
+    def shift(self, s, way):
+        """Let all others stay in the room: one cell the other way, those in front first."""
+        for column in range(self.lattice.columns):
+            for k in range(self.lattice.rows):
+                row = k if way > 0 else self.lattice.rows - 1 - k
+                cell = self.lattice.cell_of(column, row)
+                if self.cells.at(s, cell) < DIRECTIONS and self.pushed[s, cell] == 0:
+                    self.cells.relocate(s, cell, cell - way, self.cells.travelled[s, cell])

@@ -1,0 +1,173 @@
+"""Which particles meet what in a step, and what comes of it (Komatsuzaki et al., 5.3 and 5.4).
+
+First every touching particle is judged by the state after the flight: does it join the heap, meet
+a wall, or approach another particle? Rivals claim the particles they need, so that no particle has
+part in two events of a step. Then the winners act; no two of them touch the same particle.
+"""
+
+import taichi as ti
+
+from ca_damper.automaton.laws import deflected, speed_after_pair, speed_after_wall
+from ca_damper.automaton.ledger import PAIRS, quanta
+from ca_damper.automaton.rivals import ahead_of_others, rank
+from ca_damper.lattice import EMPTY, WALL, mirrored, turned_back
+from ca_damper.random_numbers import DEFLECT, EVENT, bits, unit
+
+NOTHING, JOIN, FLOOR, SIDE, PAIR = range(5)
+_CELL_BITS = 16
+
+
+@ti.data_oriented
+class Encounters:
+    """Judge and carry out the events of a step.
+
+    contacts: cells of touching particles, then cell and event in one number, shape (scenes, cells).
+    other: speed of what is met, along the direction of the particle that meets it [m/s].
+    ranks: of the events among their rivals.
+    both: whether both of a pair are updated. pairs_first: whether pairs come before walls.
+    """
+
+    def __init__(self, parts, both, pairs_first):
+        self.cells, self.lattice, self.rivals = parts.cells, parts.lattice, parts.rivals
+        self.accumulator, self.resting = parts.accumulator, parts.resting
+        self.accounting, self.numbers = parts.accounting, parts.numbers
+        self.both, self.pairs_first = both, pairs_first
+        shape = (self.cells.kind.shape[0], self.lattice.cells)
+        self.contacts = ti.field(ti.i32, shape=shape)
+        self.other = ti.field(ti.f64, shape=shape)
+        self.ranks = ti.field(ti.i64, shape=shape)
+
+    @ti.func
+    def happen(self, s, step, shared, count, velocity, pull, pressed):
+        """All events of a step; returns velocity along x that counted blows gave [quanta].
+
+        velocity: of the container [m/s]. pull: g dt [m/s].
+        """
+        events = self.judge_all(s, step, shared, count, velocity, pull, pressed)
+        gained = ti.cast(0, ti.i64)
+        for k in range(events):
+            entry = self.contacts[s, k]
+            cell, event = entry & ((1 << _CELL_BITS) - 1), entry >> _CELL_BITS
+            if self.wins(s, cell, event, self.ranks[s, k]):
+                gained += self.act(s, shared, cell, event, self.other[s, k], velocity, pull)
+        return gained
+
+    @ti.func
+    def judge_all(self, s, step, shared, count, velocity, pull, pressed):
+        """Keep those of the contacts in which something happens; returns their number."""
+        events = 0
+        for k in range(count):
+            cell = self.contacts[s, k]
+            event, other = self.judge(s, cell, velocity, pull, pressed)
+            if event != NOTHING:
+                self.contacts[s, events] = cell | (event << _CELL_BITS)
+                self.other[s, events] = other
+                ranked = rank(step, shared, cell, EVENT)
+                if ti.static(self.pairs_first):
+                    if event == PAIR:
+                        ranked = ahead_of_others(ranked)
+                self.ranks[s, events] = ranked
+                self.claim(s, cell, event, ranked)
+                events += 1
+        return events
+
+    @ti.func
+    def judge(self, s, cell, velocity, pull, pressed):
+        """What happens to a particle, and the speed of what it meets."""
+        kind = self.cells.at(s, cell)
+        ahead = self.lattice.ahead(cell, kind)
+        met = self.cells.at(s, ahead)
+        event, other = PAIR, self.cells.speed[s, ahead] * self.lattice.cosine[met, kind]
+        if met >= WALL:
+            event, other = FLOOR, velocity * self.lattice.upward(kind)
+            if met == WALL and self.lattice.in_side_wall(ahead):
+                event, other = SIDE, 0.0
+        if self.cells.speed[s, cell] <= other or met == EMPTY:
+            event = NOTHING
+        if self.resting.caught(s, cell, velocity):
+            event, other = FLOOR, velocity
+        if self.resting.joins(s, cell, velocity, pull, pressed):
+            event = JOIN
+        return event, other
+
+    @ti.func
+    def claim(self, s, cell, event, ranked):
+        """Claim the particles that an event changes."""
+        if ti.static(self.both):
+            self.rivals.claim(s, cell, ranked)
+            if event == PAIR:
+                self.rivals.claim(s, self.lattice.ahead(cell, self.cells.at(s, cell)), ranked)
+
+    @ti.func
+    def wins(self, s, cell, event, ranked):
+        """Whether the event takes place; where each particle updates itself only, it does."""
+        result = True
+        if ti.static(self.both):
+            result = self.rivals.holds(s, cell, ranked)
+            if event == PAIR and result:
+                ahead = self.lattice.ahead(cell, self.cells.at(s, cell))
+                result = self.rivals.holds(s, ahead, ranked)
+        return result
+
+    @ti.func
+    def act(self, s, shared, cell, event, other, velocity, pull):
+        """Carry out an event; returns the counted gain of velocity along x [quanta]."""
+        before = self.cells.vertical_speed(s, cell)
+        gained = ti.cast(0, ti.i64)
+        if event == PAIR:
+            gain = self.collide(s, shared, cell, other)
+            gained = self.accounting.lattice_gave(s, PAIRS, gain)
+        elif event == JOIN:
+            # The container carries the particle over this whole step, its weight with it.
+            gained = quanta(velocity - before - pull)
+            self.resting.hold(s, cell)
+        else:
+            self.rebound(s, cell, event, other)
+            gain = self.cells.vertical_speed(s, cell) - before
+            gained = self.accounting.blow(s, cell, gain)
+        return gained
+
+    @ti.func
+    def rebound(self, s, cell, event, wall):
+        """Meet a wall or the heap: side walls mirror, all else sends straight back (5.4)."""
+        kind = self.cells.at(s, cell)
+        speed = speed_after_wall(self.cells.speed[s, cell], wall, self.numbers.wall[None])
+        back = turned_back(kind)
+        if event == SIDE:
+            back = mirrored(kind)
+        after = back if speed < 0.0 else kind
+        # Side walls do not move; the place of the others is that of the floor.
+        place = 0.0 if event == SIDE else self.cells.offset[s]
+        travelled = self.accumulator.after_wall(self.cells.travelled[s, cell], kind, after, place)
+        self.cells.put(s, cell, after, abs(speed), travelled)
+
+    @ti.func
+    def collide(self, s, shared, cell, other):
+        """Two particles meet along the line from ``cell`` to what is ahead of it (eq. 9).
+
+        Returns the gain of velocity along x that is not theirs: of the deflections, and of what one
+        that came from aside had across the line [m/s].
+        """
+        line = self.cells.at(s, cell)
+        speed = self.cells.speed[s, cell]
+        restitution = self.numbers.particle[None]
+        ahead = self.lattice.ahead(cell, line)
+        before = self.cells.vertical_speed(s, cell) + self.cells.vertical_speed(s, ahead)
+        self.go_on(s, shared, cell, line, speed_after_pair(speed, other, restitution))
+        if ti.static(self.both):
+            self.go_on(s, shared, ahead, line, speed_after_pair(other, speed, restitution))
+        after = self.cells.vertical_speed(s, cell) + self.cells.vertical_speed(s, ahead)
+        return after - before
+
+    @ti.func
+    def go_on(self, s, shared, cell, line, speed):
+        """Give a particle its speed along a line; one that came along it is deflected if sent back.
+
+        One that came from aside leaves along the line, which keeps the momentum in it.
+        """
+        kind = self.cells.at(s, cell)
+        after = line if speed >= 0.0 else turned_back(line)
+        if turned_back(after) == kind:
+            after = deflected(kind, unit(bits(shared, cell, DEFLECT)))
+        travelled = self.accumulator.turned(self.cells.travelled[s, cell], kind, after)
+        self.cells.put(s, cell, after, abs(speed), travelled)

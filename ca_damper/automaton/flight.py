@@ -1,0 +1,93 @@
+"""Free flight and the step into the next cell (Komatsuzaki et al., 5.2)."""
+
+import taichi as ti
+
+from ca_damper.automaton.rivals import rank
+from ca_damper.lattice import DOWN, EMPTY
+from ca_damper.random_numbers import MOVE
+
+
+@ti.data_oriented
+class Flight:
+    """Gravity, way, and which particles have something ahead or a cell to change.
+
+    due: cells of particles that may change their cell, shape (scenes, cells).
+    """
+
+    def __init__(self, parts):
+        self.cells, self.lattice, self.rivals = parts.cells, parts.lattice, parts.rivals
+        self.accumulator, self.resting = parts.accumulator, parts.resting
+        self.accounting, self.numbers = parts.accounting, parts.numbers
+        self.due = ti.field(ti.i16, shape=(self.cells.kind.shape[0], self.lattice.cells))
+
+    @ti.func
+    def fly_all(self, s, dt, pull, contacts: ti.template()):
+        """One step of all particles.
+
+        Returns how many touch something, how many may move on, and how many fly obliquely.
+        """
+        contact_count, due_count, oblique = 0, 0, 0
+        for k in range(self.cells.traversal.size(s)):
+            cell = self.cells.traversal.cell(s, k)
+            touches, free, upward = self.fly(s, cell, dt, pull)
+            if touches:
+                contacts[s, contact_count] = cell
+                contact_count += 1
+            if free:
+                self.due[s, due_count] = ti.cast(cell, ti.i16)
+                due_count += 1
+            if ti.static(self.accounting.asks_for_lattice):
+                if upward * upward == 0.25:
+                    oblique += 1
+        return contact_count, due_count, oblique
+
+    @ti.func
+    def fly(self, s, cell, dt, pull):
+        """One step of what stands in a cell.
+
+        Gravity acts by its projection. A particle that has risen as far as it can turns straight
+        down. Empty cells and walls go the same way: their speed and their pull are zero.
+        Returns whether it touches something, whether it may move on, and the vertical part of the
+        direction in which gravity found it.
+        """
+        kind = self.cells.at(s, cell)
+        upward = self.lattice.upward(kind)
+        speed = self.cells.speed[s, cell] - pull * upward
+        travelled = self.cells.travelled[s, cell]
+        if speed < 0.0:
+            # Of an oblique flight only the vertical part is left: momentum along x is kept.
+            speed = -speed * upward
+            travelled = self.accumulator.turned(travelled, kind, DOWN)
+            kind = DOWN
+            self.cells.kind[s, cell] = ti.cast(DOWN, ti.i8)
+        travelled += speed * dt
+        due = travelled >= self.numbers.width[None]
+        blocked = self.cells.at(s, self.lattice.ahead(cell, kind)) != EMPTY
+        if blocked and due:
+            # No particle gets deeper into another than where the next step frees it.
+            travelled = self.numbers.width[None]
+        self.cells.speed[s, cell] = speed
+        self.cells.travelled[s, cell] = travelled
+        touches = blocked or self.resting.noticed(s, cell, kind)
+        return touches, due and not blocked, upward
+
+    @ti.func
+    def move_all(self, s, step, shared, due_count):
+        """Let the particles that are due change cells, one of the claimants for each cell."""
+        claimants = 0
+        for k in range(due_count):
+            cell = ti.cast(self.due[s, k], ti.i32)
+            # A collision may have turned it since.
+            if self.cells.travelled[s, cell] >= self.numbers.width[None]:
+                target = self.lattice.ahead(cell, self.cells.at(s, cell))
+                if self.cells.at(s, target) == EMPTY:
+                    self.rivals.claim(s, target, rank(step, shared, cell, MOVE))
+                    self.due[s, claimants] = ti.cast(cell, ti.i16)
+                    claimants += 1
+        for k in range(claimants):
+            cell = ti.cast(self.due[s, k], ti.i32)
+            target = self.lattice.ahead(cell, self.cells.at(s, cell))
+            if self.rivals.holds(s, target, rank(step, shared, cell, MOVE)):
+                left = self.cells.travelled[s, cell] - self.numbers.width[None]
+                self.cells.relocate(s, cell, target, left)
+                self.accounting.arrive(s, target)

@@ -1,0 +1,150 @@
+"""What a user chooses about the automaton."""
+
+from dataclasses import dataclass
+from numbers import Integral
+
+from ca_damper.automaton.accumulator import READINGS
+from ca_damper.automaton.bound import BoundAutomaton
+from ca_damper.automaton.rivals import MOST_CELLS
+from taichi_dem.checks import choice, fraction, positive, whole
+from taichi_dem.errors import InputError
+
+ACCOUNTINGS = {"landing": "ca_landing", "landing+ejection": "ca_ejection", "static": "ca_static"}
+
+
+@dataclass(frozen=True)
+class Automaton:
+    """Particles as a cellular automaton (Komatsuzaki et al., section 5).
+
+    accounting: what acts on the container: "landing" (particles that meet a wall),
+    "landing+ejection" (also those that a wall pushes along), "static" (both, and the heap that
+    lies on the floor). restitution: between particles; wall_restitution: between particle and
+    wall. pair_rule: "both" of a pair change and momentum stays in its line, or "one_sided" as
+    printed: each that looks at another changes alone. priority: of the events of a particle, at
+    "random" or "pairs_first". accumulator: what a turn does to the way travelled, one of
+    accumulator.READINGS. static_threshold: relative speed below which a particle rests on the
+    heap, in units of g dt. width: of a cell, the diameter of a particle [m]. columns, rows: cells
+    inside the walls. particle_mass [kg], gravity [m/s^2]. v_max: fastest particle to expect [m/s];
+    it bounds the step, dt < width / v_max. start: (column, row) of every particle, counted from 0
+    at the lower left; cells are drawn from the seed if None. traversal: "list" of particles or
+    "scan" of all cells, same bits. ledger: write down where uncounted momentum goes.
+    Raises InputError for what is not allowed.
+    """
+
+    accounting: str = "static"
+    restitution: float = 0.75
+    wall_restitution: float = 0.75
+    pair_rule: str = "both"
+    priority: str = "random"
+    accumulator: str = "signed"
+    static_threshold: float = 5.0
+    width: float = 6e-3
+    columns: int = 10
+    rows: int = 16
+    particle_mass: float = 0.2e-3
+    gravity: float = 10.0
+    v_max: float = 5.0
+    start: tuple = None
+    traversal: str = "list"
+    ledger: bool = False
+
+    def __post_init__(self):
+        choice("accounting", self.accounting, ACCOUNTINGS)
+        choice("pair_rule", self.pair_rule, ("both", "one_sided"))
+        choice("priority", self.priority, ("random", "pairs_first"))
+        choice("accumulator", self.accumulator, READINGS)
+        choice("traversal", self.traversal, ("list", "scan"))
+        for name in ("restitution", "wall_restitution"):
+            fraction(name, getattr(self, name))
+        for name in ("width", "particle_mass", "v_max"):
+            positive(name, getattr(self, name))
+        for name in ("gravity", "static_threshold"):
+            positive(name, getattr(self, name), zero_allowed=True)
+        self._check_rules()
+        self._check_lattice()
+
+    def _check_rules(self):
+        if not isinstance(self.ledger, bool):
+            raise InputError(f"ledger must be True or False, got {self.ledger!r}")
+        if self.ledger and self.accounting == "static":
+            raise InputError(
+                "ledger must be False with accounting 'static', where everything acts on the "
+                "container and nothing is left to write down, got True"
+            )
+        if self.pair_rule == "one_sided" and self.priority != "random":
+            raise InputError(
+                "priority must be 'random' with pair_rule 'one_sided', where each particle changes "
+                f"alone and no two events compete, got {self.priority!r}"
+            )
+
+    def _check_lattice(self):
+        for name in ("columns", "rows"):
+            whole(name, getattr(self, name), 1, MOST_CELLS)
+        cells = (self.columns + 2) * (self.rows + 2)
+        if cells >= MOST_CELLS:
+            raise InputError(
+                f"columns and rows must make fewer than {MOST_CELLS} cells with the walls, "
+                f"got {self.columns} x {self.rows}"
+            )
+        if self.start is not None:
+            object.__setattr__(self, "start", self._checked_start())
+
+    def _checked_start(self):
+        if not isinstance(self.start, (tuple, list)):
+            raise InputError(f"start must be a tuple of (column, row), got {self.start!r}")
+        cells = [tuple(cell) if isinstance(cell, (tuple, list)) else cell for cell in self.start]
+        for cell in cells:
+            if not (isinstance(cell, tuple) and len(cell) == 2 and self._inside(*cell)):
+                raise InputError(
+                    f"start must hold (column, row) from (0, 0) to ({self.columns - 1}, "
+                    f"{self.rows - 1}), got {cell!r}"
+                )
+        if len(set(cells)) < len(cells):
+            raise InputError(f"start must not name a cell twice, got {self.start!r}")
+        return tuple(cells)
+
+    def _inside(self, column, row):
+        whole_numbers = isinstance(column, Integral) and isinstance(row, Integral)
+        return whole_numbers and 0 <= column < self.columns and 0 <= row < self.rows
+
+    @property
+    def label(self):
+        """Short word for tables and files."""
+        return ACCOUNTINGS[self.accounting]
+
+    @property
+    def default_dt(self):
+        """The paper's step, 1e-4 s."""
+        return 1e-4
+
+    @property
+    def capacity(self):
+        """Most particles that fit: one a cell."""
+        return self.columns * self.rows
+
+    @property
+    def longest_dt(self):
+        """Step that a particle at v_max would need for a whole cell [s]."""
+        return self.width / self.v_max
+
+    def check(self, particles, dt):
+        """InputError unless so many particles fit and the step is shorter than width / v_max."""
+        whole("particles", particles, 0, self.capacity)
+        if self.start is not None and particles != len(self.start):
+            raise InputError(
+                f"particles must be {len(self.start)}, the cells named by start, got {particles}"
+            )
+        positive("dt", dt)
+        if not dt < self.longest_dt:
+            raise InputError(
+                f"dt must lie in (0, {self.longest_dt:g}) s, in which no particle crosses a cell "
+                f"of {self.width:g} m at v_max = {self.v_max:g} m/s, got {dt:g}"
+            )
+
+    def divergence(self, code, particles, dt):
+        """What the one code of ``health`` means, and a step that would do [s]."""
+        return "holds a particle faster than one cell a step", 0.2 * dt
+
+    def bind(self, table):
+        """The automaton on the device, for all scenes of a SceneTable."""
+        return BoundAutomaton(self, table)

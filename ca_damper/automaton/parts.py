@@ -1,0 +1,88 @@
+"""What the rules of an automaton share."""
+
+from dataclasses import dataclass
+
+import taichi as ti
+
+from ca_damper.automaton.accounting import Everything, Landings
+from ca_damper.automaton.accumulator import Accumulator
+from ca_damper.automaton.ledger import Ledger, NoLedger
+from ca_damper.automaton.rivals import Rivals
+from ca_damper.automaton.state import Cells
+from ca_damper.automaton.static_contact import NoStaticContact, StaticContact
+from ca_damper.automaton.traversal import ParticleList, Scan
+from ca_damper.lattice import Geometry, Lattice
+
+
+@ti.data_oriented
+class Numbers:
+    """Numbers that kernels read; in fields, so that another value compiles nothing anew.
+
+    width of a cell [m], mass of a particle [kg], gravity [m/s^2], restitution of particle and wall;
+    threshold of static contact in units of g dt.
+    """
+
+    def __init__(self, options):
+        self.options = options
+        for name in ("width", "mass", "gravity", "particle", "wall", "threshold"):
+            setattr(self, name, ti.field(ti.f64, shape=()))
+
+    def load(self):
+        """Take the values from the options."""
+        options = self.options
+        self._load(options.width, options.particle_mass, options.gravity)
+        self._load_collisions(
+            options.restitution, options.wall_restitution, options.static_threshold
+        )
+
+    @ti.kernel
+    def _load(self, width: ti.f64, mass: ti.f64, gravity: ti.f64):
+        self.width[None], self.mass[None], self.gravity[None] = width, mass, gravity
+
+    @ti.kernel
+    def _load_collisions(self, particle: ti.f64, wall: ti.f64, threshold: ti.f64):
+        self.particle[None], self.wall[None] = particle, wall
+        self.threshold[None] = threshold
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """State and choices of an automaton, put together by ``assembled``."""
+
+    numbers: Numbers
+    lattice: Lattice
+    cells: Cells
+    rivals: Rivals
+    accumulator: Accumulator
+    accounting: object
+    resting: object
+    ledger: object
+
+
+def assembled(options, table):
+    """The parts that a user's options ask for; what they leave out is neither stored nor asked."""
+    scenes = table.count
+    static = options.accounting == "static"
+    lattice = Lattice(Geometry(options.columns, options.rows))
+    traversal = (Scan if options.traversal == "scan" else ParticleList)(lattice, table)
+    ledger = Ledger(scenes) if options.ledger else NoLedger()
+    accounting = Everything()
+    if not static:
+        pushes = options.accounting == "landing+ejection"
+        accounting = Landings(lattice, scenes, ledger, pushes)
+    cells = Cells(lattice, traversal, accounting, scenes)
+    numbers = Numbers(options)
+    accumulator = Accumulator(options.accumulator, lattice)
+    resting = NoStaticContact()
+    if static:
+        resting = StaticContact(cells, accumulator, numbers)
+    return Parts(
+        numbers=numbers,
+        lattice=lattice,
+        cells=cells,
+        rivals=Rivals(lattice, scenes),
+        accumulator=accumulator,
+        accounting=accounting,
+        resting=resting,
+        ledger=ledger,
+    )

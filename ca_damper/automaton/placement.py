@@ -1,0 +1,63 @@
+"""Where the particles of a scene stand at its start."""
+
+import numpy as np
+import taichi as ti
+
+from ca_damper.lattice import DOWN
+from ca_damper.random_numbers import START, uniform
+
+
+@ti.data_oriented
+class DrawnCells:
+    """Cells drawn from the scene's seed, every choice of them equally likely.
+
+    A full row would fall as one lump. Each cell is taken with the probability needed / left
+    (selection sampling, Knuth, The Art of Computer Programming 2, 3.4.2).
+    """
+
+    def __init__(self, cells, table):
+        self.cells, self.lattice, self.table = cells, cells.lattice, table
+
+    def load(self):
+        """Nothing to load."""
+
+    @ti.func
+    def place(self, s):
+        """Put the particles of scene s into its cells, at rest."""
+        placed, count = 0, self.table.particles[s]
+        left = self.lattice.columns * self.lattice.rows
+        for column in range(self.lattice.columns):
+            for row in range(self.lattice.rows):
+                cell = self.lattice.cell_of(column, row)
+                if left * uniform(self.table.seed[s], 0, cell, START) < count - placed:
+                    self.cells.put(s, cell, DOWN, 0.0, 0.0)
+                    self.cells.traversal.placed(s, placed, cell)
+                    placed += 1
+                left -= 1
+
+
+@ti.data_oriented
+class NamedCells:
+    """Cells named by the user, the same in every scene."""
+
+    def __init__(self, cells, named):
+        self.cells, self.count = cells, len(named)
+        geometry = cells.lattice.geometry
+        self.chosen = np.array([geometry.cell_of(*cell) for cell in named], dtype=np.int32)
+        self.named = ti.field(ti.i32, shape=max(1, self.count))
+
+    def load(self):
+        """Take over the user's cells."""
+        self._load(self.chosen)
+
+    @ti.kernel
+    def _load(self, chosen: ti.types.ndarray(dtype=ti.i32, ndim=1)):
+        for k in range(self.count):
+            self.named[k] = chosen[k]
+
+    @ti.func
+    def place(self, s):
+        """Put the particles of scene s into the cells, at rest."""
+        for k in range(self.count):
+            self.cells.put(s, self.named[k], DOWN, 0.0, 0.0)
+            self.cells.traversal.placed(s, k, self.named[k])

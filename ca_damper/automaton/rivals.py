@@ -1,0 +1,53 @@
+"""Who comes first where only one can: the largest random rank among all that claim a cell.
+
+The largest of several does not depend on the order in which they are asked. Ranks grow with the
+step, so that old claims never need to be cleared.
+"""
+
+import taichi as ti
+
+from ca_damper.random_numbers import bits
+
+#: Room for cell numbers in a rank.
+MOST_CELLS = 1 << 12
+
+
+@ti.func
+def rank(step, shared, cell, purpose: ti.template()):
+    """Rank of a claimant (i64): step, then 19 random bits, then its cell so that no two are equal.
+
+    shared: hash of seed and step.
+    """
+    chance = ti.cast((bits(shared, cell, purpose) >> 13) << 12, ti.i64)
+    return (ti.cast(step + 1, ti.i64) << 32) | chance | ti.cast(cell, ti.i64)
+
+
+@ti.func
+def ahead_of_others(ranked):
+    """The rank above all that are drawn in the same step."""
+    return ranked | (ti.cast(1, ti.i64) << 31)
+
+
+@ti.data_oriented
+class Rivals:
+    """Largest rank that ever claimed a cell, shape (scenes, cells + 1)."""
+
+    def __init__(self, lattice, scenes):
+        self.lattice = lattice
+        self.claims = ti.field(ti.i64, shape=(scenes, lattice.cells + 1))
+
+    @ti.func
+    def clear(self, s):
+        """No claims."""
+        for cell in range(self.lattice.cells + 1):
+            self.claims[s, cell] = ti.cast(0, ti.i64)
+
+    @ti.func
+    def claim(self, s, cell, ranked):
+        """Claim a cell."""
+        self.claims[s, cell] = max(self.claims[s, cell], ranked)
+
+    @ti.func
+    def holds(self, s, cell, ranked):
+        """Whether this claim was the largest."""
+        return self.claims[s, cell] == ranked

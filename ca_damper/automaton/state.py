@@ -1,0 +1,58 @@
+"""What stands in the cells of every scene, and who moves it from one cell to another."""
+
+import taichi as ti
+
+from ca_damper.lattice import EMPTY
+
+
+@ti.data_oriented
+class Cells:
+    """State of all cells; fields of shape (scenes, cells + 1), a scene's cells together in memory.
+
+    kind: direction of a particle, or EMPTY, WALL, HELD. speed: along that direction, >= 0 [m/s].
+    travelled: part of the way to the next cell [m], negative while short of the own cell's centre.
+    Speed and way are zero in cells without a particle under way.
+    stair: displacement of the container in whole cells, (scenes,); offset: what is left of it [m].
+    Velocities are those of the room, not of the container.
+    """
+
+    def __init__(self, lattice, traversal, accounting, scenes):
+        self.lattice, self.traversal = lattice, traversal
+        self.followers = (traversal, accounting)
+        shape = (scenes, lattice.cells + 1)
+        self.kind = ti.field(ti.i8, shape=shape)
+        self.speed = ti.field(ti.f64, shape=shape)
+        self.travelled = ti.field(ti.f64, shape=shape)
+        self.stair = ti.field(ti.i32, shape=scenes)
+        self.offset = ti.field(ti.f64, shape=scenes)
+
+    @ti.func
+    def clear(self, s):
+        """Walls and nothing else."""
+        for cell in range(self.lattice.cells + 1):
+            self.put(s, cell, ti.cast(self.lattice.blank[cell], ti.i32), 0.0, 0.0)
+
+    @ti.func
+    def at(self, s, cell):
+        """Kind of what stands in a cell, as i32."""
+        return ti.cast(self.kind[s, cell], ti.i32)
+
+    @ti.func
+    def put(self, s, cell, kind, speed, travelled):
+        """Let this stand in a cell."""
+        self.kind[s, cell] = ti.cast(kind, ti.i8)
+        self.speed[s, cell] = speed
+        self.travelled[s, cell] = travelled
+
+    @ti.func
+    def relocate(self, s, origin, target, travelled):
+        """Take what stands in one cell to another, empty one."""
+        self.put(s, target, self.at(s, origin), self.speed[s, origin], travelled)
+        self.put(s, origin, EMPTY, 0.0, 0.0)
+        for follower in ti.static(self.followers):
+            follower.moved(s, origin, target)
+
+    @ti.func
+    def vertical_speed(self, s, cell):
+        """Velocity along x of a particle under way [m/s]; 0 in every other cell."""
+        return self.speed[s, cell] * self.lattice.upward(self.at(s, cell))

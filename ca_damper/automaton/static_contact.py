@@ -1,0 +1,116 @@
+"""Static contact: what lies on the floor moves with it and weighs on it.
+
+The paper names the absence of it as the reason why its response peak moves the wrong way (6.2).
+A particle that stands on the floor, or on one that is held already, and has almost its velocity is
+held: it moves as one with the container and its mass is carried by it. That lasts while the heap is
+pressed on the floor. When the container's acceleration falls below -g the heap lifts off as it
+stands. To particles under way the heap is wall.
+"""
+
+import taichi as ti
+
+from ca_damper.lattice import DOWN, HELD, UP, WALL
+
+
+@ti.data_oriented
+class StaticContact:
+    """Particles held by the container.
+
+    held: number of them, shape (scenes,).
+    """
+
+    def __init__(self, cells, accumulator, numbers):
+        self.cells, self.accumulator, self.numbers = cells, accumulator, numbers
+        self.held = ti.field(ti.i32, shape=cells.kind.shape[0])
+
+    @ti.func
+    def clear(self, s):
+        """Nobody is held."""
+        self.held[s] = 0
+
+    @ti.func
+    def count(self, s):
+        """Particles held."""
+        return self.held[s]
+
+    @ti.func
+    def supported(self, s, cell):
+        """Whether floor or a held particle is straight below."""
+        return self.cells.at(s, cell - 1) >= WALL
+
+    @ti.func
+    def noticed(self, s, cell, kind):
+        """Whether a rising particle has its support below; a falling one looks at it anyway."""
+        return kind == UP and self.supported(s, cell)
+
+    @ti.func
+    def joins(self, s, cell, velocity, pull, pressed):
+        """Whether a particle is to be held; velocity: of the container, pull: g dt [m/s]."""
+        kind = self.cells.at(s, cell)
+        result = False
+        if pressed and (kind == UP or kind == DOWN):
+            relative = self.cells.vertical_speed(s, cell) - velocity
+            if abs(relative) < self.numbers.threshold[None] * pull:
+                result = self.supported(s, cell)
+        return result
+
+    @ti.func
+    def hold(self, s, cell):
+        """Hold a particle from now on."""
+        self.cells.put(s, cell, HELD, 0.0, 0.0)
+        self.held[s] += 1
+
+    @ti.func
+    def caught(self, s, cell, velocity):
+        """Whether the floor, or the heap on it, rises into a particle that rises slower."""
+        rising = self.cells.at(s, cell) == UP and self.cells.speed[s, cell] < velocity
+        return rising and self.supported(s, cell)
+
+    @ti.func
+    def release(self, s, velocity):
+        """Let the heap go from where it is, with the velocity of the container [m/s]."""
+        if self.held[s] > 0:
+            kind = UP if velocity > 0.0 else DOWN
+            travelled = self.accumulator.at_wall(kind, self.cells.offset[s])
+            for k in range(self.cells.traversal.size(s)):
+                cell = self.cells.traversal.cell(s, k)
+                if self.cells.at(s, cell) == HELD:
+                    self.cells.put(s, cell, kind, abs(velocity), travelled)
+            self.held[s] = 0
+
+
+@ti.data_oriented
+class NoStaticContact:
+    """No particle is ever held; the compiler removes every question about it."""
+
+    @ti.func
+    def clear(self, s):
+        """Nothing to clear."""
+
+    @ti.func
+    def count(self, s):
+        """Nobody."""
+        return 0
+
+    @ti.func
+    def noticed(self, s, cell, kind):
+        """Support is not looked at."""
+        return False
+
+    @ti.func
+    def joins(self, s, cell, velocity, pull, pressed):
+        """Nobody joins."""
+        return False
+
+    @ti.func
+    def caught(self, s, cell, velocity):
+        """Only the staircase of the floor catches up with particles."""
+        return False
+
+    @ti.func
+    def hold(self, s, cell):
+        """Never called."""
+
+    @ti.func
+    def release(self, s, velocity):
+        """Nothing to release."""

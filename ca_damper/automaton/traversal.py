@@ -1,0 +1,85 @@
+"""How a step finds the particles: by scanning all cells, or by a list of those that hold one.
+
+Neither order reaches a result: rules read what no other cell writes, rivals are told apart by
+their random numbers, and impulses are summed as integers.
+"""
+
+import taichi as ti
+
+from ca_damper.lattice import EMPTY, WALL
+
+
+@ti.data_oriented
+class Scan:
+    """Every cell from the first to the last, walls between the columns included."""
+
+    def __init__(self, lattice, table):
+        self.lattice = lattice
+
+    @ti.func
+    def size(self, s):
+        """Cells to visit in a step."""
+        return self.lattice.end - self.lattice.first
+
+    @ti.func
+    def cell(self, s, k):
+        """The k-th cell to visit."""
+        return self.lattice.first + k
+
+    @ti.func
+    def placed(self, s, k, cell):
+        """A scan finds particle number k by itself."""
+
+    @ti.func
+    def moved(self, s, origin, target):
+        """A scan finds it by itself."""
+
+    @ti.func
+    def sort(self, s, cells: ti.template()):
+        """A scan is always in order."""
+
+
+@ti.data_oriented
+class ParticleList:
+    """Only the cells that hold a particle.
+
+    cells: of particle number k, shape (scenes, capacity). number: of the particle in a cell, shape
+    (scenes, cells + 1); meaningless in the other cells.
+    """
+
+    def __init__(self, lattice, table):
+        self.lattice, self.table = lattice, table
+        capacity = lattice.columns * lattice.rows
+        self.cells = ti.field(ti.i16, shape=(table.count, capacity))
+        self.number = ti.field(ti.i16, shape=(table.count, lattice.cells + 1))
+
+    @ti.func
+    def size(self, s):
+        """Cells to visit in a step."""
+        return self.table.particles[s]
+
+    @ti.func
+    def cell(self, s, k):
+        """The k-th cell to visit."""
+        return ti.cast(self.cells[s, k], ti.i32)
+
+    @ti.func
+    def placed(self, s, k, cell):
+        """Enter particle number k."""
+        self.cells[s, k] = ti.cast(cell, ti.i16)
+        self.number[s, cell] = ti.cast(k, ti.i16)
+
+    @ti.func
+    def moved(self, s, origin, target):
+        """Follow a particle to another cell."""
+        self.placed(s, ti.cast(self.number[s, origin], ti.i32), target)
+
+    @ti.func
+    def sort(self, s, cells: ti.template()):
+        """Number the particles by their cells again: neighbours then mostly do alike, and fast."""
+        count = 0
+        for cell in range(self.lattice.first, self.lattice.end):
+            kind = cells.at(s, cell)
+            if kind != EMPTY and kind != WALL:
+                self.placed(s, count, cell)
+                count += 1

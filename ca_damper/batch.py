@@ -1,0 +1,281 @@
+"""Many scenes, run together in launches of bounded length.
+
+A launch takes every scene the same share of its way and lasts about a sixth of a second, so that
+Ctrl-C, progress and the look at diverged scenes are prompt.
+"""
+
+import time
+
+import numpy as np
+import taichi as ti
+
+from ca_damper import measures
+from ca_damper.clock import Clock, steps_per_cycle
+from ca_damper.container import DrivenContainer, SprungContainer
+from ca_damper.coupling import LOST, Coupling
+from ca_damper.errors import SimulationDiverged
+from ca_damper.oscillator import Oscillator
+from ca_damper.progress import Progress
+from taichi_dem import runtime
+from taichi_dem.checks import choice, positive, whole
+from taichi_dem.errors import InputError
+from taichi_dem.fields import check_room
+
+MOUNTS = ("spring", "base")
+STARTS = ("rest", "empty", "rigid")
+
+#: A launch is kept near this long [s].
+LAUNCH_SECONDS = 0.15
+_MOST_STEPS = 2**31 - 1
+_LOST_IN_WORDS = "lost its container, whose motion is no finite number"
+#: Largest field of measured sums: 1 GiB, half of what Taichi can count.
+_MOST_NUMBERS = 2**27
+_STRUCTURE = ("mass", "stiffness", "damping", "base_amplitude")
+
+
+class Batch:
+    """A filling, a table of scenes and the container's mount, ready to run.
+
+    table.dt holds the largest step of every scene; it is shortened so that a whole number of steps
+    makes a cycle of the base: ``steps_per_cycle``, (scenes,).
+    mount: "spring", or "base" for a container that moves like the base whatever the filling does.
+    measured_cycles: most cycles that one run may measure. rtol, atol: of RK45, on the spring.
+    ``run_seconds`` and ``compile_seconds`` tell what was spent.
+    Raises InputError for a scene that the filling refuses or a step out of range.
+    """
+
+    def __init__(self, filling, table, *, mount="spring", measured_cycles=1, rtol=1e-9, atol=1e-12):
+        self.generation = runtime.generation()
+        check_room()
+        choice("mount", mount, MOUNTS)
+        self.measured_cycles = whole("measured_cycles", measured_cycles, 0, 100_000)
+        positive("rtol", rtol, zero_allowed=True)
+        positive("atol", atol)
+        self.filling, self.table, self.count = filling, table, table.count
+        self.oscillators = [Oscillator(*row) for row in zip(*map(table.column, _STRUCTURE))]
+        self.largest_dt, self.clock = table.column("dt"), Clock(table)
+        frequency = table.column("frequency")
+        dt = self._fit_steps(frequency)
+        container = DrivenContainer(table, self.clock)
+        if mount == "spring":
+            container = SprungContainer(table, self.clock, filling.gravity, rtol, atol)
+        self.bound = filling.bind(table)
+        _check_record_fits(self.count * max(1, self.measured_cycles) * len(measures.COLUMNS))
+        self.coupling = Coupling(
+            table, self.clock, container, self.bound, filling.gravity, self.measured_cycles
+        )
+        self._set_pace(frequency, dt)
+        self.time_origin = np.zeros(self.count)
+        self.run_seconds = self.compile_seconds = 0.0
+        # Scene-steps a launch; one each to begin with, as nobody knows yet what a step costs.
+        self._pace = float(self.count)
+        self._compiled = self._started = False
+
+    def start(self, start="rest"):
+        """Place the particles anew and begin at time zero, the base passing upwards through zero.
+
+        start: the container begins at "rest", or in the steady state of the "empty" container, or
+        in that of a container with the particles as "rigid" mass.
+        """
+        self._check_session()
+        choice("start", start, STARTS)
+        self.coupling.start(np.ascontiguousarray(self._initial(start)))
+        self._started = True
+        self.time_origin[:] = 0.0
+        self._check_health()
+
+    def drive(self, frequency):
+        """Go on at another frequency [Hz], a scalar or (scenes,), at the end of a cycle.
+
+        The base keeps its place and changes its speed. Raises InputError within a cycle.
+        """
+        self._check_cycle_is_full()
+        before, frequency = self.time_s, np.broadcast_to(frequency, self.count)
+        self._set_pace(frequency, self._fit_steps(frequency))
+        self.coupling.renew()
+        self.time_origin += before - self.time_s
+
+    def run(self, transient_cycles, measured_cycles, progress=None):
+        """Run whole cycles and measure the last of them; returns ``measures.Cycles``.
+
+        progress: called with a Progress about six times a second.
+        Raises InputError for numbers of cycles that are none, or within a cycle;
+        SimulationDiverged.
+        """
+        transient = whole("transient_cycles", transient_cycles, 0, 10_000_000)
+        measured = whole("measured_cycles", measured_cycles, 0, self.measured_cycles)
+        self._check_cycle_is_full()
+        steps = self.steps_per_cycle.astype(np.int64)
+        self._go((transient + measured) * steps, transient * steps, progress)
+        record = np.empty((self.count, measured, len(measures.COLUMNS)))
+        if measured:
+            self.coupling.read(record)
+        return measures.Cycles(self.table.column("frequency"), self.steps_per_cycle, record)
+
+    def advance(self, steps, progress=None):
+        """Advance every scene by a number of steps, one for all or (scenes,), without measuring.
+
+        Raises InputError unless they are whole numbers from zero, SimulationDiverged.
+        """
+        self._check_started()
+        steps = np.asarray(steps)
+        if steps.dtype.kind not in "iu" or (steps < 0).any():
+            raise InputError(f"steps must be whole numbers from 0, got {steps.tolist()}")
+        steps = np.broadcast_to(steps.astype(np.int64), self.count)
+        self._go(steps, steps, progress)
+
+    @property
+    def time_s(self):
+        """Present time of every scene [s], (scenes,)."""
+        return self.time_origin + self._look()[0] * self.table.column("dt")
+
+    def sample(self):
+        """The present state: arrays (scenes,) by name.
+
+        time_s; x [m], v [m/s], a [m/s^2] of the container, y [m] of the base; force [N]: mean of
+        the filling on the container in the last step; energy [J], momentum [kg m/s] of the
+        particles.
+        """
+        self._check_started()
+        values = np.empty((len(measures.SAMPLE), self.count))
+        self.coupling.sample(values)
+        return {"time_s": self.time_s, **dict(zip(measures.SAMPLE, values))}
+
+    def snapshot(self, s):
+        """Positions and velocities of the particles of scene s, as the filling gives them."""
+        self._check_started()
+        return self.bound.snapshot(s)
+
+    def attempts(self):
+        """Steps that RK45 has tried since the start, (scenes,); one a step unless some failed."""
+        return self.coupling.attempts.to_numpy()
+
+    def _check_session(self):
+        if self.generation != runtime.generation():
+            raise InputError("this batch belongs to a Taichi session that has been stopped")
+
+    def _look(self):
+        """Step, position in the cycle, and status of all scenes, (3, scenes)."""
+        seen = np.empty((3, self.count), dtype=np.int32)
+        self.coupling.look(seen)
+        return seen
+
+    def _check_started(self):
+        self._check_session()
+        if not self._started:
+            raise InputError("this batch has no state yet: call start() first")
+
+    def _check_cycle_is_full(self):
+        self._check_started()
+        position = self._look()[1]
+        if position.any():
+            late = int(position.argmax())
+            raise InputError(
+                f"a cycle must be full here, scene {late} stands at step {position[late]} of "
+                f"{self.steps_per_cycle[late]}: advance it first"
+            )
+
+    def _fit_steps(self, frequency):
+        """Fit the steps to the cycle, have the filling check them, and return them [s]."""
+        scenes = zip(frequency, self.largest_dt)
+        self.steps_per_cycle = np.array([steps_per_cycle(f, dt) for f, dt in scenes], np.int32)
+        dt = 1.0 / (frequency * self.steps_per_cycle)
+        for particles, step in sorted(set(zip(self.table.column("particles").tolist(), dt))):
+            self.filling.check(particles, float(step))
+        return dt
+
+    def _set_pace(self, frequency, dt):
+        self.table.drive(frequency, dt)
+        self.clock.set(self.steps_per_cycle)
+
+    def _initial(self, start):
+        """(x, v) of the container at the beginning, shape (scenes, 2)."""
+        state = np.zeros((self.count, 2))
+        if start == "rest":
+            return state
+        for s, oscillator in enumerate(self.oscillators):
+            row = self.table.row(s)
+            fixed = row["particles"] * self.filling.particle_mass if start == "rigid" else 0.0
+            state[s] = oscillator.steady_state(row["frequency"], fixed, self.filling.gravity)
+        return state
+
+    def _go(self, steps, before_measuring, progress):
+        """Take every scene a number of steps on, in launches of bounded length."""
+        begin = self._look()[0].astype(np.int64)
+        if (begin + steps).max() > _MOST_STEPS:
+            raise InputError(f"steps since the start must stay below {_MOST_STEPS}: run fewer")
+        order = dealt((1 + self.table.column("particles")) * steps, runtime.settings().threads)
+        plan = np.stack([begin, begin + steps, begin + before_measuring, order])
+        self.coupling.aim(plan.astype(np.int32))
+        if not self._compiled:
+            started = time.perf_counter()
+            self.coupling.advance(0.0)
+            self.compile_seconds += time.perf_counter() - started
+            self._compiled = True
+        self._launch_until_done(max(1, int(steps.sum())), progress)
+
+    def _launch_until_done(self, total, progress):
+        done, started = 0.0, time.perf_counter()
+        try:
+            while done < 1.0:
+                done = self._launch(done, total)
+                if progress is not None:
+                    progress(Progress(done, time.perf_counter() - started, round(done * total)))
+        finally:
+            self.run_seconds += time.perf_counter() - started
+
+    def _launch(self, done, total):
+        """One launch from a share of the way, total scene-steps long; returns the share reached."""
+        share = min(1.0, done + self._pace / total)
+        started = time.perf_counter()
+        self.coupling.advance(share)
+        ti.sync()
+        seconds = time.perf_counter() - started
+        # What a short way allowed to see says nothing of how fast a long one may go.
+        if share < 1.0:
+            self._pace *= min(4.0, max(0.25, LAUNCH_SECONDS / seconds))
+            self._pace = max(self._pace, float(self.count))
+        self._check_health()
+        return share
+
+    def _check_health(self):
+        status = self._look()[2]
+        if status.any():
+            # Scenes stop where they diverge: the first of them in time speaks for all.
+            self._report_divergence(int(np.argmin(np.where(status != 0, self.time_s, np.inf))))
+
+    def _report_divergence(self, s):
+        row, step, now = self.table.row(s), self.coupling.step[s], float(self.time_s[s])
+        code, dt = self.coupling.status[s], row["dt"]
+        words, allowed = self.filling.divergence(max(code, 1), row["particles"], dt)
+        if code == LOST:
+            # What the filling bears at most is still the best advice.
+            words, allowed = _LOST_IN_WORDS, min(allowed, 0.5 * dt)
+        raise SimulationDiverged(
+            f"the scene of particles = {row['particles']} and seed {row['seed']} at "
+            f"{row['frequency']:.5g} Hz diverged by step {step}, t = {now:.4g} s: it {words}; "
+            f"dt must be at most {allowed:.3g} s, was {dt:.3g} s",
+            scene=row,
+            step=step,
+            time_s=now,
+            dt=dt,
+            dt_allowed=allowed,
+        )
+
+
+def _check_record_fits(numbers):
+    if numbers > _MOST_NUMBERS:
+        raise InputError(
+            f"scenes x measured_cycles must stay below {_MOST_NUMBERS // len(measures.COLUMNS)} "
+            f"in one batch, got {numbers // len(measures.COLUMNS)}: measure fewer cycles"
+        )
+
+
+def dealt(cost, threads):
+    """Scene numbers in an order that gives each thread the same cost, (scenes,) i32.
+
+    A thread takes a contiguous part of the loop, so dear and cheap scenes are dealt out like cards.
+    """
+    dear_first = np.argsort(-cost, kind="stable")
+    hands = [dear_first[k::threads] for k in range(threads)]
+    return np.concatenate(hands)

@@ -1,0 +1,92 @@
+"""Time of a scene: whole steps, a whole number of them a cycle of the base."""
+
+import math
+
+import numpy as np
+import taichi as ti
+
+from taichi_dem.checks import positive
+from taichi_dem.errors import InputError
+
+#: Fewer would leave first harmonics, and the series of ``oscillator``, to chance.
+LEAST_STEPS_PER_CYCLE = 40
+MOST_STEPS_PER_CYCLE = 10_000_000
+
+
+def steps_per_cycle(frequency, largest_dt):
+    """Least number of equal steps that make a cycle, none longer than largest_dt [s].
+
+    frequency [Hz]. Raises InputError for fewer than 40 steps, or more than ten million.
+    """
+    positive("frequency", frequency)
+    positive("dt", largest_dt)
+    # A step that fits but for rounding is not shortened.
+    count = math.ceil(1.0 / (frequency * largest_dt) * (1.0 - 1e-12))
+    if not LEAST_STEPS_PER_CYCLE <= count <= MOST_STEPS_PER_CYCLE:
+        low = 1.0 / (frequency * MOST_STEPS_PER_CYCLE)
+        high = 1.0 / (frequency * LEAST_STEPS_PER_CYCLE)
+        raise InputError(
+            f"dt must lie in [{low:.3g}, {high:.3g}] s at {frequency:g} Hz, got {largest_dt:g}"
+        )
+    return count
+
+
+@ti.data_oriented
+class Clock:
+    """Phase of the base of every scene, as a count of steps in the cycle, with sine and cosine.
+
+    Sine and cosine are turned on by one step's angle; each cycle begins anew with 0 and 1, so that
+    rounding stays below steps a cycle x 1e-16 and a cycle ends exactly.
+    """
+
+    def __init__(self, table):
+        self.table = table
+        self.steps = ti.field(ti.i32, shape=table.count)
+        self.position = ti.field(ti.i32, shape=table.count)
+        self.circle = ti.Vector.field(2, ti.f64, shape=table.count)
+        self.turn = ti.Vector.field(2, ti.f64, shape=table.count)
+        self.half_turn = ti.Vector.field(2, ti.f64, shape=table.count)
+
+    def set(self, steps):
+        """Give every scene its steps a cycle, (scenes,); the phase stays as it is."""
+        angle = 2.0 * np.pi / np.asarray(steps, dtype=np.float64)
+        turns = [f(a) for a in (angle, angle / 2) for f in (np.sin, np.cos)]
+        self._set(np.ascontiguousarray(steps, dtype=np.int32), np.stack(turns))
+
+    @ti.kernel
+    def _set(
+        self,
+        steps: ti.types.ndarray(dtype=ti.i32, ndim=1),
+        turns: ti.types.ndarray(dtype=ti.f64, ndim=2),
+    ):
+        for s in range(self.table.count):
+            self.steps[s] = steps[s]
+            self.turn[s] = ti.Vector([turns[0, s], turns[1, s]])
+            self.half_turn[s] = ti.Vector([turns[2, s], turns[3, s]])
+
+    @ti.func
+    def start(self, s):
+        """The base passes upwards through zero."""
+        self.position[s] = 0
+        self.circle[s] = ti.Vector([0.0, 1.0])
+
+    @ti.func
+    def tick(self, s):
+        """One step on; returns whether a cycle is full."""
+        self.position[s] = self.position[s] + 1
+        self.circle[s] = added(self.circle[s], self.turn[s])
+        full = self.position[s] == self.steps[s]
+        if full:
+            self.start(s)
+        return full
+
+    @ti.func
+    def middle(self, s):
+        """Sine and cosine of the phase in the middle of the present step."""
+        return added(self.circle[s], self.half_turn[s])
+
+
+@ti.func
+def added(a, b):
+    """Sine and cosine of the sum of two angles, each given as (sine, cosine)."""
+    return ti.Vector([a[0] * b[1] + a[1] * b[0], a[1] * b[1] - a[0] * b[0]])

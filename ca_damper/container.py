@@ -1,0 +1,117 @@
+"""How the container moves: on its spring, pushed by base and filling, or fixed to the base.
+
+Both have the ti.funcs ``start(s, x, v)``, ``motion(s)`` at the beginning of a step, and
+``advance(s, action)`` over it, which returns the attempts that the integration took, or -1.
+"""
+
+import taichi as ti
+
+from ca_damper import rk45
+from ca_damper.filling import Action, Motion
+from ca_damper.oscillator import Forcing, slope
+
+#: Attempts within one step of the filling after which the container counts as lost.
+_MOST_ATTEMPTS = 1000
+
+
+@ti.data_oriented
+class SprungContainer:
+    """The container on its spring, integrated by RK45 within every step of the filling.
+
+    gravity [m/s^2]; rtol, atol: local error allowed; both in m and m/s for atol.
+    """
+
+    def __init__(self, table, clock, gravity, rtol, atol):
+        self.table, self.clock = table, clock
+        self.state = ti.Vector.field(2, ti.f64, shape=table.count)
+        self.slope = ti.Vector.field(2, ti.f64, shape=table.count)
+        self.impulse = ti.field(ti.f64, shape=table.count)
+        self.carried = ti.field(ti.f64, shape=table.count)
+        self.blow = ti.field(ti.f64, shape=table.count)
+        self.gravity = ti.field(ti.f64, shape=())
+        self.tolerance = ti.field(ti.f64, shape=2)
+        self.gravity[None] = gravity
+        self.tolerance[0], self.tolerance[1] = rtol, atol
+
+    @ti.func
+    def start(self, s, x, v):
+        """Place the container; nothing acts on it but spring, dashpot and base."""
+        self.state[s] = ti.Vector([x, v])
+        self.blow[s] = 0.0
+        self._take_up(s, Action(0.0, 0.0))
+
+    @ti.func
+    def motion(self, s):
+        """Displacement, velocity, and acceleration without the blows of the step before."""
+        return Motion(self.state[s][0], self.state[s][1], self.slope[s][1] - self.blow[s])
+
+    @ti.func
+    def renew(self, s):
+        """Note that the base has changed its motion, between two frequencies of a sweep."""
+        self._take_up(s, Action(self.impulse[s], self.carried[s]))
+
+    @ti.func
+    def _take_up(self, s, action):
+        self.impulse[s], self.carried[s] = action.impulse, action.carried
+        self.slope[s] = slope(self._forcing(s, action), 0.0, self.state[s])
+
+    @ti.func
+    def _forcing(self, s, action):
+        """Forcing over the step that begins now; (K + i w C) y0 turned by the present phase."""
+        table, circle = self.table, self.clock.circle[s]
+        per_mass = 1.0 / (table.mass[s] + action.carried)
+        omega = 2.0 * ti.math.pi * table.frequency[s]
+        stiffness, damping = table.stiffness[s] * per_mass, table.damping[s] * per_mass
+        by_spring = stiffness * table.base_amplitude[s]
+        by_dashpot = damping * omega * table.base_amplitude[s]
+        force = action.impulse / table.dt[s] - action.carried * self.gravity[None]
+        return Forcing(
+            stiffness=stiffness,
+            damping=damping,
+            omega=omega,
+            drive=by_spring * circle[0] + by_dashpot * circle[1],
+            quadrature=by_spring * circle[1] - by_dashpot * circle[0],
+            constant=force * per_mass,
+        )
+
+    @ti.func
+    def advance(self, s, action):
+        """Take the container over the step; the last slope serves again unless the load changed."""
+        if action.impulse != self.impulse[s] or action.carried != self.carried[s]:
+            self._take_up(s, action)
+        forcing = self._forcing(s, action)
+        dt, rtol, atol = self.table.dt[s], self.tolerance[0], self.tolerance[1]
+        y, change, attempts = rk45.integrate(
+            slope, forcing, 0.0, dt, self.state[s], self.slope[s], dt, rtol, atol, _MOST_ATTEMPTS
+        )
+        self.state[s], self.slope[s] = y, change
+        self.blow[s] = action.impulse / (dt * (self.table.mass[s] + action.carried))
+        return attempts
+
+
+@ti.data_oriented
+class DrivenContainer:
+    """The container fixed to the base: x = y0 sin(2 pi f t), whatever the filling does."""
+
+    def __init__(self, table, clock):
+        self.table, self.clock = table, clock
+
+    @ti.func
+    def start(self, s, x, v):
+        """Where the base is; x and v are not asked for."""
+
+    @ti.func
+    def renew(self, s):
+        """Nothing to note: the motion is looked up."""
+
+    @ti.func
+    def motion(self, s):
+        """Of the base."""
+        omega = 2.0 * ti.math.pi * self.table.frequency[s]
+        y0, circle = self.table.base_amplitude[s], self.clock.circle[s]
+        return Motion(y0 * circle[0], omega * y0 * circle[1], -omega * omega * y0 * circle[0])
+
+    @ti.func
+    def advance(self, s, action):
+        """Nothing to integrate: the clock moves the base."""
+        return 1

@@ -1,0 +1,167 @@
+"""The step of a coupled scene: filling, container, measures, clock; and the loop over all scenes.
+
+One scene a thread, the whole time loop inside the kernel. All state lies in fields between
+launches, so that neither their number nor what else is in the batch changes a bit.
+"""
+
+import taichi as ti
+
+from ca_damper import measures
+from taichi_dem import runtime
+
+#: Status of a scene whose container has no finite motion any more; fillings use codes above zero.
+LOST = -1
+# Beyond any motion that means something: squared [m^2] + [m^2/s^2].
+_FAR = 1e12
+_HEALTH_EVERY = 64
+SUM_COUNT = len(measures.SUMS)
+# A parallel loop on a CPU gives each thread at least this many iterations, so there a scene takes
+# that many and uses one. On a GPU every iteration has a thread of its own.
+_CPU_BLOCK = 512
+
+_I32 = ti.types.ndarray(dtype=ti.i32, ndim=2)
+_F64 = ti.types.ndarray(dtype=ti.f64, ndim=2)
+
+
+@ti.data_oriented
+class Coupling:
+    """Filling, container and clock of all scenes, tied together.
+
+    bound: what ``filling.bind`` gave. gravity [m/s^2]. measured_cycles: room in ``record``, whose
+    shape is (scenes, cycles, columns of ``measures.COLUMNS``).
+    """
+
+    def __init__(self, table, clock, container, bound, gravity, measured_cycles):
+        self.table, self.clock, self.container, self.bound = table, clock, container, bound
+        self.count = table.count
+        self.padding = _CPU_BLOCK if runtime.settings().arch == "cpu" else 1
+        self.gravity = ti.field(ti.f64, shape=())
+        self.gravity[None] = gravity
+        for name in ("order", "step", "begin", "goal", "measure_from", "cycle", "status"):
+            setattr(self, name, ti.field(ti.i32, shape=self.count))
+        self.attempts = ti.field(ti.i64, shape=self.count)
+        self.force = ti.field(ti.f64, shape=self.count)
+        self.sums = ti.Vector.field(SUM_COUNT, ti.f64, shape=self.count)
+        self.extremes = ti.Vector.field(2, ti.f64, shape=self.count)
+        shape = (self.count, max(1, measured_cycles), len(measures.COLUMNS))
+        self.record = ti.field(ti.f64, shape=shape)
+
+    @ti.kernel
+    def start(self, initial: _F64):
+        """Begin at step 0 with particles placed anew and the container at initial[s] = (x, v)."""
+        for t in range(self.padding * self.count):
+            if t % self.padding == 0:
+                s = t // self.padding
+                self.step[s], self.attempts[s], self.force[s] = 0, 0, 0.0
+                self.clock.start(s)
+                self.container.start(s, initial[s, 0], initial[s, 1])
+                self.bound.reset(s)
+                self.status[s] = self.bound.health(s)
+
+    @ti.kernel
+    def renew(self):
+        """Note that the base changed its motion, at the end of a cycle."""
+        for s in range(self.count):
+            self.container.renew(s)
+
+    @ti.kernel
+    def aim(self, plan: _I32):
+        """Set from plan[:, s]: step to begin at, to end at, to measure from; and the k-th scene."""
+        for s in range(self.count):
+            self.begin[s], self.goal[s], self.measure_from[s] = plan[0, s], plan[1, s], plan[2, s]
+            self.order[s] = plan[3, s]
+            self.cycle[s] = 0
+            self._clear(s)
+
+    @ti.kernel
+    def advance(self, share: ti.f64):
+        """Take every scene to a share of the way from its begin to its goal."""
+        for t in range(self.padding * self.count):
+            if t % self.padding == 0:
+                self._take_scene(self.order[t // self.padding], share)
+
+    @ti.func
+    def _take_scene(self, s, share):
+        begin, way = self.begin[s], self.goal[s] - self.begin[s]
+        target = begin + ti.cast(ti.floor(share * way), ti.i32)
+        while self.step[s] < target and self.status[s] == 0:
+            self._take_step(s)
+
+    @ti.func
+    def _take_step(self, s):
+        """The order of a step: filling, container, clock, measures, health."""
+        step, now, middle = self.step[s], self.clock.circle[s], self.clock.middle(s)
+        before = self.container.motion(s)
+        action = self.bound.act(s, step, before)
+        attempts = self.container.advance(s, action)
+        full = self.clock.tick(s)
+        after = self.container.motion(s)
+        self.force[s] = self._force(s, action, after.v - before.v)
+        if step >= self.measure_from[s]:
+            self._measure(s, before, now, middle)
+            if full:
+                self._write_cycle(s)
+        self.step[s], self.attempts[s] = step + 1, self.attempts[s] + attempts
+        if step % _HEALTH_EVERY == 0 or full:
+            self.status[s] = self.bound.health(s)
+        if attempts < 0 or not after.x * after.x + after.v * after.v < _FAR:
+            self.status[s] = LOST
+
+    @ti.func
+    def _force(self, s, action, gained):
+        """Mean force [N] of the filling on the container over a step that gained it speed [m/s]."""
+        dt = self.table.dt[s]
+        return action.impulse / dt - action.carried * (self.gravity[None] + gained / dt)
+
+    @ti.func
+    def _clear(self, s):
+        self.sums[s] = ti.Vector.zero(ti.f64, SUM_COUNT)
+        self.extremes[s] = ti.Vector([-ti.math.inf, ti.math.inf])
+
+    @ti.func
+    def _measure(self, s, motion, now, middle):
+        """Add what ``measures.SUMS`` names; the force of a step belongs to its middle.
+
+        Not by +=, which would be an atomic sum here.
+        """
+        x, v, f = motion.x, motion.v, self.force[s]
+        sine, cosine, fs, fc = now[0], now[1], f * middle[0], f * middle[1]
+        more = ti.Vector([x, x * x, x * cosine, x * sine, v * cosine, v * sine, f, fc, fs])
+        self.sums[s] = self.sums[s] + more
+        bounds = self.extremes[s]
+        self.extremes[s] = ti.Vector([ti.max(bounds[0], x), ti.min(bounds[1], x)])
+
+    @ti.func
+    def _write_cycle(self, s):
+        c = self.cycle[s]
+        for k in ti.static(range(SUM_COUNT)):
+            self.record[s, c, k] = self.sums[s][k]
+        self.record[s, c, SUM_COUNT] = self.extremes[s][0]
+        self.record[s, c, SUM_COUNT + 1] = self.extremes[s][1]
+        self.record[s, c, SUM_COUNT + 2] = self.bound.energy(s)
+        self.cycle[s] = c + 1
+        self._clear(s)
+
+    @ti.kernel
+    def sample(self, values: _F64):
+        """Fill values[k, s] with what ``measures.SAMPLE`` names."""
+        for s in range(self.count):
+            motion = self.container.motion(s)
+            y = self.table.base_amplitude[s] * self.clock.circle[s][0]
+            values[0, s], values[1, s], values[2, s] = motion.x, motion.v, motion.a
+            values[3, s], values[4, s] = y, self.force[s]
+            values[5, s], values[6, s] = self.bound.energy(s), self.bound.momentum(s)
+
+    @ti.kernel
+    def look(self, seen: _I32):
+        """Fill seen[:, s] with step, position in the cycle, and status."""
+        for s in range(self.count):
+            seen[0, s], seen[1, s] = self.step[s], self.clock.position[s]
+            seen[2, s] = self.status[s]
+
+    @ti.kernel
+    def read(self, cycles: ti.types.ndarray(dtype=ti.f64, ndim=3)):
+        """Copy the first cycles[s, c] of the record, all columns."""
+        for s in range(self.count):
+            for c, k in ti.ndrange(cycles.shape[1], cycles.shape[2]):
+                cycles[s, c, k] = self.record[s, c, k]

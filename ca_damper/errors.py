@@ -1,0 +1,20 @@
+"""Exceptions that a user of the package may meet; scripts end with 2 and 3 on them."""
+
+from taichi_dem.errors import InputError
+from taichi_dem.errors import SimulationDiverged as _SimulationDiverged
+
+
+class SimulationDiverged(_SimulationDiverged):
+    """A scene left the range in which its numbers mean anything.
+
+    scene: dict of the numbers of the scene's row. step: number of the step after which it was
+    found. time_s: when that was [s]. dt: the step used [s]. dt_allowed: a step that would do [s].
+    """
+
+    def __init__(self, sentence, *, scene, step, time_s, dt, dt_allowed):
+        super().__init__(sentence)
+        self.scene, self.step, self.time_s = scene, step, time_s
+        self.dt, self.dt_allowed = dt, dt_allowed
+
+
+__all__ = ["InputError", "SimulationDiverged"]

@@ -1,0 +1,152 @@
+"""The triangular lattice of the container (Komatsuzaki et al., 5.1, Fig. 4).
+
+One axis stands along gravity; odd columns are half a cell higher, so that the cells of floor and
+ceiling alternate. Walls are cells too: 16 rows and 10 columns inside make 18 x 12 cells. Columns
+stand one cell apart, as in the paper (10 particles in 60 mm); the angles are those of the
+triangular lattice. Cells are counted upwards, column by column: the cell above is the next one.
+"""
+
+import numpy as np
+import taichi as ti
+
+#: What stands in a cell: a particle on its way in one of six directions, clockwise from up ...
+UP, UP_RIGHT, DOWN_RIGHT, DOWN, DOWN_LEFT, UP_LEFT = range(6)
+#: ... or nothing, a wall, or a particle that moves as one with the container.
+EMPTY, WALL, HELD = 6, 7, 8
+KINDS = 9
+DIRECTIONS = 6
+
+_ANGLE = np.deg2rad(60.0) * np.arange(DIRECTIONS)
+_TABLE = ti.types.ndarray(dtype=ti.i32, ndim=2)
+_COSINES = ti.types.ndarray(dtype=ti.f64, ndim=2)
+
+
+def alignments():
+    """Cosine of the angle between two directions, shape (6, 6), exact."""
+    return np.round(2.0 * np.cos(_ANGLE[:, None] - _ANGLE[None, :])) / 2.0
+
+
+def unit_vectors():
+    """Horizontal and vertical part of the six directions, shape (6, 2)."""
+    return np.column_stack([np.sin(_ANGLE), alignments()[:, UP]])
+
+
+class Geometry:
+    """Which cell lies where, in NumPy; columns and rows are counted inside the walls."""
+
+    def __init__(self, columns, rows):
+        self.columns, self.rows = columns, rows
+        self.height = rows + 2
+        self.cells = (columns + 2) * self.height
+
+    def cell_of(self, column, row):
+        """Number of the cell in a column and row, both 0 at the lower left inner corner."""
+        return (column + 1) * self.height + row + 1
+
+    def column_and_row(self, cell):
+        """Column and row of a cell, -1 in the lower and left walls; arrays welcome."""
+        return cell // self.height - 1, cell % self.height - 1
+
+    def inside(self, column, row):
+        """Whether a particle may stand there; arrays welcome."""
+        return (0 <= column) & (column < self.columns) & (0 <= row) & (row < self.rows)
+
+    def neighbours(self):
+        """Cell ahead of what stands in a cell, shape (cells + 1, KINDS).
+
+        What does not fly, and all beyond the lattice, looks at cell number ``cells``: nothing ever
+        stands there, so that one rule serves every cell.
+        """
+        column, row = self.column_and_row(np.arange(self.cells))
+        high = (column + 1) % 2
+        steps = (
+            *((column, row + 1), (column + 1, row + high), (column + 1, row + high - 1)),
+            *((column, row - 1), (column - 1, row + high - 1), (column - 1, row + high)),
+        )
+        table = np.full((self.cells + 1, KINDS), self.cells, dtype=np.int32)
+        for direction, (c, r) in enumerate(steps):
+            known = (-1 <= c) & (c <= self.columns) & (-1 <= r) & (r <= self.rows)
+            table[:-1, direction] = np.where(known, self.cell_of(c, r), self.cells)
+        return table
+
+    def blank(self):
+        """WALL or EMPTY for each cell and the one beyond the lattice, shape (cells + 1,)."""
+        column, row = self.column_and_row(np.arange(self.cells))
+        kinds = np.where(self.inside(column, row), EMPTY, WALL)
+        return np.append(kinds, EMPTY).astype(np.int32)
+
+    def centres(self, width):
+        """Horizontal and vertical centre of every cell [m], shape (cells, 2).
+
+        Counted from the lower left inner corner of the container. width: of a cell [m].
+        """
+        column, row = self.column_and_row(np.arange(self.cells))
+        return width * np.column_stack([column + 0.5, row + 0.5 + 0.5 * ((column + 1) % 2)])
+
+
+@ti.data_oriented
+class Lattice:
+    """The tables of a geometry on the device."""
+
+    def __init__(self, geometry):
+        self.geometry = geometry
+        self.cells, self.height = geometry.cells, geometry.height
+        self.columns, self.rows = geometry.columns, geometry.rows
+        #: From the first to past the last cell that a particle may take.
+        self.first = geometry.cell_of(0, 0)
+        self.end = geometry.cell_of(self.columns - 1, self.rows - 1) + 1
+        self.neighbour = ti.field(ti.i16, shape=(self.cells + 1, KINDS))
+        self.blank = ti.field(ti.i8, shape=self.cells + 1)
+        self.cosine = ti.field(ti.f64, shape=(KINDS, DIRECTIONS))
+
+    def load(self):
+        """Fill the tables; apart from making them, as every first use of new fields is dear."""
+        cosines = np.zeros((KINDS, DIRECTIONS))
+        cosines[:DIRECTIONS] = alignments()
+        self._load(self.geometry.neighbours(), self.geometry.blank()[:, None], cosines)
+
+    @ti.kernel
+    def _load(self, neighbours: _TABLE, blank: _TABLE, cosines: _COSINES):
+        for cell in range(self.cells + 1):
+            self.blank[cell] = ti.cast(blank[cell, 0], ti.i8)
+            for kind in range(KINDS):
+                self.neighbour[cell, kind] = ti.cast(neighbours[cell, kind], ti.i16)
+        for kind, direction in ti.ndrange(KINDS, DIRECTIONS):
+            self.cosine[kind, direction] = cosines[kind, direction]
+
+    @ti.func
+    def ahead(self, cell, kind):
+        """Cell that a particle of this kind looks at."""
+        return ti.cast(self.neighbour[cell, kind], ti.i32)
+
+    @ti.func
+    def upward(self, kind):
+        """Vertical part of a direction: 1, 1/2, -1/2 or -1; 0 of what does not fly."""
+        return self.cosine[kind, UP]
+
+    @ti.func
+    def cell_of(self, column, row):
+        """Number of the cell in a column and row, both counted inside the walls."""
+        return (column + 1) * self.height + row + 1
+
+    @ti.func
+    def height_of(self, cell):
+        """Height of a cell's centre above the floor of the lower columns, in cells."""
+        return cell % self.height - 0.5 + 0.5 * ((cell // self.height) % 2)
+
+    @ti.func
+    def in_side_wall(self, cell):
+        """Whether a wall cell belongs to a side wall; the corners do."""
+        return cell < self.height or cell >= self.cells - self.height
+
+
+@ti.func
+def turned_back(direction):
+    """Straight back."""
+    return (direction + 3) % DIRECTIONS
+
+
+@ti.func
+def mirrored(direction):
+    """Left and right exchanged."""
+    return (DIRECTIONS - direction) % DIRECTIONS

@@ -1,0 +1,140 @@
+"""From the sums that a run gathers over whole cycles to response, loss and apparent mass.
+
+Harmonics are complex amplitudes: x(t) = mean + Re(X exp(i w t)) + higher ones, and the base motion
+y = y0 sin(w t) has Y = -i y0. X comes from n samples at the beginnings of steps, F from n means
+over steps, which belong to their middles and stand lower by sinc(w dt / 2): divided out.
+
+The filling answers the container's speed V with the force F = -(c + i w m) V: this defines its
+apparent damping c [N s/m] and apparent mass m [kg], and it takes the mean power c |V|^2 / 2. The
+complex power F conj(V) / 2 holds both. A mass fixed to the container has c = 0 and m = its mass.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+#: Summed over the steps of a cycle; _cos and _sin: times cos(w t) and sin(w t).
+SUMS = ("x", "x_squared", "x_cos", "x_sin", "v_cos", "v_sin", "f", "f_cos", "f_sin")
+#: What is written for a cycle; energy: of the particles, at its end [J].
+COLUMNS = (*SUMS, "x_max", "x_min", "energy")
+#: What ``Batch.sample`` gives beside the time.
+SAMPLE = ("x", "v", "a", "y", "force", "energy", "momentum")
+
+_NOT_A_NUMBER = complex(np.nan, np.nan)
+
+
+@dataclass(frozen=True, eq=False)
+class Cycles:
+    """Sums over measured cycles, and the measures made of them; all arrays are (scenes,).
+
+    frequency [Hz]; steps: a cycle, n. record: (scenes, cycles, COLUMNS).
+    """
+
+    frequency: np.ndarray
+    steps: np.ndarray
+    record: np.ndarray
+
+    def mean_of(self, name):
+        """Mean of a column over cycles, (scenes,)."""
+        return self.record[:, :, COLUMNS.index(name)].mean(axis=1)
+
+    def per_step(self, name):
+        """Mean of a summed quantity over steps and cycles, (scenes,)."""
+        return self.mean_of(name) / self.steps
+
+    def harmonic(self, name):
+        """Complex amplitude of x, v or f, (scenes,)."""
+        amplitude = 2.0 * (self.per_step(f"{name}_cos") - 1j * self.per_step(f"{name}_sin"))
+        return amplitude / np.sinc(1.0 / self.steps) if name == "f" else amplitude
+
+    @property
+    def omega(self):
+        """Angular frequency [rad/s]."""
+        return 2.0 * np.pi * self.frequency
+
+    @property
+    def rms(self):
+        """Root mean square of x about its mean in each cycle [m]: the response of the paper."""
+        totals = [self.record[:, :, COLUMNS.index(name)] for name in ("x_squared", "x")]
+        square, mean = (total / self.steps[:, None] for total in totals)
+        return np.sqrt(np.maximum(square - mean**2, 0.0).mean(axis=1))
+
+    @property
+    def amplitude(self):
+        """Half the way from lowest to highest x [m], mean over cycles."""
+        return 0.5 * (self.mean_of("x_max") - self.mean_of("x_min"))
+
+    @property
+    def mean(self):
+        """Mean displacement [m]."""
+        return self.per_step("x")
+
+    @property
+    def mean_force(self):
+        """Mean force of the filling on the container [N]; -N m g in the long run."""
+        return self.per_step("f")
+
+    @property
+    def energy(self):
+        """Energy of the particles at the ends of cycles [J], mean."""
+        return self.mean_of("energy")
+
+    @property
+    def impedance(self):
+        """Of the filling, -F / V = c + i w m [N s/m]; NaN where the container does not move."""
+        force, speed = self.harmonic("f"), self.harmonic("v")
+        still = speed == 0.0
+        return np.where(still, _NOT_A_NUMBER, 0.0 - force / np.where(still, 1.0, speed))
+
+    @property
+    def apparent_mass(self):
+        """Mass that the container feels at this frequency beside its own [kg]."""
+        return self.impedance.imag / self.omega
+
+    @property
+    def apparent_damping(self):
+        """Damping coefficient that the filling adds [N s/m]."""
+        return self.impedance.real
+
+    @property
+    def complex_power(self):
+        """Mean power that the filling takes [W], and i times its reactive power."""
+        return -0.5 * self.harmonic("f") * np.conj(self.harmonic("v"))
+
+    def loss_factor(self, mass):
+        """Energy that the filling takes a radian per energy in motion, c / (w (M + m)).
+
+        mass M [kg] of the container, (scenes,) or one for all. The energy in motion is that of the
+        container and the apparent mass at the largest speed; 0 for a rigid mass.
+        """
+        return self.apparent_damping / (self.omega * (mass + self.apparent_mass))
+
+    def damping_ratio(self, mass, stiffness, damping):
+        """Effective share of critical damping, (C + c) / (2 sqrt(K (M + m))).
+
+        mass M [kg], stiffness K [N/m] and damping C [N s/m] of the primary structure.
+        """
+        critical = 2.0 * np.sqrt(stiffness * (mass + self.apparent_mass))
+        return (damping + self.apparent_damping) / critical
+
+
+def peak(frequency_ratio, response):
+    """Where a response curve peaks and how high it is there: (ratio, response), floats.
+
+    By the parabola through the highest point and its neighbours, whatever their spacing; at an end
+    of the curve, or where a neighbour is no number, the point itself. NaN for a curve of NaN.
+    """
+    x, y = np.asarray(frequency_ratio, dtype=float), np.asarray(response, dtype=float)
+    if np.isnan(y).all():
+        return np.nan, np.nan
+    k = int(np.nanargmax(y))
+    if not 0 < k < len(y) - 1 or np.isnan(y[k - 1 : k + 2]).any():
+        return float(x[k]), float(y[k])
+    left, right = ((y[k] - y[j]) / (x[k] - x[j]) for j in (k - 1, k + 1))
+    bend = (right - left) / (x[k + 1] - x[k - 1])
+    if bend == 0.0:
+        return float(x[k]), float(y[k])
+    # Newton's form through (k - 1, k): slope left + bend (2 x - x[k-1] - x[k]) is zero at the top.
+    top = 0.5 * (x[k - 1] + x[k] - left / bend)
+    height = y[k] + (top - x[k]) * (left + bend * (top - x[k - 1]))
+    return float(top), float(height)

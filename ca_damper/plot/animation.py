@@ -1,0 +1,53 @@
+"""Animations small enough for a web page."""
+
+import contextlib
+
+import matplotlib
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from PIL import Image
+
+from ca_damper.plot.box import DrawnBox, frame_panel
+from taichi_dem.plot_style import STYLE, write_gif
+
+_DPI = 100
+_SMALL = {**STYLE, "font.size": 7.5, "axes.titlesize": 7.5, "xtick.labelsize": 6.5}
+_SMALL = {**_SMALL, "ytick.labelsize": 6.5, "axes.labelsize": 7.0, "legend.fontsize": 6.5}
+
+
+@contextlib.contextmanager
+def moving_picture(path, size, milliseconds):
+    """A figure and a function that takes it as the next frame; a GIF when the block ends well.
+
+    size: in inches, at 100 pixels an inch. The layout is that of the first frame.
+    """
+    with matplotlib.rc_context(_SMALL):
+        figure = Figure(figsize=size, dpi=_DPI, layout="constrained")
+        canvas, images = FigureCanvasAgg(figure), []
+
+        def shoot():
+            canvas.draw()
+            images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())[:, :, :3].copy()))
+            figure.set_layout_engine("none")
+
+        yield figure, shoot
+    write_gif(path, images, milliseconds)
+
+
+def animate_patterns(path, rows, amplitude, fastest, milliseconds=60):
+    """The boxes of several fillings side by side through one cycle, as a GIF below a megabyte.
+
+    rows: title -> (Box, frames), as many frames in each. amplitude: of the container [m]. fastest:
+    vertical speed at the ends of the colour scale [m/s].
+    """
+    with moving_picture(path, (4.0, 2.6), milliseconds) as (figure, shoot):
+        panels, drawn = figure.subplots(1, len(rows)), []
+        for axes, (title, (box, _)) in zip(panels, rows.items()):
+            frame_panel(axes, box, amplitude)
+            axes.set_title(title, loc="center")
+            drawn.append(DrawnBox(axes, box, fastest))
+        for shots in zip(*(frames for _, frames in rows.values())):
+            for one, frame in zip(drawn, shots):
+                one.show(frame)
+            shoot()

@@ -1,0 +1,142 @@
+"""Pictures of responses over frequency: curves with bands over seeds, measures, hysteresis."""
+
+import numpy as np
+from matplotlib import colormaps
+
+from taichi_dem.plot_style import picture
+
+#: Titles of the fillings in words.
+TITLES = {
+    "dem": "spheres",
+    "ca_landing": "automaton: landing",
+    "ca_ejection": "automaton: landing + ejection",
+    "ca_static": "automaton: static contact",
+}
+_SHADES = colormaps["viridis"]
+#: Okabe and Ito's, one a filling.
+_COLOURS = ("#D55E00", "#E69F00", "#009E73", "#0072B2", "#CC79A7")
+_FINE = 400
+
+
+def picture_responses(path, responses, particle_mass):
+    """A panel a filling: RMS over frequency for every particle number (Figs. 3 and 11); the peaks.
+
+    responses: Response by label. particle_mass [kg], for the rigid mass drawn for scale.
+    """
+    count = len(responses)
+    columns = 2 if count < 4 else 3
+    rows = (count + 2 + columns - 1) // columns
+    size = (4.2 * columns, 3.3 * rows)
+    with picture(path, rows, columns, size, squeeze=False) as (_, axes):
+        panels = axes.ravel()
+        for axis, (label, response) in zip(panels, responses.items()):
+            _draw_curves(axis, response)
+            axis.set_title(TITLES.get(label, label))
+        _share_height(panels[:count])
+        _draw_peaks(panels[count], panels[count + 1], responses, particle_mass)
+        for axis in panels[count + 2 :]:
+            axis.set_axis_off()
+
+
+def _draw_curves(axis, response):
+    """Median over seeds as lines, lowest and highest as bands; the empty container dotted."""
+    for k, particles in enumerate(response.particles):
+        colour = _shade(response, k)
+        _band(axis, response.ratios, 1e3 * response.rms[k], colour, f"N = {particles}")
+    oscillator = response.oscillator
+    fine = np.linspace(response.ratios[0], response.ratios[-1], _FINE)
+    empty = oscillator.base_amplitude * np.abs(
+        oscillator.transfer(fine * oscillator.natural_frequency)
+    )
+    axis.plot(fine, 1e3 * empty / np.sqrt(2.0), color="0.5", ls=":", lw=1.0, label="empty")
+    axis.set(xlabel="frequency f / f$_0$", ylabel="RMS displacement [mm]")
+    axis.legend()
+
+
+def _band(axis, x, values, colour, label):
+    """values: (points, seeds)."""
+    axis.plot(x, np.median(values, axis=1), color=colour, label=label)
+    axis.fill_between(x, values.min(axis=1), values.max(axis=1), color=colour, alpha=0.25, lw=0)
+
+
+def _shade(response, k):
+    return _SHADES(0.1 + 0.8 * k / max(1, len(response.particles) - 1))
+
+
+def _share_height(panels):
+    """The same height for all, what an empty container needs left out."""
+    highest = max(line.get_ydata().max() for axis in panels for line in axis.lines[:-1])
+    for axis in panels:
+        axis.set_ylim(0.0, 1.08 * highest)
+
+
+def _draw_peaks(place, height, responses, particle_mass):
+    """Where the curves peak and how high, over the particle number; bars from seed to seed."""
+    for mark, colour, (label, response) in zip("osD^v", _COLOURS, responses.items()):
+        ratio, rms = response.peaks()
+        for axis, values in ((place, ratio), (height, 1e3 * rms)):
+            middle = np.median(values, axis=1)
+            bars = [middle - values.min(axis=1), values.max(axis=1) - middle]
+            look = {"marker": mark, "ms": 4.5, "color": colour, "label": TITLES.get(label, label)}
+            axis.errorbar(response.particles, middle, yerr=bars, lw=1.2, **look)
+    first = next(iter(responses.values()))
+    rigid = [first.oscillator.peak(n * particle_mass) for n in first.particles]
+    place.plot(first.particles, [r for r, _ in rigid], color="0.5", ls=":", label="rigid mass")
+    place.set(title="where they peak", xlabel="particles N", ylabel="f / f$_0$ of the peak")
+    height.set(title="how high", xlabel="particles N", ylabel="peak RMS [mm]", ylim=(0, None))
+    place.legend()
+
+
+def picture_measures(path, responses, particle_mass):
+    """Apparent mass and loss factor over frequency: a column a filling, a line a particle number.
+
+    Apparent mass as a share of the particles' own: 1 for a rigid mass.
+    """
+    count = len(responses)
+    size = (1.0 + 2.6 * count, 5.4)
+    with picture(path, 2, count, size, squeeze=False, sharex=True, sharey="row") as (_, axes):
+        for column, (label, response) in zip(axes.T, responses.items()):
+            for k, particles in enumerate(response.particles):
+                if particles > 0:
+                    _draw_measures(column, response, k, particle_mass)
+            column[0].set_title(TITLES.get(label, label))
+            column[0].axhline(1.0, color="0.5", ls=":", lw=1.0)
+            column[1].set_xlabel("frequency f / f$_0$")
+        axes[0, 0].set_ylabel("apparent mass / N m")
+        axes[1, 0].set_ylabel("loss factor")
+        axes[0, 0].legend()
+
+
+def _draw_measures(column, response, k, particle_mass):
+    particles, colour = response.particles[k], _shade(response, k)
+    share = response.apparent_mass[k] / (particles * particle_mass)
+    _band(column[0], response.ratios, share, colour, f"N = {particles}")
+    _band(column[1], response.ratios, response.loss_factor[k], colour, None)
+
+
+def picture_hysteresis(path, sweeps):
+    """Sweeps up and down, the state carried on: a column a filling, a row a particle number."""
+    particles = next(iter(sweeps.values())).up.particles
+    count = len(sweeps)
+    size = (1.0 + 2.6 * count, 1.0 + 2.3 * len(particles))
+    shape = {"squeeze": False, "sharex": True, "sharey": "row"}
+    with picture(path, len(particles), count, size, **shape) as (_, axes):
+        for column, (label, sweep) in zip(axes.T, sweeps.items()):
+            column[0].set_title(TITLES.get(label, label))
+            for k, axis in enumerate(column):
+                _draw_ways(axis, sweep, k)
+            column[-1].set_xlabel("frequency f / f$_0$")
+        for k, axis in enumerate(axes[:, 0]):
+            axis.set_ylabel(f"N = {particles[k]}: RMS [mm]")
+        axes[0, 0].legend()
+
+
+def _draw_ways(axis, sweep, k):
+    """Each seed a line; up and down apart by colour and mark."""
+    for seed in range(len(sweep.up.seeds)):
+        name = {"up": "up", "down": "down"} if seed == 0 else {}
+        up, down = 1e3 * sweep.up.rms[k, :, seed], 1e3 * sweep.down.rms[k, :, seed]
+        axis.plot(sweep.up.ratios, up, color=_SHADES(0.15), marker=">", ms=3, label=name.get("up"))
+        axis.plot(
+            sweep.up.ratios, down, color=_SHADES(0.75), marker="<", ms=3, label=name.get("down")
+        )

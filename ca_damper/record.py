@@ -1,0 +1,73 @@
+"""What a run leaves behind: time series, frames for pictures, CSV files, whole or not at all."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ca_damper.progress import Stages
+from taichi_dem.checks import whole
+
+_MOST_STEPS = 2**31 - 1
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """One scene at one time.
+
+    time_s; x, y: displacement of container and base [m]; position, velocity: of the particles,
+    (particles, 2), horizontal and vertical, as the filling's ``snapshot`` gives them.
+    """
+
+    time_s: float
+    x: float
+    y: float
+    position: np.ndarray
+    velocity: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Film:
+    """A recorded run.
+
+    history: arrays (samples, scenes) by name, see ``Batch.sample``. frames: a tuple of Frames for
+    each scene.
+    """
+
+    history: dict
+    frames: tuple
+
+
+def film(batch, steps, *, sample_every=1, frame_every=None, progress=None):
+    """Run a batch of few scenes on by a number of steps and record it; returns a Film.
+
+    The present state is recorded first, then every so many steps; frame_every: None for no frames.
+    progress: called with a ``progress.Progress``.
+    Raises InputError for numbers that are none, SimulationDiverged.
+    """
+    steps = whole("steps", steps, 1, _MOST_STEPS)
+    samples = _marks("sample_every", sample_every, steps)
+    frames = _marks("frame_every", frame_every, steps) if frame_every is not None else set()
+    marks = sorted(samples | frames | {steps})
+    tell = Stages(progress, [mark / steps for mark in marks[1:]])
+    rows, shots = [], []
+    for before, mark in zip([0, *marks], marks):
+        if mark > before:
+            batch.advance(mark - before, tell)
+        present = batch.sample()
+        if mark in samples:
+            rows.append(present)
+        if mark in frames:
+            shots.append([_frame(batch, present, s) for s in range(batch.count)])
+    history = {name: np.stack([row[name] for row in rows]) for name in rows[0]}
+    return Film(history, tuple(zip(*shots)))
+
+
+def _marks(name, every, steps):
+    """Steps at which to record, from 0 on."""
+    return set(range(0, steps + 1, whole(name, every, 1, _MOST_STEPS)))
+
+
+def _frame(batch, present, s):
+    time_s, x, y = (float(present[name][s]) for name in ("time_s", "x", "y"))
+    shot = batch.snapshot(s)
+    return Frame(time_s, x, y, shot["position"], shot["velocity"])

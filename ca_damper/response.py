@@ -1,0 +1,160 @@
+"""Frequency response of the damped structure: every particle number, frequency and seed a scene."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ca_damper.batch import Batch
+from ca_damper.measures import peak
+from ca_damper.oscillator import Oscillator
+from ca_damper.table import SceneTable
+from taichi_dem.checks import positive, several, whole
+from taichi_dem.errors import InputError
+from taichi_dem.files import write_csv
+
+#: Measures of a response and the unit that a CSV file says behind their names.
+UNITS = {
+    "rms": "m",
+    "amplitude": "m",
+    "mean": "m",
+    "mean_force": "N",
+    "apparent_mass": "kg",
+    "apparent_damping": "N_s_m",
+    "loss_factor": "",
+    "damping_ratio": "",
+    "energy": "J",
+}
+_MOST_SEEDS = 2**31 - 1
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """Response curves of a filling; every measure is an array (particles, ratios, seeds).
+
+    label: of the filling. particles, seeds: whole numbers. ratios: frequency by the natural one of
+    the empty container, ascending. steps_per_cycle, dt [s]: of each ratio, (ratios,): dt is the
+    step asked for, shortened so that whole steps make a cycle.
+
+    rms: root mean square of the displacement about its mean in each cycle [m]. amplitude: half the
+    way from lowest to highest [m]. mean: displacement [m]. mean_force: of the filling on the
+    container [N]. apparent_mass [kg], apparent_damping [N s/m], loss_factor, damping_ratio: of
+    ``measures.Cycles``. energy: of the particles [J].
+    """
+
+    label: str
+    oscillator: Oscillator
+    particles: tuple
+    ratios: np.ndarray
+    seeds: tuple
+    steps_per_cycle: np.ndarray
+    dt: np.ndarray
+    rms: np.ndarray
+    amplitude: np.ndarray
+    mean: np.ndarray
+    mean_force: np.ndarray
+    apparent_mass: np.ndarray
+    apparent_damping: np.ndarray
+    loss_factor: np.ndarray
+    damping_ratio: np.ndarray
+    energy: np.ndarray
+
+    def peaks(self):
+        """Where each curve peaks: (ratio, rms [m]), two arrays (particles, seeds)."""
+        curves = np.moveaxis(self.rms, 2, 1).reshape(-1, len(self.ratios))
+        found = np.array([peak(self.ratios, curve) for curve in curves])
+        shape = (len(self.particles), len(self.seeds))
+        return found[:, 0].reshape(shape), found[:, 1].reshape(shape)
+
+    def write_csv(self, path):
+        """Write one row a scene: filling, particles, ratio, frequency, seed and all measures.
+
+        Raises InputError when the file cannot be written.
+        """
+        grids = np.meshgrid(self.particles, self.ratios, self.seeds, indexing="ij")
+        columns = dict(zip(("particles", "ratio", "seed"), (grid.ravel() for grid in grids)))
+        columns["frequency_Hz"] = columns["ratio"] * self.oscillator.natural_frequency
+        for name, unit in UNITS.items():
+            columns[f"{name}_{unit}" if unit else name] = getattr(self, name).ravel()
+        write_csv(path, {"filling": [self.label] * grids[0].size, **columns})
+
+
+def frequency_response(
+    filling,
+    *,
+    particles,
+    ratios,
+    seeds=5,
+    oscillator=None,
+    dt=None,
+    transient_cycles=150,
+    measured_cycles=20,
+    start="rest",
+    progress=None,
+):
+    """Response curves of a filling, all scenes in one batch; returns a Response.
+
+    particles: one number or several. ratios: ascending frequency ratios f/f0, f0 of the empty
+    container. seeds: how many, counted from 1, or the seeds themselves. oscillator: the primary
+    structure, the paper's if None. dt: largest step [s], the filling's own if None.
+    start: the container's motion at the beginning, see ``Batch.start``. progress: called with a
+    ``batch.Progress`` about six times a second.
+    Raises InputError for what cannot be used, SimulationDiverged.
+    """
+    grid = Grid(filling, particles, ratios, seeds, oscillator, dt)
+    batch = grid.batch(grid.ratios, measured_cycles)
+    batch.start(start)
+    cycles = batch.run(transient_cycles, measured_cycles, progress)
+    shape = grid.shape
+    steps = batch.steps_per_cycle.reshape(shape)[0, :, 0]
+    values = {name: value.reshape(shape) for name, value in grid.measures(cycles).items()}
+    return grid.response(steps, values)
+
+
+class Grid:
+    """The checked axes of a response: particle numbers, frequency ratios, seeds."""
+
+    def __init__(self, filling, particles, ratios, seeds, oscillator, dt):
+        self.filling = filling
+        self.oscillator = Oscillator() if oscillator is None else oscillator
+        self.particles = several("particles", particles, self._particles)
+        self.ratios = np.array(several("ratios", ratios, positive))
+        if (np.diff(self.ratios) <= 0.0).any():
+            raise InputError(f"ratios must ascend, got {self.ratios.tolist()}")
+        if not hasattr(seeds, "__iter__"):
+            seeds = range(1, whole("seeds", seeds, 1, 1_000_000) + 1)
+        self.seeds = several("seeds", seeds, lambda name, x: whole(name, x, 0, _MOST_SEEDS))
+        self.dt = filling.default_dt if dt is None else positive("dt", dt)
+
+    def _particles(self, name, value):
+        return whole(name, value, 0, self.filling.capacity)
+
+    @property
+    def shape(self):
+        """Of the measures: particles, ratios, seeds."""
+        return len(self.particles), len(self.ratios), len(self.seeds)
+
+    def batch(self, ratios, measured_cycles):
+        """Batch of all scenes at these ratios, the last axis (seeds) running fastest."""
+        whole("measured_cycles", measured_cycles, 1, 100_000)
+        grids = np.meshgrid(self.particles, ratios, self.seeds, indexing="ij")
+        number, ratio, seed = (grid.ravel() for grid in grids)
+        o = self.oscillator
+        structure = (o.base_amplitude, o.mass, o.stiffness, o.damping)
+        table = SceneTable(number, seed, self.dt, ratio * o.natural_frequency, *structure)
+        return Batch(self.filling, table, measured_cycles=measured_cycles)
+
+    def measures(self, cycles):
+        """Measures of all scenes by name, each (scenes,)."""
+        o = self.oscillator
+        of_structure = {
+            "loss_factor": cycles.loss_factor(o.mass),
+            "damping_ratio": cycles.damping_ratio(o.mass, o.stiffness, o.damping),
+        }
+        plain = {name: getattr(cycles, name) for name in UNITS if name not in of_structure}
+        return {**plain, **of_structure}
+
+    def response(self, steps, values):
+        """Response of measures by name, each of our shape; steps: a cycle, (ratios,)."""
+        dt = 1.0 / (self.ratios * self.oscillator.natural_frequency * steps)
+        axes = (self.particles, self.ratios, self.seeds)
+        return Response(self.filling.label, self.oscillator, *axes, steps, dt, **values)

@@ -1,0 +1,234 @@
+"""Dormand-Prince 5(4) for any right-hand side, in Python and inside kernels alike.
+
+Every function here but ``solve`` is a ``ti.pyfunc``: called from a kernel it is compiled into it,
+called from Python it runs as it stands, on NumPy vectors. So the formulas are written once. ``rhs``
+is called as ``rhs(context, t, y)`` and returns dy/dt; in a kernel it is a ti.func or a bound method
+of a data-oriented object, ``context`` whatever it needs (a scene number, a struct), and ``y`` a
+ti.Vector. Three things are kept apart: the step, what error it may make, and how long the next is.
+
+Source: Dormand and Prince, J. Comput. Appl. Math. 6 (1980) 19-26; step sizes after Hairer, Norsett
+and Wanner, Solving Ordinary Differential Equations I, section II.4.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import taichi as ti
+
+from taichi_dem.checks import positive
+from taichi_dem.errors import InputError
+
+#: Attempts after which an integration counts as stuck, unless the caller says otherwise.
+MOST_ATTEMPTS = 1_000_000
+#: Steps below this share of the time itself no longer move the clock.
+_SMALLEST_SHARE = 1e-15
+
+
+@ti.pyfunc
+def step(rhs: ti.template(), context, t, y, slope, h):
+    """One step of length h from y at t, where dy/dt is ``slope``.
+
+    Returns y at t + h (fifth order), dy/dt there (the next step's slope: six new evaluations a
+    step) and the difference to the embedded fourth-order result. A caller that has no use for the
+    last two pays nothing for them in a kernel, where what nobody reads is not computed.
+    """
+    k1 = slope
+    k2 = rhs(context, t + h * (1 / 5), y + h * (1 / 5 * k1))
+    k3 = rhs(context, t + h * (3 / 10), y + h * (3 / 40 * k1 + 9 / 40 * k2))
+    k4 = rhs(context, t + h * (4 / 5), y + h * (44 / 45 * k1 - 56 / 15 * k2 + 32 / 9 * k3))
+    y5 = 19372 / 6561 * k1 - 25360 / 2187 * k2 + 64448 / 6561 * k3 - 212 / 729 * k4
+    k5 = rhs(context, t + h * (8 / 9), y + h * y5)
+    y6 = 9017 / 3168 * k1 - 355 / 33 * k2 + 46732 / 5247 * k3 + 49 / 176 * k4
+    k6 = rhs(context, t + h, y + h * (y6 - 5103 / 18656 * k5))
+    y7 = 35 / 384 * k1 + 500 / 1113 * k3 + 125 / 192 * k4 - 2187 / 6784 * k5 + 11 / 84 * k6
+    y_new = y + h * y7
+    k7 = rhs(context, t + h, y_new)
+    gap = 71 / 57600 * k1 - 71 / 16695 * k3 + 71 / 1920 * k4 - 17253 / 339200 * k5
+    return y_new, k7, h * (gap + 22 / 525 * k6 - 1 / 40 * k7)
+
+
+@ti.pyfunc
+def scaled_norm(vector, y, y_new, rtol, atol):
+    """Euclidean length of a vector in units of atol + rtol max(|y|, |y_new|), by component.
+
+    A sum of squares and not a maximum: a maximum would let a NaN pass.
+    """
+    ratio = vector / (atol + rtol * ti.max(abs(y), abs(y_new)))
+    return (ratio * ratio).sum() ** 0.5
+
+
+@ti.pyfunc
+def growth(error):
+    """By how much the next step is longer, for an error in units of the tolerance.
+
+    The local error grows with the fifth power of the step; 0.9 aims a little short, and 0.2 to 5
+    bound a change. NaN shrinks the step.
+    """
+    factor = 0.2
+    if error < 1e3:
+        factor = min(5.0, max(0.2, 0.9 * max(error, 1e-10) ** -0.2))
+    return factor
+
+
+@ti.pyfunc
+def first_step(rhs: ti.template(), context, t, y, slope, rtol, atol):
+    """Length of a first step (algorithm of Hairer et al.); one evaluation."""
+    size = scaled_norm(y, y, y, rtol, atol)
+    speed = scaled_norm(slope, y, y, rtol, atol)
+    h = 1e-6
+    if min(size, speed) > 1e-5:
+        h = 0.01 * size / speed
+    bend = rhs(context, t + h, y + h * slope) - slope
+    steepest = max(speed, scaled_norm(bend, y, y, rtol, atol) / h)
+    guess = max(1e-6, 1e-3 * h)
+    if steepest > 1e-15:
+        guess = (0.01 / steepest) ** 0.2
+    return min(100.0 * h, guess)
+
+
+@ti.pyfunc
+def attempt(rhs: ti.template(), context, t, t_end, y, slope, h, rtol, atol):
+    """Try a step of length h, or what is left to t_end.
+
+    Returns (t, y, dy/dt, length tried, error in units of the tolerance): where the step leads when
+    its error is at most 1, where it began when it is not.
+    """
+    left = t_end - t
+    size = min(h, left)
+    y_new, slope_new, gap = step(rhs, context, t, y, slope, size)
+    error = scaled_norm(gap, y, y_new, rtol, atol)
+    t_after, y_after, slope_after = 1.0 * t, y, slope
+    if error <= 1.0:
+        y_after, slope_after = y_new, slope_new
+        t_after = t + size
+        if size == left or t_after > t_end:
+            t_after = 1.0 * t_end
+    return t_after, y_after, slope_after, size, error
+
+
+@ti.pyfunc
+def integrate(rhs: ti.template(), context, t, t_end, y, slope, h, rtol, atol, most_attempts):
+    """Take y from t to t_end >= t with steps chosen by the error.
+
+    slope: dy/dt at t. h: first step to try, positive.
+    Returns (y, dy/dt, attempts). attempts is -1 when the end was not reached within most_attempts
+    or the step fell to nothing, as it does at a singularity or a NaN.
+    """
+    now, state, change, length, attempts = 1.0 * t, y, slope, 1.0 * h, 0
+    error = 1.0
+    while now < t_end and attempts >= 0:
+        # Chosen here and not after the attempt: the last one needs no successor, and the power in
+        # ``growth`` costs as much as half a step.
+        if attempts > 0:
+            length *= growth(error)
+        now, state, change, length, error = attempt(
+            rhs, context, now, t_end, state, change, length, rtol, atol
+        )
+        attempts += 1
+        if now < t_end and stuck(now, t_end, length, attempts, most_attempts):
+            attempts = -1
+    return state, change, attempts
+
+
+@ti.pyfunc
+def stuck(t, t_end, h, attempts, most_attempts):
+    """Whether to give up: too many attempts, or a step that no longer moves the clock."""
+    return (attempts >= most_attempts) | (h <= _SMALLEST_SHARE * max(abs(t), abs(t_end)))
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A solved initial value problem.
+
+    t: (n,) times of the accepted steps, first and last included. y: (n, k) states there.
+    rejected: attempts thrown away. evaluations: of the right-hand side.
+    """
+
+    t: np.ndarray
+    y: np.ndarray
+    rejected: int
+    evaluations: int
+
+
+def solve(rhs, span, y0, *, rtol=1e-6, atol=1e-9, at=None, first=None, most_attempts=MOST_ATTEMPTS):
+    """Solve dy/dt = rhs(t, y) from y(span[0]) = y0 to span[1] in Python.
+
+    y0: (k,) numbers. rtol, atol: local error allowed, |error| <= atol + rtol |y| in the Euclidean
+    mean. at: ascending times in the span at which y is wanted; the steps land on them, so they are
+    as exact as the rest. All accepted steps are given if None. first: first step to try, chosen by
+    itself if None.
+    Raises InputError for a bad argument or when the end is not reached within most_attempts.
+    """
+    t, t_end = _checked_span(span)
+    y = np.atleast_1d(np.array(y0, dtype=np.float64))
+    if not np.isfinite(y).all():
+        raise InputError(f"y0 must be finite numbers, got {y0!r}")
+    rtol = positive("rtol", rtol, zero_allowed=True)
+    atol = positive("atol", atol)
+    wanted = None if at is None else _checked_times(at, t, t_end)
+
+    def derivative(_, time, state):
+        return np.asarray(rhs(time, state), dtype=np.float64)
+
+    slope = derivative(None, t, y)
+    h = positive("first", first) if first is not None else None
+    extra = 1 if h is not None else 2
+    h = h or first_step(derivative, None, t, y, slope, rtol, atol)
+    inner = () if wanted is None else wanted[(wanted > t) & (wanted < t_end)]
+    path = _Path(derivative, t, y, slope, h, most_attempts)
+    for stop in (*inner, t_end):
+        path.go(stop, rtol, atol)
+    times, states = np.array(path.times), np.array(path.states)
+    rejected, evaluations = path.attempts - len(times) + 1, 6 * path.attempts + extra
+    if wanted is not None:
+        times, states = wanted, states[np.searchsorted(times, wanted)]
+    return Solution(times, states, rejected, evaluations)
+
+
+class _Path:
+    """Accepted times and states on the way."""
+
+    def __init__(self, derivative, t, y, slope, h, most_attempts):
+        self.derivative, self.slope, self.h = derivative, slope, h
+        self.times, self.states = [t], [y]
+        self.attempts, self.most_attempts = 0, most_attempts
+
+    def go(self, stop, rtol, atol):
+        """Go on to a time and land on it."""
+        t, y = self.times[-1], self.states[-1]
+        while t < stop:
+            t, y, self.slope, size, error = attempt(
+                self.derivative, None, t, stop, y, self.slope, self.h, rtol, atol
+            )
+            self.attempts += 1
+            if error <= 1.0:
+                self.times.append(t)
+                self.states.append(y)
+            # A step cut short by the stop shortens no later one.
+            least = self.h if size < self.h and error <= 1.0 else 0.0
+            self.h = max(least, size * growth(error))
+            self._refuse_if_stuck(t, stop)
+
+    def _refuse_if_stuck(self, t, stop):
+        if t < stop and stuck(t, stop, self.h, self.attempts, self.most_attempts):
+            raise InputError(
+                f"rhs must be smooth up to t = {stop:g} for these tolerances: after "
+                f"{self.attempts} attempts the solver is stuck at t = {t:.6g} with steps of "
+                f"{self.h:.3g}"
+            )
+
+
+def _checked_times(at, t, t_end):
+    times = np.array(at, dtype=np.float64).ravel()
+    inside = np.isfinite(times).all() and (times >= t).all() and (times <= t_end).all()
+    if not inside or (np.diff(times) < 0.0).any():
+        raise InputError(f"at must be ascending times in [{t:g}, {t_end:g}], got {at!r}")
+    return times
+
+
+def _checked_span(span):
+    t, t_end = (float(time) for time in span)
+    if not (math.isfinite(t) and math.isfinite(t_end) and t <= t_end):
+        raise InputError(f"span must be two finite times in order, got {span!r}")
+    return t, t_end

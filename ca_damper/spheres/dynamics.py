@@ -1,0 +1,210 @@
+"""One step of the spheres: contacts, walls, motion; and what is asked of them between steps.
+
+Time integration is the leapfrog, with velocities at the times t_n that the container's motion is
+given for, and positions half a step ahead. In a step, forces are taken at the positions of its
+middle, change the velocities over the whole step, and these move the positions on. It is of second
+order, symplectic where nothing dissipates, and needs one evaluation of the contacts. As the
+forces belong to the middle of the step over which the container feels them, they do not lag.
+
+Spheres move in the frame at rest, not in the container's: so what they gain of momentum is what
+contacts and gravity give, to round-off, and the blows on the container are its exact counterpart.
+"""
+
+import numpy as np
+import taichi as ti
+
+from ca_damper.filling import Action
+from ca_damper.spheres.bodies import Bodies, vec2
+from ca_damper.spheres.contact_law import Contact, ContactLaw, pair_numbers, wall_numbers
+from ca_damper.spheres.rotation import NoRotation, Rotation
+from ca_damper.spheres.search import make_search
+
+# Codes of health; a speed is a runaway's when it crosses more than a radius in a step.
+FINE, NOT_FINITE, RUNAWAY, OVERLAP = range(4)
+DIVERGENCES = {
+    NOT_FINITE: "has a sphere whose velocity is not a finite number",
+    RUNAWAY: "has a sphere that moves by more than its radius in a step",
+    OVERLAP: "has spheres that overlap, or lie outside the container, by more than a radius",
+}
+
+
+@ti.data_oriented
+class BoundSpheres:
+    """The spheres of all scenes of a table, on the device; see ``ca_damper.filling``.
+
+    crushed: whether spheres of a scene lay in each other by a radius when ``health`` looked last.
+    """
+
+    def __init__(self, options, table):
+        self.table = table
+        self.bodies = Bodies(options, table)
+        self.law = ContactLaw(options.damping)
+        self.rotation = Rotation() if options.rotation else NoRotation()
+        self.search = make_search(options.search, options.radius)
+        self.crushed = ti.field(ti.i32, shape=table.count)
+        self.rotation.bind(self.bodies)
+        self.search.bind(self.bodies)
+        self.contact_of_pair = Contact.field(shape=())
+        self.contact_of_wall = Contact.field(shape=())
+        self._load(options)
+
+    def _load(self, options):
+        """Write all numbers, after the last field is allocated.
+
+        Taichi puts the fields allocated since the last use of any into one tree, and a session
+        ends in a crash at some 512 trees: a batch should take one and not seven.
+        """
+        share = self.rotation.tangential_share
+        self.bodies.load()
+        self.search.load()
+        self.law.load(self.contact_of_pair, pair_numbers(options), share)
+        self.law.load(self.contact_of_wall, wall_numbers(options), share)
+
+    @ti.func
+    def reset(self, s):
+        """Place the spheres of scene s, at rest; the first step takes them to the container."""
+        self.bodies.place_all(s)
+        for i in range(self.bodies.first(s), self.bodies.last(s)):
+            self.rotation.reset(i)
+        self.search.forget(s)
+
+    @ti.func
+    def act(self, s, step, motion):
+        """Take the spheres over a step; returns their blows on the container."""
+        dt = self.table.dt[s]
+        if step == 0:
+            self.bodies.board(s, motion)
+        if self.bodies.ahead[s] != 0.5 * dt:
+            self.bodies.run_ahead(s, 0.5 * dt)
+            self.search.forget(s)
+        self.search.refresh(s)
+        contact = self.law.over_step(self.contact_of_pair[None], dt)
+        self.search.each_pair(s, contact, self._pair)
+        floor = motion.x + 0.5 * dt * (motion.v + 0.25 * dt * motion.a)
+        # Seen from spheres that fall freely, as all that is foreseen of them is their fall.
+        speed = motion.v + 0.5 * dt * (motion.a + self.bodies.body[None].gravity)
+        force = self._advance(s, dt, floor, speed)
+        self.bodies.floor[s] = motion.x + dt * (motion.v + 0.5 * dt * motion.a)
+        return Action(-dt * force, 0.0)
+
+    @ti.func
+    def _pair(self, i, j, contact):
+        """Forces of two spheres on each other, if they touch."""
+        branch = self.bodies.position[j] - self.bodies.position[i]
+        square = branch.norm_sqr()
+        if square < contact.reach * contact.reach:
+            distance = ti.sqrt(square)
+            normal = branch * (1.0 / distance)
+            tangent = vec2(-normal[1], normal[0])
+            relative = self.bodies.velocity[i] - self.bodies.velocity[j]
+            slip = self.rotation.slip_of_pair(i, j, 0.5 * distance, relative.dot(tangent))
+            push = self.law.normal(contact, contact.reach - distance, relative.dot(normal))
+            drag = self.law.friction(contact, push, slip)
+            force = drag * tangent - push * normal
+            self.bodies.push(i, force)
+            self.bodies.push(j, -force)
+            self.rotation.twist(i, 0.5 * distance * drag)
+            self.rotation.twist(j, 0.5 * distance * drag)
+
+    @ti.func
+    def _advance(self, s, dt, floor, speed):
+        """Walls and motion; returns the container's force on the spheres along x [N]."""
+        contact = self.law.over_step(self.contact_of_wall[None], dt)
+        body = self.bodies.body[None]
+        high = vec2(0.5 * body.width, floor + body.height) - body.radius
+        low = vec2(-0.5 * body.width, floor) + body.radius
+        total, least, most = 0.0, vec2(ti.math.inf), vec2(-ti.math.inf)
+        for i in range(self.bodies.first(s), self.bodies.last(s)):
+            position = self.bodies.position[i]
+            force = vec2(0.0)
+            if (position < low).any() or (position > high).any():
+                force = self._walls(i, contact, position - low, high - position, speed)
+            total += force[1]
+            velocity = self.bodies.kick(i, force, dt)
+            self.rotation.kick(i, dt)
+            least, most = ti.min(least, velocity), ti.max(most, velocity)
+        if ti.static(self.search.tracks_motion):
+            self.search.moved(s, dt * (most - least).norm())
+        return total
+
+    @ti.func
+    def _walls(self, i, contact, above, below, speed):
+        """Force of the four walls on sphere i [N]; room left to each wall [m]: negative overlap."""
+        relative = self.bodies.velocity[i] - vec2(0.0, speed)
+        force = vec2(0.0)
+        for axis in ti.static(range(2)):
+            for side in ti.static((-1.0, 1.0)):
+                overlap = -(above[axis] if ti.static(side < 0.0) else below[axis])
+                if overlap > 0.0:
+                    normal = side * ti.Vector.unit(2, axis, ti.f64)
+                    force += self._wall(i, contact, normal, overlap, relative)
+        return force
+
+    @ti.func
+    def _wall(self, i, contact, normal, overlap, relative):
+        """Force of the wall that lies along ``normal`` on sphere i [N]."""
+        tangent = vec2(-normal[1], normal[0])
+        lever = contact.reach - overlap
+        slip = self.rotation.slip_at_wall(i, lever, relative.dot(tangent))
+        push = self.law.normal(contact, overlap, relative.dot(normal))
+        drag = self.law.friction(contact, push, slip)
+        self.rotation.twist(i, lever * drag)
+        return drag * tangent - push * normal
+
+    @ti.func
+    def energy(self, s):
+        """Kinetic and potential energy and that of the contacts [J]; heights from the floor."""
+        body = self.bodies.body[None]
+        total = 0.0
+        for i in range(self.bodies.first(s), self.bodies.last(s)):
+            velocity, place = self.bodies.velocity[i], self.bodies.place(s, i)
+            total += body.mass * (0.5 * velocity.norm_sqr() + body.gravity * place[1])
+            total += self.rotation.energy(i)
+            room = ti.min(place, vec2(body.width, body.height) - place)
+            for axis in ti.static(range(2)):
+                total += self.law.stored(self.contact_of_wall[None], body.radius - room[axis])
+            for j in range(i + 1, self.bodies.last(s)):
+                distance = (self.bodies.place(s, j) - place).norm()
+                total += self.law.stored(self.contact_of_pair[None], 2.0 * body.radius - distance)
+        return total
+
+    @ti.func
+    def momentum(self, s):
+        """Momentum along x [kg m/s]."""
+        total = 0.0
+        for i in range(self.bodies.first(s), self.bodies.last(s)):
+            total += self.bodies.body[None].mass * self.bodies.velocity[i][1]
+        return total
+
+    @ti.func
+    def health(self, s):
+        """0, or a code of DIVERGENCES; "not" lets NaN fail a test."""
+        body, dt = self.bodies.body[None], self.table.dt[s]
+        self.crushed[s] = self.search.crowded(s)
+        self.search.each_pair(s, self.contact_of_pair[None], self._look)
+        code = OVERLAP if self.crushed[s] > 0 else FINE
+        for i in range(self.bodies.first(s), self.bodies.last(s)):
+            place, speed = self.bodies.place(s, i), self.bodies.velocity[i].norm()
+            if (place < 0.0).any() or (place > vec2(body.width, body.height)).any():
+                code = OVERLAP
+            if not (speed * dt < body.radius):
+                code = RUNAWAY
+            if not (speed < ti.math.inf):
+                code = NOT_FINITE
+        return code
+
+    @ti.func
+    def _look(self, i, j, contact):
+        """Note spheres that overlap by more than a radius, half of their reach."""
+        branch = self.bodies.position[j] - self.bodies.position[i]
+        if branch.norm_sqr() < 0.25 * contact.reach * contact.reach:
+            self.crushed[i // self.bodies.stride] = 1
+
+    def snapshot(self, s):
+        """Places and velocities of the spheres of scene s, and their spins [rad/s] if they turn."""
+        count = self.table.particles[s]
+        rows = slice(s * self.bodies.stride, s * self.bodies.stride + count)
+        velocity = self.bodies.velocity.to_numpy()[rows]
+        position = self.bodies.position.to_numpy()[rows] - self.bodies.ahead[s] * velocity
+        shift = np.array([0.5 * self.bodies.body[None].width, -self.bodies.floor[s]])
+        return {"position": position + shift, "velocity": velocity, **self.rotation.snapshot(rows)}

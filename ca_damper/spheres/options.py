@@ -1,0 +1,159 @@
+"""What a user chooses of the spheres, and what follows from it before anything runs."""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar, Optional
+
+import numpy as np
+
+from ca_damper.spheres.contact_law import POWERS, contact_duration, pair_numbers
+from ca_damper.spheres.dynamics import DIVERGENCES, BoundSpheres
+from ca_damper.spheres.search import SEARCHES
+from taichi_dem.checks import choice, fraction, positive, whole
+from taichi_dem.errors import InputError
+
+# Spheres part ever more slowly the stronger the dashpot, but none keeps them from parting.
+_LEAST_RESTITUTION = 0.01
+
+# Steps in a contact of two spheres that met at the speed of a fall through the box.
+_STEPS_PER_CONTACT = 5.0
+
+# Room that rounding may take from a row of spheres that fits exactly.
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class Spheres:
+    """Spheres of one size in a box, by discrete elements (section 4 of the paper).
+
+    damping: "tsuji", a dashpot with d^(1/4), for one restitution at every speed, or "printed", with
+    d^(1/2) as in eq. (3), for the restitution at ``reference_speed`` [m/s] only: slower contacts
+    rebound more, faster ones less.
+    restitution, friction [-], young [Pa], poisson [-]: of two spheres; with ``wall_``: of sphere
+    and container, whose modulus and Poisson's ratio these are.
+    diameter [m], particle_mass [kg]. width, height [m]: of the box inside. gravity [m/s^2].
+    rotation: whether spheres turn; the paper leaves it out.
+    search: "cells", or "all_pairs" as in the paper; the same bits, but slower above 10 spheres.
+    start: places of the spheres [m], shape (particles, 2), from the lower left inner corner, for
+    all scenes alike; by default random ones from each scene's seed.
+
+    Restitution and reference speed are not printed in the paper; 0.75 and 0.5 m/s are ours.
+    """
+
+    damping: str = "tsuji"
+    restitution: float = 0.75
+    wall_restitution: float = 0.75
+    friction: float = 0.5
+    wall_friction: float = 0.5
+    reference_speed: float = 0.5
+    young: float = 0.5e9
+    wall_young: float = 0.5e9
+    poisson: float = 0.3
+    wall_poisson: float = 0.3
+    diameter: float = 6e-3
+    particle_mass: float = 0.2e-3
+    width: float = 60e-3
+    height: float = 96e-3
+    gravity: float = 9.8
+    rotation: bool = False
+    search: str = "cells"
+    start: Optional[tuple] = None
+
+    label: ClassVar[str] = "dem"
+    default_dt: ClassVar[float] = 2e-5
+
+    def __post_init__(self):
+        """InputError for a number or word outside its range."""
+        choice("damping", self.damping, POWERS)
+        choice("search", self.search, SEARCHES)
+        if not isinstance(self.rotation, bool):
+            raise InputError(f"rotation must be True or False, got {self.rotation!r}")
+        for name in ("reference_speed", "young", "wall_young", "diameter", "particle_mass"):
+            positive(name, getattr(self, name))
+        for name in ("friction", "wall_friction", "gravity"):
+            positive(name, getattr(self, name), zero_allowed=True)
+        for name in ("restitution", "wall_restitution"):
+            self._check_restitution(name)
+        for name in ("poisson", "wall_poisson"):
+            self._check_poisson(name)
+        for name in ("width", "height"):
+            self._check_size(name)
+        if self.start is not None:
+            object.__setattr__(self, "start", self._checked_start())
+
+    @property
+    def radius(self):
+        """Radius of a sphere [m]."""
+        return 0.5 * self.diameter
+
+    @property
+    def lattice(self):
+        """Columns and rows of the spheres that fit into the box in a square packing."""
+        return tuple(int(size / self.diameter + _ROUNDING) for size in (self.width, self.height))
+
+    @property
+    def capacity(self):
+        """Most spheres: those of the square packing."""
+        return self.lattice[0] * self.lattice[1]
+
+    def check(self, particles, dt):
+        """InputError for a number of spheres or a step [s] that cannot be meant.
+
+        A step too long for the contacts is not refused: how long it may be depends on how fast the
+        spheres come to move. Such a run ends as diverged.
+        """
+        whole("particles", particles, 0, self.capacity)
+        positive("dt", dt)
+        if self.start is not None and particles != len(self.start):
+            raise InputError(
+                f"particles must be {len(self.start)}, as many as places in start, got {particles}"
+            )
+
+    def divergence(self, code, particles, dt):
+        """What a code of ``health`` means, and a step that would do [s]."""
+        return DIVERGENCES[code], min(self.safe_step(), 0.5 * dt)
+
+    def safe_step(self):
+        """Step [s] that resolves the contact of two spheres that fell through the box."""
+        numbers = pair_numbers(self)
+        speed = math.sqrt(2.0 * max(self.gravity, 1.0) * self.height)
+        duration = contact_duration(numbers["mass"], numbers["stiffness"], speed)
+        return float(f"{duration / _STEPS_PER_CONTACT:.1e}")
+
+    def bind(self, table):
+        """The spheres on the device, for all scenes of a SceneTable."""
+        return BoundSpheres(self, table)
+
+    def _check_restitution(self, name):
+        value = fraction(name, getattr(self, name))
+        if value < _LEAST_RESTITUTION:
+            raise InputError(f"{name} must lie in [{_LEAST_RESTITUTION}, 1], got {value!r}")
+
+    def _check_poisson(self, name):
+        value = getattr(self, name)
+        if not isinstance(value, (int, float)) or not -1.0 < value <= 0.5:
+            raise InputError(f"{name} must lie above -1 and up to 0.5, got {value!r}")
+
+    def _check_size(self, name):
+        value = positive(name, getattr(self, name))
+        if value < self.diameter * (1.0 - _ROUNDING):
+            raise InputError(f"{name} must be at least the diameter {self.diameter}, got {value!r}")
+
+    def _checked_start(self):
+        """The places as a tuple of pairs, none in a wall or in another sphere."""
+        try:
+            places = np.array(self.start, dtype=np.float64).reshape(-1, 2)
+        except (TypeError, ValueError) as error:
+            raise InputError("start must hold two coordinates [m] for each sphere") from error
+        size, slack = np.array([self.width, self.height]), _ROUNDING * self.diameter
+        inside = (places >= self.radius - slack) & (places <= size - self.radius + slack)
+        if not inside.all():
+            k = int(np.flatnonzero(~inside.all(axis=1))[0])
+            raise InputError(
+                f"start must keep spheres off the walls, got {places[k]} for number {k}"
+            )
+        gaps = np.linalg.norm(places[:, None] - places[None, :], axis=2)
+        near = np.argwhere(np.triu(gaps < self.diameter - slack, 1))
+        if len(near):
+            raise InputError(f"start must not let spheres overlap, numbers {near[0]} do")
+        return tuple(map(tuple, places.tolist()))

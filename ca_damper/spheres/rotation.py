@@ -1,0 +1,103 @@
+"""Rotation of the spheres, an effect that the paper leaves out: present, or without any trace."""
+
+import taichi as ti
+
+
+@ti.data_oriented
+class NoRotation:
+    """Spheres that do not turn, as in the paper."""
+
+    # Share of the effective mass that resists a tangential blow.
+    tangential_share = 1.0
+
+    def bind(self, bodies):
+        """Nothing to allocate."""
+
+    @ti.func
+    def reset(self, i):
+        """Nothing to reset."""
+
+    @ti.func
+    def slip_of_pair(self, i, j, lever, slip):
+        """Slip [m/s] of two spheres."""
+        return slip
+
+    @ti.func
+    def slip_at_wall(self, i, lever, slip):
+        """Slip [m/s] of a sphere at a wall."""
+        return slip
+
+    @ti.func
+    def twist(self, i, torque):
+        """Nothing to twist."""
+
+    @ti.func
+    def kick(self, i, dt):
+        """Nothing to turn."""
+
+    @ti.func
+    def energy(self, i):
+        """No energy [J]."""
+        return 0.0
+
+    def snapshot(self, rows):
+        """Nothing to show."""
+        return {}
+
+
+@ti.data_oriented
+class Rotation:
+    """Spheres turn in the plane: solid spheres with moment of inertia 2/5 m r^2.
+
+    spin: angular velocity [rad/s], anticlockwise. torque: of this step [N m]. Shape: one a sphere.
+    """
+
+    # A tangential blow on a solid sphere's surface moves it like 1 / (1 + 5/2) of its mass.
+    tangential_share = 2.0 / 7.0
+
+    def bind(self, bodies):
+        """Allocate spins and torques."""
+        self.bodies = bodies
+        self.spin = ti.field(ti.f64, shape=bodies.room)
+        self.torque = ti.field(ti.f64, shape=bodies.room)
+
+    @ti.func
+    def reset(self, i):
+        """At rest."""
+        self.spin[i], self.torque[i] = 0.0, 0.0
+
+    @ti.func
+    def slip_of_pair(self, i, j, lever, slip):
+        """Slip [m/s] of two spheres whose centres are a lever [m] each from the contact."""
+        return slip + lever * (self.spin[i] + self.spin[j])
+
+    @ti.func
+    def slip_at_wall(self, i, lever, slip):
+        """Slip [m/s] of a sphere at a wall that is a lever [m] from its centre."""
+        return slip + lever * self.spin[i]
+
+    @ti.func
+    def twist(self, i, torque):
+        """Add a torque [N m] on sphere i."""
+        # Not "+=", which would be an atomic addition; a scene is one thread.
+        self.torque[i] = self.torque[i] + torque
+
+    @ti.func
+    def kick(self, i, dt):
+        """Change the spin of sphere i by its torques over a step [s]."""
+        self.spin[i] = self.spin[i] + dt * self.torque[i] / self._inertia()
+        self.torque[i] = 0.0
+
+    @ti.func
+    def energy(self, i):
+        """Energy [J] of the turning."""
+        return 0.5 * self._inertia() * self.spin[i] * self.spin[i]
+
+    def snapshot(self, rows):
+        """Spins [rad/s] of some spheres."""
+        return {"spin": self.spin.to_numpy()[rows]}
+
+    @ti.func
+    def _inertia(self):
+        body = self.bodies.body[None]
+        return 0.4 * body.mass * body.radius * body.radius

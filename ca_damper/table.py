@@ -1,0 +1,72 @@
+"""The numbers of every scene of a batch, one row a scene."""
+
+import numpy as np
+import taichi as ti
+
+_ROWS = ti.types.ndarray(dtype=ti.f64, ndim=2)
+
+
+@ti.data_oriented
+class SceneTable:
+    """What tells one scene of a batch from another; fields of shape (scenes,).
+
+    particles [-], seed [-] (cast to u32 for hashing), dt [s], frequency [Hz] and base_amplitude [m]
+    of the base motion, and the primary structure: mass [kg], stiffness [N/m], damping [N s/m].
+
+    The numbers are given as scalars or sequences and are broadcast against each other; they are
+    checked where users give them, not here. Whatever a scene does depends on its own row only (on
+    its seed, not on its index), so that no bit depends on what else is in the batch.
+    """
+
+    COLUMNS = (
+        *("particles", "seed", "dt", "frequency", "base_amplitude"),
+        *("mass", "stiffness", "damping"),
+    )
+
+    def __init__(
+        self,
+        particles,
+        seed,
+        dt,
+        frequency=6.0,
+        base_amplitude=0.0,
+        mass=0.086,
+        stiffness=123.4,
+        damping=0.08,
+    ):
+        values = (particles, seed, dt, frequency, base_amplitude, mass, stiffness, damping)
+        rows = np.broadcast_arrays(*(np.atleast_1d(value) for value in values))
+        self.count = len(rows[0])
+        self._host = dict(zip(self.COLUMNS, (row.copy() for row in rows)))
+        for name in self.COLUMNS:
+            kind = ti.i32 if name in ("particles", "seed") else ti.f64
+            setattr(self, name, ti.field(kind, shape=self.count))
+        self._load(np.stack(rows).astype(np.float64))
+
+    def drive(self, frequency, dt):
+        """Change frequency [Hz] and step [s] of all scenes, each a scalar or (scenes,)."""
+        pair = np.stack([np.broadcast_to(x, self.count) for x in (frequency, dt)])
+        self._host["frequency"], self._host["dt"] = pair.astype(np.float64)
+        self._drive(np.ascontiguousarray(pair, dtype=np.float64))
+
+    def column(self, name):
+        """What the table says under a name, (scenes,); reads no field."""
+        return self._host[name]
+
+    def row(self, s):
+        """Numbers of scene s by name."""
+        return {name: self._host[name][s].item() for name in self.COLUMNS}
+
+    @ti.kernel
+    def _load(self, rows: _ROWS):
+        for s in range(self.count):
+            self.particles[s] = ti.cast(rows[0, s], ti.i32)
+            self.seed[s] = ti.cast(rows[1, s], ti.i32)
+            self.dt[s], self.frequency[s] = rows[2, s], rows[3, s]
+            self.base_amplitude[s], self.mass[s] = rows[4, s], rows[5, s]
+            self.stiffness[s], self.damping[s] = rows[6, s], rows[7, s]
+
+    @ti.kernel
+    def _drive(self, pair: _ROWS):
+        for s in range(self.count):
+            self.frequency[s], self.dt[s] = pair[0, s], pair[1, s]

@@ -1,0 +1,75 @@
+"""Files that appear whole or not at all, and folders that can be written to."""
+
+import contextlib
+import csv
+import os
+
+import numpy as np
+
+from taichi_dem.errors import InputError
+
+
+def output_folder(path):
+    """Make a folder for output and return its path.
+
+    Raises InputError when it cannot be made or written to.
+    """
+    if not os.fspath(path):
+        raise InputError("output folder must be the name of a folder, got ''")
+    try:
+        os.makedirs(path, exist_ok=True)
+        probe = os.path.join(path, ".write-test")
+        with open(probe, "w") as handle:
+            handle.write("x")
+        os.remove(probe)
+    except OSError as error:
+        reason = error.strerror or error
+        raise InputError(f"output folder {path} must be writable: {reason}") from None
+    return os.fspath(path)
+
+
+@contextlib.contextmanager
+def renamed_when_done(path):
+    """A temporary name beside ``path`` that becomes ``path`` only after a complete write."""
+    path = os.fspath(path)
+    folder, name = os.path.split(path)
+    if not os.path.isdir(folder or "."):
+        raise InputError(f"cannot write {path}: there is no folder {folder}")
+    root, ending = os.path.splitext(name)  # kept, since it tells some writers the format
+    temporary = os.path.join(folder, f".{root}.{os.getpid()}.part{ending}")
+    try:
+        yield temporary
+        os.replace(temporary, path)
+    except OSError as error:
+        raise InputError(f"cannot write {path}: {error.strerror or error}") from None
+    finally:
+        if os.path.exists(temporary):
+            os.remove(temporary)
+
+
+def write_whole(path, write):
+    """Write a file through ``write(name)``, whole or not at all.
+
+    Raises InputError when the file cannot be written.
+    """
+    with renamed_when_done(path) as temporary:
+        write(temporary)
+
+
+def write_text(path, text):
+    """Write text as a file. Raises InputError when it cannot be written."""
+    with renamed_when_done(path) as temporary:
+        with open(temporary, "w", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+
+
+def write_csv(path, columns):
+    """Write columns of equal length, a dict of name to sequence, as a CSV file.
+
+    Raises InputError when it cannot be written.
+    """
+    with renamed_when_done(path) as temporary:
+        with open(temporary, "w", encoding="utf-8", newline="") as file:
+            rows = csv.writer(file, lineterminator="\n")
+            rows.writerow(columns)
+            rows.writerows(zip(*(np.asarray(values).tolist() for values in columns.values())))

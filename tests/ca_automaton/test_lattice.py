@@ -1,0 +1,54 @@
+"""The lattice of the container: 18 x 12 cells with walls, one axis along gravity."""
+
+import numpy as np
+import pytest
+
+from ca_damper.lattice import (
+    DIRECTIONS,
+    DOWN,
+    EMPTY,
+    UP,
+    WALL,
+    Geometry,
+    alignments,
+    unit_vectors,
+)
+
+BOX = Geometry(10, 16)
+WIDTH = 6e-3
+
+
+def test_box_of_the_paper():
+    """16 x 10 cells inside 18 x 12, the rest is wall."""
+    kinds = BOX.blank()[:-1]
+    assert BOX.cells == 18 * 12
+    assert (kinds == EMPTY).sum() == 160
+    assert (kinds == WALL).sum() == 216 - 160
+
+
+def test_every_neighbour_looks_back():
+    """Whoever is ahead has the cell straight behind in the opposite direction."""
+    ahead = BOX.neighbours()[:-1, :DIRECTIONS]
+    for cell, direction in np.argwhere(ahead < BOX.cells):
+        assert BOX.neighbours()[ahead[cell, direction], (direction + 3) % DIRECTIONS] == cell
+
+
+def test_inner_cells_have_six_neighbours_where_the_triangles_put_them():
+    """Vertical neighbours one width away, oblique ones one column aside and half a width up."""
+    ahead, centres = BOX.neighbours(), BOX.centres(WIDTH)
+    for cell in np.flatnonzero(BOX.blank()[:-1] == EMPTY):
+        way = (centres[ahead[cell, :DIRECTIONS]] - centres[cell]) / WIDTH
+        expected = np.column_stack([np.sign(unit_vectors()[:, 0].round(9)), unit_vectors()[:, 1]])
+        assert way == pytest.approx(expected, abs=1e-12)
+
+
+def test_what_does_not_fly_looks_at_the_cell_beyond_where_nothing_stands():
+    """So that one rule serves every cell."""
+    assert np.all(BOX.neighbours()[:, DIRECTIONS:] == BOX.cells)
+    assert BOX.blank()[BOX.cells] == EMPTY
+
+
+def test_projections_are_exact():
+    """cos 60 degrees is 1/2 to the last bit: gravity on oblique flights is g / 2."""
+    assert np.array_equal(alignments()[:, UP], [1.0, 0.5, -0.5, -1.0, -0.5, 0.5])
+    assert np.array_equal(alignments()[DOWN], -alignments()[UP])

@@ -1,0 +1,282 @@
+"""Batches: the same bits in any company, bounded launches, divergence in words, Ctrl-C."""
+
+import hashlib
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from ca_damper import (
+    Batch,
+    Empty,
+    InputError,
+    Progress,
+    RigidMass,
+    SceneTable,
+    SimulationDiverged,
+    runtime,
+)
+from ca_damper import batch as batch_module
+from ca_damper.batch import dealt
+from ca_damper.clock import steps_per_cycle
+from ca_damper.progress import Stages
+from tests.ca_oscillator.kicks import BAD_SEED, CODE, Kicks
+from tests.scenes import ROOT
+
+PARTICLES, SEEDS, FREQUENCIES = [0, 5, 2, 9, 1], [1, 2, 3, 4, 5], [5.0, 5.5, 6.0, 6.5, 7.0]
+KICKS = Kicks(strength=2e-5, mass=0.005)
+
+
+def kicked(rows):
+    """Everything that scenes of these rows measure and end with."""
+    pick = [[column[k] for k in rows] for column in (PARTICLES, SEEDS, FREQUENCIES)]
+    table = SceneTable(*pick[:2], 5e-4, pick[2], 0.6e-3)
+    batch = Batch(KICKS, table, measured_cycles=2)
+    batch.start()
+    cycles = batch.run(1, 2)
+    now = batch.sample()
+    return np.column_stack([cycles.record.reshape(len(rows), -1), now["x"], now["v"], now["a"]])
+
+
+def test_company_and_order_in_a_batch_change_no_bit():
+    together = kicked(range(5))
+    assert np.array_equal(kicked([4, 2, 0, 3, 1])[[2, 4, 1, 3, 0]], together)
+    for k in (1, 3):
+        assert np.array_equal(kicked([k])[0], together[k])
+
+
+def test_number_of_launches_changes_no_bit(monkeypatch):
+    once = kicked(range(5))
+    told = []
+    monkeypatch.setattr(batch_module, "LAUNCH_SECONDS", 1e-9)
+    table = SceneTable(PARTICLES, SEEDS, 5e-4, FREQUENCIES, 0.6e-3)
+    batch = Batch(KICKS, table, measured_cycles=2)
+    batch._pace = 100.0
+    batch.start()
+    cycles = batch.run(1, 2, told.append)
+    assert len(told) > 20
+    assert np.array_equal(once[:, :-3], cycles.record.reshape(5, -1))
+
+
+_DIGEST = """
+import hashlib
+from ca_damper import runtime
+runtime.start(threads={threads})
+from tests.ca_oscillator.test_batch import kicked
+print(hashlib.sha256(kicked(range(5)).tobytes()).hexdigest())
+"""
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_number_of_threads_changes_no_bit(tmp_path, threads):
+    assert runtime.settings().threads == 2
+    done = script(tmp_path, _DIGEST.format(threads=threads)).communicate(timeout=120)
+    assert done[0].strip() == hashlib.sha256(kicked(range(5)).tobytes()).hexdigest()
+
+
+def script(folder, text):
+    """A process that runs a script."""
+    path = folder / "script.py"
+    path.write_text(text)
+    environment = {**os.environ, "PYTHONPATH": ROOT}
+    pipe = subprocess.PIPE
+    return subprocess.Popen([sys.executable, path], stdout=pipe, text=True, env=environment)
+
+
+def test_a_straight_run_equals_one_in_parts():
+    table = SceneTable(3, 1, 5e-4, 6.0, 0.6e-3)
+    straight, parted = Batch(KICKS, table), Batch(KICKS, table)
+    steps = 3 * straight.steps_per_cycle[0]
+    for batch in (straight, parted):
+        batch.start()
+    straight.advance(steps)
+    for part in (1, 0, 17, steps - 18):
+        parted.advance(part)
+    for name, value in straight.sample().items():
+        assert np.array_equal(value, parted.sample()[name]), name
+
+
+@pytest.mark.parametrize("steps", [-1, 1.5, [1, -1], math.nan, "3"])
+def test_steps_that_are_none_are_refused(steps):
+    batch = Batch(Empty(), SceneTable([0, 0], 1, 5e-4, 6.0))
+    with pytest.raises(InputError, match=r"call start\(\) first"):
+        batch.advance(1)
+    batch.start()
+    with pytest.raises(InputError, match="steps must be whole numbers"):
+        batch.advance(steps)
+
+
+def test_a_new_start_repeats_the_run():
+    batch = Batch(KICKS, SceneTable(3, 1, 5e-4, 6.0, 0.6e-3), measured_cycles=1)
+    records = []
+    for _ in range(2):
+        batch.start("rigid")
+        records.append(batch.run(1, 1).record)
+    assert np.array_equal(*records)
+
+
+def test_steps_make_whole_cycles_and_never_grow():
+    assert steps_per_cycle(6.0, 1e-4) == 1667
+    assert steps_per_cycle(5.0, 1e-4) == 2000
+    assert steps_per_cycle(1.0 / 0.1667, 1e-4) == 1667
+    frequency = np.linspace(4.0, 8.0, 50)
+    batch = Batch(Empty(), SceneTable(0, 1, 1e-4, frequency))
+    dt = batch.table.column("dt")
+    assert (dt <= 1e-4 * (1.0 + 1e-12)).all()
+    assert batch.steps_per_cycle * dt * frequency == pytest.approx(1.0, rel=1e-15)
+
+
+def test_a_cycle_ends_exactly_where_it_began():
+    batch = Batch(Empty(), SceneTable(0, 1, 1e-4, FREQUENCIES, 0.6e-3))
+    batch.start()
+    batch.advance(batch.steps_per_cycle)
+    assert (batch.clock.circle.to_numpy() == [0.0, 1.0]).all()
+    assert (batch.sample()["y"] == 0.0).all()
+
+
+def test_energy_is_taken_at_the_end_of_every_measured_cycle():
+    batch = Batch(KICKS, SceneTable(0, 1, 5e-4, 6.0, 0.6e-3), measured_cycles=3)
+    batch.start()
+    energy = batch.run(2, 3).record[0, :, -1]
+    steps = batch.steps_per_cycle[0]
+    assert np.array_equal(energy, steps * np.array([3, 4, 5]) - 1)
+
+
+def test_driving_on_at_another_frequency():
+    batch = Batch(RigidMass(), SceneTable([0, 30], 1, 1e-4, 5.0, 0.6e-3), measured_cycles=2)
+    batch.start()
+    batch.run(1, 0)
+    before = batch.sample()
+    batch.drive(6.2)
+    after = batch.sample()
+    assert np.array_equal(before["x"], after["x"])
+    assert np.array_equal(before["v"], after["v"])
+    assert after["time_s"] == pytest.approx(0.2, rel=1e-14)
+    # The base goes faster at once, and pushes by its dashpot: C y0 2 pi (6.2 - 5) / (M + N m).
+    mass = 0.086 + 0.2e-3 * np.array([0, 30])
+    push = 0.08 * 0.6e-3 * 2.0 * math.pi * 1.2 / mass
+    assert after["a"] - before["a"] == pytest.approx(push, rel=1e-9)
+    batch.run(250, 0)
+    assert batch.sample()["time_s"] == pytest.approx(0.2 + 250 / 6.2, rel=1e-14)
+    batch.advance(10)
+    with pytest.raises(InputError, match="scene 0 stands at step 10 of 1613"):
+        batch.drive(5.0)
+    with pytest.raises(InputError, match="scene 0 stands at step 10 of 1613"):
+        batch.run(1, 1)
+
+
+def diverging(**kicks):
+    seeds = [1, BAD_SEED, 2]
+    batch = Batch(Kicks(**kicks), SceneTable([4, 5, 6], seeds, 1e-3, 6.0, 0.6e-3))
+    batch.start()
+    return batch
+
+
+def test_divergence_of_a_filling_is_told_in_its_words():
+    with pytest.raises(SimulationDiverged) as caught:
+        diverging(diverges_at=340).run(10, 0)
+    error = caught.value
+    dt = 1.0 / (167 * 6.0)
+    assert error.scene["particles"] == 5
+    # Health is asked every 64 steps and at the end of each cycle, here of 167.
+    assert 340 < error.step <= 340 + 65
+    assert error.time_s == pytest.approx(error.step * dt)
+    assert error.dt == pytest.approx(dt)
+    assert error.dt_allowed == pytest.approx(0.25 * dt)
+    assert f"particles = 5 and seed {BAD_SEED} at 6 Hz" in str(error)
+    assert f"it went wrong with code {CODE}; dt must be at most 0.00025 s" in str(error)
+    assert "\n" not in str(error)
+
+
+def test_a_filling_that_starts_diverged_is_found_at_once():
+    with pytest.raises(SimulationDiverged, match="by step 0"):
+        diverging(diverges_at=0)
+
+
+def test_nan_in_the_container_s_motion_is_divergence():
+    with pytest.raises(SimulationDiverged, match="lost its container") as caught:
+        diverging(lost_at=200).run(10, 0)
+    assert caught.value.step == 201
+    assert caught.value.scene["seed"] == BAD_SEED
+
+
+def test_a_blow_beyond_all_bounds_is_divergence():
+    batch = Batch(Kicks(strength=1e12), SceneTable(1, 1, 1e-3, 6.0, 0.6e-3))
+    batch.start()
+    with pytest.raises(SimulationDiverged, match="lost its container"):
+        batch.run(1, 0)
+
+
+def test_launches_are_bounded_and_progress_is_told():
+    batch = Batch(RigidMass(), SceneTable(10, 1, 1e-4, [6.0] * 40, 0.6e-3))
+    batch.start()
+    batch.run(1, 0)
+    told, times = [], []
+
+    def tell(progress):
+        told.append(progress)
+        times.append(time.perf_counter())
+
+    batch.run(150, 0, tell)
+    shares = [progress.share for progress in told]
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+    assert told[-1].seconds_left == 0.0
+    assert told[-1].steps == 40 * 150 * 1667
+    # The pace follows the launch before; a crowded machine may stretch one.
+    assert np.median(np.diff(times)) < 2.0 * batch_module.LAUNCH_SECONDS
+
+
+def test_time_left_and_stages():
+    assert Progress(0.25, 3.0, 10).seconds_left == 9.0
+    assert Progress(0.0, 0.0, 0).seconds_left == math.inf
+    told = []
+    stages = Stages(told.append, [0.5, 1.0])
+    for share in (0.5, 1.0, 0.5, 1.0):
+        stages.told = -math.inf
+        stages(Progress(share, 2.0 * share, round(10 * share)))
+    assert [progress.share for progress in told] == [0.25, 0.5, 0.75, 1.0]
+    assert [progress.seconds for progress in told] == [1.0, 2.0, 3.0, 4.0]
+    assert [progress.steps for progress in told] == [5, 10, 15, 20]
+
+
+_ENDLESS = """
+import sys, time
+from ca_damper import Batch, RigidMass, SceneTable, runtime
+runtime.start(threads=1)
+batch = Batch(RigidMass(), SceneTable(10, 1, 1e-4, [6.0] * 400, 0.6e-3))
+batch.start()
+said = []
+def tell(progress):
+    if progress.seconds > 0.5 and not said:
+        said.append(1)
+        print("running", flush=True)
+try:
+    batch.run(3000, 0, tell)
+except KeyboardInterrupt:
+    print(time.time(), flush=True)
+"""
+
+
+def test_ctrl_c_ends_a_run_within_half_a_second(tmp_path):
+    process = script(tmp_path, _ENDLESS)
+    assert process.stdout.readline().strip() == "running"
+    time.sleep(0.3)
+    sent = time.time()
+    process.send_signal(signal.SIGINT)
+    assert float(process.communicate(timeout=60)[0]) - sent < 0.5
+
+
+@pytest.mark.parametrize("threads", [1, 2, 3, 7])
+def test_scenes_are_dealt_out_evenly(threads):
+    cost = np.random.default_rng(1).integers(1, 100, 50)
+    order = dealt(cost, threads)
+    assert sorted(order.tolist()) == list(range(50))
+    hands = np.array_split(cost[order], threads)
+    sums = [hand.sum() / len(hand) for hand in hands]
+    assert max(sums) - min(sums) < 100 / (50 // threads)

@@ -1,0 +1,105 @@
+"""Measures of signals whose measures are known."""
+
+import math
+
+import numpy as np
+import pytest
+
+from ca_damper.measures import COLUMNS, Cycles, peak
+
+STEPS, COUNT, OMEGA = 500, 4, 2.0 * math.pi * 6.0
+
+
+def cycles_of(x, v, f):
+    """Cycles of one scene; x, v: functions of time, f: of the step's begin and end (its mean)."""
+    dt = 2.0 * math.pi / OMEGA / STEPS
+    t = dt * np.arange(COUNT * STEPS).reshape(COUNT, STEPS)
+    cos, sin = np.cos(OMEGA * t), np.sin(OMEGA * t)
+    middle = OMEGA * (t + dt / 2.0)
+    xs, vs, fs = x(t), v(t), f(t, t + dt)
+    products = (xs, xs**2, xs * cos, xs * sin, vs * cos, vs * sin)
+    forces = (fs, fs * np.cos(middle), fs * np.sin(middle))
+    sums = [part.sum(axis=1) for part in (*products, *forces)]
+    record = np.stack([*sums, xs.max(axis=1), xs.min(axis=1), 3.0 * np.arange(COUNT)], axis=1)
+    assert record.shape[1] == len(COLUMNS)
+    return Cycles(np.array([OMEGA / (2.0 * math.pi)]), np.array([STEPS]), record[None])
+
+
+def nothing(t, _=None):
+    return 0.0 * t
+
+
+def test_response_of_two_harmonics_and_a_mean():
+    # RMS about the mean: sqrt((A^2 + B^2) / 2), by sums that are exact for harmonics below n / 2.
+    def x(t):
+        return 0.4 + 2.0 * np.cos(OMEGA * t + 0.3) + 0.5 * np.sin(3.0 * OMEGA * t)
+
+    cycles = cycles_of(x, nothing, nothing)
+    assert cycles.rms == pytest.approx(math.sqrt((4.0 + 0.25) / 2.0), rel=1e-13)
+    assert cycles.mean == pytest.approx(0.4, rel=1e-13)
+    assert cycles.harmonic("x") == pytest.approx(2.0 * np.exp(0.3j), rel=1e-13)
+    assert cycles.energy == pytest.approx(4.5)
+
+
+def test_amplitude_is_half_the_range():
+    cycles = cycles_of(lambda t: 0.1 + 2.0 * np.sin(OMEGA * t), nothing, nothing)
+    # Quarter cycles are steps here, so the extremes are samples.
+    assert cycles.amplitude == pytest.approx(2.0, rel=1e-13)
+
+
+def test_a_mean_that_drifts_from_cycle_to_cycle_is_no_response():
+    def x(t):
+        return np.floor(OMEGA * t / (2.0 * math.pi) + 1e-9) + 2.0 * np.sin(OMEGA * t)
+
+    assert cycles_of(x, nothing, nothing).rms == pytest.approx(math.sqrt(2.0), rel=1e-13)
+
+
+@pytest.mark.parametrize(("mass", "damping"), [(0.01, 0.0), (0.0, 0.3), (-0.002, 0.05)])
+def test_apparent_mass_and_damping_are_those_of_a_mass_and_a_dashpot(mass, damping):
+    # f = -(m a + c v); its mean over a step is that of the differences of v and x.
+    def x(t):
+        return 0.02 * np.sin(OMEGA * t + 0.5)
+
+    def v(t):
+        return 0.02 * OMEGA * np.cos(OMEGA * t + 0.5)
+
+    def f(begin, end):
+        return -(mass * (v(end) - v(begin)) + damping * (x(end) - x(begin))) / (end - begin)
+
+    cycles = cycles_of(x, v, f)
+    assert cycles.apparent_mass == pytest.approx(mass, rel=1e-11, abs=1e-14)
+    assert cycles.apparent_damping == pytest.approx(damping, rel=1e-11, abs=1e-13)
+    power = 0.5 * (0.02 * OMEGA) ** 2 * (damping + 1j * OMEGA * mass)
+    assert cycles.complex_power == pytest.approx(power, rel=1e-11)
+    loss = damping / (OMEGA * (0.086 + mass))
+    assert cycles.loss_factor(0.086) == pytest.approx(loss, rel=1e-11, abs=1e-12)
+    ratio = (0.08 + damping) / (2.0 * math.sqrt(123.4 * (0.086 + mass)))
+    assert cycles.damping_ratio(0.086, 123.4, 0.08) == pytest.approx(ratio, rel=1e-11)
+
+
+def test_a_container_at_rest_has_no_impedance():
+    assert np.isnan(cycles_of(nothing, nothing, nothing).apparent_mass).all()
+
+
+def test_peak_of_a_parabola_is_exact_on_any_grid():
+    x = np.array([0.8, 0.9, 0.97, 1.0, 1.02, 1.1])
+    found = peak(x, 3.0 - 50.0 * (x - 0.983) ** 2)
+    assert found == pytest.approx((0.983, 3.0), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("response", "wanted"),
+    [
+        ([3.0, 2.0, 1.0], (0.9, 3.0)),
+        ([1.0, 2.0, 3.0], (1.1, 3.0)),
+        ([math.nan, 2.0, 1.0], (1.0, 2.0)),
+        ([2.0, 2.0, 2.0], (0.9, 2.0)),
+        ([1.0, 2.0, 2.0], (1.05, 2.125)),
+    ],
+)
+def test_peak_at_an_end_beside_nan_and_on_a_plateau(response, wanted):
+    assert peak([0.9, 1.0, 1.1], response) == pytest.approx(wanted, rel=1e-12)
+
+
+def test_no_peak_without_numbers():
+    assert np.isnan(peak([1.0, 2.0], [math.nan, math.nan])).all()

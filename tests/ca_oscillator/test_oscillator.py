@@ -1,0 +1,68 @@
+"""The primary structure in formulas."""
+
+import math
+
+import numpy as np
+import pytest
+
+from ca_damper import InputError, Oscillator, rk45
+from ca_damper.clock import LEAST_STEPS_PER_CYCLE
+from ca_damper.oscillator import sine_and_cosine
+
+PAPER = Oscillator()
+
+
+def test_figures_of_the_paper():
+    # sqrt(123.4 / 0.086) / 2 pi; 0.08 / (2 sqrt(123.4 x 0.086)).
+    assert PAPER.natural_frequency == pytest.approx(6.0288, abs=5e-5)
+    assert PAPER.damping_ratio == pytest.approx(0.0123, abs=5e-5)
+    ratios = np.linspace(0.99, 1.01, 4001)
+    gain = np.abs(PAPER.transfer(ratios * PAPER.natural_frequency))
+    assert gain.max() == pytest.approx(40.73, abs=1e-2)
+
+
+@pytest.mark.parametrize("frequency", [0.5, 6.0, 20.0])
+@pytest.mark.parametrize("added", [0.0, 0.01])
+def test_steady_state_repeats_after_a_cycle(frequency, added):
+    # Periodicity under the equation of motion itself; the solver errs by its tolerance a step.
+    o = PAPER
+    omega = 2.0 * math.pi * frequency
+
+    def motion(t, y):
+        base, speed = math.sin(omega * t), omega * math.cos(omega * t)
+        push = o.base_amplitude * (o.stiffness * base + o.damping * speed) - 9.8 * added
+        hold = o.stiffness * y[0] + o.damping * y[1]
+        return np.array([y[1], (push - hold) / (o.mass + added)])
+
+    start = np.array(o.steady_state(frequency, added, 9.8))
+    end = rk45.solve(motion, (0.0, 1.0 / frequency), start, rtol=1e-12, atol=1e-14).y[-1]
+    assert end == pytest.approx(start, rel=1e-9, abs=1e-12)
+
+
+def test_below_and_far_above_resonance():
+    assert PAPER.transfer(1e-6) == pytest.approx(1.0, abs=1e-10)
+    # Far above, only the dashpot moves the mass: x / y -> -i C / (M w), up to K / (w C).
+    omega = 2.0 * math.pi * 1e6
+    share = 123.4 / (0.08 * omega)
+    assert PAPER.transfer(1e6) == pytest.approx(-1j * 0.08 / (0.086 * omega), rel=1.1 * share)
+
+
+def test_series_of_sine_and_cosine_reach_round_off():
+    # Over a step's angle, at most 2 pi / 40: half a unit in the last place each operation.
+    angle = np.linspace(-1.0, 1.0, 1001) * 2.0 * math.pi / LEAST_STEPS_PER_CYCLE
+    sine, cosine = sine_and_cosine(angle)
+    assert np.abs(sine - np.sin(angle)).max() < 1e-16
+    assert np.abs(cosine - np.cos(angle)).max() < 4e-16
+
+
+@pytest.mark.parametrize("name", ["mass", "stiffness", "damping", "base_amplitude"])
+@pytest.mark.parametrize("value", [math.nan, math.inf, -1.0, "1", None, True])
+def test_bad_numbers_are_named(name, value):
+    with pytest.raises(InputError, match=name):
+        Oscillator(**{name: value})
+
+
+@pytest.mark.parametrize("name", ["mass", "stiffness"])
+def test_mass_and_stiffness_must_not_vanish(name):
+    with pytest.raises(InputError, match=f"{name} must be a positive finite number, got 0"):
+        Oscillator(**{name: 0.0})

@@ -1,0 +1,206 @@
+"""Dormand-Prince 5(4): order, tolerance, control of the step, the same in Python and in kernels."""
+
+import math
+
+import numpy as np
+import pytest
+import taichi as ti
+from scipy.integrate import solve_ivp
+
+from ca_damper import InputError, rk45
+
+
+def bell(_, t, y):
+    """Solved by y = 1 / (1 + t^2) from y(0) = 1: not linear, not autonomous."""
+    return -2.0 * t * y * y
+
+
+def bell_at(t):
+    return 1.0 / (1.0 + t * t)
+
+
+def slope_of(sizes, errors):
+    return np.polyfit(np.log(sizes), np.log(errors), 1)[0]
+
+
+def test_local_error_is_of_order_6_and_embedded_difference_of_order_5():
+    # Local error of the fifth-order result h^6, of the embedded fourth-order result h^5; their
+    # difference shows the latter. Steps this long stay clear of round-off (h^6 / 720 > 1e-12).
+    sizes = 0.2 * 0.5 ** np.arange(5)
+    t, y = 0.3, np.array([bell_at(0.3)])
+    steps = [rk45.step(bell, None, t, y, bell(None, t, y), h) for h in sizes]
+    errors = [abs(new[0] - bell_at(t + h)) for (new, _, _), h in zip(steps, sizes)]
+    gaps = [abs(gap[0]) for _, _, gap in steps]
+    # The exponent itself still drifts by O(h); 0.3 tells 6 from 5 and 5 from 4 with room.
+    assert slope_of(sizes, errors) == pytest.approx(6.0, abs=0.3)
+    assert slope_of(sizes, gaps) == pytest.approx(5.0, abs=0.3)
+
+
+def march(count, t_end=1.0):
+    """count equal steps of the bell from 0."""
+    y, h = np.array([1.0]), t_end / count
+    slope = bell(None, 0.0, y)
+    for k in range(count):
+        y, slope, _ = rk45.step(bell, None, k * h, y, slope, h)
+    return abs(y[0] - bell_at(t_end))
+
+
+def test_global_error_is_of_order_5():
+    counts = np.array([8, 16, 32, 64])
+    errors = [march(count) for count in counts]
+    assert slope_of(1.0 / counts, errors) == pytest.approx(5.0, abs=0.2)
+
+
+def test_last_slope_is_the_derivative_at_the_new_state():
+    y, t, h = np.array([0.7]), 0.4, 0.1
+    y_new, slope, _ = rk45.step(bell, None, t, y, bell(None, t, y), h)
+    assert slope[0] == bell(None, t + h, y_new)[0]
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-9])
+def test_error_level_is_that_of_scipy(tolerance):
+    # Same pair of formulas, same tolerance: errors of one magnitude, not equal, as the two choose
+    # their steps differently. scipy divides the squared norm by the number of components.
+    def van_der_pol(_, y):
+        return np.array([y[1], 5.0 * (1.0 - y[0] ** 2) * y[1] - y[0]])
+
+    span, y0 = (0.0, 20.0), [2.0, 0.0]
+    exact = solve_ivp(van_der_pol, span, y0, method="DOP853", rtol=1e-13, atol=1e-13).y[:, -1]
+    scipys = solve_ivp(van_der_pol, span, y0, method="RK45", rtol=tolerance, atol=tolerance)
+    ours = rk45.solve(van_der_pol, span, y0, rtol=tolerance, atol=tolerance)
+    error = np.abs(ours.y[-1] - exact).max()
+    assert error < 2.0 * np.abs(scipys.y[:, -1] - exact).max()
+    assert ours.evaluations < 1.25 * scipys.nfev
+
+
+def test_tolerance_is_kept_on_an_exact_solution():
+    # Each step may err by the tolerance; the oscillator carries errors on without growth, so the
+    # sum over the steps bounds the error at the end.
+    solution = rk45.solve(lambda t, y: np.array([y[1], -y[0]]), (0.0, 10.0), [0.0, 1.0], rtol=1e-8)
+    wanted = np.column_stack([np.sin(solution.t), np.cos(solution.t)])
+    steps = len(solution.t) - 1
+    assert solution.t[-1] == 10.0
+    assert np.abs(solution.y - wanted).max() < steps * (1e-9 + 1e-8)
+
+
+def test_wanted_times_are_landed_on_and_cost_no_accuracy():
+    wanted = np.linspace(0.0, 10.0, 7)
+    solution = rk45.solve(
+        lambda t, y: np.array([y[1], -y[0]]), (0.0, 10.0), [0.0, 1.0], rtol=1e-8, at=wanted
+    )
+    assert np.array_equal(solution.t, wanted)
+    steps = solution.evaluations / 6
+    assert np.abs(solution.y[:, 0] - np.sin(wanted)).max() < steps * (1e-9 + 1e-8)
+
+
+def test_stops_shorten_no_later_step():
+    def decay(t, y):
+        return -y
+
+    free = rk45.solve(decay, (0.0, 10.0), [1.0])
+    stopped = rk45.solve(decay, (0.0, 10.0), [1.0], at=[4.0, 4.0 + 1e-9])
+    # Two stops cut at most two steps each in two.
+    assert stopped.evaluations <= free.evaluations + 4 * 6
+
+
+def test_halving_the_tolerance_halves_the_error():
+    # The estimate grows like h^5, so h goes like the tolerance^(1/5), and the error at the end like
+    # h^5: in proportion to the tolerance. Ten halvings average over how the steps happen to fit.
+    def error(tolerance):
+        solution = rk45.solve(
+            *(lambda t, y: np.array([y[1], -y[0]]), (0.0, 20.0), [0.0, 1.0]),
+            rtol=tolerance,
+            atol=tolerance,
+        )
+        return np.hypot(*(solution.y[-1] - [math.sin(20.0), math.cos(20.0)]))
+
+    tolerances = 1e-6 * 0.5 ** np.arange(11)
+    errors = [error(tolerance) for tolerance in tolerances]
+    assert slope_of(tolerances, errors) == pytest.approx(1.0, abs=0.1)
+    assert (np.diff(errors) < 0.0).all()
+
+
+@pytest.mark.parametrize("error", [1e-9, 1e-3, 0.5, 1.0, 40.0])
+def test_growth_aims_at_nine_tenths_of_the_tolerance_limit(error):
+    assert rk45.growth(error) == pytest.approx(np.clip(0.9 * error**-0.2, 0.2, 5.0), rel=1e-14)
+
+
+@pytest.mark.parametrize("error", [math.nan, math.inf])
+def test_growth_shrinks_the_step_after_a_nonsense_error(error):
+    assert rk45.growth(error) == 0.2
+
+
+@ti.func
+def turning(rate, t, y):
+    return ti.Vector([rate * y[1], -rate * y[0]])
+
+
+def turning_in_python(rate, t, y):
+    return np.array([rate * y[1], -rate * y[0]])
+
+
+@ti.kernel
+def turn(rate: ti.f64, t_end: ti.f64, rtol: ti.f64) -> ti.types.vector(3, ti.f64):
+    y = ti.Vector([0.0, 1.0])
+    slope = turning(rate, 0.0, y)
+    y, _, attempts = rk45.integrate(turning, rate, 0.0, t_end, y, slope, 1e-3, rtol, 1e-12, 100000)
+    return ti.Vector([y[0], y[1], ti.cast(attempts, ti.f64)])
+
+
+@ti.kernel
+def one_turning_step(rate: ti.f64, h: ti.f64) -> ti.types.vector(4, ti.f64):
+    y = ti.Vector([0.25, 1.5])
+    new, _, gap = rk45.step(turning, rate, 0.0, y, turning(rate, 0.0, y), h)
+    return ti.Vector([new[0], new[1], gap[0], gap[1]])
+
+
+def test_a_step_has_the_same_bits_in_a_kernel_and_in_python():
+    y = np.array([0.25, 1.5])
+    slope = turning_in_python(3.0, 0.0, y)
+    new, _, gap = rk45.step(turning_in_python, 3.0, 0.0, y, slope, 0.0625)
+    assert np.array_equal(one_turning_step(3.0, 0.0625).to_numpy(), np.concatenate([new, gap]))
+
+
+def test_integration_in_a_kernel_keeps_the_tolerance():
+    y = turn(2.0, 10.0, 1e-9).to_numpy()
+    attempts = int(y[2])
+    assert attempts > 0
+    assert np.abs(y[:2] - [math.sin(20.0), math.cos(20.0)]).max() < attempts * 1e-9
+
+
+def test_integration_in_a_kernel_and_in_python_agree():
+    kernel = turn(2.0, 10.0, 1e-6).to_numpy()
+    y = np.array([0.0, 1.0])
+    slope = turning_in_python(2.0, 0.0, y)
+    y, _, attempts = rk45.integrate(
+        turning_in_python, 2.0, 0.0, 10.0, y, slope, 1e-3, 1e-6, 1e-12, 100000
+    )
+    assert attempts == int(kernel[2])
+    # Only the power in the step control may round differently.
+    assert np.abs(y - kernel[:2]).max() < 1e-13
+
+
+def test_a_singular_solution_is_refused_in_words():
+    # y' = y^2 from 1 ends at t = 1.
+    with pytest.raises(InputError, match=r"stuck at t = 1 "):
+        rk45.solve(lambda t, y: y * y, (0.0, 2.0), [1.0])
+
+
+@pytest.mark.parametrize(
+    ("changes", "name"),
+    [
+        ({"span": (0.0, math.nan)}, "span"),
+        ({"span": (1.0, 0.0)}, "span"),
+        ({"y0": [math.nan]}, "y0"),
+        ({"rtol": -1.0}, "rtol"),
+        ({"atol": 0.0}, "atol"),
+        ({"first": 0.0}, "first"),
+        ({"at": [0.5, 0.2]}, "at"),
+        ({"at": [0.5, 1.2]}, "at"),
+        ({"at": [math.nan]}, "at"),
+    ],
+)
+def test_bad_arguments_are_named(changes, name):
+    arguments = {"span": (0.0, 1.0), "y0": [1.0], **changes}
+    with pytest.raises(InputError, match=name):
+        rk45.solve(lambda t, y: -y, **arguments)

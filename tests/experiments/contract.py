@@ -1,0 +1,104 @@
+"""What every experiment keeps to: a quick run in a process of its own, and how bad input ends."""
+
+import csv
+import json
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from PIL import Image
+
+FOLDER = Path(__file__).resolve().parents[2] / "experiments"
+NO_EXPERIMENTS = ("make_meshes", "bench")
+NAMES = sorted(
+    path.stem
+    for path in FOLDER.glob("*.py")
+    if not path.stem.startswith("_") and path.stem not in NO_EXPERIMENTS
+)
+
+
+def start(name, *arguments):
+    """Run an experiment in a process of its own; two threads, output in pipes."""
+    line = [sys.executable, str(FOLDER / f"{name}.py"), "--threads", "2", *map(str, arguments)]
+    return subprocess.run(line, capture_output=True, text=True, timeout=1800)
+
+
+def quick_runs(names):
+    """A fixture of the quick runs of experiments: (name, folder, finished process)."""
+
+    @pytest.fixture(scope="module", params=names)
+    def quick(request, quick_run):
+        return request.param, *quick_run(request.param)
+
+    return quick
+
+
+def rows_of(path):
+    """Rows of a CSV file as dicts of strings."""
+    with open(path, newline="") as handle:
+        return list(csv.DictReader(handle))
+
+
+def assert_refused(code, captured, folder, *words):
+    """Bad input: exit code 2, one sentence with these words, nothing written."""
+    assert code == 2
+    assert len(captured.err.splitlines()) == 1, captured.err
+    assert "Traceback" not in captured.err
+    for word in words:
+        assert word in captured.err
+    assert not os.path.exists(folder), "something was written"
+
+
+@pytest.mark.slow
+class QuickRun:
+    """The contract; a test file names it TestQuickRun, with ``quick`` and what it expects."""
+
+    figures: ClassVar[dict] = {}
+    files: ClassVar[dict] = {}
+
+    def test_quick_run_succeeds_and_keeps_the_pipe_clean(self, quick):
+        _, _, done = quick
+        assert done.returncode == 0, done.stderr
+        # No progress bar, no colours, no banner: nothing at all on stderr.
+        assert done.stderr == ""
+        assert "\x1b" not in done.stdout
+        assert "\r" not in done.stdout
+        assert len(done.stdout.splitlines()) > 5
+
+    def test_quick_run_leaves_its_files_whole(self, quick):
+        name, folder, _ = quick
+        for file in (*self.files.get(name, ()), "summary.json"):
+            assert (folder / file).is_file(), file
+        assert not list(folder.rglob("*.part*"))
+
+    def test_summary_keeps_the_contract(self, quick):
+        name, folder, _ = quick
+        summary = json.loads((folder / "summary.json").read_text())
+        assert summary["experiment"] == name
+        assert set(summary) >= {"experiment", "figures", "machine", "versions", "seconds"}
+        assert set(summary["seconds"]) == {"compile", "run"}
+        assert min(summary["seconds"].values()) > 0.0
+        assert {"taichi", "numpy", "python"} <= set(summary["versions"])
+        assert set(summary["figures"]) >= self.figures.get(name, set())
+        for figure in summary["figures"].values():
+            assert set(figure) == {"value", "unit", "paper"}
+            assert math.isfinite(figure["value"])
+
+    def test_pictures_are_neither_tiny_nor_empty(self, quick):
+        _, folder, _ = quick
+        for path in folder.glob("*.png"):
+            with Image.open(path) as image:
+                assert 400 <= image.width <= 2500, path.name
+                assert 300 <= image.height <= 2500, path.name
+                # A blank canvas has one colour.
+                assert len(np.unique(np.asarray(image.convert("L")))) > 20, path.name
+        for path in folder.glob("*.gif"):
+            with Image.open(path) as image:
+                assert 2 <= image.n_frames <= 41
+                assert max(image.size) <= 400
+            assert path.stat().st_size < 1_000_000

@@ -1,0 +1,279 @@
+"""Every experiment of the damper with --quick, what it must show, and what it refuses."""
+
+import json
+import math
+import re
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from ca_damper import Automaton, Spheres, plot
+from ca_damper.lattice import Geometry
+from tests.experiments.contract import (
+    NAMES,
+    QuickRun,
+    assert_refused,
+    quick_runs,
+    rows_of,
+    start,
+)
+
+READINGS = ("signed", "signed_through_walls", "reset", "kept")
+FILLED = [f"{filling}_N{count}" for filling in ("ca", "dem") for count in (20, 40)]
+FIGURES = {
+    "damper_rebound": {
+        f"{error}{end}"
+        for error in ("impact_error_ms", "apex_error_mm")
+        for end in ("", "_dem", *(f"_{reading}" for reading in READINGS))
+    },
+    "damper_patterns": {
+        *(
+            f"{figure}_{end}"
+            for end in FILLED
+            for figure in (
+                *("height_amplitude_mm", "height_lag_deg", "height_above_floor_mm"),
+                *("floor_share_least", "floor_share_most"),
+            )
+        ),
+        *(
+            f"{figure}_N{count}"
+            for count in (20, 40)
+            for figure in ("amplitude_difference_mm", "lag_difference_deg", "height_difference_mm")
+        ),
+    },
+    "damper_response": {
+        f"{figure}_{label}_N{count}"
+        for figure in ("peak_ratio", "peak_rms_mm")
+        for label in ("dem", "ca_landing", "ca_ejection", "ca_static")
+        for count in (10, 30)
+    },
+    "damper_cost": {
+        *(f"longest_step_{label}" for label in ("dem", "ca_static", "ca_landing")),
+        *(f"growth_{label}" for label in ("dem_pairs", "dem_cells", "ca_scan_1e-4")),
+        *(f"cycle_ms_{label}_N50" for label in ("dem_pairs", "dem_cells", "ca_scan_2e-5")),
+    },
+    "demo_damper": {
+        *("amplitude_mm", "amplitude_empty_mm", "amplitude_left", "rms_mm", "power_mW"),
+        *("apparent_damping_N_s_m", "apparent_mass_g", "damping_ratio", "damping_ratio_empty"),
+        "loss_factor",
+    },
+}
+FILES = {
+    "damper_rebound": ("rebound.png", "heights.csv", "impacts.csv"),
+    "damper_patterns": (
+        *("patterns_20.png", "patterns_40.png", "cycle.png", "patterns.gif"),
+        *("cycles.csv", "particles.csv"),
+    ),
+    "damper_response": (
+        *("response.png", "measures.png", "hysteresis.png", "peaks.csv", "response_dem.csv"),
+        *("response_ca_static.csv", "sweep_up_ca_static.csv", "sweep_down_dem.csv"),
+    ),
+    "damper_cost": ("cost.png", "steps.png", "cost.csv", "steps.csv"),
+    "demo_damper": ("damper.gif", "motion.png", "motion.csv"),
+}
+
+quick = quick_runs([name for name in NAMES if "damper" in name])
+
+
+class TestQuickRun(QuickRun):
+    figures, files = FIGURES, FILES
+
+
+@pytest.fixture(scope="module")
+def shown(quick_run):
+    """``shown(name, *options)``: folder of a quick run, and its figures' values."""
+
+    def run(name, *options):
+        folder, done = quick_run(name, *options)
+        assert done.returncode == 0, done.stderr
+        figures = json.loads((folder / "summary.json").read_text())["figures"]
+        return folder, {name: figure["value"] for name, figure in figures.items()}
+
+    return run
+
+
+@pytest.mark.slow
+def test_rebound_stays_within_two_milliseconds_to_the_fourth_impact(shown):
+    folder, figures = shown("damper_rebound")
+    assert figures["impact_error_ms"] < 2.0
+    assert figures["impact_error_ms_dem"] < 2.0
+    # The readings differ, or comparing them would say nothing.
+    assert figures["impact_error_ms_reset"] > 10.0
+    assert figures["impact_error_ms_kept"] > 10.0
+    # t_1 (1 + 2 e + 2 e^2 + 2 e^3) with t_1 = sqrt(2 h / g), h = 15 cells and e = 0.75.
+    fourth = math.sqrt(2.0 * 0.09 / 10.0) * (1.0 + 2.0 * (0.75 + 0.75**2 + 0.75**3))
+    rows = [row for row in rows_of(folder / "impacts.csv") if row["filling"] == "signed"]
+    assert float(rows[3]["closed_form_s"]) == pytest.approx(fourth, rel=1e-12)
+    assert float(rows[3]["closed_form_apex_m"]) == pytest.approx(0.09 * 0.75**8, rel=1e-12)
+    late = abs(float(rows[3]["time_s"]) - fourth)
+    assert late <= 1e-3 * figures["impact_error_ms"] * (1.0 + 1e-12)
+
+
+@pytest.mark.slow
+def test_rebound_error_falls_with_the_step(shown):
+    # The blow falls one to two steps late, and a particle 1.5 dt late is 1.5 g dt too fast, which
+    # lengthens the next flight by 2 e 1.5 dt: three blows make at most 3 (2 + 3 e) dt, plus the
+    # scatter of the last by as much as a step.
+    for dt in (1e-4, 2.5e-5):
+        options = ("--ca-dt", dt) if dt != 1e-4 else ()
+        _, figures = shown("damper_rebound", *options)
+        assert figures["impact_error_ms"] <= 1e3 * dt * (3.0 * (2.0 + 3.0 * 0.75) + 1.0)
+
+
+@pytest.mark.slow
+def test_patterns_show_all_particles_inside_the_box(shown):
+    folder, figures = shown("damper_patterns")
+    rows = rows_of(folder / "particles.csv")
+    across, up = (np.array([float(row[name]) for row in rows]) for name in ("across_mm", "up_mm"))
+    # 32 frames of 20 and 40 particles in two fillings.
+    assert len(rows) == 32 * 2 * (20 + 40)
+    # Every other column of the lattice stands half a cell higher, and a flight may be a cell deep.
+    assert across.min() > 0.0
+    assert across.max() < 60.0
+    assert up.min() > 0.0
+    assert up.max() < 96.0 + 3.0
+    # Thrown higher than the container moves, and never all on the floor.
+    for end in FILLED:
+        assert figures[f"floor_share_least_{end}"] < 0.05
+        assert 10.0 < figures[f"height_amplitude_mm_{end}"] < 40.0
+
+
+@pytest.mark.slow
+def test_demo_damps(shown):
+    folder, figures = shown("demo_damper")
+    # The empty container at its natural frequency: |x / y| = sqrt(1 + (2 z)^2) / (2 z).
+    ratio = 0.08 / (2.0 * math.sqrt(123.4 * 0.086))
+    magnified = 0.6 * math.sqrt(1.0 + (2.0 * ratio) ** 2) / (2.0 * ratio)
+    # Half the way between samples misses the turning points by (w dt)^2 / 16 at most.
+    assert figures["amplitude_empty_mm"] == pytest.approx(magnified, rel=1e-5)
+    assert figures["amplitude_left"] < 0.6
+    first = rows_of(folder / "motion.csv")[0]
+    assert float(first["x_mm"]) == pytest.approx(float(first["x_empty_mm"]), abs=1e-12)
+
+
+@pytest.mark.slow
+def test_demo_without_particles_is_the_empty_container(shown):
+    _, figures = shown("demo_damper", "--particles", "0")
+    assert figures["amplitude_left"] == pytest.approx(1.0, abs=1e-9)
+    assert figures["apparent_mass_g"] == 0.0
+
+
+def test_impacts_are_found_between_samples(script):
+    rebound = script("damper_rebound")
+    fall = rebound.Fall(height=0.09, restitution=0.75, gravity=10.0)
+    # Samples of the closed form itself; the times are none of its impacts.
+    time = np.arange(0.0, 0.7, 1.7e-3)
+    starts = np.array([-fall.first_s, *(fall.impact_s(k) for k in range(1, 8))])
+    flight = np.searchsorted(starts, time, side="right") - 1
+    speed = 10.0 * (fall.first_s * 0.75**flight - (time - starts[flight]))
+    mass, height = 2e-4, fall.heights(time)
+    history = {
+        "time_s": time,
+        "force": np.zeros(len(time)),
+        "momentum": mass * speed,
+        "energy": mass * (0.5 * speed**2 + 10.0 * height),
+    }
+    batch = SimpleNamespace(filling=SimpleNamespace(particle_mass=mass, gravity=10.0))
+    made = rebound.analysed(batch, fall, history)
+    # Two parabolas cross where they do: nothing but rounding, 1e-16 over speeds near 1 m/s.
+    assert np.abs(made.impact_errors_ms()).max() < 1e-9
+    # The highest sample misses the apex by g (half a sample)^2 / 2 at most.
+    assert np.abs(made.apex_errors_mm()).max() <= 1e3 * 0.5 * 10.0 * (0.5 * 1.7e-3) ** 2
+
+
+@pytest.mark.slow
+def test_particle_that_comes_to_rest_early_is_compared_as_far_as_it_bounced(shown):
+    # The second apex, 0.09 x 0.5^4 m = 5.6 mm, lies within the lowest cell: held there.
+    _, figures = shown("damper_rebound", "--restitution", "0.5")
+    # Two blows, by the bound of the test above with e = 0.5.
+    assert figures["impact_error_ms"] <= 0.1 * (2.0 * (2.0 + 3.0 * 0.5) + 1.0)
+
+
+def test_harmonic_gives_amplitude_and_lag(script):
+    harmonic = script("damper_patterns").harmonic
+    phase = np.arange(32) * 52 / 1667
+    lag = np.radians(47.0)
+    values = 3.0 + 2.0 * np.sin(2.0 * np.pi * phase - lag)
+    amplitude, degrees = harmonic(phase, values)
+    assert amplitude == pytest.approx(2.0, rel=1e-12)
+    assert degrees == pytest.approx(47.0, rel=1e-12)
+
+
+def test_box_of_the_automaton_is_staggered_and_moves_by_cells():
+    box = plot.Box.of_automaton(Automaton())
+    plain = plot.Box.of_spheres(Spheres())
+    assert (box.width, box.height) == pytest.approx((plain.width, plain.height), rel=1e-12)
+    displaced = np.array([-0.0031, -0.0029, 0.0, 0.0029, 0.0031])
+    assert box.lift(displaced) == pytest.approx([-6e-3, 0.0, 0.0, 0.0, 6e-3], abs=1e-15)
+    assert np.array_equal(plain.lift(displaced), displaced)
+    # Lowest and highest cells of the first two columns, as the lattice places them.
+    lattice = Geometry(10, 16)
+    cells = [lattice.cell_of(*place) for place in ((0, 0), (1, 0), (0, 15), (1, 15))]
+    below, above = box.gaps(lattice.centres(6e-3)[cells])
+    assert below == pytest.approx([0.0, 0.0, 0.09, 0.09], abs=1e-15)
+    assert above == pytest.approx([0.09, 0.09, 0.0, 0.0], abs=1e-15)
+    # A closed line around 10 x 16 cells: area by the shoelace formula.
+    for one in (box, plain):
+        x, y = one.outline().T
+        area = 0.5 * abs(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1]))
+        assert area == pytest.approx(60e-3 * 96e-3, rel=1e-12)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("damper_rebound", ("--dt", "2e-4")),
+        ("damper_patterns", ("--dt", "2e-4")),
+        ("demo_damper", ("--filling", "spheres", "--dt", "2e-4")),
+    ],
+)
+def test_spheres_beyond_their_limit_end_as_diverged(tmp_path, name, options):
+    done = start(name, "--quick", "--out", tmp_path, *options)
+    assert done.returncode == 3, done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    for word in ("diverged by step", "dt must be at most", "was 0.0002 s"):
+        assert word in done.stderr
+    # A step of which a contact at the speed of a fall through the box has five.
+    advised = float(re.search(r"dt must be at most ([0-9.e-]+) s", done.stderr).group(1))
+    assert advised == Spheres().safe_step()
+    assert not (tmp_path / "summary.json").exists()
+
+
+BAD_OPTIONS = [
+    ("damper_rebound", ("--restitution", "1.2"), ("--restitution", "'1.2'", "(0.3, 1)")),
+    ("damper_rebound", ("--restitution", "nan"), ("--restitution", "'nan'")),
+    ("damper_rebound", ("--dt", "0"), ("--dt", "'0'")),
+    ("damper_rebound", ("--ca-dt", "2e-3"), ("dt", "0.0012", "0.002")),
+    ("damper_rebound", ("--dt", "0.1"), ("dt", "0.1", "10 Hz")),
+    ("damper_rebound", ("--driver", "auto"), ("--driver",)),
+    ("damper_patterns", ("--accounting", "magic"), ("--accounting", "magic", "static")),
+    ("damper_patterns", ("--amplitude", "-1"), ("--amplitude", "'-1'", "(0, 100)")),
+    ("damper_patterns", ("--frequency", "nan"), ("--frequency", "'nan'")),
+    ("damper_patterns", ("--seeds", "0"), ("--seeds", "'0'", "1 to")),
+    ("damper_patterns", ("--dt", "0.1"), ("dt", "0.1")),
+    ("damper_patterns", ("--driver", "auto"), ("--driver",)),
+    ("demo_damper", ("--particles", "161"), ("--particles", "'161'", "0 to 160")),
+    ("demo_damper", ("--particles", "-1"), ("--particles", "'-1'")),
+    ("demo_damper", ("--filling", "dust"), ("--filling", "dust", "spheres")),
+    ("demo_damper", ("--frequency", "inf"), ("--frequency", "'inf'")),
+    ("demo_damper", ("--amplitude", "0"), ("--amplitude", "'0'", "(0, 10)")),
+    ("demo_damper", ("--dt", "2e-3"), ("dt", "0.0012")),
+    ("demo_damper", ("--threads", "0"), ("--threads", "'0'")),
+]
+
+
+@pytest.mark.parametrize(("name", "options", "words"), BAD_OPTIONS)
+def test_bad_option_is_one_sentence(main, capsys, tmp_path, name, options, words):
+    folder = tmp_path / "out"
+    code = main(name, ["--quick", *options, "--out", folder])
+    assert_refused(code, capsys.readouterr(), folder, *words)
+
+
+@pytest.mark.parametrize("name", ["damper_rebound", "damper_patterns", "demo_damper"])
+def test_folder_below_a_file_is_refused_before_anything_runs(main, capsys, tmp_path, name):
+    (tmp_path / "file").write_text("x")
+    folder = tmp_path / "file" / "out"
+    code = main(name, ["--quick", "--out", folder])
+    assert_refused(code, capsys.readouterr(), folder, str(folder), "writable")
