@@ -97,3 +97,39 @@ class Multirate:
     def criterion(self):
         """Step rule for the schedule."""
         return Displacement(self.distance, self.dt0)
+
+
+@dataclass(frozen=True)
+class ImplicitDashpots:
+    """One step for all bodies; dashpots of bonds and contacts solved together in each step.
+
+    dt: step [s]. sweeps: of Gauss-Seidel over all blocks.
+    """
+
+    dt: float = 5e-7
+    sweeps: int = 2
+    theta: float = 0.5
+    refresh: float = 3e-5
+    early: float = 1.0
+    ahead: float = 0.5
+    clamp: bool = False
+
+    uniform = True
+    neighbour = "held"
+    control = None
+    dashpot = "full"
+    distance = None
+    solves = True
+
+    @property
+    def dt0(self):
+        return self.dt
+
+    @property
+    def name(self):
+        """Short name for tables."""
+        return "implicit"
+
+    def criterion(self):
+        """Step rule for the schedule."""
+        return FixedStep()

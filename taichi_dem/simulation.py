@@ -14,7 +14,9 @@ from taichi_dem.state import NEVER, State
 from taichi_dem.step.advance import Advance
 from taichi_dem.step.broad_phase import BroadPhase
 from taichi_dem.step.contacts import Contacts
-from taichi_dem.step.drivers import CALL_SECONDS, DRIVERS, Step
+from taichi_dem.step.drivers import CALL_SECONDS, DRIVERS, SolvedStep, Step
+from taichi_dem.step.implicit.advance import SolvedAdvance
+from taichi_dem.step.implicit.solver import Solver
 from taichi_dem.step.rates import rates_for
 from taichi_dem.step.schedule import Schedule
 from taichi_dem.step_control import counted_criteria
@@ -41,8 +43,8 @@ class Simulation:
             self.model = Model(scene.mesh, scene.material, scene.effects)
             self.state = State(self.model, scene.max_speed)
             self._build_contacts(brute_force)
-        self.advance = Advance(self.model, self.state, self.schedule, self.contacts)
-        step = Step(self.advance, self.schedule, self.contacts)
+            step = self._build_step()
+        self.advance = step.advance
         self.driver = DRIVERS[_driver_name(driver, self.model.bond_count)](step)
         self.step = step
         self.ledger = None
@@ -69,6 +71,15 @@ class Simulation:
         self.broad_phase = None
         if self.contacts is not None:
             self.broad_phase = BroadPhase(self.contacts, self.schedule, brute_force)
+
+    def _build_step(self):
+        parts = self.model, self.state, self.schedule, self.contacts
+        if not getattr(self.method, "solves", False):
+            return Step(Advance(*parts), self.schedule, self.contacts)
+        solver = Solver(*parts, self.method)
+        if self.contacts is not None:
+            self.broad_phase.solver, self.broad_phase.solves = solver, True
+        return SolvedStep(SolvedAdvance(*parts, solver), self.schedule, self.contacts)
 
     @property
     def time_s(self):

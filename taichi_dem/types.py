@@ -6,4 +6,5 @@ real = ti.f64
 vec2 = ti.types.vector(2, ti.f64)
 vec3 = ti.types.vector(3, ti.f64)
 vec4 = ti.types.vector(4, ti.f64)
+vec6 = ti.types.vector(6, ti.f64)
 mat3 = ti.types.matrix(3, 3, ti.f64)

@@ -18,8 +18,9 @@ from taichi_dem.types import real, vec2, vec3
 class Advance:
     """The order in which physics and effects act; see the module."""
 
-    def __init__(self, model, state, schedule, contacts):
+    def __init__(self, model, state, schedule, contacts, solver=None):
         self.model, self.state, self.schedule = model, state, schedule
+        self.solver, self.solves = solver, solver is not None
         self.contacts = contacts
         self.has_contact = contacts is not None
         # Without fast_math a product with zero is not folded: what is absent must not be written.
@@ -39,6 +40,8 @@ class Advance:
             if ti.static(self.limited):
                 scale = self._bond_share(slots[0] >> 2, slots[1] >> 2)
             motion = self._motion(b, slots)
+            if ti.static(self.solves):
+                motion = self.solver.bonds.mean(b, motion)
             stiffness = self.model.bond_stiffness[b]
             force, torque, failed = zero3(), zero3(), 0
             dragged, slipped = 0.0, 0.0
@@ -69,6 +72,18 @@ class Advance:
             else:
                 self.state.bond_heat[b] += area * vec3(0.0, slipped, self._stored(b, motion))
                 self._release(b, slots)
+            if ti.static(self.solves):
+                self._renew(b, slots, motion, failed, dragged * (area * dt))
+
+    @ti.func
+    def _renew(self, b, slots, motion, failed, dragged):
+        """Let the solver take in the twist a bond has now, or forget it; dragged [J]."""
+        if failed == 0:
+            self.solver.bonds.begin(b, slots[0] >> 2, slots[1] >> 2, motion.branch)
+        else:
+            self.solver.bonds.end(b)
+            # Dashpots are booked for the step before: it was full, also when a unit fails now.
+            self.state.bond_heat[b][0] += dragged
 
     @ti.func
     def _bond_step(self, b, i, j):
@@ -259,9 +274,16 @@ class Advance:
         """Let body i go on for elapsed [s], as its supports allow, and choose its next step."""
         velocity, momentum = self._supported(i, elapsed, velocity, momentum)
         spin = self.spin(i, momentum)
-        orientation = turned(self.state.orientation[i], spin, elapsed)
         self.state.velocity[i], self.state.angular_momentum[i] = velocity, momentum
-        self.state.spin[i], self.state.orientation[i] = spin, orientation
+        self.state.spin[i] = spin
+        self._drift(i, elapsed, velocity, spin)
+        self.schedule.choose_level(i, velocity.norm_sqr())
+
+    @ti.func
+    def _drift(self, i, elapsed, velocity, spin):
+        """Move and turn body i at a velocity and spin; note the way it went, and a runaway."""
+        orientation = turned(self.state.orientation[i], spin, elapsed)
+        self.state.orientation[i] = orientation
         self.state.rotation[i] = rotation_matrix(orientation)
         self.state.position[i] += elapsed * velocity
         self.state.last_tick[i] = self.state.tick[None]
@@ -271,7 +293,6 @@ class Advance:
         # One comparison finds runaway, infinity and NaN; "v != v" would be folded away.
         if not (speed2 + spin.norm_sqr() * self.model.radius[i] ** 2 < self.state.max_speed2[None]):
             ti.atomic_min(self.state.bad_body[None], i)
-        self.schedule.choose_level(i, speed2)
 
     @ti.func
     def _gathered(self, i):
@@ -301,7 +322,7 @@ class Advance:
     def _loaded(self, i, elapsed, linear, angular):
         """Impulse and moment with those of the loads added, and each load's own, a row each."""
         kick = ti.Matrix.zero(real, ti.static(max(1, len(self.model.loads))), 6)
-        half = self.schedule.seconds(self.state.tick[None]) - 0.5 * elapsed
+        half = self._load_time(elapsed)
         for e in ti.static(range(len(self.model.loads))):
             if self.model.loads[e].acts_on(i):
                 force, torque = self.model.loads[e].wrench(i, half, self.state.rotation[i])
@@ -310,6 +331,11 @@ class Advance:
                 for k in ti.static(range(3)):
                     kick[e, k], kick[e, 3 + k] = force[k] * elapsed, torque[k] * elapsed
         return linear, angular, kick
+
+    @ti.func
+    def _load_time(self, elapsed):
+        """Time at which loads are asked for their force: the middle of the step [s]."""
+        return self.schedule.seconds(self.state.tick[None]) - 0.5 * elapsed
 
     @ti.func
     def _book_loads(self, i, kick, velocity, momentum):

@@ -24,6 +24,7 @@ class BroadPhase:
     def __init__(self, contacts, schedule, brute_force=False):
         n = contacts.model.body_count
         self.contacts, self.schedule = contacts, schedule
+        self.solver, self.solves = None, False
         self.model, self.state = contacts.model, contacts.state
         self.rough = ti.field(ti.i32, shape=n)
         self.rough_count = ti.field(ti.i32, shape=())
@@ -128,6 +129,8 @@ class BroadPhase:
         self.old_heat[p] = self.contacts.pair_heat[p]
         if ti.static(self.schedule.has_rates):
             self.schedule.rates.near.keep(p)
+        if ti.static(self.solves):
+            self.solver.pairs.keep(p)
 
     @ti.func
     def _count_spheres(self, i):
@@ -247,6 +250,8 @@ class BroadPhase:
             self.contacts.pair_full[2 * p] = 1
         if ti.static(self.schedule.has_rates):
             self.schedule.rates.take_pair(p, old, self._exposed_now(i) | self._exposed_now(j))
+        if ti.static(self.solves):
+            self.solver.pairs.take(p, old)
 
     @ti.func
     def _exposed_now(self, i):

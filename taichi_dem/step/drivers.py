@@ -89,6 +89,47 @@ class Step:
 
 
 @ti.data_oriented
+class SolvedStep(Step):
+    """The phases of a substep in which all dashpots are solved together."""
+
+    def __init__(self, advance, schedule, contacts):
+        Step.__init__(self, advance, schedule, contacts)
+        solver = advance.solver
+        touching, booked = (), ()
+        if contacts is not None:
+            touching = ((schedule.pairs, solver.pairs.begin),)
+            booked = ((schedule.pairs, solver.pairs.book),)
+        self.phases = (
+            *touching,
+            (Once(), schedule.tick_on),
+            (schedule.bodies, advance.predict),
+            (Once(), solver.solve),
+            *booked,
+            (schedule.bodies, advance.body),
+            (Once(), schedule.put_in_order),
+            (schedule.bonds, advance.bond),
+        )
+
+    @ti.kernel
+    def prime(self):
+        """Fill the lists, guess the dashpots' first impulses and evaluate the bonds."""
+        for _ in range(1):
+            self.schedule.low[None] = 0
+            self.schedule.wanted[None] = 0
+        for i in range(self.advance.model.body_count):
+            self.schedule.choose_level(i, self.state.velocity[i].norm_sqr())
+            self.advance.solver.motion.place(i, self.advance)
+        for _ in range(1):
+            self.schedule.start_all()
+        for b in range(self.advance.model.bond_count):
+            self.advance.solver.bonds.first(b)
+        for b in range(self.advance.model.bond_count):
+            self.advance.bond(b)
+            # It booked a step that never was.
+            self.state.bond_heat[b] = 0.0 * self.state.bond_heat[b]
+
+
+@ti.data_oriented
 class Resident:
     """Many substeps in one serial kernel: the choice for small systems on a CPU."""
 

@@ -1,0 +1,96 @@
+"""Symmetric 6x6 blocks between the relative twist of two bodies and the wrench they exchange.
+
+A twist is (velocity, spin), a wrench (force, moment), both at one point. Blocks are kept as three
+3x3 matrices: unrolled 6x6 products would take seconds to compile.
+"""
+
+import taichi as ti
+
+from taichi_dem.types import mat3
+
+
+@ti.dataclass
+class Block:
+    """[[a, b], [b^T, c]]: a maps velocity to force, c spin to moment."""
+
+    a: ti.types.matrix(3, 3, ti.f64)
+    b: ti.types.matrix(3, 3, ti.f64)
+    c: ti.types.matrix(3, 3, ti.f64)
+
+
+@ti.func
+def zero_block():
+    """The zero block, as a start for sums."""
+    return Block(a=mat3(0.0), b=mat3(0.0), c=mat3(0.0))
+
+
+@ti.func
+def cross_matrix(r):
+    """Matrix [r]x with [r]x w = r x w."""
+    return mat3([[0.0, -r[2], r[1]], [r[2], 0.0, -r[0]], [-r[1], r[0], 0.0]])
+
+
+@ti.func
+def point_block(arm, law):
+    """What resists at one point: J^T law J, J = [1, -[arm]x] from the twist to its velocity.
+
+    arm: from where the twist is taken to the point [m]. law: symmetric, force per velocity.
+    """
+    lever = law @ cross_matrix(arm)
+    return Block(a=law, b=-lever, c=cross_matrix(arm).transpose() @ lever)
+
+
+@ti.func
+def mobility(mass_inverse_i, turn_i, mass_inverse_j, turn_j, branch):
+    """Twist of j against i, at j's centre, per unit wrench that pushes them apart there.
+
+    mass_inverse [1/kg] as 3x3 matrices, turn: world inverse inertia [1/(kg m^2)], branch: from
+    i's centre to j's [m].
+    """
+    across = cross_matrix(branch)
+    lever = across @ turn_i
+    return Block(
+        a=mass_inverse_i + mass_inverse_j - lever @ across, b=-lever, c=turn_i + turn_j
+    )
+
+
+@ti.func
+def plus(one, other):
+    """Sum of two blocks."""
+    return Block(a=one.a + other.a, b=one.b + other.b, c=one.c + other.c)
+
+
+@ti.func
+def inverse(block):
+    """Inverse of a positive definite block, by its Schur complement."""
+    first = block.a.inverse()
+    across = first @ block.b
+    last = (block.c - block.b.transpose() @ across).inverse()
+    b = -across @ last
+    return Block(a=first - b @ across.transpose(), b=b, c=last)
+
+
+@ti.func
+def applied(block, linear, angular):
+    """Both parts of a block times a twist or wrench."""
+    return block.a @ linear + block.b @ angular, block.b.transpose() @ linear + block.c @ angular
+
+
+@ti.func
+def solved_with(block, mobile):
+    """(block^-1 + mobile)^-1 for a block that may be singular; mobile positive definite.
+
+    It is block - block (block + mobile^-1)^-1 block.
+    """
+    whole = inverse(plus(block, inverse(mobile)))
+    # Rows of whole @ block, then block @ that.
+    across = block.b.transpose()
+    aa = whole.a @ block.a + whole.b @ across
+    ab = whole.a @ block.b + whole.b @ block.c
+    ca = whole.b.transpose() @ block.a + whole.c @ across
+    cc = whole.b.transpose() @ block.b + whole.c @ block.c
+    return Block(
+        a=block.a - block.a @ aa - block.b @ ca,
+        b=block.b - block.a @ ab - block.b @ cc,
+        c=block.c - across @ ab - block.c @ cc,
+    )

@@ -1,0 +1,57 @@
+"""What happens to a body in a step whose dashpots are solved together; bonds are as ever."""
+
+import taichi as ti
+
+from taichi_dem.physics.rotation import zero3
+from taichi_dem.step.advance import Advance
+
+
+@ti.data_oriented
+class SolvedAdvance(Advance):
+    """``Advance`` with bodies that take their new velocities from a ``Solver``.
+
+    Velocities are found first for the end of the step, with the springs' impulses at its
+    beginning and the dashpots' of the step before; the sweeps mend them; then the bodies move
+    with the mean of both ends, the midpoint rule.
+    """
+
+    @ti.func
+    def predict(self, i):
+        """Velocities at the end of the step as far as they are known before it is solved."""
+        elapsed = self.schedule.elapsed(i)
+        linear, angular = self._gathered(i)
+        linear, angular, _ = self._loaded(i, elapsed, linear, angular)
+        self.solver.motion.predict(i, self, linear, angular)
+
+    @ti.func
+    def body(self, i):
+        """Bring a body to the present tick with what the sweeps found."""
+        elapsed = self.schedule.elapsed(i)
+        before, momentum_before = self.state.velocity[i], self.state.angular_momentum[i]
+        velocity, momentum = self.solver.motion.found(i)
+        _, _, kick = self._loaded(i, elapsed, zero3(), zero3())
+        self._book_loads(i, kick, 0.5 * (before + velocity), 0.5 * (momentum_before + momentum))
+        velocity, momentum = self._supported(i, elapsed, velocity, momentum)
+        spin = self.spin(i, momentum)
+        self._drift(i, elapsed, velocity, spin)
+        self.state.velocity[i], self.state.angular_momentum[i] = velocity, momentum
+        # The next step begins with the spin in the new orientation.
+        self.state.spin[i] = self.spin(i, momentum)
+        self.solver.motion.place(i, self)
+        self.schedule.choose_level(i, velocity.norm_sqr())
+
+    @ti.func
+    def _load_time(self, elapsed):
+        """Loads act at the beginning of the step, with the springs."""
+        return self.schedule.seconds(self.state.tick[None]) - elapsed * self.solver.method.early
+
+    @ti.func
+    def allowed(self, i, velocity, momentum):
+        """Velocity and angular momentum that the supports of body i allow; nothing is booked."""
+        for effect in ti.static(self.model.supports):
+            if effect.acts_on(i):
+                time = self.schedule.seconds(self.state.tick[None])
+                velocity, momentum = effect.held(
+                    i, time, self.state.rotation[i], velocity, momentum
+                )
+        return velocity, momentum

@@ -1,0 +1,104 @@
+"""Dashpots of bonds: one 6x6 block each, visited in the order of a fixed edge colouring."""
+
+import numpy as np
+import taichi as ti
+
+from taichi_dem.fields import then
+from taichi_dem.physics.wrench import inverse, mobility, plus, point_block, zero_block
+from taichi_dem.step.implicit.colouring import edge_colours
+from taichi_dem.timeline import MACRO_TICKS
+from taichi_dem.types import real, vec3, vec6
+
+
+@ti.data_oriented
+class BondDashpots:
+    """What the sweeps read of a bond, packed in the order in which they visit.
+
+    A bond answers the mean twist of a step (slave against master, at the slave's centre) with the
+    wrench impulse y = C (theta s1 + (1 - theta) s0), s0 and s1 at the ends of the step. The sum
+    s1 + s0 (1 - theta) / theta carries over from step to step: it is the warm start, and y need not be
+    stored.
+
+    place: of a bond in the order. bodies: master and slave, -1 once released. branch: master's
+    centre to slave's [m]. a, b, c: block (C'^-1 + G)^-1, C' = theta C, G the mobility of the pair.
+    start: s0. last: the s1 that the present y satisfies. Velocities in m/s, spins in rad/s, world.
+    """
+
+    def __init__(self, model, state, schedule, motion, method):
+        self.model, self.state, self.schedule, self.motion = model, state, schedule, motion
+        self.theta, self.earlier = method.theta, (1.0 - method.theta) / method.theta
+        self.refresh_every = max(1, round(method.refresh / method.dt))
+        bonds = max(1, model.bond_count)
+        self.place = ti.field(ti.i32, shape=bonds)
+        self.bodies = ti.Vector.field(2, ti.i32, shape=bonds)
+        self.branch = ti.Vector.field(3, real, shape=bonds)
+        self.a, self.b, self.c = (ti.Matrix.field(3, 3, real, shape=bonds) for _ in range(3))
+        self.start = ti.Vector.field(6, real, shape=bonds)
+        self.last = ti.Vector.field(6, real, shape=bonds)
+        then(self.bodies.fill, -1)
+        top = model.topology
+        colours = edge_colours(np.stack([top.master, top.slave], axis=1), model.body_count)
+        self.ends = np.cumsum(np.bincount(colours, minlength=1)).tolist()
+        place = np.empty(bonds, dtype=np.int32)
+        place[np.argsort(colours, kind="stable")] = np.arange(len(colours), dtype=np.int32)
+        then(self.place.from_numpy, place)
+
+    @ti.func
+    def mean(self, b, motion):
+        """A bond's motion with the twist that its dashpots answered in the step before."""
+        k = self.place[b]
+        twist = self.theta * (self.last[k] + self.earlier * self.start[k])
+        motion.velocity = motion.axes @ twist[0:3]
+        motion.spin = motion.axes @ twist[3:6]
+        return motion
+
+    @ti.func
+    def begin(self, b, i, j, branch):
+        """Take in the present twist of an intact bond and, now and then, its block."""
+        k = self.place[b]
+        self.bodies[k], self.branch[k] = [i, j], branch
+        spin = self.state.spin[i]
+        linear = self.state.velocity[j] - self.state.velocity[i] - spin.cross(branch)
+        angular = self.state.spin[j] - spin
+        now = vec6(linear[0], linear[1], linear[2], angular[0], angular[1], angular[2])
+        self.last[k] += self.earlier * (self.start[k] - now)
+        self.start[k] = now
+        if (self.state.tick[None] // MACRO_TICKS) % self.refresh_every == 0:
+            self._refresh(b, k, i, j)
+
+    @ti.func
+    def first(self, b):
+        """Begin a run with a guess: the twist of the first step does not change."""
+        slots, k = self.model.bond_slots[b], self.place[b]
+        i, j = slots[0] >> 2, slots[1] >> 2
+        if self.state.broken_tick[b] < 0:
+            self.begin(b, i, j, self.state.position[j] - self.state.position[i])
+            self.last[k] = self.start[k]
+
+    @ti.func
+    def end(self, b):
+        """A released bond is visited no more."""
+        self.bodies[self.place[b]] = [-1, -1]
+
+    @ti.func
+    def _refresh(self, b, k, i, j):
+        dt = self.schedule.step_seconds[0]
+        axes = self.model.bond_frame[b] @ self.state.rotation[i].transpose()
+        ones = vec3(1.0, 1.0, 1.0)
+        along = self.model.dashpot.traction(ones)
+        scaled = axes
+        for r in ti.static(range(3)):
+            for c in ti.static(range(3)):
+                scaled[r, c] = axes[r, c] * along[r]
+        law = (self.theta * dt * self.model.unit_area[b]) * (axes.transpose() @ scaled)
+        block = zero_block()
+        for q in range(3):
+            arm = self.state.rotation[j] @ self.model.vertex_slave[3 * b + q]
+            block = plus(block, point_block(arm, law))
+        free = mobility(
+            self.motion.slack(i), self.motion.turn[i], self.motion.slack(j), self.motion.turn[j],
+            self.branch[k],
+        )
+        # A bond has springs in all directions: its block can be inverted.
+        solved = inverse(plus(inverse(block), free))
+        self.a[k], self.b[k], self.c[k] = solved.a, solved.b, solved.c

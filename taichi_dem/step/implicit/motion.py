@@ -1,0 +1,121 @@
+"""Velocities while a step is being solved, and how the bodies give way to an impulse."""
+
+import taichi as ti
+
+from taichi_dem.types import mat3, real, vec6
+
+
+@ti.func
+def unit3():
+    """The unit matrix."""
+    return mat3([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+
+
+@ti.data_oriented
+class Motion:
+    """Velocity and spin of every body at the end of the step, as far as it is known.
+
+    twist: velocity [m/s] and spin [rad/s], world. turn: spin per moment, R I^-1 R^T
+    [1/(kg m^2)], as supports allow. hold: velocity per impulse [1/kg], and given: all that a body was given in the
+    step [N s, N m s], where there are supports.
+    """
+
+    def __init__(self, model, state):
+        n = model.body_count
+        self.model, self.state = model, state
+        self.twist = ti.Vector.field(6, real, shape=n)
+        self.turn = ti.Matrix.field(3, 3, real, shape=n)
+        self.has_supports = bool(model.supports)
+        if self.has_supports:
+            self.hold = ti.Matrix.field(3, 3, real, shape=n)
+            self.given = ti.Vector.field(6, real, shape=n)
+
+    @ti.func
+    def slack(self, i):
+        """Velocity of body i per impulse [1/kg], a 3x3 matrix."""
+        slack = self.model.mass_inverse[i] * unit3()
+        if ti.static(self.has_supports):
+            slack = self.hold[i]
+        return slack
+
+    @ti.func
+    def place(self, i, advance):
+        """Find how body i gives way in its present orientation."""
+        rotation = self.state.rotation[i]
+        self.turn[i] = rotation @ self.model.inertia_inverse[i] @ rotation.transpose()
+        if ti.static(self.has_supports):
+            self._support(i, advance)
+
+    @ti.func
+    def _support(self, i, advance):
+        """Supports change velocities linearly: ask them for the unit impulses and moments."""
+        unit, turn = unit3(), self.turn[i]
+        rest, rest_turn = advance.allowed(i, 0.0 * unit[0, :], 0.0 * unit[0, :])
+        for k in ti.static(range(3)):
+            axis = unit[:, k]
+            velocity, _ = advance.allowed(i, self.model.mass_inverse[i] * axis, 0.0 * axis)
+            _, momentum = advance.allowed(i, 0.0 * axis, axis)
+            spin = turn @ (momentum - rest_turn)
+            for r in ti.static(range(3)):
+                self.hold[i][r, k] = velocity[r] - rest[r]
+                self.turn[i][r, k] = spin[r]
+
+    @ti.func
+    def predict(self, i, advance, linear, angular):
+        """Let body i have an impulse [N s] and moment [N m s], as its supports allow."""
+        velocity = self.state.velocity[i] + self.model.mass_inverse[i] * linear
+        spin = self.state.spin[i] + self.turn[i] @ angular
+        if ti.static(self.has_supports):
+            momentum = self.state.angular_momentum[i] + angular
+            for k in ti.static(range(3)):
+                self.given[i][k], self.given[i][3 + k] = linear[k], angular[k]
+            velocity, momentum = advance.allowed(i, velocity, momentum)
+            spin = advance.spin(i, momentum)
+        for k in ti.static(range(3)):
+            self.twist[i][k], self.twist[i][3 + k] = velocity[k], spin[k]
+
+    @ti.func
+    def found(self, i):
+        """Velocity and angular momentum at the end of the step, before supports act."""
+        twist, rotation = self.twist[i], self.state.rotation[i]
+        velocity = twist[0:3]
+        momentum = rotation @ (self.model.inertia[i] @ (rotation.transpose() @ twist[3:6]))
+        if ti.static(self.has_supports):
+            given = self.given[i]
+            velocity = self.state.velocity[i] + self.model.mass_inverse[i] * given[0:3]
+            momentum = self.state.angular_momentum[i] + given[3:6]
+        return velocity, momentum
+
+    @ti.func
+    def apart(self, i, j, branch):
+        """Velocity of body j against i at j's centre, and spin of j against i."""
+        first, second = self.twist[i], self.twist[j]
+        spin = first[3:6]
+        return second[0:3] - first[0:3] - spin.cross(branch), second[3:6] - spin
+
+    @ti.func
+    def pull(self, i, j, branch, force, moment):
+        """Give i an impulse and a moment at j's centre, and j the opposite."""
+        turned = self.turn[i] @ (moment + branch.cross(force))
+        back = self.turn[j] @ moment
+        first, second = force, force
+        if ti.static(self.has_supports):
+            first, second = self.hold[i] @ force, self.hold[j] @ force
+            self._give(i, force, moment + branch.cross(force))
+            self._give(j, -force, -moment)
+        else:
+            first, second = self.model.mass_inverse[i] * force, self.model.mass_inverse[j] * force
+        for k in ti.static(range(3)):
+            self.twist[i][k] += first[k]
+            self.twist[i][3 + k] += turned[k]
+            self.twist[j][k] -= second[k]
+            self.twist[j][3 + k] -= back[k]
+
+    @ti.func
+    def _give(self, i, impulse, moment):
+        for k in ti.static(range(3)):
+            self.given[i][k] += impulse[k]
+            self.given[i][3 + k] += moment[k]
+
+
+__all__ = ["Motion", "unit3", "vec6"]

@@ -1,0 +1,181 @@
+"""Dashpots and friction of contacts, sphere by sphere: pushes only, within the bound of friction."""
+
+import taichi as ti
+
+from taichi_dem.physics.rotation import zero3
+from taichi_dem.step.implicit.motion import unit3
+from taichi_dem.types import real, vec3
+
+
+@ti.data_oriented
+class PairDashpots:
+    """What the sweeps read of the spheres that touch.
+
+    One block for all spheres of a pair would let those that part hold on to each other while the
+    others push: a pair that rocks would stick. So each sphere has its own impulse.
+
+    touching: how many spheres of a pair touch; they are first .. first + touching - 1 in touch, which has
+    their place among the pair's candidates. normal: from first to second. arm: from the second's
+    centre to the contact [m]. push: impulse of the spring [N s]. share: how its velocity gives way
+    to an impulse along the normal, and across at most [1/kg]. impulse: on the second, what was
+    found, spring, dashpot and friction [N s]; entries as in ``Contacts.pair_sphere``.
+    """
+
+    def __init__(self, model, state, schedule, contacts, motion, method):
+        self.model, self.state, self.schedule = model, state, schedule
+        self.contacts, self.motion = contacts, motion
+        self.method = method
+        self.has_friction = bool(model.friction.name)
+        pairs, spheres = contacts.capacity, contacts.sphere_capacity
+        self.touching = ti.field(ti.i32, shape=pairs)
+        self.touch = ti.field(ti.i32, shape=spheres)
+        self.normal = ti.Vector.field(3, real, shape=spheres)
+        self.arm = ti.Vector.field(3, real, shape=spheres)
+        self.push = ti.field(real, shape=spheres)
+        self.share = ti.Vector.field(2, real, shape=spheres)
+        self.impulse = ti.Vector.field(3, real, shape=spheres)
+        self.branch = ti.Vector.field(3, real, shape=pairs)
+        self.old_first = ti.field(ti.i32, shape=pairs + 1)
+        self.old_sphere = ti.Vector.field(2, ti.i32, shape=spheres)
+        self.old_impulse = ti.Vector.field(3, real, shape=spheres)
+
+    @ti.func
+    def keep(self, p):
+        """Save what is known of a pair before the list is renewed."""
+        self.old_first[p], self.old_first[p + 1] = (
+            self.contacts.pair_first[p],
+            self.contacts.pair_first[p + 1],
+        )
+        for k in range(self.contacts.pair_first[p], self.contacts.pair_first[p + 1]):
+            self.old_sphere[k] = self.contacts.pair_sphere[k]
+            self.old_impulse[k] = self.impulse[k]
+
+    @ti.func
+    def take(self, p, old):
+        """Take it over for the pair at place p; old: its former place, -1 for none."""
+        for k in range(self.contacts.pair_first[p], self.contacts.pair_first[p + 1]):
+            spheres, found = self.contacts.pair_sphere[k], zero3()
+            if old >= 0:
+                for o in range(self.old_first[old], self.old_first[old + 1]):
+                    same = self.old_sphere[o] == spheres
+                    if same.all():
+                        found = self.old_impulse[o]
+            self.impulse[k] = found
+
+    @ti.func
+    def begin(self, p):
+        """Find what touches and its springs' impulse; start from the impulses of the last step."""
+        pair = self.contacts.pair_body[p]
+        i, j = pair[0], pair[1]
+        dt = self.schedule.step_seconds[0]
+        branch = self.state.position[j] - self.state.position[i]
+        back = self.state.rotation[i].transpose()
+        turn, offset = back @ self.state.rotation[j], back @ branch
+        force, moment, deepest = zero3(), zero3(), 0.0
+        start = self.contacts.pair_first[p]
+        end = start
+        for k in range(start, self.contacts.pair_first[p + 1]):
+            a, b = self.contacts.pair_sphere[k][0], self.contacts.pair_sphere[k][1]
+            first, second = self.model.sphere[a], self.model.sphere[b]
+            apart = turn @ second.xyz + offset - first.xyz
+            reach = first[3] + second[3]
+            if apart.norm_sqr() < reach * reach:
+                distance = ti.max(apart.norm(), 1e-30)
+                overlap = reach - distance
+                normal = self.state.rotation[i] @ apart / distance
+                depth = first[3] - 0.5 * overlap
+                arm = self.state.rotation[i] @ first.xyz + depth * normal - branch
+                self.touch[end], self.normal[end], self.arm[end] = k, normal, arm
+                self.push[end] = dt * self.contacts.law.elastic(overlap)
+                self.share[end] = self._share(i, j, branch, arm, normal)
+                force += self.impulse[k]
+                moment += arm.cross(self.impulse[k])
+                deepest = ti.max(deepest, overlap / ti.min(first[3], second[3]))
+                end += 1
+            else:
+                self.impulse[k] = zero3()
+        self.contacts.deepest[p], self.touching[p], self.branch[p] = deepest, end - start, branch
+        if end > start:
+            self._deposit(p, branch, force, moment)
+
+    @ti.func
+    def _share(self, i, j, branch, arm, normal):
+        """Velocity per impulse along the normal, and the largest across it [1/kg]."""
+        other = arm + branch
+        slack = self.motion.slack(i) + self.motion.slack(j)
+        # trace([r]x^T A [r]x) and n [r]x^T A [r]x n, for both bodies.
+        first, second = other.cross(normal), arm.cross(normal)
+        along = normal.dot(slack @ normal)
+        along += first.dot(self.motion.turn[i] @ first) + second.dot(self.motion.turn[j] @ second)
+        across = slack.trace()
+        for c in ti.static(range(3)):
+            axis = unit3()[:, c]
+            first, second = other.cross(axis), arm.cross(axis)
+            across += first.dot(self.motion.turn[i] @ first)
+            across += second.dot(self.motion.turn[j] @ second)
+        return ti.Vector([along, across - along])
+
+    @ti.func
+    def _deposit(self, p, branch, force, moment):
+        """Let both bodies have the first guess: force on the second, moment about its centre."""
+        around = moment + branch.cross(force)
+        self.contacts.pair_full[2 * p] = 1
+        self.contacts.pair_full[2 * p + 1] = 1
+        for k in ti.static(range(3)):
+            self.contacts.pair_slot[2 * p][k] -= force[k]
+            self.contacts.pair_slot[2 * p][3 + k] -= around[k]
+            self.contacts.pair_slot[2 * p + 1][k] += force[k]
+            self.contacts.pair_slot[2 * p + 1][3 + k] += moment[k]
+
+    @ti.func
+    def visit(self, p):
+        """Solve the contacts of one pair, one after the other, against its present motion."""
+        if self.touching[p] > 0:
+            pair = self.contacts.pair_body[p]
+            damping = self.schedule.step_seconds[0] * self.contacts.law.damping()
+            start = self.contacts.pair_first[p]
+            for c in range(start, start + self.touching[p]):
+                self._visit(c, pair[0], pair[1], self.branch[p], damping)
+
+    @ti.func
+    def _visit(self, c, i, j, branch, damping):
+        k, normal, arm, share = self.touch[c], self.normal[c], self.arm[c], self.share[c]
+        linear, angular = self.motion.apart(i, j, branch)
+        velocity = linear + angular.cross(arm)
+        held = self.impulse[k]
+        pressed, rate = held.dot(normal), velocity.dot(normal)
+        # The opening rate without this contact's own impulse, and the law solved for the impulse.
+        free = rate - share[0] * pressed
+        found = ti.max(0.0, (self.push[c] - damping * free) / (1.0 + damping * share[0])) * normal
+        if ti.static(self.has_friction):
+            slide = velocity - rate * normal - share[1] * (held - pressed * normal)
+            rub = (-damping / (1.0 + damping * share[1])) * slide
+            bound = self.model.friction.law[0] * found.dot(normal)
+            size = rub.norm()
+            if size > bound:
+                rub *= bound / size
+            found += rub
+        step = held - found
+        self.impulse[k] = found
+        self.motion.pull(i, j, branch, step, arm.cross(step))
+
+    @ti.func
+    def book(self, p):
+        """Book what the dashpots and friction of a pair took, with its mean motion in the step."""
+        if self.touching[p] > 0:
+            pair = self.contacts.pair_body[p]
+            i, j, branch = pair[0], pair[1], self.branch[p]
+            linear, angular = self.motion.apart(i, j, branch)
+            spin = self.state.spin[i]
+            before = self.state.velocity[j] - self.state.velocity[i] - spin.cross(branch)
+            linear = 0.5 * (linear + before)
+            angular = 0.5 * (angular + self.state.spin[j] - spin)
+            start = self.contacts.pair_first[p]
+            dragged, rubbed = 0.0, 0.0
+            for c in range(start, start + self.touching[p]):
+                velocity, normal = linear + angular.cross(self.arm[c]), self.normal[c]
+                impulse = self.impulse[self.touch[c]]
+                pressed, rate = impulse.dot(normal), velocity.dot(normal)
+                dragged += (self.push[c] - pressed) * rate
+                rubbed -= (impulse - pressed * normal).dot(velocity)
+            self.contacts.pair_heat[p] += vec3(dragged, rubbed, 0.0)
