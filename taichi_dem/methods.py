@@ -112,7 +112,7 @@ class ImplicitDashpots:
     refresh: float = 3e-5
     early: float = 1.0
     ahead: float = 0.5
-    clamp: bool = False
+    spec: float = 1.0
 
     uniform = True
     neighbour = "held"

@@ -71,6 +71,7 @@ class PairDashpots:
         branch = self.state.position[j] - self.state.position[i]
         back = self.state.rotation[i].transpose()
         turn, offset = back @ self.state.rotation[j], back @ branch
+        ahead = self.method.spec * dt * self._speed(i, j)
         force, moment, deepest = zero3(), zero3(), 0.0
         start = self.contacts.pair_first[p]
         end = start
@@ -79,14 +80,16 @@ class PairDashpots:
             first, second = self.model.sphere[a], self.model.sphere[b]
             apart = turn @ second.xyz + offset - first.xyz
             reach = first[3] + second[3]
-            if apart.norm_sqr() < reach * reach:
+            if apart.norm_sqr() < (reach + ahead) * (reach + ahead):
                 distance = ti.max(apart.norm(), 1e-30)
                 overlap = reach - distance
                 normal = self.state.rotation[i] @ apart / distance
                 depth = first[3] - 0.5 * overlap
                 arm = self.state.rotation[i] @ first.xyz + depth * normal - branch
                 self.touch[end], self.normal[end], self.arm[end] = k, normal, arm
-                self.push[end] = dt * self.contacts.law.elastic(overlap)
+                # Spheres still apart may approach until they touch, at the end of the step.
+                self.push[end] = dt * self.contacts.law.elastic(ti.max(overlap, 0.0))
+                self.push[end] += self.contacts.law.damping() * ti.min(overlap, 0.0)
                 self.share[end] = self._share(i, j, branch, arm, normal)
                 force += self.impulse[k]
                 moment += arm.cross(self.impulse[k])
@@ -97,6 +100,13 @@ class PairDashpots:
         self.contacts.deepest[p], self.touching[p], self.branch[p] = deepest, end - start, branch
         if end > start:
             self._deposit(p, branch, force, moment)
+
+    @ti.func
+    def _speed(self, i, j):
+        """Bound of the speed at which two bodies' surfaces approach [m/s]."""
+        speed = (self.state.velocity[j] - self.state.velocity[i]).norm()
+        speed += self.state.spin[i].norm() * self.model.radius[i]
+        return speed + self.state.spin[j].norm() * self.model.radius[j]
 
     @ti.func
     def _share(self, i, j, branch, arm, normal):
@@ -176,6 +186,6 @@ class PairDashpots:
                 velocity, normal = linear + angular.cross(self.arm[c]), self.normal[c]
                 impulse = self.impulse[self.touch[c]]
                 pressed, rate = impulse.dot(normal), velocity.dot(normal)
-                dragged += (self.push[c] - pressed) * rate
+                dragged += (ti.max(self.push[c], 0.0) - pressed) * rate
                 rubbed -= (impulse - pressed * normal).dot(velocity)
             self.contacts.pair_heat[p] += vec3(dragged, rubbed, 0.0)
