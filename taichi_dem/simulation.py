@@ -41,11 +41,12 @@ class Simulation:
         self.scene, self.method = scene, method
         with fields_first():
             self.model = Model(scene.mesh, scene.material, scene.effects)
+            driver = _driver_name(driver, self.model.bond_count)
             self.state = State(self.model, scene.max_speed)
-            self._build_contacts(brute_force)
+            self._build_contacts(brute_force, driver == "resident")
             step = self._build_step()
         self.advance = step.advance
-        self.driver = DRIVERS[_driver_name(driver, self.model.bond_count)](step)
+        self.driver = DRIVERS[driver](step)
         self.step = step
         self.ledger = None
         self.searches = 0
@@ -53,7 +54,7 @@ class Simulation:
         self.run_seconds = self.run_cpu_seconds = 0.0
         self.started = None
 
-    def _build_contacts(self, brute_force):
+    def _build_contacts(self, brute_force, serial):
         model, state, method = self.model, self.state, self.method
         self.contacts = Contacts(model, state) if model.has_contact else None
         drifted = method.neighbour == "drifted"
@@ -70,7 +71,7 @@ class Simulation:
         )
         self.broad_phase = None
         if self.contacts is not None:
-            self.broad_phase = BroadPhase(self.contacts, self.schedule, brute_force)
+            self.broad_phase = BroadPhase(self.contacts, self.schedule, brute_force, serial)
 
     def _build_step(self):
         parts = self.model, self.state, self.schedule, self.contacts

@@ -179,7 +179,7 @@ class Advance:
             if ti.static(self.has_rates):
                 self.rates.notice(slots[side] >> 2, RELEASE)
         if ti.static(self.has_contact):
-            self.contacts.search_due[None] = 1
+            self.contacts.broke()
 
     @ti.func
     def contact(self, p):

@@ -1,13 +1,15 @@
 """Search for contact pairs: the broken ones among the neighbouring faces, then their spheres.
 
-The list is rebuilt when a body may have left the skin, or at once when a bond breaks. Impulses that
-wait in the slots of a pair are carried over, so results do not depend on when a search is made.
+The list is rebuilt when a body may have left the skin. When a bond breaks, only what its two bodies
+touch is looked for, at once. Impulses that wait in the slots of a pair are carried over, so results
+do not depend on when a search is made.
 """
 
 import taichi as ti
 
 from taichi_dem.errors import InputError
 from taichi_dem.step.cells import group
+from taichi_dem.step.contacts import BROKEN
 from taichi_dem.step.neighbours import Neighbours
 from taichi_dem.types import real, vec3
 
@@ -18,13 +20,15 @@ _ROOM = ("", "pairs_per_body", "spheres_per_body")
 class BroadPhase:
     """Finds the pairs and fills the lists of a ``Contacts``.
 
-    brute_force: compare all bodies with broken faces, for tests.
+    brute_force: compare all bodies with broken faces, for tests. whole: 1 for a search that looks
+    at all bodies; exposed: 1 for those at which it looks; searched: tick of the last one.
     """
 
-    def __init__(self, contacts, schedule, brute_force=False):
+    def __init__(self, contacts, schedule, brute_force=False, serial=False):
         n = contacts.model.body_count
         self.contacts, self.schedule = contacts, schedule
         self.solver, self.solves = None, False
+        self.serial, self.phases = serial, None
         self.model, self.state = contacts.model, contacts.state
         self.rough = ti.field(ti.i32, shape=n)
         self.rough_count = ti.field(ti.i32, shape=())
@@ -36,6 +40,11 @@ class BroadPhase:
         self.old_slot = ti.Vector.field(6, real, shape=2 * contacts.capacity)
         self.old_full = ti.field(ti.i32, shape=2 * contacts.capacity)
         self.old_heat = ti.Vector.field(3, real, shape=contacts.capacity)
+        self.old_first = ti.field(ti.i32, shape=contacts.capacity + 1)
+        self.searched = ti.field(ti.i64, shape=())
+        self.old_sphere = ti.Vector.field(2, ti.i32, shape=contacts.sphere_capacity)
+        self.whole = ti.field(ti.i32, shape=())
+        self.exposed = ti.field(ti.i32, shape=n)
         self.fresh = ti.field(ti.i32, shape=())
         self.old_first_of = ti.field(ti.i32, shape=n + 1)
         self.full = ti.field(ti.i32, shape=())
@@ -43,41 +52,74 @@ class BroadPhase:
 
     def search(self):
         """Rebuild the lists. Raises InputError when they outgrow the room the scene gave them."""
+        if self.phases is None:
+            self.phases = self._phases()
         self._search()
         room = "neighbours_per_body" if self.near.full[None] else _ROOM[self.full[None]]
         if room:
             raise InputError(f"contact lists are full: give SphereContact a larger {room}")
 
+    def _phases(self):
+        """What a search does, as pairs of how often and what, in order."""
+        return (
+            (self._bodies, self.near.place),
+            (self._once, self._begin),
+            (self._bodies, self.near.count),
+            (self._once, self._allot),
+            (self._bodies, self.near.fill),
+            (self._rough_bodies, self._place_spheres),
+            (self._pairs, self._keep),
+            (self._bodies, self._count_spheres),
+            (self._once, self._number_pairs),
+            (self._pairs, self._fill_pair),
+            (self._once, self._end),
+        )
+
     @ti.kernel
     def _search(self):
-        for i in range(self.model.body_count):
-            self.near.place(i)
-        for _ in range(1):
-            self._list_rough()
-            self.near.begin()
-        for i in range(self.model.body_count):
-            self.near.count(i)
-        for _ in range(1):
-            self.near.allot()
-        for i in range(self.model.body_count):
-            self.near.fill(i)
-        for a in range(self.rough_count[None]):
-            self._place_spheres(self.rough[a])
-        for p in range(self.contacts.pair_count[None]):
-            self._keep(p)
-        for i in range(self.model.body_count):
-            self.old_first_of[i] = self.contacts.first_of[i]
-            self.contacts.travel[i] = 0.0
-            self._count_spheres(i)
-        for _ in range(1):
-            self._number_pairs()
-        for p in range(self.contacts.pair_count[None]):
-            self._fill_pair(p)
-        for _ in range(1):
-            self.near.end()
-            self._index_second()
-            self.schedule.start_pairs()
-            self.contacts.search_due[None] = 0
+        if ti.static(self.serial):
+            # One task: to wake a pool of threads a dozen times takes longer than the search.
+            for _ in range(1):
+                for count, item in ti.static(self.phases):
+                    for a in range(count()):
+                        item(a)
+        else:
+            for count, item in ti.static(self.phases):
+                for a in range(count()):
+                    item(a)
+
+    @ti.func
+    def _bodies(self):
+        return self.model.body_count
+
+    @ti.func
+    def _rough_bodies(self):
+        return self.rough_count[None]
+
+    @ti.func
+    def _pairs(self):
+        return self.contacts.pair_count[None]
+
+    @ti.func
+    def _once(self):
+        return 1
+
+    @ti.func
+    def _begin(self, one):
+        self._list_rough()
+        self._choose_extent()
+        self.near.begin()
+
+    @ti.func
+    def _allot(self, one):
+        self.near.allot()
+
+    @ti.func
+    def _end(self, one):
+        self.near.end()
+        self._index_second()
+        self.schedule.start_pairs()
+        self.contacts.search_due[None] = 0
 
     @ti.func
     def _list_rough(self):
@@ -102,8 +144,23 @@ class BroadPhase:
         self.state.injected_tick[None] = newest
 
     @ti.func
-    def _place_spheres(self, i):
-        """World positions of a body's spheres, computed once for the many that ask."""
+    def _choose_extent(self):
+        """Look at all bodies where one left its skin, else at those that a break has exposed."""
+        wider = self.contacts.search_due[None] != BROKEN or self.near.stale[None] == 1
+        self.whole[None] = ti.cast(wider, ti.i32)
+        for i in range(self.model.body_count):
+            exposed = ti.cast(wider, ti.i32)
+            for face in range(4 * i, 4 * i + 4):
+                exposed |= ti.cast(self.state.exposed_tick[face] > self.searched[None], ti.i32)
+            self.exposed[i] = exposed
+            if wider:
+                self.contacts.travel[i] = 0.0
+        self.searched[None] = self.state.tick[None]
+
+    @ti.func
+    def _place_spheres(self, a):
+        """World positions of a rough body's spheres, computed once for the many that ask."""
+        i = self.rough[a]
         size = ti.static(self.model.spheres_per_face)
         position, rotation = self.state.position[i], self.state.rotation[i]
         for face in range(4 * i, 4 * i + 4):
@@ -123,6 +180,9 @@ class BroadPhase:
     def _keep(self, p):
         """Save a pair of the old list with what waits in its slots."""
         self.old_body[p] = self.contacts.pair_body[p]
+        self.old_first[p] = self.contacts.pair_first[p]
+        for k in range(self.contacts.pair_first[p], self.contacts.pair_first[p + 1]):
+            self.old_sphere[k] = self.contacts.pair_sphere[k]
         for side in ti.static(range(2)):
             self.old_slot[2 * p + side] = self.contacts.pair_slot[2 * p + side]
             self.old_full[2 * p + side] = self.contacts.pair_full[2 * p + side]
@@ -134,14 +194,16 @@ class BroadPhase:
 
     @ti.func
     def _count_spheres(self, i):
-        """Number of sphere pairs of body i with each neighbour."""
+        """Number of sphere pairs of body i with each neighbour that this search looks at."""
+        self.old_first_of[i] = self.contacts.first_of[i]
         for k in range(self.near.first[i], self.near.first[i + 1]):
-            j, spheres = self.near.body[k], 0
-            faces = self.near.faces[k] & self._broken_faces(i, j)
-            if faces != 0:
-                if not self._bonded(i, j):
-                    spheres = self._spheres_near(i, j, faces, 0, False)
-            self.near_faces[k], self.near_spheres[k] = faces, spheres
+            j = self.near.body[k]
+            if self.exposed[i] | self.exposed[j] != 0:
+                faces, spheres = self.near.faces[k] & self._broken_faces(i, j), 0
+                if faces != 0:
+                    if not self._bonded(i, j):
+                        spheres = self._spheres_near(i, j, faces, 0, False)
+                self.near_faces[k], self.near_spheres[k] = faces, spheres
 
     @ti.func
     def _broken_faces(self, i, j):
@@ -180,7 +242,7 @@ class BroadPhase:
         return count
 
     @ti.func
-    def _number_pairs(self):
+    def _number_pairs(self, one):
         """Give the pairs that have spheres near, or an impulse waiting, a place in order."""
         self.old_first_of[self.model.body_count] = self.contacts.pair_count[None]
         self.contacts.pair_count[None] = 0
@@ -234,8 +296,12 @@ class BroadPhase:
     def _fill_pair(self, p):
         """Write a pair's spheres, take over what waited for it, book what its birth injects."""
         i, j = self.contacts.pair_body[p][0], self.contacts.pair_body[p][1]
-        self._spheres_near(i, j, self.pair_faces[p], self.contacts.pair_first[p], True)
-        old, injected = self._old_pair(i, j), self._injected(p, i, j)
+        old, injected = self._old_pair(i, j), 0.0
+        if self.exposed[i] | self.exposed[j] != 0:
+            self._spheres_near(i, j, self.pair_faces[p], self.contacts.pair_first[p], True)
+            injected = self._injected(p, i, j)
+        else:
+            self._copy_spheres(p, old)
         for side in ti.static(range(2)):
             waiting, full = 0.0 * self.contacts.pair_slot[2 * p + side], 0
             if old >= 0:
@@ -252,6 +318,13 @@ class BroadPhase:
             self.schedule.rates.take_pair(p, old, self._exposed_now(i) | self._exposed_now(j))
         if ti.static(self.solves):
             self.solver.pairs.take(p, old)
+
+    @ti.func
+    def _copy_spheres(self, p, old):
+        """Take over the spheres of a pair at which this search does not look."""
+        start = self.contacts.pair_first[p]
+        for k in range(start, self.contacts.pair_first[p + 1]):
+            self.contacts.pair_sphere[k] = self.old_sphere[self.old_first[old] + k - start]
 
     @ti.func
     def _exposed_now(self, i):
