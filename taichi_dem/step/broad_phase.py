@@ -55,6 +55,8 @@ class BroadPhase:
         if self.phases is None:
             self.phases = self._phases()
         self._search()
+        if self.near.stale[None] and not self.near.full[None]:
+            self._search()
         room = "neighbours_per_body" if self.near.full[None] else _ROOM[self.full[None]]
         if room:
             raise InputError(f"contact lists are full: give SphereContact a larger {room}")
@@ -146,7 +148,7 @@ class BroadPhase:
     @ti.func
     def _choose_extent(self):
         """Look at all bodies where one left its skin, else at those that a break has exposed."""
-        wider = self.contacts.search_due[None] != BROKEN or self.near.stale[None] == 1
+        wider = self.contacts.search_due[None] != BROKEN or self.near.gone_count[None] > 0
         self.whole[None] = ti.cast(wider, ti.i32)
         for i in range(self.model.body_count):
             exposed = ti.cast(wider, ti.i32)
@@ -196,7 +198,7 @@ class BroadPhase:
     def _count_spheres(self, i):
         """Number of sphere pairs of body i with each neighbour that this search looks at."""
         self.old_first_of[i] = self.contacts.first_of[i]
-        for k in range(self.near.first[i], self.near.first[i + 1]):
+        for k in range(self.near.first[i], self.near.last[i]):
             j = self.near.body[k]
             if self.exposed[i] | self.exposed[j] != 0:
                 faces, spheres = self.near.faces[k] & self._broken_faces(i, j), 0
@@ -250,7 +252,7 @@ class BroadPhase:
         for i in range(self.model.body_count):
             self.contacts.first_of[i] = self.contacts.pair_count[None]
             old, last = self.old_first_of[i], self.old_first_of[i + 1]
-            for k in range(self.near.first[i], self.near.first[i + 1]):
+            for k in range(self.near.first[i], self.near.last[i]):
                 if self.near_spheres[k] > 0:
                     j = self.near.body[k]
                     old = self._number_waiting(i, old, last, j)

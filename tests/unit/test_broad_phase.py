@@ -139,14 +139,14 @@ def test_a_break_injects_the_energy_of_the_overlaps_that_it_brings_once():
 
 def neighbouring_faces(near):
     """Pairs of faces in the list of neighbours."""
-    first, faces = near.first.to_numpy(), near.faces.to_numpy()[: near.first[near.model.body_count]]
-    one = np.repeat(np.arange(near.model.body_count), np.diff(first))
-    other = near.body.to_numpy()[: len(faces)]
+    first, last = near.first.to_numpy()[:-1], near.last.to_numpy()
+    body, faces = near.body.to_numpy(), near.faces.to_numpy()
     return {
-        (4 * i + fg // 4, 4 * j + fg % 4)
-        for i, j, mask in zip(one.tolist(), other.tolist(), faces.tolist())
+        (4 * i + fg // 4, 4 * int(body[k]) + fg % 4)
+        for i in range(len(last))
+        for k in range(first[i], last[i])
         for fg in range(16)
-        if mask >> fg & 1
+        if faces[k] >> fg & 1
     }
 
 
