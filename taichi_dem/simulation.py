@@ -75,7 +75,7 @@ class Simulation:
 
     def _build_step(self):
         parts = self.model, self.state, self.schedule, self.contacts
-        if not getattr(self.method, "solves", False):
+        if not self.method.solves:
             return Step(Advance(*parts), self.schedule, self.contacts)
         solver = Solver(*parts, self.method)
         if self.contacts is not None:

@@ -49,9 +49,7 @@ def mobility(mass_inverse_i, turn_i, mass_inverse_j, turn_j, branch):
     """
     across = cross_matrix(branch)
     lever = across @ turn_i
-    return Block(
-        a=mass_inverse_i + mass_inverse_j - lever @ across, b=-lever, c=turn_i + turn_j
-    )
+    return Block(a=mass_inverse_i + mass_inverse_j - lever @ across, b=-lever, c=turn_i + turn_j)
 
 
 @ti.func

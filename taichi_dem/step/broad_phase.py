@@ -121,6 +121,8 @@ class BroadPhase:
         self.near.end()
         self._index_second()
         self.schedule.start_pairs()
+        if ti.static(self.solves):
+            self.solver.pairs.sort()
         self.contacts.search_due[None] = 0
 
     @ti.func

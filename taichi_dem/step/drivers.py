@@ -6,8 +6,10 @@ every item writes its own slots, and every sum has a fixed order.
 
 import time
 
+import numpy as np
 import taichi as ti
 
+from taichi_dem.step.implicit.pairs import COLOURS
 from taichi_dem.step.wake import Wake
 
 #: A resident call is kept near this long [s], so that Ctrl-C, progress and health are prompt.
@@ -52,6 +54,11 @@ class Step:
             (Once(), schedule.put_in_order),
             (schedule.bonds, advance.bond),
         )
+        self.parts = (self.phases,)
+
+    def repeats(self, part):
+        """Whether a part of the phases is called for once more: never here."""
+        return False
 
     def _retimed(self):
         """Phases in which bodies take new rates, and are woken, where the method asks for it."""
@@ -89,6 +96,42 @@ class Step:
 
 
 @ti.data_oriented
+class Range:
+    """Some places in a row, whatever is due."""
+
+    def __init__(self, first, size):
+        self.first, self.size = first, size
+
+    @ti.func
+    def count(self, low):
+        """How many there are."""
+        return self.size
+
+    @ti.func
+    def pick(self, a):
+        """One of them."""
+        return self.first + a
+
+
+@ti.data_oriented
+class Colour:
+    """The contact pairs of one colour."""
+
+    def __init__(self, pairs, colour):
+        self.pairs, self.colour = pairs, colour
+
+    @ti.func
+    def count(self, low):
+        """How many there are."""
+        return self.pairs.colour_first[self.colour + 1] - self.pairs.colour_first[self.colour]
+
+    @ti.func
+    def pick(self, a):
+        """One of them."""
+        return self.pairs.order[self.pairs.colour_first[self.colour] + a]
+
+
+@ti.data_oriented
 class SolvedStep(Step):
     """The phases of a substep in which all dashpots are solved together."""
 
@@ -99,16 +142,34 @@ class SolvedStep(Step):
         if contacts is not None:
             touching = ((schedule.pairs, solver.pairs.begin),)
             booked = ((schedule.pairs, solver.pairs.book),)
-        self.phases = (
+        before = (
             *touching,
             (Once(), schedule.tick_on),
+            (Once(), solver.begin),
             (schedule.bodies, advance.predict),
-            (Once(), solver.solve),
+        )
+        after = (
             *booked,
             (schedule.bodies, advance.body),
             (Once(), schedule.put_in_order),
             (schedule.bonds, advance.bond),
         )
+        self.phases = (*before, (Once(), solver.solve), *after)
+        self.parts = (before, self._sweep(solver), after)
+
+    def _sweep(self, solver):
+        """One sweep, colour by colour."""
+        ends = np.cumsum([0, *solver.bonds.colours]).tolist()
+        bonds = tuple((Range(a, b - a), solver.bond) for a, b in zip(ends, ends[1:]))
+        pairs = ()
+        if self.has_contact:
+            pairs = tuple((Colour(solver.pairs, c), solver.pair) for c in range(COLOURS))
+            pairs += ((Once(), solver.last_pairs),)
+        return (*bonds, *pairs, (Once(), solver.judge))
+
+    def repeats(self, part):
+        """Whether a part, the sweep, is called for once more."""
+        return part == 1 and self.advance.solver.unsolved[None] == 1
 
     @ti.kernel
     def prime(self):
@@ -182,13 +243,22 @@ class Parallel:
     def run(self, end_tick):
         """Advance to a tick, to the next halt, or for about CALL_SECONDS."""
         start = time.perf_counter()
-        while self._run(end_tick) == 0 and time.perf_counter() - start < CALL_SECONDS:
+        while self._substep(end_tick) == 0 and time.perf_counter() - start < CALL_SECONDS:
             pass
 
+    def _substep(self, end_tick):
+        """All parts of a substep; nonzero at the end or where the host must act."""
+        halt = 0
+        for part in range(len(self.step.parts)):
+            halt = self._run(part, end_tick)
+            while self.step.repeats(part):
+                halt = self._run(part, end_tick)
+        return halt
+
     @ti.kernel
-    def _run(self, end_tick: ti.i64) -> ti.i32:
+    def _run(self, part: ti.template(), end_tick: ti.i64) -> ti.i32:
         low = ti.static(self.step.schedule.low)
-        for due, item in ti.static(self.step.phases):
+        for due, item in ti.static(self.step.parts[part]):
             for a in range(due.count(low[None])):
                 item(due.pick(a))
         finished = ti.cast(self.step.state.tick[None] >= end_tick, ti.i32)

@@ -357,6 +357,16 @@ class Schedule:
         self.evaluations[4] += self.bonds.end[0]
 
     @ti.func
+    def count_sweep(self):
+        """Count what a sweep over all dashpots visits as evaluations."""
+        visits = ti.cast(self.bonds.end[0], ti.i64)
+        self.evaluations[2] += visits
+        if ti.static(self.has_contact):
+            self.evaluations[3] += self.pairs.end[0]
+            visits += self.pairs.end[0]
+        self.evaluations[4] += visits
+
+    @ti.func
     def _bond_key(self, b):
         key = -1
         if self.state.broken_tick[b] < 0:

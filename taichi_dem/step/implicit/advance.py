@@ -10,9 +10,10 @@ from taichi_dem.step.advance import Advance
 class SolvedAdvance(Advance):
     """``Advance`` with bodies that take their new velocities from a ``Solver``.
 
-    Velocities are found first for the end of the step, with the springs' impulses at its
-    beginning and the dashpots' of the step before; the sweeps mend them; then the bodies move
-    with the mean of both ends, the midpoint rule.
+    Velocities are found first for the end of the step, with the impulses of springs and loads at
+    its beginning and of the dashpots as in the step before; the sweeps mend them. Springs and
+    loads at the time of the positions, dashpots with the mean of the velocities before and after:
+    the scheme is of second order, and the velocities are those in the middle of the next step.
     """
 
     @ti.func
@@ -22,6 +23,7 @@ class SolvedAdvance(Advance):
         linear, angular = self._gathered(i)
         linear, angular, _ = self._loaded(i, elapsed, linear, angular)
         self.solver.motion.predict(i, self, linear, angular)
+        self.solver.note_speed(self.state.velocity[i].norm_sqr())
 
     @ti.func
     def body(self, i):
@@ -43,14 +45,14 @@ class SolvedAdvance(Advance):
     @ti.func
     def _load_time(self, elapsed):
         """Loads act at the beginning of the step, with the springs."""
-        return self.schedule.seconds(self.state.tick[None]) - elapsed * self.solver.method.early
+        return self.schedule.seconds(self.state.tick[None]) - elapsed
 
     @ti.func
     def allowed(self, i, velocity, momentum):
         """Velocity and angular momentum that the supports of body i allow; nothing is booked."""
         for effect in ti.static(self.model.supports):
             if effect.acts_on(i):
-                time = self.schedule.seconds(self.state.tick[None])
+                time = self.schedule.seconds(self.state.tick[None]) - 0.5 * self.schedule.dt0
                 velocity, momentum = effect.held(
                     i, time, self.state.rotation[i], velocity, momentum
                 )

@@ -19,7 +19,7 @@ class BondDashpots:
     s1 + s0 (1 - theta) / theta carries over from step to step: it is the warm start, and y need not be
     stored.
 
-    place: of a bond in the order. bodies: master and slave, -1 once released. branch: master's
+    colours: how many bonds there are of each. place: of a bond in the order. bodies: master and slave, -1 once released. branch: master's
     centre to slave's [m]. a, b, c: block (C'^-1 + G)^-1, C' = theta C, G the mobility of the pair.
     start: s0. last: the s1 that the present y satisfies. Velocities in m/s, spins in rad/s, world.
     """
@@ -38,7 +38,7 @@ class BondDashpots:
         then(self.bodies.fill, -1)
         top = model.topology
         colours = edge_colours(np.stack([top.master, top.slave], axis=1), model.body_count)
-        self.ends = np.cumsum(np.bincount(colours, minlength=1)).tolist()
+        self.colours = np.bincount(colours, minlength=1).tolist()
         place = np.empty(bonds, dtype=np.int32)
         place[np.argsort(colours, kind="stable")] = np.arange(len(colours), dtype=np.int32)
         then(self.place.from_numpy, place)
@@ -81,11 +81,32 @@ class BondDashpots:
         self.bodies[self.place[b]] = [-1, -1]
 
     @ti.func
+    def visit(self, k):
+        """Solve the bond at place k against its bodies; square of the velocity it changed."""
+        change2 = 0.0
+        i, j = self.bodies[k][0], self.bodies[k][1]
+        if i >= 0:
+            branch, last = self.branch[k], self.last[k]
+            linear, angular = self.motion.apart(i, j, branch)
+            linear -= last[0:3]
+            angular -= last[3:6]
+            change2 = linear.norm_sqr()
+            force = self.a[k] @ linear + self.b[k] @ angular
+            moment = self.b[k].transpose() @ linear + self.c[k] @ angular
+            self.motion.pull(i, j, branch, force, moment)
+            linear, angular = self.motion.apart(i, j, branch)
+            for q in ti.static(range(3)):
+                self.last[k][q], self.last[k][3 + q] = linear[q], angular[q]
+        return change2
+
+    @ti.func
     def _refresh(self, b, k, i, j):
         dt = self.schedule.step_seconds[0]
         axes = self.model.bond_frame[b] @ self.state.rotation[i].transpose()
-        ones = vec3(1.0, 1.0, 1.0)
-        along = self.model.dashpot.traction(ones)
+        along = self.model.dashpot.traction(vec3(1.0, 1.0, 1.0))
+        # A trace of the springs lets the block be inverted where a coefficient is zero.
+        stiffness = self.model.bond_stiffness[b]
+        along += 1e-9 * dt * vec3(stiffness[0], stiffness[1], stiffness[1])
         scaled = axes
         for r in ti.static(range(3)):
             for c in ti.static(range(3)):
@@ -96,9 +117,11 @@ class BondDashpots:
             arm = self.state.rotation[j] @ self.model.vertex_slave[3 * b + q]
             block = plus(block, point_block(arm, law))
         free = mobility(
-            self.motion.slack(i), self.motion.turn[i], self.motion.slack(j), self.motion.turn[j],
+            self.motion.slack(i),
+            self.motion.turn[i],
+            self.motion.slack(j),
+            self.motion.turn[j],
             self.branch[k],
         )
-        # A bond has springs in all directions: its block can be inverted.
         solved = inverse(plus(inverse(block), free))
         self.a[k], self.b[k], self.c[k] = solved.a, solved.b, solved.c

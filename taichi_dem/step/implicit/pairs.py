@@ -3,8 +3,12 @@
 import taichi as ti
 
 from taichi_dem.physics.rotation import zero3
+from taichi_dem.step.cells import group
 from taichi_dem.step.implicit.motion import unit3
 from taichi_dem.types import real, vec3
+
+#: Colours of pairs that share no body; what finds no free one is visited last, in turn.
+COLOURS = 16
 
 
 @ti.data_oriented
@@ -14,17 +18,17 @@ class PairDashpots:
     One block for all spheres of a pair would let those that part hold on to each other while the
     others push: a pair that rocks would stick. So each sphere has its own impulse.
 
-    touching: how many spheres of a pair touch; they are first .. first + touching - 1 in touch, which has
-    their place among the pair's candidates. normal: from first to second. arm: from the second's
+    touching: how many spheres of a pair touch, or may within the step; they come first among the
+    pair's candidates in touch, which holds their places. normal: from first to second. arm: from the second's
     centre to the contact [m]. push: impulse of the spring [N s]. share: how its velocity gives way
     to an impulse along the normal, and across at most [1/kg]. impulse: on the second, what was
-    found, spring, dashpot and friction [N s]; entries as in ``Contacts.pair_sphere``.
+    found, spring, dashpot and friction [N s]; entries as in ``Contacts.pair_sphere``. order: pairs
+    by colour, those of colour c from colour_first[c] on.
     """
 
-    def __init__(self, model, state, schedule, contacts, motion, method):
+    def __init__(self, model, state, schedule, contacts, motion):
         self.model, self.state, self.schedule = model, state, schedule
         self.contacts, self.motion = contacts, motion
-        self.method = method
         self.has_friction = bool(model.friction.name)
         pairs, spheres = contacts.capacity, contacts.sphere_capacity
         self.touching = ti.field(ti.i32, shape=pairs)
@@ -35,6 +39,11 @@ class PairDashpots:
         self.share = ti.Vector.field(2, real, shape=spheres)
         self.impulse = ti.Vector.field(3, real, shape=spheres)
         self.branch = ti.Vector.field(3, real, shape=pairs)
+        n = model.body_count
+        self.order = ti.field(ti.i32, shape=pairs)
+        self.colour = ti.field(ti.i32, shape=pairs)
+        self.taken = ti.field(ti.i32, shape=n)
+        self.colour_first = ti.field(ti.i32, shape=COLOURS + 3)
         self.old_first = ti.field(ti.i32, shape=pairs + 1)
         self.old_sphere = ti.Vector.field(2, ti.i32, shape=spheres)
         self.old_impulse = ti.Vector.field(3, real, shape=spheres)
@@ -63,6 +72,30 @@ class PairDashpots:
             self.impulse[k] = found
 
     @ti.func
+    def sort(self):
+        """Colour the pairs of a new list: those of one colour share no body.
+
+        Each takes the lowest colour that is free at both bodies; what finds none comes last.
+        """
+        for i in range(self.model.body_count):
+            self.taken[i] = 0
+        for p in range(self.contacts.pair_count[None]):
+            i, j = self.contacts.pair_body[p][0], self.contacts.pair_body[p][1]
+            taken, colour = self.taken[i] | self.taken[j], 0
+            while (taken >> colour) & 1 == 1 and colour < COLOURS:
+                colour += 1
+            if colour < COLOURS:
+                self.taken[i] |= 1 << colour
+                self.taken[j] |= 1 << colour
+            self.colour[p] = colour
+        pairs = self.contacts.pair_count[None]
+        group(self.colour_first, self.order, COLOURS + 1, pairs, self._colour_of)
+
+    @ti.func
+    def _colour_of(self, p):
+        return self.colour[p]
+
+    @ti.func
     def begin(self, p):
         """Find what touches and its springs' impulse; start from the impulses of the last step."""
         pair = self.contacts.pair_body[p]
@@ -71,7 +104,7 @@ class PairDashpots:
         branch = self.state.position[j] - self.state.position[i]
         back = self.state.rotation[i].transpose()
         turn, offset = back @ self.state.rotation[j], back @ branch
-        ahead = self.method.spec * dt * self._speed(i, j)
+        ahead = dt * self._speed(i, j)
         force, moment, deepest = zero3(), zero3(), 0.0
         start = self.contacts.pair_first[p]
         end = start
@@ -139,13 +172,16 @@ class PairDashpots:
 
     @ti.func
     def visit(self, p):
-        """Solve the contacts of one pair, one after the other, against its present motion."""
+        """Solve a pair's contacts, one after the other; largest squared velocity it changed."""
+        change2 = 0.0
         if self.touching[p] > 0:
             pair = self.contacts.pair_body[p]
             damping = self.schedule.step_seconds[0] * self.contacts.law.damping()
             start = self.contacts.pair_first[p]
             for c in range(start, start + self.touching[p]):
-                self._visit(c, pair[0], pair[1], self.branch[p], damping)
+                found = self._visit(c, pair[0], pair[1], self.branch[p], damping)
+                change2 = ti.max(change2, found)
+        return change2
 
     @ti.func
     def _visit(self, c, i, j, branch, damping):
@@ -168,6 +204,7 @@ class PairDashpots:
         step = held - found
         self.impulse[k] = found
         self.motion.pull(i, j, branch, step, arm.cross(step))
+        return share[0] * share[0] * step.norm_sqr()
 
     @ti.func
     def book(self, p):
