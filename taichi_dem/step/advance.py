@@ -32,9 +32,8 @@ class Advance:
     @ti.func
     def bond(self, b):
         """Evaluate the three contact units of a bond; release it when one of them fails."""
-        slots = self.model.bond_slots[b]
-        dt = self._bond_step(b, slots[0] >> 2, slots[1] >> 2)
-        if dt > 0.0:
+        if self._owes(b):
+            slots = self.model.bond_slots[b]
             scale = 1.0
             if ti.static(self.limited):
                 scale = self._bond_share(slots[0] >> 2, slots[1] >> 2)
@@ -61,6 +60,7 @@ class Advance:
                 torque += arm.cross(traction)
                 slipped += spent
                 failed |= self.model.tension.failed(u)
+            dt = self._bond_step(b, slots[0] >> 2, slots[1] >> 2)
             area = self.model.unit_area[b]
             if failed == 0:
                 self._pull_together(slots, motion, force * (area * dt), torque * (area * dt))
@@ -71,16 +71,26 @@ class Advance:
                 self._release(b, slots)
 
     @ti.func
+    def _owes(self, b):
+        """Whether a bond holds, and has not given its impulse for the coming step already."""
+        owes = self.state.broken_tick[b] < 0
+        if ti.static(self.retimes):
+            slots = self.model.bond_slots[b]
+            owes = (
+                owes
+                and self.schedule.unpaid(self.schedule.paid[b], slots[0] >> 2, slots[1] >> 2) > 0.0
+            )
+        return owes
+
+    @ti.func
     def _bond_step(self, b, i, j):
-        """Seconds for which a bond gives its impulse now; 0 when it is released or has given it."""
+        """Seconds for which a bond gives its impulse now."""
         dt = 0.0
-        if self.state.broken_tick[b] < 0:
-            if ti.static(self.retimes):
-                dt = self.schedule.unpaid(self.schedule.paid[b], i, j)
-                if dt > 0.0:
-                    self.schedule.paid[b] = self.schedule.paid_until(i, j)
-            else:
-                dt = self.schedule.pair_step(i, j)
+        if ti.static(self.retimes):
+            dt = self.schedule.unpaid(self.schedule.paid[b], i, j)
+            self.schedule.paid[b] = self.schedule.paid_until(i, j)
+        else:
+            dt = self.schedule.pair_step(i, j)
         return dt
 
     @ti.func
@@ -301,15 +311,25 @@ class Advance:
     def _loaded(self, i, elapsed, linear, angular):
         """Impulse and moment with those of the loads added, and each load's own, a row each."""
         kick = ti.Matrix.zero(real, ti.static(max(1, len(self.model.loads))), 6)
-        half = self.schedule.seconds(self.state.tick[None]) - 0.5 * elapsed
+        now = self._load_time(elapsed)
         for e in ti.static(range(len(self.model.loads))):
             if self.model.loads[e].acts_on(i):
-                force, torque = self.model.loads[e].wrench(i, half, self.state.rotation[i])
+                force, torque = self.model.loads[e].wrench(i, now, self.state.rotation[i])
                 linear += force * elapsed
                 angular += torque * elapsed
                 for k in ti.static(range(3)):
                     kick[e, k], kick[e, 3 + k] = force[k] * elapsed, torque[k] * elapsed
         return linear, angular, kick
+
+    @ti.func
+    def _load_time(self, elapsed):
+        """Time at which loads are asked for their force: the beginning of the step [s].
+
+        Forces that change velocities there, and positions that follow from the new ones, are the
+        leapfrog whose velocities live half a step earlier: of second order without dashpots. The
+        middle of the step would be half a step ahead of the springs, an error of first order.
+        """
+        return self.schedule.seconds(self.state.tick[None]) - elapsed
 
     @ti.func
     def _book_loads(self, i, kick, velocity, momentum):

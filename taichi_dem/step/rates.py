@@ -32,8 +32,10 @@ from taichi_dem.types import real
 HIT, RELEASE, CLOSE = (1 << k for k in range(len(EVENTS)))
 #: With c min(1, LIMITED / X) no dashpot takes more than this in a step (X = 2 is unstable).
 LIMITED = 1.7
-#: Part of it that near contacts get at least.
+#: Part of it that near contacts get at least, if they need it.
 FOR_CONTACTS = 0.5
+#: Part of it that they get at most: with more, bodies that meet part again.
+STOPS = 1.0
 
 
 @ti.data_oriented
@@ -57,7 +59,7 @@ class Rates:
         rule = self.control or StepControl()
         self.dt0, self.distance, self.safety = method.dt0, method.distance, rule.safety
         self.limited = method.dashpot == "limited"
-        self.angle, self.jump = rule.angle, rule.level_jump
+        self.angle, self.jump, self.floor = rule.angle, rule.level_jump, rule.dashpot_floor
         self.counts = {name: name in rule.criteria for name in CRITERIA}
         self.has_load = self.counts["load"] and self.has_distance and bool(model.loads)
         self.wakes = 0
@@ -174,7 +176,10 @@ class Rates:
         cause = BOND_C
         if contact_c > bond_c:
             cause = CONTACT_C
-        step, by = shorter(step, by, self.safety * dashpot_limit(bond_c + contact_c), cause)
+        borne = self.safety * dashpot_limit(bond_c + contact_c)
+        if ti.static(self.limited):
+            borne = ti.max(borne, self.floor)
+        step, by = shorter(step, by, borne, cause)
         self.limit[i], self.limit_by[i] = step, by
 
     @ti.func
@@ -210,28 +215,21 @@ class Rates:
 
     @ti.func
     def bond_share(self, i, step):
-        """Share of its bonds' dashpots that a step [s] of body i bears: c min(1, 1.7 / X).
-
-        X = 2 dt lambda, lambda the rate of the bonds' dashpots. With contacts near they get a
-        part of the 1.7 and the bonds the rest: one share for both would all but switch off the
-        bonds of a body in contact, whose dashpots are most of the physics.
-        """
-        x = 2.0 * step * self.bond_damping[i]
-        return ti.min(1.0, self._bonds_get(i) / ti.max(x, 1e-200))
+        """Share of its bonds' dashpots that a step [s] of body i bears."""
+        return self._bonds_get(i, step) / ti.max(2.0 * step * self.bond_damping[i], 1e-200)
 
     @ti.func
     def contact_share(self, i, step):
         """Share of its contacts' dashpots that a step [s] of body i bears, beside its bonds."""
-        used = ti.min(2.0 * step * self.bond_damping[i], self._bonds_get(i))
         x = 2.0 * step * self.contact_damping[i]
-        return ti.min(1.0, (LIMITED - used) / ti.max(x, 1e-200))
+        left = ti.min(STOPS, LIMITED - self._bonds_get(i, step))
+        return ti.min(1.0, left / ti.max(x, 1e-200))
 
     @ti.func
-    def _bonds_get(self, i):
-        bonds = LIMITED
-        if self.contact_damping[i] > 0.0:
-            bonds -= FOR_CONTACTS
-        return bonds
+    def _bonds_get(self, i, step):
+        """What the bonds take of LIMITED."""
+        contacts = ti.min(FOR_CONTACTS, 2.0 * step * self.contact_damping[i])
+        return ti.min(2.0 * step * self.bond_damping[i], LIMITED - contacts)
 
 
 def rates_for(model, state, contacts, method):
