@@ -79,7 +79,7 @@ def damped_block():
 
 
 def test_steps_obey_the_limits_and_what_binds_is_recorded_counted_and_drawn(tmp_path):
-    """Every body takes the longest dt0 / 2^k below a share of its limit; its cause is in the state."""
+    """Every body takes the longest dt0 / 2^k below a share of its limit; its cause is kept."""
     dt0 = 4e-6
     control = StepControl(safety=0.8, level_jump=None)
     method = Multirate(dt0, 1.0, control=control)
