@@ -11,9 +11,10 @@ class Payments:
 
     A bond gives it for the coming step of the finer body at once. When that body is woken and
     takes a shorter step, the bond is due again while it has still paid: it gives no more until
-    the tick that it paid up to.
+    the tick that it paid up to. That is a time of the coarser step, so of any finer
+    one: nothing is ever paid in part.
     bond: that tick for every bond; those of the pairs are in ``Near``, which keeps them through a
-    search. schedule: gives seconds to ticks.
+    search. schedule: knows their steps.
     """
 
     def __init__(self, model, state, schedule, rates):
@@ -27,25 +28,21 @@ class Payments:
 
     @ti.func
     def take_bond(self, b, i, j):
-        """Seconds that bond b is to give for now; they count as given."""
-        paid = self.bond[b]
+        """Seconds that bond b, which owes, is to give for now; they count as given."""
         self.bond[b] = self._until(i, j)
-        return self._seconds(paid, i, j)
+        return self.schedule.pair_step(i, j)
 
     @ti.func
     def take_pair(self, p, i, j):
-        """The same for a pair in contact, which may also have paid for longer than it has now."""
-        paid = self.near.paid[p]
-        self.near.paid[p] = ti.max(paid, self._until(i, j))
-        return self._seconds(paid, i, j)
+        """The same for a pair in contact; 0 where it has given them."""
+        dt, until = 0.0, self._until(i, j)
+        if self.near.paid[p] < until:
+            dt = self.schedule.pair_step(i, j)
+            self.near.paid[p] = until
+        return dt
 
     @ti.func
     def _until(self, i, j):
         """Tick at which two bodies are looked at again."""
         finer = ti.max(self.state.level[i], self.state.level[j])
         return self.state.tick[None] + device_ticks_of(finer)
-
-    @ti.func
-    def _seconds(self, paid, i, j):
-        start = ti.max(paid, self.state.tick[None])
-        return self.schedule.seconds(ti.max(0, self._until(i, j) - start))
