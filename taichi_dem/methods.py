@@ -16,6 +16,9 @@ def _check_options(method):
         raise InputError(f"control must be a StepControl or None, got {method.control!r}")
     if method.dashpot not in DASHPOTS:
         raise InputError(f"dashpot must be one of {', '.join(DASHPOTS)}, got {method.dashpot!r}")
+    floor = method.control.dashpot_floor if method.control is not None else 0.0
+    if floor > 0.0 and method.dashpot != "limited":
+        raise InputError(f"dashpot_floor must be 0 unless dashpot is 'limited', got {floor!r}")
 
 
 def _suffix(method):

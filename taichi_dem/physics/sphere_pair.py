@@ -24,3 +24,30 @@ def friction_force(coefficient, damping, force_normal, slide):
     if speed > 0.0:
         force = slide * (-ti.min(coefficient * force_normal, damping * speed) / speed)
     return force
+
+
+@ti.dataclass
+class Meeting:
+    """Where two spheres meet: overlap [m], negative while they are apart.
+
+    normal: from the first to the second, world. arm: from the first body's centre to the middle
+    of the overlap, world [m].
+    """
+
+    overlap: ti.f64
+    normal: ti.types.vector(3, ti.f64)
+    arm: ti.types.vector(3, ti.f64)
+
+
+@ti.func
+def meeting(first, reach, apart, rotation):
+    """Meeting of two spheres.
+
+    first: centre of the first in its body's frame and radius [m]. reach: sum of both radii [m].
+    apart: from the first to the second centre, in the first body's frame [m]. rotation: of that.
+    """
+    distance = ti.max(apart.norm(), 1e-30)
+    overlap = reach - distance
+    normal = rotation @ apart / distance
+    arm = rotation @ first.xyz + (first[3] - 0.5 * overlap) * normal
+    return Meeting(overlap=overlap, normal=normal, arm=arm)

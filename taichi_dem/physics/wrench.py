@@ -66,29 +66,3 @@ def inverse(block):
     last = (block.c - block.b.transpose() @ across).inverse()
     b = -across @ last
     return Block(a=first - b @ across.transpose(), b=b, c=last)
-
-
-@ti.func
-def applied(block, linear, angular):
-    """Both parts of a block times a twist or wrench."""
-    return block.a @ linear + block.b @ angular, block.b.transpose() @ linear + block.c @ angular
-
-
-@ti.func
-def solved_with(block, mobile):
-    """(block^-1 + mobile)^-1 for a block that may be singular; mobile positive definite.
-
-    It is block - block (block + mobile^-1)^-1 block.
-    """
-    whole = inverse(plus(block, inverse(mobile)))
-    # Rows of whole @ block, then block @ that.
-    across = block.b.transpose()
-    aa = whole.a @ block.a + whole.b @ across
-    ab = whole.a @ block.b + whole.b @ block.c
-    ca = whole.b.transpose() @ block.a + whole.c @ across
-    cc = whole.b.transpose() @ block.b + whole.c @ block.c
-    return Block(
-        a=block.a - block.a @ aa - block.b @ ca,
-        b=block.b - block.a @ ab - block.b @ cc,
-        c=block.c - across @ ab - block.c @ cc,
-    )

@@ -11,11 +11,12 @@ import taichi as ti
 from taichi_dem.physics.bond import bond_motion, unit_arm, unit_opening, unit_velocity
 from taichi_dem.physics.rotation import rotation_matrix, spin_of, turned, zero3
 from taichi_dem.step.rates import RELEASE
+from taichi_dem.step.touch import Touch
 from taichi_dem.types import real, vec2, vec3
 
 
 @ti.data_oriented
-class Advance:
+class Advance(Touch):
     """The order in which physics and effects act; see the module."""
 
     def __init__(self, model, state, schedule, contacts, solver=None):
@@ -33,9 +34,8 @@ class Advance:
     @ti.func
     def bond(self, b):
         """Evaluate the three contact units of a bond; release it when one of them fails."""
-        slots = self.model.bond_slots[b]
-        dt = self._bond_step(b, slots[0] >> 2, slots[1] >> 2)
-        if dt > 0.0:
+        if self._owes(b):
+            slots = self.model.bond_slots[b]
             scale = 1.0
             if ti.static(self.limited):
                 scale = self._bond_share(slots[0] >> 2, slots[1] >> 2)
@@ -64,6 +64,7 @@ class Advance:
                 torque += arm.cross(traction)
                 slipped += spent
                 failed |= self.model.tension.failed(u)
+            dt = self._bond_step(b, slots[0] >> 2, slots[1] >> 2)
             area = self.model.unit_area[b]
             if failed == 0:
                 self._pull_together(slots, motion, force * (area * dt), torque * (area * dt))
@@ -86,16 +87,22 @@ class Advance:
             self.state.bond_heat[b][0] += dragged
 
     @ti.func
+    def _owes(self, b):
+        """Whether a bond holds, and has not given its impulse for the coming step already."""
+        owes = self.state.broken_tick[b] < 0
+        if ti.static(self.retimes):
+            slots = self.model.bond_slots[b]
+            owes = owes and self.schedule.payments.owes(b, slots[0] >> 2, slots[1] >> 2)
+        return owes
+
+    @ti.func
     def _bond_step(self, b, i, j):
-        """Seconds for which a bond gives its impulse now; 0 when it is released or has given it."""
+        """Seconds for which a bond gives its impulse now."""
         dt = 0.0
-        if self.state.broken_tick[b] < 0:
-            if ti.static(self.retimes):
-                dt = self.schedule.unpaid(self.schedule.paid[b], i, j)
-                if dt > 0.0:
-                    self.schedule.paid[b] = self.schedule.paid_until(i, j)
-            else:
-                dt = self.schedule.pair_step(i, j)
+        if ti.static(self.retimes):
+            dt = self.schedule.payments.take_bond(b, i, j)
+        else:
+            dt = self.schedule.pair_step(i, j)
         return dt
 
     @ti.func
@@ -103,12 +110,6 @@ class Advance:
         """Share of its coefficient that a bond's dashpot keeps: what both bodies bear."""
         first = self.rates.bond_share(i, self.schedule.own_step(i))
         return ti.min(first, self.rates.bond_share(j, self.schedule.own_step(j)))
-
-    @ti.func
-    def _contact_share(self, i, j):
-        """The same for the dashpots of a pair in contact."""
-        first = self.rates.contact_share(i, self.schedule.own_step(i))
-        return ti.min(first, self.rates.contact_share(j, self.schedule.own_step(j)))
 
     @ti.func
     def _motion(self, b, slots):
@@ -182,86 +183,6 @@ class Advance:
             self.contacts.broke()
 
     @ti.func
-    def contact(self, p):
-        """Evaluate the spheres of a pair of bodies: repulsion, and friction of what slides."""
-        pair = self.contacts.pair_body[p]
-        i, j = pair[0], pair[1]
-        branch = self.state.position[j] - self.state.position[i]
-        # Most candidates do not touch: find out in the first body's frame, where it costs half.
-        back = self.state.rotation[i].transpose()
-        turn, offset = back @ self.state.rotation[j], back @ branch
-        force, moment_i, moment_j = zero3(), zero3(), zero3()
-        dragged, rubbed, deepest = 0.0, 0.0, 0.0
-        scale, margin, near = 1.0, 0.0, 0
-        if ti.static(self.limited):
-            scale = self._contact_share(i, j)
-        if ti.static(self.has_rates):
-            margin = self.rates.near.margin(i, j)
-        for k in range(self.contacts.pair_first[p], self.contacts.pair_first[p + 1]):
-            a, b = self.contacts.pair_sphere[k][0], self.contacts.pair_sphere[k][1]
-            first, second = self.model.sphere[a], self.model.sphere[b]
-            apart = turn @ second.xyz + offset - first.xyz
-            reach = first[3] + second[3]
-            if ti.static(self.has_rates):
-                near += ti.cast(apart.norm_sqr() < (reach + margin) * (reach + margin), ti.i32)
-            if apart.norm_sqr() < reach * reach:
-                distance = ti.max(apart.norm(), 1e-30)
-                overlap = reach - distance
-                normal = self.state.rotation[i] @ apart / distance
-                depth = first[3] - 0.5 * overlap
-                arm = self.state.rotation[i] @ first.xyz + depth * normal
-                velocity = self._velocity_at(j, arm - branch) - self._velocity_at(i, arm)
-                rate = velocity.dot(normal)
-                slide = velocity - rate * normal
-                push = self.contacts.law.normal(overlap, self._limited(rate, scale))
-                drag = self._limited(self.contacts.law.damping(), scale)
-                rub = self.model.friction.force(drag, push, slide)
-                pushed = push * normal + rub
-                force += pushed
-                moment_i -= arm.cross(pushed)
-                moment_j += (arm - branch).cross(pushed)
-                dragged += (self.contacts.law.elastic(overlap) - push) * rate
-                rubbed -= rub.dot(slide)
-                deepest = ti.max(deepest, overlap / ti.min(first[3], second[3]))
-        if deepest > 0.0:
-            dt = self._pair_step(p, i, j)
-            self._push_apart(2 * p, -force * dt, moment_i * dt)
-            self._push_apart(2 * p + 1, force * dt, moment_j * dt)
-            self.contacts.pair_heat[p] += dt * vec3(dragged, rubbed, 0.0)
-        self.contacts.deepest[p] = deepest
-        if ti.static(self.has_rates):
-            self.rates.notice_pair(p, near)
-
-    @ti.func
-    def _limited(self, value, scale):
-        """A dashpot's coefficient or rate times its share, where dashpots are limited."""
-        if ti.static(self.limited):
-            value *= scale
-        return value
-
-    @ti.func
-    def _pair_step(self, p, i, j):
-        """Seconds for which a touching pair gives its impulse now; 0 when it has given it."""
-        dt = self.schedule.pair_step(i, j)
-        if ti.static(self.retimes):
-            dt = self.schedule.unpaid(self.rates.near.paid[p], i, j)
-            self.rates.near.paid[p] = ti.max(
-                self.rates.near.paid[p], self.schedule.paid_until(i, j)
-            )
-        return dt
-
-    @ti.func
-    def _velocity_at(self, i, arm):
-        return self.state.velocity[i] + self.state.spin[i].cross(arm)
-
-    @ti.func
-    def _push_apart(self, slot, linear, angular):
-        self.contacts.pair_full[slot] = 1
-        for k in ti.static(range(3)):
-            self.contacts.pair_slot[slot][k] += linear[k]
-            self.contacts.pair_slot[slot][3 + k] += angular[k]
-
-    @ti.func
     def body(self, i):
         """Bring a body to the present tick and let it choose its next step."""
         elapsed = self.schedule.elapsed(i)
@@ -322,10 +243,10 @@ class Advance:
     def _loaded(self, i, elapsed, linear, angular):
         """Impulse and moment with those of the loads added, and each load's own, a row each."""
         kick = ti.Matrix.zero(real, ti.static(max(1, len(self.model.loads))), 6)
-        half = self._load_time(elapsed)
+        now = self._load_time(elapsed)
         for e in ti.static(range(len(self.model.loads))):
             if self.model.loads[e].acts_on(i):
-                force, torque = self.model.loads[e].wrench(i, half, self.state.rotation[i])
+                force, torque = self.model.loads[e].wrench(i, now, self.state.rotation[i])
                 linear += force * elapsed
                 angular += torque * elapsed
                 for k in ti.static(range(3)):
@@ -334,8 +255,13 @@ class Advance:
 
     @ti.func
     def _load_time(self, elapsed):
-        """Time at which loads are asked for their force: the middle of the step [s]."""
-        return self.schedule.seconds(self.state.tick[None]) - 0.5 * elapsed
+        """Time at which loads are asked for their force: the beginning of the step [s].
+
+        Forces that change velocities there, and positions that follow from the new ones, are the
+        leapfrog whose velocities live half a step earlier: of second order without dashpots. The
+        middle of the step would be half a step ahead of the springs, an error of first order.
+        """
+        return self.schedule.seconds(self.state.tick[None]) - elapsed
 
     @ti.func
     def _book_loads(self, i, kick, velocity, momentum):

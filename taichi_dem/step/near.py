@@ -4,7 +4,9 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem.fields import then
+from taichi_dem.physics.wrench import cross_matrix
 from taichi_dem.quality import inverse_root
+from taichi_dem.timeline import MAX_LEVEL
 from taichi_dem.types import mat3, real
 
 #: Squarings of the block of near contacts: tr(A^32)^(1/32) exceeds its largest eigenvalue by at
@@ -28,25 +30,21 @@ def largest_eigenvalue(a, b, c):
     return bound
 
 
-@ti.func
-def cross_matrix(r):
-    """Matrix [r]x with [r]x w = r x w."""
-    return mat3([[0.0, -r[2], r[1]], [r[2], 0.0, -r[0]], [-r[1], r[0], 0.0]])
-
-
 @ti.data_oriented
 class Near:
     """Which sphere pairs count as contacts, and the block they form on each body.
 
-    A sphere pair counts from the moment at which it could touch within some seconds.
+    A sphere pair counts from the moment at which it could touch within some steps of the finer of
+    its bodies: it is evaluated once a step, and the coarser body is woken before the next time.
     count: how many of the sphere pairs of a body pair count; UNSEEN for a pair that is new in the
     list, FRESH for one that a break has given new spheres, until it is evaluated. paid: tick up
     to which a pair has given its impulse.
     """
 
-    def __init__(self, model, state, contacts, seconds):
+    def __init__(self, model, state, contacts, ahead):
         self.model, self.state, self.contacts = model, state, contacts
-        self.seconds = seconds
+        self.ahead = ti.field(real, shape=MAX_LEVEL + 1)
+        then(self.ahead.from_numpy, ahead / 2.0 ** np.arange(MAX_LEVEL + 1))
         self.count = ti.field(ti.i32, shape=contacts.capacity)
         self.old_count = ti.field(ti.i32, shape=contacts.capacity)
         self.paid = ti.field(ti.i64, shape=contacts.capacity)
@@ -64,7 +62,7 @@ class Near:
         speed = (self.state.velocity[j] - self.state.velocity[i]).norm()
         speed += self.state.spin[i].norm() * self.model.radius[i]
         speed += self.state.spin[j].norm() * self.model.radius[j]
-        return self.seconds * speed
+        return self.ahead[ti.max(self.state.level[i], self.state.level[j])] * speed
 
     @ti.func
     def keep(self, p):
@@ -131,4 +129,4 @@ class Near:
         return along * root * root, lever * root, lever @ lever.transpose()
 
 
-__all__ = ["Near", "cross_matrix", "largest_eigenvalue"]
+__all__ = ["Near", "largest_eigenvalue"]

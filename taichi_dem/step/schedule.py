@@ -1,92 +1,19 @@
 """Who is due: levels of bodies, and lists of bodies, bonds and pairs in order of falling level.
 
-A list in order of level makes the members due at a tick its first part. Levels change seldom
-against how often they are used, so a body that changes its own moves just its own entries.
+Levels change seldom against how often they are used, so a body that changes its own moves just its
+own entries.
 """
 
 import numpy as np
 import taichi as ti
 
 from taichi_dem.fields import then
-from taichi_dem.step.rates import CLOSE
+from taichi_dem.step.due_list import DueList
+from taichi_dem.step.level_limit import LevelLimit
+from taichi_dem.step.payments import Payments
 from taichi_dem.step_control import DISPLACEMENT, LARGEST, NEIGHBOUR
 from taichi_dem.timeline import MACRO_TICKS, MAX_LEVEL, device_coarsest_due, device_ticks_of
 from taichi_dem.types import real
-
-
-@ti.data_oriented
-class DueList:
-    """Indices in order of falling key; end[k] counts the members with a key of at least k.
-
-    order: the members; place: where in it each one is; key: each one's key, -1 for one that is
-    not listed. The order within a key does not matter: nothing that is computed depends on it.
-    """
-
-    def __init__(self, capacity):
-        room = max(1, capacity)
-        self.order = ti.field(ti.i32, shape=room)
-        self.place = ti.field(ti.i32, shape=room)
-        self.key = ti.field(ti.i32, shape=room)
-        self.end = ti.field(ti.i32, shape=MAX_LEVEL + 2)
-
-    @ti.func
-    def count(self, low):
-        """Number of members with a key of at least low."""
-        return self.end[low]
-
-    @ti.func
-    def pick(self, a):
-        """Member at place a."""
-        return self.order[a]
-
-    @ti.func
-    def fill(self, count, key_of: ti.template()):
-        """List those of 0 .. count - 1 whose key is not negative. key_of: function of a member."""
-        for k in range(MAX_LEVEL + 2):
-            self.end[k] = 0
-        for m in range(count):
-            key = key_of(m)
-            self.key[m] = key
-            if key >= 0:
-                self.end[key] += 1
-        total = 0
-        for back in range(MAX_LEVEL + 1):
-            members = self.end[MAX_LEVEL - back]
-            self.end[MAX_LEVEL - back] = total
-            total += members
-        for m in range(count):
-            key = self.key[m]
-            if key >= 0:
-                self._put(m, self.end[key])
-                self.end[key] += 1
-
-    @ti.func
-    def move(self, m, key):
-        """Give a listed member another key; a negative one takes it off the list.
-
-        It changes places with the first, or last, of each key that it passes.
-        """
-        present = self.key[m]
-        self.key[m] = key
-        while present < key and present >= 0:
-            present += 1
-            self._swap(m, self.end[present])
-            self.end[present] += 1
-        while present > key:
-            self.end[present] -= 1
-            self._swap(m, self.end[present])
-            present -= 1
-
-    @ti.func
-    def _swap(self, m, place):
-        other, old = self.order[place], self.place[m]
-        self._put(other, old)
-        self._put(m, place)
-
-    @ti.func
-    def _put(self, m, place):
-        self.order[place] = m
-        self.place[m] = place
 
 
 @ti.data_oriented
@@ -98,8 +25,8 @@ class Schedule:
     dt0 [s]: step of level 0. finest: finest level present. low: coarsest level now due.
     changed: bodies whose own level or bonds changed since the lists were put in order.
     rates: a ``Rates`` that knows stable steps, None where the rule needs none. retimes: whether
-    bodies may be brought to the present between their own times; bonds and pairs then keep in
-    paid the tick up to which they have given their impulse. known: levels at the last ordering.
+    bodies may be brought to the present between their own times; payments then keeps what bonds and
+    pairs have given ahead. level_limit: how much coarser than its neighbours a body may be.
     evaluations: substeps, bodies advanced, bonds and pairs evaluated, and the bonds and pairs that
     one step for all would have evaluated in the same substeps.
     """
@@ -109,12 +36,10 @@ class Schedule:
         self.has_rates = rates is not None
         self.controlled = self.has_rates and rates.control is not None
         self.retimes = self.controlled and rates.wakes != 0
-        self.jump = rates.jump if self.controlled and not uniform else None
-        if self.retimes:
-            self.paid = ti.field(ti.i64, shape=max(1, model.bond_count))
-        self.spreads = self.jump is not None
+        self.payments = Payments(model, state, self, rates) if self.retimes else None
+        self.spreads = self.controlled and not uniform and rates.jump is not None
         if self.spreads:
-            self.known = ti.field(ti.i32, shape=model.body_count)
+            self.level_limit = LevelLimit(model, state, contacts, rates)
         self.criterion, self.uniform, self.drifted = criterion, uniform, drifted
         self.has_contact = contacts is not None
         self.dt0 = dt0
@@ -140,21 +65,6 @@ class Schedule:
     def own_step(self, i):
         """Step of body i [s]."""
         return self.step_seconds[self.state.level[i]]
-
-    @ti.func
-    def unpaid(self, paid, i, j):
-        """Seconds of the coming pair step that are not paid yet; paid: tick, may lie behind."""
-        start, end = self._present(), self.paid_until(i, j)
-        return ti.cast(ti.max(0, end - ti.max(paid, start)), real) * self.step_seconds[MAX_LEVEL]
-
-    @ti.func
-    def paid_until(self, i, j):
-        """Tick at which two bodies are looked at again."""
-        return self._present() + device_ticks_of(ti.max(self.state.level[i], self.state.level[j]))
-
-    @ti.func
-    def _present(self):
-        return self.state.tick[None]
 
     @ti.func
     def elapsed(self, i):
@@ -203,56 +113,10 @@ class Schedule:
         """Level that the rates and the neighbours of body i ask for, and which criterion does."""
         wanted, bound = self.rates.wanted(i, self.seconds(self.state.tick[None]))
         if ti.static(self.spreads):
-            floor = self._finest_neighbour(i) - self.jump
-            if floor > wanted:
-                wanted, bound = floor, NEIGHBOUR
+            least = self.level_limit.least(i)
+            if least > wanted:
+                wanted, bound = least, NEIGHBOUR
         return wanted, bound
-
-    @ti.func
-    def _finest_neighbour(self, i):
-        """Finest level among the bodies that body i touches, at the last ordering; -1 for none."""
-        finest = -1
-        for f in range(4):
-            if self._bonded(4 * i + f):
-                finest = ti.max(finest, self.known[self.model.neighbour[4 * i + f]])
-        if ti.static(self.has_contact):
-            for p in range(self.contacts.first_of[i], self.contacts.first_of[i + 1]):
-                if self.rates.near.count[p] > 0:
-                    finest = ti.max(finest, self.known[self.contacts.pair_body[p][1]])
-            for k in range(self.contacts.touch_first[i], self.contacts.touch_first[i + 1]):
-                p = self.contacts.touch[k]
-                if self.rates.near.count[p] > 0:
-                    finest = ti.max(finest, self.known[self.contacts.pair_body[p][0]])
-        return finest
-
-    @ti.func
-    def _bonded(self, face):
-        bonded = False
-        if self.model.neighbour[face] >= 0:
-            bonded = self.state.broken_tick[self.model.face_bond[face]] < 0
-        return bonded
-
-    @ti.func
-    def _spread(self, i):
-        """Tell the bodies that body i touches of its level, where they are too much coarser."""
-        level = self.state.level[i]
-        self.known[i] = level
-        for f in range(4):
-            if self._bonded(4 * i + f):
-                self._tell(self.model.neighbour[4 * i + f], level)
-        if ti.static(self.has_contact):
-            for p in range(self.contacts.first_of[i], self.contacts.first_of[i + 1]):
-                if self.rates.near.count[p] > 0:
-                    self._tell(self.contacts.pair_body[p][1], level)
-            for k in range(self.contacts.touch_first[i], self.contacts.touch_first[i + 1]):
-                p = self.contacts.touch[k]
-                if self.rates.near.count[p] > 0:
-                    self._tell(self.contacts.pair_body[p][0], level)
-
-    @ti.func
-    def _tell(self, j, level):
-        if self.state.level[j] < level - self.jump:
-            self.rates.notice(j, CLOSE)
 
     @ti.func
     def note_change(self, i):
@@ -279,7 +143,7 @@ class Schedule:
         for a in range(self.changed_count[None]):
             self._move_entries(self.changed[a])
             if ti.static(self.spreads):
-                self._spread(self.changed[a])
+                self.level_limit.spread(self.changed[a])
         self.changed_count[None] = 0
         self._find_finest()
 
@@ -315,20 +179,24 @@ class Schedule:
             self._level_all()
         self.changed_count[None] = 0
         if ti.static(self.spreads):
-            for i in range(self.model.body_count):
-                self.known[i] = self.state.level[i]
+            self.level_limit.note_all()
         self.bodies.fill(self.model.body_count, self._body_key)
         self.bonds.fill(self.model.bond_count, self._bond_key)
         if ti.static(self.has_contact):
-            self.start_pairs()
+            self.pairs.fill(self.contacts.pair_count[None], self._pair_key)
         self._find_finest()
 
     @ti.func
     def start_pairs(self):
-        """Take in the pairs of a new contact search; neighbours may now reach further."""
+        """Take in the pairs of a new contact search; neighbours may now reach further.
+
+        All lists are filled anew on the occasion: what lies side by side is then visited in turn,
+        which moving entries undoes with time (5 % of the time of a run).
+        """
         self.pairs.fill(self.contacts.pair_count[None], self._pair_key)
-        if ti.static(self.drifted):
+        if ti.static(not self.uniform):
             self.bodies.fill(self.model.body_count, self._body_key)
+            self.bonds.fill(self.model.bond_count, self._bond_key)
 
     @ti.func
     def _level_all(self):

@@ -32,6 +32,8 @@ from tests.scenes import PAPER_BLOCK
         lambda: StepControl(criteria=("colour",)),
         lambda: StepControl(wake=("noise",)),
         lambda: StepControl(level_jump=-1),
+        lambda: StepControl(ahead=0.5),
+        lambda: Multirate(control=StepControl(dashpot_floor=1e-8)),
         lambda: Uniform(dashpot="half"),
         lambda: Multirate(control="all"),
         lambda: step_report(pair()),
@@ -77,9 +79,10 @@ def damped_block():
 
 
 def test_steps_obey_the_limits_and_what_binds_is_recorded_counted_and_drawn(tmp_path):
-    """Every body takes the longest dt0 / 2^k below 0.8 of its limit; its cause is in the state."""
+    """Every body takes the longest dt0 / 2^k below a share of its limit; its cause is kept."""
     dt0 = 4e-6
-    method = Multirate(dt0, 1.0, control=StepControl(level_jump=None))
+    control = StepControl(safety=0.8, level_jump=None)
+    method = Multirate(dt0, 1.0, control=control)
     result = simulate(damped_block(), method=method, until=4e-6, frames=1, output=str(tmp_path))
     limit = 0.8 * step_report(damped_block()).step_s
     step = dt0 / 2.0 ** result.frames[-1].level

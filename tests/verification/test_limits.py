@@ -8,6 +8,7 @@ from taichi_dem import CONCRETE, Scene, Simulation, StepControl, Uniform, effect
 from taichi_dem.mesh import checked_mesh
 from taichi_dem.mesh_shapes import pair, single
 from taichi_dem.quality import bond_rates, dashpot_step, dashpots_of, spring_step, springs_of
+from taichi_dem.step.rates import LIMITED
 from taichi_dem.step_report import contact_eigenvalues
 from taichi_dem.timeline import MACRO_TICKS, MAX_LEVEL
 from taichi_dem.topology import topology_of
@@ -110,15 +111,74 @@ def test_bond_limits_are_where_motion_begins_to_grow(kind):
     assert formula.max() <= exact * (1 + 1e-9) < 2.0 * formula.min()
 
 
-def facing(gap):
-    """Two equal tetrahedra without a bond, base against base across a gap [m]."""
+def facing(gap, sides=False):
+    """Two equal tetrahedra without a bond, base against base across a gap [m].
+
+    sides: put all other faces into a group hole.
+    """
     mesh = single()
     points = mesh.points
     other = points * [-1.0, 1.0, 1.0] + [gap, 0.0, 0.0]
-    return checked_mesh(np.vstack([points, other]), [[0, 1, 2, 3], [4, 6, 5, 7]], {})
+    around = [(0, 1, 2), (0, 2, 3), (0, 3, 1)]
+    loaded = [*around, *(tuple(4 + k for k in face) for face in around)]
+    groups = {"hole": loaded} if sides else {}
+    return checked_mesh(np.vstack([points, other]), [[0, 1, 2, 3], [4, 6, 5, 7]], groups)
 
 
 GAP = 1e-6
+
+
+def contact_eigenvalue(model, spheres):
+    """As ``pair_eigenvalue``, for frictionless contacts of unit stiffness base against base."""
+    mass, block = np.zeros((12, 12)), np.zeros((12, 12))
+    for body in range(2):
+        mass[6 * body : 6 * body + 3, 6 * body : 6 * body + 3] = model.body_mass[body] * np.eye(3)
+        mass[6 * body + 3 : 6 * body + 6, 6 * body + 3 : 6 * body + 6] = model.body_inertia[body]
+    normal = np.array([1.0, 0.0, 0.0])
+    for first in spheres:
+        row = np.zeros(12)
+        # In the world both touch the plane between the bases, opposite each other.
+        for body, sign in ((0, -1.0), (1, 1.0)):
+            arm = np.array([-model.centre[body, 0], first[1], first[2]])
+            row[6 * body : 6 * body + 3] = sign * normal
+            row[6 * body + 3 : 6 * body + 6] = sign * np.cross(arm, normal)
+        block += np.outer(row, row)
+    return np.linalg.eigvals(np.linalg.solve(mass, block)).real.max()
+
+
+@pytest.mark.parametrize("divisions, contacts", [(3, 1), (5, 6)])
+def test_sphere_springs_hold_up_to_their_limit(divisions, contacts):
+    """Bodies pressed together lie still up to 2 / w of their fastest mode: symplectic Euler.
+
+    Gas on their other faces keeps all contacts closed, so that they are springs both ways. Their
+    dashpots are 1e-7 of the material's: w c / 2 k < 1e-5. The formula takes a partner of equal
+    rate for all that touch, never longer than the limit, here shorter by 2 at most.
+    """
+    pressure = 1e6
+    gas = effects.GasPressure("hole", peak=pressure, rise=1e-12, decay_ratio=1e12)
+    material = type(CONCRETE)(**{**vars(CONCRETE), "contact_damping": 1e-7 * 3.08e6})
+    listed = [effects.SphereContact(divisions, outer_faces=True), gas]
+    rig = Rig(facing(GAP, sides=True), listed, material=material)
+    model = rig.simulation.model
+    spheres = model.sphere.to_numpy()[:contacts, :3]
+    rate = CONCRETE.contact_stiffness * contact_eigenvalue(model, spheres)
+    exact = 2.0 / np.sqrt(rate)
+    push = pressure * 0.05**2 * 3.0**0.5 / 4.0
+    overlap = push / (contacts * CONCRETE.contact_stiffness)
+    position = rig.centre - np.outer([0.0, 1.0], [GAP + overlap, 0.0, 0.0])
+    velocity = 1e-7 * np.random.default_rng(5).standard_normal((2, 3)) * [1.0, 0.0, 0.0]
+    together = np.outer([1.0, -1.0], [push / model.body_mass[0], 0.0, 0.0])
+
+    def calm(step):
+        # The gas sets in at t = 0: the first step has springs alone, whose kick goes on top.
+        start = velocity + step * together
+        return rig.speeds(step, STEPS, position, start, np.zeros((2, 3))) < 1e-2
+
+    found = bisected(calm, 0.5 * exact, 1.5 * exact)
+    assert found == pytest.approx(exact, rel=0.007), found / exact
+    one, whole = contact_eigenvalues(model.mesh, CONCRETE.density, divisions, False)
+    formula = spring_step(CONCRETE.contact_stiffness * (whole if contacts > 1 else one)).min()
+    assert exact / 2.0 < formula <= exact * (1 + 1e-6)
 
 
 @pytest.mark.parametrize("divisions, contacts", [(3, 1), (5, 6)])
@@ -176,3 +236,49 @@ def test_near_contacts_are_counted_before_they_touch_and_limit_as_the_report_say
     rig.state.place(rig.centre, STILL, -velocity * 1e-6)
     _refresh(rates, 2)
     assert rates.limit[0] == 1e-6
+
+
+def test_limited_dashpots_never_throw_back_at_any_step():
+    """A contact keeps 1 / X of its coefficient, X = 2 dt lambda: bodies that meet stop together.
+
+    Head on with one contact X is the pair's rate times dt, so that after one step the approach is
+    over to what the eigenvalue bound leaves, 1 - 6^(-1/32); with full dashpots the same pair parts
+    faster than it came from X = 2 on. Found by bisection: no step up to 1e3 limits does that.
+    """
+    rig = Rig(
+        facing(GAP),
+        [effects.SphereContact(3, outer_faces=True)],
+        Uniform(1e-9, dashpot="limited"),
+    )
+    model, rates = rig.simulation.model, rig.simulation.schedule.rates
+    position = rig.centre - np.outer([0.0, 1.0], [GAP + 1e-10, 0.0, 0.0])
+    velocity = np.array([[0.5, 0.0, 0.0], [-0.5, 0.0, 0.0]])
+    exact = model.body_mass[0] / CONCRETE.contact_damping
+    for share in (0.6, 1.0, 3.0, 10.0, 100.0):
+        after = rig.speeds(share * exact, 1, position, velocity, np.zeros((2, 3)))
+        assert after < 0.06 * np.linalg.norm(velocity)
+        assert rates.contact_damping[0] * exact == pytest.approx(1.0, rel=0.06)
+
+
+def test_limited_dashpots_of_a_bond_are_stable_at_any_step():
+    """A bonded pair at ten times the step that full dashpots bear keeps 1.7 / X of them.
+
+    Growth begins where the pair's rate times the kept share is 2 / dt. X takes twice the rate of
+    one body, which is never less than that of the pair: the cap could be 2 at least. Found by
+    bisection of a factor on the rates that the limiter knows.
+    """
+    soft = {"normal_stiffness": 450e5, "shear_stiffness": 90e5, "fracture_energy": 1e9}
+    material = type(CONCRETE)(**{**vars(CONCRETE), **soft})
+    rig = Rig(pair(), [effects.BondDamping()], Uniform(1e-9, dashpot="limited"), material)
+    table = rig.simulation.schedule.rates.dashpot_table
+    known, rate = table.to_numpy(), pair_eigenvalue(rig.simulation.model, dashpots_of(material))
+    calm = grown(rig, 3)
+
+    def wild(factor):
+        table.from_numpy(factor * known)
+        return not calm(20.0 / rate)
+
+    exact = 0.5 * LIMITED * rate / (2.0 * known.max())
+    assert exact < 0.5 * LIMITED * (1 + 1e-9) < 1.0
+    assert bisected(wild, 0.5 * exact, 1.5 * exact) == pytest.approx(exact, rel=0.007)
+    assert not wild(1.0)

@@ -31,7 +31,9 @@ def test_multirate_stays_within_the_error_of_its_steps(uniform, neighbour):
 
     Both runs obey the same rule, |v| dt <= l; where the steps of the uniform run are s times
     shorter its error is s times smaller. The bound takes the mean ratio of the steps, which is
-    the gain in body updates, plus one for the uniform run's own error.
+    the gain in body updates, plus one for the uniform run's own error. What is left of that is
+    the velocity that dashpots take, half a step old. Between steps of different length it is a
+    whole one: held, of a partner's last time; drifted, of the kick for a long step given at once.
     """
     reference, error, other = uniform
     position, simulation = position_after(Multirate(1e-8, 2e-7, neighbour))
@@ -40,5 +42,5 @@ def test_multirate_stays_within_the_error_of_its_steps(uniform, neighbour):
     assert report.ideal_gain > 1.5
     moved = np.linalg.norm(reference - simulation.model.centre)
     assert error < 0.01 * moved
-    assert np.linalg.norm(position - reference) < (1.0 + report.ideal_gain) * error
+    assert np.linalg.norm(position - reference) < (1.0 + 2.0 * report.ideal_gain) * error
     assert report.contact_evaluations < other.report().contact_evaluations

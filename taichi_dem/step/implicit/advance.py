@@ -43,11 +43,6 @@ class SolvedAdvance(Advance):
         self.schedule.choose_level(i, velocity.norm_sqr())
 
     @ti.func
-    def _load_time(self, elapsed):
-        """Loads act at the beginning of the step, with the springs."""
-        return self.schedule.seconds(self.state.tick[None]) - elapsed
-
-    @ti.func
     def allowed(self, i, velocity, momentum):
         """Velocity and angular momentum that the supports of body i allow; nothing is booked."""
         for effect in ti.static(self.model.supports):

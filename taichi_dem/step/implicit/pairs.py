@@ -3,6 +3,7 @@
 import taichi as ti
 
 from taichi_dem.physics.rotation import zero3
+from taichi_dem.physics.sphere_pair import meeting
 from taichi_dem.step.cells import group
 from taichi_dem.step.implicit.motion import unit3
 from taichi_dem.types import real, vec3
@@ -114,11 +115,8 @@ class PairDashpots:
             apart = turn @ second.xyz + offset - first.xyz
             reach = first[3] + second[3]
             if apart.norm_sqr() < (reach + ahead) * (reach + ahead):
-                distance = ti.max(apart.norm(), 1e-30)
-                overlap = reach - distance
-                normal = self.state.rotation[i] @ apart / distance
-                depth = first[3] - 0.5 * overlap
-                arm = self.state.rotation[i] @ first.xyz + depth * normal - branch
+                met = meeting(first, reach, apart, self.state.rotation[i])
+                overlap, normal, arm = met.overlap, met.normal, met.arm - branch
                 self.touch[end], self.normal[end], self.arm[end] = k, normal, arm
                 # Spheres still apart may approach until they touch, at the end of the step.
                 self.push[end] = dt * self.contacts.law.elastic(ti.max(overlap, 0.0))

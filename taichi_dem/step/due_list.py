@@ -1,0 +1,80 @@
+"""A list in order of falling level: the members that are due at a tick are its first part."""
+
+import taichi as ti
+
+from taichi_dem.timeline import MAX_LEVEL
+
+
+@ti.data_oriented
+class DueList:
+    """Indices in order of falling key; end[k] counts the members with a key of at least k.
+
+    order: the members; place: where in it each one is; key: each one's key, -1 for one that is
+    not listed. The order within a key does not matter: nothing that is computed depends on it.
+    """
+
+    def __init__(self, capacity):
+        room = max(1, capacity)
+        self.order = ti.field(ti.i32, shape=room)
+        self.place = ti.field(ti.i32, shape=room)
+        self.key = ti.field(ti.i32, shape=room)
+        self.end = ti.field(ti.i32, shape=MAX_LEVEL + 2)
+
+    @ti.func
+    def count(self, low):
+        """Number of members with a key of at least low."""
+        return self.end[low]
+
+    @ti.func
+    def pick(self, a):
+        """Member at place a."""
+        return self.order[a]
+
+    @ti.func
+    def fill(self, count, key_of: ti.template()):
+        """List those of 0 .. count - 1 whose key is not negative. key_of: function of a member."""
+        for k in range(MAX_LEVEL + 2):
+            self.end[k] = 0
+        for m in range(count):
+            key = key_of(m)
+            self.key[m] = key
+            if key >= 0:
+                self.end[key] += 1
+        total = 0
+        for back in range(MAX_LEVEL + 1):
+            members = self.end[MAX_LEVEL - back]
+            self.end[MAX_LEVEL - back] = total
+            total += members
+        for m in range(count):
+            key = self.key[m]
+            if key >= 0:
+                self._put(m, self.end[key])
+                self.end[key] += 1
+
+    @ti.func
+    def move(self, m, key):
+        """Give a listed member another key; a negative one takes it off the list.
+
+        It changes places with the first, or last, of each key that it passes.
+        """
+        present = self.key[m]
+        self.key[m] = key
+        while present < key and present >= 0:
+            present += 1
+            self._swap(m, self.end[present])
+            self.end[present] += 1
+        while present > key:
+            self.end[present] -= 1
+            self._swap(m, self.end[present])
+            present -= 1
+
+    @ti.func
+    def _swap(self, m, place):
+        other, old = self.order[place], self.place[m]
+        self._put(other, old)
+        self._put(m, place)
+
+    @ti.func
+    def _put(self, m, place):
+        self.order[place] = m
+        self.place[m] = place

@@ -1,0 +1,71 @@
+"""How much coarser a body may step than those it touches."""
+
+import taichi as ti
+
+from taichi_dem.step.rates import CLOSE
+
+
+@ti.data_oriented
+class LevelLimit:
+    """A body takes a level at most jump below the finest of the bodies that it touches.
+
+    It touches those to which it is bonded and those with which contacts are near. known: levels
+    at the last ordering of the lists, so that no result depends on the order of bodies.
+    """
+
+    def __init__(self, model, state, contacts, rates):
+        self.model, self.state, self.contacts, self.rates = model, state, contacts, rates
+        self.has_contact, self.jump = contacts is not None, rates.jump
+        self.known = ti.field(ti.i32, shape=model.body_count)
+
+    @ti.func
+    def note_all(self):
+        """Take the levels of all bodies as known."""
+        for i in range(self.model.body_count):
+            self.known[i] = self.state.level[i]
+
+    @ti.func
+    def least(self, i):
+        """Coarsest level that body i may have beside those it touches; negative for any."""
+        finest = -1
+        for f in range(4):
+            if self._bonded(4 * i + f):
+                finest = ti.max(finest, self.known[self.model.neighbour[4 * i + f]])
+        if ti.static(self.has_contact):
+            for p in range(self.contacts.first_of[i], self.contacts.first_of[i + 1]):
+                if self.rates.near.count[p] > 0:
+                    finest = ti.max(finest, self.known[self.contacts.pair_body[p][1]])
+            for k in range(self.contacts.touch_first[i], self.contacts.touch_first[i + 1]):
+                p = self.contacts.touch[k]
+                if self.rates.near.count[p] > 0:
+                    finest = ti.max(finest, self.known[self.contacts.pair_body[p][0]])
+        return finest - self.jump
+
+    @ti.func
+    def spread(self, i):
+        """Take the level of body i as known, and list those it touches that are too coarse."""
+        level = self.state.level[i]
+        self.known[i] = level
+        for f in range(4):
+            if self._bonded(4 * i + f):
+                self._tell(self.model.neighbour[4 * i + f], level)
+        if ti.static(self.has_contact):
+            for p in range(self.contacts.first_of[i], self.contacts.first_of[i + 1]):
+                if self.rates.near.count[p] > 0:
+                    self._tell(self.contacts.pair_body[p][1], level)
+            for k in range(self.contacts.touch_first[i], self.contacts.touch_first[i + 1]):
+                p = self.contacts.touch[k]
+                if self.rates.near.count[p] > 0:
+                    self._tell(self.contacts.pair_body[p][0], level)
+
+    @ti.func
+    def _bonded(self, face):
+        bonded = False
+        if self.model.neighbour[face] >= 0:
+            bonded = self.state.broken_tick[self.model.face_bond[face]] < 0
+        return bonded
+
+    @ti.func
+    def _tell(self, j, level):
+        if self.state.level[j] < level - self.jump:
+            self.rates.notice(j, CLOSE)

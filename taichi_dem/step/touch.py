@@ -1,0 +1,94 @@
+"""What happens to a pair of bodies whose spheres may touch: ``Advance``'s part for contacts."""
+
+import taichi as ti
+
+from taichi_dem.physics.rotation import zero3
+from taichi_dem.physics.sphere_pair import meeting
+from taichi_dem.types import vec3
+
+
+@ti.data_oriented
+class Touch:
+    """Base of ``Advance``, which owns all that is used here."""
+
+    @ti.func
+    def contact(self, p):
+        """Evaluate the spheres of a pair of bodies: repulsion, and friction of what slides."""
+        pair = self.contacts.pair_body[p]
+        i, j = pair[0], pair[1]
+        branch = self.state.position[j] - self.state.position[i]
+        # Most candidates do not touch: find out in the first body's frame, where it costs half.
+        back = self.state.rotation[i].transpose()
+        turn, offset = back @ self.state.rotation[j], back @ branch
+        force, moment_i, moment_j = zero3(), zero3(), zero3()
+        dragged, rubbed, deepest = 0.0, 0.0, 0.0
+        scale, margin, near = 1.0, 0.0, 0
+        if ti.static(self.limited):
+            scale = self._contact_share(i, j)
+        if ti.static(self.has_rates):
+            margin = self.rates.near.margin(i, j)
+        for k in range(self.contacts.pair_first[p], self.contacts.pair_first[p + 1]):
+            a, b = self.contacts.pair_sphere[k][0], self.contacts.pair_sphere[k][1]
+            first, second = self.model.sphere[a], self.model.sphere[b]
+            apart = turn @ second.xyz + offset - first.xyz
+            reach = first[3] + second[3]
+            if ti.static(self.has_rates):
+                near += ti.cast(apart.norm_sqr() < (reach + margin) * (reach + margin), ti.i32)
+            if apart.norm_sqr() < reach * reach:
+                met = meeting(first, reach, apart, self.state.rotation[i])
+                overlap, normal, arm = met.overlap, met.normal, met.arm
+                velocity = self._velocity_at(j, arm - branch) - self._velocity_at(i, arm)
+                rate = velocity.dot(normal)
+                slide = velocity - rate * normal
+                push = self.contacts.law.normal(overlap, self._limited(rate, scale))
+                drag = self._limited(self.contacts.law.damping(), scale)
+                rub = self.model.friction.force(drag, push, slide)
+                pushed = push * normal + rub
+                force += pushed
+                moment_i -= arm.cross(pushed)
+                moment_j += (arm - branch).cross(pushed)
+                dragged += (self.contacts.law.elastic(overlap) - push) * rate
+                rubbed -= rub.dot(slide)
+                deepest = ti.max(deepest, overlap / ti.min(first[3], second[3]))
+        if deepest > 0.0:
+            dt = self._pair_step(p, i, j)
+            self._push_apart(2 * p, -force * dt, moment_i * dt)
+            self._push_apart(2 * p + 1, force * dt, moment_j * dt)
+            self.contacts.pair_heat[p] += dt * vec3(dragged, rubbed, 0.0)
+        self.contacts.deepest[p] = deepest
+        if ti.static(self.has_rates):
+            self.rates.notice_pair(p, near)
+
+    @ti.func
+    def _limited(self, value, scale):
+        """A dashpot's coefficient or rate times its share, where dashpots are limited."""
+        if ti.static(self.limited):
+            value *= scale
+        return value
+
+    @ti.func
+    def _pair_step(self, p, i, j):
+        """Seconds for which a touching pair gives its impulse now; 0 when it has given it."""
+        dt = 0.0
+        if ti.static(self.retimes):
+            dt = self.schedule.payments.take_pair(p, i, j)
+        else:
+            dt = self.schedule.pair_step(i, j)
+        return dt
+
+    @ti.func
+    def _velocity_at(self, i, arm):
+        return self.state.velocity[i] + self.state.spin[i].cross(arm)
+
+    @ti.func
+    def _push_apart(self, slot, linear, angular):
+        self.contacts.pair_full[slot] = 1
+        for k in ti.static(range(3)):
+            self.contacts.pair_slot[slot][k] += linear[k]
+            self.contacts.pair_slot[slot][3 + k] += angular[k]
+
+    @ti.func
+    def _contact_share(self, i, j):
+        """The same for the dashpots of a pair in contact."""
+        first = self.rates.contact_share(i, self.schedule.own_step(i))
+        return ti.min(first, self.rates.contact_share(j, self.schedule.own_step(j)))
