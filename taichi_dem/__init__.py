@@ -17,7 +17,7 @@ from taichi_dem.errors import InputError, SimulationDiverged
 from taichi_dem.materials import CONCRETE, Material
 from taichi_dem.mesh import Mesh, checked_mesh
 from taichi_dem.mesh_files import read_mesh
-from taichi_dem.methods import Multirate, Uniform
+from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
 from taichi_dem.quality import quality_report
 from taichi_dem.record import write_paraview
 from taichi_dem.scene import Scene
@@ -30,6 +30,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "CONCRETE",
+    "ImplicitDashpots",
     "InputError",
     "Material",
     "Mesh",

@@ -101,7 +101,9 @@ class Simulation:
         if self.contacts is not None:
             self.broad_phase.search()
         self.ledger = Ledger(self.model, self.state, self.advance, self.contacts)
-        self.health = Health(self.model, self.state, self.schedule, self.contacts, self.ledger)
+        self.health = Health(
+            self.model, self.state, self.schedule, self.contacts, self.ledger, self.method.solves
+        )
         self.watch = Watch(self.model, self.state, self.advance)
         self.watch.look(0.0)
         self.driver.compile()

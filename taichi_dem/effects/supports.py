@@ -75,9 +75,10 @@ class Roller(_Support):
     def held(self, i, t, rotation, velocity, angular_momentum):
         """Velocity within the plane, spin about its normal."""
         normal = vec3(self.normal[0], self.normal[1], self.normal[2])
-        in_body = rotation.transpose() @ angular_momentum
-        spin = (rotation @ (self.model.inertia_inverse[i] @ in_body)).dot(normal) * normal
-        kept = rotation @ (self.model.inertia[i] @ (rotation.transpose() @ spin))
+        axis = rotation.transpose() @ normal
+        # The plane's moment is across the normal: what there is along it stays.
+        spin = angular_momentum.dot(normal) / axis.dot(self.model.inertia[i] @ axis)
+        kept = rotation @ (self.model.inertia[i] @ (spin * axis))
         return velocity - velocity.dot(normal) * normal, kept
 
 

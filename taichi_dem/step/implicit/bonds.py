@@ -14,14 +14,15 @@ from taichi_dem.types import real, vec3, vec6
 class BondDashpots:
     """What the sweeps read of a bond, packed in the order in which they visit.
 
-    A bond answers the mean twist of a step (slave against master, at the slave's centre) with the
-    wrench impulse y = C (theta s1 + (1 - theta) s0), s0 and s1 at the ends of the step. The sum
-    s1 + s0 (1 - theta) / theta carries over from step to step: it is the warm start, and y need not be
-    stored.
+    A bond answers the twist in a step (slave against master, at the slave's centre) with the
+    wrench impulse y = C (theta s1 + (1 - theta) s0), s0 and s1 at both ends of the step. The sum
+    s1 + s0 (1 - theta) / theta carries over from step to step: it is the warm start, and y itself
+    need not be stored.
 
-    colours: how many bonds there are of each. place: of a bond in the order. bodies: master and slave, -1 once released. branch: master's
-    centre to slave's [m]. a, b, c: block (C'^-1 + G)^-1, C' = theta C, G the mobility of the pair.
-    start: s0. last: the s1 that the present y satisfies. Velocities in m/s, spins in rad/s, world.
+    colours: how many bonds there are of each. place: of a bond in the order. bodies: master and
+    slave, -1 once released. branch: master's centre to slave's [m]. a, b, c: the block
+    (C'^-1 + G)^-1, C' = theta C, G the mobility of the pair. start: s0. last: the s1 that the
+    present y satisfies. Velocities in m/s, spins in rad/s, world.
     """
 
     def __init__(self, model, state, schedule, motion, method):

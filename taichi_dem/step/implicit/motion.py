@@ -2,7 +2,7 @@
 
 import taichi as ti
 
-from taichi_dem.types import mat3, real, vec6
+from taichi_dem.types import mat3, real
 
 
 @ti.func
@@ -16,8 +16,8 @@ class Motion:
     """Velocity and spin of every body at the end of the step, as far as it is known.
 
     twist: velocity [m/s] and spin [rad/s], world. turn: spin per moment, R I^-1 R^T
-    [1/(kg m^2)], as supports allow. hold: velocity per impulse [1/kg], and given: all that a body was given in the
-    step [N s, N m s], where there are supports.
+    [1/(kg m^2)], as supports allow. Where there are supports, hold: velocity per impulse [1/kg],
+    and given: all that a body was given in the step [N s, N m s].
     """
 
     def __init__(self, model, state):
@@ -116,6 +116,3 @@ class Motion:
         for k in ti.static(range(3)):
             self.given[i][k] += impulse[k]
             self.given[i][3 + k] += moment[k]
-
-
-__all__ = ["Motion", "unit3", "vec6"]

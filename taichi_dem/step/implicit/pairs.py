@@ -1,4 +1,4 @@
-"""Dashpots and friction of contacts, sphere by sphere: pushes only, within the bound of friction."""
+"""Dashpots and friction of contacts, sphere by sphere: they push, within the bound of friction."""
 
 import taichi as ti
 
@@ -20,11 +20,11 @@ class PairDashpots:
     others push: a pair that rocks would stick. So each sphere has its own impulse.
 
     touching: how many spheres of a pair touch, or may within the step; they come first among the
-    pair's candidates in touch, which holds their places. normal: from first to second. arm: from the second's
-    centre to the contact [m]. push: impulse of the spring [N s]. share: how its velocity gives way
-    to an impulse along the normal, and across at most [1/kg]. impulse: on the second, what was
-    found, spring, dashpot and friction [N s]; entries as in ``Contacts.pair_sphere``. order: pairs
-    by colour, those of colour c from colour_first[c] on.
+    pair's candidates. touch: which candidate. normal: from first to second. arm: from the second's
+    centre to the contact [m]. push: impulse of the spring, or what the gap still lets through
+    [N s]. share: velocity per impulse along the normal, and across at most [1/kg]. impulse: on the
+    second, of spring, dashpot and friction, as found [N s]; entries as in
+    ``Contacts.pair_sphere``. order: pairs by colour, those of colour c from colour_first[c] on.
     """
 
     def __init__(self, model, state, schedule, contacts, motion):
