@@ -121,8 +121,6 @@ class BroadPhase:
         self.near.end()
         self._index_second()
         self.schedule.start_pairs()
-        if ti.static(self.solves):
-            self.solver.pairs.sort()
         self.contacts.search_due[None] = 0
 
     @ti.func

@@ -24,8 +24,8 @@ class Contacts:
     touch, and to ask is cheaper than to add zeros. first_of[i]: first pair whose first body is i;
     touch_first, touch: pairs whose second body is i. rough: bit f for a broken face f.
     travel: bound of the way any point of a body went since the search [m]. search_due: why the
-    list may miss a contact, BROKEN or MOVED, 0 while it does not. deepest: overlap of a pair in
-    radii of the smaller sphere.
+    list may miss a contact, BROKEN or MOVED, 0 while it does not. deepest: overlap of a pair as
+    a share of the distance at which its spheres touch.
     """
 
     def __init__(self, model, state):

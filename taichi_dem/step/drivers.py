@@ -140,7 +140,7 @@ class SolvedStep(Step):
         solver = advance.solver
         touching, booked = (), ()
         if contacts is not None:
-            touching = ((schedule.pairs, solver.pairs.begin),)
+            touching = ((schedule.pairs, solver.pairs.begin), (Once(), solver.pairs.sort))
             booked = ((schedule.pairs, solver.pairs.book),)
         before = (
             *touching,

@@ -14,7 +14,7 @@ STALE, MAKING = 1, 2
 #: Room left behind the neighbours of each body, for fast ones that come.
 ROOM = 16
 #: Reach of the list in skins of the search: a longer list against fewer of them.
-REACH = 16.0
+REACH = 8.0
 
 
 @ti.data_oriented

@@ -24,7 +24,8 @@ class PairDashpots:
     centre to the contact [m]. push: impulse of the spring, or what the gap still lets through
     [N s]. share: velocity per impulse along the normal, and across at most [1/kg]. impulse: on the
     second, of spring, dashpot and friction, as found [N s]; entries as in
-    ``Contacts.pair_sphere``. order: pairs by colour, those of colour c from colour_first[c] on.
+    ``Contacts.pair_sphere``. active: the pairs that touch, count of them. order: places in it by
+    colour, those of colour c from colour_first[c] on.
     """
 
     def __init__(self, model, state, schedule, contacts, motion):
@@ -41,6 +42,8 @@ class PairDashpots:
         self.impulse = ti.Vector.field(3, real, shape=spheres)
         self.branch = ti.Vector.field(3, real, shape=pairs)
         n = model.body_count
+        self.count = ti.field(ti.i32, shape=())
+        self.active = ti.field(ti.i32, shape=pairs)
         self.order = ti.field(ti.i32, shape=pairs)
         self.colour = ti.field(ti.i32, shape=pairs)
         self.taken = ti.field(ti.i32, shape=n)
@@ -73,28 +76,39 @@ class PairDashpots:
             self.impulse[k] = found
 
     @ti.func
-    def sort(self):
-        """Colour the pairs of a new list: those of one colour share no body.
+    def sort(self, one):
+        """List and colour the pairs that touch: those of one colour share no body.
 
         Each takes the lowest colour that is free at both bodies; what finds none comes last.
+        Candidates that do not touch are left out, so that no skin changes the order.
         """
-        for i in range(self.model.body_count):
-            self.taken[i] = 0
+        count = 0
         for p in range(self.contacts.pair_count[None]):
-            i, j = self.contacts.pair_body[p][0], self.contacts.pair_body[p][1]
+            if self.touching[p] > 0:
+                self.active[count] = p
+                count += 1
+                for side in ti.static(range(2)):
+                    self.taken[self.contacts.pair_body[p][side]] = 0
+        for a in range(count):
+            i, j = self._bodies(a)
             taken, colour = self.taken[i] | self.taken[j], 0
             while (taken >> colour) & 1 == 1 and colour < COLOURS:
                 colour += 1
             if colour < COLOURS:
                 self.taken[i] |= 1 << colour
                 self.taken[j] |= 1 << colour
-            self.colour[p] = colour
-        pairs = self.contacts.pair_count[None]
-        group(self.colour_first, self.order, COLOURS + 1, pairs, self._colour_of)
+            self.colour[a] = colour
+        self.count[None] = count
+        group(self.colour_first, self.order, COLOURS + 1, count, self._colour_of)
 
     @ti.func
-    def _colour_of(self, p):
-        return self.colour[p]
+    def _bodies(self, a):
+        pair = self.contacts.pair_body[self.active[a]]
+        return pair[0], pair[1]
+
+    @ti.func
+    def _colour_of(self, a):
+        return self.colour[a]
 
     @ti.func
     def begin(self, p):
@@ -124,7 +138,7 @@ class PairDashpots:
                 self.share[end] = self._share(i, j, branch, arm, normal)
                 force += self.impulse[k]
                 moment += arm.cross(self.impulse[k])
-                deepest = ti.max(deepest, overlap / ti.min(first[3], second[3]))
+                deepest = ti.max(deepest, overlap / reach)
                 end += 1
             else:
                 self.impulse[k] = zero3()
@@ -172,13 +186,12 @@ class PairDashpots:
     def visit(self, p):
         """Solve a pair's contacts, one after the other; largest squared velocity it changed."""
         change2 = 0.0
-        if self.touching[p] > 0:
-            pair = self.contacts.pair_body[p]
-            damping = self.schedule.step_seconds[0] * self.contacts.law.damping()
-            start = self.contacts.pair_first[p]
-            for c in range(start, start + self.touching[p]):
-                found = self._visit(c, pair[0], pair[1], self.branch[p], damping)
-                change2 = ti.max(change2, found)
+        pair = self.contacts.pair_body[p]
+        damping = self.schedule.step_seconds[0] * self.contacts.law.damping()
+        start = self.contacts.pair_first[p]
+        for c in range(start, start + self.touching[p]):
+            found = self._visit(c, pair[0], pair[1], self.branch[p], damping)
+            change2 = ti.max(change2, found)
         return change2
 
     @ti.func

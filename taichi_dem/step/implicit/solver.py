@@ -59,7 +59,7 @@ class Solver:
             for k in range(self.model.bond_count):
                 self.bond(k)
             if ti.static(self.has_contact):
-                for a in range(self.contacts.pair_count[None]):
+                for a in range(self.pairs.count[None]):
                     self.pair(self.pairs.order[a])
             self.judge(0)
 
@@ -69,15 +69,15 @@ class Solver:
         self._note(self.bonds.visit(k))
 
     @ti.func
-    def pair(self, p):
-        """Visit the touching spheres of a pair."""
-        self._note(self.pairs.visit(p))
+    def pair(self, a):
+        """Visit the touching spheres of the pair at place a."""
+        self._note(self.pairs.visit(self.pairs.active[a]))
 
     @ti.func
     def last_pairs(self, one):
         """Visit the pairs that found no colour, one after the other."""
         first = self.pairs.colour_first[COLOURS]
-        for a in range(first, self.contacts.pair_count[None]):
+        for a in range(first, self.pairs.count[None]):
             self.pair(self.pairs.order[a])
 
     @ti.func
