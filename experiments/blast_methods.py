@@ -61,9 +61,7 @@ def options_parser():
     made.add_argument("--until", type=number(0, 1), help="simulated time [s], 5e-4")
     made.add_argument("--stable-until", type=number(0, 1), help="for the stable step [s], 1e-4")
     made.add_argument("--samples", type=whole(1, 100000), help="rows of the time series, 100")
-    made.add_argument(
-        "--doublings", type=whole(0, 20), help="tried for the largest stable step, 8"
-    )
+    made.add_argument("--doublings", type=whole(0, 20), help="tried for the largest stable step, 8")
     made.add_argument(
         "--methods", type=several(method_name), default=list(METHODS), help="by comma; all"
     )
@@ -147,7 +145,8 @@ def run(options):
         reports.append(report)
         histories[name] = series
     write_csv(
-        os.path.join(options.out, "methods.csv"), {key: [row[key] for row in rows] for key in rows[0]}
+        os.path.join(options.out, "methods.csv"),
+        {key: [row[key] for row in rows] for key in rows[0]},
     )
     plot.plot_methods(os.path.join(options.out, "methods.png"), histories)
     figures = figures_of(rows, best, wanted)
