@@ -11,7 +11,8 @@ from taichi_dem.errors import InputError
 from taichi_dem.step.cells import group
 from taichi_dem.step.contacts import BROKEN
 from taichi_dem.step.neighbours import Neighbours
-from taichi_dem.types import real, vec3
+from taichi_dem.step.old_pairs import OldPairs
+from taichi_dem.types import real
 
 _ROOM = ("", "pairs_per_body", "spheres_per_body")
 
@@ -36,17 +37,11 @@ class BroadPhase:
         self.near_faces = ti.field(ti.i32, shape=self.near.capacity)
         self.near_spheres = ti.field(ti.i32, shape=self.near.capacity)
         self.pair_faces = ti.field(ti.i32, shape=contacts.capacity)
-        self.old_body = ti.Vector.field(2, ti.i32, shape=contacts.capacity)
-        self.old_slot = ti.Vector.field(6, real, shape=2 * contacts.capacity)
-        self.old_full = ti.field(ti.i32, shape=2 * contacts.capacity)
-        self.old_heat = ti.Vector.field(3, real, shape=contacts.capacity)
-        self.old_first = ti.field(ti.i32, shape=contacts.capacity + 1)
         self.searched = ti.field(ti.i64, shape=())
-        self.old_sphere = ti.Vector.field(2, ti.i32, shape=contacts.sphere_capacity)
         self.whole = ti.field(ti.i32, shape=())
         self.exposed = ti.field(ti.i32, shape=n)
         self.fresh = ti.field(ti.i32, shape=())
-        self.old_first_of = ti.field(ti.i32, shape=n + 1)
+        self.old = OldPairs(contacts)
         self.full = ti.field(ti.i32, shape=())
         self.sphere = ti.Vector.field(3, real, shape=4 * n * self.model.spheres_per_face)
 
@@ -180,15 +175,8 @@ class BroadPhase:
 
     @ti.func
     def _keep(self, p):
-        """Save a pair of the old list with what waits in its slots."""
-        self.old_body[p] = self.contacts.pair_body[p]
-        self.old_first[p] = self.contacts.pair_first[p]
-        for k in range(self.contacts.pair_first[p], self.contacts.pair_first[p + 1]):
-            self.old_sphere[k] = self.contacts.pair_sphere[k]
-        for side in ti.static(range(2)):
-            self.old_slot[2 * p + side] = self.contacts.pair_slot[2 * p + side]
-            self.old_full[2 * p + side] = self.contacts.pair_full[2 * p + side]
-        self.old_heat[p] = self.contacts.pair_heat[p]
+        """Save a pair of the old list with what waits for it."""
+        self.old.keep(p)
         if ti.static(self.schedule.has_rates):
             self.schedule.rates.near.keep(p)
         if ti.static(self.solves):
@@ -197,7 +185,7 @@ class BroadPhase:
     @ti.func
     def _count_spheres(self, i):
         """Number of sphere pairs of body i with each neighbour that this search looks at."""
-        self.old_first_of[i] = self.contacts.first_of[i]
+        self.old.first_of[i] = self.contacts.first_of[i]
         for k in range(self.near.first[i], self.near.last[i]):
             j = self.near.body[k]
             if self.exposed[i] | self.exposed[j] != 0:
@@ -246,12 +234,12 @@ class BroadPhase:
     @ti.func
     def _number_pairs(self, one):
         """Give the pairs that have spheres near, or an impulse waiting, a place in order."""
-        self.old_first_of[self.model.body_count] = self.contacts.pair_count[None]
+        self.old.first_of[self.model.body_count] = self.contacts.pair_count[None]
         self.contacts.pair_count[None] = 0
         self.contacts.pair_first[0] = 0
         for i in range(self.model.body_count):
             self.contacts.first_of[i] = self.contacts.pair_count[None]
-            old, last = self.old_first_of[i], self.old_first_of[i + 1]
+            old, last = self.old.first_of[i], self.old.first_of[i + 1]
             for k in range(self.near.first[i], self.near.last[i]):
                 if self.near_spheres[k] > 0:
                     j = self.near.body[k]
@@ -263,10 +251,10 @@ class BroadPhase:
     @ti.func
     def _number_waiting(self, i, old, last, j):
         """Number the old pairs of body i before partner j that hold something; next old pair."""
-        while old < last and self.old_body[ti.min(old, last - 1)][1] <= j:
-            partner = self.old_body[old][1]
+        while old < last and self.old.body[ti.min(old, last - 1)][1] <= j:
+            partner = self.old.body[old][1]
             if partner < j:
-                if self.old_full[2 * old] == 1 or self.old_full[2 * old + 1] == 1:
+                if self.old.waits(old):
                     self._number(i, partner, 0, 0)
             old += 1
         return old
@@ -286,47 +274,20 @@ class BroadPhase:
             self.contacts.pair_count[None] = p + 1
 
     @ti.func
-    def _old_pair(self, i, j):
-        """Place of a pair in the old list, -1 if it was not there."""
-        place = -1
-        for p in range(self.old_first_of[i], self.old_first_of[i + 1]):
-            if self.old_body[p][1] == j:
-                place = p
-        return place
-
-    @ti.func
     def _fill_pair(self, p):
         """Write a pair's spheres, take over what waited for it, book what its birth injects."""
         i, j = self.contacts.pair_body[p][0], self.contacts.pair_body[p][1]
-        old, injected = self._old_pair(i, j), 0.0
+        old, injected = self.old.place(i, j), 0.0
         if self.exposed[i] | self.exposed[j] != 0:
             self._spheres_near(i, j, self.pair_faces[p], self.contacts.pair_first[p], True)
             injected = self._injected(p, i, j)
         else:
-            self._copy_spheres(p, old)
-        for side in ti.static(range(2)):
-            waiting, full = 0.0 * self.contacts.pair_slot[2 * p + side], 0
-            if old >= 0:
-                waiting, full = self.old_slot[2 * old + side], self.old_full[2 * old + side]
-            self.contacts.pair_slot[2 * p + side] = waiting
-            self.contacts.pair_full[2 * p + side] = full
-        heat = vec3(0.0, 0.0, injected)
-        if old >= 0:
-            heat += self.old_heat[old]
-        self.contacts.pair_heat[p] = heat
-        if injected > 0.0:
-            self.contacts.pair_full[2 * p] = 1
+            self.old.copy_spheres(p, old)
+        self.old.hand_over(p, old, injected)
         if ti.static(self.schedule.has_rates):
             self.schedule.rates.take_pair(p, old, self._exposed_now(i) | self._exposed_now(j))
         if ti.static(self.solves):
-            self.solver.pairs.take(p, old)
-
-    @ti.func
-    def _copy_spheres(self, p, old):
-        """Take over the spheres of a pair at which this search does not look."""
-        start = self.contacts.pair_first[p]
-        for k in range(start, self.contacts.pair_first[p + 1]):
-            self.contacts.pair_sphere[k] = self.old_sphere[self.old_first[old] + k - start]
+            self.solver.pairs.take(p, old, self.old)
 
     @ti.func
     def _exposed_now(self, i):

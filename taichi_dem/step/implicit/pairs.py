@@ -48,32 +48,22 @@ class PairDashpots:
         self.colour = ti.field(ti.i32, shape=pairs)
         self.taken = ti.field(ti.i32, shape=n)
         self.colour_first = ti.field(ti.i32, shape=COLOURS + 3)
-        self.old_first = ti.field(ti.i32, shape=pairs + 1)
-        self.old_sphere = ti.Vector.field(2, ti.i32, shape=spheres)
         self.old_impulse = ti.Vector.field(3, real, shape=spheres)
 
     @ti.func
     def keep(self, p):
-        """Save what is known of a pair before the list is renewed."""
-        self.old_first[p], self.old_first[p + 1] = (
-            self.contacts.pair_first[p],
-            self.contacts.pair_first[p + 1],
-        )
+        """Save the impulses of a pair before the list is renewed."""
         for k in range(self.contacts.pair_first[p], self.contacts.pair_first[p + 1]):
-            self.old_sphere[k] = self.contacts.pair_sphere[k]
             self.old_impulse[k] = self.impulse[k]
 
     @ti.func
-    def take(self, p, old):
-        """Take it over for the pair at place p; old: its former place, -1 for none."""
+    def take(self, p, place, old):
+        """Take them over for the pair at place p; place: its former one in the ``OldPairs`` old."""
         for k in range(self.contacts.pair_first[p], self.contacts.pair_first[p + 1]):
-            spheres, found = self.contacts.pair_sphere[k], zero3()
-            if old >= 0:
-                for o in range(self.old_first[old], self.old_first[old + 1]):
-                    same = self.old_sphere[o] == spheres
-                    if same.all():
-                        found = self.old_impulse[o]
-            self.impulse[k] = found
+            former = old.candidate(place, self.contacts.pair_sphere[k])
+            self.impulse[k] = zero3()
+            if former >= 0:
+                self.impulse[k] = self.old_impulse[former]
 
     @ti.func
     def sort(self, one):
