@@ -39,6 +39,7 @@ class Simulation:
         self.generation = runtime.generation()
         started = time.perf_counter()
         self.scene, self.method = scene, method
+        self.solves = getattr(method, "solves", False)
         with fields_first():
             self.model = Model(scene.mesh, scene.material, scene.effects)
             driver = _driver_name(driver, self.model.bond_count)
@@ -75,7 +76,7 @@ class Simulation:
 
     def _build_step(self):
         parts = self.model, self.state, self.schedule, self.contacts
-        if not self.method.solves:
+        if not self.solves:
             return Step(Advance(*parts), self.schedule, self.contacts)
         solver = Solver(*parts, self.method)
         if self.contacts is not None:
@@ -102,7 +103,7 @@ class Simulation:
             self.broad_phase.search()
         self.ledger = Ledger(self.model, self.state, self.advance, self.contacts)
         self.health = Health(
-            self.model, self.state, self.schedule, self.contacts, self.ledger, self.method.solves
+            self.model, self.state, self.schedule, self.contacts, self.ledger, self.solves
         )
         self.watch = Watch(self.model, self.state, self.advance)
         self.watch.look(0.0)
