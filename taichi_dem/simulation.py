@@ -139,7 +139,7 @@ class Simulation:
             self.driver.run(end)
             self.health.check_speed()
             if self.contacts is not None and self.contacts.search_due[None]:
-                self.broad_phase.search()
+                self.broad_phase.search(everywhere=False)
                 self.searches += 1
 
     def evaluations(self):

@@ -1,15 +1,14 @@
 """Search for contact pairs: the broken ones among the neighbouring faces, then their spheres.
 
-The list is rebuilt when a body may have left the skin. When a bond breaks, only what its two bodies
-touch is looked for, at once. Impulses that wait in the slots of a pair are carried over, so results
-do not depend on when a search is made.
+The list is renewed when a body may have left the skin, or at once when a bond breaks: a search
+looks at the bodies that moved or broke, and keeps what it knows of the others. Impulses that wait
+in the slots of a pair are carried over, so results do not depend on when a search is made.
 """
 
 import taichi as ti
 
 from taichi_dem.errors import InputError
 from taichi_dem.step.cells import group
-from taichi_dem.step.contacts import BROKEN
 from taichi_dem.step.neighbours import Neighbours
 from taichi_dem.step.old_pairs import OldPairs
 from taichi_dem.types import real
@@ -21,8 +20,8 @@ _ROOM = ("", "pairs_per_body", "spheres_per_body")
 class BroadPhase:
     """Finds the pairs and fills the lists of a ``Contacts``.
 
-    brute_force: compare all bodies with broken faces, for tests. whole: 1 for a search that looks
-    at all bodies; exposed: 1 for those at which it looks; searched: tick of the last one.
+    brute_force: compare all bodies with broken faces, for tests. looked: 1 for the bodies at which
+    a search looks, all of them everywhere; searched: tick of the last one.
     """
 
     def __init__(self, contacts, schedule, brute_force=False, serial=False):
@@ -34,23 +33,26 @@ class BroadPhase:
         self.rough = ti.field(ti.i32, shape=n)
         self.rough_count = ti.field(ti.i32, shape=())
         self.near = Neighbours(contacts, brute_force)
-        self.near_faces = ti.field(ti.i32, shape=self.near.capacity)
-        self.near_spheres = ti.field(ti.i32, shape=self.near.capacity)
         self.pair_faces = ti.field(ti.i32, shape=contacts.capacity)
         self.searched = ti.field(ti.i64, shape=())
-        self.whole = ti.field(ti.i32, shape=())
-        self.exposed = ti.field(ti.i32, shape=n)
+        self.looked = ti.field(ti.i32, shape=n)
+        self.everywhere = ti.field(ti.i32, shape=())
         self.fresh = ti.field(ti.i32, shape=())
         self.old = OldPairs(contacts)
         self.full = ti.field(ti.i32, shape=())
         self.sphere = ti.Vector.field(3, real, shape=4 * n * self.model.spheres_per_face)
 
-    def search(self):
-        """Rebuild the lists. Raises InputError when they outgrow the room the scene gave them."""
+    def search(self, everywhere=True):
+        """Renew the lists. Raises InputError when they outgrow the room the scene gave them.
+
+        everywhere: look at all bodies, as is needed once they have been moved by hand.
+        """
+        self.everywhere[None] = int(everywhere)
         if self.phases is None:
             self.phases = self._phases()
         self._search()
         if self.near.stale[None] and not self.near.full[None]:
+            # A row of neighbours had no room left.
             self._search()
         room = "neighbours_per_body" if self.near.full[None] else _ROOM[self.full[None]]
         if room:
@@ -104,8 +106,8 @@ class BroadPhase:
     @ti.func
     def _begin(self, one):
         self._list_rough()
-        self._choose_extent()
         self.near.begin()
+        self._choose_extent()
 
     @ti.func
     def _allot(self, one):
@@ -142,15 +144,22 @@ class BroadPhase:
 
     @ti.func
     def _choose_extent(self):
-        """Look at all bodies where one left its skin, else at those that a break has exposed."""
-        wider = self.contacts.search_due[None] != BROKEN or self.near.gone_count[None] > 0
-        self.whole[None] = ti.cast(wider, ti.i32)
+        """Look at the bodies that went far into their skin or that a break has exposed.
+
+        All are looked at while the list of neighbours is made anew.
+        """
+        far = 0.25 * self.contacts.skin[None]
+        if self.near.making() or self.everywhere[None] == 1:
+            far = -1.0
         for i in range(self.model.body_count):
-            exposed = ti.cast(wider, ti.i32)
+            looked = ti.cast(self.contacts.travel[i] > far, ti.i32)
             for face in range(4 * i, 4 * i + 4):
-                exposed |= ti.cast(self.state.exposed_tick[face] > self.searched[None], ti.i32)
-            self.exposed[i] = exposed
-            if wider:
+                looked |= ti.cast(self.state.exposed_tick[face] > self.searched[None], ti.i32)
+            self.looked[i] = looked
+        for a in range(self.near.gone_count[None]):
+            self.looked[self.near.gone[a]] = 1
+        for i in range(self.model.body_count):
+            if self.looked[i] == 1:
                 self.contacts.travel[i] = 0.0
         self.searched[None] = self.state.tick[None]
 
@@ -188,12 +197,12 @@ class BroadPhase:
         self.old.first_of[i] = self.contacts.first_of[i]
         for k in range(self.near.first[i], self.near.last[i]):
             j = self.near.body[k]
-            if self.exposed[i] | self.exposed[j] != 0:
+            if self.looked[i] | self.looked[j] != 0:
                 faces, spheres = self.near.faces[k] & self._broken_faces(i, j), 0
                 if faces != 0:
                     if not self._bonded(i, j):
                         spheres = self._spheres_near(i, j, faces, 0, False)
-                self.near_faces[k], self.near_spheres[k] = faces, spheres
+                self.near.broken[k], self.near.spheres[k] = faces, spheres
 
     @ti.func
     def _broken_faces(self, i, j):
@@ -241,10 +250,10 @@ class BroadPhase:
             self.contacts.first_of[i] = self.contacts.pair_count[None]
             old, last = self.old.first_of[i], self.old.first_of[i + 1]
             for k in range(self.near.first[i], self.near.last[i]):
-                if self.near_spheres[k] > 0:
+                if self.near.spheres[k] > 0:
                     j = self.near.body[k]
                     old = self._number_waiting(i, old, last, j)
-                    self._number(i, j, self.near_faces[k], self.near_spheres[k])
+                    self._number(i, j, self.near.broken[k], self.near.spheres[k])
             self._number_waiting(i, old, last, self.model.body_count)
         self.contacts.first_of[self.model.body_count] = self.contacts.pair_count[None]
 
@@ -278,7 +287,7 @@ class BroadPhase:
         """Write a pair's spheres, take over what waited for it, book what its birth injects."""
         i, j = self.contacts.pair_body[p][0], self.contacts.pair_body[p][1]
         old, injected = self.old.place(i, j), 0.0
-        if self.exposed[i] | self.exposed[j] != 0:
+        if self.looked[i] | self.looked[j] != 0:
             self._spheres_near(i, j, self.pair_faces[p], self.contacts.pair_first[p], True)
             injected = self._injected(p, i, j)
         else:

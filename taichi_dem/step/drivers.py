@@ -91,7 +91,7 @@ class Step:
         """1 when the host must act: a contact search is due or a body left its bounds."""
         halt = ti.cast(self.state.bad_body[None] < self.advance.model.body_count, ti.i32)
         if ti.static(self.has_contact):
-            halt |= ti.cast(self.contacts.search_due[None] > 0, ti.i32)
+            halt |= self.contacts.search_due[None]
         return halt
 
 
