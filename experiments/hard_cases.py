@@ -13,6 +13,7 @@ words: numbers in their place count as a failure.
 import math
 import os
 import sys
+import textwrap
 import time
 
 from _cli import (
@@ -40,7 +41,6 @@ OF_QUICK = (
 )
 COLUMNS = 5
 _COLOURS = (RED, BLUE, GREEN, ORANGE, PURPLE, SKY)
-_SIGNS = {PASSED: ("passed", GREEN), REFUSED: ("declines", GREY), FAILED: ("failed", RED)}
 
 
 def options_parser():
@@ -100,67 +100,92 @@ def write_table(path, results):
     write_csv(path, columns)
 
 
+def looks_of(results):
+    """Colour and line width of every method; the first are drawn thick, so that all are seen."""
+    methods = list(dict.fromkeys(result.method for result in results))
+    return {
+        method: {"color": _COLOURS[k % len(_COLOURS)], "lw": max(0.8, 3.0 - 0.45 * k)}
+        for k, method in enumerate(methods)
+    }
+
+
 def picture_case(path, case, results):
     """One picture of a case: what its methods did, and how they fared."""
-    with picture(path, 1, 1, (6.4, 4.2)) as (_, axis):
-        draw_case(axis, case, results)
-        axis.set_title(f"{case.name}: {case.question}", fontsize=7.5, wrap=True)
+    own = [result for result in results if result.case == case.name]
+    with picture(path, 1, 1, (7.0, 4.6)) as (figure, axis):
+        draw_case(axis, own, looks_of(results), size=8.0)
+        figure.suptitle(f"{case.name}: {case.question}", fontsize=9.0, x=0.02, ha="left")
+        handles, labels = axis.get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=5)
 
 
 def picture_sheet(path, cases, results, columns):
     """All cases on one sheet."""
-    rows = -(-len(cases) // columns)
-    size = (3.2 * columns, min(16.0, 2.4 * rows))
-    with picture(path, rows, columns, size, squeeze=False) as (_, axes):
+    rows, looks = -(-len(cases) // columns), looks_of(results)
+    size = (3.2 * columns, min(16.0, 0.4 + 2.4 * rows))
+    with picture(path, rows, columns, size, squeeze=False) as (figure, axes):
         panels = axes.ravel()
         for axis, case in zip(panels, cases):
-            draw_case(axis, case, results, small=True)
+            draw_case(axis, [result for result in results if result.case == case.name], looks, 6.0)
         for axis in panels[len(cases) :]:
             axis.set_axis_off()
+        shown = dict.fromkeys(result.method for result in results if result.shown)
+        lines = [panels[0].plot([], [], **looks[method])[0] for method in shown]
+        figure.legend(lines, list(shown), loc="outside upper left", ncols=len(lines) or 1)
 
 
-def draw_case(axis, case, results, small=False):
-    """Curves of the methods that gave any, the status of all in words."""
-    own = [result for result in results if result.case == case.name]
-    size = 6.0 if small else 8.0
-    for k, result in enumerate(own):
-        colour = _COLOURS[k % 6]
+def draw_case(axis, own, looks, size):
+    """What the methods of a case did, and how they fared in the title.
+
+    own: results of the case. looks: by method. size: of letters [points].
+    """
+    for result in own:
         if result.shown is not None:
-            draw_curves(axis, result.shown, colour, k)
+            draw_curves(axis, result.shown, result.method, looks[result.method])
     if not any(result.shown for result in own):
         axis.set(xticks=[], yticks=[])
-        axis.text(0.5, 0.35, "no numbers,\nas it should be", ha="center", transform=axis.transAxes)
-    counts = {word: [r.method for r in own if r.status == word] for word in _SIGNS}
-    said = [f"{_SIGNS[word][0]}: {', '.join(who)}" for word, who in counts.items() if who]
-    colour = RED if counts[FAILED] else GREEN if counts[PASSED] else GREY
-    axis.set_title(case.name.replace("_", " "), fontsize=size + 1.5, color=colour)
-    margins = [result.margin for result in own if result.limit]
-    if margins:
-        said.append(f"least margin {min(margins):.3g}")
+        said = textwrap.fill(own[0].words, 44)
+        axis.text(0.03, 0.92, said, fontsize=size, va="top", transform=axis.transAxes)
     axis.tick_params(labelsize=size)
     axis.xaxis.label.set_size(size)
     axis.yaxis.label.set_size(size)
-    if not small:
-        axis.text(0.0, -0.2, "\n".join(said), fontsize=size, va="top", transform=axis.transAxes)
+    axis.set_title(f"{own[0].case.replace('_', ' ')}: {verdict(own)}", fontsize=size + 1.0)
+    if any(result.status == FAILED for result in own):
+        axis.title.set_color(RED)
 
 
-def draw_curves(axis, shown, colour, k):
-    """Lines of one method, its bounds dotted; later methods thinner, to let the first be seen."""
-    for name, (x, y) in shown.lines.items():
+def verdict(own):
+    """How the methods of a case fared, in words."""
+    words = {PASSED: "pass", REFUSED: "decline", FAILED: "FAIL"}
+    counts = {word: sum(result.status == word for result in own) for word in words}
+    said = [f"{counts[word]} {words[word]}" for word in words if counts[word]]
+    margins = [result.margin for result in own if result.limit]
+    if margins and math.isfinite(min(margins)):
+        said.append(f"margin {min(margins):.2g}")
+    return ", ".join(said)
+
+
+def draw_curves(axis, shown, method, look):
+    """Lines of one method, its bounds dotted."""
+    for k, (x, y) in enumerate(shown.lines.values()):
+        label = method if k == 0 else None
         if shown.dots:
-            axis.plot(x, y, "o", ms=3.0, mfc="none", color=colour, label=name or None)
+            dots = {"ms": 1.6 * look["lw"] + 1.0, "mfc": "none", "color": look["color"]}
+            axis.plot(x, y, "o", label=label, **dots)
         else:
-            axis.plot(x, y, color=colour, lw=2.0 - 0.3 * k, label=name or None)
+            axis.plot(x, y, label=label, **look)
     for bound in shown.bounds:
         axis.axhline(bound, color=GREY, ls=":", lw=1.0)
     axis.set(xlabel=shown.xlabel, ylabel=shown.ylabel)
     if shown.log:
         axis.set_yscale("log")
+    elif axis.get_ylim()[0] >= 0.0 or shown.dots:
+        axis.set_ylim(bottom=0.0)
 
 
 def figures_of(cases, results):
     """How many cases, and how many askings ended in which way."""
-    counts = {word: sum(r.status == word for r in results) for word in _SIGNS}
+    counts = {word: sum(r.status == word for r in results) for word in (PASSED, REFUSED, FAILED)}
     margins = [result.margin for result in results if result.limit]
     figures = {"cases": figure(len(cases), "1"), "askings": figure(len(results), "1")}
     figures.update({word: figure(count, "1") for word, count in counts.items()})
