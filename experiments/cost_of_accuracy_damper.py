@@ -89,12 +89,14 @@ METHODS = {
 FULL = {
     "job": Job(30, (0.92, 0.95, 0.966, 0.98, 1.0, 1.04), 40, 40),
     "methods": tuple(METHODS),
+    "twins": tuple(METHODS),
     "seeds": 3,
     "repeats": 5,
 }
 QUICK = {
     "job": Job(30, (0.95, 0.98, 1.0), 10, 10),
     "methods": ("ca_static", "ca_landing", SPHERES, "dem_soft"),
+    "twins": (SPHERES,),
     "seeds": 2,
     "repeats": 2,
 }
@@ -145,7 +147,7 @@ class Sweep:
 
     points: against its own reference. curves: Curve by step. reference: dict of the curve at the
     finest step: mean [m] over ratios, rms, compile_s, force_check. roundoff: spread of runs that
-    differ by the last bit of the base's amplitude. compile_s: of everything.
+    differ by the last bit of the base's amplitude, None if not asked for. compile_s: of everything.
     """
 
     def __init__(self, label, method, sizes, options, bar):
@@ -156,10 +158,9 @@ class Sweep:
         self.reference, kept = self._reference(os.path.join(options.out, "references"))
         for dt in method.steps_of_quick if options.quick else method.steps:
             self._run(dt)
-        twins = simulate(method.filling, self.job, max(self.curves), TWINS, ulps=range(len(TWINS)))
-        self.roundoff = seed_variance(twins.rms) ** 0.5
-        self.compile_s = sum(curve.compile_s for curve in [twins, *self.curves.values()])
+        self.compile_s = sum(curve.compile_s for curve in self.curves.values())
         self.compile_s += 0.0 if kept else self.reference["compile_s"]
+        self.roundoff = self._twins() if label in sizes["twins"] else None
         self.points = self.against(self.reference["mean"])
 
     def _reference(self, folder):
@@ -194,6 +195,12 @@ class Sweep:
             )
         except SimulationDiverged:
             self.failures[dt] = "diverged"
+
+    def _twins(self):
+        step, ulps = max(self.curves), range(len(TWINS))
+        curve = simulate(self.method.filling, self.job, step, TWINS, ulps=ulps)
+        self.compile_s += curve.compile_s
+        return seed_variance(curve.rms) ** 0.5
 
     def against(self, truth):
         """Points with errors against a curve [m]."""

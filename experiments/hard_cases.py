@@ -146,6 +146,9 @@ def draw_case(axis, own, looks, size):
         axis.set(xticks=[], yticks=[])
         said = textwrap.fill(own[0].words, 44)
         axis.text(0.03, 0.92, said, fontsize=size, va="top", transform=axis.transAxes)
+    lowest, highest = axis.get_ylim()
+    if axis.get_yscale() == "linear" and 0.0 < lowest < 0.95 * highest:
+        axis.set_ylim(0.0, highest)
     axis.tick_params(labelsize=size)
     axis.xaxis.label.set_size(size)
     axis.yaxis.label.set_size(size)
@@ -179,8 +182,6 @@ def draw_curves(axis, shown, method, look):
     axis.set(xlabel=shown.xlabel, ylabel=shown.ylabel)
     if shown.log:
         axis.set_yscale("log")
-    elif axis.get_ylim()[0] >= 0.0 or shown.dots:
-        axis.set_ylim(bottom=0.0)
 
 
 def figures_of(cases, results):

@@ -108,7 +108,7 @@ def wall_above_a_cell_a_step(method, quick):
 
 
 def longest_steps(method, quick):
-    """Steps of 1.1 ms, an eighth of a cell's fall, shaken at 3.5 g."""
+    """Steps of 1.1 ms, of the 1.2 ms in which v_max crosses a cell, shaken at 3.5 g."""
     run = scenes.drive(filling(method), 50, 20 if quick else 200, dt=1.1e-3)
     return _sound(run, method, scenes.speed_bounded(run))
 
