@@ -243,9 +243,13 @@ def _draw_failures(axis, points, looks, cost):
         place = [cost_of(p, points, cost) for p in own]
         axis.plot(place, [level] * len(own), "x", color=colour, ms=6, mew=1.6)
         words = ", ".join(f"{p.label} {p.failure}" for p in own)
+        # On the side where there is room for it.
+        left, right = axis.get_xlim()
+        late = place[-1] ** 2 > left * right
+        end, shift, side = (place[0], -7, "right") if late else (place[-1], 7, "left")
         axis.annotate(
-            words, (place[-1], level), (7, -2.5), textcoords="offset points", fontsize=_SMALL,
-            color=colour,
+            words, (end, level), (shift, -2.5), textcoords="offset points", fontsize=_SMALL,
+            color=colour, ha=side,
         )  # fmt: skip
 
 

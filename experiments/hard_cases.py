@@ -1,6 +1,6 @@
 """Which hard cases each method bears, which it declines in words, and by what margin.
 
-    python experiments/hard_cases.py                      # about five minutes on one core
+    python experiments/hard_cases.py                      # about three minutes on one core
     python experiments/hard_cases.py --only full_box,still_heap
     python experiments/hard_cases.py --quick
 
