@@ -19,8 +19,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from _cli import ProgressBar, figure, main, parser, print_table, whole
-from _demo import conclude, placed_together
+from _cli import figure, main, parser, print_table, whole
+from _demo import ShareBar, conclude, placed_together
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects
 from taichi_dem.files import output_folder, write_csv
 from taichi_dem.mesh import group_area
@@ -124,8 +124,8 @@ def run(options):
     output_folder(options.out)
     scene, drives = bench()
     simulation = Simulation(scene, Uniform(STEP))
-    with ProgressBar("bench") as bar:
-        made = measure(simulation, drives, steps, lambda share: bar(Share(share)))
+    with ShareBar("bench") as bar:
+        made = measure(simulation, drives, steps, bar)
     rows = comparison(made)
     picture(made, options)
     caption = (
@@ -142,17 +142,6 @@ def run(options):
     )  # fmt: skip
     print()
     conclude(options, NAME, figures_of(rows), caption, [simulation])
-
-
-@dataclass(frozen=True)
-class Share:
-    """Progress of the bench."""
-
-    share: float
-
-    def __str__(self):
-        """There is no speed to tell."""
-        return ""
 
 
 def comparison(made):

@@ -46,8 +46,7 @@ def film_law(path, lines, curves, pressures, points, count):
         last = len(curves) - 1
         opened, shifted = (f"× {factor:g}" for factor in _MAGNIFY)
         pulled = _Specimen(panels[0, 0], points, f"opening {opened}", _COLOURS[0])
-        pressed = f"{1e-6 * pressures[-1]:g} MPa, sliding {shifted}"
-        slid = _Specimen(panels[0, 1], points, pressed, _COLOURS[last])
+        slid = _Specimen(panels[0, 1], points, f"sliding {shifted}", _COLOURS[last])
         for row in np.linspace(0, len(curves[0][0]) - 1, count).round().astype(int):
             for (trail, head), (way, traction) in zip(marks, curves):
                 some = _evenly(way[: row + 1], traction[: row + 1])
