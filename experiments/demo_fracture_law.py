@@ -81,22 +81,24 @@ def velocities(corners, steps):
 
 
 def bench():
-    """The scene of all specimens, and the motion that drives each."""
+    """The scene of all specimens, each driven on its right."""
     specimens = [f"specimen{k}" for k in range(1 + len(PRESSURES))]
     mesh = placed_together(
         {name: (pair(EDGE), (0.0, 0.0, APART * k)) for k, name in enumerate(specimens)}
     )
     drives = [effects.PrescribedMotion(f"{name}_right", (0.0, 0.0, 0.0)) for name in specimens]
     acting = [effects.Softening(), effects.ShearSlip(), effects.Fixed("left"), *drives]
-    return Scene(mesh, CONCRETE, acting), drives
+    return Scene(mesh, CONCRETE, acting)
 
 
-def measure(simulation, drives, steps, progress):
+def measure(simulation, steps, progress):
     """Drive all specimens along their ways and read their load cells; returns Measured.
 
     What the clamp gives the left body in a step is what the bond took from it at the step's start.
     """
     plans = [velocities(corners, steps) for corners in ways()]
+    # A scene may serve many runs: the motion of this one is its model's.
+    drives = [effect for effect in simulation.model.supports if effect.name == "prescribed_motion"]
     state, first = simulation.state, simulation.model.centre
     place, given = [], []
     simulation.start()
@@ -122,10 +124,9 @@ def run(options):
     """Measure all specimens, compare with the law, picture."""
     steps = options.steps or (QUICK if options.quick else FULL)["steps"]
     output_folder(options.out)
-    scene, drives = bench()
-    simulation = Simulation(scene, Uniform(STEP))
+    simulation = Simulation(bench(), Uniform(STEP))
     with ShareBar("bench") as bar:
-        made = measure(simulation, drives, steps, bar)
+        made = measure(simulation, steps, bar)
     rows = comparison(made)
     picture(made, options)
     caption = (
