@@ -164,7 +164,7 @@ def runs(explicit, implicit):
 def test_displacements_agree_with_tiny_explicit_steps(runs, name):
     """To 0.1 % of the largest, at 200 times the step: both schemes tend to the same motion.
 
-    Without contact the error is of second order, (dt / ms of the fastest motion)^2; contacts are
+    Without contact the error is of second order, (w dt)^2 of the motion, w < 1e5 1/s; contacts are
     met up to a step late, of the hundreds that follow.
     """
     first, second = (run["moved"][name] for run in runs)
