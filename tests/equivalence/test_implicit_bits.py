@@ -82,6 +82,7 @@ def test_whole_searches_give_the_same_bits(block, reference, monkeypatch):
     assert differing(reference[0], fields_of(block.state), MOTION) == []
 
 
+@pytest.mark.slow
 def test_parallel_driver_and_a_search_without_cells_give_the_same_bits(reference):
     """Both in one run, to compile once: no order in either may show."""
     simulation = Simulation(brisk_scene(), ImplicitDashpots(STEP), "parallel", brute_force=True)
@@ -118,6 +119,7 @@ print(json.dumps(hashes(shaken())))
 """
 
 
+@pytest.mark.slow
 def test_threads_change_no_bit():
     """One thread in a process of its own, two in this one; sweeps and all loops are spread."""
     simulation = shaken()
