@@ -1,5 +1,6 @@
 """Time integration methods a user chooses from; each says how the schedule steps."""
 
+import numbers
 from dataclasses import dataclass
 from typing import Optional
 
@@ -136,9 +137,7 @@ class ImplicitDashpots:
         positive("dt", self.dt)
         positive("tolerance", self.tolerance)
         positive("refresh", self.refresh)
-        positive("theta", self.theta)
-        if not 0.5 <= self.theta <= 1.0:
-            raise InputError(f"theta must be a number from 0.5 to 1, got {self.theta!r}")
+        _check_theta(self.theta)
         _check_sweeps(self.sweeps)
 
     @property
@@ -149,6 +148,12 @@ class ImplicitDashpots:
     def criterion(self):
         """Step rule for the schedule."""
         return FixedStep()
+
+
+def _check_theta(theta):
+    number = isinstance(theta, numbers.Real) and not isinstance(theta, bool)
+    if not (number and 0.5 <= theta <= 1.0):
+        raise InputError(f"theta must be a number from 0.5 to 1, got {theta!r}")
 
 
 def _check_sweeps(sweeps):
