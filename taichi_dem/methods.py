@@ -1,10 +1,9 @@
 """Time integration methods a user chooses from; each says how the schedule steps."""
 
-import numbers
 from dataclasses import dataclass
 from typing import Optional
 
-from taichi_dem.checks import positive
+from taichi_dem.checks import between, choice, positive
 from taichi_dem.errors import InputError
 from taichi_dem.step_control import Displacement, FixedStep, StepControl
 
@@ -15,8 +14,7 @@ DASHPOTS = ("full", "limited")
 def _check_options(method):
     if method.control is not None and not isinstance(method.control, StepControl):
         raise InputError(f"control must be a StepControl or None, got {method.control!r}")
-    if method.dashpot not in DASHPOTS:
-        raise InputError(f"dashpot must be one of {', '.join(DASHPOTS)}, got {method.dashpot!r}")
+    choice("dashpot", method.dashpot, DASHPOTS)
     floor = method.control.dashpot_floor if method.control is not None else 0.0
     if floor > 0.0 and method.dashpot != "limited":
         raise InputError(f"dashpot_floor must be 0 unless dashpot is 'limited', got {floor!r}")
@@ -89,10 +87,7 @@ class Multirate:
     def __post_init__(self):
         positive("dt0", self.dt0)
         positive("distance", self.distance)
-        if self.neighbour not in NEIGHBOURS:
-            raise InputError(
-                f"neighbour must be one of {', '.join(NEIGHBOURS)}, got {self.neighbour!r}"
-            )
+        choice("neighbour", self.neighbour, NEIGHBOURS)
         _check_options(self)
 
     @property
@@ -137,7 +132,7 @@ class ImplicitDashpots:
         positive("dt", self.dt)
         positive("tolerance", self.tolerance)
         positive("refresh", self.refresh)
-        _check_theta(self.theta)
+        between("theta", self.theta, 0.5, 1.0)
         _check_sweeps(self.sweeps)
 
     @property
@@ -148,12 +143,6 @@ class ImplicitDashpots:
     def criterion(self):
         """Step rule for the schedule."""
         return FixedStep()
-
-
-def _check_theta(theta):
-    number = isinstance(theta, numbers.Real) and not isinstance(theta, bool)
-    if not (number and 0.5 <= theta <= 1.0):
-        raise InputError(f"theta must be a number from 0.5 to 1, got {theta!r}")
 
 
 def _check_sweeps(sweeps):

@@ -39,13 +39,17 @@ class Simulation:
         self.generation = runtime.generation()
         started = time.perf_counter()
         self.scene, self.method = scene, method
-        self.solves = getattr(method, "solves", False)
+        self.solves = method.solves
         with fields_first():
             self.model = Model(scene.mesh, scene.material, scene.effects)
             driver = _driver_name(driver, self.model.bond_count)
             self.state = State(self.model, scene.max_speed)
-            self._build_contacts(brute_force, driver == "resident")
+            self._build_schedule()
             step = self._build_step()
+            self.broad_phase = None
+            if self.contacts is not None:
+                parts = self.contacts, self.schedule, step.advance.solver
+                self.broad_phase = BroadPhase(*parts, brute_force, driver == "resident")
         self.advance = step.advance
         self.driver = DRIVERS[driver](step)
         self.step = step
@@ -55,7 +59,7 @@ class Simulation:
         self.run_seconds = self.run_cpu_seconds = 0.0
         self.started = None
 
-    def _build_contacts(self, brute_force, serial):
+    def _build_schedule(self):
         model, state, method = self.model, self.state, self.method
         self.contacts = Contacts(model, state) if model.has_contact else None
         drifted = method.neighbour == "drifted"
@@ -70,18 +74,13 @@ class Simulation:
             drifted,
             rates,
         )
-        self.broad_phase = None
-        if self.contacts is not None:
-            self.broad_phase = BroadPhase(self.contacts, self.schedule, brute_force, serial)
 
     def _build_step(self):
         parts = self.model, self.state, self.schedule, self.contacts
         if not self.solves:
             return Step(Advance(*parts), self.schedule, self.contacts)
-        solver = Solver(*parts, self.method)
-        if self.contacts is not None:
-            self.broad_phase.solver, self.broad_phase.solves = solver, True
-        return SolvedStep(SolvedAdvance(*parts, solver), self.schedule, self.contacts)
+        advance = SolvedAdvance(*parts, Solver(*parts, self.method))
+        return SolvedStep(advance, self.schedule, self.contacts)
 
     @property
     def time_s(self):
@@ -146,6 +145,10 @@ class Simulation:
         """Bonds and contact pairs evaluated so far."""
         return int(self.schedule.evaluations[2] + self.schedule.evaluations[3])
 
+    def sweeps(self):
+        """Sweeps over all dashpots so far, 0 for a method that solves none."""
+        return int(self.advance.solver.total_sweeps[None]) if self.solves else 0
+
     def running_seconds(self):
         """Wall time spent stepping so far [s], compile time apart."""
         present = time.perf_counter() - self.started if self.started is not None else 0.0
@@ -174,6 +177,7 @@ class Simulation:
             body_updates=counts[1],
             bond_evaluations=counts[2],
             pair_evaluations=counts[3],
+            sweeps=self.sweeps(),
             uniform_evaluations=counts[4],
             searches=self.searches,
             ledger=self.ledger.account(),

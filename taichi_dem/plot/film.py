@@ -5,14 +5,8 @@ import os
 import shutil
 import subprocess
 
-import matplotlib
-import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
-from PIL import Image
-
 from taichi_dem.files import renamed_when_done
-from taichi_dem.plot_style import STYLE, write_gif
+from taichi_dem.plot_style import STYLE, filming, write_gif
 
 #: Pixels an inch of the MP4; the GIF has half as many each way.
 _DPI = 200
@@ -36,15 +30,7 @@ def moving_picture(path, size, milliseconds, colours=48):
     400 pixels. milliseconds: a frame. The layout is that of the first frame.
     Raises InputError when a file cannot be written.
     """
-    with matplotlib.rc_context(_SMALL):
-        figure = Figure(figsize=size, dpi=_DPI, layout="constrained")
-        canvas, images = FigureCanvasAgg(figure), []
-
-        def shoot():
-            canvas.draw()
-            images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())[:, :, :3].copy()))
-            figure.set_layout_engine("none")
-
+    with filming(size, _DPI, _SMALL) as (figure, shoot, images):
         yield figure, shoot
     write_gif(path, [image.reduce(2) for image in images], milliseconds, colours)
     write_mp4(os.path.splitext(path)[0] + ".mp4", images, milliseconds)

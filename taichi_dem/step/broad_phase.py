@@ -20,14 +20,15 @@ _ROOM = ("", "pairs_per_body", "spheres_per_body")
 class BroadPhase:
     """Finds the pairs and fills the lists of a ``Contacts``.
 
-    brute_force: compare all bodies with broken faces, for tests. looked: 1 for the bodies at which
-    a search looks, all of them everywhere; searched: tick of the last one.
+    solver: of the dashpots, whose impulses go with the pairs, None without. brute_force: compare
+    all bodies with broken faces, for tests. serial: one loop for all, for one core. looked: 1 for
+    the bodies at which a search looks, all of them everywhere; searched: tick of the last one.
     """
 
-    def __init__(self, contacts, schedule, brute_force=False, serial=False):
+    def __init__(self, contacts, schedule, solver=None, brute_force=False, serial=False):
         n = contacts.model.body_count
         self.contacts, self.schedule = contacts, schedule
-        self.solver, self.solves = None, False
+        self.solver, self.solves = solver, solver is not None
         self.serial, self.phases = serial, None
         self.model, self.state = contacts.model, contacts.state
         self.rough = ti.field(ti.i32, shape=n)
