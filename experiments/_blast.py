@@ -55,6 +55,6 @@ METHODS = {
     "paper_uniform": (paper_uniform, 1e-8),
     "paper_multirate": (paper_multirate, 1e-8),
     "multirate_controlled": (multirate_controlled, 8e-8),
-    "explicit_limited": (explicit_limited, 2e-8),
+    "explicit_limited": (explicit_limited, 2.5e-8),
     "implicit": (ImplicitDashpots, 4e-7),
 }

@@ -51,7 +51,7 @@ NAME = "blast_fracture"
 #: Method by name: how it is made of the largest step and the way l; its largest step [s], l [m].
 METHODS = {
     "implicit": (lambda dt0, distance: ImplicitDashpots(dt0), 4e-7, None),
-    "limited": (lambda dt0, distance: explicit_limited(dt0), 2e-8, None),
+    "limited": (lambda dt0, distance: explicit_limited(dt0), 2.5e-8, None),
     "controlled": (lambda dt0, distance: multirate_controlled(dt0), 8e-8, None),
     "multirate": (lambda dt0, distance: Multirate(dt0, distance), 1e-8, 1e-7),
     "multirate_drifted": (lambda dt0, distance: Multirate(dt0, distance, "drifted"), 1e-8, 1e-7),

@@ -57,6 +57,11 @@ class Uniform:
         """Short name for tables."""
         return f"uniform{_suffix(self)}"
 
+    @property
+    def ahead(self):
+        """Steps of a body by which its contacts are counted before they touch."""
+        return self.control.ahead if self.control is not None else 0.0
+
     def criterion(self):
         """Step rule for the schedule."""
         if self.distance is None:
@@ -95,6 +100,11 @@ class Multirate:
         """Short name for tables."""
         return f"multirate_{self.neighbour}{_suffix(self)}"
 
+    @property
+    def ahead(self):
+        """Steps of a body by which its contacts are counted before they touch."""
+        return self.control.ahead if self.control is not None else 0.0
+
     def criterion(self):
         """Step rule for the schedule."""
         return Displacement(self.distance, self.dt0)
@@ -126,6 +136,8 @@ class ImplicitDashpots:
     dashpot = "full"
     distance = None
     solves = True
+    # What may touch within the step is solved with it; a little more, as a spin is rounded.
+    ahead = 1.01
     name = "implicit"
 
     def __post_init__(self):

@@ -14,7 +14,7 @@ from taichi_dem.state import NEVER, State
 from taichi_dem.step.advance import Advance
 from taichi_dem.step.broad_phase import BroadPhase
 from taichi_dem.step.contacts import Contacts
-from taichi_dem.step.drivers import CALL_SECONDS, DRIVERS, SolvedStep, Step
+from taichi_dem.step.drivers import DRIVERS, SolvedStep, Step
 from taichi_dem.step.implicit.advance import SolvedAdvance
 from taichi_dem.step.implicit.solver import Solver
 from taichi_dem.step.rates import rates_for
@@ -45,23 +45,24 @@ class Simulation:
             driver = _driver_name(driver, self.model.bond_count)
             self.state = State(self.model, scene.max_speed)
             self._build_schedule()
-            step = self._build_step()
+            self.advance = self._build_advance()
             self.broad_phase = None
             if self.contacts is not None:
-                parts = self.contacts, self.schedule, step.advance.solver
-                self.broad_phase = BroadPhase(*parts, brute_force, driver == "resident")
-        self.advance = step.advance
-        self.driver = DRIVERS[driver](step)
-        self.step = step
+                parts = self.contacts, self.schedule, self.advance.solver
+                self.broad_phase = BroadPhase(*parts, brute_force)
+        kind = SolvedStep if self.solves else Step
+        self.step = kind(self.advance, self.schedule, self.broad_phase)
+        self.driver = DRIVERS[driver](self.step)
         self.ledger = None
-        self.searches = 0
         self.compile_seconds = time.perf_counter() - started
         self.run_seconds = self.run_cpu_seconds = 0.0
         self.started = None
 
     def _build_schedule(self):
         model, state, method = self.model, self.state, self.method
-        self.contacts = Contacts(model, state) if model.has_contact else None
+        self.contacts = None
+        if model.has_contact:
+            self.contacts = Contacts(model, state, method.ahead)
         drifted = method.neighbour == "drifted"
         rates = rates_for(model, state, self.contacts, method)
         self.schedule = Schedule(
@@ -75,12 +76,11 @@ class Simulation:
             rates,
         )
 
-    def _build_step(self):
+    def _build_advance(self):
         parts = self.model, self.state, self.schedule, self.contacts
-        if not self.solves:
-            return Step(Advance(*parts), self.schedule, self.contacts)
-        advance = SolvedAdvance(*parts, Solver(*parts, self.method))
-        return SolvedStep(advance, self.schedule, self.contacts)
+        if self.solves:
+            return SolvedAdvance(*parts, Solver(*parts, self.method))
+        return Advance(*parts)
 
     @property
     def time_s(self):
@@ -99,14 +99,15 @@ class Simulation:
             self.state.expose(self.model.topology)
         self.step.prime()
         if self.contacts is not None:
-            self.broad_phase.search()
+            self.broad_phase.ask(everywhere=True)
+        self.driver.settle()
+        self._check_room()
         self.ledger = Ledger(self.model, self.state, self.advance, self.contacts)
         self.health = Health(
             self.model, self.state, self.schedule, self.contacts, self.ledger, self.solves
         )
         self.watch = Watch(self.model, self.state, self.advance)
         self.watch.look(0.0)
-        self.driver.compile()
         self.compile_seconds += time.perf_counter() - started
 
     def advance_to(self, macro_step, on_call=None):
@@ -122,7 +123,8 @@ class Simulation:
         self.started = wall
         try:
             while self.state.tick[None] < end:
-                self._run_for_a_while(end)
+                self.driver.run(end)
+                self._check_room()
                 self.health.check()
                 if on_call is not None:
                     on_call()
@@ -131,15 +133,14 @@ class Simulation:
             self.run_seconds += time.perf_counter() - wall
             self.run_cpu_seconds += time.process_time() - cpu
 
-    def _run_for_a_while(self, end):
-        """Run the driver, and the searches it halts for, for about CALL_SECONDS."""
-        started = time.perf_counter()
-        while self.state.tick[None] < end and time.perf_counter() - started < CALL_SECONDS:
-            self.driver.run(end)
-            self.health.check_speed()
-            if self.contacts is not None and self.contacts.search_due[None]:
-                self.broad_phase.search(everywhere=False)
-                self.searches += 1
+    def _check_room(self):
+        if self.contacts is not None:
+            self.broad_phase.check_room()
+
+    @property
+    def searches(self):
+        """Contact searches so far."""
+        return int(self.broad_phase.searches[None]) if self.contacts is not None else 0
 
     def evaluations(self):
         """Bonds and contact pairs evaluated so far."""

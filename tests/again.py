@@ -57,16 +57,16 @@ class Again:
         ledger.start_momentum = ledger.momentum()
 
     def run(self, steps, look=None):
-        """Go on to a number of steps since the start; look() is called before every search.
+        """Go on to a number of steps since the start; look() is called after steps with a search.
 
         Returns the positions (n, 3) then [m].
         """
-        contacts = self.simulation.contacts
         while self.state.tick[None] < steps * MACRO_TICKS:
-            self.simulation.driver.run(steps * MACRO_TICKS)
+            searches, end = self.simulation.searches, steps
+            if look is not None:
+                end = self.state.tick[None] // MACRO_TICKS + 1
+            self.simulation.driver.run(end * MACRO_TICKS)
             assert self.state.bad_body[None] == self.model.body_count
-            if contacts is not None and contacts.search_due[None]:
-                self.simulation.broad_phase.search(everywhere=False)
-                if look is not None:
-                    look()
+            if look is not None and self.simulation.searches > searches:
+                look()
         return self.state.position.to_numpy()

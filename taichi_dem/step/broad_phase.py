@@ -9,11 +9,11 @@ import taichi as ti
 
 from taichi_dem.errors import InputError
 from taichi_dem.step.cells import group
-from taichi_dem.step.neighbours import Neighbours
+from taichi_dem.step.neighbours import FAR, Neighbours
 from taichi_dem.step.old_pairs import OldPairs
 from taichi_dem.types import real
 
-_ROOM = ("", "pairs_per_body", "spheres_per_body")
+_ROOM = ("", "pairs_per_body", "spheres_per_body", "neighbours_per_body")
 
 
 @ti.data_oriented
@@ -21,15 +21,16 @@ class BroadPhase:
     """Finds the pairs and fills the lists of a ``Contacts``.
 
     solver: of the dashpots, whose impulses go with the pairs, None without. brute_force: compare
-    all bodies with broken faces, for tests. serial: one loop for all, for one core. looked: 1 for
-    the bodies at which a search looks, all of them everywhere; searched: tick of the last one.
+    all bodies with broken faces, for tests. everywhere: 1 when the next search looks at all bodies,
+    as is needed once they have been moved by hand. looked: 1 for those at which the last one
+    looked; searched: its tick. searches: how many there were. full: which list has no room left,
+    a place in ``_ROOM``.
     """
 
-    def __init__(self, contacts, schedule, solver=None, brute_force=False, serial=False):
+    def __init__(self, contacts, schedule, solver=None, brute_force=False):
         n = contacts.model.body_count
         self.contacts, self.schedule = contacts, schedule
         self.solver, self.solves = solver, solver is not None
-        self.serial, self.phases = serial, None
         self.model, self.state = contacts.model, contacts.state
         self.rough = ti.field(ti.i32, shape=n)
         self.rough_count = ti.field(ti.i32, shape=())
@@ -41,35 +42,44 @@ class BroadPhase:
         self.fresh = ti.field(ti.i32, shape=())
         self.old = OldPairs(contacts)
         self.full = ti.field(ti.i32, shape=())
+        self.searches = ti.field(ti.i32, shape=())
         self.sphere = ti.Vector.field(3, real, shape=4 * n * self.model.spheres_per_face)
 
-    def search(self, everywhere=True):
-        """Renew the lists. Raises InputError when they outgrow the room the scene gave them.
-
-        everywhere: look at all bodies, as is needed once they have been moved by hand.
-        """
+    def ask(self, everywhere=False):
+        """Let the driver make a search before its next step."""
         self.everywhere[None] = int(everywhere)
-        if self.phases is None:
-            self.phases = self._phases()
-        self._search()
-        if self.near.stale[None] and not self.near.full[None]:
-            # A row of neighbours had no room left.
+        self.contacts.search_due[None] = 1
+
+    def renew(self):
+        """Renew the lists, a parallel loop a phase, until no search is due."""
+        while self.contacts.search_due[None]:
             self._search()
-        room = "neighbours_per_body" if self.near.full[None] else _ROOM[self.full[None]]
+
+    def search(self, everywhere=True):
+        """Renew the lists now. Raises InputError when they outgrow their room."""
+        self.ask(everywhere)
+        self.renew()
+        self.check_room()
+
+    def check_room(self):
+        """Raise InputError when lists have outgrown the room that the scene gave them."""
+        room = _ROOM[self.full[None]]
         if room:
             raise InputError(f"contact lists are full: give SphereContact a larger {room}")
 
-    def _phases(self):
+    @property
+    def phases(self):
         """What a search does, as pairs of how often and what, in order."""
         return (
-            (self._bodies, self.near.place),
+            (self._once, self._list_rough),
+            (self._rough_bodies, self._choose),
             (self._once, self._begin),
             (self._bodies, self.near.count),
             (self._once, self._allot),
             (self._bodies, self.near.fill),
-            (self._rough_bodies, self._place_spheres),
+            (self._rough_bodies, self._place),
             (self._pairs, self._keep),
-            (self._bodies, self._count_spheres),
+            (self._rough_bodies, self._count_spheres),
             (self._once, self._number_pairs),
             (self._pairs, self._fill_pair),
             (self._once, self._end),
@@ -77,16 +87,19 @@ class BroadPhase:
 
     @ti.kernel
     def _search(self):
-        if ti.static(self.serial):
-            # One task: to wake a pool of threads a dozen times takes longer than the search.
-            for _ in range(1):
-                for count, item in ti.static(self.phases):
-                    for a in range(count()):
-                        item(a)
-        else:
-            for count, item in ti.static(self.phases):
-                for a in range(count()):
-                    item(a)
+        for count, item in ti.static(self.phases):
+            for a in range(count()):
+                item(a)
+
+    @ti.func
+    def due(self):
+        """1 when a search is called for."""
+        return self.contacts.search_due[None]
+
+    @ti.func
+    def overflows(self):
+        """1 when a list has no room left."""
+        return ti.cast(self.full[None] != 0, ti.i32)
 
     @ti.func
     def _bodies(self):
@@ -106,9 +119,8 @@ class BroadPhase:
 
     @ti.func
     def _begin(self, one):
-        self._list_rough()
         self.near.begin()
-        self._choose_extent()
+        self.searched[None] = self.state.tick[None]
 
     @ti.func
     def _allot(self, one):
@@ -116,13 +128,19 @@ class BroadPhase:
 
     @ti.func
     def _end(self, one):
+        if self.near.full[None] == 1:
+            self.full[None] = 3
         self.near.end()
         self._index_second()
         self.schedule.start_pairs()
-        self.contacts.search_due[None] = 0
+        self.everywhere[None] = 0
+        self.searches[None] += 1
+        # A row of neighbours without room calls for another search, which makes the list anew.
+        again = self.near.stale[None] != 0 and self.full[None] == 0
+        self.contacts.search_due[None] = ti.cast(again, ti.i32)
 
     @ti.func
-    def _list_rough(self):
+    def _list_rough(self, one):
         """List the bodies with spheres on some face, in order of their index."""
         count = 0
         newest = ti.cast(0, ti.i64)
@@ -134,6 +152,7 @@ class BroadPhase:
                 if since >= 0:
                     exposed |= 1 << f
             self.contacts.rough[i] = exposed
+            self.looked[i] = 0
             if exposed != 0:
                 self.rough[count] = i
                 count += 1
@@ -144,30 +163,34 @@ class BroadPhase:
         self.state.injected_tick[None] = newest
 
     @ti.func
-    def _choose_extent(self):
-        """Look at the bodies that went far into their skin or that a break has exposed.
-
-        All are looked at while the list of neighbours is made anew.
-        """
-        far = 0.25 * self.contacts.skin[None]
-        if self.near.making() or self.everywhere[None] == 1:
-            far = -1.0
-        for i in range(self.model.body_count):
-            looked = ti.cast(self.contacts.travel[i] > far, ti.i32)
-            for face in range(4 * i, 4 * i + 4):
-                looked |= ti.cast(self.state.exposed_tick[face] > self.searched[None], ti.i32)
-            self.looked[i] = looked
-        for a in range(self.near.gone_count[None]):
-            self.looked[self.near.gone[a]] = 1
-        for i in range(self.model.body_count):
-            if self.looked[i] == 1:
-                self.contacts.travel[i] = 0.0
-        self.searched[None] = self.state.tick[None]
+    def _choose(self, a):
+        """Look at a rough body if it went far into its skin, or if a break has exposed it."""
+        i = self.rough[a]
+        far = self.contacts.travel[i] > FAR * self.contacts.skin[None]
+        looked = self.everywhere[None] | ti.cast(far, ti.i32)
+        for face in range(4 * i, 4 * i + 4):
+            looked |= ti.cast(self.state.exposed_tick[face] > self.searched[None], ti.i32)
+        self.looked[i] = looked
+        if looked == 1:
+            self.near.notice(i)
 
     @ti.func
-    def _place_spheres(self, a):
-        """World positions of a rough body's spheres, computed once for the many that ask."""
+    def _place(self, a):
+        """Note where the spheres of a body are that is looked at; computed once for many that ask.
+
+        The others count as lying where they were when they were last looked at: they have used up
+        that much of their skin since. All are looked at while the list of neighbours is made anew.
+        """
         i = self.rough[a]
+        if self.near.making():
+            self.looked[i] = 1
+        if self.looked[i] == 1:
+            self.contacts.travel[i] = 0.0
+            self.near.place(i)
+            self._place_spheres(i)
+
+    @ti.func
+    def _place_spheres(self, i):
         size = ti.static(self.model.spheres_per_face)
         position, rotation = self.state.position[i], self.state.rotation[i]
         for face in range(4 * i, 4 * i + 4):
@@ -193,9 +216,9 @@ class BroadPhase:
             self.solver.pairs.keep(p)
 
     @ti.func
-    def _count_spheres(self, i):
-        """Number of sphere pairs of body i with each neighbour that this search looks at."""
-        self.old.first_of[i] = self.contacts.first_of[i]
+    def _count_spheres(self, a):
+        """Number of sphere pairs of a rough body with each neighbour that this search looks at."""
+        i = self.rough[a]
         for k in range(self.near.first[i], self.near.last[i]):
             j = self.near.body[k]
             if self.looked[i] | self.looked[j] != 0:
@@ -244,19 +267,27 @@ class BroadPhase:
     @ti.func
     def _number_pairs(self, one):
         """Give the pairs that have spheres near, or an impulse waiting, a place in order."""
-        self.old.first_of[self.model.body_count] = self.contacts.pair_count[None]
+        for i in range(self.model.body_count + 1):
+            self.old.first_of[i] = self.contacts.first_of[i]
         self.contacts.pair_count[None] = 0
         self.contacts.pair_first[0] = 0
         for i in range(self.model.body_count):
             self.contacts.first_of[i] = self.contacts.pair_count[None]
-            old, last = self.old.first_of[i], self.old.first_of[i + 1]
-            for k in range(self.near.first[i], self.near.last[i]):
-                if self.near.spheres[k] > 0:
-                    j = self.near.body[k]
-                    old = self._number_waiting(i, old, last, j)
-                    self._number(i, j, self.near.broken[k], self.near.spheres[k])
-            self._number_waiting(i, old, last, self.model.body_count)
+            # A body without spheres is in no pair, now or before.
+            if self.contacts.rough[i] != 0:
+                self._number_of(i)
         self.contacts.first_of[self.model.body_count] = self.contacts.pair_count[None]
+
+    @ti.func
+    def _number_of(self, i):
+        """Number the pairs of which body i is the first."""
+        old, last = self.old.first_of[i], self.old.first_of[i + 1]
+        for k in range(self.near.first[i], self.near.last[i]):
+            if self.near.spheres[k] > 0:
+                j = self.near.body[k]
+                old = self._number_waiting(i, old, last, j)
+                self._number(i, j, self.near.broken[k], self.near.spheres[k])
+        self._number_waiting(i, old, last, self.model.body_count)
 
     @ti.func
     def _number_waiting(self, i, old, last, j):

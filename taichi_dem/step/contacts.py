@@ -20,14 +20,16 @@ class Contacts:
     first body takes it. pair_full[2 p + side]: 1 while something waits there; most pairs do not
     touch, and to ask is cheaper than to add zeros. first_of[i]: first pair whose first body is i;
     touch_first, touch: pairs whose second body is i. rough: bit f for a broken face f.
-    travel: bound of the way any point of a body went since the search [m]. search_due: 1 when the
-    list may miss a contact. deepest: overlap of a pair as
-    a share of the distance at which its spheres touch.
+    travel: bound of the way any point of a body went since it was last looked at [m]. ahead: steps
+    of a body by which its contacts are counted before they touch. search_due: 1 when the list may
+    miss one of them. deepest: overlap of a pair as a share of the distance at which its spheres
+    touch.
     """
 
-    def __init__(self, model, state):
+    def __init__(self, model, state, ahead=0.0):
         n, effect = model.body_count, model.contact
         self.model, self.state, self.law, self.friction = model, state, effect, model.friction
+        self.ahead = ahead
         self.capacity = n * effect.pairs_per_body + 64
         self.sphere_capacity = n * effect.spheres_per_body + 4096
         self.pair_count = ti.field(ti.i32, shape=())
@@ -108,5 +110,5 @@ class Contacts:
             speed = velocity.norm() + spin.norm() * self.model.radius[i]
             way = self.travel[i] + speed * elapsed
             self.travel[i] = way
-            if way > 0.5 * self.skin[None]:
+            if way + self.ahead * elapsed * speed > 0.5 * self.skin[None]:
                 self.search_due[None] = 1

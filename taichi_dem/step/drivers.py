@@ -15,6 +15,8 @@ from taichi_dem.step.wake import Wake
 #: A resident call is kept near this long [s], so that Ctrl-C, progress and health are prompt.
 CALL_SECONDS = 0.2
 _MAX_SUBSTEPS = 1 << 24
+#: Bit that a parallel substep adds to what it returns when a search is due.
+_SEARCH = 2
 
 
 @ti.data_oriented
@@ -38,11 +40,13 @@ class Step:
 
     A substep begins with the contacts of the present tick, whose bonds are evaluated already, and
     ends with the bonds of the next: between substeps the contact lists can be renewed.
+
+    search: the ``BroadPhase`` that does so, None for a scene without contact.
     """
 
-    def __init__(self, advance, schedule, contacts):
-        self.advance, self.schedule, self.contacts = advance, schedule, contacts
-        self.has_contact = contacts is not None
+    def __init__(self, advance, schedule, search):
+        self.advance, self.schedule, self.search = advance, schedule, search
+        self.has_contact = search is not None
         self.state = advance.state
         self.parts = self._parts()
         self.phases = self._phases()
@@ -98,10 +102,10 @@ class Step:
 
     @ti.func
     def halted(self):
-        """1 when the host must act: a contact search is due or a body left its bounds."""
+        """1 when the host must act: a body left its bounds, or a list its room."""
         halt = ti.cast(self.state.bad_body[None] < self.advance.model.body_count, ti.i32)
         if ti.static(self.has_contact):
-            halt |= self.contacts.search_due[None]
+            halt |= self.search.overflows()
         return halt
 
 
@@ -212,8 +216,8 @@ class Resident:
         self.step = step
         self.substeps = 64
 
-    def compile(self):
-        """Compile the kernel without stepping."""
+    def settle(self):
+        """Make the search that is due, without a step; compiles the kernel."""
         self._run(0, 0)
 
     def run(self, end_tick):
@@ -230,13 +234,19 @@ class Resident:
         done = 0
         low = ti.static(self.step.schedule.low)
         ti.loop_config(serialize=True)
-        for s in range(substeps):
+        for s in range(substeps + 1):
+            if ti.static(self.step.has_contact):
+                while self.step.search.due() == 1:
+                    for count, item in ti.static(self.step.search.phases):
+                        for a in range(count()):
+                            item(a)
+            finished = self.step.state.tick[None] >= end_tick or self.step.halted() == 1
+            if s == substeps or finished:
+                break
             for due, item in ti.static(self.step.phases):
                 for a in range(due.count(low[None])):
                     item(due.pick(a))
             done = s + 1
-            if self.step.state.tick[None] >= end_tick or self.step.halted() == 1:
-                break
         return done
 
 
@@ -249,8 +259,10 @@ class Parallel:
     def __init__(self, step):
         self.step = step
 
-    def compile(self):
-        """Nothing to do ahead: the kernel is compiled by its first substep."""
+    def settle(self):
+        """Make the search that is due, without a step."""
+        if self.step.has_contact:
+            self.step.search.renew()
 
     def run(self, end_tick):
         """Advance to a tick, to the next halt, or for about CALL_SECONDS."""
@@ -259,13 +271,15 @@ class Parallel:
             pass
 
     def _substep(self, end_tick):
-        """All parts of a substep; nonzero at the end or where the host must act."""
-        halt = 0
+        """All parts of a substep, and the search that is due; nonzero at the end or a halt."""
+        state = 0
         for part in range(len(self.step.parts)):
-            halt = self._run(part, end_tick)
+            state = self._run(part, end_tick)
             while self.step.repeats(part):
-                halt = self._run(part, end_tick)
-        return halt
+                state = self._run(part, end_tick)
+        if state & _SEARCH:
+            self.step.search.renew()
+        return state & ~_SEARCH
 
     @ti.kernel
     def _run(self, part: ti.template(), end_tick: ti.i64) -> ti.i32:
@@ -274,7 +288,10 @@ class Parallel:
             for a in range(due.count(low[None])):
                 item(due.pick(a))
         finished = ti.cast(self.step.state.tick[None] >= end_tick, ti.i32)
-        return finished | self.step.halted()
+        finished |= self.step.halted()
+        if ti.static(self.step.has_contact):
+            finished |= _SEARCH * self.step.search.due()
+        return finished
 
 
 #: Drivers by the name that users give.

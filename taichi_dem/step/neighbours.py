@@ -15,6 +15,8 @@ STALE, MAKING = 1, 2
 ROOM = 16
 #: Reach of the list in skins of the search: a longer list against fewer of them.
 REACH = 8.0
+#: Share of its skin that a body may use up before a search looks at it.
+FAR = 0.25
 
 
 @ti.data_oriented
@@ -24,10 +26,10 @@ class Neighbours:
     first[i] .. last[i]: those of body i, in body, with some room behind. faces: which of the two
     bodies' faces are near, bit 4 f + g for faces f and g; broken: which of these are broken too,
     and spheres: how many of their spheres are within the skin, for ``BroadPhase``. cluster: centre
-    of the ball around the spheres of a face, at the last search [m]. placed_at, turned_to: where a
-    body was when it was listed. gone: bodies that have left the list's reach since, whose entries
-    are made anew; a few fragments fly faster than all the rest. stale: STALE when all are. full: 1
-    when there is no room.
+    of the ball around the spheres of a face, where the body was last looked at [m]. placed_at,
+    turned_to: where a body was when it was listed. gone: bodies that have left the list's reach
+    since, left: 1 for them; their entries are made anew, as a few fragments fly faster than all
+    the rest. stale: STALE when all are. full: 1 when there is no room.
     """
 
     def __init__(self, contacts, brute_force=False):
@@ -46,21 +48,33 @@ class Neighbours:
         self.turned_to = ti.Matrix.field(3, 3, real, shape=n)
         self.gone = ti.field(ti.i32, shape=n)
         self.gone_count = ti.field(ti.i32, shape=())
+        self.left = ti.field(ti.i32, shape=n)
         self.stale = ti.field(ti.i32, shape=())
         self.full = ti.field(ti.i32, shape=())
         then(self.stale.fill, STALE)
 
     @ti.func
-    def place(self, i):
-        """Bring the clusters of body i to where it is, and see whether it left the list's reach."""
-        position, rotation = self.state.position[i], self.state.rotation[i]
-        for face in range(4 * i, 4 * i + 4):
-            self.cluster[face] = position + rotation @ self.model.cluster[face].xyz
+    def notice(self, i):
+        """See whether body i, which is looked at, has left the list's reach."""
         # No point of the body went further than this: a norm of a matrix bounds what it does.
-        way = (position - self.placed_at[i]).norm()
-        way += (rotation - self.turned_to[i]).norm() * self.model.radius[i]
-        if not way < 0.5 * (REACH - 1.0) * self.skin[None]:
+        way = (self.state.position[i] - self.placed_at[i]).norm()
+        way += (self.state.rotation[i] - self.turned_to[i]).norm() * self.model.radius[i]
+        # It goes on for FAR before it is looked at again; and each of two bodies may go from one
+        # end of its way to the other after one of them is listed anew.
+        if not way < (0.25 * (REACH - 1.0) - FAR) * self.skin[None]:
+            self.left[i] = 1
             self.gone[ti.atomic_add(self.gone_count[None], 1)] = i
+
+    @ti.func
+    def place(self, i):
+        """Note where the clusters of body i are."""
+        for face in range(4 * i, 4 * i + 4):
+            self.cluster[face] = self._middle(i, face)
+
+    @ti.func
+    def _middle(self, i, face):
+        """Centre of a face's cluster now [m]."""
+        return self.state.position[i] + self.state.rotation[i] @ self.model.cluster[face].xyz
 
     @ti.func
     def begin(self):
@@ -112,27 +126,21 @@ class Neighbours:
 
         A row without room leaves the list stale, to be made anew.
         """
-        if self._is_gone(i):
+        if self.left[i] == 1:
             self.last[i] = self.first[i]
             for j in range(i + 1, self.model.body_count):
                 self._add(i, j)
         else:
             end = self.first[i]
             for k in range(self.first[i], self.last[i]):
-                if not self._is_gone(self.body[k]):
-                    self._move(k, end)
+                if self.left[self.body[k]] == 0:
+                    if k != end:
+                        self._move(k, end)
                     end += 1
             self.last[i] = end
             for a in range(self.gone_count[None]):
                 if self.gone[a] > i:
                     self._add(i, self.gone[a])
-
-    @ti.func
-    def _is_gone(self, i):
-        found = False
-        for a in range(self.gone_count[None]):
-            found |= self.gone[a] == i
-        return found
 
     @ti.func
     def _add(self, i, j):
@@ -155,6 +163,7 @@ class Neighbours:
         """The list serves until a body has left its reach."""
         for a in range(self.gone_count[None]):
             self._listed(self.gone[a])
+            self.left[self.gone[a]] = 0
         self.gone_count[None] = 0
         if self.stale[None] == MAKING:
             self.stale[None] = ti.select(self.full[None] == 1, STALE, 0)
@@ -199,17 +208,21 @@ class Neighbours:
         reach = self.model.radius[i] + self.model.radius[j] + wide
         if (self.state.position[j] - self.state.position[i]).norm_sqr() < reach * reach:
             for f in range(4):
-                if self._cluster_near(4 * i + f, j, wide):
-                    for g in range(4):
-                        if self.clusters_near(4 * i + f, 4 * j + g, wide):
-                            faces |= 1 << (4 * f + g)
+                faces |= self._near_face(i, f, j, wide) << (4 * f)
         return faces
 
     @ti.func
-    def _cluster_near(self, face, j, wide):
-        """Whether the ball around the spheres of a face comes near the ball around a body."""
-        reach = self.model.cluster[face][3] + self.model.radius[j] + wide
-        return (self.state.position[j] - self.cluster[face]).norm_sqr() < reach * reach
+    def _near_face(self, i, f, j, wide):
+        """Which faces of body j, a bit each, come near face f of body i."""
+        faces, face = 0, 4 * i + f
+        middle, reach = self._middle(i, face), self.model.cluster[face][3] + wide
+        whole = reach + self.model.radius[j]
+        if (self.state.position[j] - middle).norm_sqr() < whole * whole:
+            for g in range(4):
+                other = reach + self.model.cluster[4 * j + g][3]
+                apart = self._middle(j, 4 * j + g) - middle
+                faces |= ti.cast(apart.norm_sqr() < other * other, ti.i32) << g
+        return faces
 
     @ti.func
     def clusters_near(self, face_i, face_j, wide):

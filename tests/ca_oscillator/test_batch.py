@@ -246,8 +246,10 @@ def test_time_left_and_stages():
     assert [progress.steps for progress in told] == [5, 10, 15, 20]
 
 
+# A shell that started the tests in the background may have left the signal ignored.
 _ENDLESS = """
-import sys, time
+import signal, time
+signal.signal(signal.SIGINT, signal.default_int_handler)
 from ca_damper import Batch, RigidMass, SceneTable, runtime
 runtime.start(threads=1)
 batch = Batch(RigidMass(), SceneTable(10, 1, 1e-4, [6.0] * 400, 0.6e-3))

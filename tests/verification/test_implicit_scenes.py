@@ -253,6 +253,8 @@ def test_one_fast_fragment_keeps_the_list_of_neighbours_right(implicit):
         turn[fragment] += [0.0, 0.03, 0.01, 0.02]
         turn[fragment] /= np.linalg.norm(turn[fragment])
         implicit.state.place(place, turn, still, still)
+        # What steps would have noted of its way.
+        simulation.contacts.travel[fragment] = 1e-2
         simulation.broad_phase.search(everywhere=False)
         assert neighbouring_faces(near) == near_faces(simulation, REACH * skin)
         assert set(listed(simulation)) == expected(simulation, skin)
