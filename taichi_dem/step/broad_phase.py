@@ -25,6 +25,8 @@ class BroadPhase:
     the bodies at which a search looks, all of them everywhere; searched: tick of the last one.
     """
 
+    scratch_fields = ("rough", "rough_count", "pair_faces", "looked", "sphere")
+
     def __init__(self, contacts, schedule, solver=None, brute_force=False, serial=False):
         n = contacts.model.body_count
         self.contacts, self.schedule = contacts, schedule

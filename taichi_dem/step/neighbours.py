@@ -30,6 +30,8 @@ class Neighbours:
     when there is no room.
     """
 
+    scratch_fields = ("cluster",)
+
     def __init__(self, contacts, brute_force=False):
         n = contacts.model.body_count
         self.model, self.state, self.skin = contacts.model, contacts.state, contacts.skin
