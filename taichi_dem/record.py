@@ -67,6 +67,12 @@ class Recorder:
         self.rows = []
         self.frames = []
 
+    def compile(self):
+        """Compile all that recording needs, so that nothing later keeps Ctrl-C waiting."""
+        self.sample()
+        self.snapshot()
+        self.rows, self.frames = [], []
+
     def sample(self):
         """Add a row to the time series."""
         sim = self.simulation

@@ -118,13 +118,13 @@ def simulate(
     simulation = Simulation(scene, method, driver)
     recorder = Recorder(simulation, _watched_group(scene))
     simulation.start()
+    recorder.compile()
     keeper = _keeper(simulation, recorder, checkpoint, resume, last)
     error = None
     try:
         with keeper:
-            _run(
-                simulation, recorder, keeper, _marks(last, samples), _marks(last, frames), progress
-            )
+            marks = _marks(last, samples), _marks(last, frames)
+            _run(simulation, recorder, keeper, marks, progress)
     except SimulationDiverged as diverged:
         error = diverged
     result = _result(scene, method, simulation, recorder, error)

@@ -109,6 +109,8 @@ class Simulation:
         self.watch = Watch(self.model, self.state, self.advance)
         self.watch.look(0.0)
         self.driver.compile()
+        self.health.check()
+        self.evaluations_ahead()
         self.compile_seconds += time.perf_counter() - started
 
     def advance_to(self, macro_step, on_call=None):
