@@ -22,7 +22,7 @@ from taichi_dem.checkpoint import version_text
 from taichi_dem.checks import choice, positive, whole
 from taichi_dem.errors import InputError
 from taichi_dem.fields import check_room
-from taichi_dem.restart import NoKeeper, Saved, keeper_of
+from taichi_dem.restart import Keeper, NoKeeper, Saved, opened
 
 MOUNTS = ("spring", "base")
 STARTS = ("rest", "empty", "rigid")
@@ -169,12 +169,17 @@ class Batch:
         """
         self._check_started()
 
-        def saved():
-            own = {"version": version_text(), "filling": repr(self.filling)}
-            return Saved({**own, **identity}, self, {"batch": self, **dict(parts)})
-
+        identity = {"filling": repr(self.filling), **identity}
+        if checkpoint is None and resume is None:
+            return self.keeper
+        identity["version"] = version_text()
+        arrays = opened(checkpoint, resume, lambda: identity)
         self._compile()
-        self.keeper = keeper_of(checkpoint, resume, saved, self._now)
+        saved = Saved(identity, self, {"batch": self, **dict(parts)})
+        if arrays:
+            saved.take(arrays, resume)
+        if checkpoint is not None:
+            self.keeper = Keeper(checkpoint, saved, self._now)
         return self.keeper
 
     def _now(self):

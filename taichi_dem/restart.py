@@ -32,9 +32,11 @@ class Saved:
             arrays.update({f"{part}/{name}": array for name, array in owner.saved().items()})
         write_checkpoint(path, self.identity, arrays)
 
-    def read(self, path):
-        """Put the run where it was saved. Raises InputError for what does not fit it."""
-        arrays = read_checkpoint(path, self.identity)
+    def take(self, arrays, path):
+        """Put the run where it was saved, with the arrays that ``opened`` gave for a path.
+
+        Raises InputError where the fields are not those of this run.
+        """
         missing = self.memory.misfit(_under("field", arrays))
         if missing:
             raise InputError(f"checkpoint {path} is of another version: field {missing} differs")
@@ -119,17 +121,12 @@ class NoKeeper:
         return ""
 
 
-def keeper_of(checkpoint, resume, saved, now):
-    """Put a run where the file ``resume`` has it, unless None, and return what saves it on.
+def opened(checkpoint, resume, identity):
+    """Look, before anything dear is done, whether a run can be saved and gone on with.
 
-    checkpoint: a Checkpoint or None. saved: gives the ``Saved``, asked if there is need.
-    Raises InputError for a checkpoint that is none, and for a file that does not fit the run.
+    checkpoint: a Checkpoint or None. resume: file to go on from, or None. identity: gives that of
+    the run. Returns the arrays of the file, None without. Raises InputError.
     """
     if checkpoint is not None and not isinstance(checkpoint, Checkpoint):
         raise InputError(f"checkpoint must be a Checkpoint or None, got {checkpoint!r}")
-    if checkpoint is None and resume is None:
-        return NoKeeper()
-    run = saved()
-    if resume is not None:
-        run.read(resume)
-    return Keeper(checkpoint, run, now) if checkpoint is not None else NoKeeper()
+    return None if resume is None else read_checkpoint(resume, identity())

@@ -15,7 +15,7 @@ from taichi_dem.record import (
     Recorder,
     write_paraview,
 )
-from taichi_dem.restart import Saved, keeper_of
+from taichi_dem.restart import Keeper, NoKeeper, Saved, opened
 from taichi_dem.simulation import Simulation, macro_steps
 from taichi_dem.timeline import MACRO_TICKS
 
@@ -115,11 +115,12 @@ def simulate(
     last = macro_steps(until, method.dt0)
     _check_count("samples", samples, 1)
     _check_count("frames", frames, 0)
+    arrays = _opened(scene, method, checkpoint, resume, last)
     simulation = Simulation(scene, method, driver)
     recorder = Recorder(simulation, _watched_group(scene))
     simulation.start()
     recorder.compile()
-    keeper = _keeper(simulation, recorder, checkpoint, resume, last)
+    keeper = _keeper(simulation, recorder, checkpoint, resume, arrays)
     error = None
     try:
         with keeper:
@@ -136,28 +137,42 @@ def simulate(
     return result
 
 
-def _keeper(simulation, recorder, checkpoint, resume, last):
-    """What saves the run, after the run has been put where it was saved."""
+def _opened(scene, method, checkpoint, resume, last):
+    """What a run goes on from, arrays by name, or None; InputError for what it cannot."""
+    arrays = opened(checkpoint, resume, lambda: identity_of(scene, method))
+    begin = int(arrays["field/state.tick"]) if arrays else 0
+    if begin > last * MACRO_TICKS:
+        seconds = method.dt0 / MACRO_TICKS
+        raise InputError(
+            f"until must be at least {begin * seconds:.6g} s, where {resume} begins, "
+            f"got {last * method.dt0:.6g}"
+        )
+    return arrays
 
-    def saved():
-        parts = {
-            "simulation": simulation,
-            "ledger": simulation.ledger,
-            "watch": simulation.watch,
-            "recorder": recorder,
-        }
-        return Saved(identity_of(simulation.scene, simulation.method), simulation, parts)
+
+def _keeper(simulation, recorder, checkpoint, resume, arrays):
+    """What saves the run, after the run has been put where it was saved."""
+    if checkpoint is None and resume is None:
+        return NoKeeper()
+    saved = saved_run(simulation, recorder)
+    if arrays:
+        saved.take(arrays, resume)
 
     def now():
         return simulation.state.tick[None] // MACRO_TICKS, simulation.time_s
 
-    keeper = keeper_of(checkpoint, resume, saved, now)
-    if simulation.state.tick[None] > last * MACRO_TICKS:
-        raise InputError(
-            f"until must be at least {simulation.time_s:.6g} s, where {resume} begins, "
-            f"got {last * simulation.method.dt0:.6g}"
-        )
-    return keeper
+    return Keeper(checkpoint, saved, now) if checkpoint is not None else NoKeeper()
+
+
+def saved_run(simulation, recorder):
+    """All that a checkpoint holds of a started simulation, a ``restart.Saved``."""
+    parts = {
+        "simulation": simulation,
+        "ledger": simulation.ledger,
+        "watch": simulation.watch,
+        "recorder": recorder,
+    }
+    return Saved(identity_of(simulation.scene, simulation.method), simulation, parts)
 
 
 def identity_of(scene, method):
