@@ -4,6 +4,7 @@ A launch takes every scene the same share of its way and lasts about a sixth of 
 Ctrl-C, progress and the look at diverged scenes are prompt.
 """
 
+import contextlib
 import time
 
 import numpy as np
@@ -159,8 +160,9 @@ class Batch:
         """Steps that RK45 has tried since the start, (scenes,); one a step unless some failed."""
         return self.coupling.attempts.to_numpy()
 
+    @contextlib.contextmanager
     def keep(self, checkpoint, resume, identity, parts=()):
-        """Let the runs that follow save themselves; returns the keeper, whose block they need.
+        """Let the runs in its block save themselves; gives what saves them.
 
         checkpoint: a Checkpoint or None. resume: file to go on from, or None: the run that it was
         saved in is then to be called for again, and goes on. identity: words by name that a file
@@ -168,19 +170,17 @@ class Batch:
         Raises InputError.
         """
         self._check_started()
-
-        identity = {"filling": repr(self.filling), **identity}
-        if checkpoint is None and resume is None:
-            return self.keeper
-        identity["version"] = version_text()
-        arrays = opened(checkpoint, resume, lambda: identity)
+        own = {"version": version_text(), "filling": repr(self.filling)}
+        arrays = opened(checkpoint, resume, lambda: {**own, **identity})
         self._compile()
-        saved = Saved(identity, self, {"batch": self, **dict(parts)})
+        saved = Saved({**own, **identity}, self, {"batch": self, **dict(parts)})
         if arrays:
             saved.take(arrays, resume)
-        if checkpoint is not None:
-            self.keeper = Keeper(checkpoint, saved, self._now)
-        return self.keeper
+        with Keeper(checkpoint, saved, self._now) if checkpoint else NoKeeper() as self.keeper:
+            try:
+                yield self.keeper
+            finally:
+                self.keeper = NoKeeper()
 
     def _now(self):
         """Mean step and time [s] of the scenes."""
@@ -281,9 +281,7 @@ class Batch:
             self._aim(steps, before_measuring)
         self.going_on = False
         self._compile()
-        self._launch_until_done(max(1, int(steps.sum())), progress)
-        self.scene_steps += int(steps.sum())
-        self.particle_steps += int((self.table.column("particles") * steps).sum())
+        self._launch_until_done(steps, progress)
 
     def _aim(self, steps, before_measuring):
         """Say how far every scene is to go."""
@@ -303,19 +301,26 @@ class Batch:
             self.compile_seconds += time.perf_counter() - started
             self._compiled = True
 
-    def _launch_until_done(self, total, progress):
-        while True:
-            started = time.perf_counter()
+    def _launch_until_done(self, steps, progress):
+        """Launch, tell and save; a run that was saved at its end is told and saved once more."""
+        total, done = max(1, int(steps.sum())), -1.0
+        while done < 1.0:
+            done, started = self._done, time.perf_counter()
             try:
-                self._done = self._launch(self._done, total)
+                self._done = self._launch(done, total)
             finally:
                 self._seconds += time.perf_counter() - started
                 self.run_seconds += time.perf_counter() - started
+            if done < 1.0 == self._done:
+                self._count(steps)
             if progress is not None:
                 progress(Progress(self._done, self._seconds, round(self._done * total)))
             self.keeper.look()
-            if self._done == 1.0:
-                break
+            done = self._done
+
+    def _count(self, steps):
+        self.scene_steps += int(steps.sum())
+        self.particle_steps += int((self.table.column("particles") * steps).sum())
 
     def _launch(self, done, total):
         """One launch from a share of the way, total scene-steps long; returns the share reached."""

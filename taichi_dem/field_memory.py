@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 import taichi as ti
 from taichi.lang import impl
+from taichi.lang.matrix import MatrixField
+from taichi.lang.struct import StructField
 from taichi.lang.util import to_numpy_type
 
 #: What is looked into for fields: all objects but those of these libraries.
@@ -35,7 +37,7 @@ def fields_of(root):
         name, kind, thing = ahead.pop(0)
         if id(thing) not in seen:
             seen.add(id(thing))
-            if isinstance(thing, ti.Field):
+            if isinstance(thing, ti.Field) and not isinstance(thing, StructField):
                 found.append(FieldOf(name[1:], thing, kind))
             else:
                 ahead += [(f"{name}.{key}", *rest) for key, *rest in _members(thing, kind)]
@@ -44,6 +46,8 @@ def fields_of(root):
 
 def _members(thing, kind):
     """What hangs on an object, as (name, kind of a field there, member)."""
+    if isinstance(thing, StructField):
+        thing = thing.field_dict
     if isinstance(thing, dict):
         return [(key, kind, member) for key, member in thing.items()]
     if isinstance(thing, (list, tuple)):
@@ -71,16 +75,17 @@ class FieldMemory:
     def __init__(self, root, kind="saved"):
         kept = [one for one in fields_of(root) if one.kind == kind]
         self.fields = {one.name: one.field for one in kept}
-        self.views = None
+        self.views = {}
         if impl.current_cfg().arch != ti.cuda:
-            self.views = dict(zip(self.fields, _views(list(self.fields.values()))))
+            self.views = _views(self.fields)
 
     def read(self):
         """Copies of all fields as arrays by name, without the zeros at their ends."""
         ti.sync()
-        if self.views is None:
-            return {name: without_end(f.to_numpy()) for name, f in self.fields.items()}
-        return {name: without_end(view).copy() for name, view in self.views.items()}
+        return {name: without_end(self._whole(name)).copy() for name in self.fields}
+
+    def _whole(self, name):
+        return self.views[name] if name in self.views else self.fields[name].to_numpy()
 
     def misfit(self, arrays):
         """Name of a field that arrays, as ``read`` gave them, lack or do not fit; else ""."""
@@ -98,10 +103,10 @@ class FieldMemory:
         for name, field in self.fields.items():
             whole = np.zeros(_shape(field), arrays[name].dtype)
             whole[slice(len(arrays[name])) if whole.ndim else ()] = arrays[name]
-            if self.views is None:
-                field.from_numpy(whole)
-            else:
+            if name in self.views:
                 self.views[name][...] = whole
+            else:
+                field.from_numpy(whole)
 
 
 def without_end(array):
@@ -115,38 +120,47 @@ def without_end(array):
 def _shape(field):
     """Shape of a field as an array."""
     entry = ()
-    if isinstance(field, ti.lang.matrix.MatrixField):
+    if isinstance(field, MatrixField):
         entry = (field.n,) if field.ndim == 1 else (field.n, field.m)
     return (*field.shape, *entry)
 
 
 def _views(fields):
-    """Arrays that lie where the fields do; entries of a field lie side by side, row by row."""
-    found = []
-    for field, address in zip(fields, _addresses(fields)):
+    """Arrays by name that lie where the fields do, of those whose entries lie side by side."""
+    found = {}
+    for (name, field), (first, last) in zip(fields.items(), _addresses(fields.values())):
         kind, shape = np.dtype(to_numpy_type(field.dtype)), _shape(field)
         size = int(np.prod(shape, dtype=np.int64)) * kind.itemsize
-        memory = (ctypes.c_char * size).from_address(int(address))
-        found.append(np.frombuffer(memory, dtype=kind).reshape(shape))
+        if last - first + kind.itemsize == size:
+            memory = (ctypes.c_char * size).from_address(first)
+            found[name] = np.frombuffer(memory, dtype=kind).reshape(shape)
     return found
 
 
 def _addresses(fields):
-    """Addresses of the first entries of fields, (n,)."""
-    first = []
-    for place, field in enumerate(fields):
-        if isinstance(field, ti.lang.matrix.MatrixField):
-            field = field.get_scalar_field(*([0] * field.ndim))
-        first.append((place, field, [0] * len(field.shape)))
-    parts = tuple(tuple(first[k : k + _UNROLLED]) for k in range(0, len(first), _UNROLLED))
+    """Addresses of the first number of each field and of its last, as a list of pairs."""
+    asked = []
+    for field in fields:
+        ends = [0] * len(field.shape), [length - 1 for length in field.shape]
+        parts = (field, field)
+        if isinstance(field, MatrixField):
+            parts = [field.get_scalar_field(*place) for place in _corners(field)]
+        asked += list(zip(parts, ends))
+    numbered = [(place, *end) for place, end in enumerate(asked)]
+    groups = [tuple(numbered[k : k + _UNROLLED]) for k in range(0, len(asked), _UNROLLED)]
 
     @ti.kernel
     def ask(found: ti.types.ndarray(dtype=ti.u64, ndim=1)):
         for _ in range(1):
-            for part in ti.static(parts):
-                for place, field, index in ti.static(part):
+            for group in ti.static(tuple(groups)):
+                for place, field, index in ti.static(group):
                     found[place] = ti.get_addr(field, index)
 
-    found = np.zeros(len(fields), dtype=np.uint64)
+    found = np.zeros(len(asked), dtype=np.uint64)
     ask(found)
-    return found
+    return found.reshape(-1, 2).tolist()
+
+
+def _corners(field):
+    """Places of the first and the last component of a matrix or vector field."""
+    return ((0,), (field.n - 1,)) if field.ndim == 1 else ((0, 0), (field.n - 1, field.m - 1))

@@ -30,8 +30,9 @@ ODD = 5
 
 
 def every_field():
-    """All fields that exist, but for parts and derivatives of others, by id."""
-    found = {id(thing): thing for thing in gc.get_objects() if isinstance(thing, ti.Field)}
+    """All fields that exist, but for structs, parts and derivatives of others, by id."""
+    fields = [thing for thing in gc.get_objects() if isinstance(thing, ti.Field)]
+    found = {id(f): f for f in fields if not isinstance(f, ti.lang.struct.StructField)}
     for field in list(found.values()):
         parts = field.vars if isinstance(field, ti.lang.matrix.MatrixField) else ()
         for part in (*parts, field.grad, field.dual):

@@ -198,6 +198,13 @@ def test_without_end_cuts_zeros_of_all_bits():
     assert without_end(np.array(0.0)).shape == ()
 
 
+@ti.dataclass
+class Grain:
+    size: ti.f64
+    place: ti.types.vector(2, ti.f64)
+    kind: ti.i32
+
+
 class Part:
     """Fields of every kind, one of them in a list, and parts that know each other."""
 
@@ -210,6 +217,8 @@ class Part:
         self.matrix = ti.Matrix.field(3, 2, ti.f64, shape=4)
         self.record = ti.field(ti.f64, shape=(2, 3, 4))
         self.vector = ti.Vector.field(3, ti.f64, shape=5)
+        # Its members do not lie side by side.
+        self.grain = Grain.field(shape=6)
         self.whole = whole
         self.method = (whole or self).look
 
@@ -222,6 +231,7 @@ def test_fields_are_found_wherever_they_hang():
     found = {one.name: one.kind for one in fields_of(inner)}
     own = {"mass": "constant", "spare": "scratch", "listed.0": "saved", "listed.1.deep": "saved"}
     own.update(matrix="saved", record="saved", vector="saved")
+    own.update({f"grain.{name}": "saved" for name in ("size", "place", "kind")})
     assert found == {**own, **{f"whole.{name}": kind for name, kind in own.items()}}
 
 
@@ -237,6 +247,7 @@ def test_field_memory_reads_and_writes_what_taichi_does():
     read = memory.read()
     assert set(read) == set(first)
     assert memory.misfit(read) == ""
+    assert set(read) - set(memory.views) == {"grain.size", "grain.place", "grain.kind"}
     for name, field in fields.items():
         assert np.array_equal(read[name], first[name])
         field.fill(7)
