@@ -12,7 +12,7 @@ from importlib.metadata import version
 
 from taichi_dem import Checkpoint, InputError, SimulationDiverged, runtime
 from taichi_dem.checkpoint import Interrupted
-from taichi_dem.files import output_folder, write_text
+from taichi_dem.files import write_text
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 _INTERVALS = {
@@ -130,7 +130,7 @@ def checkpoint_of(options, name="checkpoint"):
 
     A job saves itself on Ctrl-C and at its end in any case.
     """
-    path = os.path.join(output_folder(options.out), f"{name}.npz")
+    path = os.path.join(options.out, f"{name}.npz")
     checkpoint = Checkpoint(**{**options.checkpoint_every, "path": path})
     return {"checkpoint": checkpoint, "resume": path if options.resume else None}
 

@@ -115,8 +115,8 @@ def run(options):
         if getattr(options, name) is None:
             setattr(options, name, value)
     chosen = chosen_fillings(options.fillings)
-    output_folder(options.out)
     check_resume(options)
+    output_folder(options.out)
     measured = {label: measure(filling, options) for label, filling in chosen.items()}
     write_tables(measured, options.out)
     picture_all(measured, options.out)

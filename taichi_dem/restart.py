@@ -12,6 +12,7 @@ from taichi_dem.checkpoint import (
 )
 from taichi_dem.errors import InputError
 from taichi_dem.field_memory import FieldMemory
+from taichi_dem.files import output_folder
 
 
 class Saved:
@@ -129,4 +130,7 @@ def opened(checkpoint, resume, identity):
     """
     if checkpoint is not None and not isinstance(checkpoint, Checkpoint):
         raise InputError(f"checkpoint must be a Checkpoint or None, got {checkpoint!r}")
-    return None if resume is None else read_checkpoint(resume, identity())
+    arrays = None if resume is None else read_checkpoint(resume, identity())
+    if checkpoint is not None:
+        output_folder(os.path.dirname(os.path.abspath(checkpoint.path)))
+    return arrays

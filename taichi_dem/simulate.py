@@ -110,12 +110,12 @@ def simulate(
     Raises InputError for bad arguments, SimulationDiverged when the run leaves its bounds,
     Interrupted when Ctrl-C has saved the run.
     """
-    if output is not None:
-        output_folder(output)
     last = macro_steps(until, method.dt0)
     _check_count("samples", samples, 1)
     _check_count("frames", frames, 0)
     arrays = _opened(scene, method, checkpoint, resume, last)
+    if output is not None:
+        output_folder(output)
     simulation = Simulation(scene, method, driver)
     recorder = Recorder(simulation, _watched_group(scene))
     simulation.start()

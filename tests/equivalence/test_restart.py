@@ -148,10 +148,9 @@ def test_a_resumed_run_has_the_bits_of_a_straight_one(run, straight):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("run", ["uniform"], indirect=True)
 def test_a_killed_run_resumes_to_the_same_bits(run, straight, tmp_path):
     """kill -9 twice, at random moments after a checkpoint; then on in this process."""
-    if run.simulation.method != METHODS["uniform"]:
-        pytest.skip("the uniform run alone takes long enough to be killed on its way")
     path, moments = tmp_path / "run.npz", random.Random(6)
     for resume in (None, path):
         kill_after_checkpoint(path, resume, moments.uniform(0.0, 0.3))
