@@ -102,6 +102,30 @@ def run(request):
     return Run(METHODS[request.param])
 
 
+@pytest.fixture(scope="module")
+def foretold(run):
+    """Evaluations of a largest step at the start, as expected from the levels and as made."""
+    run.simulation.advance_to(2)
+    expected, before = run.simulation.evaluations_ahead(), run.simulation.evaluations()
+    run.simulation.advance_to(3)
+    return expected * run.simulation.method.dt0, run.simulation.evaluations() - before
+
+
+def test_time_left_weighs_each_level_by_its_steps(run, foretold):
+    """A bond at level k is evaluated 2^k times a largest step; sweeps vary from step to step.
+
+    The expected number is within 3 eps of a whole one: a division and a product.
+    """
+    expected, made = foretold
+    bonds = run.simulation.model.bond_count
+    if run.simulation.solves:
+        fewest, most = run.simulation.method.sweeps
+        assert (1 + fewest) * bonds <= expected <= (1 + most) * bonds
+    else:
+        assert made >= 2 * bonds
+        assert expected == pytest.approx(made, rel=3 * np.finfo(float).eps)
+
+
 def test_every_field_is_found(run):
     """What is found is saved unless its class says why not: nobody has to remember it."""
     found = {id(one.field) for one in fields_of(run.simulation)}
@@ -110,7 +134,7 @@ def test_every_field_is_found(run):
 
 
 @pytest.fixture(scope="module")
-def straight(run, tmp_path_factory):
+def straight(run, foretold, tmp_path_factory):
     """Checkpoint on the way, what the run came to, and what its constant fields were before."""
     constant = FieldMemory(run.simulation, "constant")
     before, path = constant.read(), tmp_path_factory.mktemp("saved") / "run.npz"
@@ -213,6 +237,25 @@ def test_simulate_goes_on_to_a_later_time(light, tmp_path):
     assert len(rest.frames) == 5 - 1
     assert np.array_equal(rest.frames[-1].position, whole.frames[-1].position)
     assert rest.history["kinetic_J"][-1] == whole.history["kinetic_J"][-1]
+
+
+def test_a_full_disk_at_the_end_names_the_checkpoint(light, tmp_path, monkeypatch):
+    """The last good output stays: the run is saved before anything is written."""
+    path, job = light
+
+    def full(name, columns):
+        raise InputError(f"cannot write {name}: No space left on device")
+
+    monkeypatch.setattr(sys.modules["taichi_dem.simulate"], "write_csv", full)
+    keep = Checkpoint(tmp_path / "run.npz")
+    words = (
+        r"history.csv: No space left on device; checkpoint .*run.npz holds the run at t = 5e-06 s"
+    )
+    with pytest.raises(InputError, match=words):
+        simulate(
+            light_scene(), until=5e-6, resume=path, checkpoint=keep, output=tmp_path / "out", **job
+        )
+    assert os.listdir(tmp_path / "out") == []
 
 
 @pytest.mark.parametrize(
