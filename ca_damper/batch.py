@@ -4,6 +4,7 @@ A launch takes every scene the same share of its way and lasts about a sixth of 
 Ctrl-C, progress and the look at diverged scenes are prompt.
 """
 
+import contextlib
 import time
 
 import numpy as np
@@ -18,9 +19,11 @@ from ca_damper.oscillator import Oscillator
 from ca_damper.progress import Progress
 from ca_damper.report import RK45_STAGES, Report
 from taichi_dem import runtime
+from taichi_dem.checkpoint import version_text
 from taichi_dem.checks import choice, positive, whole
 from taichi_dem.errors import InputError
 from taichi_dem.fields import check_room
+from taichi_dem.restart import Keeper, NoKeeper, Saved, opened
 
 MOUNTS = ("spring", "base")
 STARTS = ("rest", "empty", "rigid")
@@ -72,6 +75,9 @@ class Batch:
         # Scene-steps a launch; one each to begin with, as nobody knows yet what a step costs.
         self._pace = float(self.count)
         self._compiled = self._started = False
+        # Of the present run: share done and seconds it took; whether it goes on from a checkpoint.
+        self._done, self._seconds, self.going_on = 0.0, 0.0, False
+        self.keeper = NoKeeper()
 
     def start(self, start="rest"):
         """Place the particles anew and begin at time zero, the base passing upwards through zero.
@@ -106,7 +112,9 @@ class Batch:
         """
         transient = whole("transient_cycles", transient_cycles, 0, 10_000_000)
         measured = whole("measured_cycles", measured_cycles, 0, self.measured_cycles)
-        self._check_cycle_is_full()
+        self._check_started()
+        if not self.going_on:
+            self._check_cycle_is_full()
         steps = self.steps_per_cycle.astype(np.int64)
         self._go((transient + measured) * steps, transient * steps, progress)
         record = np.empty((self.count, measured, len(measures.COLUMNS)))
@@ -151,6 +159,51 @@ class Batch:
     def attempts(self):
         """Steps that RK45 has tried since the start, (scenes,); one a step unless some failed."""
         return self.coupling.attempts.to_numpy()
+
+    @contextlib.contextmanager
+    def keep(self, checkpoint, resume, identity, parts=()):
+        """Let the runs in its block save themselves; gives what saves them.
+
+        checkpoint: a Checkpoint or None. resume: file to go on from, or None: the run that it was
+        saved in is then to be called for again, and goes on. identity: words by name that a file
+        must share; parts: (name, part) of what else goes into it, as in ``restart.Saved``.
+        Raises InputError.
+        """
+        self._check_started()
+        own = {"version": version_text(), "filling": repr(self.filling)}
+        arrays = opened(checkpoint, resume, lambda: {**own, **identity})
+        self._compile()
+        saved = Saved({**own, **identity}, self, {"batch": self, **dict(parts)})
+        if arrays:
+            saved.take(arrays, resume)
+        with Keeper(checkpoint, saved, self._now) if checkpoint else NoKeeper() as self.keeper:
+            try:
+                yield self.keeper
+            finally:
+                self.keeper = NoKeeper()
+
+    def _now(self):
+        """Mean step and time [s] of the scenes."""
+        return int(self._look()[0].mean()), float(self.time_s.mean())
+
+    def saved(self):
+        """What a checkpoint holds of it beside the fields, arrays by name."""
+        pace = [self.table.column(name) for name in ("frequency", "dt")]
+        return {
+            "run": np.array([self._done, self._seconds, self.run_seconds]),
+            "steps": np.array([self.scene_steps, self.particle_steps]),
+            "pace": np.stack([*pace, self.time_origin]),
+            "steps_per_cycle": self.steps_per_cycle,
+        }
+
+    def resume(self, saved):
+        """Take over what ``saved`` gave."""
+        self._done, self._seconds, self.run_seconds = saved["run"].tolist()
+        self.scene_steps, self.particle_steps = saved["steps"].tolist()
+        frequency, dt, self.time_origin = saved["pace"].copy()
+        self.steps_per_cycle = saved["steps_per_cycle"]
+        self._set_pace(frequency, dt)
+        self.going_on = True
 
     def report(self):
         """What was done and what it cost, as a ``report.Report``."""
@@ -224,30 +277,50 @@ class Batch:
 
     def _go(self, steps, before_measuring, progress):
         """Take every scene a number of steps on, in launches of bounded length."""
+        if not self.going_on:
+            self._aim(steps, before_measuring)
+        self.going_on = False
+        self._compile()
+        self._launch_until_done(steps, progress)
+
+    def _aim(self, steps, before_measuring):
+        """Say how far every scene is to go."""
         begin = self._look()[0].astype(np.int64)
         if (begin + steps).max() > _MOST_STEPS:
             raise InputError(f"steps since the start must stay below {_MOST_STEPS}: run fewer")
         order = dealt((1 + self.table.column("particles")) * steps, runtime.settings().threads)
         plan = np.stack([begin, begin + steps, begin + before_measuring, order])
         self.coupling.aim(plan.astype(np.int32))
+        self._done = self._seconds = 0.0
+
+    def _compile(self):
+        """Compile the launch without stepping."""
         if not self._compiled:
             started = time.perf_counter()
             self.coupling.advance(0.0)
             self.compile_seconds += time.perf_counter() - started
             self._compiled = True
-        self._launch_until_done(max(1, int(steps.sum())), progress)
+
+    def _launch_until_done(self, steps, progress):
+        """Launch, tell and save; a run that was saved at its end is told and saved once more."""
+        total, done = max(1, int(steps.sum())), -1.0
+        while done < 1.0:
+            done, started = self._done, time.perf_counter()
+            try:
+                self._done = self._launch(done, total)
+            finally:
+                self._seconds += time.perf_counter() - started
+                self.run_seconds += time.perf_counter() - started
+            if done < 1.0 == self._done:
+                self._count(steps)
+            if progress is not None:
+                progress(Progress(self._done, self._seconds, round(self._done * total)))
+            self.keeper.look()
+            done = self._done
+
+    def _count(self, steps):
         self.scene_steps += int(steps.sum())
         self.particle_steps += int((self.table.column("particles") * steps).sum())
-
-    def _launch_until_done(self, total, progress):
-        done, started = 0.0, time.perf_counter()
-        try:
-            while done < 1.0:
-                done = self._launch(done, total)
-                if progress is not None:
-                    progress(Progress(done, time.perf_counter() - started, round(done * total)))
-        finally:
-            self.run_seconds += time.perf_counter() - started
 
     def _launch(self, done, total):
         """One launch from a share of the way, total scene-steps long; returns the share reached."""

@@ -94,6 +94,8 @@ def frequency_response(
     measured_cycles=20,
     start="rest",
     progress=None,
+    checkpoint=None,
+    resume=None,
 ):
     """Response curves of a filling, all scenes in one batch; returns a Response.
 
@@ -101,13 +103,18 @@ def frequency_response(
     container. seeds: how many, counted from 1, or the seeds themselves. oscillator: the primary
     structure, the paper's if None. dt: largest step [s], the filling's own if None.
     start: the container's motion at the beginning, see ``Batch.start``. progress: called with a
-    ``batch.Progress`` about six times a second.
+    ``batch.Progress`` about six times a second. checkpoint: a Checkpoint that says where and when
+    the run saves itself, besides at its end and on Ctrl-C. resume: such a file to go on from; the
+    bits are those of a run that was never stopped.
     Raises InputError for what cannot be used, SimulationDiverged.
     """
     grid = Grid(filling, particles, ratios, seeds, oscillator, dt)
     batch = grid.batch(grid.ratios, measured_cycles)
     batch.start(start)
-    cycles = batch.run(transient_cycles, measured_cycles, progress)
+    job = f"response, {grid.words()}, {transient_cycles} + {measured_cycles} cycles from {start}"
+    with batch.keep(checkpoint, resume, {"job": job}) as keeper:
+        cycles = batch.run(transient_cycles, measured_cycles, progress)
+        keeper.keep()
     shape = grid.shape
     steps = batch.steps_per_cycle.reshape(shape)[0, :, 0]
     values = {name: value.reshape(shape) for name, value in grid.measures(cycles).items()}
@@ -131,6 +138,14 @@ class Grid:
 
     def _particles(self, name, value):
         return whole(name, value, 0, self.filling.capacity)
+
+    def words(self):
+        """What is run, but for the filling, in words."""
+        ratios = self.ratios.tolist()
+        return (
+            f"particles {self.particles}, ratios {ratios}, seeds {self.seeds}, dt {self.dt}, "
+            f"{self.oscillator}"
+        )
 
     @property
     def shape(self):

@@ -37,6 +37,8 @@ def sweep_up_and_down(
     measured_cycles=20,
     start="rest",
     progress=None,
+    checkpoint=None,
+    resume=None,
 ):
     """Go up through the ratios and down again without a new start; returns a Sweep.
 
@@ -46,14 +48,51 @@ def sweep_up_and_down(
     grid = Grid(filling, particles, ratios, seeds, oscillator, dt)
     batch = grid.batch(grid.ratios[:1], measured_cycles)
     batch.start(start)
-    way = [*range(len(grid.ratios)), *reversed(range(len(grid.ratios)))]
-    up, down = _Collected(grid), _Collected(grid)
-    tell = Stages(progress, (np.arange(len(way)) + 1.0) / len(way))
-    for stage, k in enumerate(way):
-        batch.drive(grid.ratios[k] * grid.oscillator.natural_frequency)
-        cycles = batch.run(transient_cycles, measured_cycles, tell)
-        (up if stage < len(grid.ratios) else down).keep(k, batch, cycles)
-    return Sweep(up.response(), down.response())
+    way = _Way(grid)
+    job = f"sweep, {grid.words()}, {transient_cycles} + {measured_cycles} cycles from {start}"
+    with batch.keep(checkpoint, resume, {"job": job}, way.parts()) as keeper:
+        tell = Stages(progress, way.ends())
+        for k in way.ahead():
+            if not batch.going_on:
+                batch.drive(grid.ratios[k] * grid.oscillator.natural_frequency)
+            cycles = batch.run(transient_cycles, measured_cycles, tell)
+            way.keep(k, batch, cycles)
+        keeper.keep()
+    return Sweep(way.up.response(), way.down.response())
+
+
+class _Way:
+    """The ratios of a sweep, up and down, and how many of them are done."""
+
+    def __init__(self, grid):
+        self.up, self.down, self.done = _Collected(grid), _Collected(grid), 0
+        self.count = len(grid.ratios)
+
+    def parts(self):
+        """What a checkpoint holds of it."""
+        return ("way", self), ("up", self.up), ("down", self.down)
+
+    def ends(self):
+        """Shares of what was ahead at which each ratio that was not done ends."""
+        ahead = 2 * self.count - self.done
+        return (np.arange(ahead) + 1.0) / max(1, ahead)
+
+    def ahead(self):
+        """Numbers of the ratios that are not done, in order."""
+        return [*range(self.count), *reversed(range(self.count))][self.done :]
+
+    def keep(self, k, batch, cycles):
+        """Take what was measured at ratio number k."""
+        (self.up if self.done < self.count else self.down).keep(k, batch, cycles)
+        self.done += 1
+
+    def saved(self):
+        """What a checkpoint holds of it, arrays by name."""
+        return {"done": np.array(self.done)}
+
+    def resume(self, saved):
+        """Take over what ``saved`` gave."""
+        self.done = int(saved["done"])
 
 
 class _Collected:
@@ -70,6 +109,15 @@ class _Collected:
         self.steps[k] = batch.steps_per_cycle[0]
         for name, value in self.grid.measures(cycles).items():
             self.values[name][:, k] = value.reshape(particles, seeds)
+
+    def saved(self):
+        """What a checkpoint holds of it, arrays by name."""
+        return {"steps": self.steps, **self.values}
+
+    def resume(self, saved):
+        """Take over what ``saved`` gave."""
+        self.steps = saved["steps"]
+        self.values = {name: saved[name] for name in UNITS}
 
     def response(self):
         """All of them."""

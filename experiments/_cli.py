@@ -5,14 +5,22 @@ import json
 import math
 import os
 import platform
+import re
 import subprocess
 import sys
 from importlib.metadata import version
 
-from taichi_dem import InputError, SimulationDiverged, runtime
+from taichi_dem import Checkpoint, InputError, SimulationDiverged, runtime
+from taichi_dem.checkpoint import Interrupted
 from taichi_dem.files import write_text
 
 HERE = os.path.dirname(os.path.abspath(__file__))
+_INTERVALS = {
+    "": "every_wall_s",
+    "s": "every_wall_s",
+    "steps": "every_steps",
+    "sim": "every_s",
+}
 BLAST_DRIVERS = ("auto", "resident", "parallel")
 PAPER_BLOCK = os.path.join(HERE, "meshes", "paper_block.msh")
 
@@ -61,6 +69,20 @@ def whole(low, high):
     return parse
 
 
+def interval(text):
+    """Type of an option that says how often: 600s on the wall, 5000steps, or 1e-5sim seconds."""
+    found = re.fullmatch(r"([0-9.]+(?:[eE][-+]?[0-9]+)?)(s|steps|sim|)", text)
+    try:
+        unit = _INTERVALS[found[2]]
+        value = int(found[1]) if unit == "every_steps" else float(found[1])
+        Checkpoint("any", **{unit: value})
+    except (TypeError, ValueError, InputError):
+        raise argparse.ArgumentTypeError(
+            f"must be like 600s (on the wall), 5000steps or 1e-5sim, got {text!r}"
+        ) from None
+    return {unit: value}
+
+
 def several(kind):
     """Type of an option that is a comma-separated list of a type, without repetitions."""
 
@@ -90,6 +112,29 @@ def parser(name, description, drivers=()):
     return made
 
 
+def add_checkpoints(made):
+    """Add the options of a job that saves itself; see ``checkpoint_of``."""
+    made.add_argument(
+        "--checkpoint-every",
+        type=interval,
+        default={},
+        help="save the run every 600s on the wall, 5000steps or 1e-5sim simulated seconds",
+    )
+    made.add_argument(
+        "--resume", action="store_true", help="go on from what a run has saved in the same --out"
+    )
+
+
+def checkpoint_of(options, name="checkpoint"):
+    """Arguments checkpoint and resume of a job: its file is out/name.npz.
+
+    A job saves itself on Ctrl-C and at its end in any case.
+    """
+    path = os.path.join(options.out, f"{name}.npz")
+    checkpoint = Checkpoint(**{**options.checkpoint_every, "path": path})
+    return {"checkpoint": checkpoint, "resume": path if options.resume else None}
+
+
 def main(run, made, arguments=None):
     """Parse, start Taichi, run; returns the exit code.
 
@@ -103,6 +148,8 @@ def main(run, made, arguments=None):
         return _say(error, 2)
     except SimulationDiverged as error:
         return _say(error, 3)
+    except Interrupted as error:
+        return _say(f"{error}: go on with --resume", 130)
     except KeyboardInterrupt:
         return _say("interrupted", 130)
     return 0
@@ -123,28 +170,39 @@ class ProgressBar:
     def __enter__(self):
         if sys.stderr.isatty():
             from rich.console import Console
-            from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+            from rich.progress import BarColumn, Progress, TextColumn
 
             self.bar = Progress(
                 TextColumn("{task.description}"),
                 BarColumn(),
-                TextColumn("{task.percentage:>3.0f} %  {task.fields[speed]}"),
-                TimeRemainingColumn(),
+                TextColumn("{task.percentage:>3.0f} %  {task.fields[speed]}  {task.fields[left]}"),
                 console=Console(stderr=True),
                 transient=True,
             )
             self.bar.start()
-            self.task = self.bar.add_task(self.title, total=1.0, speed="compiling")
+            self.task = self.bar.add_task(self.title, total=1.0, speed="compiling", left="")
         return self
 
     def __call__(self, progress):
         """Show a Progress of either package: its share, and what it says of its speed."""
         if self.bar is not None:
-            self.bar.update(self.task, completed=progress.share, speed=str(progress))
+            left = time_left(progress.seconds_left)
+            self.bar.update(self.task, completed=progress.share, speed=str(progress), left=left)
 
     def __exit__(self, *_):
         if self.bar is not None:
             self.bar.stop()
+
+
+def time_left(seconds):
+    """A time that is left [s] in words, no finer than it is known."""
+    if not math.isfinite(seconds):
+        return ""
+    if seconds < 90.0:
+        return f"{seconds:.0f} s left"
+    if seconds < 5400.0:
+        return f"{seconds / 60.0:.0f} min left"
+    return f"{seconds / 3600.0:.1f} h left"
 
 
 def figure(value, unit, paper=None):

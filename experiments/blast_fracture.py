@@ -7,6 +7,9 @@ zone at the hole, cracks that run out from it, and a wedge pushed out of the fre
     python experiments/blast_fracture.py --until 1e-3     # cracks through to the other faces
     python experiments/blast_fracture.py --method multirate --l 1e-8    # the paper's: three minutes
 
+A run saves itself in checkpoint.npz at its end, on Ctrl-C, and as often as --checkpoint-every says;
+the same command with --resume goes on from there, also with a larger --until.
+
 Dashpots are solved together unless another method is asked for; blast_methods.py compares them.
 
 Writes pictures, an animation, history.csv, the mesh used, CSV of all that is plotted, summary.json
@@ -23,6 +26,8 @@ from _cli import (
     BLAST_DRIVERS,
     PAPER_BLOCK,
     ProgressBar,
+    add_checkpoints,
+    checkpoint_of,
     figure,
     main,
     number,
@@ -86,6 +91,7 @@ def options_parser():
     made.add_argument("--without", default="", help="effects to leave out, by comma")
     made.add_argument("--frames", type=whole(1, 10000), help="snapshots, 40")
     made.add_argument("--samples", type=whole(1, 1000000), help="rows of the time series, 200")
+    add_checkpoints(made)
     return made
 
 
@@ -133,6 +139,7 @@ def run(options):
                 frames=options.frames,
                 progress=progress,
                 output=options.out,
+                **checkpoint_of(options),
             )
     except SimulationDiverged as error:
         if error.result.frames:

@@ -9,17 +9,23 @@ Bands are the lowest and highest of the seeds, lines their median. A rigid mass 
 weight is drawn for scale: what the particles take off its peak is damping, what they shift beside
 it is apparent mass. A sweep up and down, the state carried on, shows where two motions are
 possible.
+
+Responses and sweeps save themselves at their end, on Ctrl-C, and as often as --checkpoint-every
+says; the same command with --resume goes on from there and repeats nothing.
 """
 
 import os
 import sys
 import time
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from _cli import (
     ProgressBar,
+    add_checkpoints,
+    checkpoint_of,
     figure,
     main,
     number,
@@ -99,6 +105,7 @@ def options_parser():
     made.add_argument("--ca-dt", type=number(0, 1), help="step of the automata [s], 1e-4")
     made.add_argument("--sweep-particles", type=several(whole(0, 160)), help="swept, 10,50")
     made.add_argument("--sweep-seeds", type=whole(1, 1000), help="swept, 2")
+    add_checkpoints(made)
     return made
 
 
@@ -108,6 +115,7 @@ def run(options):
         if getattr(options, name) is None:
             setattr(options, name, value)
     chosen = chosen_fillings(options.fillings)
+    check_resume(options)
     output_folder(options.out)
     measured = {label: measure(filling, options) for label, filling in chosen.items()}
     write_tables(measured, options.out)
@@ -151,6 +159,7 @@ def measure(filling, options):
             seeds=options.dem_seeds if spheres else options.seeds,
             transient_cycles=options.transient,
             progress=progress,
+            **kept(options, f"{filling.label}_response"),
             **shared,
         ),
     )
@@ -162,10 +171,25 @@ def measure(filling, options):
             seeds=options.sweep_seeds,
             transient_cycles=max(1, options.transient // 3),
             progress=progress,
+            **kept(options, f"{filling.label}_sweep"),
             **shared,
         ),
     )
     return Measured(response, sweep, one[0] + two[0], one[1] + two[1])
+
+
+def check_resume(options):
+    """Raise InputError when there is nothing to go on from."""
+    if options.resume and not any(Path(options.out).glob("checkpoint_*.npz")):
+        raise InputError(f"resume must be left out: there is no checkpoint in {options.out}")
+
+
+def kept(options, name):
+    """Arguments checkpoint and resume of one of the jobs; those not begun yet have no file."""
+    arguments = checkpoint_of(options, f"checkpoint_{name}")
+    if options.resume and not os.path.exists(arguments["resume"]):
+        arguments["resume"] = None
+    return arguments
 
 
 def timed(title, work):

@@ -13,6 +13,7 @@ A scene is a mesh, a material and the effects that act; ``simulate`` runs it::
 from taichi_dem import runtime  # isort: skip
 
 from taichi_dem import effects, methods
+from taichi_dem.checkpoint import Checkpoint
 from taichi_dem.errors import InputError, SimulationDiverged
 from taichi_dem.materials import CONCRETE, Material
 from taichi_dem.mesh import Mesh, checked_mesh
@@ -30,6 +31,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "CONCRETE",
+    "Checkpoint",
     "ImplicitDashpots",
     "InputError",
     "Material",

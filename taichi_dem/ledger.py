@@ -36,6 +36,14 @@ class Ledger:
         self.start_energy = first["kinetic"] + first["bond_strain"] + first["sphere_strain"]
         self.start_momentum = self.momentum()
 
+    def saved(self):
+        """What a checkpoint holds of it, arrays by name."""
+        return {"start": np.array([self.start_energy, *self.start_momentum])}
+
+    def resume(self, saved):
+        """Take over what ``saved`` gave."""
+        self.start_energy, self.start_momentum = float(saved["start"][0]), saved["start"][1:]
+
     def account(self):
         """All terms in J by name; residual is what the account cannot explain."""
         n, bonds = self.model.body_count, self.model.bond_count

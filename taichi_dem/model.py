@@ -26,6 +26,12 @@ class Model:
     Body frames coincide with the world axes at the start. Source: Konno et al., section 2.
     """
 
+    constant_fields = (
+        *("mass", "mass_inverse", "radius", "inertia", "inertia_inverse"),
+        *("bond_slots", "bond_frame", "bond_stiffness", "unit_area"),
+        *("vertex_master", "vertex_slave", "neighbour", "face_bond", "sphere", "cluster"),
+    )
+
     def __init__(self, mesh, material, effects):
         self.mesh = mesh
         self.material = material

@@ -1,7 +1,7 @@
 """What a run leaves behind: time series, snapshots, ParaView files; written whole or not at all."""
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 import taichi as ti
@@ -67,6 +67,12 @@ class Recorder:
         self.rows = []
         self.frames = []
 
+    def compile(self):
+        """Compile all that recording needs, so that nothing later keeps Ctrl-C waiting."""
+        self.sample()
+        self.snapshot()
+        self.rows, self.frames = [], []
+
     def sample(self):
         """Add a row to the time series."""
         sim = self.simulation
@@ -103,6 +109,27 @@ class Recorder:
                 bound=self.state.bound.to_numpy(),
             )
         )
+
+    def saved(self):
+        """What a checkpoint holds of it, arrays by name: columns of rows, stacks of frames."""
+        rows = {f"row.{name}": column for name, column in self.history().items()}
+        stacks = {
+            f"frame.{field.name}": np.array([getattr(frame, field.name) for frame in self.frames])
+            for field in fields(Frame)
+            if self.frames
+        }
+        return {**rows, **stacks}
+
+    def resume(self, saved):
+        """Take over what ``saved`` gave."""
+        rows = {k[4:]: column.tolist() for k, column in saved.items() if k.startswith("row.")}
+        self.rows = [dict(zip(rows, values)) for values in zip(*rows.values())]
+        stacks = {k[6:]: stack for k, stack in saved.items() if k.startswith("frame.")}
+        times = stacks.pop("time_s", np.zeros(0)).tolist()
+        self.frames = [
+            Frame(time_s, **dict(zip(stacks, arrays)))
+            for time_s, *arrays in zip(times, *stacks.values())
+        ]
 
     @ti.kernel
     def _read_damage(self, damage: ti.types.ndarray(dtype=ti.f64, ndim=1)):

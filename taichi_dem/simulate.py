@@ -1,11 +1,13 @@
 """The loop a user calls: step, sample, keep frames, and hand everything back as one result."""
 
 import json
+import math
 import os
 from dataclasses import dataclass
 
 import numpy as np
 
+from taichi_dem.checkpoint import digest, version_text
 from taichi_dem.errors import InputError, SimulationDiverged
 from taichi_dem.files import output_folder, write_csv, write_text
 from taichi_dem.mesh_files import write_mesh
@@ -13,22 +15,36 @@ from taichi_dem.record import (
     Recorder,
     write_paraview,
 )
+from taichi_dem.restart import Keeper, NoKeeper, Saved, opened
 from taichi_dem.simulation import Simulation, macro_steps
+from taichi_dem.timeline import MACRO_TICKS
 
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a run is: time_s of until_s; bonds and pairs evaluated, in run_seconds."""
+    """How far a run is: time_s of until_s; bonds and pairs evaluated, in run_seconds.
+
+    ahead: bonds and pairs to evaluate in a simulated second at the present levels [1/s].
+    """
 
     time_s: float
     until_s: float
     evaluations: int
     run_seconds: float
+    ahead: float
 
     @property
     def share(self):
         """Of the way, in [0, 1]."""
         return self.time_s / self.until_s
+
+    @property
+    def seconds_left(self):
+        """Time expected until the end [s], each level weighted by its steps; infinite at first."""
+        if not self.evaluations:
+            return math.inf
+        work = max(0.0, self.until_s - self.time_s) * self.ahead
+        return work * self.run_seconds / self.evaluations
 
     def __str__(self):
         """How fast it goes."""
@@ -70,7 +86,17 @@ class Result:
 
 
 def simulate(
-    scene, *, method, until, driver="auto", samples=200, frames=0, progress=None, output=None
+    scene,
+    *,
+    method,
+    until,
+    driver="auto",
+    samples=200,
+    frames=0,
+    progress=None,
+    output=None,
+    checkpoint=None,
+    resume=None,
 ):
     """Run a scene to a time and return the result.
 
@@ -78,53 +104,135 @@ def simulate(
     steps. samples, frames: how many evenly spaced rows of the time series, and snapshots, after
     the one at the start. progress: called with a Progress about five times a second.
     output: folder for the result, written at the end, or up to the last good sample when the
-    run diverges.
-    Raises InputError for bad arguments, SimulationDiverged when the run leaves its bounds.
+    run diverges. checkpoint: a Checkpoint that says where and when the run saves itself, besides
+    at its end and on Ctrl-C. resume: a checkpoint file to go on from, of the same scene and method;
+    the bits are those of a run that was never stopped.
+    Raises InputError for bad arguments, SimulationDiverged when the run leaves its bounds,
+    Interrupted when Ctrl-C has saved the run.
     """
-    if output is not None:
-        output_folder(output)
     last = macro_steps(until, method.dt0)
     _check_count("samples", samples, 1)
     _check_count("frames", frames, 0)
+    arrays = _opened(scene, method, checkpoint, resume, last)
+    if output is not None:
+        output_folder(output)
     simulation = Simulation(scene, method, driver)
     recorder = Recorder(simulation, _watched_group(scene))
     simulation.start()
-    sample_steps, frame_steps = _marks(last, samples), _marks(last, frames)
+    recorder.compile()
+    keeper = _keeper(simulation, recorder, checkpoint, resume, arrays)
     error = None
     try:
-        _run(simulation, recorder, sample_steps, frame_steps, progress)
+        with keeper:
+            marks = _marks(last, samples), _marks(last, frames)
+            _run(simulation, recorder, keeper, marks, progress)
     except SimulationDiverged as diverged:
         error = diverged
     result = _result(scene, method, simulation, recorder, error)
     if output is not None:
-        result.write(output)
+        _write(result, output, keeper)
     if error is not None:
         error.result = result
         raise error
     return result
 
 
-def _run(simulation, recorder, sample_steps, frame_steps, progress):
-    """Step from mark to mark; every mark is sampled, photographed, or both."""
+def _opened(scene, method, checkpoint, resume, last):
+    """What a run goes on from, arrays by name, or None; InputError for what it cannot."""
+    arrays = opened(checkpoint, resume, lambda: identity_of(scene, method))
+    begin = int(arrays["field/state.tick"]) if arrays else 0
+    if begin > last * MACRO_TICKS:
+        seconds = method.dt0 / MACRO_TICKS
+        raise InputError(
+            f"until must be at least {begin * seconds:.6g} s, where {resume} begins, "
+            f"got {last * method.dt0:.6g}"
+        )
+    return arrays
+
+
+def _keeper(simulation, recorder, checkpoint, resume, arrays):
+    """What saves the run, after the run has been put where it was saved."""
+    if checkpoint is None and resume is None:
+        return NoKeeper()
+    saved = saved_run(simulation, recorder)
+    if arrays:
+        saved.take(arrays, resume)
+
+    def now():
+        return simulation.state.tick[None] // MACRO_TICKS, simulation.time_s
+
+    return Keeper(checkpoint, saved, now) if checkpoint is not None else NoKeeper()
+
+
+def saved_run(simulation, recorder):
+    """All that a checkpoint holds of a started simulation, a ``restart.Saved``."""
+    parts = {
+        "simulation": simulation,
+        "ledger": simulation.ledger,
+        "watch": simulation.watch,
+        "recorder": recorder,
+    }
+    return Saved(identity_of(simulation.scene, simulation.method), simulation, parts)
+
+
+def identity_of(scene, method):
+    """What two runs must share for one to go on from the other, in words.
+
+    Driver, threads, and how long a run goes and what it records may differ.
+    """
+    mesh = scene.mesh
+    groups = [array for name in sorted(mesh.groups) for array in (list(name), mesh.groups[name])]
+    content = digest(mesh.points, mesh.tetrahedra, *groups)
+    return {
+        "version": version_text(),
+        "mesh": f"{mesh.body_count} tetrahedra ({content})",
+        "material": repr(scene.material),
+        "effects": ", ".join(f"{effect.name} {vars(effect)}" for effect in scene.effects),
+        "max_speed": repr(scene.max_speed),
+        "method": repr(method),
+    }
+
+
+def _run(simulation, recorder, keeper, marks, progress):
+    """Step from mark to mark; every mark is sampled, photographed, or only looked at.
+
+    marks: largest steps to sample, and to photograph, two sets. Those up to which a resumed run
+    has come have been seen to.
+    """
+    sample_steps, frame_steps = marks
     last = max(sample_steps)
+    seen = simulation.state.tick[None] if recorder.rows else -1
+    marks = sorted(sample_steps | frame_steps | keeper.marks(last, simulation.method.dt0))
+    for step in (mark for mark in marks if mark * MACRO_TICKS > seen):
 
-    def tell():
-        if progress is not None:
-            progress(progress_of(simulation, last * simulation.method.dt0))
+        def tell(end=step * MACRO_TICKS):
+            if progress is not None:
+                progress(progress_of(simulation, last * simulation.method.dt0))
+            if simulation.state.tick[None] < end:
+                keeper.look()
 
-    for step in sorted(sample_steps | frame_steps):
         simulation.advance_to(step, tell)
         if step in sample_steps:
             simulation.watch.look(simulation.time_s)
             recorder.sample()
         if step in frame_steps:
             recorder.snapshot()
+        keeper.look()
+    keeper.keep()
+
+
+def _write(result, folder, keeper):
+    try:
+        result.write(folder)
+    except InputError as error:
+        raise InputError(f"{error}{keeper.last_good()}") from None
 
 
 def progress_of(simulation, until):
     """Progress of a simulation towards a time [s]."""
     done, seconds = simulation.evaluations(), simulation.running_seconds()
-    return Progress(simulation.time_s, until, done, seconds)
+    ahead = simulation.evaluations_ahead()
+    return Progress(simulation.time_s, until, done, seconds, ahead)
 
 
 def _marks(last, count):

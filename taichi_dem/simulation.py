@@ -3,6 +3,8 @@
 import math
 import time
 
+import numpy as np
+
 from taichi_dem import runtime
 from taichi_dem.errors import InputError, SimulationDiverged
 from taichi_dem.fields import fields_first
@@ -108,6 +110,8 @@ class Simulation:
         )
         self.watch = Watch(self.model, self.state, self.advance)
         self.watch.look(0.0)
+        self.health.check()
+        self.evaluations_ahead()
         self.compile_seconds += time.perf_counter() - started
 
     def advance_to(self, macro_step, on_call=None):
@@ -119,8 +123,7 @@ class Simulation:
             raise InputError("this simulation belongs to a Taichi session that has been stopped")
         self.start()
         end = macro_step * MACRO_TICKS
-        wall, cpu = time.perf_counter(), time.process_time()
-        self.started = wall
+        self.started, self.started_cpu = time.perf_counter(), time.process_time()
         try:
             while self.state.tick[None] < end:
                 self.driver.run(end)
@@ -129,9 +132,8 @@ class Simulation:
                 if on_call is not None:
                     on_call()
         finally:
+            self.run_seconds, self.run_cpu_seconds = self.running_seconds(), self.cpu_seconds()
             self.started = None
-            self.run_seconds += time.perf_counter() - wall
-            self.run_cpu_seconds += time.process_time() - cpu
 
     def _check_room(self):
         if self.contacts is not None:
@@ -141,6 +143,14 @@ class Simulation:
     def searches(self):
         """Contact searches so far."""
         return int(self.broad_phase.searches[None]) if self.contacts is not None else 0
+
+    def saved(self):
+        """What a checkpoint holds of it beside the fields, arrays by name."""
+        return {"cost": np.array([self.running_seconds(), self.cpu_seconds()])}
+
+    def resume(self, saved):
+        """Take over what ``saved`` gave."""
+        self.run_seconds, self.run_cpu_seconds = saved["cost"].tolist()
 
     def evaluations(self):
         """Bonds and contact pairs evaluated so far."""
@@ -154,6 +164,21 @@ class Simulation:
         """Wall time spent stepping so far [s], compile time apart."""
         present = time.perf_counter() - self.started if self.started is not None else 0.0
         return self.run_seconds + present
+
+    def cpu_seconds(self):
+        """CPU time spent stepping so far [s], compile time apart."""
+        present = time.process_time() - self.started_cpu if self.started is not None else 0.0
+        return self.run_cpu_seconds + present
+
+    def evaluations_ahead(self):
+        """Bonds and pairs to evaluate in a simulated second, if all levels stay as they are."""
+        members = self.schedule.members()
+        steps = 2.0 ** np.arange(len(members))
+        if self.schedule.uniform:
+            steps[:] = 2.0 ** self.schedule.finest[None]
+        if self.solves:
+            steps *= 1.0 + self.sweeps() / max(1, int(self.schedule.evaluations[0]))
+        return float(members @ steps) / self.method.dt0
 
     def gas_work(self):
         """Work of the gas pressure [J], zero without it."""

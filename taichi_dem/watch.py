@@ -65,6 +65,17 @@ class Watch:
                 missed.times += 1
                 missed.most = max(missed.most, len(places))
 
+    def saved(self):
+        """What a checkpoint holds of it, arrays by name."""
+        rows = [[m.times, m.most, m.where, m.first_s] for m in self.missed.values()]
+        return {"missed": np.array(rows, dtype=np.float64).reshape(-1, 4)}
+
+    def resume(self, saved):
+        """Take over what ``saved`` gave."""
+        for missed, row in zip(self.missed.values(), saved["missed"].tolist()):
+            missed.times, missed.most, missed.where = (int(value) for value in row[:3])
+            missed.first_s = row[3]
+
     def findings(self):
         """Sentences about effects that were needed, an empty tuple where none was."""
         return tuple(str(missed) for missed in self.missed.values() if missed.times)

@@ -27,6 +27,8 @@ class BroadPhase:
     a place in ``_ROOM``.
     """
 
+    scratch_fields = ("rough", "rough_count", "pair_faces", "looked")
+
     def __init__(self, contacts, schedule, solver=None, brute_force=False):
         n = contacts.model.body_count
         self.contacts, self.schedule = contacts, schedule

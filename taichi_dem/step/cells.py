@@ -12,6 +12,8 @@ class CellGrid:
     member: bodies, cell by cell. brute_force: a single cell.
     """
 
+    scratch_fields = ("first", "member", "cell", "counts", "corner", "edge", "largest")
+
     def __init__(self, model, state, brute_force=False):
         n = model.body_count
         self.model, self.state, self.brute_force = model, state, brute_force

@@ -12,8 +12,10 @@ import taichi as ti
 from taichi_dem.step.implicit.pairs import COLOURS
 from taichi_dem.step.wake import Wake
 
-#: A resident call is kept near this long [s], so that Ctrl-C, progress and health are prompt.
+#: Drivers are called for about this long [s] between two looks at health, progress and Ctrl-C.
 CALL_SECONDS = 0.2
+#: A resident kernel is kept near this long [s]: it may begin when the time above is almost over.
+_KERNEL_SECONDS = 0.1
 _MAX_SUBSTEPS = 1 << 24
 #: Bit that a parallel substep adds to what it returns when a search is due.
 _SEARCH = 2
@@ -221,12 +223,12 @@ class Resident:
         self._run(0, 0)
 
     def run(self, end_tick):
-        """Advance to a tick, to the next halt, or for about CALL_SECONDS."""
+        """Advance to a tick, to the next halt, or for about _KERNEL_SECONDS."""
         start = time.perf_counter()
         done = self._run(end_tick, self.substeps)
         seconds = max(time.perf_counter() - start, 1e-5)
         if done == self.substeps:
-            grown = int(done * CALL_SECONDS / seconds)
+            grown = int(done * _KERNEL_SECONDS / seconds)
             self.substeps = max(64, min(4 * self.substeps, grown, _MAX_SUBSTEPS))
 
     @ti.kernel

@@ -42,6 +42,9 @@ class Near:
     to which a pair has given its impulse.
     """
 
+    constant_fields = ("ahead", "root_mass", "root_inertia")
+    scratch_fields = ("old_count", "old_paid")
+
     def __init__(self, model, state, contacts, ahead):
         self.model, self.state, self.contacts = model, state, contacts
         self.ahead = ti.field(real, shape=MAX_LEVEL + 1)

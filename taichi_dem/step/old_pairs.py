@@ -12,6 +12,8 @@ class OldPairs:
     Fields have the names of those they copy. first_of: first pair of each body then.
     """
 
+    scratch_fields = ("first_of", "body", "first", "sphere", "slot", "full", "heat")
+
     def __init__(self, contacts):
         self.contacts = contacts
         n, pairs, spheres = contacts.model.body_count, contacts.capacity, contacts.sphere_capacity

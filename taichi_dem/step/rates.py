@@ -71,6 +71,8 @@ class Rates:
         2e-7   0.5    1.0     +39 %   0.004
     """
 
+    constant_fields = ("dashpot_table", "spring_table")
+
     def __init__(self, model, state, contacts, method):
         self.model, self.state, self.contacts = model, state, contacts
         self.control = method.control

@@ -56,6 +56,11 @@ class Schedule:
         self.changed_count = ti.field(ti.i32, shape=())
         self.evaluations = ti.field(ti.i64, shape=5)
 
+    def members(self):
+        """How many bonds and pairs are evaluated at the step of each level, (MAX_LEVEL + 1,)."""
+        ends = self.bonds.end.to_numpy() + self.pairs.end.to_numpy()
+        return ends[:-1] - ends[1:]
+
     @ti.func
     def pair_step(self, i, j):
         """Seconds until two bodies are looked at again: the smaller of their steps."""

@@ -304,6 +304,8 @@ BAD_OPTIONS = [
     ("hard_cases", ("--only", "dust"), ("dust", "full_box")),
     ("hard_cases", ("--columns", "0"), ("--columns", "'0'", "1 to")),
     ("demo_damper", ("--threads", "0"), ("--threads", "'0'")),
+    ("damper_response", ("--resume",), ("resume", "no checkpoint")),
+    ("damper_response", ("--checkpoint-every", "-1"), ("--checkpoint-every", "'-1'", "600s")),
 ]
 
 

@@ -3,6 +3,8 @@
 import json
 import math
 import os
+import re
+import signal
 
 import numpy as np
 import pytest
@@ -221,6 +223,50 @@ def test_diverging_run_names_body_and_step_and_keeps_the_last_good_output(
     assert not (tmp_path / "summary.json").exists()
 
 
+class CtrlC:
+    """Stands for the progress bar, and for a user who presses Ctrl-C at its second call."""
+
+    def __init__(self, title):
+        self.calls = 0
+
+    def __enter__(self):
+        return self
+
+    def __call__(self, progress):
+        self.calls += 1
+        if self.calls == 2:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    def __exit__(self, *_):
+        pass
+
+
+@pytest.mark.slow
+def test_interrupted_blast_goes_on_to_the_same_files(script, monkeypatch, capsys, tmp_path):
+    module = script("blast_fracture")
+    import _cli
+
+    monkeypatch.setattr(module, "picture", lambda result, folder: None)
+    quick = ["--quick", "--threads", "2", "--method", "fixed", "--until", "4e-5"]
+    quick += ["--without", "sphere_contact,friction", "--checkpoint-every", "500steps"]
+
+    def run(folder, *more):
+        given = [*quick, "--out", str(tmp_path / folder), *more]
+        return _cli.main(module.run, module.options_parser(), given), capsys.readouterr().err
+
+    assert run("straight") == (0, "")
+    with monkeypatch.context() as patched:
+        patched.setattr(module, "ProgressBar", CtrlC)
+        code, said = run("stopped")
+    path = tmp_path / "stopped" / "checkpoint.npz"
+    assert code == 130
+    assert re.fullmatch(rf"interrupted at t = \S+ s, saved in {path}: go on with --resume\n", said)
+    assert os.listdir(path.parent) == [path.name]
+    assert run("stopped", "--resume") == (0, "")
+    for name in ("history.csv", "mesh.msh", "paraview/blast_0006.vtu"):
+        assert (path.parent / name).read_bytes() == (tmp_path / "straight" / name).read_bytes()
+
+
 @pytest.fixture
 def bad_mesh(tmp_path):
     """Writes a file that is refused as the blast's mesh; returns its path."""
@@ -256,6 +302,11 @@ BAD_OPTIONS = [
     (("--colour", "red"), ("--colour",)),
     (("--l", "1e-7"), ("l must be left out", "multirate", "1e-07")),
     (("--unti", "1e-6", "--l", "1e-7"), ("--unti",)),
+    (("--checkpoint-every", "3hours"), ("--checkpoint-every", "600s", "'3hours'")),
+    (("--checkpoint-every", "1.5steps"), ("--checkpoint-every", "'1.5steps'")),
+    (("--checkpoint-every", "0s"), ("--checkpoint-every", "'0s'")),
+    (("--checkpoint-every", "1e999sim"), ("--checkpoint-every", "'1e999sim'")),
+    (("--resume",), ("cannot read checkpoint", "checkpoint.npz", "No such file")),
 ]
 
 

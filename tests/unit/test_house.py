@@ -17,8 +17,9 @@ ROOT = Path(__file__).resolve().parents[2]
 LAYERS = {
     "taichi_dem": (
         ("errors", "types", "runtime"),
-        ("checks", "fields", "files"),
-        ("plot_style",),
+        ("checks", "fields", "field_memory", "files"),
+        ("plot_style", "checkpoint"),
+        ("restart",),
         (
             *("tetrahedra", "mesh", "mesh_files", "mesh_shapes", "mesh_gmsh"),
             *("topology", "quality", "contact_spheres", "materials"),
@@ -55,6 +56,7 @@ ACROSS = {
     "ca_damper": (
         *("taichi_dem.runtime", "taichi_dem.errors", "taichi_dem.checks", "taichi_dem.fields"),
         *("taichi_dem.files", "taichi_dem.plot_style"),
+        *("taichi_dem.checkpoint", "taichi_dem.restart"),
     )
 }
 

@@ -25,6 +25,8 @@ class BondDashpots:
     present y satisfies. Velocities in m/s, spins in rad/s, world.
     """
 
+    constant_fields = ("place",)
+
     def __init__(self, model, state, schedule, motion, method):
         self.model, self.state, self.schedule, self.motion = model, state, schedule, motion
         self.theta, self.earlier = method.theta, (1.0 - method.theta) / method.theta

@@ -15,6 +15,8 @@ class Motion:
     and given: all that a body was given in the step [N s, N m s].
     """
 
+    scratch_fields = ("twist", "given")
+
     def __init__(self, model, state):
         n = model.body_count
         self.model, self.state = model, state

@@ -27,6 +27,11 @@ class PairDashpots:
     colour, those of colour c from colour_first[c] on.
     """
 
+    scratch_fields = (
+        *("touching", "touch", "normal", "arm", "push", "share", "branch"),
+        *("active", "order", "colour", "taken", "colour_first", "old_impulse"),
+    )
+
     def __init__(self, model, state, schedule, contacts, motion):
         self.model, self.state, self.schedule = model, state, schedule
         self.contacts, self.motion = contacts, motion

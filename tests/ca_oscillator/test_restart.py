@@ -1,0 +1,123 @@
+"""Batches that go on from a checkpoint, in the middle of a launch's way, to the same bits."""
+
+import os
+import signal
+
+import numpy as np
+import pytest
+
+from ca_damper import (
+    Automaton,
+    Batch,
+    InputError,
+    RigidMass,
+    SceneTable,
+    Spheres,
+    frequency_response,
+    sweep_up_and_down,
+)
+from taichi_dem import Checkpoint
+from taichi_dem.checkpoint import Interrupted
+from taichi_dem.field_memory import FieldMemory
+from tests.equivalence.test_restart import every_field
+
+IDENTITY = {"job": "a test"}
+
+
+class CtrlCAt:
+    """A progress callback that stands for a user who presses Ctrl-C at its n-th call."""
+
+    def __init__(self, call):
+        self.left = call
+
+    def __call__(self, progress):
+        self.left -= 1
+        if self.left == 0:
+            os.kill(os.getpid(), signal.SIGINT)
+
+
+class Shaken:
+    """Three scenes of a filling, and all that their run gives."""
+
+    def __init__(self, filling, dt):
+        before = every_field()
+        table = SceneTable([4, 7, 9], [1, 2, 3], dt, [5.0, 6.0, 6.5], 3e-3)
+        self.batch = Batch(filling, table, measured_cycles=1)
+        self.made = [field for key, field in every_field().items() if key not in before]
+
+    def run(self, progress=None):
+        """One cycle to get going and one that is measured."""
+        cycles = self.batch.run(1, 1, progress)
+        return {"record": cycles.record, **self.batch.sample(), **FieldMemory(self.batch).read()}
+
+
+@pytest.fixture(
+    scope="module",
+    params=[
+        (Automaton(), 1e-3),
+        pytest.param((Spheres(), 2e-5), marks=pytest.mark.slow),
+    ],
+    ids=["automaton", "spheres"],
+)
+def shaken(request):
+    return Shaken(*request.param)
+
+
+def test_every_field_of_a_batch_is_saved(shaken):
+    kept = {id(field) for field in FieldMemory(shaken.batch).fields.values()}
+    assert len(shaken.made) > 20
+    assert [field for field in shaken.made if id(field) not in kept] == []
+
+
+def test_an_interrupted_batch_goes_on_to_the_same_bits(shaken, tmp_path):
+    """Interrupted after its second launch of a few steps; other steps are taken in between."""
+    batch, checkpoint = shaken.batch, Checkpoint(tmp_path / "run.npz")
+    batch.start()
+    straight, steps = shaken.run(), batch.scene_steps
+    batch.start()
+    batch._pace = 3.0
+    with pytest.raises(Interrupted, match=r"interrupted at t = .* s, saved in .*run.npz"):
+        with batch.keep(checkpoint, None, IDENTITY):
+            shaken.run(CtrlCAt(2))
+    done = batch._look()[0]
+    assert (done > 0).all()
+    assert (done < 2 * batch.steps_per_cycle).all()
+    batch.start("rigid")
+    batch.advance(7)
+    with batch.keep(None, checkpoint.path, IDENTITY):
+        resumed = shaken.run()
+    assert [name for name in straight if straight[name].tobytes() != resumed[name].tobytes()] == []
+    assert batch.scene_steps == 2 * steps
+    with pytest.raises(InputError, match="of another job: a test, not another"):
+        batch.keep(None, checkpoint.path, {"job": "another"}).__enter__()
+
+
+#: Of a container with a rigid mass: little to compile.
+JOB = {"particles": 3, "ratios": [0.9, 1.0], "seeds": 2, "dt": 1e-3, "measured_cycles": 2}
+
+
+@pytest.mark.parametrize("work", [frequency_response, sweep_up_and_down])
+def test_responses_and_sweeps_go_on_to_the_same_bits(work, tmp_path):
+    """A sweep is stopped in its third of four stages; a finished one is read, not run again."""
+    checkpoint = Checkpoint(tmp_path / "run.npz")
+    job = {**JOB, "transient_cycles": 20}
+    straight = measures(work(RigidMass(), **job))
+    calls = 3 if work is frequency_response else 2
+    with pytest.raises(Interrupted):
+        work(RigidMass(), checkpoint=checkpoint, progress=CtrlCAt(calls), **job)
+    for _ in range(2):
+        told = []
+        resumed = work(
+            RigidMass(), checkpoint=checkpoint, resume=checkpoint.path, progress=told.append, **job
+        )
+        assert [a.tobytes() for a in measures(resumed)] == [a.tobytes() for a in straight]
+        if told:
+            assert told[-1].share == 1.0
+    with pytest.raises(InputError, match="of another filling: RigidMass"):
+        work(RigidMass(1e-3), resume=checkpoint.path, **job)
+
+
+def measures(result):
+    """The measures of a response, or of both ways of a sweep."""
+    ways = (result.up, result.down) if hasattr(result, "up") else (result,)
+    return [np.asarray(getattr(way, name)) for way in ways for name in ("rms", "energy", "dt")]
