@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[2]
 LAYERS = {
     "taichi_dem": (
         ("errors", "types", "runtime"),
-        ("checks", "fields", "files"),
+        ("checks", "fields", "files", "effect_use"),
         ("plot_style",),
         (
             *("tetrahedra", "mesh", "mesh_files", "mesh_shapes", "mesh_gmsh"),
@@ -31,10 +31,10 @@ LAYERS = {
         ("state",),
         ("step",),
         ("ledger",),
-        ("health", "watch", "report", "step_report"),
+        ("health", "watch", "report", "step_report", "effects_acted"),
         ("simulation",),
         ("monitor", "record"),
-        ("simulate",),
+        ("simulate", "needed_effects"),
         ("plot",),
         ("__init__",),
     ),
@@ -43,7 +43,7 @@ LAYERS = {
         ("filling", "rk45", "oscillator", "clock", "record"),
         ("container", "automaton", "spheres"),
         ("coupling",),
-        ("batch",),
+        ("batch", "needed_effects"),
         ("response",),
         ("sweep",),
         ("plot",),
@@ -54,7 +54,7 @@ LAYERS = {
 ACROSS = {
     "ca_damper": (
         *("taichi_dem.runtime", "taichi_dem.errors", "taichi_dem.checks", "taichi_dem.fields"),
-        *("taichi_dem.files", "taichi_dem.plot_style"),
+        *("taichi_dem.files", "taichi_dem.plot_style", "taichi_dem.effect_use"),
     )
 }
 
