@@ -77,8 +77,9 @@ AUTOMATON = (
 ADDED = ("rotation",)
 VARIANTS = tuple(label for label, _ in SPHERES + AUTOMATON)
 COSTS = (
-    *("step_ms", "step_ms_most", "run_s", "spared_percent", "memory_MB"),
-    *("before_first_step_s", "compiled_kB"),
+    *("step_ms", "step_ms_most", "run_s"),
+    *("spared_percent", "spared_least_percent", "spared_most_percent"),
+    *("memory_MB", "before_first_step_s", "compiled_kB"),
 )
 
 
@@ -236,6 +237,9 @@ def _cost_row(job, complete):
         "step_ms_most": timing.high,
         "run_s": 1e-3 * timing.low * job.first["steps"],
         "spared_percent": 100.0 * (1.0 - timing.low / complete.step_ms.low),
+        # From the slowest of its repeats beside the fastest of the others to the reverse.
+        "spared_least_percent": 100.0 * (1.0 - timing.high / complete.step_ms.low),
+        "spared_most_percent": 100.0 * (1.0 - timing.low / complete.step_ms.high),
         "memory_MB": job.first["memory_MB"],
         "before_first_step_s": job.first["compile_s"],
         "compiled_kB": job.compiled_kB,
@@ -243,13 +247,16 @@ def _cost_row(job, complete):
 
 
 def verdicts(rows, groups):
-    """(name, spared [%], change [%], whether it was added) for each effect of some groups."""
+    """(name, cost [%] with its least and most, change [%]) for each effect of some groups."""
     found = []
     for row in rows:
         name = row["scene"].replace("without ", "")
         alone = row["scene"].startswith("without ") or name in VARIANTS
         if row["group"] in groups and alone and not row["failed"]:
-            found.append((name, row["spared_percent"], row["change_percent"], name in ADDED))
+            costs = [row[f"spared_{key}percent"] for key in ("", "least_", "most_")]
+            if name in ADDED:
+                name, costs = f"{name} (added)", [-costs[0], -costs[2], -costs[1]]
+            found.append((name, costs, row["change_percent"]))
     return found
 
 
@@ -294,7 +301,8 @@ def write_rows(path, rows):
 
 def show(rows, title):
     """Print the rows that did not fail, and why the others did."""
-    names = [name for name in rows[0] if name not in ("group", "failed", "run_s")]
+    hidden = ("group", "failed", "run_s", "spared_least_percent", "spared_most_percent")
+    names = [name for name in rows[0] if name not in hidden]
     cells = [[_cell(row[name]) for name in names] for row in rows]
     print(f"\n{title}")
     print_table(cells, names)
