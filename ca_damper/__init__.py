@@ -7,6 +7,7 @@ from ca_damper.automaton import Automaton
 from ca_damper.batch import Batch
 from ca_damper.errors import InputError, SimulationDiverged
 from ca_damper.filling import Empty, RigidMass
+from ca_damper.needed_effects import needed_effects
 from ca_damper.oscillator import Oscillator
 from ca_damper.progress import Progress
 from ca_damper.record import film
@@ -32,6 +33,7 @@ __all__ = [
     "Sweep",
     "film",
     "frequency_response",
+    "needed_effects",
     "runtime",
     "sweep_up_and_down",
 ]

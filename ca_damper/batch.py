@@ -213,6 +213,7 @@ class Batch:
             method=self.filling.label,
             mount=self.mount,
             effects=self.filling.effects,
+            acted=self.bound.uses(self.filling.effects),
             scenes=self.count,
             particles=(int(particles.min()), int(particles.max())),
             dt_s=(float(dt.min()), float(dt.max())),

@@ -23,8 +23,9 @@ What ``bind`` returns is data oriented and has the ti.funcs
 ``momentum(s)``            momentum of the particles along x [kg m/s]
 ``health(s)``              0, or the code of a divergence, 1 and up; asked every few steps
 
-and in Python ``snapshot(s)``, a dict with ``position`` [m] and ``velocity`` [m/s], both (particles,
-2) as (horizontal, vertical), positions from the container's lower left inner corner.
+and in Python ``uses(effects)``, an EffectUse for each of the named effects that can be counted, and
+``snapshot(s)``, a dict with ``position`` [m] and ``velocity`` [m/s], both (particles, 2) as
+(horizontal, vertical), positions from the container's lower left inner corner.
 ``table.dt`` may change between two steps, when a sweep goes on to its next frequency.
 """
 
@@ -163,6 +164,10 @@ class FixedMass:
     def health(self, s):
         """Always fine."""
         return 0
+
+    def uses(self, effects):
+        """Nothing to count: a fixed mass acts in every step."""
+        return ()
 
     def snapshot(self, s):
         """All particles on the floor, in the corner."""

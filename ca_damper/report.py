@@ -14,7 +14,8 @@ class Report:
     """What a batch did since it was made, and what it cost.
 
     method: label of the filling. mount: "spring" or "base". effects: what the filling was asked to
-    compute. scenes: number; particles, dt_s: fewest and most. simulated_s: longest time of a scene
+    compute. acted: an ``EffectUse`` for each of them that can be counted, since the start.
+    scenes: number; particles, dt_s: fewest and most. simulated_s: longest time of a scene
     since its start. scene_steps, particle_steps: steps of all scenes, and times their particles.
     container_evaluations: of the container's right-hand side since the start; 0 on the base.
     compile_seconds, run_seconds: cost.
@@ -23,6 +24,7 @@ class Report:
     method: str
     mount: str
     effects: tuple
+    acted: tuple
     scenes: int
     particles: tuple
     dt_s: tuple
@@ -47,10 +49,11 @@ class Report:
         write_text(path, json.dumps(self.as_dict(), indent=1))
 
     def __str__(self):
-        """A table of seven lines."""
+        """A table of seven lines, and one for each effect that acted."""
         rows = [
             ("method", f"{self.method}, container on the {self.mount}"),
             ("effects", ", ".join(self.effects) or "none"),
+            *(("", f"{use.effect}: {use}") for use in self.acted),
             ("scenes", f"{self.scenes:,} with {_range(self.particles)} particles"),
             ("simulated", f"{self.simulated_s:.4g} s in steps of {_range(self.dt_s)} s"),
             ("steps", f"{self.scene_steps:,} of scenes, {self.particle_steps:,} of particles"),

@@ -19,6 +19,7 @@ from taichi_dem.materials import CONCRETE, Material
 from taichi_dem.mesh import Mesh, checked_mesh
 from taichi_dem.mesh_files import read_mesh
 from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
+from taichi_dem.needed_effects import needed_effects
 from taichi_dem.quality import quality_report
 from taichi_dem.record import write_paraview
 from taichi_dem.scene import Scene
@@ -45,6 +46,7 @@ __all__ = [
     "checked_mesh",
     "effects",
     "methods",
+    "needed_effects",
     "quality_report",
     "read_mesh",
     "runtime",

@@ -7,6 +7,7 @@ it was made would take twenty groups, and the thirtieth model of a notebook woul
 import contextlib
 
 import taichi as ti
+from taichi._snode.fields_builder import FieldsBuilder
 from taichi.lang import impl
 
 from taichi_dem.errors import InputError
@@ -55,6 +56,11 @@ def check_room():
             f"groups of fields in a Taichi session must stay below {MOST_GROUPS}, got {groups}: "
             "call runtime.stop() and runtime.start() after some hundred simulations"
         )
+
+
+def field_bytes():
+    """Bytes of all fields that the session has used so far."""
+    return sum(root._cell_size_bytes for root in FieldsBuilder._finalized_roots())
 
 
 @ti.func

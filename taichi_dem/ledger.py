@@ -46,13 +46,7 @@ class Ledger:
 
     def account(self):
         """All terms in J by name; residual is what the account cannot explain."""
-        n, bonds = self.model.body_count, self.model.bond_count
-        body, bond = np.zeros((n, 6)), np.zeros((max(1, bonds), 5))
-        self._read_bodies(body)
-        self._read_bonds(bond)
-        pair = np.zeros((self._pair_count(), 4))
-        if self.contacts is not None:
-            self._read_pairs(pair)
+        body, bond, pair = self.tables()
         terms = {
             "kinetic": body[:, 0].sum(),
             "bond_strain": bond[:, 0].sum(),
@@ -70,6 +64,22 @@ class Ledger:
         terms["residual"] = self._residual(terms)
         return {name: float(value) for name, value in terms.items()}
 
+    def tables(self):
+        """What the terms are summed of [J].
+
+        A row a body: kinetic, loads, supports, sphere dashpots, friction, injected. A row a bond:
+        strain, dashpot, slip, release, softening. A row a pair: strain, dashpots, friction,
+        injected, so far as its first body has not taken them.
+        """
+        n, bonds = self.model.body_count, self.model.bond_count
+        body, bond = np.zeros((n, 6)), np.zeros((max(1, bonds), 5))
+        self._read_bodies(body)
+        self._read_bonds(bond)
+        pair = np.zeros((self._pair_count(), 4))
+        if self.contacts is not None:
+            self._read_pairs(pair)
+        return body, bond, pair
+
     def _residual(self, terms):
         given = terms["load_work"] + terms["support_work"] + terms["injected"] + self.start_energy
         return given - sum(
@@ -80,9 +90,19 @@ class Ledger:
 
     def load_work(self, index):
         """Work of one load [J], by its place in the scene's list of loads."""
+        return float(self.load_works(index).sum())
+
+    def load_works(self, index):
+        """Work of one load on every body [J], (body_count,)."""
         work = np.zeros(self.model.body_count)
         self._read_load(index, work)
-        return float(work.sum())
+        return work
+
+    def support_works(self, index):
+        """Work [J] of all supports on the bodies that one of them holds, (body_count,)."""
+        work = np.zeros(self.model.body_count)
+        self._read_support(index, work)
+        return work
 
     def momentum(self):
         """Linear [N s] and angular momentum about the origin [N m s] less what was given, (6,)."""
@@ -123,8 +143,9 @@ class Ledger:
     def _read_bonds(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
         for b in range(self.model.bond_count):
             table[b, 0] = self.advance.bond_energy(b)
-            for k in ti.static(range(3)):
-                table[b, 1 + k] = self.state.bond_heat[b][k]
+            if ti.static(self.model.has_bond_heat):
+                for k in ti.static(range(3)):
+                    table[b, 1 + k] = self.state.bond_heat[b][k]
             for q in range(3):
                 spent = self.model.tension.spent(b, 3 * b + q)
                 table[b, 4] += self.model.unit_area[b] * spent
@@ -142,6 +163,13 @@ class Ledger:
             for e in ti.static(range(len(self.model.loads))):
                 if e == index:
                     work[i] = self.state.load_work[i][e]
+
+    @ti.kernel
+    def _read_support(self, index: ti.i32, work: ti.types.ndarray(dtype=ti.f64, ndim=1)):
+        for i in range(self.model.body_count):
+            for e in ti.static(range(len(self.model.supports))):
+                if e == index and self.model.supports[e].acts_on(i):
+                    work[i] = self.state.load_work[i][ti.static(len(self.model.loads))]
 
     @ti.kernel
     def _read_momentum(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):

@@ -60,6 +60,8 @@ class Model:
         self.has_contact = self.contact is not None
         if self.has_contact:
             self._allocate_spheres()
+        named = (self.tension.name, self.shear.name, self.dashpot.name)
+        self.has_bond_heat = any(named)
         slots = (self.tension, self.shear, self.dashpot, self.friction, self.contact)
         self.effects = tuple(e for e in (*slots, *self.loads, *self.supports) if e is not None)
         for effect in self.effects:

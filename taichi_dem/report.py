@@ -16,7 +16,8 @@ class Report:
     the finer body's step. searches: rebuilt contact lists.
     ledger: energy terms [J]; ledger_residual_fraction: residual over the work put in.
     linear_momentum_error, angular_momentum_error: out of nothing, as shares of what was
-    exchanged. compile_seconds, run_seconds, run_cpu_seconds: cost. needs: effects missed.
+    exchanged. compile_seconds, run_seconds, run_cpu_seconds: cost. acted: an ``EffectUse`` for each
+    effect. missed: a ``watch.Missed`` for each effect that was left out and needed.
     bound_by: bodies at the end by what bounds their step, see ``step_control.CRITERIA``.
     """
 
@@ -41,8 +42,14 @@ class Report:
     compile_seconds: float
     run_seconds: float
     run_cpu_seconds: float
-    needs: tuple
+    acted: tuple
+    missed: tuple
     bound_by: dict
+
+    @property
+    def needs(self):
+        """Sentences about the effects that were missed."""
+        return tuple(str(missed) for missed in self.missed)
 
     @property
     def contact_evaluations(self):
@@ -69,7 +76,15 @@ class Report:
     def as_dict(self):
         """All figures, for a JSON file."""
         derived = ("contact_evaluations", "ideal_gain", "boundary_gain", "ledger_residual_fraction")
+        derived += ("needs",)
         return {**asdict(self), **{name: getattr(self, name) for name in derived}}
+
+    def _effect_rows(self):
+        """What each effect did."""
+        if not self.acted:
+            return (("effects", "none"),)
+        rows = [f"{use.effect}: {use}" for use in self.acted]
+        return (("effects", rows[0]), *(("", row) for row in rows[1:]))
 
     def _sweeps_row(self):
         """What solving all dashpots took, for the methods that do."""
@@ -78,10 +93,10 @@ class Report:
         return (("sweeps", f"{self.sweeps:,}, {self.sweeps / self.substeps:.2f} a substep"),)
 
     def __str__(self):
-        """A table of a dozen lines, then one line for every effect that was missed."""
+        """A table of some twenty lines, then one line for every effect that was missed."""
         rows = [
             ("method", f"{self.method}, {self.driver} driver"),
-            ("effects", ", ".join(self.effects) or "none"),
+            *self._effect_rows(),
             (
                 "simulated",
                 f"{self.until_s:.4g} s, {self.broken_faces} of {self.bond_count} bonds broken",

@@ -6,6 +6,7 @@ import time
 import numpy as np
 
 from taichi_dem import runtime
+from taichi_dem.effects_acted import effects_acted
 from taichi_dem.errors import InputError, SimulationDiverged
 from taichi_dem.fields import fields_first
 from taichi_dem.health import Health
@@ -212,7 +213,8 @@ class Simulation:
             compile_seconds=self.compile_seconds,
             run_seconds=self.run_seconds,
             run_cpu_seconds=self.run_cpu_seconds,
-            needs=self.watch.findings(),
+            acted=effects_acted(self.model, self.ledger, self.watch.touching),
+            missed=self.watch.findings(),
             bound_by=counted_criteria(self.state.bound.to_numpy()),
         )
 

@@ -23,8 +23,9 @@ class State:
     slot: impulse [N s] and its moment about the body's centre [N m s] that face f of body i has
     gathered since then, entry 4 i + f.
     broken_tick: when a bond was released, NEVER while it holds. exposed_tick: since when a face
-    carries contact spheres.
-    bond_heat: energy that dashpots, slip and release have taken from each bond [J].
+    carries contact spheres; with contact only.
+    bond_heat: energy that dashpots, slip and release have taken from each bond [J]; not for bonds
+    that are merely elastic.
     contact_heat: energy that sphere dashpots and friction have taken, and energy that releases
     have injected [J], booked to the first body of a pair; with contact only.
     injected_tick: last tick whose releases have been booked there.
@@ -47,9 +48,11 @@ class State:
         self.last_tick = ti.field(ti.i64, shape=n)
         self.slot = ti.Vector.field(6, real, shape=4 * n)
         self.broken_tick = ti.field(ti.i64, shape=bonds)
-        self.exposed_tick = ti.field(ti.i64, shape=4 * n)
-        self.bond_heat = ti.Vector.field(3, real, shape=bonds)
+        if model.has_bond_heat:
+            self.bond_heat = ti.Vector.field(3, real, shape=bonds)
         if model.has_contact:
+            self.exposed_tick = ti.field(ti.i64, shape=4 * n)
+            then(self.exposed_tick.fill, NEVER)
             self.contact_heat = ti.Vector.field(3, real, shape=n)
             self.injected_tick = ti.field(ti.i64, shape=())
         self.load_work = ti.Vector.field(len(model.loads) + 1, real, shape=n)
@@ -59,7 +62,6 @@ class State:
         self.max_speed2 = ti.field(real, shape=())
         then(self.max_speed2.fill, max_speed**2)
         then(self.broken_tick.fill, NEVER)
-        then(self.exposed_tick.fill, NEVER)
         then(self.bad_body.fill, n)
         then(self.place, model.centre, np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)))
 

@@ -1,6 +1,6 @@
 """Looks, at recording times, for effects that a scene left out and the run turns out to need."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import taichi as ti
@@ -12,21 +12,26 @@ from taichi_dem.physics.fracture import coulomb_limit
 class Missed:
     """A need that no listed effect serves.
 
-    effect: what to list. what: the finding in words. times: recordings that saw it. most: the
-    largest number of places in one of them. where: first such bond. first_s: when first [s].
+    effect: what to list. what: the finding in words. times: recordings that saw it, of ``looks``.
+    most: the largest number of places in one of them. where: first such bond, place_m: the middle
+    of its face in the mesh [m]. first_s: when first [s].
     """
 
     effect: str
     what: str
     times: int = 0
+    looks: int = 0
     most: int = 0
     where: int = -1
+    place_m: tuple = ()
     first_s: float = 0.0
 
     def __str__(self):
+        place = ", ".join(f"{x:.3g}" for x in self.place_m)
         return (
             f"{self.effect} is left out, but {self.what}: up to {self.most} at a time, first at "
-            f"t = {self.first_s:.4g} s (bond {self.where}), seen at {self.times} recordings"
+            f"t = {self.first_s:.4g} s (bond {self.where} at {place} m), seen at {self.times} of "
+            f"{self.looks} recordings"
         )
 
 
@@ -39,10 +44,15 @@ _NEEDS = (
 
 @ti.data_oriented
 class Watch:
-    """Counts the places where an absent effect would have acted, at recording times."""
+    """Counts the places where an absent effect would have acted, at recording times.
+
+    touching: most pairs of bodies that one of them saw in contact.
+    """
 
     def __init__(self, model, state, advance):
         self.model, self.state, self.advance = model, state, advance
+        self.touching = self.looks = 0
+        self.last_s = -1.0
         listed = {effect.role for effect in model.effects if effect.name}
         self.missed = {
             role: Missed(effect, what) for role, effect, what in _NEEDS if role not in listed
@@ -52,6 +62,10 @@ class Watch:
 
     def look(self, time_s):
         """Update the findings at a recording time [s]."""
+        if time_s == self.last_s:
+            return
+        self.looks, self.last_s = self.looks + 1, time_s
+        self._count_touching()
         if not self.missed or self.model.bond_count == 0:
             return
         marks = np.zeros((self.model.bond_count, 3), dtype=np.int32)
@@ -62,23 +76,42 @@ class Watch:
                 missed = self.missed[role]
                 if missed.times == 0:
                     missed.where, missed.first_s = int(places[0]), time_s
+                    missed.place_m = self._middle(missed.where)
                 missed.times += 1
                 missed.most = max(missed.most, len(places))
 
     def saved(self):
         """What a checkpoint holds of it, arrays by name."""
         rows = [[m.times, m.most, m.where, m.first_s] for m in self.missed.values()]
-        return {"missed": np.array(rows, dtype=np.float64).reshape(-1, 4)}
+        return {
+            "missed": np.array(rows, dtype=np.float64).reshape(-1, 4),
+            "looks": np.array([self.looks, self.touching, self.last_s]),
+        }
 
     def resume(self, saved):
         """Take over what ``saved`` gave."""
         for missed, row in zip(self.missed.values(), saved["missed"].tolist()):
             missed.times, missed.most, missed.where = (int(value) for value in row[:3])
             missed.first_s = row[3]
+            if missed.times:
+                missed.place_m = self._middle(missed.where)
+        looks, touching, self.last_s = saved["looks"].tolist()
+        self.looks, self.touching = int(looks), int(touching)
+
+    def _count_touching(self):
+        contacts = self.advance.contacts
+        if contacts is not None:
+            deepest = contacts.deepest.to_numpy()[: contacts.pair_count[None]]
+            self.touching = max(self.touching, int((deepest > 0.0).sum()))
+
+    def _middle(self, bond):
+        corners = self.model.topology.vertices[bond]
+        return tuple(self.model.mesh.points[corners].mean(axis=0).tolist())
 
     def findings(self):
-        """Sentences about effects that were needed, an empty tuple where none was."""
-        return tuple(str(missed) for missed in self.missed.values() if missed.times)
+        """A ``Missed`` for each effect that was needed, an empty tuple where none was."""
+        found = [missed for missed in self.missed.values() if missed.times]
+        return tuple(replace(missed, looks=self.looks) for missed in found)
 
     @ti.kernel
     def _mark(self, marks: ti.types.ndarray(dtype=ti.i32, ndim=2)):

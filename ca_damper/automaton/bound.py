@@ -22,7 +22,7 @@ class BoundAutomaton:
         parts = assembled(options, table)
         self.table, self.numbers, self.lattice = table, parts.numbers, parts.lattice
         self.cells, self.rivals, self.accounting = parts.cells, parts.rivals, parts.accounting
-        self.resting, self.ledger = parts.resting, parts.ledger
+        self.resting, self.ledger, self.tally = parts.resting, parts.ledger, parts.tally
         self.flight, self.ejection = Flight(parts), Ejection(parts)
         both, pairs_first = options.pair_rule == "both", options.priority == "pairs_first"
         self.encounters = Encounters(parts, both, pairs_first)
@@ -40,6 +40,7 @@ class BoundAutomaton:
         self.rivals.clear(s)
         self.resting.clear(s)
         self.accounting.clear(s)
+        self.tally.clear(s)
         self.placement.place(s)
         self.velocity[s] = 0.0
 
@@ -91,6 +92,10 @@ class BoundAutomaton:
         for cell in range(self.lattice.cells):
             fastest = max(fastest, self.cells.speed[s, cell])
         return 0 if fastest * self.table.dt[s] < self.numbers.width[None] else 1
+
+    def uses(self, effects):
+        """How often each of the named effects acted."""
+        return self.tally.uses(effects)
 
     def snapshot(self, s):
         """Positions and velocities of the particles, by cell (see ``ca_damper.filling``)."""

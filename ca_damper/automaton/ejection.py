@@ -9,6 +9,7 @@ stays in the room has nothing pushed in its way, or it would touch it and be pus
 
 import taichi as ti
 
+from ca_damper.automaton.tally import PUSHES
 from ca_damper.lattice import DIRECTIONS, DOWN, HELD, UP
 
 
@@ -23,6 +24,7 @@ class Ejection:
     def __init__(self, parts):
         self.cells, self.lattice, self.numbers = parts.cells, parts.lattice, parts.numbers
         self.accumulator, self.accounting = parts.accumulator, parts.accounting
+        self.tally = parts.tally
         scenes, size = self.cells.kind.shape
         self.pushed = ti.field(ti.i8, shape=(scenes, size))
         self.border = ti.field(ti.i16, shape=(scenes, size))
@@ -95,6 +97,7 @@ class Ejection:
         kind = self.cells.at(s, cell)
         gain = velocity - self.cells.vertical_speed(s, cell)
         if gain * way > 0.0:
+            self.tally.note(s, PUSHES)
             kind = UP if velocity > 0.0 else DOWN
             travelled = self.accumulator.at_wall(kind, self.cells.offset[s])
             self.cells.put(s, cell, kind, abs(velocity), travelled)

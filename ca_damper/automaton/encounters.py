@@ -10,6 +10,8 @@ import taichi as ti
 from ca_damper.automaton.laws import deflected, speed_after_pair, speed_after_wall
 from ca_damper.automaton.ledger import PAIRS, quanta
 from ca_damper.automaton.rivals import ahead_of_others, rank
+from ca_damper.automaton.tally import HOLDS, WALLS
+from ca_damper.automaton.tally import PAIRS as PAIRS_MET
 from ca_damper.lattice import EMPTY, WALL, mirrored, turned_back
 from ca_damper.random_numbers import DEFLECT, EVENT, bits, unit
 
@@ -30,7 +32,7 @@ class Encounters:
     def __init__(self, parts, both, pairs_first):
         self.cells, self.lattice, self.rivals = parts.cells, parts.lattice, parts.rivals
         self.accumulator, self.resting = parts.accumulator, parts.resting
-        self.accounting, self.numbers = parts.accounting, parts.numbers
+        self.accounting, self.numbers, self.tally = parts.accounting, parts.numbers, parts.tally
         self.both, self.pairs_first = both, pairs_first
         shape = (self.cells.kind.shape[0], self.lattice.cells)
         self.contacts = ti.field(ti.i32, shape=shape)
@@ -115,13 +117,16 @@ class Encounters:
         before = self.cells.vertical_speed(s, cell)
         gained = ti.cast(0, ti.i64)
         if event == PAIR:
+            self.tally.note(s, PAIRS_MET)
             gain = self.collide(s, shared, cell, other)
             gained = self.accounting.lattice_gave(s, PAIRS, gain)
         elif event == JOIN:
             # The container carries the particle over this whole step, its weight with it.
+            self.tally.note(s, HOLDS)
             gained = quanta(velocity - before - pull)
             self.resting.hold(s, cell)
         else:
+            self.tally.note(s, WALLS)
             self.rebound(s, cell, event, other)
             gain = self.cells.vertical_speed(s, cell) - before
             gained = self.accounting.blow(s, cell, gain)

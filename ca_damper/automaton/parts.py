@@ -10,6 +10,7 @@ from ca_damper.automaton.ledger import Ledger, NoLedger
 from ca_damper.automaton.rivals import Rivals
 from ca_damper.automaton.state import Cells
 from ca_damper.automaton.static_contact import NoStaticContact, StaticContact
+from ca_damper.automaton.tally import Tally
 from ca_damper.automaton.traversal import ParticleList, Scan
 from ca_damper.lattice import Geometry, Lattice
 
@@ -57,6 +58,7 @@ class Parts:
     accounting: object
     resting: object
     ledger: object
+    tally: Tally
 
 
 def assembled(options, table):
@@ -85,4 +87,5 @@ def assembled(options, table):
         accounting=accounting,
         resting=resting,
         ledger=ledger,
+        tally=Tally(scenes),
     )

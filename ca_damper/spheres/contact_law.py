@@ -123,8 +123,13 @@ class ContactLaw:
         root = ti.sqrt(overlap)
         # d^(3/2) and d^(1/4) by square roots: a power costs ten times as much.
         dashpot = contact.damping * (root if ti.static(self.printed) else ti.sqrt(root))
-        force = contact.stiffness * overlap * root + dashpot * approach
+        force = self.elastic(contact, overlap) + dashpot * approach
         return ti.max(0.0, force) / (1.0 + dashpot * contact.yielding)
+
+    @ti.func
+    def elastic(self, contact, overlap):
+        """The spring's part of the repulsion [N]."""
+        return contact.stiffness * overlap * ti.sqrt(overlap)
 
     @ti.func
     def friction(self, contact, push, slip):

@@ -14,6 +14,7 @@ import numpy as np
 import taichi as ti
 
 from ca_damper.filling import Action
+from ca_damper.spheres.acted import Acted
 from ca_damper.spheres.bodies import Bodies, vec2
 from ca_damper.spheres.contact_law import Contact, ContactLaw, pair_numbers, wall_numbers
 from ca_damper.spheres.rotation import NoRotation, Rotation
@@ -42,6 +43,7 @@ class BoundSpheres:
         self.rotation = Rotation() if options.rotation else NoRotation()
         self.search = make_search(options.search, options.radius)
         self.crushed = ti.field(ti.i32, shape=table.count)
+        self.acted = Acted(table.count)
         self.rotation.bind(self.bodies)
         self.search.bind(self.bodies)
         self.contact_of_pair = Contact.field(shape=())
@@ -66,6 +68,7 @@ class BoundSpheres:
         self.bodies.place_all(s)
         for i in range(self.bodies.first(s), self.bodies.last(s)):
             self.rotation.reset(i)
+        self.acted.clear(s)
         self.search.forget(s)
 
     @ti.func
@@ -94,17 +97,23 @@ class BoundSpheres:
         square = branch.norm_sqr()
         if square < contact.reach * contact.reach:
             distance = ti.sqrt(square)
-            normal = branch * (1.0 / distance)
-            tangent = vec2(-normal[1], normal[0])
-            relative = self.bodies.velocity[i] - self.bodies.velocity[j]
-            slip = self.rotation.slip_of_pair(i, j, 0.5 * distance, relative.dot(tangent))
-            push = self.law.normal(contact, contact.reach - distance, relative.dot(normal))
+            normal, tangent, approach, slip = self._meeting(i, j, branch, distance)
+            push = self.law.normal(contact, contact.reach - distance, approach)
             drag = self.law.friction(contact, push, slip)
             force = drag * tangent - push * normal
             self.bodies.push(i, force)
             self.bodies.push(j, -force)
             self.rotation.twist(i, 0.5 * distance * drag)
             self.rotation.twist(j, 0.5 * distance * drag)
+
+    @ti.func
+    def _meeting(self, i, j, branch, distance):
+        """Normal, tangent, approach [m/s] and slip [m/s] of two spheres that touch."""
+        normal = branch * (1.0 / distance)
+        tangent = vec2(-normal[1], normal[0])
+        relative = self.bodies.velocity[i] - self.bodies.velocity[j]
+        slip = self.rotation.slip_of_pair(i, j, 0.5 * distance, relative.dot(tangent))
+        return normal, tangent, relative.dot(normal), slip
 
     @ti.func
     def _advance(self, s, dt, floor, speed):
@@ -181,7 +190,8 @@ class BoundSpheres:
         """0, or a code of DIVERGENCES; "not" lets NaN fail a test."""
         body, dt = self.bodies.body[None], self.table.dt[s]
         self.crushed[s] = self.search.crowded(s)
-        self.search.each_pair(s, self.contact_of_pair[None], self._look)
+        contact = self.law.over_step(self.contact_of_pair[None], dt)
+        self.search.each_pair(s, contact, self._look)
         code = OVERLAP if self.crushed[s] > 0 else FINE
         for i in range(self.bodies.first(s), self.bodies.last(s)):
             place, speed = self.bodies.place(s, i), self.bodies.velocity[i].norm()
@@ -191,14 +201,31 @@ class BoundSpheres:
                 code = RUNAWAY
             if not (speed < ti.math.inf):
                 code = NOT_FINITE
+            room = ti.min(place, vec2(body.width, body.height) - place)
+            at_wall = ti.cast((room < body.radius).any(), ti.i32)
+            going = 0.5 * body.mass * speed * speed
+            self.acted.look(s, at_wall, going, self.rotation.energy(i))
         return code
 
     @ti.func
     def _look(self, i, j, contact):
-        """Note spheres that overlap by more than a radius, half of their reach."""
+        """Note spheres that touch, and those that overlap by more than half of their reach."""
+        s = i // self.bodies.stride
         branch = self.bodies.position[j] - self.bodies.position[i]
-        if branch.norm_sqr() < 0.25 * contact.reach * contact.reach:
-            self.crushed[i // self.bodies.stride] = 1
+        distance = branch.norm()
+        if distance < 0.5 * contact.reach:
+            self.crushed[s] = 1
+        if distance < contact.reach:
+            _, _, approach, slip = self._meeting(i, j, branch, distance)
+            overlap = contact.reach - distance
+            push = self.law.normal(contact, overlap, approach)
+            drag = self.law.friction(contact, push, slip)
+            dragged = (push - self.law.elastic(contact, overlap)) * approach
+            self.acted.touch(s, dragged, -drag * slip)
+
+    def uses(self, effects):
+        """What each of the named effects did."""
+        return self.acted.uses(effects)
 
     def snapshot(self, s):
         """Places and velocities of the spheres of scene s, and their spins [rad/s] if they turn."""

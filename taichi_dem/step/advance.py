@@ -71,7 +71,9 @@ class Advance(Touch):
                 if ti.static(self.has_heat):
                     self.state.bond_heat[b] += area * vec3(dragged * dt, slipped, 0.0)
             else:
-                self.state.bond_heat[b] += area * vec3(0.0, slipped, self._stored(b, motion))
+                if ti.static(self.model.has_bond_heat):
+                    heat = vec3(0.0, slipped, self._stored(b, motion))
+                    self.state.bond_heat[b] += area * heat
                 self._release(b, slots)
             if ti.static(self.solves):
                 self._renew(b, slots, motion, failed, dragged * (area * dt))
@@ -83,8 +85,9 @@ class Advance(Touch):
             self.solver.bonds.begin(b, slots[0] >> 2, slots[1] >> 2, motion.branch)
         else:
             self.solver.bonds.end(b)
-            # Dashpots are booked for the step before: it was full, also when a unit fails now.
-            self.state.bond_heat[b][0] += dragged
+            if ti.static(self.model.has_bond_heat):
+                # Dashpots are booked for the step before: it was full, though a unit fails now.
+                self.state.bond_heat[b][0] += dragged
 
     @ti.func
     def _owes(self, b):
@@ -175,7 +178,8 @@ class Advance(Touch):
         tick = self.state.tick[None]
         self.state.broken_tick[b] = tick
         for side in ti.static(range(2)):
-            self.state.exposed_tick[slots[side]] = tick
+            if ti.static(self.has_contact):
+                self.state.exposed_tick[slots[side]] = tick
             self.schedule.note_change(slots[side] >> 2)
             if ti.static(self.has_rates):
                 self.rates.notice(slots[side] >> 2, RELEASE)

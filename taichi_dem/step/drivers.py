@@ -205,7 +205,8 @@ class SolvedStep(Step):
         for b in range(self.advance.model.bond_count):
             self.advance.bond(b)
             # It booked a step that never was.
-            self.state.bond_heat[b] = 0.0 * self.state.bond_heat[b]
+            if ti.static(self.advance.model.has_bond_heat):
+                self.state.bond_heat[b] = 0.0 * self.state.bond_heat[b]
 
 
 @ti.data_oriented

@@ -85,5 +85,8 @@ class BoundKicks:
             code = CODE
         return code
 
+    def uses(self, effects):
+        return ()
+
     def snapshot(self, s):
         return {"position": np.zeros((2, 2)), "velocity": np.ones((2, 2))}

@@ -60,6 +60,16 @@ FIGURES = {
             *("ideal_gain", "boundary_gain", "realised_gain"),
         )
     },
+    "cost_of_effects": {
+        *("overhead_absent_percent", "blast_seconds", "blast_chance_percent"),
+        *(
+            f"{effect}_{what}"
+            for effect in ("sphere_contact", "friction")
+            for what in ("seconds", "memory_MB", "compiled_kB", "displacement_change_percent")
+        ),
+        "spheres_rotation_seconds",
+        "automaton_static_contact_response_change_percent",
+    },
     "demo_fracture_law": {"peak_MPa_error", "failure_opening_um_error", "energy_J_m2_error"},
     "demo_wave_and_spall": {"wave_speed_m_s", "free_end_over_wave", "spall_1.5_depth_m"},
     "demo_step_too_large": {"limit_dashpots_s", "dashpots_0.9_diverged", "dashpots_1.3_diverged"},
@@ -76,6 +86,7 @@ FILES = {
         *("comparison.csv", "uniform.csv", "multirate_held.csv", "multirate_drifted.csv"),
         *("levels_multirate_held.png", "levels_multirate_drifted.png", "methods.png"),
     ),
+    "cost_of_effects": ("effects.png", "blast.csv", "damper.csv"),
     "demo_fracture_law": ("law.gif", "law.png", "tension.csv", "shear.csv", "caption.txt"),
     "demo_wave_and_spall": (
         *("spall.gif", "wave.png", "spall.png", "wave.csv", "spall.csv", "caption.txt"),
@@ -85,7 +96,7 @@ FILES = {
 }
 
 
-quick = quick_runs([name for name in NAMES if "blast" in name])
+quick = quick_runs([name for name in NAMES if "blast" in name or name == "cost_of_effects"])
 
 
 class TestQuickRun(QuickRun):

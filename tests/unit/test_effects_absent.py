@@ -15,83 +15,116 @@ from tests.scenes import ROOT
 PAST = 20e-6
 
 _COUNT = """
-import glob, json, os, re
-import taichi as ti
+import glob, json, os, re, sys
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects, runtime
+from taichi_dem.fields import field_bytes
 from taichi_dem.mesh_shapes import pair
-from taichi_dem.physics.bond import unit_arm, unit_opening, unit_velocity
-from taichi_dem.physics.rotation import zero3
 from taichi_dem.step.advance import Advance
-from taichi_dem.types import vec3
+import taichi as ti
+sys.path.insert(0, os.environ["EXPERIMENTS"])
+from _stripped import ByHand
 
 os.environ["TI_OFFLINE_CACHE"] = "0"
 os.environ["TI_PRINT_KERNEL_LLVM_IR_OPTIMIZED"] = "1"
 runtime.start(threads=1)
 
 @ti.data_oriented
-class ByHand(Advance):
-    @ti.func
-    def bond(self, b):
-        if self.state.broken_tick[b] < 0:
-            slots = self.model.bond_slots[b]
-            motion = self._motion(b, slots)
-            force, torque = zero3(), zero3()
-            for q in range(3):
-                u = 3 * b + q
-                arm = unit_arm(motion, self.model.vertex_slave[u])
-                opening = unit_opening(motion, arm, self.model.vertex_master[u])
-                k = self.model.bond_stiffness[b]
-                traction = vec3(k[0] * opening[0], k[1] * opening[1], k[1] * opening[2])
-                force += traction
-                torque += arm.cross(traction)
-            dt = self.schedule.pair_step(slots[0] >> 2, slots[1] >> 2)
-            area = self.model.unit_area[b]
-            self._pull_together(slots, motion, force * (area * dt), torque * (area * dt))
-
-@ti.data_oriented
 class Kernel:
     def __init__(self, advance):
         self.advance = advance
     @ti.kernel
-    def evaluate(self):
+    def bond(self):
         for _ in range(1):
             self.advance.bond(0)
+    @ti.kernel
+    def body(self):
+        for _ in range(1):
+            self.advance.body(0)
 
-def instructions(advance):
+def instructions(kernel):
     for name in glob.glob("*.ll"):
         os.remove(name)
-    Kernel(advance).evaluate()
+    kernel()
     text = "".join(open(name).read() for name in glob.glob("*.ll"))
     return len(re.findall(r"^  (?:%|store|br|ret|call)", text, re.M))
 
-def advance_of(cls, listed):
+def counts(cls, *listed):
+    before = field_bytes()
     sim = Simulation(Scene(pair(), CONCRETE, listed), Uniform())
-    return cls(sim.model, sim.state, sim.schedule, None)
+    kernel = Kernel(cls(sim.model, sim.state, sim.schedule, None))
+    return {
+        "bytes": field_bytes() - before,
+        "bond": instructions(kernel.bond),
+        "body": instructions(kernel.body),
+    }
 
-every = [effects.BondDamping(), effects.Softening(), effects.ShearSlip()]
+# Model, state and schedule of n elastic, free bodies and b bonds, in the order of their making.
+n, b, whole, wide = 2, 1, ti.i32, ti.i64
+model = [(n, 1), (n, 1), (n, 1), (n, 9), (n, 9)]
+model += [(b, 2, whole), (b, 9), (b, 2), (b, 1), (3 * b, 3), (3 * b, 3)]
+model += [(4 * n, 1, whole), (4 * n, 1, whole)]
+state = [(n, 3), (n, 4), (n, 9), (n, 3), (n, 3), (n, 3), (n, 1, whole), (n, 1, whole)]
+state += [(n, 1, wide), (4 * n, 6), (b, 1, wide), (n, 1), (n, 6)]
+state += [(1, 1, wide), (1, 1, whole), (1, 1)]
+# Of three due lists that of contacts has but one place.
+due = [(k, 1, whole) for size in (n, b, 1) for k in (size, size, size, 22)]
+clock = [(21, 1), *due, *[(1, 1, whole)] * 3, (2 * n + 2 * b, 1, whole), (1, 1, whole)]
+clock += [(5, 1, wide)]
+
+def bytes_by_hand():
+    before = field_bytes()
+    made = []
+    for size, width, *kind in (*model, *state, *clock):
+        made.append(ti.Vector.field(width, kind[0] if kind else ti.f64, shape=size))
+    made[0].fill(0)
+    return field_bytes() - before
+
+every = {e.name: e for e in (effects.BondDamping(), effects.Softening(), effects.ShearSlip())}
 print(json.dumps({
-    "composed": instructions(advance_of(Advance, [])),
-    "by hand": instructions(advance_of(ByHand, [])),
-    "all": instructions(advance_of(Advance, every)),
+    "composed": counts(Advance),
+    "by hand": counts(ByHand),
+    "all": counts(Advance, *every.values(), effects.Gravity()),
+    "bytes by hand": bytes_by_hand(),
+    **{name: counts(Advance, effect) for name, effect in every.items()},
 }))
 """
 
 
-def test_a_bond_without_effects_compiles_to_the_code_written_by_hand(tmp_path):
-    """Optimised LLVM instructions of one bond: composed without effects = stripped by hand."""
-    script = tmp_path / "count.py"
+@pytest.fixture(scope="module")
+def count(tmp_path_factory):
+    """Optimised LLVM instructions of a bond and of a body, and bytes of all fields, by scene."""
+    folder = tmp_path_factory.mktemp("count")
+    script = folder / "count.py"
     script.write_text(_COUNT)
+    paths = {"PYTHONPATH": ROOT, "EXPERIMENTS": os.path.join(ROOT, "experiments")}
     done = subprocess.run(
         [sys.executable, str(script)],
         capture_output=True,
         text=True,
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": ROOT},
+        cwd=folder,
+        env={**os.environ, **paths},
     )
     assert done.returncode == 0, done.stderr
-    count = json.loads(done.stdout.splitlines()[-1])
-    assert count["by hand"] < count["all"]
-    assert count["composed"] == count["by hand"], count
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+@pytest.mark.parametrize("what", ["bond", "body"])
+def test_a_step_without_effects_compiles_to_the_code_written_by_hand(count, what):
+    """Optimised LLVM instructions: composed without effects = stripped by hand."""
+    assert count["by hand"][what] < count["all"][what]
+    assert count["composed"][what] == count["by hand"][what]
+
+
+def test_a_scene_without_effects_allocates_what_is_listed_by_hand(count):
+    assert count["composed"]["bytes"] == count["bytes by hand"]
+
+
+@pytest.mark.parametrize(
+    ("effect", "own"), [("bond_damping", 2), ("softening", 2 + 6), ("shear_slip", 2 + 6)]
+)
+def test_an_effect_adds_its_own_fields_and_the_account_of_heat(count, effect, own):
+    """own: numbers of the law, and two for each of three units; three of heat a bond; 8 bytes."""
+    assert count[effect]["bytes"] - count["composed"]["bytes"] == 8 * (own + 3)
 
 
 OWNED = {"softening_unit": effects.Softening, "shear_slip": effects.ShearSlip}
@@ -135,7 +168,7 @@ def test_a_run_that_needed_an_absent_effect_says_so(missing):
     listed = [make() for make in classes]
     found = needs_after(listed, shift, broken)
     assert len(found) == 1
-    assert found[0].startswith(f"{missing} is left out") and "(bond 0)" in found[0]
+    assert found[0].startswith(f"{missing} is left out") and "(bond 0 at " in found[0]
 
 
 def test_a_run_that_stayed_below_the_limits_is_silent():

@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[2]
 LAYERS = {
     "taichi_dem": (
         ("errors", "types", "runtime"),
-        ("checks", "fields", "field_memory", "files"),
+        ("checks", "fields", "field_memory", "files", "effect_use"),
         ("plot_style", "checkpoint"),
         ("restart",),
         (
@@ -32,10 +32,10 @@ LAYERS = {
         ("state",),
         ("step",),
         ("ledger",),
-        ("health", "watch", "report", "step_report"),
+        ("health", "watch", "report", "step_report", "effects_acted"),
         ("simulation",),
         ("monitor", "record"),
-        ("simulate",),
+        ("simulate", "needed_effects"),
         ("plot",),
         ("__init__",),
     ),
@@ -44,7 +44,7 @@ LAYERS = {
         ("filling", "rk45", "oscillator", "clock", "record"),
         ("container", "automaton", "spheres"),
         ("coupling",),
-        ("batch",),
+        ("batch", "needed_effects"),
         ("response",),
         ("sweep",),
         ("plot",),
@@ -55,7 +55,7 @@ LAYERS = {
 ACROSS = {
     "ca_damper": (
         *("taichi_dem.runtime", "taichi_dem.errors", "taichi_dem.checks", "taichi_dem.fields"),
-        *("taichi_dem.files", "taichi_dem.plot_style"),
+        *("taichi_dem.files", "taichi_dem.plot_style", "taichi_dem.effect_use"),
         *("taichi_dem.checkpoint", "taichi_dem.restart"),
     )
 }

@@ -1,0 +1,20 @@
+"""Which effects of a filling a run had need of."""
+
+from ca_damper.report import Report
+from taichi_dem.checks import fraction
+from taichi_dem.effect_use import Advice
+from taichi_dem.errors import InputError
+
+
+def needed_effects(result, tolerance=1e-3):
+    """Advice about the effects of a run; print it, or ask for its ``droppable``.
+
+    result: a Response, or the Report of a Batch. tolerance: share of the energy taken (friction)
+    or in motion (rotation) below which an effect counts as nothing, in [0, 1].
+    Raises InputError for a result that is none, or a tolerance out of range.
+    """
+    report = getattr(result, "report", result)
+    if not isinstance(report, Report):
+        kind = type(result).__name__
+        raise InputError(f"result must be a Response or the Report of a Batch, got {kind}")
+    return Advice(report.acted, (), fraction("tolerance", tolerance))

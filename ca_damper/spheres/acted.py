@@ -1,0 +1,64 @@
+"""What the effects of the spheres did, as seen when the health of a scene was looked at.
+
+Those looks are every few steps: to ask in every step would cost a fifth of it.
+"""
+
+import taichi as ti
+
+from taichi_dem.effect_use import EffectUse
+
+vec2 = ti.types.vector(2, ti.f64)
+
+
+@ti.data_oriented
+class Acted:
+    """Sums over the looks since the reset, by scene.
+
+    touches: of two spheres, or of a sphere and a wall. power: into dashpots and into friction of
+    sphere on sphere [W]. motion: energy of going and of turning [J].
+    """
+
+    def __init__(self, scenes):
+        self.touches = ti.field(ti.i64, shape=scenes)
+        self.power = ti.Vector.field(2, ti.f64, shape=scenes)
+        self.motion = ti.Vector.field(2, ti.f64, shape=scenes)
+
+    @ti.func
+    def clear(self, s):
+        """Nothing has been seen yet."""
+        self.touches[s] = ti.cast(0, ti.i64)
+        self.power[s], self.motion[s] = vec2(0.0), vec2(0.0)
+
+    @ti.func
+    def touch(self, s, dragged, rubbed):
+        """Note two spheres that touch: power into their dashpot and into friction [W]."""
+        # Not "+=", which would be an atomic addition; a scene is one thread.
+        self.touches[s] = self.touches[s] + 1
+        self.power[s] = self.power[s] + vec2(dragged, rubbed)
+
+    @ti.func
+    def look(self, s, at_wall, going, turning):
+        """Note a sphere: whether it is at a wall, and the energy of its motion [J]."""
+        self.touches[s] = self.touches[s] + at_wall
+        self.motion[s] = self.motion[s] + vec2(going, turning)
+
+    def uses(self, effects):
+        """An EffectUse for each of the named effects, over all scenes."""
+        power, motion = (field.to_numpy().sum(axis=0) for field in (self.power, self.motion))
+        touches = int(self.touches.to_numpy().sum())
+        turned = touches if motion[1] > 0.0 else 0
+        found = {
+            "normal contact": (touches, _share(power, 0), "what contacts took", True),
+            "friction": (touches, _share(power, 1), "what contacts took", False),
+            "rotation": (turned, _share(motion, 1), "the energy of motion", False),
+        }
+        return tuple(_use(name, *found[name]) for name in effects)
+
+
+def _use(name, touches, share, whole, steers):
+    return EffectUse(name, "touches seen", touches, share=share, whole=whole, steers=steers)
+
+
+def _share(parts, which):
+    """None for no part at all: spheres may rub on walls alone, which is not seen."""
+    return float(parts[which] / parts.sum()) if parts[which] > 0.0 else None

@@ -1,0 +1,100 @@
+"""Jobs of ``cost_of_effects.py``: what is measured, and the processes that measure it."""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from _timing import Timing
+from taichi_dem import InputError
+
+_WORKER = os.path.join(os.path.dirname(os.path.abspath(__file__)), "_effects_worker.py")
+
+
+@dataclass
+class Job:
+    """One measurement and what came of its repeats.
+
+    group: "blast", "spheres", "automaton" or "absent". label: for tables. kind, arguments: as the
+    worker takes them. results: of every repeat, the first with an empty cache of kernels.
+    compiled_kB: size of the kernels that the first left there.
+    """
+
+    group: str
+    label: str
+    kind: str
+    arguments: dict
+    results: list = field(default_factory=list)
+    compiled_kB: float = 0.0
+
+    @property
+    def failed(self):
+        """The sentence of a run that diverged, or ""."""
+        return self.first.get("failed", "")
+
+    @property
+    def first(self):
+        """What the first repeat measured."""
+        return self.results[0]
+
+    @property
+    def step_ms(self):
+        """Timing of a step, its seconds in ms of CPU, over all repeats."""
+        return Timing.of([1e3 * r["run_s"] / r["steps"] for r in self.results])
+
+
+@dataclass(frozen=True)
+class Share:
+    """How many of all runs are done, as a progress bar wants it."""
+
+    done: int
+    total: int
+
+    @property
+    def share(self):
+        """Of the runs, in [0, 1]."""
+        return self.done / self.total
+
+    def __str__(self):
+        """In words."""
+        return f"{self.done} of {self.total} runs"
+
+
+def run_all(jobs, repeats, workers, arch, progress):
+    """Run every job ``repeats`` times (``absent`` once), some at a time; returns wall seconds.
+
+    All first runs come before all second ones, so that a busy minute of the machine does not fall
+    on one job alone.
+    """
+    started, done = time.perf_counter(), 0
+    rounds = [[job for job in jobs if k == 0 or job.kind != "absent"] for k in range(repeats)]
+    total = sum(map(len, rounds))
+    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(workers) as pool:
+        places = {id(job): Path(folder, str(k)) for k, job in enumerate(jobs)}
+        for some in rounds:
+            for _ in pool.map(lambda job: _measure(job, places[id(job)], arch), some):
+                done += 1
+                progress(Share(done, total))
+    return time.perf_counter() - started
+
+
+def _measure(job, place, arch):
+    """Run a job once in a process of its own, with a kernel cache of its own at a place."""
+    cache = place / "kernels"
+    cache.mkdir(parents=True, exist_ok=True)
+    task = place / "job.json"
+    task.write_text(json.dumps({"kind": job.kind, "arch": arch, "arguments": job.arguments}))
+    environment = {**os.environ, "TI_OFFLINE_CACHE": "1", "TI_OFFLINE_CACHE_FILE_PATH": str(cache)}
+    done = subprocess.run(
+        [sys.executable, _WORKER, str(task)], capture_output=True, text=True, env=environment
+    )
+    if done.returncode != 0:
+        raise InputError(f"the run of {job.label} ended with: {done.stderr.strip()[-300:]}")
+    job.results.append(json.loads(done.stdout))
+    if not job.compiled_kB:
+        job.compiled_kB = 1e-3 * sum(p.stat().st_size for p in cache.rglob("*.tic"))

@@ -1,0 +1,57 @@
+"""What happens to a bond and a body without any effect, stripped by hand, to compare with."""
+
+import taichi as ti
+
+from taichi_dem.physics.bond import unit_arm, unit_opening
+from taichi_dem.physics.rotation import rotation_matrix, spin_of, turned, zero3
+from taichi_dem.step.advance import Advance
+from taichi_dem.types import vec3
+
+
+@ti.data_oriented
+class ByHand(Advance):
+    """Elastic bonds and free bodies, with nothing left in that an effect could hook into."""
+
+    @ti.func
+    def bond(self, b):
+        """Elastic traction of three units, given to both bodies."""
+        if self.state.broken_tick[b] < 0:
+            slots = self.model.bond_slots[b]
+            motion = self._motion(b, slots)
+            force, torque = zero3(), zero3()
+            for q in range(3):
+                u = 3 * b + q
+                arm = unit_arm(motion, self.model.vertex_slave[u])
+                opening = unit_opening(motion, arm, self.model.vertex_master[u])
+                k = self.model.bond_stiffness[b]
+                traction = vec3(k[0] * opening[0], k[1] * opening[1], k[1] * opening[2])
+                force += traction
+                torque += arm.cross(traction)
+            dt = self.schedule.pair_step(slots[0] >> 2, slots[1] >> 2)
+            area = self.model.unit_area[b]
+            self._pull_together(slots, motion, force * (area * dt), torque * (area * dt))
+
+    @ti.func
+    def body(self, i):
+        """Take the impulses, move and turn."""
+        elapsed = self.schedule.elapsed(i)
+        linear, angular = zero3(), zero3()
+        for f in range(4):
+            taken = self.state.slot[4 * i + f]
+            linear += taken[0:3]
+            angular += taken[3:6]
+            self.state.slot[4 * i + f] = 0.0 * taken
+        velocity = self.state.velocity[i] + linear * self.model.mass_inverse[i]
+        momentum = self.state.angular_momentum[i] + angular
+        spin = spin_of(self.state.rotation[i], self.model.inertia_inverse[i], momentum)
+        self.state.velocity[i], self.state.angular_momentum[i] = velocity, momentum
+        self.state.spin[i] = spin
+        orientation = turned(self.state.orientation[i], spin, elapsed)
+        self.state.orientation[i] = orientation
+        self.state.rotation[i] = rotation_matrix(orientation)
+        self.state.position[i] += elapsed * velocity
+        self.state.last_tick[i] = self.state.tick[None]
+        speed2 = velocity.norm_sqr()
+        if not (speed2 + spin.norm_sqr() * self.model.radius[i] ** 2 < self.state.max_speed2[None]):
+            ti.atomic_min(self.state.bad_body[None], i)
+        self.schedule.choose_level(i, speed2)

@@ -1,0 +1,321 @@
+"""What does each effect cost, and what does the result lose without it?
+
+    python experiments/cost_of_effects.py          # about five minutes on two cores
+    python experiments/cost_of_effects.py --quick
+
+The paper's block is blasted with its effects added one by one, and left out one by one; so is a
+response curve of the damper, by spheres and by the automaton. Every run is a process of its own
+with an empty cache of kernels, then with a full one for the repeats: CPU seconds of a step (least
+of the repeats), memory of all fields, CPU seconds before the first step, size of the compiled
+kernels. Beside it: the displacement of the hole and the broken faces, or the response. An effect
+that is left out of a scene must cost nothing: an elastic block is timed against a step stripped
+by hand.
+
+Writes effects.png, blast.csv, damper.csv and summary.json to results/cost_of_effects/.
+"""
+
+import os
+import sys
+
+import numpy as np
+
+from _cli import (
+    ProgressBar,
+    figure,
+    main,
+    number,
+    parser,
+    print_figures,
+    print_table,
+    whole,
+    write_summary,
+)
+from _damper_response import distance
+from _effects_jobs import Job, run_all
+from _effects_picture import picture_effects
+from taichi_dem.files import output_folder, write_csv
+
+NAME = "cost_of_effects"
+#: Effects in the order in which they are added; the load is always there.
+ORDER = ("bond_damping", "softening", "shear_slip", "sphere_contact", "friction")
+#: What cannot stay without it.
+ALONG = {"sphere_contact": ("friction",)}
+ALL = "all effects"
+STEP = 4e-7
+FULL = {
+    "until": 2.5e-4,
+    "repeats": 3,
+    "ratios": (0.88, 0.91, 0.94, 0.96, 0.98, 1.0, 1.03),
+    "cycles": (60, 20),
+    "left_out": ORDER,
+    "added": ORDER,
+    "again": 100,
+}
+QUICK = {
+    "until": 1e-4,
+    "repeats": 1,
+    "ratios": (0.92, 0.96, 1.0),
+    "cycles": (15, 5),
+    "left_out": ("sphere_contact", "friction"),
+    "added": (),
+    "again": 40,
+}
+#: Substeps that the elastic block is timed over at a time.
+SUBSTEPS = 150
+LAST_BIT = "all effects, last bit of the load changed"
+PARTICLES, SEEDS = 30, (1, 2)
+#: What is left out of a filling, or added to it: in words, and as options.
+SPHERES = (
+    ("friction of spheres", {"friction": 0.0}),
+    ("friction at walls", {"wall_friction": 0.0}),
+    ("rotation", {"rotation": True}),
+)
+AUTOMATON = (
+    ("static contact", {"accounting": "landing+ejection"}),
+    ("ejection and static contact", {"accounting": "landing"}),
+)
+ADDED = ("rotation",)
+VARIANTS = tuple(label for label, _ in SPHERES + AUTOMATON)
+COSTS = (
+    *("step_ms", "step_ms_most", "run_s"),
+    *("spared_percent", "spared_least_percent", "spared_most_percent"),
+    *("memory_MB", "before_first_step_s", "compiled_kB"),
+)
+
+
+def options_parser():
+    """Options of this experiment; threads: processes side by side."""
+    made = parser(NAME, __doc__)
+    made.add_argument("--until", type=number(0, 1), help="simulated time of the blast [s], 2.5e-4")
+    made.add_argument("--repeats", type=whole(1, 100), help="of every run, 3")
+    return made
+
+
+def run(options):
+    """Measure, then write and print."""
+    for name, value in (QUICK if options.quick else FULL).items():
+        if getattr(options, name, None) is None:
+            setattr(options, name, value)
+    output_folder(options.out)
+    jobs = [*blast_jobs(options), *damper_jobs(options), absent_job(options)]
+    workers = options.threads or min(2, os.cpu_count() or 1)
+    with ProgressBar("measuring") as progress:
+        seconds = run_all(jobs, options.repeats, workers, options.arch, progress)
+    blast, damper = blast_rows(jobs), damper_rows(jobs)
+    figures = figures_of(jobs, blast, damper)
+    write_rows(os.path.join(options.out, "blast.csv"), blast)
+    write_rows(os.path.join(options.out, "damper.csv"), damper)
+    picture(blast, damper, os.path.join(options.out, "effects.png"))
+    compiling = sum(job.first.get("compile_s", 0.0) for job in jobs)
+    write_summary(options.out, NAME, figures, compile_seconds=compiling, run_seconds=seconds)
+    show(blast, "The blast: hole's displacement [mm] and broken faces")
+    show(damper, "The damper: peak of the response [mm]; first rows: what two seeds may differ by")
+    print()
+    print_figures(figures)
+    print(f"\nThe picture and the tables are in {options.out}")
+
+
+def picture(blast, damper, path):
+    """Bars: what an effect costs, and what changes without it."""
+    parts = [
+        ("Blast of the paper's block", verdicts(blast, ("blast",)), _chance(blast)),
+        ("Damper, spheres", verdicts(damper, ("spheres",)), _floor(damper, "spheres")),
+        ("Damper, automaton", verdicts(damper, ("automaton",)), _floor(damper, "automaton")),
+    ]
+    picture_effects(path, parts)
+
+
+def _floor(rows, group):
+    return next(row["change_percent"] for row in rows if row["group"] == group)
+
+
+def _chance(blast):
+    """What a change of the load's last bit changes [%], 0 where that was not tried."""
+    return next((row["change_percent"] for row in blast if row["scene"] == LAST_BIT), 0.0)
+
+
+def blast_jobs(options):
+    """All effects, without each, and from the load alone up to all; none of them twice."""
+    wanted = {ALL: ORDER}
+    for name in options.left_out:
+        gone = (name, *ALONG.get(name, ()))
+        wanted[f"without {' and '.join(gone)}"] = tuple(e for e in ORDER if e not in gone)
+    wanted["gas pressure alone"] = ()
+    for k, name in enumerate(options.added):
+        wanted[f"up to {name}"] = ORDER[: k + 1]
+    made = {}
+    for label, names in wanted.items():
+        if names not in made.values():
+            made[label] = names
+    jobs = [_blast_job(label, names, options) for label, names in made.items()]
+    if options.repeats > 1:
+        jobs.append(_blast_job(LAST_BIT, ORDER, options, ulps=1))
+    return jobs
+
+
+def _blast_job(label, names, options, ulps=0):
+    names = ["gas_pressure", *names]
+    arguments = {"names": names, "until": options.until, "step": STEP, "ulps": ulps}
+    return Job("blast", label, "blast", arguments)
+
+
+def damper_jobs(options):
+    """Both fillings as they are, and with each effect left out or added."""
+    jobs = []
+    for filling, step, variants in (("spheres", 4e-5, SPHERES), ("automaton", 1e-4, AUTOMATON)):
+        common = {"filling": filling, "particles": PARTICLES, "step": step, "seeds": SEEDS}
+        common.update(ratios=options.ratios, cycles=options.cycles)
+        for label, chosen in ((f"{filling} as they are", {}), *variants):
+            jobs.append(Job(filling, label, "damper", {**common, "options": chosen}))
+    return jobs
+
+
+def absent_job(options):
+    """An elastic block as composed and as stripped by hand."""
+    arguments = {"substeps": SUBSTEPS, "repeats": options.again}
+    return Job("absent", "elastic block", "absent", arguments)
+
+
+def blast_rows(jobs):
+    """A row of the table for every blast."""
+    blasts = [job for job in jobs if job.group == "blast"]
+    rows = [_cost_row(job, blasts[0]) for job in blasts]
+    for row, job in zip(rows, blasts):
+        done = not job.failed
+        row["hole_mm"] = job.first["hole_mm"] if done else None
+        row["broken_faces"] = job.first["broken"] if done else None
+        row["energy_percent"] = _energy(row["scene"], blasts[0])
+        row["change_percent"] = _percent(row["hole_mm"], rows[0]["hole_mm"])
+    return rows
+
+
+def _energy(scene, complete):
+    """Share of the energy that the first effect left out of a scene takes in the complete one."""
+    name = scene.replace("without ", "").split()[0]
+    share = complete.first.get("shares", {}).get(name)
+    return None if share is None else 100.0 * share
+
+
+def damper_rows(jobs):
+    """A row for every response curve; the change is the distance to that of the full filling.
+
+    The floor is half of the distance of two seeds: what the mean over them may owe to chance.
+    """
+    rows = []
+    for group in ("spheres", "automaton"):
+        curves = [job for job in jobs if job.group == group]
+        whole_curve = _curve(curves[0])
+        for job in curves:
+            row = _cost_row(job, curves[0])
+            curve = _curve(job)
+            row["peak_mm"] = None if job.failed else float(curve.max())
+            row["change_percent"] = None if job.failed else 100.0 * distance(curve, whole_curve)
+            rows.append(row)
+        one, other = curves[0].first["rms_mm"]
+        rows[-len(curves)]["change_percent"] = 50.0 * distance(one, other)
+    return rows
+
+
+def _curve(job):
+    """Mean over the seeds [mm], (ratios,)."""
+    return np.mean(job.first.get("rms_mm", np.nan), axis=0)
+
+
+def _percent(value, of):
+    return None if value is None else 100.0 * abs(value - of) / abs(of)
+
+
+def _cost_row(job, complete):
+    """What a job cost, and what share of a step of the complete scene it spares."""
+    row = {"group": job.group, "scene": job.label, "failed": job.failed}
+    if job.failed:
+        return {**row, **dict.fromkeys(COSTS)}
+    timing = job.step_ms
+    return {
+        **row,
+        "step_ms": timing.low,
+        "step_ms_most": timing.high,
+        "run_s": 1e-3 * timing.low * job.first["steps"],
+        "spared_percent": 100.0 * (1.0 - timing.low / complete.step_ms.low),
+        # From the slowest of its repeats beside the fastest of the others to the reverse.
+        "spared_least_percent": 100.0 * (1.0 - timing.high / complete.step_ms.low),
+        "spared_most_percent": 100.0 * (1.0 - timing.low / complete.step_ms.high),
+        "memory_MB": job.first["memory_MB"],
+        "before_first_step_s": job.first["compile_s"],
+        "compiled_kB": job.compiled_kB,
+    }
+
+
+def verdicts(rows, groups):
+    """(name, cost [%] with its least and most, change [%]) for each effect of some groups."""
+    found = []
+    for row in rows:
+        name = row["scene"].replace("without ", "")
+        alone = row["scene"].startswith("without ") or name in VARIANTS
+        if row["group"] in groups and alone and not row["failed"]:
+            costs = [row[f"spared_{key}percent"] for key in ("", "least_", "most_")]
+            if name in ADDED:
+                name, costs = f"{name} (added)", [-costs[0], -costs[2], -costs[1]]
+            found.append((name, costs, row["change_percent"]))
+    return found
+
+
+def figures_of(jobs, blast, damper):
+    """Overhead of what is absent; for each effect what it adds, and what its absence changes."""
+    times = jobs[-1].first
+    # Each against its neighbour in time: a machine is never equally fast for long.
+    ratio = np.array(times["composed"]) / np.array(times["by_hand"])
+    low, middle, high = 100.0 * (np.percentile(ratio, [25, 50, 75]) - 1.0)
+    figures = {"overhead_absent_percent": figure(float(middle), "%")}
+    figures["overhead_absent_low_percent"] = figure(float(low), "%")
+    figures["overhead_absent_high_percent"] = figure(float(high), "%")
+    figures["blast_seconds"] = figure(blast[0]["run_s"], "s")
+    figures["blast_chance_percent"] = figure(_chance(blast), "%")
+    for row in blast:
+        if row["scene"].startswith("without "):
+            name = row["scene"].split()[1]
+            _add(figures, name, row, blast[0])
+            change = None if row["failed"] else row["broken_faces"] - blast[0]["broken_faces"]
+            figures[f"{name}_broken_faces_change"] = figure(change, "1")
+    for row in damper:
+        if row["scene"] in VARIANTS:
+            complete = next(r for r in damper if r["group"] == row["group"])
+            _add(figures, f"{row['group']}_{row['scene'].replace(' ', '_')}", row, complete)
+    return figures
+
+
+def _add(figures, name, row, complete):
+    """Seconds, memory and kernels that an effect adds, and the change of the result."""
+    sign = -1.0 if row["scene"] in ADDED else 1.0
+    for key, unit in (("run_s", "s"), ("memory_MB", "MB"), ("compiled_kB", "kB")):
+        more = None if row["failed"] else sign * (complete[key] - row[key])
+        figures[f"{name}_{'seconds' if key == 'run_s' else key}"] = figure(more, unit)
+    what = "displacement" if row["group"] == "blast" else "response"
+    figures[f"{name}_{what}_change_percent"] = figure(row["change_percent"], "%")
+
+
+def write_rows(path, rows):
+    """CSV with a column for every key."""
+    write_csv(path, {key: [row[key] for row in rows] for key in rows[0]})
+
+
+def show(rows, title):
+    """Print the rows that did not fail, and why the others did."""
+    hidden = ("group", "failed", "run_s", "spared_least_percent", "spared_most_percent")
+    names = [name for name in rows[0] if name not in hidden]
+    cells = [[_cell(row[name]) for name in names] for row in rows]
+    print(f"\n{title}")
+    print_table(cells, names)
+    for row in rows:
+        if row["failed"]:
+            print(f"{row['scene']}: {row['failed']}")
+
+
+def _cell(value):
+    if value is None:
+        return "-"
+    return value if isinstance(value, (str, int)) else f"{value:.3g}"
+
+
+if __name__ == "__main__":
+    sys.exit(main(run, options_parser()))

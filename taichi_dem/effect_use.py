@@ -1,0 +1,79 @@
+"""What an effect did in a run, and which of them a user may leave out; plain data, no physics."""
+
+from dataclasses import dataclass
+from typing import Optional
+
+
+@dataclass(frozen=True)
+class EffectUse:
+    """What one effect did.
+
+    effect: its name. what: the events in words. events: how many, of at most ``of`` (0 where there
+    is no most). energy_J: taken or given, None where it is not booked. share: of ``whole``, in
+    words; None where there is nothing to compare with. steers: whether it directs the rest even
+    where it takes little, as a crack does: then only one that never acted can be left out.
+    """
+
+    effect: str
+    what: str
+    events: int
+    of: int = 0
+    energy_J: Optional[float] = None
+    share: Optional[float] = None
+    whole: str = "the energy put in"
+    steers: bool = False
+
+    @property
+    def acted(self):
+        """Whether it had any part in the run."""
+        return self.events > 0
+
+    def negligible(self, tolerance):
+        """Whether it acted, and booked less than a share of the energy."""
+        judged = self.acted and not self.steers and self.share is not None
+        return judged and self.share < tolerance
+
+    def __str__(self):
+        """One line without the name."""
+        if not self.acted:
+            return f"never acted (0 {self.what})"
+        most = f" of {self.of:,}" if self.of else ""
+        energy = f", {self.energy_J:.3g} J" if self.energy_J is not None else ""
+        share = f", {100 * self.share:.3g} % of {self.whole}" if self.share is not None else ""
+        return f"{self.events:,}{most} {self.what}{energy}{share}"
+
+
+@dataclass(frozen=True)
+class Advice:
+    """Which effects a run had need of.
+
+    uses: an EffectUse for each effect. missed: findings about effects that were left out, with how
+    often and where. tolerance: share of the energy below which an effect counts as negligible.
+    """
+
+    uses: tuple
+    missed: tuple
+    tolerance: float
+
+    @property
+    def never_acted(self):
+        """Names of the effects that had no part; without them not a bit would differ."""
+        return tuple(use.effect for use in self.uses if not use.acted)
+
+    @property
+    def negligible(self):
+        """Names of the effects that acted, and booked less than the tolerance."""
+        return tuple(use.effect for use in self.uses if use.negligible(self.tolerance))
+
+    @property
+    def droppable(self):
+        """Names of the effects that the scene could do without."""
+        return self.never_acted + self.negligible
+
+    def __str__(self):
+        """A line for every effect, then what was missed."""
+        lines = [f"{self._verdict(use):10s} {use.effect:16s} {use}" for use in self.uses]
+        return "\n".join([*lines, *(f"missed     {finding}" for finding in self.missed)])
+
+    def _verdict(self, use):
+        return "drop" if use.effect in self.droppable else "keep"

@@ -1,0 +1,21 @@
+"""Which effects a run had need of: those to keep, those to drop, those that were missed."""
+
+from taichi_dem.checks import fraction
+from taichi_dem.effect_use import Advice
+from taichi_dem.errors import InputError
+from taichi_dem.report import Report
+
+
+def needed_effects(result, tolerance=1e-3):
+    """Advice about the effects of a run; print it, or ask for its ``droppable`` and ``missed``.
+
+    result: what ``simulate`` gave, or its report. tolerance: share of the work put in below which
+    what an effect booked counts as nothing, in [0, 1]. Effects that steer (fracture, contact,
+    supports) take little and decide much: they are dropped only where they never acted.
+    Raises InputError for a result that is none, or a tolerance out of range.
+    """
+    report = getattr(result, "report", result)
+    if not isinstance(report, Report):
+        kind = type(result).__name__
+        raise InputError(f"result must be a Result of simulate or its report, got {kind}")
+    return Advice(report.acted, report.missed, fraction("tolerance", tolerance))
