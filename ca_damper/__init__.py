@@ -10,6 +10,7 @@ from ca_damper.filling import Empty, RigidMass
 from ca_damper.oscillator import Oscillator
 from ca_damper.progress import Progress
 from ca_damper.record import film
+from ca_damper.report import Report
 from ca_damper.response import Response, frequency_response
 from ca_damper.spheres import Spheres
 from ca_damper.sweep import Sweep, sweep_up_and_down
@@ -22,6 +23,7 @@ __all__ = [
     "InputError",
     "Oscillator",
     "Progress",
+    "Report",
     "Response",
     "RigidMass",
     "SceneTable",

@@ -16,6 +16,7 @@ from ca_damper.coupling import LOST, Coupling
 from ca_damper.errors import SimulationDiverged
 from ca_damper.oscillator import Oscillator
 from ca_damper.progress import Progress
+from ca_damper.report import RK45_STAGES, Report
 from taichi_dem import runtime
 from taichi_dem.checks import choice, positive, whole
 from taichi_dem.errors import InputError
@@ -40,7 +41,7 @@ class Batch:
     makes a cycle of the base: ``steps_per_cycle``, (scenes,).
     mount: "spring", or "base" for a container that moves like the base whatever the filling does.
     measured_cycles: most cycles that one run may measure. rtol, atol: of RK45, on the spring.
-    ``run_seconds`` and ``compile_seconds`` tell what was spent.
+    ``run_seconds`` and ``compile_seconds`` tell what was spent, ``report()`` all of it in short.
     Raises InputError for a scene that the filling refuses or a step out of range.
     """
 
@@ -51,7 +52,7 @@ class Batch:
         self.measured_cycles = whole("measured_cycles", measured_cycles, 0, 100_000)
         positive("rtol", rtol, zero_allowed=True)
         positive("atol", atol)
-        self.filling, self.table, self.count = filling, table, table.count
+        self.filling, self.table, self.count, self.mount = filling, table, table.count, mount
         self.oscillators = [Oscillator(*row) for row in zip(*map(table.column, _STRUCTURE))]
         self.largest_dt, self.clock = table.column("dt"), Clock(table)
         frequency = table.column("frequency")
@@ -67,6 +68,7 @@ class Batch:
         self._set_pace(frequency, dt)
         self.time_origin = np.zeros(self.count)
         self.run_seconds = self.compile_seconds = 0.0
+        self.scene_steps = self.particle_steps = 0
         # Scene-steps a launch; one each to begin with, as nobody knows yet what a step costs.
         self._pace = float(self.count)
         self._compiled = self._started = False
@@ -150,6 +152,25 @@ class Batch:
         """Steps that RK45 has tried since the start, (scenes,); one a step unless some failed."""
         return self.coupling.attempts.to_numpy()
 
+    def report(self):
+        """What was done and what it cost, as a ``report.Report``."""
+        particles, dt = self.table.column("particles"), self.table.column("dt")
+        sprung = self.mount == "spring"
+        return Report(
+            method=self.filling.label,
+            mount=self.mount,
+            effects=self.filling.effects,
+            scenes=self.count,
+            particles=(int(particles.min()), int(particles.max())),
+            dt_s=(float(dt.min()), float(dt.max())),
+            simulated_s=float(self.time_s.max()),
+            scene_steps=self.scene_steps,
+            particle_steps=self.particle_steps,
+            container_evaluations=RK45_STAGES * int(self.attempts().sum()) if sprung else 0,
+            compile_seconds=self.compile_seconds,
+            run_seconds=self.run_seconds,
+        )
+
     def _check_session(self):
         if self.generation != runtime.generation():
             raise InputError("this batch belongs to a Taichi session that has been stopped")
@@ -178,7 +199,9 @@ class Batch:
     def _fit_steps(self, frequency):
         """Fit the steps to the cycle, have the filling check them, and return them [s]."""
         scenes = zip(frequency, self.largest_dt)
-        self.steps_per_cycle = np.array([steps_per_cycle(f, dt) for f, dt in scenes], np.int32)
+        self.steps_per_cycle = np.array(
+            [steps_per_cycle(float(f), float(dt)) for f, dt in scenes], np.int32
+        )
         dt = 1.0 / (frequency * self.steps_per_cycle)
         for particles, step in sorted(set(zip(self.table.column("particles").tolist(), dt))):
             self.filling.check(particles, float(step))
@@ -213,6 +236,8 @@ class Batch:
             self.compile_seconds += time.perf_counter() - started
             self._compiled = True
         self._launch_until_done(max(1, int(steps.sum())), progress)
+        self.scene_steps += int(steps.sum())
+        self.particle_steps += int((self.table.column("particles") * steps).sum())
 
     def _launch_until_done(self, total, progress):
         done, started = 0.0, time.perf_counter()

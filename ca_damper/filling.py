@@ -6,6 +6,7 @@ A filling is a frozen dataclass of a user's options, checked when it is made. It
 ``default_dt``     step to take unless the user asks for another [s]
 ``capacity``       most particles that fit
 ``particle_mass``  [kg]             ``gravity``  that acts on the particles [m/s^2], downwards
+``effects``        what it computes, in words for the report
 ``check(particles, dt)``            raises InputError for what the filling cannot do
 ``divergence(code, particles, dt)`` what a code of ``health`` means, in words that follow "it", and
                                     a step that would do [s]
@@ -69,6 +70,7 @@ class Empty:
     """A container without particles."""
 
     label: ClassVar[str] = "empty"
+    effects: ClassVar[tuple] = ()
     default_dt: ClassVar[float] = 1e-4
     capacity: ClassVar[int] = 0
     particle_mass: ClassVar[float] = 0.0
@@ -99,6 +101,7 @@ class RigidMass:
     gravity: float = 9.8
 
     label: ClassVar[str] = "rigid"
+    effects: ClassVar[tuple] = ("fixed mass",)
     default_dt: ClassVar[float] = 1e-4
     capacity: ClassVar[int] = 1_000_000
 

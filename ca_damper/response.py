@@ -1,12 +1,14 @@
 """Frequency response of the damped structure: every particle number, frequency and seed a scene."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Optional
 
 import numpy as np
 
 from ca_damper.batch import Batch
 from ca_damper.measures import peak
 from ca_damper.oscillator import Oscillator
+from ca_damper.report import Report
 from ca_damper.table import SceneTable
 from taichi_dem.checks import positive, several, whole
 from taichi_dem.errors import InputError
@@ -38,7 +40,8 @@ class Response:
     rms: root mean square of the displacement about its mean in each cycle [m]. amplitude: half the
     way from lowest to highest [m]. mean: displacement [m]. mean_force: of the filling on the
     container [N]. apparent_mass [kg], apparent_damping [N s/m], loss_factor, damping_ratio: of
-    ``measures.Cycles``. energy: of the particles [J].
+    ``measures.Cycles``. energy: of the particles [J]. report: what was done and what it cost; None
+    for one way of a sweep.
     """
 
     label: str
@@ -57,6 +60,7 @@ class Response:
     loss_factor: np.ndarray
     damping_ratio: np.ndarray
     energy: np.ndarray
+    report: Optional[Report] = None
 
     def peaks(self):
         """Where each curve peaks: (ratio, rms [m]), two arrays (particles, seeds)."""
@@ -107,7 +111,7 @@ def frequency_response(
     shape = grid.shape
     steps = batch.steps_per_cycle.reshape(shape)[0, :, 0]
     values = {name: value.reshape(shape) for name, value in grid.measures(cycles).items()}
-    return grid.response(steps, values)
+    return replace(grid.response(steps, values), report=batch.report())
 
 
 class Grid:

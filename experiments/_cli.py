@@ -213,6 +213,6 @@ def print_figures(figures):
 
 
 def _short(value):
-    if value is None:
-        return ""
+    if value is None or isinstance(value, str):
+        return value or ""
     return f"{value:,}" if isinstance(value, int) else f"{value:.4g}"

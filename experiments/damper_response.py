@@ -182,10 +182,11 @@ def timed(title, work):
 
 
 def write_tables(measured, folder):
-    """CSV of every scene, of the peaks, of the sweeps."""
+    """CSV of every scene, of the peaks, of the sweeps; what each response cost as JSON."""
     peaks = {"filling": [], "particles": [], "seed": [], "peak_ratio": [], "peak_rms_mm": []}
     for label, one in measured.items():
         one.response.write_csv(os.path.join(folder, f"response_{label}.csv"))
+        one.response.report.write(os.path.join(folder, f"report_{label}.json"))
         one.sweep.up.write_csv(os.path.join(folder, f"sweep_up_{label}.csv"))
         one.sweep.down.write_csv(os.path.join(folder, f"sweep_down_{label}.csv"))
         ratio, rms = one.response.peaks()

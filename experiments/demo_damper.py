@@ -110,6 +110,10 @@ def run(options):
         run_seconds=sum(made.batch.run_seconds for made in runs.values()),
     )
     tell(figures, filling, oscillator, options)
+    report = runs["full"].batch.report()
+    report.write(os.path.join(options.out, "report.json"))
+    print(f"\n{report}")
+    print(f"\nAnimation, curves and table are in {options.out}")
 
 
 def figures_of(full, empty, oscillator):
@@ -181,7 +185,6 @@ def tell(figures, filling, oscillator, options):
         f"{value['damping_ratio']:.2g} instead of {value['damping_ratio_empty']:.2g}."
     )
     print(f"In the swing they weigh as much as {value['apparent_mass_g']:.1f} g fixed to it.")
-    print(f"\nAnimation, curves and table are in {options.out}")
 
 
 if __name__ == "__main__":

@@ -113,6 +113,13 @@ class Automaton:
         return ACCOUNTINGS[self.accounting]
 
     @property
+    def effects(self):
+        """What is computed, in words for the report."""
+        counted = {"landing": (), "landing+ejection": ("ejection",)}
+        more = counted.get(self.accounting, ("ejection", "static contact"))
+        return ("pairs", "landing", *more, *(("ledger",) if self.ledger else ()))
+
+    @property
     def default_dt(self):
         """The paper's step, 1e-4 s."""
         return 1e-4

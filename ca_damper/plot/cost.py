@@ -1,5 +1,7 @@
 """Pictures of what a cycle costs (Fig. 12), and of the steps that fillings bear."""
 
+import numpy as np
+
 from taichi_dem.plot_style import picture
 
 TITLES = {
@@ -52,3 +54,22 @@ def picture_steps(path, borne):
         axis.set(xscale="log", xlabel="step [s]", ylim=(-0.6, len(borne) - 0.4))
         axis.set_yticks(range(len(borne)), list(borne))
         axis.legend(ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+
+
+def picture_curves(path, curves, oscillator):
+    """Response curves by title: means over seeds as lines, their range as bars; empty dotted.
+
+    curves: {title: (ratios, rms [mm], (ratios, seeds))}.
+    """
+    with picture(path, 1, 1, (7.0, 4.6)) as (_, axis):
+        for (title, (ratios, rms)), mark in zip(curves.items(), "osD^vP*X"):
+            middle = rms.mean(axis=1)
+            bars = [middle - rms.min(axis=1), rms.max(axis=1) - middle]
+            axis.errorbar(ratios, middle, yerr=bars, marker=mark, ms=4, lw=1.2, label=title)
+        fine = np.linspace(min(ratios), max(ratios), 300)
+        empty = abs(oscillator.transfer(fine * oscillator.natural_frequency))
+        empty *= 1e3 * oscillator.base_amplitude / np.sqrt(2.0)
+        top = 1.15 * max(rms.max() for _, rms in curves.values())
+        axis.plot(fine, empty, ":", color="0.5", lw=1.0, label="empty container")
+        axis.set(xlabel="frequency f / f$_0$", ylabel="RMS displacement [mm]", ylim=(0.0, top))
+        axis.legend()

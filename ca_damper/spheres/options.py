@@ -82,6 +82,13 @@ class Spheres:
             object.__setattr__(self, "start", self._checked_start())
 
     @property
+    def effects(self):
+        """What is computed, in words for the report."""
+        rough = self.friction > 0.0 or self.wall_friction > 0.0
+        asked = {"friction": rough, "rotation": self.rotation}
+        return ("normal contact", *(name for name, there in asked.items() if there))
+
+    @property
     def radius(self):
         """Radius of a sphere [m]."""
         return 0.5 * self.diameter

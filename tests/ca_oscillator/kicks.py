@@ -28,6 +28,7 @@ class Kicks:
     traced: int = 1
 
     label: ClassVar[str] = "kicks"
+    effects: ClassVar[tuple] = ("kicks",)
     default_dt: ClassVar[float] = 1e-4
     capacity: ClassVar[int] = 10
     particle_mass: ClassVar[float] = 0.2e-3

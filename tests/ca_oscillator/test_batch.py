@@ -1,6 +1,7 @@
 """Batches: the same bits in any company, bounded launches, divergence in words, Ctrl-C."""
 
 import hashlib
+import json
 import math
 import os
 import signal
@@ -280,3 +281,24 @@ def test_scenes_are_dealt_out_evenly(threads):
     hands = np.array_split(cost[order], threads)
     sums = [hand.sum() / len(hand) for hand in hands]
     assert max(sums) - min(sums) < 100 / (50 // threads)
+
+
+def test_report_counts_the_steps_of_all_scenes_and_of_their_particles(tmp_path):
+    table = SceneTable([0, 3], 1, 1e-3, [5.0, 8.0], 1e-3)
+    batch = Batch(RigidMass(), table, measured_cycles=2)
+    batch.start()
+    batch.run(1, 2)
+    report = batch.report()
+    # Whole steps a cycle: 200 at 5 Hz and 125 at 8 Hz, three cycles each.
+    assert report.scene_steps == 3 * (200 + 125)
+    assert report.particle_steps == 3 * 3 * 125
+    # Six a try, and at least a try a step.
+    assert report.container_evaluations == 6 * batch.attempts().sum() >= 6 * report.scene_steps
+    assert report.simulated_s == pytest.approx(3 / 5.0, rel=1e-12)
+    assert report.run_seconds == batch.run_seconds
+    assert report.particles == (0, 3)
+    report.write(tmp_path / "report.json")
+    written = json.loads((tmp_path / "report.json").read_text())
+    assert written["effects"] == ["fixed mass"]
+    assert written["particle_steps"] == report.particle_steps
+    assert "fixed mass" in str(report)

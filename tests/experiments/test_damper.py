@@ -53,6 +53,12 @@ FIGURES = {
         *(f"growth_{label}" for label in ("dem_pairs", "dem_cells", "ca_scan_1e-4")),
         *(f"cycle_ms_{label}_N50" for label in ("dem_pairs", "dem_cells", "ca_scan_2e-5")),
     },
+    "cost_of_accuracy_damper": {
+        *("cheapest_seconds_at_1_percent", "cheapest_method_at_1_percent"),
+        *("seconds_at_0.1_percent", "chaos_floor", "distance_to_spheres_ca_static"),
+        *(f"check_force_{label}" for label in ("ca_static", "ca_landing", "dem_tsuji", "dem_soft")),
+    },
+    "hard_cases": {"cases", "passed", "refused", "failed"},
     "demo_damper": {
         *("amplitude_mm", "amplitude_empty_mm", "amplitude_left", "rms_mm", "power_mW"),
         *("apparent_damping_N_s_m", "apparent_mass_g", "damping_ratio", "damping_ratio_empty"),
@@ -70,10 +76,16 @@ FILES = {
         *("response_ca_static.csv", "sweep_up_ca_static.csv", "sweep_down_dem.csv"),
     ),
     "damper_cost": ("cost.png", "steps.png", "cost.csv", "steps.csv"),
-    "demo_damper": ("damper.gif", "motion.png", "motion.csv"),
+    "cost_of_accuracy_damper": (
+        *("work_precision.png", "against_spheres.png", "rk45.png", "curves.png"),
+        *("points.csv", "points_against_spheres.csv", "points_empty.csv", "answers.csv"),
+        "curves.csv",
+    ),
+    "hard_cases": ("hard_cases.csv", "hard_cases.png", "full_box.png"),
+    "demo_damper": ("damper.gif", "motion.png", "motion.csv", "report.json"),
 }
 
-quick = quick_runs([name for name in NAMES if "damper" in name])
+quick = quick_runs([name for name in NAMES if "damper" in name or name == "hard_cases"])
 
 
 class TestQuickRun(QuickRun):
@@ -157,6 +169,34 @@ def test_demo_without_particles_is_the_empty_container(shown):
     _, figures = shown("demo_damper", "--particles", "0")
     assert figures["amplitude_left"] == pytest.approx(1.0, abs=1e-9)
     assert figures["apparent_mass_g"] == 0.0
+
+
+@pytest.mark.slow
+def test_cost_of_accuracy_knows_its_reference_and_names_what_diverged(shown):
+    folder, figures = shown("cost_of_accuracy_damper")
+    # The motion by the measured force must be the motion measured; the sums take x at n points a
+    # cycle, which misses its change over the cycles by their n-th part.
+    for label in ("ca_static", "ca_landing", "dem_tsuji", "dem_soft"):
+        assert figures[f"check_force_{label}"] < 1e-3
+    points = {(row["method"], row["label"]): row for row in rows_of(folder / "points.csv")}
+    assert points["dem_tsuji", "100 µs"]["failure"] == "diverged"
+    assert points["ca_static", "2 ms"]["failure"] == "refused"
+    assert points["ca_static", "2 ms"]["error"] == ""
+    # 30 particles, 3 frequencies, 2 seeds, 20 cycles of 1 / (f dt) steps.
+    ratios = np.array([0.95, 0.98, 1.0])
+    steps = np.ceil(1.0 / (ratios * math.sqrt(123.4 / 0.086) / (2.0 * math.pi) * 2e-4)).sum()
+    assert float(points["ca_static", "200 µs"]["evaluations"]) == 30 * 2 * 20 * steps
+    # The reference is kept and used again.
+    assert len(list((folder / "references").glob("*.json"))) == 4
+
+
+@pytest.mark.slow
+def test_no_hard_case_of_the_quick_run_fails(shown):
+    folder, figures = shown("hard_cases")
+    rows = rows_of(folder / "hard_cases.csv")
+    assert figures["failed"] == 0, [row["words"] for row in rows if row["status"] == "failed"]
+    assert figures["passed"] + figures["refused"] == len(rows)
+    assert {"value", "bound", "margin", "formula", "words"} <= set(rows[0])
 
 
 def test_impacts_are_found_between_samples(script):
@@ -260,6 +300,9 @@ BAD_OPTIONS = [
     ("demo_damper", ("--frequency", "inf"), ("--frequency", "'inf'")),
     ("demo_damper", ("--amplitude", "0"), ("--amplitude", "'0'", "(0, 10)")),
     ("demo_damper", ("--dt", "2e-3"), ("dt", "0.0012")),
+    ("cost_of_accuracy_damper", ("--methods", "dust"), ("--methods",)),
+    ("hard_cases", ("--only", "dust"), ("dust", "full_box")),
+    ("hard_cases", ("--columns", "0"), ("--columns", "'0'", "1 to")),
     ("demo_damper", ("--threads", "0"), ("--threads", "'0'")),
 ]
 

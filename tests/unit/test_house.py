@@ -39,7 +39,7 @@ LAYERS = {
         ("__init__",),
     ),
     "ca_damper": (
-        ("errors", "random_numbers", "lattice", "table", "progress", "measures"),
+        ("errors", "random_numbers", "lattice", "table", "progress", "measures", "report"),
         ("filling", "rk45", "oscillator", "clock", "record"),
         ("container", "automaton", "spheres"),
         ("coupling",),

@@ -1,0 +1,40 @@
+"""Results that are dear to compute, kept beside the output under everything they depend on."""
+
+import hashlib
+import json
+from pathlib import Path
+
+from taichi_dem.errors import InputError
+from taichi_dem.files import output_folder, write_text
+
+_ROOT = Path(__file__).resolve().parents[1]
+
+
+def cached(folder, name, settings, packages, compute):
+    """What ``compute()`` returns, a JSON-like dict, from a file if it was computed before.
+
+    settings: whatever else the result depends on, by its repr. packages: folders whose sources
+    it depends on. The file's name holds a digest of both, so that a change of either computes
+    anew. Returns (result, whether it came from the file).
+    """
+    path = Path(output_folder(folder), f"{name}-{digest(settings, packages)}.json")
+    try:
+        return json.loads(path.read_text(encoding="utf-8")), True
+    except FileNotFoundError:
+        pass
+    except (OSError, ValueError) as error:
+        raise InputError(f"cannot read the kept result {path}: {error}; delete it") from None
+    result = compute()
+    write_text(path, json.dumps(result))
+    return result, False
+
+
+def digest(settings, packages):
+    """Twelve letters that change with the settings and with any source of the packages."""
+    made = hashlib.sha256(repr(settings).encode())
+    for package in packages:
+        for path in sorted((_ROOT / package).rglob("*.py")):
+            # Pictures change no number.
+            if "plot" not in path.relative_to(_ROOT).parts:
+                made.update(path.read_bytes())
+    return made.hexdigest()[:12]

@@ -1,0 +1,214 @@
+"""Which hard cases each method bears, which it declines in words, and by what margin.
+
+    python experiments/hard_cases.py                      # about three minutes on one core
+    python experiments/hard_cases.py --only full_box,still_heap
+    python experiments/hard_cases.py --quick
+
+A case is a scene at the edge of what can be computed, with figures that physics bounds: the formula
+stands in the table. A method that claims the case passes with all figures within their bounds; the
+margin is bound over figure, of the worst of them. A method that cannot handle it has to decline in
+words: numbers in their place count as a failure.
+"""
+
+import math
+import os
+import sys
+import textwrap
+import time
+
+from _cli import (
+    ProgressBar,
+    figure,
+    main,
+    parser,
+    print_figures,
+    print_table,
+    several,
+    whole,
+    write_summary,
+)
+from _hard_cases import judge, named, registry
+from _hard_cases._case import FAILED, PASSED, REFUSED
+from ca_damper.progress import Progress
+from taichi_dem.files import output_folder, write_csv
+from taichi_dem.plot_style import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, SKY, picture
+
+NAME = "hard_cases"
+#: Cases of a quick run, one of each kind; the tests ask all, at quick size.
+OF_QUICK = (
+    *("full_box", "empty_box", "no_rebound", "longest_steps", "step_above_limit"),
+    *("spheres_near_limit", "spheres_beyond_limit", "single_cell"),
+)
+COLUMNS = 5
+_COLOURS = (RED, BLUE, GREEN, ORANGE, PURPLE, SKY)
+
+
+def options_parser():
+    """Options of this experiment."""
+    made = parser(NAME, __doc__)
+    made.add_argument("--only", type=several(str), help="cases by name, all by default")
+    made.add_argument("--columns", type=whole(1, 8), default=COLUMNS, help="of the sheet, 5")
+    return made
+
+
+def run(options):
+    """Ask every method of every case, write table, pictures and the sheet of all."""
+    cases = registry()
+    if options.only or options.quick:
+        cases = named(cases, options.only or OF_QUICK)
+    output_folder(options.out)
+    started = time.perf_counter()
+    results = ask(cases, options.quick)
+    compiling = sum(result.compile_s for result in results)
+    write_table(os.path.join(options.out, "hard_cases.csv"), results)
+    for case in cases:
+        picture_case(os.path.join(options.out, f"{case.name}.png"), case, results)
+    picture_sheet(os.path.join(options.out, "hard_cases.png"), cases, results, options.columns)
+    figures = figures_of(cases, results)
+    spent = time.perf_counter() - started
+    write_summary(
+        options.out, NAME, figures, compile_seconds=compiling, run_seconds=spent - compiling
+    )
+    print_results(results)
+    print()
+    print_figures(figures)
+    print(f"\nPictures and tables are in {options.out}")
+
+
+def ask(cases, quick):
+    """Results of all cases and methods."""
+    asked = [(case, method) for case in cases for method in case.asked]
+    results, started = [], time.perf_counter()
+    with ProgressBar("hard cases") as bar:
+        for k, (case, method) in enumerate(asked):
+            results.append(judge(case, method, quick))
+            bar(Progress((k + 1) / len(asked), time.perf_counter() - started, k + 1))
+    return results
+
+
+def write_table(path, results):
+    """One row a case and method; cells of what does not exist are empty."""
+    names = "case,package,method,status,figure,value,bound,formula,margin,seconds,words"
+    columns = {name: [] for name in names.split(",")}
+    for result in results:
+        limit = result.limit
+        worst = (limit.name, limit.value, limit.bound, limit.formula) if limit else ("",) * 4
+        margin = result.margin if limit else ""
+        row = (result.case, result.package, result.method, result.status, *worst, margin)
+        for name, value in zip(columns, (*row, f"{result.seconds:.3g}", result.words)):
+            columns[name].append(str(value))
+    write_csv(path, columns)
+
+
+def looks_of(results):
+    """Colour and line width of every method; the first are drawn thick, so that all are seen."""
+    methods = list(dict.fromkeys(result.method for result in results))
+    return {
+        method: {"color": _COLOURS[k % len(_COLOURS)], "lw": max(0.8, 3.0 - 0.45 * k)}
+        for k, method in enumerate(methods)
+    }
+
+
+def picture_case(path, case, results):
+    """One picture of a case: what its methods did, and how they fared."""
+    own = [result for result in results if result.case == case.name]
+    with picture(path, 1, 1, (7.0, 4.6)) as (figure, axis):
+        draw_case(axis, own, looks_of(results), size=8.0)
+        figure.suptitle(f"{case.name}: {case.question}", fontsize=9.0, x=0.02, ha="left")
+        handles, labels = axis.get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=5)
+
+
+def picture_sheet(path, cases, results, columns):
+    """All cases on one sheet."""
+    rows, looks = -(-len(cases) // columns), looks_of(results)
+    size = (3.2 * columns, min(16.0, 0.4 + 2.4 * rows))
+    with picture(path, rows, columns, size, squeeze=False) as (figure, axes):
+        panels = axes.ravel()
+        for axis, case in zip(panels, cases):
+            draw_case(axis, [result for result in results if result.case == case.name], looks, 6.0)
+        for axis in panels[len(cases) :]:
+            axis.set_axis_off()
+        shown = dict.fromkeys(result.method for result in results if result.shown)
+        lines = [panels[0].plot([], [], **looks[method])[0] for method in shown]
+        figure.legend(lines, list(shown), loc="outside upper left", ncols=len(lines) or 1)
+
+
+def draw_case(axis, own, looks, size):
+    """What the methods of a case did, and how they fared in the title.
+
+    own: results of the case. looks: by method. size: of letters [points].
+    """
+    for result in own:
+        if result.shown is not None:
+            draw_curves(axis, result.shown, result.method, looks[result.method])
+    if not any(result.shown for result in own):
+        axis.set(xticks=[], yticks=[])
+        said = textwrap.fill(own[0].words, 44)
+        axis.text(0.03, 0.92, said, fontsize=size, va="top", transform=axis.transAxes)
+    lowest, highest = axis.get_ylim()
+    if axis.get_yscale() == "linear" and 0.0 < lowest < 0.95 * highest:
+        axis.set_ylim(0.0, highest)
+    axis.tick_params(labelsize=size)
+    axis.xaxis.label.set_size(size)
+    axis.yaxis.label.set_size(size)
+    axis.set_title(f"{own[0].case.replace('_', ' ')}: {verdict(own)}", fontsize=size + 1.0)
+    if any(result.status == FAILED for result in own):
+        axis.title.set_color(RED)
+
+
+def verdict(own):
+    """How the methods of a case fared, in words."""
+    words = {PASSED: "pass", REFUSED: "decline", FAILED: "FAIL"}
+    counts = {word: sum(result.status == word for result in own) for word in words}
+    said = [f"{counts[word]} {words[word]}" for word in words if counts[word]]
+    margins = [result.margin for result in own if result.limit]
+    if margins and math.isfinite(min(margins)):
+        said.append(f"margin {min(margins):.2g}")
+    return ", ".join(said)
+
+
+def draw_curves(axis, shown, method, look):
+    """Lines of one method, its bounds dotted."""
+    for k, (x, y) in enumerate(shown.lines.values()):
+        label = method if k == 0 else None
+        if shown.dots:
+            dots = {"ms": 1.6 * look["lw"] + 1.0, "mfc": "none", "color": look["color"]}
+            axis.plot(x, y, "o", label=label, **dots)
+        else:
+            axis.plot(x, y, label=label, **look)
+    for bound in shown.bounds:
+        axis.axhline(bound, color=GREY, ls=":", lw=1.0)
+    axis.set(xlabel=shown.xlabel, ylabel=shown.ylabel)
+    if shown.log:
+        axis.set_yscale("log")
+
+
+def figures_of(cases, results):
+    """How many cases, and how many askings ended in which way."""
+    counts = {word: sum(r.status == word for r in results) for word in (PASSED, REFUSED, FAILED)}
+    margins = [result.margin for result in results if result.limit]
+    figures = {"cases": figure(len(cases), "1"), "askings": figure(len(results), "1")}
+    figures.update({word: figure(count, "1") for word, count in counts.items()})
+    if margins and math.isfinite(min(margins)):
+        figures["least_margin"] = figure(min(margins), "1")
+    return figures
+
+
+def print_results(results):
+    """The table: case, method, status, worst figure, margin."""
+    rows = [
+        (
+            result.case,
+            result.method,
+            result.status,
+            f"{result.margin:.3g}" if result.limit else "",
+            result.words if len(result.words) < 90 else result.words[:87] + "...",
+        )
+        for result in results
+    ]
+    print_table(rows, ["case", "method", "status", "margin", "worst figure, or what it said"])
+
+
+if __name__ == "__main__":
+    sys.exit(main(run, options_parser()))

@@ -1,0 +1,65 @@
+"""How a hard case is judged, with methods made up for it."""
+
+import math
+
+import pytest
+
+from _hard_cases import Case, Limit, Measured, judge, named, registry
+from _hard_cases._case import FAILED, PASSED, REFUSED
+from ca_damper import InputError
+
+
+def case(value=0.5, raises=None, **options):
+    def run(method, quick):
+        if raises is not None:
+            raise raises
+        return Measured((Limit("kept", 0.0, 0.0, "nothing"), Limit("asked", value, 1.0, "one")))
+
+    return Case("made_up", "damper", "Nothing.", ("able",), run, **options)
+
+
+def test_figure_within_its_bound_passes_with_the_margin_of_the_worst():
+    result = judge(case(0.5), "able", True)
+    assert result.status == PASSED
+    assert result.limit.name == "asked"
+    assert result.margin == 2.0
+    assert "0.5 of at most 1" in result.words
+
+
+@pytest.mark.parametrize("value", [1.001, math.inf, math.nan])
+def test_figure_beyond_its_bound_or_no_number_fails(value):
+    assert judge(case(value), "able", True).status == FAILED
+
+
+def test_method_that_claims_a_case_and_refuses_it_fails():
+    assert judge(case(raises=InputError("dt must be short")), "able", True).status == FAILED
+
+
+def test_method_that_declines_in_the_words_that_are_due_is_refused():
+    unable = {"unable": "dt must"}
+    assert (
+        judge(case(raises=InputError("dt must"), declines=unable), "unable", True).status == REFUSED
+    )
+    assert judge(case(raises=InputError("no"), declines=unable), "unable", True).status == FAILED
+
+
+def test_numbers_where_a_method_should_decline_are_a_failure():
+    result = judge(case(declines={"unable": "dt must"}), "unable", True)
+    assert result.status == FAILED
+    assert "should have declined" in result.words
+
+
+def test_names_of_cases_are_unique_and_unknown_ones_refused():
+    cases = registry()
+    names = [one.name for one in cases]
+    assert len(set(names)) == len(names)
+    assert named(cases, names[1:2]) == cases[1:2]
+    with pytest.raises(InputError, match="dust"):
+        named(cases, ["dust"])
+
+
+def test_every_case_says_what_is_hard_and_asks_somebody():
+    for one in registry():
+        assert one.question.endswith(".")
+        assert one.asked
+        assert not set(one.methods) & set(one.declines)
