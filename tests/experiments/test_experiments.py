@@ -44,6 +44,11 @@ FIGURES = {
             *("ideal_gain", "boundary_gain", "realised_gain"),
         )
     },
+    "cost_of_accuracy_blast": {
+        *("cheapest_seconds_at_1_percent", "cheapest_method_at_1_percent"),
+        *("seconds_at_0.1_percent", "chaos_floor", "reference_check"),
+        *(f"seconds_at_1_percent_{name}" for name in ("multirate_held", "limited", "implicit")),
+    },
 }
 FILES = {
     "blast_fracture": (
@@ -54,6 +59,9 @@ FILES = {
     "blast_multirate": (
         *("comparison.csv", "uniform.csv", "multirate_held.csv", "multirate_drifted.csv"),
         *("levels_multirate_held.png", "levels_multirate_drifted.png", "methods.png"),
+    ),
+    "cost_of_accuracy_blast": (
+        *("work_precision.png", "errors.png", "points.csv", "runs.csv", "answers.csv"),
     ),
 }
 
