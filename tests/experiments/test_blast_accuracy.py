@@ -49,6 +49,6 @@ def test_quick_run_agrees_with_its_reference_and_keeps_every_run(quick_run):
     assert figures["cheapest_method_at_1_percent"]["value"] == "implicit"
     with open(folder / "runs.csv", newline="") as file:
         rows = list(csv.DictReader(file))
-    assert [row["method"] for row in rows][0] == "reference"
+    assert rows[0]["method"] == "reference"
     assert {row["disturbed"] for row in rows} == {"0", "1"}
     assert all(float(row["displacement_error"]) < 0.01 for row in rows)
