@@ -119,7 +119,7 @@ def picture_case(path, case, results):
     own = [result for result in results if result.case == case.name]
     with picture(path, 1, 1, (7.0, 4.6)) as (figure, axis):
         draw_case(axis, own, looks_of(own), size=8.0)
-        figure.suptitle(f"{case.name}: {case.question}", fontsize=9.0, x=0.02, ha="left")
+        figure.suptitle(textwrap.fill(case.question, 100), fontsize=9.0, x=0.02, ha="left")
         handles, labels = axis.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=5)
 
