@@ -19,6 +19,7 @@ import sys
 
 import numpy as np
 
+from _blast import paper_scene
 from _cli import (
     BLAST_DRIVERS,
     PAPER_BLOCK,
@@ -34,14 +35,10 @@ from _cli import (
 )
 from _timing import Timing
 from taichi_dem import (
-    CONCRETE,
     Multirate,
-    Scene,
     Simulation,
     Uniform,
-    effects,
     plot,
-    read_mesh,
 )
 from taichi_dem.files import output_folder, write_csv
 from taichi_dem.record import Recorder
@@ -77,23 +74,10 @@ def options_parser():
     return made
 
 
-def build_scene(mesh):
-    """The paper's scene: all of its effects."""
-    acting = [
-        effects.BondDamping(),
-        effects.Softening(),
-        effects.ShearSlip(),
-        effects.SphereContact(),
-        effects.Friction(),
-        effects.GasPressure(),
-    ]
-    return Scene(mesh, CONCRETE, acting)
-
-
-def follow(name, options, mesh):
+def follow(name, options, scene):
     """One run of a method: (report at the early instant, report at the end, series, seconds)."""
     method = METHODS[name](options.dt0, options.l)
-    simulation = Simulation(build_scene(mesh), method, options.driver)
+    simulation = Simulation(scene, method, options.driver)
     recorder = Recorder(simulation, "hole")
     simulation.start()
     last = macro_steps(options.until, method.dt0)
@@ -122,10 +106,11 @@ def run(options):
     for name, value in (QUICK if options.quick else FULL).items():
         if getattr(options, name) is None:
             setattr(options, name, value)
-    mesh = read_mesh(options.mesh)
-    build_scene(mesh)
+    scene = paper_scene(options.mesh)
     output_folder(options.out)
-    runs = {name: [follow(name, options, mesh) for _ in range(options.repeats)] for name in METHODS}
+    runs = {
+        name: [follow(name, options, scene) for _ in range(options.repeats)] for name in METHODS
+    }
     rows = table_of(runs)
     write_csv(os.path.join(options.out, "comparison.csv"), columns_of(rows))
     series = {name: made[0][2] for name, made in runs.items()}

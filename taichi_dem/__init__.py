@@ -2,11 +2,11 @@
 
 A scene is a mesh, a material and the effects that act; ``simulate`` runs it::
 
-    from taichi_dem import CONCRETE, Multirate, Scene, effects, read_mesh, runtime, simulate
+    from taichi_dem import CONCRETE, ImplicitDashpots, Scene, effects, read_mesh, runtime, simulate
 
     runtime.start()
     scene = Scene(mesh=read_mesh("block.msh"), material=CONCRETE, effects=[...])
-    result = simulate(scene, method=Multirate(), until=1e-4)
+    result = simulate(scene, method=ImplicitDashpots(), until=1e-4)
 """
 
 # First, out of order: it prepares the environment for ``import taichi``.

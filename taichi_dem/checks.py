@@ -19,6 +19,13 @@ def positive(name, value, zero_allowed=False):
     return float(value)
 
 
+def between(name, value, least, most):
+    """The value as a float; InputError unless it is a number from least to most."""
+    if not _finite(value) or not least <= value <= most:
+        raise InputError(f"{name} must be a number from {least:g} to {most:g}, got {value!r}")
+    return float(value)
+
+
 def fraction(name, value):
     """The value as a float; InputError unless it lies in [0, 1]."""
     if not _finite(value) or not 0.0 <= value <= 1.0:

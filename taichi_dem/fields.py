@@ -6,6 +6,7 @@ it was made would take twenty groups, and the thirtieth model of a notebook woul
 
 import contextlib
 
+import taichi as ti
 from taichi.lang import impl
 
 from taichi_dem.errors import InputError
@@ -54,3 +55,11 @@ def check_room():
             f"groups of fields in a Taichi session must stay below {MOST_GROUPS}, got {groups}: "
             "call runtime.stop() and runtime.start() after some hundred simulations"
         )
+
+
+@ti.func
+def raise_to(field: ti.template(), value):
+    """Let a field of no dimension hold the largest of the values that a loop gives it."""
+    # Ask first: an atomic for every body costs as much as its rotation.
+    if value > field[None]:
+        ti.atomic_max(field[None], value)

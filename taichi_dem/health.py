@@ -8,8 +8,9 @@ from taichi_dem.step_control import CRITERIA
 
 #: Energy that may appear from nowhere before a run counts as diverged, as a share of what is there.
 ENERGY_FROM_NOWHERE = 0.5
-#: Overlap of two contact spheres, in radii of the smaller, that no contact recovers from.
-DEEPEST_OVERLAP = 1.9
+#: Overlap of two contact spheres that no contact recovers from, as a share of the distance at which
+#: they touch: their centres are about to pass each other. A small one may be inside a large one.
+DEEPEST_OVERLAP = 0.95
 
 
 class Health:
@@ -43,7 +44,8 @@ class Health:
         pair = int(deepest.argmax())
         if deepest[pair] > DEEPEST_OVERLAP:
             body, other = (int(k) for k in self.contacts.pair_body[pair])
-            what = f"has a contact sphere inside one of body {other} ({deepest[pair]:.2f} radii)"
+            share = f"{100 * deepest[pair]:.0f} % of their radii"
+            what = f"has a contact sphere inside one of body {other} ({share})"
             raise SimulationDiverged(self._sentence(body, self.state.motion(), what))
 
     def _check_energy(self):

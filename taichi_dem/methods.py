@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Optional
 
-from taichi_dem.checks import positive
+from taichi_dem.checks import between, choice, positive
 from taichi_dem.errors import InputError
 from taichi_dem.step_control import Displacement, FixedStep, StepControl
 
@@ -14,8 +14,7 @@ DASHPOTS = ("full", "limited")
 def _check_options(method):
     if method.control is not None and not isinstance(method.control, StepControl):
         raise InputError(f"control must be a StepControl or None, got {method.control!r}")
-    if method.dashpot not in DASHPOTS:
-        raise InputError(f"dashpot must be one of {', '.join(DASHPOTS)}, got {method.dashpot!r}")
+    choice("dashpot", method.dashpot, DASHPOTS)
     floor = method.control.dashpot_floor if method.control is not None else 0.0
     if floor > 0.0 and method.dashpot != "limited":
         raise InputError(f"dashpot_floor must be 0 unless dashpot is 'limited', got {floor!r}")
@@ -88,10 +87,7 @@ class Multirate:
     def __post_init__(self):
         positive("dt0", self.dt0)
         positive("distance", self.distance)
-        if self.neighbour not in NEIGHBOURS:
-            raise InputError(
-                f"neighbour must be one of {', '.join(NEIGHBOURS)}, got {self.neighbour!r}"
-            )
+        choice("neighbour", self.neighbour, NEIGHBOURS)
         _check_options(self)
 
     @property
@@ -136,9 +132,7 @@ class ImplicitDashpots:
         positive("dt", self.dt)
         positive("tolerance", self.tolerance)
         positive("refresh", self.refresh)
-        positive("theta", self.theta)
-        if not 0.5 <= self.theta <= 1.0:
-            raise InputError(f"theta must be a number from 0.5 to 1, got {self.theta!r}")
+        between("theta", self.theta, 0.5, 1.0)
         _check_sweeps(self.sweeps)
 
     @property

@@ -1,5 +1,7 @@
 """What never changes in a run: bodies, bonds and contact spheres as device tables."""
 
+import copy
+
 import numpy as np
 import taichi as ti
 
@@ -36,7 +38,12 @@ class Model:
         self._take_in(effects)
 
     def _take_in(self, effects):
-        """Sort the effects by role, put null objects where none is listed, and bind them."""
+        """Sort the effects by role, put null objects where none is listed, and bind them.
+
+        Each is copied first: a bound effect belongs to one model, and a scene may serve many. Its
+        kernels would go on to use the fields of the first.
+        """
+        effects = [copy.copy(effect) for effect in effects]
         by_role = {role: [e for e in effects if e.role == role] for role in ROLES}
         for role, listed in by_role.items():
             if role in MANY:

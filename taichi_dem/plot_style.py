@@ -49,6 +49,25 @@ def picture(path, rows=1, columns=1, size=(6.4, 4.2), **options):
         write_whole(path, lambda name: figure.savefig(name, format="png"))
 
 
+@contextlib.contextmanager
+def filming(size, dpi, style):
+    """A figure, a function that takes it as the next image, and the RGB images taken so far.
+
+    size: in inches, at dpi pixels each. style: of matplotlib. The layout stays that of the first
+    image, so that nothing jumps.
+    """
+    with matplotlib.rc_context(style):
+        figure = Figure(figsize=size, dpi=dpi, layout="constrained")
+        canvas, images = FigureCanvasAgg(figure), []
+
+        def shoot():
+            canvas.draw()
+            images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())[:, :, :3].copy()))
+            figure.set_layout_engine("none")
+
+        yield figure, shoot, images
+
+
 def seconds(value):
     """A time in words, with a unit that keeps the number readable: 3.125e-10 -> 0.313 ns."""
     for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):

@@ -10,9 +10,10 @@ class Report:
     method, driver, effects: what was run. until_s: simulated time. substeps: ticks at which
     something was due. body_updates, bond_evaluations, pair_evaluations: work done.
     uniform_evaluations: bonds and pairs that one step for all would have evaluated in the same
-    substeps. ideal_gain: bodies times substeps over body updates, what the different steps would
-    save if a pair cost nothing; boundary_gain: uniform over actual evaluations, what they save
-    with every pair evaluated at the finer body's step. searches: rebuilt contact lists.
+    substeps. sweeps: over all dashpots where they are solved, else 0. ideal_gain: bodies times
+    substeps over body updates, what the different steps would save if a pair cost nothing;
+    boundary_gain: uniform over actual evaluations, what they save with every pair evaluated at
+    the finer body's step. searches: rebuilt contact lists.
     ledger: energy terms [J]; ledger_residual_fraction: residual over the work put in.
     linear_momentum_error, angular_momentum_error: out of nothing, as shares of what was
     exchanged. compile_seconds, run_seconds, run_cpu_seconds: cost. needs: effects missed.
@@ -31,6 +32,7 @@ class Report:
     body_updates: int
     bond_evaluations: int
     pair_evaluations: int
+    sweeps: int
     uniform_evaluations: int
     searches: int
     ledger: dict
@@ -69,6 +71,12 @@ class Report:
         derived = ("contact_evaluations", "ideal_gain", "boundary_gain", "ledger_residual_fraction")
         return {**asdict(self), **{name: getattr(self, name) for name in derived}}
 
+    def _sweeps_row(self):
+        """What solving all dashpots took, for the methods that do."""
+        if not self.sweeps:
+            return ()
+        return (("sweeps", f"{self.sweeps:,}, {self.sweeps / self.substeps:.2f} a substep"),)
+
     def __str__(self):
         """A table of a dozen lines, then one line for every effect that was missed."""
         rows = [
@@ -91,6 +99,7 @@ class Report:
                 f"{self.ideal_gain:.2f} ideal, {self.boundary_gain:.2f} with "
                 f"the pairs at the finer step",
             ),
+            *self._sweeps_row(),
             ("contact searches", f"{self.searches:,}"),
             ("work put in", f"{self.ledger['load_work'] + self.ledger['support_work']:.6g} J"),
             ("ledger residual", f"{100 * self.ledger_residual_fraction:.3g} % of it"),

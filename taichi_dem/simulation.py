@@ -39,12 +39,17 @@ class Simulation:
         self.generation = runtime.generation()
         started = time.perf_counter()
         self.scene, self.method = scene, method
+        self.solves = method.solves
         with fields_first():
             self.model = Model(scene.mesh, scene.material, scene.effects)
             driver = _driver_name(driver, self.model.bond_count)
             self.state = State(self.model, scene.max_speed)
-            self._build_contacts(brute_force, driver == "resident")
+            self._build_schedule()
             step = self._build_step()
+            self.broad_phase = None
+            if self.contacts is not None:
+                parts = self.contacts, self.schedule, step.advance.solver
+                self.broad_phase = BroadPhase(*parts, brute_force, driver == "resident")
         self.advance = step.advance
         self.driver = DRIVERS[driver](step)
         self.step = step
@@ -54,7 +59,7 @@ class Simulation:
         self.run_seconds = self.run_cpu_seconds = 0.0
         self.started = None
 
-    def _build_contacts(self, brute_force, serial):
+    def _build_schedule(self):
         model, state, method = self.model, self.state, self.method
         self.contacts = Contacts(model, state) if model.has_contact else None
         drifted = method.neighbour == "drifted"
@@ -69,18 +74,13 @@ class Simulation:
             drifted,
             rates,
         )
-        self.broad_phase = None
-        if self.contacts is not None:
-            self.broad_phase = BroadPhase(self.contacts, self.schedule, brute_force, serial)
 
     def _build_step(self):
         parts = self.model, self.state, self.schedule, self.contacts
-        if not self.method.solves:
+        if not self.solves:
             return Step(Advance(*parts), self.schedule, self.contacts)
-        solver = Solver(*parts, self.method)
-        if self.contacts is not None:
-            self.broad_phase.solver, self.broad_phase.solves = solver, True
-        return SolvedStep(SolvedAdvance(*parts, solver), self.schedule, self.contacts)
+        advance = SolvedAdvance(*parts, Solver(*parts, self.method))
+        return SolvedStep(advance, self.schedule, self.contacts)
 
     @property
     def time_s(self):
@@ -102,7 +102,7 @@ class Simulation:
             self.broad_phase.search()
         self.ledger = Ledger(self.model, self.state, self.advance, self.contacts)
         self.health = Health(
-            self.model, self.state, self.schedule, self.contacts, self.ledger, self.method.solves
+            self.model, self.state, self.schedule, self.contacts, self.ledger, self.solves
         )
         self.watch = Watch(self.model, self.state, self.advance)
         self.watch.look(0.0)
@@ -138,12 +138,16 @@ class Simulation:
             self.driver.run(end)
             self.health.check_speed()
             if self.contacts is not None and self.contacts.search_due[None]:
-                self.broad_phase.search()
+                self.broad_phase.search(everywhere=False)
                 self.searches += 1
 
     def evaluations(self):
         """Bonds and contact pairs evaluated so far."""
         return int(self.schedule.evaluations[2] + self.schedule.evaluations[3])
+
+    def sweeps(self):
+        """Sweeps over all dashpots so far, 0 for a method that solves none."""
+        return int(self.advance.solver.total_sweeps[None]) if self.solves else 0
 
     def running_seconds(self):
         """Wall time spent stepping so far [s], compile time apart."""
@@ -173,6 +177,7 @@ class Simulation:
             body_updates=counts[1],
             bond_evaluations=counts[2],
             pair_evaluations=counts[3],
+            sweeps=self.sweeps(),
             uniform_evaluations=counts[4],
             searches=self.searches,
             ledger=self.ledger.account(),

@@ -6,7 +6,7 @@ from typing import Optional
 import numpy as np
 import taichi as ti
 
-from taichi_dem.errors import InputError
+from taichi_dem.checks import between, choice, whole
 from taichi_dem.fields import then
 from taichi_dem.timeline import MAX_LEVEL
 from taichi_dem.types import real
@@ -61,26 +61,15 @@ class StepControl:
     dashpot_floor: float = 0.0
 
     def __post_init__(self):
-        for name, top in (("safety", 1.0), ("angle", 1.0)):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, (int, float)):
-                raise InputError(f"{name} must be a number in (0, {top:g}], got {value!r}")
-            if not 0.0 < value <= top:
-                raise InputError(f"{name} must be a number in (0, {top:g}], got {value!r}")
-        for name, least, most in (("ahead", 1.0, 100.0), ("dashpot_floor", 0.0, 1.0)):
-            value = getattr(self, name)
-            number = isinstance(value, (int, float)) and not isinstance(value, bool)
-            if not (number and least <= value <= most):
-                raise InputError(
-                    f"{name} must be a number from {least:g} to {most:g}, got {value!r}"
-                )
+        for name in ("safety", "angle"):
+            between(name, getattr(self, name), 1e-6, 1.0)
+        between("ahead", self.ahead, 1.0, 100.0)
+        between("dashpot_floor", self.dashpot_floor, 0.0, 1.0)
         for name, known in (("criteria", OPTIONAL), ("wake", EVENTS)):
             for entry in getattr(self, name):
-                if entry not in known:
-                    raise InputError(f"{name} must be out of {', '.join(known)}, got {entry!r}")
-        jump = self.level_jump
-        if jump is not None and (isinstance(jump, bool) or not isinstance(jump, int) or jump < 0):
-            raise InputError(f"level_jump must be a whole number of at least 0, got {jump!r}")
+                choice(name, entry, known)
+        if self.level_jump is not None:
+            whole("level_jump", self.level_jump, 0, MAX_LEVEL)
 
 
 def counted_criteria(bound):

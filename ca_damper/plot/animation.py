@@ -2,14 +2,8 @@
 
 import contextlib
 
-import matplotlib
-import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
-from PIL import Image
-
 from ca_damper.plot.box import DrawnBox, frame_panel
-from taichi_dem.plot_style import STYLE, write_gif
+from taichi_dem.plot_style import STYLE, filming, write_gif
 
 _DPI = 100
 _SMALL = {**STYLE, "font.size": 7.5, "axes.titlesize": 7.5, "xtick.labelsize": 6.5}
@@ -22,15 +16,7 @@ def moving_picture(path, size, milliseconds):
 
     size: in inches, at 100 pixels an inch. The layout is that of the first frame.
     """
-    with matplotlib.rc_context(_SMALL):
-        figure = Figure(figsize=size, dpi=_DPI, layout="constrained")
-        canvas, images = FigureCanvasAgg(figure), []
-
-        def shoot():
-            canvas.draw()
-            images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())[:, :, :3].copy()))
-            figure.set_layout_engine("none")
-
+    with filming(size, _DPI, _SMALL) as (figure, shoot, images):
         yield figure, shoot
     write_gif(path, images, milliseconds)
 

@@ -25,7 +25,7 @@ class SphereContact(Effect):
         self,
         divisions=5,
         outer_faces=False,
-        skin=4e-4,
+        skin=8e-4,
         neighbours_per_body=64,
         pairs_per_body=24,
         spheres_per_body=160,

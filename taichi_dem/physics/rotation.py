@@ -64,3 +64,9 @@ def spin_of(rotation, inertia_inverse, angular_momentum):
 def zero3():
     """The zero vector, as a start for sums."""
     return vec3(0.0, 0.0, 0.0)
+
+
+@ti.func
+def unit3():
+    """The unit matrix."""
+    return mat3([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])

@@ -4,15 +4,12 @@ import math
 
 import matplotlib
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap
-from matplotlib.figure import Figure
-from PIL import Image
 
 from taichi_dem.plot.block import break_times, displaced, frame_block
 from taichi_dem.plot.view import View, surface, traces
-from taichi_dem.plot_style import STYLE, write_gif
+from taichi_dem.plot_style import STYLE, filming, write_gif
 
 #: Half decades of speed that are told apart; what is slower has one colour.
 _STEPS = 7
@@ -33,16 +30,15 @@ def save_animation(
     cracks are drawn and open. magnify: of the
     displacement. One palette for all frames, no dithering and few colours keep 40 frames small.
     """
-    with matplotlib.rc_context({**STYLE, "font.size": 8.5}):
-        times = break_times(model, broken_time)
-        images = _images(model, frames, times, magnify, View(axis))
+    times = break_times(model, broken_time)
+    with filming((4.0, 3.4), 100, {**STYLE, "font.size": 8.5}) as (figure, shoot, images):
+        for _ in _drawn(figure, model, frames, times, magnify, View(axis)):
+            shoot()
     write_gif(path, images, milliseconds, colours=32)
 
 
-def _images(model, frames, broken_time, magnify, view):
-    """One RGB image a frame; a single collection changes, nothing else is drawn anew."""
-    figure = Figure(figsize=(4.0, 3.4), dpi=100, layout="constrained")
-    canvas = FigureCanvasAgg(figure)
+def _drawn(figure, model, frames, broken_time, magnify, view):
+    """Draw frame after frame; a single collection changes, nothing else is drawn anew."""
     axes = figure.subplots()
     frame_block(axes, view, model, 0.08)
     axes.set_axis_off()
@@ -53,7 +49,6 @@ def _images(model, frames, broken_time, magnify, view):
     bar = figure.colorbar(drawn, ax=axes, label="speed [m/s]", aspect=25)
     bar.ax.set_yticks(drawn.norm.boundaries, [f"{v:g}" for v in drawn.norm.boundaries])
     lips, ends, times = traces(model.mesh, model.topology, view, broken_time)
-    images = []
     for frame in frames:
         corners = displaced(model, frame, magnify)
         polygons, body, _ = surface(model.topology, view, corners, broken_time <= frame.time_s)
@@ -63,10 +58,7 @@ def _images(model, frames, broken_time, magnify, view):
         cracks.set_segments(view.project(corners[lips[open_now, None], ends[open_now]]))
         text = "true scale" if magnify == 1.0 else f"displacement × {magnify:g}"
         axes.set_title(f"t = {1e3 * frame.time_s:.3f} ms, {text}", fontsize=9)
-        canvas.draw()
-        images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())[:, :, :3].copy()))
-        figure.set_layout_engine("none")  # keep the panel where the first frame put it
-    return images
+        yield frame
 
 
 def _empty_collection(frames):

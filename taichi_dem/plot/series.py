@@ -18,7 +18,10 @@ _TERMS = {
     "friction_J": ("friction", "#3E9B52"),
 }
 #: Colour and line of methods that are compared.
-_STROKES = ((BLUE, "-"), (RED, "--"), (GREEN, ":"), (PURPLE, "-."))
+_STROKES = (
+    *((BLUE, "-"), (RED, "--"), (GREEN, ":"), (PURPLE, "-.")),
+    *(("black", "-"), ("#8C6D31", "--")),
+)
 _GIVEN = {
     "gas_work_J": ("gas work", "black", "--"),
     "injected_J": ("injected at release", PURPLE, ":"),
@@ -161,7 +164,7 @@ def plot_methods(path, series):
     series: title -> columns time_s, cpu_s, evaluations and monitor_displacement_mm; the first is
     the one the others are compared with.
     """
-    with picture(path, 1, 3, size=(11.0, 3.4)) as (_, (cost, work, moved)):
+    with picture(path, 1, 3, size=(12.5, 3.4)) as (_, (cost, work, moved)):
         first = next(iter(series.values()))
         for (title, made), (colour, line) in zip(series.items(), _STROKES):
             look = {"color": colour, "linestyle": line, "label": title}
@@ -169,15 +172,22 @@ def plot_methods(path, series):
             cost.plot(time, made["cpu_s"], **look)
             work.plot(time, 1e-6 * np.asarray(made["evaluations"]), **look)
             here = np.asarray(made["monitor_displacement_mm"])
-            there = np.asarray(first["monitor_displacement_mm"])
+            # Largest steps differ, and with them the times of the samples.
+            there = np.interp(time, 1e3 * first["time_s"], first["monitor_displacement_mm"])
             share = np.where(
                 there > 1e-3 * there.max(), here / np.where(there > 0, there, 1), np.nan
             )
             moved.plot(time, 100.0 * (share - 1.0), **look)
-        cost.set(ylabel="CPU time of stepping [s]", ylim=(0.0, None))
-        work.set(ylabel="evaluations [millions]", ylim=(0.0, None))
+        cost.set(ylabel="CPU time of stepping [s]")
+        work.set(ylabel="evaluations [millions]")
+        for axes, name in ((cost, "cpu_s"), (work, "evaluations")):
+            last = [made[name][-1] for made in series.values()]
+            if max(last) > 20.0 * min(last):
+                axes.set_yscale("log")
+            else:
+                axes.set_ylim(0.0, None)
         moved.set(ylabel=f"displacement, difference\nfrom {next(iter(series))} [%]")
         for axes in (cost, work, moved):
             axes.set(xlabel="time [ms]")
             _span(axes, time)
-        cost.legend(loc="upper left")
+        moved.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0))

@@ -180,7 +180,7 @@ class Advance(Touch):
             if ti.static(self.has_rates):
                 self.rates.notice(slots[side] >> 2, RELEASE)
         if ti.static(self.has_contact):
-            self.contacts.broke()
+            self.contacts.search_due[None] = 1
 
     @ti.func
     def body(self, i):

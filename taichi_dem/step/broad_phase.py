@@ -1,17 +1,17 @@
 """Search for contact pairs: the broken ones among the neighbouring faces, then their spheres.
 
-The list is rebuilt when a body may have left the skin. When a bond breaks, only what its two bodies
-touch is looked for, at once. Impulses that wait in the slots of a pair are carried over, so results
-do not depend on when a search is made.
+The list is renewed when a body may have left the skin, or at once when a bond breaks: a search
+looks at the bodies that moved or broke, and keeps what it knows of the others. Impulses that wait
+in the slots of a pair are carried over, so results do not depend on when a search is made.
 """
 
 import taichi as ti
 
 from taichi_dem.errors import InputError
 from taichi_dem.step.cells import group
-from taichi_dem.step.contacts import BROKEN
 from taichi_dem.step.neighbours import Neighbours
-from taichi_dem.types import real, vec3
+from taichi_dem.step.old_pairs import OldPairs
+from taichi_dem.types import real
 
 _ROOM = ("", "pairs_per_body", "spheres_per_body")
 
@@ -20,42 +20,40 @@ _ROOM = ("", "pairs_per_body", "spheres_per_body")
 class BroadPhase:
     """Finds the pairs and fills the lists of a ``Contacts``.
 
-    brute_force: compare all bodies with broken faces, for tests. whole: 1 for a search that looks
-    at all bodies; exposed: 1 for those at which it looks; searched: tick of the last one.
+    solver: of the dashpots, whose impulses go with the pairs, None without. brute_force: compare
+    all bodies with broken faces, for tests. serial: one loop for all, for one core. looked: 1 for
+    the bodies at which a search looks, all of them everywhere; searched: tick of the last one.
     """
 
-    def __init__(self, contacts, schedule, brute_force=False, serial=False):
+    def __init__(self, contacts, schedule, solver=None, brute_force=False, serial=False):
         n = contacts.model.body_count
         self.contacts, self.schedule = contacts, schedule
-        self.solver, self.solves = None, False
+        self.solver, self.solves = solver, solver is not None
         self.serial, self.phases = serial, None
         self.model, self.state = contacts.model, contacts.state
         self.rough = ti.field(ti.i32, shape=n)
         self.rough_count = ti.field(ti.i32, shape=())
         self.near = Neighbours(contacts, brute_force)
-        self.near_faces = ti.field(ti.i32, shape=self.near.capacity)
-        self.near_spheres = ti.field(ti.i32, shape=self.near.capacity)
         self.pair_faces = ti.field(ti.i32, shape=contacts.capacity)
-        self.old_body = ti.Vector.field(2, ti.i32, shape=contacts.capacity)
-        self.old_slot = ti.Vector.field(6, real, shape=2 * contacts.capacity)
-        self.old_full = ti.field(ti.i32, shape=2 * contacts.capacity)
-        self.old_heat = ti.Vector.field(3, real, shape=contacts.capacity)
-        self.old_first = ti.field(ti.i32, shape=contacts.capacity + 1)
         self.searched = ti.field(ti.i64, shape=())
-        self.old_sphere = ti.Vector.field(2, ti.i32, shape=contacts.sphere_capacity)
-        self.whole = ti.field(ti.i32, shape=())
-        self.exposed = ti.field(ti.i32, shape=n)
+        self.looked = ti.field(ti.i32, shape=n)
+        self.everywhere = ti.field(ti.i32, shape=())
         self.fresh = ti.field(ti.i32, shape=())
-        self.old_first_of = ti.field(ti.i32, shape=n + 1)
+        self.old = OldPairs(contacts)
         self.full = ti.field(ti.i32, shape=())
         self.sphere = ti.Vector.field(3, real, shape=4 * n * self.model.spheres_per_face)
 
-    def search(self):
-        """Rebuild the lists. Raises InputError when they outgrow the room the scene gave them."""
+    def search(self, everywhere=True):
+        """Renew the lists. Raises InputError when they outgrow the room the scene gave them.
+
+        everywhere: look at all bodies, as is needed once they have been moved by hand.
+        """
+        self.everywhere[None] = int(everywhere)
         if self.phases is None:
             self.phases = self._phases()
         self._search()
         if self.near.stale[None] and not self.near.full[None]:
+            # A row of neighbours had no room left.
             self._search()
         room = "neighbours_per_body" if self.near.full[None] else _ROOM[self.full[None]]
         if room:
@@ -109,8 +107,8 @@ class BroadPhase:
     @ti.func
     def _begin(self, one):
         self._list_rough()
-        self._choose_extent()
         self.near.begin()
+        self._choose_extent()
 
     @ti.func
     def _allot(self, one):
@@ -121,8 +119,6 @@ class BroadPhase:
         self.near.end()
         self._index_second()
         self.schedule.start_pairs()
-        if ti.static(self.solves):
-            self.solver.pairs.sort()
         self.contacts.search_due[None] = 0
 
     @ti.func
@@ -149,15 +145,22 @@ class BroadPhase:
 
     @ti.func
     def _choose_extent(self):
-        """Look at all bodies where one left its skin, else at those that a break has exposed."""
-        wider = self.contacts.search_due[None] != BROKEN or self.near.gone_count[None] > 0
-        self.whole[None] = ti.cast(wider, ti.i32)
+        """Look at the bodies that went far into their skin or that a break has exposed.
+
+        All are looked at while the list of neighbours is made anew.
+        """
+        far = 0.25 * self.contacts.skin[None]
+        if self.near.making() or self.everywhere[None] == 1:
+            far = -1.0
         for i in range(self.model.body_count):
-            exposed = ti.cast(wider, ti.i32)
+            looked = ti.cast(self.contacts.travel[i] > far, ti.i32)
             for face in range(4 * i, 4 * i + 4):
-                exposed |= ti.cast(self.state.exposed_tick[face] > self.searched[None], ti.i32)
-            self.exposed[i] = exposed
-            if wider:
+                looked |= ti.cast(self.state.exposed_tick[face] > self.searched[None], ti.i32)
+            self.looked[i] = looked
+        for a in range(self.near.gone_count[None]):
+            self.looked[self.near.gone[a]] = 1
+        for i in range(self.model.body_count):
+            if self.looked[i] == 1:
                 self.contacts.travel[i] = 0.0
         self.searched[None] = self.state.tick[None]
 
@@ -182,15 +185,8 @@ class BroadPhase:
 
     @ti.func
     def _keep(self, p):
-        """Save a pair of the old list with what waits in its slots."""
-        self.old_body[p] = self.contacts.pair_body[p]
-        self.old_first[p] = self.contacts.pair_first[p]
-        for k in range(self.contacts.pair_first[p], self.contacts.pair_first[p + 1]):
-            self.old_sphere[k] = self.contacts.pair_sphere[k]
-        for side in ti.static(range(2)):
-            self.old_slot[2 * p + side] = self.contacts.pair_slot[2 * p + side]
-            self.old_full[2 * p + side] = self.contacts.pair_full[2 * p + side]
-        self.old_heat[p] = self.contacts.pair_heat[p]
+        """Save a pair of the old list with what waits for it."""
+        self.old.keep(p)
         if ti.static(self.schedule.has_rates):
             self.schedule.rates.near.keep(p)
         if ti.static(self.solves):
@@ -199,15 +195,15 @@ class BroadPhase:
     @ti.func
     def _count_spheres(self, i):
         """Number of sphere pairs of body i with each neighbour that this search looks at."""
-        self.old_first_of[i] = self.contacts.first_of[i]
+        self.old.first_of[i] = self.contacts.first_of[i]
         for k in range(self.near.first[i], self.near.last[i]):
             j = self.near.body[k]
-            if self.exposed[i] | self.exposed[j] != 0:
+            if self.looked[i] | self.looked[j] != 0:
                 faces, spheres = self.near.faces[k] & self._broken_faces(i, j), 0
                 if faces != 0:
                     if not self._bonded(i, j):
                         spheres = self._spheres_near(i, j, faces, 0, False)
-                self.near_faces[k], self.near_spheres[k] = faces, spheres
+                self.near.broken[k], self.near.spheres[k] = faces, spheres
 
     @ti.func
     def _broken_faces(self, i, j):
@@ -248,27 +244,27 @@ class BroadPhase:
     @ti.func
     def _number_pairs(self, one):
         """Give the pairs that have spheres near, or an impulse waiting, a place in order."""
-        self.old_first_of[self.model.body_count] = self.contacts.pair_count[None]
+        self.old.first_of[self.model.body_count] = self.contacts.pair_count[None]
         self.contacts.pair_count[None] = 0
         self.contacts.pair_first[0] = 0
         for i in range(self.model.body_count):
             self.contacts.first_of[i] = self.contacts.pair_count[None]
-            old, last = self.old_first_of[i], self.old_first_of[i + 1]
+            old, last = self.old.first_of[i], self.old.first_of[i + 1]
             for k in range(self.near.first[i], self.near.last[i]):
-                if self.near_spheres[k] > 0:
+                if self.near.spheres[k] > 0:
                     j = self.near.body[k]
                     old = self._number_waiting(i, old, last, j)
-                    self._number(i, j, self.near_faces[k], self.near_spheres[k])
+                    self._number(i, j, self.near.broken[k], self.near.spheres[k])
             self._number_waiting(i, old, last, self.model.body_count)
         self.contacts.first_of[self.model.body_count] = self.contacts.pair_count[None]
 
     @ti.func
     def _number_waiting(self, i, old, last, j):
         """Number the old pairs of body i before partner j that hold something; next old pair."""
-        while old < last and self.old_body[ti.min(old, last - 1)][1] <= j:
-            partner = self.old_body[old][1]
+        while old < last and self.old.body[ti.min(old, last - 1)][1] <= j:
+            partner = self.old.body[old][1]
             if partner < j:
-                if self.old_full[2 * old] == 1 or self.old_full[2 * old + 1] == 1:
+                if self.old.waits(old):
                     self._number(i, partner, 0, 0)
             old += 1
         return old
@@ -288,47 +284,20 @@ class BroadPhase:
             self.contacts.pair_count[None] = p + 1
 
     @ti.func
-    def _old_pair(self, i, j):
-        """Place of a pair in the old list, -1 if it was not there."""
-        place = -1
-        for p in range(self.old_first_of[i], self.old_first_of[i + 1]):
-            if self.old_body[p][1] == j:
-                place = p
-        return place
-
-    @ti.func
     def _fill_pair(self, p):
         """Write a pair's spheres, take over what waited for it, book what its birth injects."""
         i, j = self.contacts.pair_body[p][0], self.contacts.pair_body[p][1]
-        old, injected = self._old_pair(i, j), 0.0
-        if self.exposed[i] | self.exposed[j] != 0:
+        old, injected = self.old.place(i, j), 0.0
+        if self.looked[i] | self.looked[j] != 0:
             self._spheres_near(i, j, self.pair_faces[p], self.contacts.pair_first[p], True)
             injected = self._injected(p, i, j)
         else:
-            self._copy_spheres(p, old)
-        for side in ti.static(range(2)):
-            waiting, full = 0.0 * self.contacts.pair_slot[2 * p + side], 0
-            if old >= 0:
-                waiting, full = self.old_slot[2 * old + side], self.old_full[2 * old + side]
-            self.contacts.pair_slot[2 * p + side] = waiting
-            self.contacts.pair_full[2 * p + side] = full
-        heat = vec3(0.0, 0.0, injected)
-        if old >= 0:
-            heat += self.old_heat[old]
-        self.contacts.pair_heat[p] = heat
-        if injected > 0.0:
-            self.contacts.pair_full[2 * p] = 1
+            self.old.copy_spheres(p, old)
+        self.old.hand_over(p, old, injected)
         if ti.static(self.schedule.has_rates):
             self.schedule.rates.take_pair(p, old, self._exposed_now(i) | self._exposed_now(j))
         if ti.static(self.solves):
-            self.solver.pairs.take(p, old)
-
-    @ti.func
-    def _copy_spheres(self, p, old):
-        """Take over the spheres of a pair at which this search does not look."""
-        start = self.contacts.pair_first[p]
-        for k in range(start, self.contacts.pair_first[p + 1]):
-            self.contacts.pair_sphere[k] = self.old_sphere[self.old_first[old] + k - start]
+            self.solver.pairs.take(p, old, self.old)
 
     @ti.func
     def _exposed_now(self, i):

@@ -9,9 +9,6 @@ import taichi as ti
 from taichi_dem.fields import then
 from taichi_dem.types import real, vec3
 
-#: Why a search is due: a bond broke, or a body may have left its skin, which counts for more.
-BROKEN, MOVED = 1, 2
-
 
 @ti.data_oriented
 class Contacts:
@@ -23,9 +20,9 @@ class Contacts:
     first body takes it. pair_full[2 p + side]: 1 while something waits there; most pairs do not
     touch, and to ask is cheaper than to add zeros. first_of[i]: first pair whose first body is i;
     touch_first, touch: pairs whose second body is i. rough: bit f for a broken face f.
-    travel: bound of the way any point of a body went since the search [m]. search_due: why the
-    list may miss a contact, BROKEN or MOVED, 0 while it does not. deepest: overlap of a pair in
-    radii of the smaller sphere.
+    travel: bound of the way any point of a body went since the search [m]. search_due: 1 when the
+    list may miss a contact. deepest: overlap of a pair as
+    a share of the distance at which its spheres touch.
     """
 
     def __init__(self, model, state):
@@ -105,12 +102,6 @@ class Contacts:
         return level
 
     @ti.func
-    def broke(self):
-        """Ask for the contacts of newly exposed faces."""
-        if self.search_due[None] == 0:
-            self.search_due[None] = BROKEN
-
-    @ti.func
     def moved(self, i, velocity, spin, elapsed):
         """Add to the way of body i and ask for a search once it may have left the skin."""
         if self.rough[i] != 0:
@@ -118,4 +109,4 @@ class Contacts:
             way = self.travel[i] + speed * elapsed
             self.travel[i] = way
             if way > 0.5 * self.skin[None]:
-                self.search_due[None] = MOVED
+                self.search_due[None] = 1

@@ -36,25 +36,35 @@ class Once:
 class Step:
     """The phases of a substep, as (due list, what happens to one member) pairs.
 
-    A substep begins with the contacts of the present tick,
-    whose bonds are evaluated already, and ends with the bonds of the next: between substeps the
-    contact lists can be renewed.
+    A substep begins with the contacts of the present tick, whose bonds are evaluated already, and
+    ends with the bonds of the next: between substeps the contact lists can be renewed.
     """
 
     def __init__(self, advance, schedule, contacts):
         self.advance, self.schedule, self.contacts = advance, schedule, contacts
         self.has_contact = contacts is not None
         self.state = advance.state
-        touching = ((schedule.pairs, advance.contact),) if contacts is not None else ()
-        self.phases = (
-            *self._retimed(),
-            *touching,
-            (Once(), schedule.tick_on),
-            (schedule.bodies, advance.body),
-            (Once(), schedule.put_in_order),
-            (schedule.bonds, advance.bond),
+        self.parts = self._parts()
+        self.phases = self._phases()
+
+    def _phases(self):
+        """All phases of a substep in a row, for one serial kernel."""
+        return self.parts[0]
+
+    def _parts(self):
+        """The same in parts of which one may be called for again."""
+        advance, schedule = self.advance, self.schedule
+        touching = ((schedule.pairs, advance.contact),) if self.has_contact else ()
+        return (
+            (
+                *self._retimed(),
+                *touching,
+                (Once(), schedule.tick_on),
+                (schedule.bodies, advance.body),
+                (Once(), schedule.put_in_order),
+                (schedule.bonds, advance.bond),
+            ),
         )
-        self.parts = (self.phases,)
 
     def repeats(self, part):
         """Whether a part of the phases is called for once more: never here."""
@@ -91,7 +101,7 @@ class Step:
         """1 when the host must act: a contact search is due or a body left its bounds."""
         halt = ti.cast(self.state.bad_body[None] < self.advance.model.body_count, ti.i32)
         if ti.static(self.has_contact):
-            halt |= ti.cast(self.contacts.search_due[None] > 0, ti.i32)
+            halt |= self.contacts.search_due[None]
         return halt
 
 
@@ -135,12 +145,15 @@ class Colour:
 class SolvedStep(Step):
     """The phases of a substep in which all dashpots are solved together."""
 
-    def __init__(self, advance, schedule, contacts):
-        Step.__init__(self, advance, schedule, contacts)
-        solver = advance.solver
+    def _phases(self):
+        before, _, after = self.parts
+        return (*before, (Once(), self.advance.solver.solve), *after)
+
+    def _parts(self):
+        advance, schedule, solver = self.advance, self.schedule, self.advance.solver
         touching, booked = (), ()
-        if contacts is not None:
-            touching = ((schedule.pairs, solver.pairs.begin),)
+        if self.has_contact:
+            touching = ((schedule.pairs, solver.pairs.begin), (Once(), solver.pairs.sort))
             booked = ((schedule.pairs, solver.pairs.book),)
         before = (
             *touching,
@@ -154,8 +167,7 @@ class SolvedStep(Step):
             (Once(), schedule.put_in_order),
             (schedule.bonds, advance.bond),
         )
-        self.phases = (*before, (Once(), solver.solve), *after)
-        self.parts = (before, self._sweep(solver), after)
+        return (before, self._sweep(solver), after)
 
     def _sweep(self, solver):
         """One sweep, colour by colour."""

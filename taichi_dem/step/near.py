@@ -4,6 +4,7 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem.fields import then
+from taichi_dem.physics.rotation import unit3
 from taichi_dem.physics.wrench import cross_matrix
 from taichi_dem.quality import inverse_root
 from taichi_dem.timeline import MAX_LEVEL
@@ -123,7 +124,7 @@ class Near:
         """Blocks of one contact at an arm from the centre of body i, in its frame."""
         along = normal.outer_product(normal)
         if ti.static(bool(self.model.friction.name)):
-            along = mat3([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+            along = unit3()
         root = self.root_mass[i]
         lever = self.root_inertia[i] @ cross_matrix(arm) @ along
         return along * root * root, lever * root, lever @ lever.transpose()

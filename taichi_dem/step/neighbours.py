@@ -14,7 +14,7 @@ STALE, MAKING = 1, 2
 #: Room left behind the neighbours of each body, for fast ones that come.
 ROOM = 16
 #: Reach of the list in skins of the search: a longer list against fewer of them.
-REACH = 16.0
+REACH = 8.0
 
 
 @ti.data_oriented
@@ -22,11 +22,12 @@ class Neighbours:
     """For each body the bodies of higher index near it, in order.
 
     first[i] .. last[i]: those of body i, in body, with some room behind. faces: which of the two
-    bodies' faces are near, bit 4 f + g for faces f and g. cluster: centre of the ball around the
-    spheres of a face, at the last search [m]. placed_at, turned_to: where a body was when it was
-    listed. gone: bodies that have left the list's reach since, whose entries are made anew; a few
-    fragments fly faster than all the rest. stale: STALE when all
-    are. full: 1 when there is no room.
+    bodies' faces are near, bit 4 f + g for faces f and g; broken: which of these are broken too,
+    and spheres: how many of their spheres are within the skin, for ``BroadPhase``. cluster: centre
+    of the ball around the spheres of a face, at the last search [m]. placed_at, turned_to: where a
+    body was when it was listed. gone: bodies that have left the list's reach since, whose entries
+    are made anew; a few fragments fly faster than all the rest. stale: STALE when all are. full: 1
+    when there is no room.
     """
 
     def __init__(self, contacts, brute_force=False):
@@ -38,6 +39,8 @@ class Neighbours:
         self.last = ti.field(ti.i32, shape=n)
         self.body = ti.field(ti.i32, shape=self.capacity)
         self.faces = ti.field(ti.i32, shape=self.capacity)
+        self.broken = ti.field(ti.i32, shape=self.capacity)
+        self.spheres = ti.field(ti.i32, shape=self.capacity)
         self.cluster = ti.Vector.field(3, real, shape=4 * n)
         self.placed_at = ti.Vector.field(3, real, shape=n)
         self.turned_to = ti.Matrix.field(3, 3, real, shape=n)
@@ -117,7 +120,7 @@ class Neighbours:
             end = self.first[i]
             for k in range(self.first[i], self.last[i]):
                 if not self._is_gone(self.body[k]):
-                    self.body[end], self.faces[end] = self.body[k], self.faces[k]
+                    self._move(k, end)
                     end += 1
             self.last[i] = end
             for a in range(self.gone_count[None]):
@@ -141,6 +144,11 @@ class Neighbours:
                 self.last[i] += 1
             else:
                 self.stale[None] = STALE
+
+    @ti.func
+    def making(self):
+        """Whether the list is being made anew."""
+        return self.stale[None] == MAKING
 
     @ti.func
     def end(self):
@@ -173,9 +181,16 @@ class Neighbours:
     def _insert(self, start, end, j, faces):
         place = end
         while place > start and self.body[ti.max(place - 1, 0)] > j:
-            self.body[place], self.faces[place] = self.body[place - 1], self.faces[place - 1]
+            self._move(place - 1, place)
             place -= 1
         self.body[place], self.faces[place] = j, faces
+        self.broken[place], self.spheres[place] = 0, 0
+
+    @ti.func
+    def _move(self, k, place):
+        """Move an entry."""
+        self.body[place], self.faces[place] = self.body[k], self.faces[k]
+        self.broken[place], self.spheres[place] = self.broken[k], self.spheres[k]
 
     @ti.func
     def _faces_near(self, i, j):

@@ -7,7 +7,7 @@ own entries.
 import numpy as np
 import taichi as ti
 
-from taichi_dem.fields import then
+from taichi_dem.fields import raise_to, then
 from taichi_dem.step.due_list import DueList
 from taichi_dem.step.level_limit import LevelLimit
 from taichi_dem.step.payments import Payments
@@ -101,9 +101,7 @@ class Schedule:
                 wanted = self.criterion.wanted(level, speed2, low)
                 self.state.bound[i] = ti.select(wanted > 0, DISPLACEMENT, LARGEST)
             if ti.static(self.uniform):
-                # Ask first: an atomic for every body costs as much as its rotation.
-                if wanted > self.wanted[None]:
-                    ti.atomic_max(self.wanted[None], wanted)
+                raise_to(self.wanted, wanted)
             elif wanted != level:
                 self.state.level[i] = wanted
                 self.note_change(i)

@@ -49,7 +49,7 @@ class Touch:
                 moment_j += (arm - branch).cross(pushed)
                 dragged += (self.contacts.law.elastic(overlap) - push) * rate
                 rubbed -= rub.dot(slide)
-                deepest = ti.max(deepest, overlap / ti.min(first[3], second[3]))
+                deepest = ti.max(deepest, overlap / reach)
         if deepest > 0.0:
             dt = self._pair_step(p, i, j)
             self._push_apart(2 * p, -force * dt, moment_i * dt)

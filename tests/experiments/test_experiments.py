@@ -1,13 +1,16 @@
 """Every experiment of blasting with --quick, and what each refuses."""
 
+import json
 import math
 import os
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from taichi_dem import mesh_shapes
 from taichi_dem.mesh_files import read_mesh, write_mesh
+from taichi_dem.plot.film import write_mp4
 from tests.experiments.contract import (
     FOLDER,
     NAMES,
@@ -35,6 +38,17 @@ FIGURES = {
         "contact_evaluations",
         "seconds_per_simulated_ms",
     },
+    "blast_methods": {
+        f"{what}_{method}"
+        for method in (
+            *("paper_uniform", "paper_multirate", "multirate_controlled"),
+            *("explicit_limited", "implicit"),
+        )
+        for what in (
+            *("seconds", "displacement_error", "broken_faces", "ledger_residual_fraction"),
+            "largest_stable_step_s",
+        )
+    },
     "blast_multirate": {
         f"{method}_{instant}_{what}"
         for method in ("multirate_held", "multirate_drifted")
@@ -49,13 +63,18 @@ FIGURES = {
         *("seconds_at_0.1_percent", "chaos_floor", "reference_check"),
         *(f"seconds_at_1_percent_{name}" for name in ("multirate_held", "limited", "implicit")),
     },
+    "demo_fracture_law": {"peak_MPa_error", "failure_opening_um_error", "energy_J_m2_error"},
+    "demo_wave_and_spall": {"wave_speed_m_s", "free_end_over_wave", "spall_1.5_depth_m"},
+    "demo_step_too_large": {"limit_dashpots_s", "dashpots_0.9_diverged", "dashpots_1.3_diverged"},
+    "demo_multirate": {"uniform_evaluations", "held_fewer_evaluations", "held_difference"},
 }
 FILES = {
     "blast_fracture": (
         *("history.csv", "mesh.msh", "report.json", "bonds.csv", "bodies.csv", "pressure.csv"),
-        *("pressure.png", "cracks.png", "steps.png", "energy.png", "history.png", "levels.png"),
-        *("levels.csv", "blast.gif", "paraview/blast.pvd", "paraview/blast_0000.vtu"),
+        *("pressure.png", "cracks.png", "energy.png", "history.png"),
+        *("blast.gif", "paraview/blast.pvd", "paraview/blast_0000.vtu"),
     ),
+    "blast_methods": ("methods.csv", "methods.png", "history_reference.csv"),
     "blast_multirate": (
         *("comparison.csv", "uniform.csv", "multirate_held.csv", "multirate_drifted.csv"),
         *("levels_multirate_held.png", "levels_multirate_drifted.png", "methods.png"),
@@ -63,6 +82,12 @@ FILES = {
     "cost_of_accuracy_blast": (
         *("work_precision.png", "errors.png", "points.csv", "runs.csv", "answers.csv"),
     ),
+    "demo_fracture_law": ("law.gif", "law.png", "tension.csv", "shear.csv", "caption.txt"),
+    "demo_wave_and_spall": (
+        *("spall.gif", "wave.png", "spall.png", "wave.csv", "spall.csv", "caption.txt"),
+    ),
+    "demo_step_too_large": ("shaken.gif", "energy.png", "steps.csv", "caption.txt"),
+    "demo_multirate": ("blow.gif", "blow.png", "blow.csv", "levels_held.csv", "caption.txt"),
 }
 
 
@@ -71,6 +96,78 @@ quick = quick_runs([name for name in NAMES if "blast" in name])
 
 class TestQuickRun(QuickRun):
     figures, files = FIGURES, FILES
+
+
+@pytest.fixture(scope="module")
+def shown(quick_run):
+    """``shown(name)``: folder of a quick run, and its figures' values."""
+
+    def run(name):
+        folder, done = quick_run(name)
+        assert done.returncode == 0, done.stderr
+        figures = json.loads((folder / "summary.json").read_text())["figures"]
+        return folder, {key: figure["value"] for key, figure in figures.items()}
+
+    return run
+
+
+@pytest.mark.slow
+def test_bond_on_the_bench_follows_its_law(shown):
+    _, figures = shown("demo_fracture_law")
+    # 84 um of way in 1000 samples: the peak may lie between two, the failure is seen one late.
+    sample = (22.0 + 26.0 + 36.0) / 1000
+    assert -sample / 14.80 <= figures["peak_MPa_error"] <= 1e-9
+    assert -1e-9 <= figures["failure_opening_um_error"] <= sample / 29.93
+    # Trapezoids cut the corner at the peak, where the slope changes by 450 + 440 GPa/m.
+    assert abs(figures["energy_J_m2_error"]) <= 890e9 * (1e-6 * sample) ** 2 / 8 / 99.67 + 1e-9
+    # Openings are known to 8 eps of 0.8 m, the bench's size.
+    for pressure in (0, 5, 10, 15):
+        assert abs(figures[f"plateau_at_{pressure}_MPa_error"]) < 1e-9
+
+
+@pytest.mark.slow
+def test_bars_spall_within_a_cell_of_the_formula(shown):
+    _, figures = shown("demo_wave_and_spall")
+    assert abs(figures["spall_1.5_error_cells"]) <= 1.0
+    assert abs(figures["spall_2_error_cells"]) <= 1.0
+    # Dispersion (k h)^2 / 24 of a pulse of 0.76 m, and the depth of the last cell's middle.
+    dispersion = (2.0 * math.pi * 0.1 / 0.76) ** 2 / 24.0
+    assert 2.0 * (1.0 - 4.0 * dispersion) < figures["free_end_over_wave"] < 2.0 + 2.0 * dispersion
+
+
+@pytest.mark.slow
+def test_step_beyond_the_limit_diverges_and_says_so_word_for_word(shown):
+    folder, figures = shown("demo_step_too_large")
+    assert figures["dashpots_0.9_diverged"] == 0
+    assert figures["dashpots_1.3_diverged"] == 1
+    assert figures["dashpots_0.9_unexplained"] < 0.01
+    # Half of the energy given is what the health check lets pass.
+    assert figures["dashpots_1.3_unexplained"] > 0.5
+    sentence = rows_of(folder / "steps.csv")[1]["sentence"]
+    assert sentence.startswith("diverged at t = ")
+    assert "its bond dashpots allow" in sentence
+    assert sentence in (folder / "caption.txt").read_text()
+
+
+@pytest.mark.slow
+def test_multirate_gives_the_same_answer_for_fewer_evaluations(shown):
+    _, figures = shown("demo_multirate")
+    assert figures["held_fewer_evaluations"] > 3.0
+    assert figures["held_difference"] < 2e-3
+
+
+def test_film_is_written_as_mp4_where_ffmpeg_is_found(tmp_path, monkeypatch):
+    images = [Image.new("RGB", (40, 30), colour) for colour in ("red", "blue")]
+    monkeypatch.setenv("PATH", "")
+    assert not write_mp4(tmp_path / "none.mp4", images, 100)
+    # A program of that name that keeps what it is given: two frames of 40 x 30 x 3 bytes.
+    program = tmp_path / "ffmpeg"
+    program.write_text('#!/bin/sh\nfor last; do :; done\n/bin/cat > "$last"\n')
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert write_mp4(tmp_path / "film.mp4", images, 100)
+    assert (tmp_path / "film.mp4").stat().st_size == 2 * 40 * 30 * 3
+    assert not list(tmp_path.glob(".*part*"))
 
 
 @pytest.fixture(scope="module")
@@ -94,6 +191,20 @@ def test_history_has_the_columns_in_order(blast):
     read, used = read_mesh(FOLDER / "meshes" / "paper_block.msh"), read_mesh(folder / "mesh.msh")
     assert np.array_equal(read.points, used.points)
     assert np.array_equal(read.tetrahedra, used.tetrahedra)
+
+
+@pytest.mark.slow
+def test_a_run_with_several_levels_shows_them(tmp_path):
+    options = ("--method", "multirate", "--until", "6e-5", "--frames", "2", "--samples", "4")
+    done = start("blast_fracture", *options, "--out", tmp_path)
+    assert done.returncode == 0, done.stderr
+    shares = [
+        [float(v) for k, v in row.items() if k != "time_s"]
+        for row in rows_of(tmp_path / "levels.csv")
+    ]
+    assert len(shares[-1]) > 1
+    assert all(sum(row) == pytest.approx(1.0, rel=1e-12) for row in shares)
+    assert (tmp_path / "steps.png").is_file() and (tmp_path / "levels.png").is_file()
 
 
 @pytest.mark.slow
@@ -151,6 +262,7 @@ BAD_OPTIONS = [
     (("--driver", "bus"), ("--driver", "bus", "resident")),
     (("--threads", "0"), ("--threads", "'0'")),
     (("--colour", "red"), ("--colour",)),
+    (("--l", "1e-7"), ("l must be left out", "multirate", "1e-07")),
     (("--unti", "1e-6", "--l", "1e-7"), ("--unti",)),
 ]
 

@@ -122,7 +122,7 @@ def test_load_criterion_looks_a_largest_step_ahead():
     control = StepControl(level_jump=None)
     simulation = Simulation(scene, Multirate(1e-6, distance, control=control))
     simulation.start()
-    loaded = np.unique(listed[0].body)
+    loaded = np.unique(simulation.model.loads[0].body)
     bound = simulation.state.bound.to_numpy()
     assert np.all(bound[loaded] == CRITERIA.index("load"))
     area = 0.1 * 0.1 / 2

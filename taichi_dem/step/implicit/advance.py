@@ -2,6 +2,7 @@
 
 import taichi as ti
 
+from taichi_dem.fields import raise_to
 from taichi_dem.physics.rotation import zero3
 from taichi_dem.step.advance import Advance
 
@@ -23,7 +24,7 @@ class SolvedAdvance(Advance):
         linear, angular = self._gathered(i)
         linear, angular, _ = self._loaded(i, elapsed, linear, angular)
         self.solver.motion.predict(i, self, linear, angular)
-        self.solver.note_speed(self.state.velocity[i].norm_sqr())
+        raise_to(self.solver.speed2, self.state.velocity[i].norm_sqr())
 
     @ti.func
     def body(self, i):
@@ -47,8 +48,9 @@ class SolvedAdvance(Advance):
         """Velocity and angular momentum that the supports of body i allow; nothing is booked."""
         for effect in ti.static(self.model.supports):
             if effect.acts_on(i):
-                time = self.schedule.seconds(self.state.tick[None]) - 0.5 * self.schedule.dt0
+                now = self.schedule.seconds(self.state.tick[None])
+                half = now - 0.5 * self.schedule.step_seconds[0]
                 velocity, momentum = effect.held(
-                    i, time, self.state.rotation[i], velocity, momentum
+                    i, half, self.state.rotation[i], velocity, momentum
                 )
         return velocity, momentum

@@ -58,10 +58,7 @@ class BondDashpots:
         """Take in the present twist of an intact bond and, now and then, its block."""
         k = self.place[b]
         self.bodies[k], self.branch[k] = [i, j], branch
-        spin = self.state.spin[i]
-        linear = self.state.velocity[j] - self.state.velocity[i] - spin.cross(branch)
-        angular = self.state.spin[j] - spin
-        now = vec6(linear[0], linear[1], linear[2], angular[0], angular[1], angular[2])
+        now = self._twist(i, j, branch)
         self.last[k] += self.earlier * (self.start[k] - now)
         self.start[k] = now
         if (self.state.tick[None] // MACRO_TICKS) % self.refresh_every == 0:
@@ -73,8 +70,17 @@ class BondDashpots:
         slots, k = self.model.bond_slots[b], self.place[b]
         i, j = slots[0] >> 2, slots[1] >> 2
         if self.state.broken_tick[b] < 0:
-            self.begin(b, i, j, self.state.position[j] - self.state.position[i])
+            branch = self.state.position[j] - self.state.position[i]
+            self.start[k] = self._twist(i, j, branch)
             self.last[k] = self.start[k]
+
+    @ti.func
+    def _twist(self, i, j, branch):
+        """Twist of a bond at the present time, slave against master."""
+        spin = self.state.spin[i]
+        linear = self.state.velocity[j] - self.state.velocity[i] - spin.cross(branch)
+        angular = self.state.spin[j] - spin
+        return vec6(linear[0], linear[1], linear[2], angular[0], angular[1], angular[2])
 
     @ti.func
     def end(self, b):

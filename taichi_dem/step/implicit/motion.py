@@ -2,13 +2,8 @@
 
 import taichi as ti
 
-from taichi_dem.types import mat3, real
-
-
-@ti.func
-def unit3():
-    """The unit matrix."""
-    return mat3([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+from taichi_dem.physics.rotation import unit3
+from taichi_dem.types import real
 
 
 @ti.data_oriented

@@ -2,10 +2,9 @@
 
 import taichi as ti
 
-from taichi_dem.physics.rotation import zero3
+from taichi_dem.physics.rotation import unit3, zero3
 from taichi_dem.physics.sphere_pair import meeting
 from taichi_dem.step.cells import group
-from taichi_dem.step.implicit.motion import unit3
 from taichi_dem.types import real, vec3
 
 #: Colours of pairs that share no body; what finds no free one is visited last, in turn.
@@ -24,7 +23,8 @@ class PairDashpots:
     centre to the contact [m]. push: impulse of the spring, or what the gap still lets through
     [N s]. share: velocity per impulse along the normal, and across at most [1/kg]. impulse: on the
     second, of spring, dashpot and friction, as found [N s]; entries as in
-    ``Contacts.pair_sphere``. order: pairs by colour, those of colour c from colour_first[c] on.
+    ``Contacts.pair_sphere``. active: the pairs that touch, count of them. order: places in it by
+    colour, those of colour c from colour_first[c] on.
     """
 
     def __init__(self, model, state, schedule, contacts, motion):
@@ -41,60 +41,63 @@ class PairDashpots:
         self.impulse = ti.Vector.field(3, real, shape=spheres)
         self.branch = ti.Vector.field(3, real, shape=pairs)
         n = model.body_count
+        self.count = ti.field(ti.i32, shape=())
+        self.active = ti.field(ti.i32, shape=pairs)
         self.order = ti.field(ti.i32, shape=pairs)
         self.colour = ti.field(ti.i32, shape=pairs)
         self.taken = ti.field(ti.i32, shape=n)
         self.colour_first = ti.field(ti.i32, shape=COLOURS + 3)
-        self.old_first = ti.field(ti.i32, shape=pairs + 1)
-        self.old_sphere = ti.Vector.field(2, ti.i32, shape=spheres)
         self.old_impulse = ti.Vector.field(3, real, shape=spheres)
 
     @ti.func
     def keep(self, p):
-        """Save what is known of a pair before the list is renewed."""
-        self.old_first[p], self.old_first[p + 1] = (
-            self.contacts.pair_first[p],
-            self.contacts.pair_first[p + 1],
-        )
+        """Save the impulses of a pair before the list is renewed."""
         for k in range(self.contacts.pair_first[p], self.contacts.pair_first[p + 1]):
-            self.old_sphere[k] = self.contacts.pair_sphere[k]
             self.old_impulse[k] = self.impulse[k]
 
     @ti.func
-    def take(self, p, old):
-        """Take it over for the pair at place p; old: its former place, -1 for none."""
+    def take(self, p, place, old):
+        """Take them over for the pair at place p; place: its former one in the ``OldPairs`` old."""
         for k in range(self.contacts.pair_first[p], self.contacts.pair_first[p + 1]):
-            spheres, found = self.contacts.pair_sphere[k], zero3()
-            if old >= 0:
-                for o in range(self.old_first[old], self.old_first[old + 1]):
-                    same = self.old_sphere[o] == spheres
-                    if same.all():
-                        found = self.old_impulse[o]
-            self.impulse[k] = found
+            former = old.candidate(place, self.contacts.pair_sphere[k])
+            self.impulse[k] = zero3()
+            if former >= 0:
+                self.impulse[k] = self.old_impulse[former]
 
     @ti.func
-    def sort(self):
-        """Colour the pairs of a new list: those of one colour share no body.
+    def sort(self, one):
+        """List and colour the pairs that touch: those of one colour share no body.
 
         Each takes the lowest colour that is free at both bodies; what finds none comes last.
+        Candidates that do not touch are left out, so that no skin changes the order.
         """
-        for i in range(self.model.body_count):
-            self.taken[i] = 0
+        count = 0
         for p in range(self.contacts.pair_count[None]):
-            i, j = self.contacts.pair_body[p][0], self.contacts.pair_body[p][1]
+            if self.touching[p] > 0:
+                self.active[count] = p
+                count += 1
+                for side in ti.static(range(2)):
+                    self.taken[self.contacts.pair_body[p][side]] = 0
+        for a in range(count):
+            i, j = self._bodies(a)
             taken, colour = self.taken[i] | self.taken[j], 0
             while (taken >> colour) & 1 == 1 and colour < COLOURS:
                 colour += 1
             if colour < COLOURS:
                 self.taken[i] |= 1 << colour
                 self.taken[j] |= 1 << colour
-            self.colour[p] = colour
-        pairs = self.contacts.pair_count[None]
-        group(self.colour_first, self.order, COLOURS + 1, pairs, self._colour_of)
+            self.colour[a] = colour
+        self.count[None] = count
+        group(self.colour_first, self.order, COLOURS + 1, count, self._colour_of)
 
     @ti.func
-    def _colour_of(self, p):
-        return self.colour[p]
+    def _bodies(self, a):
+        pair = self.contacts.pair_body[self.active[a]]
+        return pair[0], pair[1]
+
+    @ti.func
+    def _colour_of(self, a):
+        return self.colour[a]
 
     @ti.func
     def begin(self, p):
@@ -124,7 +127,7 @@ class PairDashpots:
                 self.share[end] = self._share(i, j, branch, arm, normal)
                 force += self.impulse[k]
                 moment += arm.cross(self.impulse[k])
-                deepest = ti.max(deepest, overlap / ti.min(first[3], second[3]))
+                deepest = ti.max(deepest, overlap / reach)
                 end += 1
             else:
                 self.impulse[k] = zero3()
@@ -172,13 +175,12 @@ class PairDashpots:
     def visit(self, p):
         """Solve a pair's contacts, one after the other; largest squared velocity it changed."""
         change2 = 0.0
-        if self.touching[p] > 0:
-            pair = self.contacts.pair_body[p]
-            damping = self.schedule.step_seconds[0] * self.contacts.law.damping()
-            start = self.contacts.pair_first[p]
-            for c in range(start, start + self.touching[p]):
-                found = self._visit(c, pair[0], pair[1], self.branch[p], damping)
-                change2 = ti.max(change2, found)
+        pair = self.contacts.pair_body[p]
+        damping = self.schedule.step_seconds[0] * self.contacts.law.damping()
+        start = self.contacts.pair_first[p]
+        for c in range(start, start + self.touching[p]):
+            found = self._visit(c, pair[0], pair[1], self.branch[p], damping)
+            change2 = ti.max(change2, found)
         return change2
 
     @ti.func

@@ -2,6 +2,7 @@
 
 import taichi as ti
 
+from taichi_dem.fields import raise_to
 from taichi_dem.step.implicit.bonds import BondDashpots
 from taichi_dem.step.implicit.motion import Motion
 from taichi_dem.step.implicit.pairs import COLOURS, PairDashpots
@@ -13,8 +14,7 @@ class Solver:
     """Gauss-Seidel over bonds, then touching pairs, in the order of their colours.
 
     Members of one colour share no body: they may be visited side by side, and the order within a
-    colour changes no bit. So one core and many cores run the same sweeps to the same bits, and
-    Jacobi, which needs twice the sweeps, is not called for.
+    colour changes no bit. So one core and many cores run the same sweeps to the same bits.
 
     sweeps: how many the present step has had. change2: largest squared change of a velocity in
     the present sweep [m2/s2], residual2 that of the last. speed2: largest squared speed of a body
@@ -46,44 +46,32 @@ class Solver:
         self.change2[None], self.speed2[None] = 0.0, 0.0
 
     @ti.func
-    def note_speed(self, speed2):
-        """Take a body's squared speed [m2/s2] into the scale of the residual."""
-        # Ask first: an atomic for every body costs as much as its rotation.
-        if speed2 > self.speed2[None]:
-            ti.atomic_max(self.speed2[None], speed2)
-
-    @ti.func
     def solve(self, one):
         """All sweeps of a step, one member after the other."""
         while self.unsolved[None] == 1:
             for k in range(self.model.bond_count):
                 self.bond(k)
             if ti.static(self.has_contact):
-                for a in range(self.contacts.pair_count[None]):
+                for a in range(self.pairs.count[None]):
                     self.pair(self.pairs.order[a])
             self.judge(0)
 
     @ti.func
     def bond(self, k):
         """Visit the bond at place k."""
-        self._note(self.bonds.visit(k))
+        raise_to(self.change2, self.bonds.visit(k))
 
     @ti.func
-    def pair(self, p):
-        """Visit the touching spheres of a pair."""
-        self._note(self.pairs.visit(p))
+    def pair(self, a):
+        """Visit the touching spheres of the pair at place a."""
+        raise_to(self.change2, self.pairs.visit(self.pairs.active[a]))
 
     @ti.func
     def last_pairs(self, one):
         """Visit the pairs that found no colour, one after the other."""
         first = self.pairs.colour_first[COLOURS]
-        for a in range(first, self.contacts.pair_count[None]):
+        for a in range(first, self.pairs.count[None]):
             self.pair(self.pairs.order[a])
-
-    @ti.func
-    def _note(self, change2):
-        if change2 > self.change2[None]:
-            ti.atomic_max(self.change2[None], change2)
 
     @ti.func
     def judge(self, one):

@@ -1,0 +1,129 @@
+"""Runs with steps that are too large: energy from nowhere, and what a block looks like then.
+
+A run has: limit (what sets it), share (of the limit), step [s], time [s] and residual (over the
+energy put in by then), simulation, frames, speeds (of the bodies' corners [m/s], (frames,
+bodies)), sentence (of its end; "" when it ended well).
+"""
+
+import textwrap
+
+import numpy as np
+from matplotlib.collections import PolyCollection
+
+from taichi_dem.plot.block import displaced
+from taichi_dem.plot.film import moving_picture
+from taichi_dem.plot.view import View, surface
+from taichi_dem.plot_style import BLACK, BLUE, GREEN, GREY, ORANGE, RED, picture, seconds
+
+#: Of the displacement in the film.
+_MAGNIFY = 6000.0
+#: Oblique enough to show two sides and the struck end.
+_AXIS = (-0.35, 0.45, 1.0)
+_LOOKS = {0: GREEN, 1: ORANGE, 2: RED, 3: BLUE}
+#: Last pictures of the film, which stand still for the sentence.
+_HELD = 8
+_RANGE = (1e-5, 1e3)
+
+
+def picture_energy(path, runs):
+    """Energy that the account cannot explain over time, a panel a limit; the sentences below."""
+    limits = list(dict.fromkeys(made.limit for made in runs))
+    said = [made for made in runs if made.sentence]
+    size = (4.6 * len(limits) + 0.6, 3.4 + 0.55 * len(said))
+    with picture(path, 1, len(limits), size=size, squeeze=False) as (figure, panels):
+        for axes, limit in zip(panels[0], limits):
+            for k, made in enumerate(m for m in runs if m.limit == limit):
+                _residual(axes, made, _LOOKS[k % len(_LOOKS)])
+            axes.axhline(1.0, color=GREY, linestyle=":", linewidth=1.0)
+            axes.set(title=f"limited by its {limit}", xlabel="time [µs]")
+            axes.legend(loc="lower left", title="step")
+        panels[0, 0].set_ylabel("unexplained energy / energy put in")
+        width = 62 * len(limits)
+        words = [f"{made.limit}, {made.share:g} × limit: “{made.sentence}”" for made in said]
+        words = "\n".join(textwrap.fill(text, width) for text in words)
+        figure.supxlabel(words, x=0.02, ha="left", fontsize=7.5, family="monospace")
+
+
+def _residual(axes, made, colour):
+    """One curve; a cross where the program ended the run."""
+    time = 1e6 * made.time
+    shown = np.where(made.residual > 0.0, made.residual, np.nan)
+    axes.plot(time, shown, color=colour, label=f"{made.share:g} × limit = {seconds(made.step)}")
+    if made.sentence:
+        axes.plot(time[-1:], shown[-1:], "X", color=colour, ms=7, clip_on=False)
+    axes.set(yscale="log", ylim=_RANGE)
+
+
+def film_shaken(path, safe, bad, count):
+    """A safe run and a diverging one side by side, their energy below. count: of pictures."""
+    with moving_picture(path, (4.0, 4.0), 130) as (figure, shoot):
+        grid = figure.add_gridspec(4, 2, height_ratios=(0.75, 0.9, 1.0, 0.4))
+        fastest = float(safe.speeds.max())
+        blocks = [
+            _Block(figure, grid[0, k], grid[1, k], made, fastest)
+            for k, made in enumerate((safe, bad))
+        ]
+        energy = figure.add_subplot(grid[2, :])
+        words = figure.add_subplot(grid[3, :])
+        words.set_axis_off()
+        said = words.text(-0.12, 1.0, "", va="top", fontsize=5.8, family="monospace")
+        end = float(bad.time[-1])
+        curves = [_curve(energy, made, colour) for made, colour in ((safe, GREEN), (bad, RED))]
+        energy.set(yscale="log", ylim=_RANGE, xlim=(0.0, 1.03e6 * end))
+        energy.set(xlabel="time [µs]", ylabel="unexplained /\nput in")
+        energy.legend(loc="upper left")
+        for now in _instants(end, count):
+            for block in blocks:
+                block.show(now)
+            for line, time, values in curves:
+                line.set_data(time[time <= 1e6 * now], values[time <= 1e6 * now])
+            said.set_text(textwrap.fill(bad.sentence, 74) if now == end else "")
+            shoot()
+
+
+def _instants(end, count):
+    """Times of the pictures [s]: closer together towards the end, where all happens at once."""
+    early = np.linspace(0.0, 0.6 * end, (count - _HELD) // 3, endpoint=False)
+    late = np.linspace(0.6 * end, end, count - _HELD - len(early))
+    return np.concatenate([early, late, np.full(_HELD, end)])
+
+
+def _curve(axes, made, colour):
+    (line,) = axes.plot([], [], color=colour, label=f"{made.share:g} × limit")
+    shown = np.where(made.residual > 0.0, made.residual, np.nan)
+    return line, 1e6 * made.time, shown
+
+
+class _Block:
+    """The block of a run, magnified and coloured by speed, over the velocities of its bodies."""
+
+    def __init__(self, figure, place, below, made, fastest):
+        axes, speeds = figure.add_subplot(place), figure.add_subplot(below)
+        self.made, self.model, self.view = made, made.simulation.model, View(_AXIS)
+        self.whole = np.zeros(self.model.bond_count, dtype=bool)
+        flat = self.view.project(self.model.mesh.points)
+        low, high = flat.min(axis=0), flat.max(axis=0)
+        pad = 0.16 * (high - low).max()
+        axes.set(xlim=(low[0] - pad, high[0] + pad), ylim=(low[1] - pad, high[1] + pad))
+        axes.set_aspect("equal")
+        axes.set_axis_off()
+        self.drawn = PolyCollection([], cmap="YlOrRd", linewidth=0.3, edgecolor=BLACK)
+        self.drawn.set_clim(0.0, fastest)
+        axes.add_collection(self.drawn)
+        self.axes = axes
+        self.along = self.model.centre[:, 0]
+        (self.dots,) = speeds.plot([], [], ".", ms=2.5, color=BLUE)
+        speeds.set(xlim=(0.0, self.model.mesh.points[:, 0].max()), xlabel="place [m]")
+        speeds.set(yscale="log", ylim=(1e-4 * fastest, 1e2 * fastest), ylabel="speed [m/s]")
+
+    def show(self, time):
+        """Show the frame at or before a time [s]."""
+        row = int(np.searchsorted(self.made.time, time * (1.0 + 1e-9), side="right")) - 1
+        frame, speed = self.made.frames[row], self.made.speeds[row]
+        corners = displaced(self.model, frame, _MAGNIFY)
+        polygons, body, _ = surface(self.model.topology, self.view, corners, self.whole)
+        self.drawn.set_verts(polygons)
+        self.drawn.set_array(speed[body])
+        self.dots.set_data(self.along, speed)
+        text = f"{self.made.share:g} × limit, t = {1e6 * frame.time_s:.1f} µs"
+        self.axes.set_title(text, loc="center")

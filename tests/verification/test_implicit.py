@@ -1,0 +1,181 @@
+"""Solved dashpots on a bonded pair: the scheme to round-off, its order, where it is stable."""
+
+import numpy as np
+import pytest
+
+from taichi_dem import CONCRETE, ImplicitDashpots, InputError, effects
+from taichi_dem.mesh_shapes import pair
+from taichi_dem.quality import dashpots_of, springs_of
+from tests.verification.test_limits import Rig, bisected, pair_eigenvalue
+
+EPS = np.finfo(float).eps
+#: So tight that the sweeps add nothing to what is measured.
+TIGHT = {"sweeps": (2, 200), "tolerance": 1e-12}
+#: Stretch of the pair [m], and how well openings are known: differences of positions of 0.02 m.
+STRETCH = 1e-6
+NOISE = 4 * 0.02 * EPS
+
+
+@pytest.fixture(scope="module")
+def rigs():
+    """Damped bonded pairs by theta, each compiled once."""
+    made = {}
+
+    def rig(theta):
+        if theta not in made:
+            method = ImplicitDashpots(1e-9, theta=theta, **TIGHT)
+            made[theta] = Rig(pair(), [effects.BondDamping()], method)
+        return made[theta]
+
+    return rig
+
+
+def damped(rig, share):
+    """Give the dashpots a share of the material's coefficients; rates of the normal mode.
+
+    Returns the square of the frequency 2 k A / m and the damping rate 2 c A / m, in 1/s^2 and 1/s.
+    """
+    law = share * np.array([CONCRETE.normal_damping, CONCRETE.shear_damping])
+    rig.simulation.model.dashpot.law.from_numpy(law)
+    per_mass = 2.0 * 3.0 * rig.simulation.model.unit_area[0] / rig.simulation.model.body_mass[0]
+    return CONCRETE.normal_stiffness * per_mass, law[0] * per_mass
+
+
+def openings(rig, dt, marks, speed=0.0):
+    """Opening [m] after numbers of steps, from STRETCH and a speed at which the bodies part."""
+    apart = np.array([[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]])
+    found = []
+    for steps in marks:
+        rig.speeds(dt, steps, rig.centre + STRETCH * apart, speed * apart, np.zeros((2, 3)))
+        place = rig.state.position
+        found.append(place[1][0] - place[0][0] - np.diff(rig.centre[:, 0])[0])
+    return np.array(found)
+
+
+def recurrence(dt, steps, stiff, rate, theta, speed=0.0):
+    """v' = v - dt stiff u - dt rate (theta v' + (1 - theta) v), u' = u + dt v'; all openings."""
+    opening, found = STRETCH, [STRETCH]
+    for _ in range(steps):
+        kept = (1.0 - (1.0 - theta) * dt * rate) * speed - dt * stiff * opening
+        speed = kept / (1.0 + theta * dt * rate)
+        opening += dt * speed
+        found.append(opening)
+    return np.array(found)
+
+
+@pytest.mark.parametrize("theta", [0.5, 1.0])
+def test_an_overdamped_pair_follows_the_recurrence_to_round_off(rigs, theta):
+    """At 20 times the step that explicit dashpots bear, where an error of the block would show.
+
+    A step rounds the opening by NOISE; dashpots this strong hold it, so that roundings add up.
+    """
+    rig = rigs(theta)
+    stiff, rate = damped(rig, 10.0)
+    dt, marks = 20.0 * 2.0 / rate, [1, 2, 3, 10, 100]
+    assert dt**2 * stiff < 4.0
+    expected = recurrence(dt, marks[-1], stiff, rate, theta)[marks]
+    found = openings(rig, dt, marks)
+    assert expected[-1] < 0.9 * STRETCH
+    assert np.all(np.abs(found - expected) < np.array(marks) * NOISE)
+
+
+@pytest.mark.parametrize("theta, order", [(0.5, 2), (1.0, 1)])
+def test_the_slow_decay_is_met_in_the_order_of_theta(rigs, theta, order):
+    """exp(-l t), l the smaller root of l^2 - 2 c A / m l + 2 k A / m = 0.
+
+    Velocities live half a step behind: the run begins with that of -dt / 2, on the slow solution
+    itself. Half the step, 1 / 2^order of the error; terms of the next order are the share
+    l dt = 0.08 of it at the largest step, or its square where the scheme is symmetric in time.
+    """
+    rig = rigs(theta)
+    stiff, rate = damped(rig, 1.0)
+    slow = 0.5 * rate - np.sqrt(0.25 * rate**2 - stiff)
+    steps, errors = 10, []
+    time_s = steps * 4e-6
+    for part in (1, 2, 4):
+        dt = time_s / (steps * part)
+        start = -slow * STRETCH * np.exp(0.5 * slow * dt)
+        found = openings(rig, dt, [steps * part], start)[0]
+        errors.append(found / STRETCH - np.exp(-slow * time_s))
+    assert rate * 4e-6 > 5.0 and 1e-5 < abs(errors[0]) < (slow * 4e-6) ** order
+    ratios = np.array(errors[:-1]) / errors[1:]
+    assert ratios == pytest.approx([2.0**order] * 2, rel=0.08)
+
+
+def test_all_modes_are_damped_at_twenty_times_the_explicit_limit(rigs):
+    """Forward Euler bears 2 / rate of the fastest mode of the pair, 12 x 12; here 40 / rate."""
+    rig = rigs(0.5)
+    damped(rig, 10.0)
+    rate = 10.0 * pair_eigenvalue(rig.simulation.model, dashpots_of(CONCRETE))
+    random = np.random.default_rng(3)
+    velocity, spin = 1e-7 * random.standard_normal((2, 3)), 1e-6 * random.standard_normal((2, 3))
+    after = rig.speeds(40.0 / rate, 3000, rig.centre, velocity, spin)
+    drift = velocity.mean(axis=0)
+    # The pair as a whole flies and turns on; what it turns with is below its first spins.
+    free = np.linalg.norm(np.tile(drift, (2, 1))) + 2e-6 * 2 * 0.05
+    assert after < free + 1e-9
+
+
+@pytest.mark.parametrize("share", [0.0, 0.02])
+def test_springs_bound_the_step_whatever_the_dashpots(rigs, share):
+    """2 / w of the fastest mode: at z = -1 the mean of both velocities is none, so C drops out.
+
+    The fastest turns the bodies against each other about the normal. Growth too slow to see, and
+    bisection, as in ``test_limits``. What has grown is looked at early too: bodies that turn far
+    swing slower, and dashpots then calm them.
+    """
+    rig = rigs(0.5)
+    damped(rig, share)
+    exact = 2.0 / np.sqrt(pair_eigenvalue(rig.simulation.model, springs_of(CONCRETE)))
+    random = np.random.default_rng(3)
+    velocity, spin = 1e-7 * random.standard_normal((2, 3)), 1e-6 * random.standard_normal((2, 3))
+
+    def calm(step):
+        for steps in (20, 50, 100, 200, 400):
+            speed = rig.speeds(step, steps, rig.centre, velocity, spin)
+            if not speed < 1e-3 or np.abs(rig.state.motion()["spin"]).max() > 1e-3:
+                return False
+        return True
+
+    found = bisected(calm, 0.5 * exact, 1.5 * exact)
+    assert found == pytest.approx(exact, rel=0.007), found / exact
+
+
+def test_velocities_at_the_end_of_the_step_bear_longer_ones(rigs):
+    """theta = 1: (w dt)^2 < 4 + 2 r dt from z = -1 in the recurrence, w, r of the normal mode."""
+    rig = rigs(1.0)
+    stiff, rate = damped(rig, 1.0)
+    exact = (rate + np.sqrt(rate**2 + 4.0 * stiff)) / stiff
+    assert exact > 5.0 * 2.0 / np.sqrt(stiff)
+    found = [openings(rig, part * exact, [400])[0] for part in (0.99, 1.01)]
+    assert abs(found[0]) < STRETCH < abs(found[1])
+
+
+@pytest.mark.parametrize(
+    "options, name, value, bounds",
+    [
+        ({"dt": 0.0}, "dt", "0.0", "positive"),
+        ({"dt": float("nan")}, "dt", "nan", "positive"),
+        ({"dt": "long"}, "dt", "'long'", "positive"),
+        ({"tolerance": -1.0}, "tolerance", "-1.0", "positive"),
+        ({"tolerance": None}, "tolerance", "None", "positive"),
+        ({"refresh": float("inf")}, "refresh", "inf", "positive"),
+        ({"theta": 0.49}, "theta", "0.49", "from 0.5 to 1"),
+        ({"theta": 1.01}, "theta", "1.01", "from 0.5 to 1"),
+        ({"theta": 0.0}, "theta", "0.0", "from 0.5 to 1"),
+        ({"theta": "mean"}, "theta", "'mean'", "from 0.5 to 1"),
+        ({"sweeps": 3}, "sweeps", "3", "from 1 to 1000"),
+        ({"sweeps": (5, 2)}, "sweeps", "(5, 2)", "from 1 to 1000"),
+        ({"sweeps": (0, 2)}, "sweeps", "(0, 2)", "from 1 to 1000"),
+        ({"sweeps": (2, 1001)}, "sweeps", "(2, 1001)", "from 1 to 1000"),
+        ({"sweeps": (1, True)}, "sweeps", "(1, True)", "from 1 to 1000"),
+        ({"sweeps": (1.0, 2)}, "sweeps", "(1.0, 2)", "from 1 to 1000"),
+    ],
+)
+def test_wrong_options_are_refused_in_a_sentence(options, name, value, bounds):
+    """Name, value and range of what was given."""
+    with pytest.raises(InputError) as caught:
+        ImplicitDashpots(**options)
+    words = str(caught.value)
+    assert words.startswith(name) and words.count("\n") == 0
+    assert value in words and bounds in words
