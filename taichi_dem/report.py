@@ -16,7 +16,8 @@ class Report:
     the finer body's step. searches: rebuilt contact lists.
     ledger: energy terms [J]; ledger_residual_fraction: residual over the work put in.
     linear_momentum_error, angular_momentum_error: out of nothing, as shares of what was
-    exchanged. compile_seconds, run_seconds, run_cpu_seconds: cost. needs: effects missed.
+    exchanged. compile_seconds, run_seconds, run_cpu_seconds: cost. needs: effects missed, and
+    bonds that the step did not resolve.
     bound_by: bodies at the end by what bounds their step, see ``step_control.CRITERIA``.
     """
 

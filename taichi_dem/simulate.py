@@ -115,7 +115,7 @@ def _run(simulation, recorder, sample_steps, frame_steps, progress):
     for step in sorted(sample_steps | frame_steps):
         simulation.advance_to(step, tell)
         if step in sample_steps:
-            simulation.watch.look(simulation.time_s)
+            simulation.look()
             recorder.sample()
         if step in frame_steps:
             recorder.snapshot()

@@ -10,6 +10,7 @@ from taichi_dem.health import Health
 from taichi_dem.ledger import Ledger
 from taichi_dem.model import Model
 from taichi_dem.report import Report
+from taichi_dem.resolution import Resolution
 from taichi_dem.state import NEVER, State
 from taichi_dem.step.advance import Advance
 from taichi_dem.step.broad_phase import BroadPhase
@@ -105,9 +106,18 @@ class Simulation:
             self.model, self.state, self.schedule, self.contacts, self.ledger, self.solves
         )
         self.watch = Watch(self.model, self.state, self.advance)
-        self.watch.look(0.0)
+        self.resolution = Resolution(self.model, self.state, self.advance)
+        self.look()
         self.driver.compile()
         self.compile_seconds += time.perf_counter() - started
+
+    def look(self):
+        """Look for effects that are missed, and for bonds that the step does not resolve.
+
+        Called at recording times, so that the step stays bare.
+        """
+        self.watch.look(self.time_s)
+        self.resolution.look()
 
     def advance_to(self, macro_step, on_call=None):
         """Step until a number of largest steps; on_call() is called about five times a second.
@@ -186,7 +196,7 @@ class Simulation:
             compile_seconds=self.compile_seconds,
             run_seconds=self.run_seconds,
             run_cpu_seconds=self.run_cpu_seconds,
-            needs=self.watch.findings(),
+            needs=(*self.watch.findings(), *self.resolution.findings()),
             bound_by=counted_criteria(self.state.bound.to_numpy()),
         )
 

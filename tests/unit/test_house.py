@@ -31,7 +31,7 @@ LAYERS = {
         ("state",),
         ("step",),
         ("ledger",),
-        ("health", "watch", "report", "step_report"),
+        ("health", "watch", "resolution", "report", "step_report"),
         ("simulation",),
         ("monitor", "record"),
         ("simulate",),
