@@ -20,15 +20,17 @@ class Resolution:
     """Looks, at recording times, at what steps leave of dashpots; at the end, at how bonds failed.
 
     share: least share of its dashpots that each bond was left with while it held, (bond_count,).
-    pair_share, taken: of the contacts of each body, the least such share, and the largest part of
-    a speed that they take in a step, (body_count,).
+    step: shortest step of each body [s]; lightest: mass of the lightest it came near [kg]; taken:
+    largest part of a speed that its contacts take in a step; all (body_count,).
     """
 
     def __init__(self, model, state, advance):
         self.model, self.state, self.advance = model, state, advance
         self.contacts = advance.contacts
         self.share = np.ones(model.bond_count)
-        self.pair_share, self.taken = np.ones(model.body_count), np.zeros(model.body_count)
+        self.taken = np.zeros(model.body_count)
+        self.step = np.full(model.body_count, np.inf)
+        self.lightest = model.body_mass.copy()
 
     def look(self):
         """Update the figures at a recording time. Dashpots that are solved need no look."""
@@ -37,7 +39,18 @@ class Resolution:
         if self.advance.limited and self.advance.has_dashpot and self.model.bond_count:
             self._read_bonds(self.share)
         if self.contacts is not None and self.contacts.pair_count[None]:
-            self._read_pairs(self.pair_share, self.taken)
+            if self.advance.limited:
+                self._note_partners()
+            else:
+                self._read_pairs(self.taken)
+
+    def _note_partners(self):
+        """Remember steps and light partners: few contacts last until a recording."""
+        schedule, mass = self.advance.schedule, self.model.body_mass
+        self.step = np.minimum(self.step, schedule.dt0 / 2.0 ** self.state.level.to_numpy())
+        pairs = self.contacts.pair_body.to_numpy()[: self.contacts.pair_count[None]]
+        for one, other in (pairs.T, pairs.T[::-1]):
+            np.minimum.at(self.lightest, one, mass[other])
 
     def findings(self, bodies=None):
         """Sentences about what the step did not resolve, an empty tuple where it did all.
@@ -68,7 +81,8 @@ class Resolution:
         return found
 
     def _pairs(self, bodies):
-        share, taken = np.where(bodies, self.pair_share, 1.0), np.where(bodies, self.taken, 0.0)
+        share = np.where(bodies, self._contact_shares(), 1.0)
+        taken = np.where(bodies, self.taken, 0.0)
         found = []
         if (share < LEAST_SHARE).any():
             worst = int(np.argmin(share))
@@ -85,6 +99,18 @@ class Resolution:
                 f"and throw bodies apart that they should stop"
             )
         return found
+
+    def _contact_shares(self):
+        """Largest share that limited sphere dashpots can have had where they acted, (body_count,).
+
+        That of a single contact, 1 / X with X = 2 c dt / m; see ``step/rates.py``. Where contacts
+        took energy they acted; it is booked to the first body of a pair.
+        """
+        if self.contacts is None or not self.advance.limited:
+            return np.ones(self.model.body_count)
+        acted = self.state.contact_heat.to_numpy()[:, :2].sum(axis=1) > 0.0
+        x = 2.0 * self.model.material.contact_damping * self.step / self.lightest
+        return np.where(acted, 1.0 / np.maximum(1.0, x), 1.0)
 
     def _openings_at_failure(self):
         """Largest opening of the units of every bond that failed over the failure opening, (b,)."""
@@ -103,19 +129,11 @@ class Resolution:
                 share[b] = ti.min(share[b], self.advance.bond_share(b))
 
     @ti.kernel
-    def _read_pairs(
-        self,
-        share: ti.types.ndarray(dtype=ti.f64, ndim=1),
-        taken: ti.types.ndarray(dtype=ti.f64, ndim=1),
-    ):
+    def _read_pairs(self, taken: ti.types.ndarray(dtype=ti.f64, ndim=1)):
         for p in range(self.contacts.pair_count[None]):
             count = self.contacts.touching(p)
             if count > 0:
                 i, j = self.contacts.pair_body[p][0], self.contacts.pair_body[p][1]
-                kept = 1.0
-                if ti.static(self.advance.limited):
-                    kept = self.advance.contact_share(i, j)
-                rate = count * (1.0 / self.model.mass[i] + 1.0 / self.model.mass[j])
-                rate *= kept * self.contacts.law.damping()
-                ti.atomic_min(share[i], kept)
+                rate = count * self.contacts.law.damping()
+                rate *= 1.0 / self.model.mass[i] + 1.0 / self.model.mass[j]
                 ti.atomic_max(taken[i], rate * self.advance.schedule.pair_step(i, j))

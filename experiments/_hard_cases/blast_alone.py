@@ -32,9 +32,6 @@ from taichi_dem.mesh import checked_mesh
 from taichi_dem.mesh_shapes import bar, pair, single
 from taichi_dem.topology import body_properties, faces_of_group
 
-SHORT = ("limited", "controlled", "implicit")
-
-
 JUMPING = {
     "controlled": Multirate(8e-8, 5e-9, control=StepControl(level_jump=None)),
     "multirate_held": Multirate(8e-8, 5e-9),
@@ -73,8 +70,7 @@ def mass_ratio_1e4(method, quick):
     x = np.array([1.0, 0.0, 0.0])
     true = stopped_speed(small, CONCRETE, large, arms, x, x)
     speed = track.motion["velocity"][:, 0]
-    formula = "5 %: the other spheres of the face come near"
-    error = as_converged("velocity error / speed", speed[-1], true, 1.0, 0.05, formula)
+    error = as_converged("velocity error / speed", speed[-1], true, 1.0)
     limits = (momentum_kept(track), error)
     return measured(track, method, limits, speed[:, 0], "speed [m/s]")
 
@@ -141,64 +137,13 @@ def many_steps_at_rest(method, quick):
     fixed[faces_of_group(mesh, top, "left")[0]] = True
     static = static_sag(mesh, CONCRETE, weight, fixed)[:, 0]
     speed = np.linalg.norm(samples["motion"]["velocity"][-1], axis=1).max()
+    settling = CONCRETE.shear_damping / CONCRETE.shear_stiffness
     limits = (
         as_converged("error of the sag / sag", sag[-1], static, abs(static).max()),
-        Limit("speed left x 1 ms / sag", 1e-3 * speed / abs(static).max(), 0.01, "at rest"),
+        Limit("way still to go / sag", settling * speed / abs(static).max(), 0.01, "v c / k"),
     )
     shown = Curves("time [µs]", "sag [nm]", {method: (1e6 * samples["time_s"], 1e9 * sag.min(1))})
     return Measured(limits, shown, simulation.compile_seconds)
-
-
-RATIOS = {
-    "multirate_held": 0.3,
-    "multirate_drifted": 0.3,
-    "controlled": 1.0,
-}
-#: Edges of the scan [m], so that frequency x largest step runs through a factor of four.
-SCAN = tuple(np.geomspace(0.02, 0.32, 16))
-
-
-def step_ratio_resonance(method, quick):
-    """Undamped trios that swing while their bodies step at 1 to 16 to one another: no gain.
-
-    A regular body with a light neighbour and an equal one, all in motion, from edges of 2 to 32 cm,
-    so that the largest step runs through all shares of the light one's period up to a limit.
-    """
-    islands = {f"{edge:.3f}": _trio(edge) for edge in SCAN}
-    # sqrt(k A / m) of the smallest trio's light body.
-    fastest = np.sqrt(4.0 * 3.0 * CONCRETE.normal_stiffness / (2390.0 * LIGHT * SCAN[0] * 0.8165))
-    dt0 = RATIOS[method] / fastest
-    control = StepControl() if method == "controlled" else None
-    neighbour = "drifted" if method == "multirate_drifted" else "held"
-    way = Multirate(dt0, 0.05 * dt0, neighbour, control=control)
-    tracks = scenes.follow(islands, [], way, (500 if quick else 20000) * dt0)
-    gain = np.array([(one.kinetic() / one.kinetic()[0]).max() - 1.0 for one in tracks.values()])
-    jump = max(np.ptp(one.motion["level"], axis=1).max() for one in tracks.values())
-    limits = (
-        Limit("largest kinetic energy / given - 1", float(gain.max()), 0.05, "energy is kept"),
-        Limit("3 / levels between neighbours", 3.0 / max(1.0, float(jump)), 1.0, "steps differ"),
-    )
-    first = next(iter(tracks.values()))
-    shown = Curves("edge [m]", "kinetic energy / given - 1, largest", {method: (SCAN, gain)})
-    return Measured(limits, shown, first.compile_s)
-
-
-#: Height of the light neighbour over that of the others.
-LIGHT = 0.06
-
-
-def _trio(edge):
-    """A regular body, a flat neighbour on one face and a regular one on another, in motion."""
-    middle = single(edge)
-    corners = middle.points[middle.tetrahedra[0]]
-    points, bodies = [*corners], [[0, 1, 2, 3]]
-    for k, share in ((0, LIGHT), (1, 1.0)):
-        face = [j for j in range(4) if j != k]
-        centre = corners[face].mean(axis=0)
-        bodies.append([*face, len(points)])
-        points.append(centre + share * (centre - corners[k]))
-    mesh = checked_mesh(points, bodies, {})
-    return scenes.Island.of((mesh, 0.0), velocity=[[0, 0, 0], [0.5, 0, 0], [0, 0.05, 0]])
 
 
 def sudden_pressure_on_sleepers(method, quick):
@@ -290,10 +235,9 @@ _BASIC = ("uniform", "multirate_held", "implicit")
 
 CASES = (
     blast_case(jump_of_ten_levels, tuple(JUMPING)),
-    blast_case(mass_ratio_1e4, SHORT),
+    blast_case(mass_ratio_1e4, ("implicit",), decline(("limited", "controlled"), "parts too fast")),
     blast_case(damping_ratio_300, ("controlled", "implicit")),
     blast_case(stiffness_ratio_1e4, tuple(STIFF)),
-    blast_case(step_ratio_resonance, tuple(RATIOS)),
     blast_case(many_steps_at_rest, tuple(STANDING)),
     blast_case(sudden_pressure_on_sleepers, ("multirate_held", "controlled", "implicit")),
     blast_case(step_beyond_all_limits, (), decline(_BASIC, "diverged at")),

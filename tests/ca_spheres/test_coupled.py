@@ -83,6 +83,21 @@ def test_run_beyond_the_stability_limit_ends_as_diverged_with_a_step_that_does(d
     assert energy < 30 * MASS * (0.5 * (2 * 0.57) ** 2 + G * 0.096)
 
 
+def test_energy_from_contacts_of_three_steps_is_noticed_before_anything_runs_away():
+    # At 40 us the contacts of 50 spheres give back 6 % of the energy within 5 cycles, and all
+    # speeds stay below 2 m/s; at 20 us, over as long, 2e-4 at most.
+    def five_cycles(dt):
+        batch = Batch(Spheres(), SceneTable(50, 2, dt, 6.0, 0.015), mount="base")
+        batch.start()
+        batch.run(5, 0)
+        return batch.sample()["energy"][0]
+
+    assert five_cycles(2e-5) < 0.01
+    with pytest.raises(SimulationDiverged, match="give back more energy than they took") as caught:
+        five_cycles(4e-5)
+    assert caught.value.dt_allowed <= 2.6e-5
+
+
 def test_softer_spheres_bear_the_longer_step():
     # E^(-2/5): a hundredth of the modulus lets the step be 6.3 times as long.
     assert shaken(1e-4, young=5e6, wall_young=5e6).sample()["energy"][0] < 0.01
