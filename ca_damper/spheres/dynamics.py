@@ -39,7 +39,7 @@ class BoundSpheres:
 
     crushed: whether spheres of a scene lay in each other by a radius when ``health`` looked last.
     given: work of the walls on the spheres [J]. lost: most energy that contacts have taken up to
-    any look [J], but for a constant.
+    any look [J], but for a constant. held: energy of the pairs that touch [J], as of a look.
     """
 
     def __init__(self, options, table):
@@ -51,6 +51,7 @@ class BoundSpheres:
         self.crushed = ti.field(ti.i32, shape=table.count)
         self.given = ti.field(ti.f64, shape=table.count)
         self.lost = ti.field(ti.f64, shape=table.count)
+        self.held = ti.field(ti.f64, shape=table.count)
         self.rotation.bind(self.bodies)
         self.search.bind(self.bodies)
         self.contact_of_pair = Contact.field(shape=())
@@ -166,19 +167,31 @@ class BoundSpheres:
     @ti.func
     def energy(self, s):
         """Kinetic and potential energy and that of the contacts [J]; heights from the floor."""
-        body = self.bodies.body[None]
         total = 0.0
         for i in range(self.bodies.first(s), self.bodies.last(s)):
-            velocity, place = self.bodies.velocity[i], self.bodies.place(s, i)
-            total += body.mass * (0.5 * velocity.norm_sqr() + body.gravity * place[1])
-            total += self.rotation.energy(i)
-            room = ti.min(place, vec2(body.width, body.height) - place)
-            for axis in ti.static(range(2)):
-                total += self.law.stored(self.contact_of_wall[None], body.radius - room[axis])
+            total += self._own_energy(s, i)
             for j in range(i + 1, self.bodies.last(s)):
-                distance = (self.bodies.place(s, j) - place).norm()
-                total += self.law.stored(self.contact_of_pair[None], 2.0 * body.radius - distance)
+                total += self._pair_energy(s, i, j)
         return total
+
+    @ti.func
+    def _own_energy(self, s, i):
+        """Kinetic and potential energy of a sphere and that of its contacts with walls [J]."""
+        body = self.bodies.body[None]
+        velocity, place = self.bodies.velocity[i], self.bodies.place(s, i)
+        total = body.mass * (0.5 * velocity.norm_sqr() + body.gravity * place[1])
+        total += self.rotation.energy(i)
+        room = ti.min(place, vec2(body.width, body.height) - place)
+        for axis in ti.static(range(2)):
+            total += self.law.stored(self.contact_of_wall[None], body.radius - room[axis])
+        return total
+
+    @ti.func
+    def _pair_energy(self, s, i, j):
+        """Energy of the contact of two spheres [J], none where they do not touch."""
+        contact = self.contact_of_pair[None]
+        distance = (self.bodies.place(s, j) - self.bodies.place(s, i)).norm()
+        return self.law.stored(contact, contact.reach - distance)
 
     @ti.func
     def momentum(self, s):
@@ -192,7 +205,7 @@ class BoundSpheres:
     def health(self, s):
         """0, or a code of DIVERGENCES; "not" lets NaN fail a test."""
         body, dt = self.bodies.body[None], self.table.dt[s]
-        self.crushed[s] = self.search.crowded(s)
+        self.crushed[s], self.held[s] = self.search.crowded(s), 0.0
         self.search.each_pair(s, self.contact_of_pair[None], self._look)
         code = GAINED if self._gains(s) else FINE
         if self.crushed[s] > 0:
@@ -212,17 +225,21 @@ class BoundSpheres:
         """Whether contacts gave back a good part of the energy there is, which none ever can."""
         body = self.bodies.body[None]
         weight = self.table.particles[s] * body.mass * body.gravity
-        energy = self.energy(s)
+        energy = self.held[s]
+        for i in range(self.bodies.first(s), self.bodies.last(s)):
+            energy += self._own_energy(s, i)
         lost = self.given[s] - energy - weight * self.bodies.floor[s]
         self.lost[s] = ti.max(self.lost[s], lost)
         return self.lost[s] - lost > MOST_GAIN * energy
 
     @ti.func
     def _look(self, i, j, contact):
-        """Note spheres that overlap by more than a radius, half of their reach."""
+        """Note what two spheres hold, and whether they overlap by a radius, half of their reach."""
+        s = i // self.bodies.stride
+        self.held[s] = self.held[s] + self._pair_energy(s, i, j)
         branch = self.bodies.position[j] - self.bodies.position[i]
         if branch.norm_sqr() < 0.25 * contact.reach * contact.reach:
-            self.crushed[i // self.bodies.stride] = 1
+            self.crushed[s] = 1
 
     def snapshot(self, s):
         """Places and velocities of the spheres of scene s, and their spins [rad/s] if they turn."""
