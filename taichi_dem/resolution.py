@@ -20,15 +20,16 @@ class Resolution:
     """Looks, at recording times, at what steps leave of dashpots; at the end, at how bonds failed.
 
     share: least share of its dashpots that each bond was left with while it held, (bond_count,).
-    step: shortest step of each body [s]; lightest: mass of the lightest it came near [kg]; taken:
-    largest part of a speed that its contacts take in a step; all (body_count,).
+    step: shortest step of each body [s]; lightest: mass of the lightest it came near [kg];
+    pair_share: least share that its contacts were seen with; taken: largest part of a speed that
+    they take in a step; all (body_count,).
     """
 
     def __init__(self, model, state, advance):
         self.model, self.state, self.advance = model, state, advance
         self.contacts = advance.contacts
         self.share = np.ones(model.bond_count)
-        self.taken = np.zeros(model.body_count)
+        self.pair_share, self.taken = np.ones(model.body_count), np.zeros(model.body_count)
         self.step = np.full(model.body_count, np.inf)
         self.lightest = model.body_mass.copy()
 
@@ -41,8 +42,7 @@ class Resolution:
         if self.contacts is not None and self.contacts.pair_count[None]:
             if self.advance.limited:
                 self._note_partners()
-            else:
-                self._read_pairs(self.taken)
+            self._read_pairs(self.pair_share, self.taken)
 
     def _note_partners(self):
         """Remember steps and light partners: few contacts last until a recording."""
@@ -103,14 +103,15 @@ class Resolution:
     def _contact_shares(self):
         """Largest share that limited sphere dashpots can have had where they acted, (body_count,).
 
-        That of a single contact, 1 / X with X = 2 c dt / m; see ``step/rates.py``. Where contacts
-        took energy they acted; it is booked to the first body of a pair.
+        What was seen of them, or that of a single contact, 1 / X with X = 2 c dt / m; see
+        ``step/rates.py``. Where contacts took energy they acted; it is booked to the first body
+        of a pair.
         """
         if self.contacts is None or not self.advance.limited:
-            return np.ones(self.model.body_count)
+            return self.pair_share
         acted = self.state.contact_heat.to_numpy()[:, :2].sum(axis=1) > 0.0
         x = 2.0 * self.model.material.contact_damping * self.step / self.lightest
-        return np.where(acted, 1.0 / np.maximum(1.0, x), 1.0)
+        return np.minimum(self.pair_share, np.where(acted, 1.0 / np.maximum(1.0, x), 1.0))
 
     def _openings_at_failure(self):
         """Largest opening of the units of every bond that failed over the failure opening, (b,)."""
@@ -129,11 +130,18 @@ class Resolution:
                 share[b] = ti.min(share[b], self.advance.bond_share(b))
 
     @ti.kernel
-    def _read_pairs(self, taken: ti.types.ndarray(dtype=ti.f64, ndim=1)):
+    def _read_pairs(
+        self,
+        share: ti.types.ndarray(dtype=ti.f64, ndim=1),
+        taken: ti.types.ndarray(dtype=ti.f64, ndim=1),
+    ):
         for p in range(self.contacts.pair_count[None]):
             count = self.contacts.touching(p)
             if count > 0:
                 i, j = self.contacts.pair_body[p][0], self.contacts.pair_body[p][1]
-                rate = count * self.contacts.law.damping()
-                rate *= 1.0 / self.model.mass[i] + 1.0 / self.model.mass[j]
-                ti.atomic_max(taken[i], rate * self.advance.schedule.pair_step(i, j))
+                if ti.static(self.advance.limited):
+                    ti.atomic_min(share[i], self.advance.contact_share(i, j))
+                else:
+                    rate = count * self.contacts.law.damping()
+                    rate *= 1.0 / self.model.mass[i] + 1.0 / self.model.mass[j]
+                    ti.atomic_max(taken[i], rate * self.advance.schedule.pair_step(i, j))
