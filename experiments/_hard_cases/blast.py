@@ -119,7 +119,11 @@ def deep_overlap_at_start(method, quick):
     laws = 6.0 * CONCRETE.contact_stiffness, 6.0 * CONCRETE.contact_damping
     left = damped_opening(0.5 * track.mass[0], *laws, 1e-3, 0.0, track.time_s)
     parted = track.moved[:, 1, 0] - track.moved[:, 0, 0]
-    error = as_converged("error of the way apart / way", parted, 1e-3 - left, 1e-3 - left[-1])
+    # Up to 1 % of the overlap: later on those that touch at an angle part before the others.
+    early, gone = track.time_s < 2.1e-5, 1e-3 - left
+    error = as_converged(
+        "error of the way apart / way", parted[early], gone[early], gone[early][-1]
+    )
     limits = (momentum_kept(track), error)
     return measured(track, method, limits, 1e6 * parted, "way apart [µm]")
 
