@@ -14,14 +14,15 @@ from _cli import processor, versions
 from _timing import Timing
 from taichi_dem import runtime
 from taichi_dem.files import write_csv
-from taichi_dem.plot_style import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, SKY, picture
+from taichi_dem.plot_style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, RED, SKY, picture
 
-_COLOURS = (RED, BLUE, GREEN, ORANGE, PURPLE, SKY)
-_MARKS = "osD^vP"
+_COLOURS = (RED, BLUE, GREEN, ORANGE, PURPLE, SKY, BLACK)
+_MARKS = "osD^vPX"
 _SMALL = 6.5
 #: Where a label's centre may stand: right and up in widths and heights of the label, and a gap.
 _PLACES = ((1, 1), (-1, -1), (1, -1), (-1, 1), (1, 0), (-1, 0), (0, 2), (0, -2), (1, 3), (-1, -3))
-_PANELS = {"seconds": "wall time [s], fastest of the repeats", "evaluations": "evaluations"}
+_COSTS = ("seconds", "evaluations")
+WALL = "wall time [s], fastest of the repeats"
 
 
 @dataclass(frozen=True)
@@ -134,29 +135,36 @@ def machine_words():
 
 
 def picture_work_precision(
-    path, points, titles, *, floors, caption, error_name, work_name, residual_names=(), order=1
+    path,
+    points,
+    titles,
+    *,
+    floors,
+    caption,
+    error_name,
+    work_name,
+    time_name=WALL,
+    residual_names=(),
+    order=1,
 ):
     """Error over wall time and over evaluations; the residual of each run over its step.
 
-    titles: of the methods, in the order of the legend. floors: dotted, by method. order: of the
-    line of ideal gain, error ~ cost^-order, drawn through the best buy. residual_names: of a third
-    panel's axes (step, residual), none if empty. Failures are crosses on the top edge, above what
-    they would have cost, with their reason.
+    titles: of the methods, in the order of the legend. time_name: what the times are. floors:
+    dotted, by method. order: of the line of ideal gain, error ~ cost^-order, drawn through the
+    best buy. residual_names: of a third panel's axes (step, residual), none if empty. Failures are
+    crosses on the top edge, above what they would have cost, with their reason.
     """
     panels = 3 if residual_names else 2
     ratios = {"width_ratios": (1.0, 1.0, 0.62)[:panels]}
     size = (6.0 * min(panels, 2.62), 6.2)
     with picture(path, 1, panels, size, gridspec_kw=ratios) as (figure, axes):
-        looks = {
-            method: {"color": _COLOURS[k % 6], "marker": _MARKS[k % 6], "ms": 5, "lw": 1.2}
-            for k, method in enumerate(titles)
-        }
-        for axis, cost in zip(axes, _PANELS):
+        looks = _looks(titles)
+        for axis, cost in zip(axes, _COSTS):
             _draw_costs(axis, points, looks, cost, floors)
             _draw_ideal(axis, points, cost, order)
             _draw_failures(axis, points, looks, cost)
-            axis.set(xlabel=_PANELS[cost], ylabel=error_name)
-        axes[1].set(xlabel=work_name, ylabel="")
+        axes[0].set(xlabel=time_name, ylabel=error_name)
+        axes[1].set(xlabel=work_name)
         if residual_names:
             _draw_residuals(axes[2], points, looks)
             axes[2].set(xlabel=residual_names[0], ylabel=residual_names[1])
@@ -164,8 +172,37 @@ def picture_work_precision(
         figure.supxlabel(f"{caption}\n{machine_words()}", fontsize=7.5, x=0.01, ha="left")
         # Where a label has room is known when everything else has its place.
         figure.draw_without_rendering()
-        for axis, cost in zip(axes, _PANELS):
+        for axis, cost in zip(axes, _COSTS):
             _say_steps(axis, points, looks, cost)
+
+
+def picture_errors(path, errors, titles, *, time_name, caption):
+    """Several errors over one cost.
+
+    errors: by what they are of, then by method: pairs (cost, error), coarse to fine. An error of
+    zero lies on the bottom edge.
+    """
+    with picture(path, 1, len(errors), (4.6 * len(errors), 5.0)) as (figure, axes):
+        looks = _looks(titles)
+        for axis, (words, by_method) in zip(axes, errors.items()):
+            seen = [error for pairs in by_method.values() for _, error in pairs if error > 0.0]
+            bottom = 0.5 * min(seen, default=1.0)
+            for method, pairs in by_method.items():
+                height = [max(error, bottom) for _, error in pairs]
+                axis.plot([cost for cost, _ in pairs], height, label=method, **looks[method])
+            axis.set(xscale="log", yscale="log", title=words, xlabel=time_name)
+        axes[0].set_ylabel("error")
+        figure.legend(*_legend(axes[0], titles), loc="outside upper left", ncols=4)
+        figure.supxlabel(f"{caption}\n{machine_words()}", fontsize=7.5, x=0.01, ha="left")
+
+
+def _looks(titles):
+    """Colour and mark of every method."""
+    count = len(_COLOURS)
+    return {
+        method: {"color": _COLOURS[k % count], "marker": _MARKS[k % count], "ms": 5, "lw": 1.2}
+        for k, method in enumerate(titles)
+    }
 
 
 def _legend(axis, titles):
@@ -262,6 +299,8 @@ def _draw_residuals(axis, points, looks):
     for method, look in looks.items():
         own = [p for p in _good(points, method) if p.residual > 0.0]
         axis.plot([p.step for p in own], [p.residual for p in own], **look)
+    # Within a decade a log axis writes all its minor ticks, wide as they are.
+    axis.xaxis.set_minor_formatter("")
 
 
 def _say_steps(axis, points, looks, cost):

@@ -1,6 +1,6 @@
 """Which hard cases each method bears, which it declines in words, and by what margin.
 
-    python experiments/hard_cases.py                      # about three minutes on one core
+    python experiments/hard_cases.py                      # about ten minutes on one core
     python experiments/hard_cases.py --only full_box,still_heap
     python experiments/hard_cases.py --quick
 
@@ -38,6 +38,7 @@ NAME = "hard_cases"
 OF_QUICK = (
     *("full_box", "empty_box", "no_rebound", "longest_steps", "step_above_limit"),
     *("spheres_near_limit", "spheres_beyond_limit", "single_cell"),
+    *("faster_than_the_bound", "flat_element", "step_that_is_no_number"),
 )
 COLUMNS = 5
 _COLOURS = (RED, BLUE, GREEN, ORANGE, PURPLE, SKY)
@@ -63,7 +64,11 @@ def run(options):
     write_table(os.path.join(options.out, "hard_cases.csv"), results)
     for case in cases:
         picture_case(os.path.join(options.out, f"{case.name}.png"), case, results)
-    picture_sheet(os.path.join(options.out, "hard_cases.png"), cases, results, options.columns)
+    for package in dict.fromkeys(case.package for case in cases):
+        own = [case for case in cases if case.package == package]
+        seen = [result for result in results if result.package == package]
+        path = os.path.join(options.out, f"hard_cases_{package}.png")
+        picture_sheet(path, own, seen, options.columns)
     figures = figures_of(cases, results)
     spent = time.perf_counter() - started
     write_summary(
@@ -113,14 +118,14 @@ def picture_case(path, case, results):
     """One picture of a case: what its methods did, and how they fared."""
     own = [result for result in results if result.case == case.name]
     with picture(path, 1, 1, (7.0, 4.6)) as (figure, axis):
-        draw_case(axis, own, looks_of(results), size=8.0)
-        figure.suptitle(f"{case.name}: {case.question}", fontsize=9.0, x=0.02, ha="left")
+        draw_case(axis, own, looks_of(own), size=8.0)
+        figure.suptitle(textwrap.fill(case.question, 100), fontsize=9.0, x=0.02, ha="left")
         handles, labels = axis.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=5)
 
 
 def picture_sheet(path, cases, results, columns):
-    """All cases on one sheet."""
+    """All cases of a package on one sheet."""
     rows, looks = -(-len(cases) // columns), looks_of(results)
     size = (3.2 * columns, min(16.0, 0.4 + 2.4 * rows))
     with picture(path, rows, columns, size, squeeze=False) as (figure, axes):

@@ -3,8 +3,7 @@
 import numpy as np
 
 from taichi_dem.errors import SimulationDiverged
-from taichi_dem.quality import quality_report
-from taichi_dem.step_control import CRITERIA
+from taichi_dem.quality import dashpot_step, quality_report, spring_step
 
 #: Energy that may appear from nowhere before a run counts as diverged, as a share of what is there.
 ENERGY_FROM_NOWHERE = 0.5
@@ -21,6 +20,7 @@ class Health:
 
     def __init__(self, model, state, schedule, contacts, ledger, solves=False):
         self.model, self.state, self.schedule, self.solves = model, state, schedule, solves
+        self.limited = schedule.has_rates and schedule.rates.limited
         self.contacts, self.ledger = contacts, ledger
 
     def check(self):
@@ -62,15 +62,15 @@ class Health:
         level = int(motion["level"][body])
         time_s = self.state.tick[None] * self.schedule.tick_seconds
         step = self.schedule.dt0 / 2.0**level
-        limit, cause = self._limit(body)
+        links = self._links(body)
         return (
-            f"diverged at t = {time_s:.6g} s: body {body} {what}; {self._partner(body, motion)}; "
-            f"its step was {step:.3g} s (level {level}), {cause} allow {limit:.3g} s: "
-            f"try a step of {0.5 * limit:.2g} s"
+            f"diverged at t = {time_s:.6g} s: body {body} {what}; "
+            f"{_partner(body, motion, links)}; its step was {step:.3g} s (level {level}), "
+            f"{self._advice(body, links)}"
         )
 
-    def _partner(self, body, motion):
-        """The neighbour that moves fastest against the body, and how they are tied."""
+    def _links(self, body):
+        """Bodies that a body is tied to or near, and how, as pairs."""
         top = self.model.topology
         intact = self.state.broken_tick.to_numpy() < 0
         links = [
@@ -81,39 +81,60 @@ class Health:
         for first, second in self._pairs():
             if body in (first, second):
                 links.append((int(first + second - body), "contact with body"))
-        if not links:
-            return "it touches nothing"
-        apart = [
-            np.linalg.norm(motion["velocity"][other] - motion["velocity"][body])
-            for other, _ in links
-        ]
-        other, tie = links[int(np.nanargmax(np.nan_to_num(apart, nan=np.inf)))]
-        return f"the fastest against it is {tie} {other}"
+        return links
 
     def _pairs(self):
         if self.contacts is None:
             return np.zeros((0, 2), dtype=int)
         return self.contacts.pair_body.to_numpy()[: self.contacts.pair_count[None]]
 
-    def _limit(self, body):
-        """Largest stable explicit step at a body [s], and what sets it."""
-        model = self.model
-        if self.schedule.controlled:
-            rates = self.schedule.rates
-            cause = CRITERIA[rates.limit_by[body]].replace("_", " ")
-            return rates.limit[body] / rates.safety, f"its limits (first {cause})"
-        steps = quality_report(model.mesh, model.material)
-        limit, cause = steps.spring_step_s[body], "its bond springs"
-        if self.solves:
-            return limit, cause
-        if model.dashpot.name and steps.dashpot_step_s[body] < limit:
-            limit, cause = steps.dashpot_step_s[body], "its bond dashpots"
+    def _advice(self, body, links):
+        """What limits the step around a body, and a step that would do.
+
+        What runs away is often thrown by a neighbour of a shorter step: the tightest one counts.
+        """
+        limits = self._limits()
+        near = [body, *(other for other, _ in links)]
+        limit, cause, tight = min((limits[name][k], name, k) for name in limits for k in near)
+        if not np.isfinite(limit):
+            return "which nothing near it limits"
+        whose = f"its {cause}" if tight == body else f"the {cause} of body {tight} beside it"
+        return f"{whose} allow {limit:.3g} s: try a step of {0.5 * limit:.2g} s"
+
+    def _limits(self):
+        """Largest stable explicit steps by what sets them [s], arrays (body_count,).
+
+        Dashpots that are solved or limited set none.
+        """
+        steps = quality_report(self.model.mesh, self.model.material)
+        limits = {"bond springs": steps.spring_step_s}
+        tame = self.solves or self.limited
+        if self.model.dashpot.name and not tame:
+            limits["bond dashpots"] = steps.dashpot_step_s
         if self.contacts is not None:
-            first = self.contacts.pair_first.to_numpy()
-            for pair, (i, j) in enumerate(self._pairs()):
-                if body in (i, j):
-                    rate = model.material.contact_damping * sum(1.0 / model.body_mass[[i, j]])
-                    rate *= max(1, first[pair + 1] - first[pair])
-                    if rate > 0.0 and 2.0 / rate < limit:
-                        limit, cause = 2.0 / rate, "its sphere dashpots"
-        return limit, cause
+            rates = self._contact_rates()
+            limits["contact springs"] = spring_step(self.model.material.contact_stiffness * rates)
+            if not tame:
+                limits["sphere dashpots"] = dashpot_step(
+                    self.model.material.contact_damping * rates
+                )
+        return limits
+
+    def _contact_rates(self):
+        """Sphere pairs near every body over its mass [1/kg], (body_count,)."""
+        first = self.contacts.pair_first.to_numpy()
+        rates = np.zeros(self.model.body_count)
+        for pair, bodies in enumerate(self._pairs()):
+            count = max(1, first[pair + 1] - first[pair])
+            rates[bodies] = np.maximum(rates[bodies], count / self.model.body_mass[bodies])
+        return rates
+
+
+def _partner(body, motion, links):
+    """The neighbour that moves fastest against a body, and how they are tied."""
+    if not links:
+        return "it touches nothing"
+    velocity = motion["velocity"]
+    apart = [np.linalg.norm(velocity[other] - velocity[body]) for other, _ in links]
+    other, tie = links[int(np.nanargmax(np.nan_to_num(apart, nan=np.inf)))]
+    return f"the fastest against it is {tie} {other}"

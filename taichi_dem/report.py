@@ -17,7 +17,8 @@ class Report:
     ledger: energy terms [J]; ledger_residual_fraction: residual over the work put in.
     linear_momentum_error, angular_momentum_error: out of nothing, as shares of what was
     exchanged. compile_seconds, run_seconds, run_cpu_seconds: cost. acted: an ``EffectUse`` for each
-    effect. missed: a ``watch.Missed`` for each effect that was left out and needed.
+    effect. missed: a ``watch.Missed`` for each effect that was left out and needed. unresolved:
+    sentences about bonds and contacts for which the step was too long.
     bound_by: bodies at the end by what bounds their step, see ``step_control.CRITERIA``.
     """
 
@@ -44,12 +45,13 @@ class Report:
     run_cpu_seconds: float
     acted: tuple
     missed: tuple
+    unresolved: tuple
     bound_by: dict
 
     @property
     def needs(self):
-        """Sentences about the effects that were missed."""
-        return tuple(str(missed) for missed in self.missed)
+        """Sentences about effects that were missed, and about a step that was too long."""
+        return (*(str(missed) for missed in self.missed), *self.unresolved)
 
     @property
     def contact_evaluations(self):

@@ -170,6 +170,7 @@ def saved_run(simulation, recorder):
         "simulation": simulation,
         "ledger": simulation.ledger,
         "watch": simulation.watch,
+        "resolution": simulation.resolution,
         "recorder": recorder,
     }
     return Saved(identity_of(simulation.scene, simulation.method), simulation, parts)
@@ -213,7 +214,7 @@ def _run(simulation, recorder, keeper, marks, progress):
 
         simulation.advance_to(step, tell)
         if step in sample_steps:
-            simulation.watch.look(simulation.time_s)
+            simulation.look()
             recorder.sample()
         if step in frame_steps:
             recorder.snapshot()

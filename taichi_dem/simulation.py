@@ -13,6 +13,7 @@ from taichi_dem.health import Health
 from taichi_dem.ledger import Ledger
 from taichi_dem.model import Model
 from taichi_dem.report import Report
+from taichi_dem.resolution import Resolution
 from taichi_dem.state import NEVER, State
 from taichi_dem.step.advance import Advance
 from taichi_dem.step.broad_phase import BroadPhase
@@ -110,10 +111,19 @@ class Simulation:
             self.model, self.state, self.schedule, self.contacts, self.ledger, self.solves
         )
         self.watch = Watch(self.model, self.state, self.advance)
-        self.watch.look(0.0)
+        self.resolution = Resolution(self.model, self.state, self.advance)
+        self.look()
         self.health.check()
         self.evaluations_ahead()
         self.compile_seconds += time.perf_counter() - started
+
+    def look(self):
+        """Look for effects that are missed, and for bonds that the step does not resolve.
+
+        Called at recording times, so that the step stays bare.
+        """
+        self.watch.look(self.time_s)
+        self.resolution.look()
 
     def advance_to(self, macro_step, on_call=None):
         """Step until a number of largest steps; on_call() is called about five times a second.
@@ -215,6 +225,7 @@ class Simulation:
             run_cpu_seconds=self.run_cpu_seconds,
             acted=effects_acted(self.model, self.ledger, self.watch.touching),
             missed=self.watch.findings(),
+            unresolved=self.resolution.findings(),
             bound_by=counted_criteria(self.state.bound.to_numpy()),
         )
 

@@ -47,11 +47,15 @@ class Curves:
 
 @dataclass(frozen=True)
 class Measured:
-    """What a run gave: figures with their bounds, what to draw of it, seconds of compiling."""
+    """What a run gave: figures with their bounds, what to draw of it, seconds of compiling.
+
+    warnings: sentences in which the run itself said that its numbers are not to be trusted.
+    """
 
     limits: tuple
     shown: Optional[Curves] = None
     compile_s: float = 0.0
+    warnings: tuple = ()
 
 
 @dataclass(frozen=True)
@@ -104,7 +108,8 @@ def judge(case, method, quick):
     """Run a method through a case; returns a Result.
 
     A method that claims the case passes with all figures within their bounds. One that does not
-    has to say so, in a sentence with the word that is due: numbers in its place are a failure.
+    has to say so, in a sentence with the word that is due, by an exception or by a warning of its
+    report: numbers without it are a failure.
     """
     renew_session()
     started = time.perf_counter()
@@ -116,8 +121,10 @@ def judge(case, method, quick):
         status = REFUSED if due is not None and due in words else FAILED
         return _result(case, method, status, words, started)
     if method in case.declines:
-        words = "returned numbers where it should have declined"
-        return _result(case, method, FAILED, words, started)
+        said = [words for words in measured.warnings if case.declines[method] in words]
+        words = said[0] if said else "returned numbers where it should have declined"
+        rest = (None, measured.shown, measured.compile_s)
+        return _result(case, method, REFUSED if said else FAILED, words, started, *rest)
     worst = min(measured.limits, key=_closeness)
     status = PASSED if all(limit.kept for limit in measured.limits) else FAILED
     words = f"{worst.name} {worst.value:.3g} of at most {worst.bound:.3g} ({worst.formula})"

@@ -38,7 +38,7 @@ class Advance(Touch):
             slots = self.model.bond_slots[b]
             scale = 1.0
             if ti.static(self.limited):
-                scale = self._bond_share(slots[0] >> 2, slots[1] >> 2)
+                scale = self.bond_share(b)
             motion = self._motion(b, slots)
             if ti.static(self.solves):
                 motion = self.solver.bonds.mean(b, motion)
@@ -109,8 +109,9 @@ class Advance(Touch):
         return dt
 
     @ti.func
-    def _bond_share(self, i, j):
-        """Share of its coefficient that a bond's dashpot keeps: what both bodies bear."""
+    def bond_share(self, b):
+        """Share of its coefficient that a bond's limited dashpot keeps: what both bodies bear."""
+        i, j = self.model.bond_slots[b][0] >> 2, self.model.bond_slots[b][1] >> 2
         first = self.rates.bond_share(i, self.schedule.own_step(i))
         return ti.min(first, self.rates.bond_share(j, self.schedule.own_step(j)))
 

@@ -24,7 +24,7 @@ class Touch:
         dragged, rubbed, deepest = 0.0, 0.0, 0.0
         scale, margin, near = 1.0, 0.0, 0
         if ti.static(self.limited):
-            scale = self._contact_share(i, j)
+            scale = self.contact_share(i, j)
         if ti.static(self.has_rates):
             margin = self.rates.near.margin(i, j)
         for k in range(self.contacts.pair_first[p], self.contacts.pair_first[p + 1]):
@@ -88,7 +88,7 @@ class Touch:
             self.contacts.pair_slot[slot][3 + k] += angular[k]
 
     @ti.func
-    def _contact_share(self, i, j):
-        """The same for the dashpots of a pair in contact."""
+    def contact_share(self, i, j):
+        """Share of its coefficient that a limited dashpot of a pair in contact keeps."""
         first = self.rates.contact_share(i, self.schedule.own_step(i))
         return ti.min(first, self.rates.contact_share(j, self.schedule.own_step(j)))

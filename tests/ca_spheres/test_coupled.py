@@ -83,6 +83,21 @@ def test_run_beyond_the_stability_limit_ends_as_diverged_with_a_step_that_does(d
     assert energy < 30 * MASS * (0.5 * (2 * 0.57) ** 2 + G * 0.096)
 
 
+def test_energy_from_contacts_of_three_steps_is_noticed_before_anything_runs_away():
+    # Thirty spheres at the peak of the response. At 40 us one contact gives back 0.6 of all energy
+    # within 13 cycles, and all speeds stay below 2 m/s; at 20 us none gives 1e-3.
+    def thirteen_cycles(dt):
+        batch = Batch(Spheres(), SceneTable(30, 3, dt, 0.97 * 6.0, 0.6e-3))
+        batch.start()
+        batch.run(13, 0)
+        return batch.sample()["energy"][0]
+
+    assert thirteen_cycles(2e-5) < 0.004
+    with pytest.raises(SimulationDiverged, match="give back more energy than they took") as caught:
+        thirteen_cycles(4e-5)
+    assert caught.value.dt_allowed <= 2e-5
+
+
 def test_softer_spheres_bear_the_longer_step():
     # E^(-2/5): a hundredth of the modulus lets the step be 6.3 times as long.
     assert shaken(1e-4, young=5e6, wall_young=5e6).sample()["energy"][0] < 0.01

@@ -61,15 +61,12 @@ class Run:
         simulation = self.simulation
         simulation.driver.substeps = ODD
         simulation.driver.run(self.last * MACRO_TICKS)
-        if simulation.contacts.search_due[None]:
-            simulation.broad_phase.search(everywhere=False)
-            simulation.searches += 1
 
     def finish(self):
         """Go on to the end; all that can be compared there."""
         self.recorder.snapshot()
         self.simulation.advance_to(self.last)
-        self.simulation.watch.look(self.simulation.time_s)
+        self.simulation.look()
         self.recorder.sample()
         columns, frame = self.recorder.history(), self.recorder.frames[-1]
         told = {

@@ -81,7 +81,12 @@ FILES = {
         *("points.csv", "points_against_spheres.csv", "points_empty.csv", "answers.csv"),
         "curves.csv",
     ),
-    "hard_cases": ("hard_cases.csv", "hard_cases.png", "full_box.png"),
+    "hard_cases": (
+        "hard_cases.csv",
+        "hard_cases_damper.png",
+        "hard_cases_blast.png",
+        "full_box.png",
+    ),
     "demo_damper": ("damper.gif", "motion.png", "motion.csv", "report.json"),
 }
 

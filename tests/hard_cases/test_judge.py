@@ -9,11 +9,12 @@ from _hard_cases._case import FAILED, PASSED, REFUSED
 from ca_damper import InputError
 
 
-def case(value=0.5, raises=None, **options):
+def case(value=0.5, raises=None, warnings=(), **options):
     def run(method, quick):
         if raises is not None:
             raise raises
-        return Measured((Limit("kept", 0.0, 0.0, "nothing"), Limit("asked", value, 1.0, "one")))
+        limits = Limit("kept", 0.0, 0.0, "nothing"), Limit("asked", value, 1.0, "one")
+        return Measured(limits, warnings=warnings)
 
     return Case("made_up", "damper", "Nothing.", ("able",), run, **options)
 
@@ -47,6 +48,14 @@ def test_numbers_where_a_method_should_decline_are_a_failure():
     result = judge(case(declines={"unable": "dt must"}), "unable", True)
     assert result.status == FAILED
     assert "should have declined" in result.words
+
+
+def test_numbers_with_the_warning_that_is_due_are_refused():
+    unable = {"unable": "too long"}
+    said = case(warnings=("first", "the step is too long"), declines=unable)
+    result = judge(said, "unable", True)
+    assert (result.status, result.words) == (REFUSED, "the step is too long")
+    assert judge(case(warnings=("first",), declines=unable), "unable", True).status == FAILED
 
 
 def test_names_of_cases_are_unique_and_unknown_ones_refused():

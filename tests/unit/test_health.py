@@ -5,8 +5,18 @@ import re
 import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE, Scene, SimulationDiverged, Uniform, effects, simulate
-from taichi_dem.mesh_shapes import bar
+from taichi_dem import (
+    CONCRETE,
+    Scene,
+    Simulation,
+    SimulationDiverged,
+    Uniform,
+    effects,
+    quality_report,
+    simulate,
+)
+from taichi_dem.mesh import checked_mesh
+from taichi_dem.mesh_shapes import bar, pair, single
 
 STEP, UNTIL = 1e-6, 2e-4
 
@@ -55,3 +65,31 @@ def test_a_diverged_run_leaves_its_last_good_output(diverged):
     rows = (folder / "history.csv").read_text().splitlines()
     assert len(rows) == len(times) + 1
     assert "diverged at t" in (folder / "report.json").read_text()
+
+
+def sentence_of(mesh, velocity, listed=()):
+    """What is said of bodies that exceed 100 m/s."""
+    simulation = Simulation(Scene(mesh, CONCRETE, list(listed), max_speed=100.0), Uniform(1e-10))
+    simulation.state.place(simulation.model.centre, [[1.0, 0, 0, 0]] * mesh.body_count, velocity)
+    with pytest.raises(SimulationDiverged) as refusal:
+        simulation.advance_to(1)
+    return str(refusal.value)
+
+
+def test_a_body_without_bonds_has_no_limit_to_quote():
+    sentence = sentence_of(single(), [[200.0, 0.0, 0.0]])
+    assert "which nothing near it limits" in sentence
+    assert "inf" not in sentence and "try a step" not in sentence
+
+
+def test_the_tightest_limit_near_the_body_is_quoted_with_its_body():
+    # A large body that runs away beside a small one, whose limit is as much shorter.
+    points = pair().points.copy()
+    points[4] *= 0.1
+    mesh = checked_mesh(points, pair().tetrahedra, {})
+    steps = quality_report(mesh, CONCRETE).dashpot_step_s
+    assert steps[1] < 0.2 * steps[0]
+    sentence = sentence_of(mesh, [[200.0, 0.0, 0.0]] * 2, [effects.BondDamping()])
+    assert "body 0 moves at" in sentence
+    assert f"the bond dashpots of body 1 beside it allow {steps[1]:.3g} s" in sentence
+    assert f"try a step of {0.5 * steps[1]:.2g} s" in sentence

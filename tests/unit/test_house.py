@@ -32,7 +32,7 @@ LAYERS = {
         ("state",),
         ("step",),
         ("ledger",),
-        ("health", "watch", "report", "step_report", "effects_acted"),
+        ("health", "watch", "resolution", "report", "step_report", "effects_acted"),
         ("simulation",),
         ("monitor", "record"),
         ("simulate", "needed_effects"),

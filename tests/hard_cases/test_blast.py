@@ -1,0 +1,37 @@
+"""The hard cases of the blast at quick size: what is claimed holds, what is not is declined.
+
+Compiling is what they cost. The experiment asks all methods; here those of a case that shares its
+run with others are four that have no code in common but the laws, and a case with a run of its
+own is asked of the first method that claims it and the first that declines it.
+"""
+
+import pytest
+
+from _hard_cases import blast, judge, registry
+
+SHARED = ("uniform", "multirate_drifted", "controlled", "implicit")
+
+
+def methods_of(case):
+    if case in blast.CASES:
+        return [method for method in case.asked if method in SHARED]
+    return [*case.methods[:1], *list(case.declines)[:1]]
+
+
+ASKED = [
+    pytest.param(case, method, id=f"{case.name}-{method}")
+    for case in registry()
+    if case.package == "blast"
+    for method in methods_of(case)
+]
+
+
+@pytest.mark.parametrize(("case", "method"), ASKED)
+def test_method_bears_the_case_or_declines_it_in_words(case, method):
+    result = judge(case, method, quick=True)
+    wanted = "refused" if method in case.declines else "passed"
+    assert result.status == wanted, result.words
+
+
+def test_there_are_enough_cases():
+    assert len({param.values[0].name for param in ASKED}) >= 28
