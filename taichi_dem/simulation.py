@@ -78,7 +78,9 @@ class Simulation:
     def _build_step(self):
         parts = self.model, self.state, self.schedule, self.contacts
         if not self.solves:
-            return Step(Advance(*parts), self.schedule, self.contacts)
+            # A method may bring an order of its own (docs/add_a_time_integrator.md).
+            order = getattr(self.method, "advance", Advance)
+            return Step(order(*parts), self.schedule, self.contacts)
         advance = SolvedAdvance(*parts, Solver(*parts, self.method))
         return SolvedStep(advance, self.schedule, self.contacts)
 
