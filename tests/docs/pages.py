@@ -39,6 +39,14 @@ def words(page):
     return [token.content for token in tokens(page) if token.type == "code_inline"]
 
 
+def headings(page):
+    """(Place among the tokens, text) of every heading of a page."""
+    everything = list(tokens(page))
+    for number, token in enumerate(everything):
+        if token.type == "heading_open":
+            yield number + 1, everything[number + 1].content
+
+
 def run_block(text, folder):
     """Run a block as a script in a folder; returns the names it leaves."""
     script = folder / "block.py"
