@@ -122,7 +122,7 @@ PAGES = (
         BLAST,
         "Which method solves that, how fast, and how well?",
         "All curves lie on each other until a bond on the edge of breaking parts them. Solving the "
-        "dashpots takes under a second where the paper's rule takes minutes.",
+        "dashpots takes about a second where the paper's rule takes minutes.",
         "about 10 min",
         ("methods.png",),
         ("seconds_*", "displacement_error_*", "largest_stable_step_s_*"),

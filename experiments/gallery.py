@@ -26,7 +26,7 @@ from taichi_dem.files import output_folder, write_text, write_whole
 
 HERE = Path(__file__).resolve().parent
 #: A small picture for the repository: widest side [pixels] and colours.
-SMALL = (960, 96)
+SMALL = (960, 128)
 
 
 def options_parser():
@@ -134,7 +134,9 @@ def small_copy(source):
             image.seek(getattr(image, "n_frames", 1) - 1)
             made = image.convert("RGB")
         made.thumbnail((SMALL[0], SMALL[0]))
-        made.quantize(SMALL[1], dither=Image.Dither.NONE).save(name, format="PNG", optimize=True)
+        # Cover all colours there are: by area, thin lines would take those of their neighbours.
+        how = {"method": Image.Quantize.MAXCOVERAGE, "dither": Image.Dither.NONE}
+        made.quantize(SMALL[1], **how).save(name, format="PNG", optimize=True)
 
     return write
 
