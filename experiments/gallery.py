@@ -26,7 +26,7 @@ from taichi_dem.files import output_folder, write_text, write_whole
 
 HERE = Path(__file__).resolve().parent
 #: A small picture for the repository: widest side [pixels] and colours.
-SMALL = (960, 128)
+SMALL = (960, 256)
 
 
 def options_parser():
@@ -134,9 +134,9 @@ def small_copy(source):
             image.seek(getattr(image, "n_frames", 1) - 1)
             made = image.convert("RGB")
         made.thumbnail((SMALL[0], SMALL[0]))
-        # Cover all colours there are: by area, thin lines would take those of their neighbours.
-        how = {"method": Image.Quantize.MAXCOVERAGE, "dither": Image.Dither.NONE}
-        made.quantize(SMALL[1], **how).save(name, format="PNG", optimize=True)
+        # With too few colours, or without the means, thin lines take those of their neighbours.
+        made = made.quantize(SMALL[1], kmeans=3, dither=Image.Dither.NONE)
+        made.save(name, format="PNG", optimize=True)
 
     return write
 
