@@ -223,11 +223,11 @@ PAGES = (
         "cost_of_effects",
         PRICE,
         "What does each effect cost, and what does the result lose without it?",
-        "Long bars are dear effects. An effect whose second bar is short changes nothing here and "
-        "can be left out of a scene like this.",
+        "Long bars are dear effects. One that costs time and changes nothing here can be left out "
+        "of a scene like this; one that is left out costs nothing, to within the noise.",
         "5 min",
-        ("cost_of_effects.png",),
-        ("overhead_absent*", "*seconds*", "*displacement*"),
+        ("effects.png",),
+        ("overhead_absent*", "*_seconds", "*_change*"),
     ),
 )
 
