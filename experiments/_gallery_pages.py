@@ -1,6 +1,6 @@
 """What the gallery and the first page say of each experiment: one entry an experiment.
 
-A new experiment gets an entry here, and README.md the table that ``gallery.py --table`` prints.
+A new experiment gets an entry here; ``gallery.py --readme`` then renews the table of README.md.
 """
 
 from dataclasses import dataclass

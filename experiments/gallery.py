@@ -11,6 +11,7 @@ failed or is missing from the page.
 
 import json
 import os
+import re
 import subprocess
 import sys
 import time
@@ -36,7 +37,7 @@ def options_parser():
     made.add_argument("--out", default="results", help="folder for page and results")
     made.add_argument("--only", type=several(str), default=None, help="names, by comma")
     made.add_argument("--reuse", action="store_true", help="run only what has no result yet")
-    made.add_argument("--table", action="store_true", help="print README's table, run nothing")
+    made.add_argument("--readme", action="store_true", help="renew README.md, run nothing")
     made.add_argument(
         "--pictures", action="store_true", help=f"renew {SMALL_PICTURES}, run nothing"
     )
@@ -141,12 +142,25 @@ def small_copy(source):
     return write
 
 
+def renew_readme(root):
+    """Renew the table of README.md in a folder, and show pictures whose place was kept for them."""
+    path = Path(root, "README.md")
+
+    def show(place):
+        return place[1] if Path(root, place[2]).is_file() else place[0]
+
+    text = path.read_text(encoding="utf-8")
+    text = re.sub(r"\| question \|.*?\n\n", lambda _: f"{readme_table()}\n", text, flags=re.DOTALL)
+    text = re.sub(r"<!-- (!\[[^]]+\]\((.+?)\)) -->", show, text)
+    write_text(path, text)
+
+
 def main(arguments=None):
     """Run the gallery; returns the exit code: 0, 1 with a list, 2 for bad input."""
     try:
         options = options_parser().parse_args(arguments)
-        if options.table:
-            print(readme_table(), end="")
+        if options.readme:
+            renew_readme(HERE.parent)
             return 0
         if options.pictures:
             print("\n".join(shrink_pictures(options.out, HERE.parent / SMALL_PICTURES)))

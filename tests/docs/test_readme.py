@@ -8,6 +8,7 @@ import meshio
 import pytest
 
 from _gallery_pages import SMALL_PICTURES, readme_table
+from gallery import renew_readme
 from taichi_dem import runtime
 from tests.docs.pages import FOLDER, PAGES, blocks, links, run_block, words
 from tests.scenes import ROOT
@@ -62,13 +63,23 @@ def test_the_damper_runs_and_both_fillings_agree(left_by, tmp_path):
 
 def test_the_table_is_that_of_the_gallery():
     text = README.read_text(encoding="utf-8")
-    assert readme_table() in text, (
-        "README.md has another table than `python experiments/gallery.py --table` prints"
-    )
+    assert readme_table() in text, "renew it: python experiments/gallery.py --readme"
+
+
+def test_renewing_writes_the_table_and_shows_what_is_there(tmp_path):
+    """A picture that is there leaves its comment; the rest stays, and once is enough."""
+    (tmp_path / "there.png").touch()
+    places = "<!-- ![One](there.png) -->\n<!-- ![Two](not_there.png) -->\n"
+    page = tmp_path / "README.md"
+    page.write_text(f"Before\n\n| question | old |\n|---|---|\n| a | b |\n\nAfter\n{places}")
+    for _ in range(2):
+        renew_readme(tmp_path)
+        expected = f"Before\n\n{readme_table()}\nAfter\n![One](there.png)\n"
+        assert page.read_text() == f"{expected}<!-- ![Two](not_there.png) -->\n"
 
 
 def test_every_picture_is_shown_or_linked():
-    """One that a colleague adds has its place in README.md in a comment: take it out of that."""
+    """One whose place was kept in a comment is shown by: python experiments/gallery.py --readme."""
     used = {Path(link).name for page in PAGES for link in links(page)}
     there = {path.name for path in (FOLDER / SMALL_PICTURES).iterdir()}
     assert there <= used, sorted(there - used)
@@ -84,4 +95,4 @@ def test_pictures_that_are_not_there_yet_are_named_in_a_comment():
     text = README.read_text(encoding="utf-8")
     for line in re.findall(r"<!--(.*?)-->", text, re.DOTALL):
         for name in re.findall(r"!\[[^]]+\]\((.+?)\)", line):
-            assert not (FOLDER / name).exists(), f"{name} is there: take it out of the comment"
+            assert not (FOLDER / name).exists(), f"{name} is there: gallery.py --readme shows it"
