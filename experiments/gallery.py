@@ -9,6 +9,7 @@ Open results/index.html: it needs no server. Ends with exit code 1 and a list wh
 failed or is missing from the page.
 """
 
+import argparse
 import json
 import os
 import re
@@ -32,7 +33,12 @@ SMALL = (960, 256)
 
 def options_parser():
     """Options of the gallery."""
-    made = Parser(prog="python experiments/gallery.py", description=__doc__, allow_abbrev=False)
+    made = Parser(
+        prog="python experiments/gallery.py",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
     made.add_argument("--quick", action="store_true", help="run smaller jobs of under a minute")
     made.add_argument("--out", default="results", help="folder for page and results")
     made.add_argument("--only", type=several(str), default=None, help="names, by comma")
