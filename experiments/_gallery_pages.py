@@ -180,8 +180,9 @@ PAGES = (
         "damper_cost",
         DAMPER,
         "What does a cycle cost against the number of grains, and which steps are stable?",
-        "Spheres by all pairs grow with the square of the number, by cells with the number. The "
-        "automaton is cheapest at any number, and bears any step below a cell per step.",
+        "Spheres by all pairs grow ever more steeply, by cells about with the number; the automaton "
+        "by a list of particles is cheapest at any number. Spheres diverge from 50 µs on, the "
+        "automaton bears all steps in which no particle crosses a cell, and declines the others.",
         "1 min",
         ("cost.png", "steps.png"),
         ("cycle_ms_*", "growth_*", "longest_step_*"),
@@ -202,8 +203,9 @@ PAGES = (
         PRICE,
         "What does an error of 10 or 1 % in the damper's response cost, by automaton, spheres and "
         "RK45?",
-        "The same for the damper. The flat ends are chaos: no step, however short, gets below the "
-        "spread of equal runs that differ in one rounding.",
+        "Left is cheap, low is exact, crosses failed or were refused. Each method is compared with "
+        "its own limit; dotted is what other seeds alone make of that, below which a shorter step "
+        "buys nothing.",
         "5 min on one",
         ("work_precision.png", "against_spheres.png", "curves.png", "rk45.png"),
         ("cheapest*", "seconds_at*", "chaos_floor"),
@@ -213,8 +215,9 @@ PAGES = (
         PRICE,
         "Which scenes at the edge does each method bear, by what margin, and which does it "
         "decline?",
-        "Green is a figure within the bound that physics sets, with its margin; grey was declined "
-        "in words. Numbers in the place of a refusal would count as failed.",
+        "A panel a case, a line a method. Titles say how many pass, and the worst margin: bound of "
+        "physics over figure. A panel of words is a refusal; numbers in its place would count as "
+        "failed.",
         "3 min on one",
         ("hard_cases.png",),
         ("*",),
