@@ -8,10 +8,12 @@ DEMO_OPTIONS ?=
 TEST_OPTIONS ?= -n 2 --dist loadfile
 BENCH_OPTIONS ?=
 MESH_OPTIONS ?=
+GALLERY_OPTIONS ?=
 
 BIN := $(if $(filter Windows_NT,$(OS)),.venv/Scripts,.venv/bin)
 STAMP := .venv/stamp
 MESH_STAMP := .venv/stamp-mesh
+DOCS_STAMP := .venv/stamp-docs
 GMSH_PACKAGES := libglu1-mesa libgl1 libxcursor1 libxft2 libxinerama1 libgomp1
 
 # taichi aborts where HOME is not set.
@@ -19,10 +21,10 @@ ifeq ($(strip $(HOME)),)
 export HOME := $(CURDIR)/.venv/home
 endif
 
-.PHONY: help venv demo test lint bench mesh clean
+.PHONY: help venv demo test lint bench gallery api mesh clean
 
 help: ## print this list
-	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-6s %s\n", $$1, $$2}' Makefile
+	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-7s %s\n", $$1, $$2}' Makefile
 
 venv: $(STAMP) ## set up .venv (about a minute; done by itself where needed)
 
@@ -39,6 +41,12 @@ lint: $(STAMP) ## check style and format
 bench: $(STAMP) ## measure speed
 	$(BIN)/python experiments/bench.py $(BENCH_OPTIONS)
 
+gallery: $(STAMP) ## run all experiments and show them on one page (GALLERY_OPTIONS=--quick: minutes)
+	$(BIN)/python experiments/gallery.py $(GALLERY_OPTIONS)
+
+api: $(DOCS_STAMP) ## pages of all functions from their docstrings, in results/api (installs pdoc)
+	$(BIN)/python docs/make_api.py results/api
+
 mesh: $(MESH_STAMP) ## make the meshes again (installs gmsh; the others do not need it)
 	$(BIN)/python experiments/make_meshes.py $(MESH_OPTIONS)
 
@@ -54,4 +62,9 @@ $(MESH_STAMP): $(STAMP)
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[mesh]"
 	@$(BIN)/python -c "import gmsh" || { echo "gmsh lacks system libraries; on Debian or Ubuntu type:" \
 	  "sudo apt-get install --no-install-recommends $(GMSH_PACKAGES)"; exit 1; }
+	@touch $@
+
+$(DOCS_STAMP): $(STAMP)
+	@echo "Installing pdoc (a few seconds)."
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[docs]"
 	@touch $@

@@ -156,7 +156,7 @@ def run(options):
     )
     print(f"\n{result.report}\n")
     print_figures(figures)
-    print(f"\nPictures, tables and the ParaView series are in {options.out}")
+    print(f"\nPictures, tables and the ParaView series are in {options.out}: see cracks.png first")
 
 
 def figures_of(result):

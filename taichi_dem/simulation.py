@@ -84,7 +84,8 @@ class Simulation:
         parts = self.model, self.state, self.schedule, self.contacts
         if self.solves:
             return SolvedAdvance(*parts, Solver(*parts, self.method))
-        return Advance(*parts)
+        # A method may bring an order of its own (docs/add_a_time_integrator.md).
+        return getattr(self.method, "advance", Advance)(*parts)
 
     @property
     def time_s(self):

@@ -14,7 +14,7 @@ import pytest
 from PIL import Image
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments"
-NO_EXPERIMENTS = ("make_meshes", "bench")
+NO_EXPERIMENTS = ("make_meshes", "bench", "gallery")
 NAMES = sorted(
     path.stem
     for path in FOLDER.glob("*.py")

@@ -1,0 +1,187 @@
+"""Run every experiment, each in a process of its own, and show all of them on one static page.
+
+    make gallery                                       # about 40 minutes on two cores
+    make gallery GALLERY_OPTIONS=--quick               # about six
+    python experiments/gallery.py --reuse              # the page alone, from what is there
+    python experiments/gallery.py --only demo_damper   # one anew, the others from what is there
+
+Open results/index.html: it needs no server. Ends with exit code 1 and a list when an experiment
+failed or is missing from the page.
+"""
+
+import argparse
+import json
+import os
+import re
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from PIL import Image
+
+from _cli import Parser, several
+from _gallery_html import RUN, shown, write_page
+from _gallery_pages import SMALL_PICTURES, TOOLS, pages, readme_table
+from taichi_dem import InputError
+from taichi_dem.files import output_folder, write_text, write_whole
+
+HERE = Path(__file__).resolve().parent
+#: A small picture for the repository: widest side [pixels] and colours.
+SMALL = (960, 256)
+
+
+def options_parser():
+    """Options of the gallery."""
+    made = Parser(
+        prog="python experiments/gallery.py",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    made.add_argument("--quick", action="store_true", help="run smaller jobs of under a minute")
+    made.add_argument("--out", default="results", help="folder for page and results")
+    made.add_argument("--only", type=several(str), default=None, help="names, by comma")
+    made.add_argument("--reuse", action="store_true", help="run only what has no result yet")
+    made.add_argument("--readme", action="store_true", help="renew README.md, run nothing")
+    made.add_argument(
+        "--pictures", action="store_true", help=f"renew {SMALL_PICTURES}, run nothing"
+    )
+    return made
+
+
+def scripts():
+    """Names of all experiments there are."""
+    names = {path.stem for path in HERE.glob("*.py") if not path.stem.startswith("_")}
+    return sorted(names - set(TOOLS))
+
+
+def chosen(only):
+    """Entries of the experiments asked for, all by default; InputError for an unknown name."""
+    known = {page.name: page for page in pages()}
+    for name in only or ():
+        if name not in known:
+            raise InputError(f"only must name experiments out of {', '.join(known)}, got {name!r}")
+    return tuple(known[name] for name in only or known)
+
+
+def run_one(page, out, quick):
+    """Run an experiment and note what it printed; returns why it failed, or ""."""
+    folder = os.path.join(out, page.name)
+    _forget(folder)
+    line = [sys.executable, str(HERE / f"{page.name}.py"), *page.options.split()]
+    line += ["--out", folder, *(["--quick"] if quick else [])]
+    started = time.perf_counter()
+    done = subprocess.run(line, capture_output=True, text=True)
+    note = {"seconds": time.perf_counter() - started, "output": done.stdout}
+    write_text(os.path.join(output_folder(folder), RUN), json.dumps(note, indent=1))
+    if done.returncode == 0:
+        return ""
+    said = done.stderr.strip().splitlines() or ["it said nothing"]
+    return f"exit code {done.returncode}: {said[-1]}"
+
+
+def _forget(folder):
+    """Remove the summary of an earlier run, so that none of its figures pass for this one's."""
+    for name in ("summary.json", RUN):
+        Path(folder, name).unlink(missing_ok=True)
+
+
+def run_all(wanted, options):
+    """Run what is wanted, one after the other, and say how each ended; name -> why it failed."""
+    failed = {}
+    for number, page in enumerate(wanted, 1):
+        there = os.path.exists(os.path.join(options.out, page.name, "summary.json"))
+        if options.reuse and there:
+            continue
+        print(f"{number:2d}/{len(wanted)} {page.name} ... ", end="", flush=True)
+        started = time.perf_counter()
+        failed[page.name] = run_one(page, options.out, options.quick)
+        print(failed[page.name] or f"{time.perf_counter() - started:.0f} s", flush=True)
+    return failed
+
+
+def build(options):
+    """Run what is asked for and write the page; returns a line for each thing amiss."""
+    wanted, out = chosen(options.only), output_folder(options.out)
+    failed = run_all(wanted, options)
+    items = [shown(page, out, failed.get(page.name, "")) for page in pages()]
+    path = os.path.join(out, "index.html")
+    write_page(path, items)
+    print(f"The page is {path}: open it in any browser.")
+    names = {page.name for page in wanted}
+    return [
+        *(f"{i.page.name}: {i.failed}" for i in items if i.failed and i.page.name in names),
+        *(f"{name}: has no entry in _gallery_pages.py" for name in without_entry()),
+    ]
+
+
+def without_entry():
+    """Names of experiments that the page would not show."""
+    return sorted(set(scripts()) - {page.name for page in pages()})
+
+
+def shrink_pictures(out, folder):
+    """Small copies of each experiment's first picture for the repository; the names written."""
+    written = []
+    for page in pages():
+        source = Path(out, page.name, page.pictures[0])
+        if source.is_file():
+            target = os.path.join(folder, f"{page.name}.png")
+            write_whole(target, small_copy(source))
+            written.append(target)
+    return written
+
+
+def small_copy(source):
+    """A function that writes a picture, the last image of a film, within SMALL as PNG."""
+
+    def write(name):
+        with Image.open(source) as image:
+            image.seek(getattr(image, "n_frames", 1) - 1)
+            made = image.convert("RGB")
+        made.thumbnail((SMALL[0], SMALL[0]))
+        # With too few colours, or without the means, thin lines take those of their neighbours.
+        made = made.quantize(SMALL[1], kmeans=3, dither=Image.Dither.NONE)
+        made.save(name, format="PNG", optimize=True)
+
+    return write
+
+
+def renew_readme(root):
+    """Renew the table of README.md in a folder, and show pictures whose place was kept for them."""
+    path = Path(root, "README.md")
+
+    def show(place):
+        return place[1] if Path(root, place[2]).is_file() else place[0]
+
+    text = path.read_text(encoding="utf-8")
+    text = re.sub(r"\| question \|.*?\n\n", lambda _: f"{readme_table()}\n", text, flags=re.DOTALL)
+    text = re.sub(r"<!-- (!\[[^]]+\]\((.+?)\)) -->", show, text)
+    write_text(path, text)
+
+
+def main(arguments=None):
+    """Run the gallery; returns the exit code: 0, 1 with a list, 2 for bad input."""
+    try:
+        options = options_parser().parse_args(arguments)
+        if options.readme:
+            renew_readme(HERE.parent)
+            return 0
+        if options.pictures:
+            print("\n".join(shrink_pictures(options.out, HERE.parent / SMALL_PICTURES)))
+            return 0
+        amiss = build(options)
+    except InputError as error:
+        print(" ".join(str(error).split()), file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return 130
+    if amiss:
+        print("\n".join(["Without a result:", *amiss]), file=sys.stderr)
+    return 1 if amiss else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
