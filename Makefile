@@ -1,11 +1,12 @@
 # Everything runs in .venv, which the first target that needs it builds: python3 and make are enough.
-# Options: make demo DEMO_OPTIONS="--quick"   make test TEST_OPTIONS="-n 2 -k mesh"
+# Options: make demo DEMO_OPTIONS="--quick"   make test TEST_OPTIONS="-k mesh"
 #          make venv PYTHON=/path/to/python3.12
 
 PYTHON ?=
 DEMO_OPTIONS ?=
 # One worker a core; tests of a file share what they build.
-TEST_OPTIONS ?= -n 2 --dist loadfile
+TEST := -m pytest -q -n 2 --dist loadfile
+TEST_OPTIONS ?=
 BENCH_OPTIONS ?=
 MESH_OPTIONS ?=
 GALLERY_OPTIONS ?=
@@ -21,18 +22,21 @@ ifeq ($(strip $(HOME)),)
 export HOME := $(CURDIR)/.venv/home
 endif
 
-.PHONY: help venv demo test lint bench gallery api mesh clean
+.PHONY: help venv demo test test-slow lint bench gallery api mesh clean
 
 help: ## print this list
-	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-7s %s\n", $$1, $$2}' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-9s %s\n", $$1, $$2}' Makefile
 
 venv: $(STAMP) ## set up .venv (about a minute; done by itself where needed)
 
 demo: $(STAMP) ## blast a block and show the fracture
 	$(BIN)/python experiments/blast_fracture.py $(DEMO_OPTIONS)
 
-test: $(STAMP) ## run the tests
-	$(BIN)/python -m pytest -q $(TEST_OPTIONS)
+test: $(STAMP) ## run the tests that a change must pass
+	$(BIN)/python $(TEST) -m "not slow" $(TEST_OPTIONS)
+
+test-slow: $(STAMP) ## run those that take longer
+	$(BIN)/python $(TEST) -m slow $(TEST_OPTIONS)
 
 lint: $(STAMP) ## check style and format
 	$(BIN)/python -m ruff check .
