@@ -182,7 +182,7 @@ PAGES = (
         "What does a cycle cost against the number of grains, and which steps are stable?",
         "Spheres by all pairs grow ever more steeply, by cells about with the number; the "
         "automaton by a list of particles is cheapest at any number. Spheres diverge from 50 µs "
-        "on, the automaton bears all steps in which no particle crosses a cell, and declines the others.",
+        "on, the automaton bears every step in which no particle crosses a cell.",
         "1 min",
         ("cost.png", "steps.png"),
         ("cycle_ms_*", "growth_*", "longest_step_*"),
