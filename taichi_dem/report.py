@@ -88,6 +88,18 @@ class Report:
         rows = [f"{use.effect}: {use}" for use in self.acted]
         return (("effects", rows[0]), *(("", row) for row in rows[1:]))
 
+    def _bound_words(self):
+        """What bounds the steps of how many bodies."""
+        words = ((name.replace("_", " "), n) for name, n in self.bound_by.items())
+        return ", ".join(f"{name} ({n} bodies)" for name, n in words)
+
+    def _gain_row(self):
+        """What steps of different length save, where there are some."""
+        if self.body_updates == self.body_count * self.substeps:
+            return ()
+        ideal, reached = f"{self.ideal_gain:.2f}", f"{self.boundary_gain:.2f}"
+        return (("gain over uniform", f"{ideal} ideal, {reached} with pairs at the finer step"),)
+
     def _sweeps_row(self):
         """What solving all dashpots took, for the methods that do."""
         if not self.sweeps:
@@ -104,18 +116,14 @@ class Report:
                 f"{self.until_s:.4g} s, {self.broken_faces} of {self.bond_count} bonds broken",
             ),
             ("smallest step", f"{self.smallest_step_s:.3g} s"),
-            ("steps bound by", ", ".join(f"{n} {name}" for name, n in self.bound_by.items())),
+            ("steps bound by", self._bound_words()),
             ("substeps", f"{self.substeps:,}"),
             (
                 "evaluations",
                 f"{self.bond_evaluations:,} bonds, {self.pair_evaluations:,} pairs, "
                 f"{self.body_updates:,} bodies",
             ),
-            (
-                "gain over uniform",
-                f"{self.ideal_gain:.2f} ideal, {self.boundary_gain:.2f} with "
-                f"the pairs at the finer step",
-            ),
+            *self._gain_row(),
             *self._sweeps_row(),
             ("contact searches", f"{self.searches:,}"),
             ("work put in", f"{self.ledger['load_work'] + self.ledger['support_work']:.6g} J"),

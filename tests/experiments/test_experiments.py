@@ -60,6 +60,11 @@ FIGURES = {
             *("ideal_gain", "boundary_gain", "realised_gain"),
         )
     },
+    "blast_sweeps": {
+        f"sweeps_{way}_{tolerance}"
+        for way in ("gauss_seidel", "jacobi", "momentum")
+        for tolerance in ("0.05", "0.01", "0.001")
+    },
     "cost_of_effects": {
         *("overhead_absent_percent", "blast_seconds", "blast_chance_percent"),
         *(
@@ -91,6 +96,7 @@ FILES = {
         *("comparison.csv", "uniform.csv", "multirate_held.csv", "multirate_drifted.csv"),
         *("levels_multirate_held.png", "levels_multirate_drifted.png", "methods.png"),
     ),
+    "blast_sweeps": ("sweeps.csv", "sweeps.png"),
     "cost_of_effects": ("effects.png", "blast.csv", "damper.csv"),
     "cost_of_accuracy_blast": (
         *("work_precision.png", "errors.png", "points.csv", "runs.csv", "answers.csv"),

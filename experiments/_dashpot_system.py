@@ -1,0 +1,115 @@
+"""The dashpots of all bonds of a running simulation as one linear system, and ways to sweep it.
+
+In NumPy, to compare ways that the solver does not have. A bond answers its twist (velocity and spin
+of one body against the other) with a wrench impulse; both bodies give way to it.
+"""
+
+import numpy as np
+
+from taichi_dem.step.implicit.colouring import edge_colours
+
+
+def cross_matrices(vectors):
+    """Matrices [r]x with [r]x w = r x w, (n, 3, 3), of vectors (n, 3)."""
+    made = np.zeros((len(vectors), 3, 3))
+    for row, column, part, sign in ((0, 1, 2, -1), (0, 2, 1, 1), (1, 2, 0, -1)):
+        made[:, row, column] = sign * vectors[:, part]
+        made[:, column, row] = -made[:, row, column]
+    return made
+
+
+def applied(matrices, vectors):
+    """Products of n matrices with n vectors."""
+    return np.einsum("nij,nj->ni", matrices, vectors)
+
+
+class DashpotSystem:
+    """What the sweeps need of the bonds that hold; simulation: of ``ImplicitDashpots``, started.
+
+    bodies: two of each bond, (2, n). onto: Jacobians from the twists of both to that of the bond,
+    (2, n, 6, 6). gives: twist of a body per wrench impulse, (bodies, 6, 6) [1/kg, ...]. law:
+    inverse of the bonds' own blocks. colours: of the bonds.
+    """
+
+    def __init__(self, simulation):
+        solver, model = simulation.advance.solver, simulation.model
+        pairs = solver.bonds.bodies.to_numpy()
+        holds = pairs[:, 0] >= 0
+        self.bodies = pairs[holds].T
+        self.colours = edge_colours(self.bodies.T, model.body_count)
+        self.onto = self._jacobians(solver.bonds.branch.to_numpy()[holds])
+        self.gives = np.zeros((model.body_count, 6, 6))
+        self.gives[:, :3, :3] = model.mass_inverse.to_numpy()[:, None, None] * np.eye(3)
+        self.gives[:, 3:, 3:] = solver.motion.turn.to_numpy()
+        a, b, c = (f.to_numpy()[holds] for f in (solver.bonds.a, solver.bonds.b, solver.bonds.c))
+        solved = np.block([[a, b], [b.swapaxes(1, 2), c]])
+        self.law = np.linalg.inv(solved) - sum(self._mobilities())
+
+    @staticmethod
+    def _jacobians(branch):
+        made = np.zeros((2, len(branch), 6, 6))
+        made[0] = -np.eye(6)
+        made[0, :, :3, 3:] = cross_matrices(branch)
+        made[1] = np.eye(6)
+        return made
+
+    def _mobilities(self):
+        """What both bodies of each bond give way by, (n, 6, 6) each."""
+        return [
+            onto @ self.gives[body] @ onto.swapaxes(1, 2)
+            for onto, body in zip(self.onto, self.bodies)
+        ]
+
+    def twists(self, motion, some=slice(None)):
+        """Twists of the bonds, or of some, at the bodies' motion (bodies, 6) [m/s, rad/s]."""
+        return sum(
+            applied(onto[some], motion[body[some]]) for onto, body in zip(self.onto, self.bodies)
+        )
+
+    def pull(self, motion, impulse, some=slice(None)):
+        """Let the bonds, or some, give their bodies wrench impulses; changes motion."""
+        for onto, body in zip(self.onto, self.bodies):
+            push = applied(onto[some].swapaxes(1, 2), impulse)
+            np.subtract.at(motion, body[some], applied(self.gives[body[some]], push))
+
+    def gauss_seidel(self, motion, twist):
+        """Motion after each sweep by colours; twist: that the impulses so far have answered."""
+        solved = np.linalg.inv(self.law + sum(self._mobilities()))
+        motion, twist = motion.copy(), twist.copy()
+        groups = [np.flatnonzero(self.colours == c) for c in range(1 + self.colours.max())]
+        while True:
+            for some in groups:
+                step = applied(solved[some], self.twists(motion, some) - twist[some])
+                self.pull(motion, step, some)
+                twist[some] = self.twists(motion, some)
+            yield motion
+
+    def jacobi(self, motion, twist, momentum=False):
+        """The same with all bonds at once, the mass of a body split among its bonds.
+
+        momentum: Nesterov's, begun anew when it leads away (Macklin and others, 2014; Mazhar and
+        others, 2015).
+        """
+        shares = np.bincount(self.bodies.ravel(), minlength=len(self.gives))
+        split = sum(
+            shares[body][:, None, None] * part
+            for body, part in zip(self.bodies, self._mobilities())
+        )
+        solved = np.linalg.inv(self.law + split)
+        impulse = before = np.zeros_like(twist)
+        pace = 1.0
+        while True:
+            ahead = impulse
+            if momentum:
+                faster = 0.5 * (1.0 + np.sqrt(1.0 + 4.0 * pace * pace))
+                ahead = impulse + (pace - 1.0) / faster * (impulse - before)
+                pace = faster
+            there = motion.copy()
+            self.pull(there, ahead)
+            step = applied(solved, self.twists(there) - twist - applied(self.law, ahead))
+            before, impulse = impulse, ahead + step
+            if np.sum(step * (impulse - before)) < 0.0:
+                pace = 1.0
+            found = motion.copy()
+            self.pull(found, impulse)
+            yield found
