@@ -26,8 +26,9 @@ class Rig:
         self.simulation = Simulation(Scene(mesh, material, listed), method or Uniform(1e-9))
         self.simulation.start()
         self.state, self.centre = self.simulation.state, self.simulation.model.centre
-        # Spheres on the bases alone: those of other faces would touch there too.
-        self.state.exposed_tick.from_numpy(np.array([0, -1, -1, -1] * 2, dtype=np.int64))
+        if self.simulation.contacts is not None:
+            # Spheres on the bases alone: those of other faces would touch there too.
+            self.state.exposed_tick.from_numpy(np.array([0, -1, -1, -1] * 2, dtype=np.int64))
 
     def speeds(self, step, steps, position, velocity, spin):
         """Root of the sum of squared speeds after some steps of a length [s]."""
