@@ -22,6 +22,7 @@ class Advance(Touch):
     def __init__(self, model, state, schedule, contacts, solver=None):
         self.model, self.state, self.schedule = model, state, schedule
         self.solver, self.solves = solver, solver is not None
+        self.solves_bonds = self.solves and solver.has_bonds
         self.contacts = contacts
         self.has_contact = contacts is not None
         # Without fast_math a product with zero is not folded: what is absent must not be written.
@@ -40,7 +41,7 @@ class Advance(Touch):
             if ti.static(self.limited):
                 scale = self.bond_share(b)
             motion = self._motion(b, slots)
-            if ti.static(self.solves):
+            if ti.static(self.solves_bonds):
                 motion = self.solver.bonds.mean(b, motion)
             stiffness = self.model.bond_stiffness[b]
             force, torque, failed = zero3(), zero3(), 0
@@ -75,7 +76,7 @@ class Advance(Touch):
                     heat = vec3(0.0, slipped, self._stored(b, motion))
                     self.state.bond_heat[b] += area * heat
                 self._release(b, slots)
-            if ti.static(self.solves):
+            if ti.static(self.solves_bonds):
                 self._renew(b, slots, motion, failed, dragged * (area * dt))
 
     @ti.func

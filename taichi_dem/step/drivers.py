@@ -177,7 +177,7 @@ class SolvedStep(Step):
 
     def _sweep(self, solver):
         """One sweep, colour by colour."""
-        ends = np.cumsum([0, *solver.bonds.colours]).tolist()
+        ends = np.cumsum([0, *(solver.bonds.colours if solver.has_bonds else ())]).tolist()
         bonds = tuple((Range(a, b - a), solver.bond) for a, b in zip(ends, ends[1:]))
         pairs = ()
         if self.has_contact:
@@ -200,8 +200,9 @@ class SolvedStep(Step):
             self.advance.solver.motion.place(i, self.advance)
         for _ in range(1):
             self.schedule.start_all()
-        for b in range(self.advance.model.bond_count):
-            self.advance.solver.bonds.first(b)
+        if ti.static(self.advance.solver.has_bonds):
+            for b in range(self.advance.model.bond_count):
+                self.advance.solver.bonds.first(b)
         for b in range(self.advance.model.bond_count):
             self.advance.bond(b)
             # It booked a step that never was.

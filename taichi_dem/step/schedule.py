@@ -228,10 +228,12 @@ class Schedule:
         self.evaluations[4] += self.bonds.end[0]
 
     @ti.func
-    def count_sweep(self):
+    def count_sweep(self, with_bonds: ti.template()):
         """Count what a sweep over all dashpots visits as evaluations."""
-        visits = ti.cast(self.bonds.end[0], ti.i64)
-        self.evaluations[2] += visits
+        visits = ti.cast(0, ti.i64)
+        if ti.static(with_bonds):
+            visits += self.bonds.end[0]
+            self.evaluations[2] += visits
         if ti.static(self.has_contact):
             self.evaluations[3] += self.pairs.end[0]
             visits += self.pairs.end[0]

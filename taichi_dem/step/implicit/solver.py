@@ -11,7 +11,7 @@ from taichi_dem.types import real
 
 @ti.data_oriented
 class Solver:
-    """Gauss-Seidel over bonds, then touching pairs, in the order of their colours.
+    """Gauss-Seidel over bonds with dashpots, then touching pairs, in the order of their colours.
 
     Members of one colour share no body: they may be visited side by side, and the order within a
     colour changes no bit. So one core and many cores run the same sweeps to the same bits.
@@ -25,7 +25,10 @@ class Solver:
         self.model, self.state, self.schedule, self.contacts = model, state, schedule, contacts
         self.fewest, self.most = method.sweeps
         self.motion = Motion(model, state)
-        self.bonds = BondDashpots(model, state, schedule, self.motion, method)
+        self.bonds = None
+        self.has_bonds = bool(model.dashpot.name)
+        if self.has_bonds:
+            self.bonds = BondDashpots(model, state, schedule, self.motion, method)
         self.pairs = None
         self.has_contact = contacts is not None
         if self.has_contact:
@@ -49,8 +52,9 @@ class Solver:
     def solve(self, one):
         """All sweeps of a step, one member after the other."""
         while self.unsolved[None] == 1:
-            for k in range(self.model.bond_count):
-                self.bond(k)
+            if ti.static(self.has_bonds):
+                for k in range(self.model.bond_count):
+                    self.bond(k)
             if ti.static(self.has_contact):
                 for a in range(self.pairs.count[None]):
                     self.pair(self.pairs.order[a])
@@ -84,4 +88,4 @@ class Solver:
         settled = self.sweeps[None] >= self.fewest and self.residual2[None] <= bound
         if settled or self.sweeps[None] >= self.most:
             self.unsolved[None] = 0
-        self.schedule.count_sweep()
+        self.schedule.count_sweep(self.has_bonds)
