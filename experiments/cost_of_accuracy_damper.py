@@ -76,7 +76,7 @@ METHODS = {
     "ca_static": automaton("static contact", "static"),
     "ca_ejection": automaton("landing + ejection", "landing+ejection"),
     "ca_landing": automaton("landing", "landing"),
-    SPHERES: Method("spheres, p = 1/4", Spheres(), DEM_STEPS, 5e-6, 3, (1e-4, 4e-5)),
+    SPHERES: Method("spheres, p = 1/4", Spheres(), DEM_STEPS, 5e-6, 3, (1e-4, 3e-5)),
     "dem_printed": Method(
         "spheres, p = 1/2", Spheres(damping="printed"), PRINTED_STEPS, 5e-6, 3, (4e-5,)
     ),
@@ -160,7 +160,7 @@ class Sweep:
             self._run(dt)
         self.compile_s = sum(curve.compile_s for curve in self.curves.values())
         self.compile_s += 0.0 if kept else self.reference["compile_s"]
-        self.roundoff = self._twins() if label in sizes["twins"] else None
+        self.roundoff = self._twins() if label in sizes["twins"] and self.curves else None
         self.points = self.against(self.reference["mean"])
 
     def _reference(self, folder):

@@ -76,6 +76,7 @@ def test_skin_changes_no_bit(held):
     assert differing(held[0], thin, MOTION) == []
 
 
+@pytest.mark.slow
 def test_drifted_neighbours_give_the_same_bits_in_both_drivers():
     method = Multirate(neighbour="drifted", **COARSE)
     resident, _ = state_after(method)
@@ -83,7 +84,7 @@ def test_drifted_neighbours_give_the_same_bits_in_both_drivers():
     assert differing(resident, parallel) == []
 
 
-@pytest.mark.parametrize("neighbour", ["held", "drifted"])
+@pytest.mark.parametrize("neighbour", ["held", pytest.param("drifted", marks=pytest.mark.slow)])
 def test_one_level_for_all_is_the_uniform_run(neighbour):
     """With a distance that no body covers in dt0 every body stays at level 0."""
     one_level, _ = state_after(Multirate(5e-9, 1.0, neighbour), steps=5500)

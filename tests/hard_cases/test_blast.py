@@ -2,7 +2,7 @@
 
 Compiling is what they cost. The experiment asks all methods; here those of a case that shares its
 run with others are the two that share least code, and a case with a run of its own is asked of the
-first method that claims it and the first that declines it.
+first method that claims it and the first that declines it, among the slow tests.
 """
 
 import pytest
@@ -19,7 +19,11 @@ def methods_of(case):
 
 
 ASKED = [
-    pytest.param(case, method, id=f"{case.name}-{method}")
+    pytest.param(
+        *(case, method),
+        id=f"{case.name}-{method}",
+        marks=() if case in blast.CASES else pytest.mark.slow,
+    )
     for case in registry()
     if case.package == "blast"
     for method in methods_of(case)

@@ -169,7 +169,15 @@ def test_a_checkpoint_is_due_by_steps_by_time_and_by_the_wall(monkeypatch):
     assert not due.now(5, 2e-7)
 
 
-def test_ctrl_c_is_noted_first_and_interrupts_then():
+@pytest.fixture
+def listening():
+    """Ctrl-C interrupts, as at a terminal; a shell may have left it ignored for background jobs."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def test_ctrl_c_is_noted_first_and_interrupts_then(listening):
     with pytest.raises(KeyboardInterrupt), CtrlC() as ctrl_c:
         os.kill(os.getpid(), signal.SIGINT)
         assert ctrl_c.asked
@@ -180,7 +188,7 @@ def test_ctrl_c_is_noted_first_and_interrupts_then():
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
-def test_ctrl_c_that_nobody_saw_interrupts_at_the_end():
+def test_ctrl_c_that_nobody_saw_interrupts_at_the_end(listening):
     with pytest.raises(KeyboardInterrupt), CtrlC():
         os.kill(os.getpid(), signal.SIGINT)
 

@@ -33,6 +33,7 @@ def test_what_an_error_leaves_waiting_is_forgotten():
     assert seen == ["at once"]
 
 
+@pytest.mark.slow
 def test_a_simulation_takes_one_group_of_fields():
     """Two, were one of its fields declared after another was used; a session bears 512."""
     before = groups()

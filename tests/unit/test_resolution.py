@@ -29,7 +29,9 @@ def test_limited_dashpots_are_named_with_the_share_that_their_step_leaves():
     assert f"bond 0 to {100 * share:.2g} %" in said
 
 
-@pytest.mark.parametrize(("step", "named"), [(4e-7, True), (2e-8, False)])
+@pytest.mark.parametrize(
+    ("step", "named"), [(4e-7, True), pytest.param(2e-8, False, marks=pytest.mark.slow)]
+)
 def test_a_bond_that_failed_a_step_late_is_named(step, named):
     # At 200 m/s the failure opening of 30 um is passed in 0.15 us.
     apart = [[-100.0, 0.0, 0.0], [100.0, 0.0, 0.0]]

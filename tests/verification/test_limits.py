@@ -215,7 +215,7 @@ def _refresh(rates: ti.template(), count: ti.i32):
         rates.refresh(i)
 
 
-@pytest.mark.parametrize("friction", [False, True])
+@pytest.mark.parametrize("friction", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_near_contacts_are_counted_before_they_touch_and_limit_as_the_report_says(friction):
     """Six spheres that will meet within twice the largest step, none of which touches yet.
 

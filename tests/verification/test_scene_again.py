@@ -1,11 +1,13 @@
 """A scene says what to simulate and is not used up by it."""
 
 import numpy as np
+import pytest
 
 from taichi_dem import Simulation, Uniform
 from tests.scenes import paper_scene
 
 
+@pytest.mark.slow
 def test_a_scene_that_serves_twice_gives_the_same_bits():
     """Loads, supports and laws belong to the run: the second one is pushed as the first was."""
     scene, positions = paper_scene(), []

@@ -109,6 +109,7 @@ def test_waking_keeps_momentum_and_the_account(woken):
     assert report.ledger_residual_fraction < 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dashpot", ["full", "limited"])
 def test_waking_gives_the_same_bits_in_both_drivers(dashpot):
     fields = []

@@ -109,7 +109,7 @@ def _release(advance: ti.template(), bond: ti.i32):
         advance._release(bond, advance.model.bond_slots[bond])
 
 
-@pytest.mark.parametrize("wake", [(), ("release",)])
+@pytest.mark.parametrize("wake", [pytest.param((), marks=pytest.mark.slow), ("release",)])
 def test_a_release_brings_sleeping_bodies_to_the_present_where_they_now_touch(wake):
     """Their bond held them squeezed, and is released at dt0 / 4; now their spheres overlap.
 
@@ -140,7 +140,7 @@ def test_a_released_bond_pays_sleeping_bodies_nothing_more():
     assert made.simulation.schedule.rates.woken[None] == 0
 
 
-@pytest.mark.parametrize("criteria", [(), ("load",)])
+@pytest.mark.parametrize("criteria", [pytest.param((), marks=pytest.mark.slow), ("load",)])
 def test_a_pressure_that_sets_in_while_a_body_sleeps_moves_it_by_no_more_than_the_way(criteria):
     """A free body, a pulse that rises within dt0: u = P0 A / m (t^2 / 4 - (1 - cos wt) / 2w^2).
 
