@@ -20,6 +20,13 @@ def _check_options(method):
         raise InputError(f"dashpot_floor must be 0 unless dashpot is 'limited', got {floor!r}")
 
 
+def _ahead(method):
+    rule = method.control
+    if rule is None and method.dashpot == "limited":
+        rule = StepControl()
+    return rule.ahead if rule is not None else 0.0
+
+
 def _suffix(method):
     """What a name adds for control and limited dashpots."""
     controlled = "_controlled" if method.control is not None else ""
@@ -60,7 +67,7 @@ class Uniform:
     @property
     def ahead(self):
         """Steps of a body by which its contacts are counted before they touch."""
-        return self.control.ahead if self.control is not None else 0.0
+        return _ahead(self)
 
     def criterion(self):
         """Step rule for the schedule."""
@@ -103,7 +110,7 @@ class Multirate:
     @property
     def ahead(self):
         """Steps of a body by which its contacts are counted before they touch."""
-        return self.control.ahead if self.control is not None else 0.0
+        return _ahead(self)
 
     def criterion(self):
         """Step rule for the schedule."""

@@ -25,7 +25,7 @@ class SphereContact(Effect):
         self,
         divisions=5,
         outer_faces=False,
-        skin=8e-4,
+        skin=1.2e-3,
         neighbours_per_body=64,
         pairs_per_body=24,
         spheres_per_body=160,
