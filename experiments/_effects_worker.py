@@ -117,7 +117,7 @@ def _elastic(cls):
     if cls is not None:
         advance = cls(simulation.model, simulation.state, simulation.schedule, None)
         driver = Resident(Step(advance, simulation.schedule, None))
-    driver.compile()
+    driver.settle()
     return lambda substeps: driver._run(1 << 60, substeps)
 
 

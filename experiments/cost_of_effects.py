@@ -162,7 +162,7 @@ def _blast_job(label, names, options, ulps=0):
 def damper_jobs(options):
     """Both fillings as they are, and with each effect left out or added."""
     jobs = []
-    for filling, step, variants in (("spheres", 4e-5, SPHERES), ("automaton", 1e-4, AUTOMATON)):
+    for filling, step, variants in (("spheres", 3e-5, SPHERES), ("automaton", 1e-4, AUTOMATON)):
         common = {"filling": filling, "particles": PARTICLES, "step": step, "seeds": SEEDS}
         common.update(ratios=options.ratios, cycles=options.cycles)
         for label, chosen in ((f"{filling} as they are", {}), *variants):
@@ -218,7 +218,7 @@ def damper_rows(jobs):
 
 def _curve(job):
     """Mean over the seeds [mm], (ratios,)."""
-    return np.mean(job.first.get("rms_mm", np.nan), axis=0)
+    return np.mean(np.atleast_2d(job.first.get("rms_mm", np.nan)), axis=0)
 
 
 def _percent(value, of):

@@ -123,10 +123,11 @@ class ImplicitDashpots:
 
     Springs and loads are explicit; their stability bounds the step, not that of the dashpots.
     dt: step [s]. sweeps: fewest and most sweeps over all dashpots in a step. tolerance: sweeps end
-    once none changes a velocity by more than this share of the largest speed. theta: where in the
-    step bond dashpots take their velocity, from 0.5 (mean of both ends, second order) to 1 (the
-    end, first order, for steps so long that the mean would ring). refresh: how long the solved
-    blocks of bonds serve [s].
+    once none changes a velocity by more than this share of the largest speed in the whole scene;
+    what creeps beside something very fast needs a smaller one. theta: where in the step bond
+    dashpots take their velocity, from 0.5 (mean of both ends, second order) to 1 (the end, first
+    order, for steps so long that the mean would ring). refresh: how long the solved blocks of
+    bonds serve [s].
     Raises InputError for a value out of its range.
     Source: specification, section 6; not in the paper.
     """

@@ -55,7 +55,7 @@ def jump_of_ten_levels(method, quick):
 
 
 def mass_ratio_1e4(method, quick):
-    """A body of 3.5 mg meets one of 35 g at 1 m/s: it is thrown back at no more than it came."""
+    """A body of 3.5 mg meets one of 35 g at 1 m/s: dashpots stop the point that meets."""
     small = single(0.05 * 1e-4 ** (1.0 / 3.0))
     large = checked_mesh(pair().points[[0, 1, 2, 4]], [[3, 0, 2, 1]], {})
     # The spheres stand behind the faces, so that two of them have to be aimed at each other.
@@ -64,7 +64,8 @@ def mass_ratio_1e4(method, quick):
     place = points[1] - points[0] - [1e-7, 0.0, 0.0]
     island = scenes.Island.of((small, place), (large, 0.0), velocity=motion)
     way = {**scenes.TOUCHING, "limited": Uniform(4e-9, dashpot="limited")}[method]
-    track = _alone(island, way, touching_until(quick))
+    # The exact solution knows one contact; later the small body has turned, and others meet.
+    track = _alone(island, way, 2e-5)
     centres = [body_properties(one, CONCRETE.density)[1][0] for one in (small, large)]
     arms = [point - centre for point, centre in zip(points, centres)]
     x = np.array([1.0, 0.0, 0.0])
@@ -149,7 +150,7 @@ def many_steps_at_rest(method, quick):
 def sudden_pressure_on_sleepers(method, quick):
     """Full pressure within 10 ns on bodies at rest: momentum is the pressure's to rounding."""
     mesh = bar(0.2, 0.1, (2, 1, 1))
-    gas = effects.GasPressure(group="left", peak=100e6, rise=1e-8, decay_ratio=1e5)
+    gas = effects.GasPressure(group="left", peak=100e6, rise=1e-8, decay_ratio=1e7)
     acting = [effects.BondDamping(), effects.Softening(), effects.ShearSlip(), gas]
     way = {**scenes.FREE, "multirate_held": Multirate(1e-8, 1e-7)}[method]
     simulation = Simulation(Scene(mesh, CONCRETE, acting), way)
