@@ -169,6 +169,7 @@ def solve(rhs, span, y0, *, rtol=1e-6, atol=1e-9, at=None, first=None, most_atte
     wanted = None if at is None else _checked_times(at, t, t_end)
 
     def derivative(_, time, state):
+        """The user's right-hand side, in the shape that the stages call."""
         return np.asarray(rhs(time, state), dtype=np.float64)
 
     slope = derivative(None, t, y)

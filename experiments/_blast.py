@@ -16,9 +16,9 @@ from taichi_dem import (
 WAY_PER_STEP = 10.0
 
 
-def paper_scene(mesh=PAPER_BLOCK):
-    """The paper's scene with all of its effects; mesh: a file."""
-    acting = [
+def paper_effects():
+    """All effects of the paper's scene."""
+    return [
         effects.BondDamping(),
         effects.Softening(),
         effects.ShearSlip(),
@@ -26,7 +26,11 @@ def paper_scene(mesh=PAPER_BLOCK):
         effects.Friction(),
         effects.GasPressure(),
     ]
-    return Scene(read_mesh(mesh), CONCRETE, acting)
+
+
+def paper_scene(mesh=PAPER_BLOCK):
+    """The paper's scene with all of its effects; mesh: a file."""
+    return Scene(read_mesh(mesh), CONCRETE, paper_effects())
 
 
 def paper_uniform(step):

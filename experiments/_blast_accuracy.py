@@ -4,8 +4,9 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from _blast import paper_effects
 from _hard_cases._case import renew_session
-from taichi_dem import CONCRETE, Scene, Simulation, SimulationDiverged, effects
+from taichi_dem import CONCRETE, Scene, Simulation, SimulationDiverged
 from taichi_dem.simulate import progress_of
 from taichi_dem.simulation import macro_steps
 from taichi_dem.state import NEVER
@@ -45,26 +46,13 @@ class Outcome:
         return asdict(self)
 
 
-def paper_scene(mesh):
-    """The paper's scene: all of its effects."""
-    acting = [
-        effects.BondDamping(),
-        effects.Softening(),
-        effects.ShearSlip(),
-        effects.SphereContact(),
-        effects.Friction(),
-        effects.GasPressure(),
-    ]
-    return Scene(mesh, CONCRETE, acting)
-
-
 def blast(mesh, method, until, driver="auto", seed=None, progress=None):
     """Run the paper's blast by a method to a time [s]; returns an Outcome.
 
     seed: None, or of the disturbance of all positions by DISTURBANCE.
     """
     renew_session()
-    simulation = Simulation(paper_scene(mesh), method, driver)
+    simulation = Simulation(Scene(mesh, CONCRETE, paper_effects()), method, driver)
     if seed is not None:
         _disturb(simulation, seed)
     simulation.start()

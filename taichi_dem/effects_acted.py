@@ -5,13 +5,13 @@ import numpy as np
 from taichi_dem.effect_use import EffectUse
 
 
-def effects_acted(model, ledger, touching):
+def effects_acted(model, ledger, tables, account, touching):
     """An EffectUse for every listed effect, in the model's order.
 
-    touching: most pairs of bodies that a recording saw in contact. Judged by role, so that an
-    effect of one's own is judged like those of the package.
+    tables, account: what the ledger's methods of that name gave. touching: most pairs of bodies
+    that a recording saw in contact. Judged by role, so that an effect of one's own is judged like
+    those of the package.
     """
-    account, tables = ledger.account(), ledger.tables()
     given = abs(account["load_work"]) + abs(account["support_work"]) + ledger.start_energy
     found = [_by_role(model, ledger, tables, touching, effect) for effect in _listed(model)]
     return tuple(_use(account, given, model, *entry) for entry in found)

@@ -151,6 +151,7 @@ def _addresses(fields):
 
     @ti.kernel
     def ask(found: ti.types.ndarray(dtype=ti.u64, ndim=1)):
+        """Fill in the addresses."""
         for _ in range(1):
             for group in ti.static(tuple(groups)):
                 for place, field, index in ti.static(group):

@@ -26,12 +26,11 @@ class Health:
 
     def check(self):
         """Raise SimulationDiverged when a body ran away, spheres swallowed, or energy appeared."""
-        self.check_speed()
+        self._check_speed()
         self._check_overlap()
         self._check_energy()
 
-    def check_speed(self):
-        """The cheap part of the check: has the step flagged a body that left its bounds?"""
+    def _check_speed(self):
         body = self.state.bad_body[None]
         if body < self.model.body_count:
             motion = self.state.motion()

@@ -44,9 +44,12 @@ class Ledger:
         """Take over what ``saved`` gave."""
         self.start_energy, self.start_momentum = float(saved["start"][0]), saved["start"][1:]
 
-    def account(self):
-        """All terms in J by name; residual is what the account cannot explain."""
-        body, bond, pair = self.tables()
+    def account(self, tables=None):
+        """All terms in J by name; residual is what the account cannot explain.
+
+        tables: what ``tables`` gave, where it has been read already.
+        """
+        body, bond, pair = self.tables() if tables is None else tables
         terms = {
             "kinetic": body[:, 0].sum(),
             "bond_strain": bond[:, 0].sum(),

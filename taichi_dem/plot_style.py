@@ -61,6 +61,7 @@ def filming(size, dpi, style):
         canvas, images = FigureCanvasAgg(figure), []
 
         def shoot():
+            """Take the figure as the next image."""
             canvas.draw()
             images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())[:, :, :3].copy()))
             figure.set_layout_engine("none")

@@ -159,6 +159,7 @@ def _keeper(simulation, recorder, checkpoint, resume, arrays):
         saved.take(arrays, resume)
 
     def now():
+        """Present largest step, and time [s]."""
         return simulation.state.tick[None] // MACRO_TICKS, simulation.time_s
 
     return Keeper(checkpoint, saved, now) if checkpoint is not None else NoKeeper()
@@ -207,6 +208,7 @@ def _run(simulation, recorder, keeper, marks, progress):
     for step in (mark for mark in marks if mark * MACRO_TICKS > seen):
 
         def tell(end=step * MACRO_TICKS):
+            """Tell how far the run is, and save it if due; at a mark its rows come first."""
             if progress is not None:
                 progress(progress_of(simulation, last * simulation.method.dt0))
             if simulation.state.tick[None] < end:

@@ -202,6 +202,8 @@ class Simulation:
         counts = [int(value) for value in self.schedule.evaluations.to_numpy()]
         linear, angular = self.ledger.momentum_errors()
         levels = self.state.level.to_numpy()
+        tables = self.ledger.tables()
+        account = self.ledger.account(tables)
         return Report(
             method=self.method.name,
             driver=self.driver.name,
@@ -218,13 +220,13 @@ class Simulation:
             sweeps=self.sweeps(),
             uniform_evaluations=counts[4],
             searches=self.searches,
-            ledger=self.ledger.account(),
+            ledger=account,
             linear_momentum_error=float(linear),
             angular_momentum_error=float(angular),
             compile_seconds=self.compile_seconds,
             run_seconds=self.run_seconds,
             run_cpu_seconds=self.run_cpu_seconds,
-            acted=effects_acted(self.model, self.ledger, self.watch.touching),
+            acted=effects_acted(self.model, self.ledger, tables, account, self.watch.touching),
             missed=self.watch.findings(),
             unresolved=self.resolution.findings(),
             bound_by=counted_criteria(self.state.bound.to_numpy()),

@@ -12,9 +12,10 @@ import taichi as ti
 from taichi_dem.step.implicit.pairs import COLOURS
 from taichi_dem.step.wake import Wake
 
-#: Drivers are called for about this long [s] between two looks at health, progress and Ctrl-C.
+#: The parallel driver is called for about this long [s] between two looks at health, progress and
+#: Ctrl-C.
 CALL_SECONDS = 0.2
-#: A resident kernel is kept near this long [s]: it may begin when the time above is almost over.
+#: The resident one is kept near this long [s]: its kernel cannot be interrupted.
 _KERNEL_SECONDS = 0.1
 _MAX_SUBSTEPS = 1 << 24
 #: Bit that a parallel substep adds to what it returns when a search is due.
