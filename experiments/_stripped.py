@@ -3,7 +3,7 @@
 import taichi as ti
 
 from taichi_dem.physics.bond import unit_arm, unit_opening
-from taichi_dem.physics.rotation import rotation_matrix, spin_of, turned, zero3
+from taichi_dem.physics.rotation import mean_spin, rotation_matrix, spin_of, turned, zero3
 from taichi_dem.step.advance import Advance
 from taichi_dem.types import vec3
 
@@ -44,9 +44,9 @@ class ByHand(Advance):
         velocity = self.state.velocity[i] + linear * self.model.mass_inverse[i]
         momentum = self.state.angular_momentum[i] + angular
         spin = spin_of(self.state.rotation[i], self.model.inertia_inverse[i], momentum)
-        self.state.velocity[i], self.state.angular_momentum[i] = velocity, momentum
-        self.state.spin[i] = spin
-        orientation = turned(self.state.orientation[i], spin, elapsed)
+        inverse = self.model.inertia_inverse[i]
+        turning = mean_spin(self.state.rotation[i], inverse, momentum, spin, elapsed)
+        orientation = turned(self.state.orientation[i], turning, elapsed)
         self.state.orientation[i] = orientation
         self.state.rotation[i] = rotation_matrix(orientation)
         self.state.position[i] += elapsed * velocity
@@ -54,4 +54,6 @@ class ByHand(Advance):
         speed2 = velocity.norm_sqr()
         if not (speed2 + spin.norm_sqr() * self.model.radius[i] ** 2 < self.state.max_speed2[None]):
             ti.atomic_min(self.state.bad_body[None], i)
+        self.state.velocity[i], self.state.angular_momentum[i] = velocity, momentum
+        self.state.spin[i] = spin
         self.schedule.choose_level(i, speed2)

@@ -61,6 +61,17 @@ def spin_of(rotation, inertia_inverse, angular_momentum):
 
 
 @ti.func
+def mean_spin(rotation, inertia_inverse, angular_momentum, spin, dt):
+    """World spin [rad/s] in the middle of a free turn of dt [s] that begins with the given spin.
+
+    At a constant L the spin changes by J^-1 (L x w), with J^-1 = R I^-1 R^T in the world frame:
+    the spin an angular momentum of L + dt/2 L x w has now. With it the turn is of second order.
+    """
+    ahead = angular_momentum + 0.5 * dt * angular_momentum.cross(spin)
+    return spin_of(rotation, inertia_inverse, ahead)
+
+
+@ti.func
 def zero3():
     """The zero vector, as a start for sums."""
     return vec3(0.0, 0.0, 0.0)

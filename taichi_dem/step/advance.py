@@ -3,13 +3,13 @@
 Drivers choose who is next and call these functions; no other file applies a force or moves a body.
 A bond or pair evaluated at a tick gives both bodies the impulse F * (smaller of their steps), with
 opposite signs; a body takes what has gathered at its own time (Konno et al., 3.1, eq. 3):
-v += S / m, L += T, then x += dt v and q = exp(dt w) q.
+v += S / m, L += T, then x += dt v and q = exp(dt w) q, with the spin w in the middle of the turn.
 """
 
 import taichi as ti
 
 from taichi_dem.physics.bond import bond_motion, unit_arm, unit_opening, unit_velocity
-from taichi_dem.physics.rotation import rotation_matrix, spin_of, turned, zero3
+from taichi_dem.physics.rotation import mean_spin, rotation_matrix, spin_of, turned, zero3
 from taichi_dem.step.rates import RELEASE
 from taichi_dem.step.touch import Touch
 from taichi_dem.types import real, vec2, vec3
@@ -201,15 +201,16 @@ class Advance(Touch):
         """Let body i go on for elapsed [s], as its supports allow, and choose its next step."""
         velocity, momentum = self._supported(i, elapsed, velocity, momentum)
         spin = self.spin(i, momentum)
+        self._drift(i, elapsed, velocity, momentum, spin)
         self.state.velocity[i], self.state.angular_momentum[i] = velocity, momentum
         self.state.spin[i] = spin
-        self._drift(i, elapsed, velocity, spin)
         self.schedule.choose_level(i, velocity.norm_sqr())
 
     @ti.func
-    def _drift(self, i, elapsed, velocity, spin):
-        """Move and turn body i at a velocity and spin; note the way it went, and a runaway."""
-        orientation = turned(self.state.orientation[i], spin, elapsed)
+    def _drift(self, i, elapsed, velocity, momentum, spin):
+        """Move and turn body i, which begins with a spin; note the way it went, and a runaway."""
+        turning = self._turning(i, elapsed, momentum, spin)
+        orientation = turned(self.state.orientation[i], turning, elapsed)
         self.state.orientation[i] = orientation
         self.state.rotation[i] = rotation_matrix(orientation)
         self.state.position[i] += elapsed * velocity
@@ -220,6 +221,16 @@ class Advance(Touch):
         # One comparison finds runaway, infinity and NaN; "v != v" would be folded away.
         if not (speed2 + spin.norm_sqr() * self.model.radius[i] ** 2 < self.state.max_speed2[None]):
             ti.atomic_min(self.state.bad_body[None], i)
+
+    @ti.func
+    def _turning(self, i, elapsed, momentum, spin):
+        """World spin in the middle of the step [rad/s]; a body in supports has what they allow."""
+        inverse = self.model.inertia_inverse[i]
+        turning = mean_spin(self.state.rotation[i], inverse, momentum, spin, elapsed)
+        for effect in ti.static(self.model.supports):
+            if effect.acts_on(i):
+                turning = spin
+        return turning
 
     @ti.func
     def _gathered(self, i):

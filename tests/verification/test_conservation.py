@@ -120,12 +120,14 @@ def precession_error(steps):
     return np.linalg.norm(axis - expected)
 
 
-def test_free_precession_is_met_at_first_order():
-    """Axisymmetric body: |L| / I_across about L, analytic; half the step, half the error."""
+def test_free_precession_is_met_at_second_order():
+    """Axisymmetric body: |L| / I_across about L, analytic; half the step, a quarter of the error.
+
+    In a step the body turns by p = pi / 2 / 400 = 4e-3: each errs by p^3 at most, all by p^2 pi/2.
+    """
     coarse, fine = precession_error(400), precession_error(800)
-    # In a step the body turns by p = pi / 2 / 400 = 4e-3: first order p, the rest p^2.
-    assert coarse < 2 * 0.5 * np.pi / 400
-    assert fine / coarse == pytest.approx(0.5, abs=0.02)
+    assert coarse < 0.5 * np.pi * (0.5 * np.pi / 400) ** 2
+    assert fine / coarse == pytest.approx(0.25, abs=0.5 * np.pi / 400)
 
 
 @pytest.fixture(scope="module")

@@ -36,7 +36,7 @@ class SolvedAdvance(Advance):
         self._book_loads(i, kick, 0.5 * (before + velocity), 0.5 * (momentum_before + momentum))
         velocity, momentum = self._supported(i, elapsed, velocity, momentum)
         spin = self.spin(i, momentum)
-        self._drift(i, elapsed, velocity, spin)
+        self._drift(i, elapsed, velocity, momentum, spin)
         self.state.velocity[i], self.state.angular_momentum[i] = velocity, momentum
         # The next step begins with the spin in the new orientation.
         self.state.spin[i] = self.spin(i, momentum)

@@ -73,10 +73,14 @@ class Motion:
 
     @ti.func
     def found(self, i):
-        """Velocity and angular momentum at the end of the step, before supports act."""
+        """Velocity and angular momentum at the end of the step, before supports act.
+
+        The momentum is found from the change of the spin: where nothing acts it stays, to the bit.
+        """
         twist, rotation = self.twist[i], self.state.rotation[i]
         velocity = twist[0:3]
-        momentum = rotation @ (self.model.inertia[i] @ (rotation.transpose() @ twist[3:6]))
+        change = rotation.transpose() @ (twist[3:6] - self.state.spin[i])
+        momentum = self.state.angular_momentum[i] + rotation @ (self.model.inertia[i] @ change)
         if ti.static(self.has_supports):
             given = self.given[i]
             velocity = self.state.velocity[i] + self.model.mass_inverse[i] * given[0:3]
