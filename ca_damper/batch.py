@@ -11,6 +11,7 @@ import numpy as np
 import taichi as ti
 
 from ca_damper import measures
+from ca_damper.account import MomentumAccount
 from ca_damper.clock import Clock, steps_per_cycle
 from ca_damper.container import DrivenContainer, SprungContainer
 from ca_damper.coupling import LOST, Coupling
@@ -65,8 +66,10 @@ class Batch:
             container = SprungContainer(table, self.clock, filling.gravity, rtol, atol)
         self.bound = filling.bind(table)
         _check_record_fits(self.count * max(1, self.measured_cycles) * len(measures.COLUMNS))
+        self.account = MomentumAccount(table, filling.particle_mass * filling.gravity)
         self.coupling = Coupling(
-            table, self.clock, container, self.bound, filling.gravity, self.measured_cycles
+            *(table, self.clock, container, self.bound, self.account),
+            *(filling.gravity, self.measured_cycles),
         )
         self._set_pace(frequency, dt)
         self.time_origin = np.zeros(self.count)
@@ -220,10 +223,15 @@ class Batch:
             simulated_s=float(self.time_s.max()),
             scene_steps=self.scene_steps,
             particle_steps=self.particle_steps,
+            step_bound=self.filling.step_bound,
+            momentum_error=self._momentum_error(),
             container_evaluations=RK45_STAGES * int(self.attempts().sum()) if sprung else 0,
             compile_seconds=self.compile_seconds,
             run_seconds=self.run_seconds,
         )
+
+    def _momentum_error(self):
+        return self.account.error(self.sample()["momentum"]) if self._started else 0.0
 
     def _check_session(self):
         if self.generation != runtime.generation():

@@ -27,12 +27,14 @@ _F64 = ti.types.ndarray(dtype=ti.f64, ndim=2)
 class Coupling:
     """Filling, container and clock of all scenes, tied together.
 
-    bound: what ``filling.bind`` gave. gravity [m/s^2]. measured_cycles: room in ``record``, whose
-    shape is (scenes, cycles, columns of ``measures.COLUMNS``).
+    bound: what ``filling.bind`` gave. account: a MomentumAccount. gravity [m/s^2].
+    measured_cycles: room in ``record``, whose shape is (scenes, cycles, columns of
+    ``measures.COLUMNS``).
     """
 
-    def __init__(self, table, clock, container, bound, gravity, measured_cycles):
+    def __init__(self, table, clock, container, bound, account, gravity, measured_cycles):
         self.table, self.clock, self.container, self.bound = table, clock, container, bound
+        self.account = account
         self.count = table.count
         self.padding = _CPU_BLOCK if runtime.settings().arch == "cpu" else 1
         self.gravity = ti.field(ti.f64, shape=())
@@ -97,6 +99,7 @@ class Coupling:
         full = self.clock.tick(s)
         after = self.container.motion(s)
         self.force[s] = self._force(s, action, after.v - before.v)
+        self._enter(s, step, action.carried * (after.v - before.v))
         if step >= self.measure_from[s]:
             self._measure(s, before, now, middle)
             if full:
@@ -112,6 +115,14 @@ class Coupling:
         """Mean force [N] of the filling on the container over a step that gained it speed [m/s]."""
         dt = self.table.dt[s]
         return action.impulse / dt - action.carried * (self.gravity[None] + gained / dt)
+
+    @ti.func
+    def _enter(self, s, step, late):
+        """Enter a step in the account; late: what the carried mass gained in it [kg m/s]."""
+        if step > 0:
+            self.account.add(s, self.force[s], late)
+        else:
+            self.account.begin(s, self.bound.momentum(s), late)
 
     @ti.func
     def _clear(self, s):

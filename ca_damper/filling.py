@@ -7,6 +7,7 @@ A filling is a frozen dataclass of a user's options, checked when it is made. It
 ``capacity``       most particles that fit
 ``particle_mass``  [kg]             ``gravity``  that acts on the particles [m/s^2], downwards
 ``effects``        what it computes, in words for the report
+``step_bound``     longest step it allows or advises [s] and why, in words; None where any will do
 ``check(particles, dt)``            raises InputError for what the filling cannot do
 ``divergence(code, particles, dt)`` what a code of ``health`` means, in words that follow "it", and
                                     a step that would do [s]
@@ -72,6 +73,7 @@ class Empty:
 
     label: ClassVar[str] = "empty"
     effects: ClassVar[tuple] = ()
+    step_bound: ClassVar[None] = None
     default_dt: ClassVar[float] = 1e-4
     capacity: ClassVar[int] = 0
     particle_mass: ClassVar[float] = 0.0
@@ -103,6 +105,7 @@ class RigidMass:
 
     label: ClassVar[str] = "rigid"
     effects: ClassVar[tuple] = ("fixed mass",)
+    step_bound: ClassVar[None] = None
     default_dt: ClassVar[float] = 1e-4
     capacity: ClassVar[int] = 1_000_000
 

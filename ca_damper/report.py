@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import asdict, dataclass
+from typing import Optional
 
 from taichi_dem.files import write_text
 
@@ -16,7 +17,10 @@ class Report:
     method: label of the filling. mount: "spring" or "base". effects: what the filling was asked to
     compute. acted: an ``EffectUse`` for each of them that can be counted, since the start.
     scenes: number; particles, dt_s: fewest and most. simulated_s: longest time of a scene
-    since its start. scene_steps, particle_steps: steps of all scenes, and times their particles.
+    since its start. step_bound: longest step [s] that the filling allows or advises, and why; None
+    where any does. momentum_error: momentum of the particles out of nothing, as a share of what
+    they and the container exchanged, of the worst scene.
+    scene_steps, particle_steps: steps of all scenes, and times their particles.
     container_evaluations: of the container's right-hand side since the start; 0 on the base.
     compile_seconds, run_seconds: cost.
     """
@@ -29,6 +33,8 @@ class Report:
     particles: tuple
     dt_s: tuple
     simulated_s: float
+    step_bound: Optional[tuple]
+    momentum_error: float
     scene_steps: int
     particle_steps: int
     container_evaluations: int
@@ -48,14 +54,23 @@ class Report:
         """Write all figures as JSON. Raises InputError when the file cannot be written."""
         write_text(path, json.dumps(self.as_dict(), indent=1))
 
+    def _bound_row(self):
+        """What bounds the step, and how near to it the run went."""
+        if self.step_bound is None:
+            return ()
+        most, why = self.step_bound
+        return (("step bound by", f"{why}: {most:.3g} s, {self.dt_s[1] / most:.2g} of it taken"),)
+
     def __str__(self):
-        """A table of seven lines, and one for each effect that acted."""
+        """A table of some nine lines, and one for each effect that acted."""
         rows = [
             ("method", f"{self.method}, container on the {self.mount}"),
             ("effects", ", ".join(self.effects) or "none"),
             *(("", f"{use.effect}: {use}") for use in self.acted),
             ("scenes", f"{self.scenes:,} with {_range(self.particles)} particles"),
             ("simulated", f"{self.simulated_s:.4g} s in steps of {_range(self.dt_s)} s"),
+            *self._bound_row(),
+            ("momentum error", f"{self.momentum_error:.2g} of what was exchanged"),
             ("steps", f"{self.scene_steps:,} of scenes, {self.particle_steps:,} of particles"),
             ("evaluations", f"{self.container_evaluations:,} of the container's motion"),
             (

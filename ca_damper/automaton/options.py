@@ -134,6 +134,11 @@ class Automaton:
         """Step that a particle at v_max would need for a whole cell [s]."""
         return self.width / self.v_max
 
+    @property
+    def step_bound(self):
+        """Longest step [s], and why."""
+        return self.longest_dt, "a cell crossed at v_max"
+
     def check(self, particles, dt):
         """InputError unless so many particles fit and the step is shorter than width / v_max."""
         whole("particles", particles, 0, self.capacity)

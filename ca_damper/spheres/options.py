@@ -127,6 +127,11 @@ class Spheres:
         duration = contact_duration(numbers["mass"], numbers["stiffness"], speed)
         return float(f"{duration / _STEPS_PER_CONTACT:.1e}")
 
+    @property
+    def step_bound(self):
+        """Step [s] to stay at or below, and why; see ``safe_step``."""
+        return self.safe_step(), "five steps in a contact"
+
     def bind(self, table):
         """The spheres on the device, for all scenes of a SceneTable."""
         return BoundSpheres(self, table)

@@ -1,0 +1,44 @@
+"""Account of the momentum along x that a filling and its container give each other."""
+
+import numpy as np
+import taichi as ti
+
+
+@ti.data_oriented
+class MomentumAccount:
+    """What fillings should have gained, less what they gave to the container and their weight.
+
+    Counted from the end of the first step, when all that is carried moves along.
+
+    weight: of a particle [N]. due: momentum that a filling should have [kg m/s]. late: part of it
+    that what is carried takes over at its next step [kg m/s]. exchanged: sum of the magnitudes of
+    what was given [N s].
+    """
+
+    def __init__(self, table, weight):
+        self.table, self.weight = table, ti.field(ti.f64, shape=())
+        self.weight[None] = weight
+        for name in ("due", "late", "exchanged"):
+            setattr(self, name, ti.field(ti.f64, shape=table.count))
+
+    @ti.func
+    def begin(self, s, momentum, late):
+        """The first step is over; what the filling has now is right."""
+        self.due[s], self.late[s], self.exchanged[s] = momentum + late, late, 0.0
+
+    @ti.func
+    def add(self, s, force, late):
+        """Book a step with a mean force [N] on the container."""
+        dt = self.table.dt[s]
+        self.due[s] = self.due[s] - (force + self.table.particles[s] * self.weight[None]) * dt
+        self.exchanged[s] = self.exchanged[s] + ti.abs(force) * dt
+        self.late[s] = late
+
+    def error(self, momentum):
+        """Momentum out of nothing as a share of what was exchanged, of the worst scene.
+
+        momentum: of the fillings, at the start of the last step for what is carried (scenes,).
+        """
+        missing = np.abs(momentum + self.late.to_numpy() - self.due.to_numpy())
+        exchanged = self.exchanged.to_numpy()
+        return float((missing / np.where(exchanged > 0.0, exchanged, np.inf)).max())

@@ -1,0 +1,59 @@
+"""What the report says of momentum and of the step: nothing comes from nowhere, or it is said."""
+
+import numpy as np
+import pytest
+
+from ca_damper import Automaton, Batch, Empty, RigidMass, SceneTable, Spheres
+from ca_damper.automaton.ledger import QUANTUM
+
+EPS = np.finfo(float).eps
+PARTICLES = (1, 40)
+
+
+def reported(filling, mount):
+    """Report of a few cycles of hard shaking, and momentum that rounding may lose, as a share."""
+    amplitude = 2e-3 if mount == "spring" else 20e-3
+    table = SceneTable(PARTICLES if filling.capacity else 0, 1, filling.default_dt, 6.0, amplitude)
+    batch = Batch(filling, table, mount=mount)
+    batch.start()
+    batch.run(3, 0)
+    exchanged = batch.account.exchanged.to_numpy()
+    steps = batch.coupling.step.to_numpy()
+    mass = table.column("particles") * filling.particle_mass
+    # The automaton rounds a particle's blow and its entries to half a quantum, at most three times
+    # a step; sums of n terms round by n eps of their magnitude, at most some m/s times the mass.
+    rounding = mass * 1.5 * QUANTUM * steps + 4.0 * EPS * steps * (exchanged + 10.0 * mass)
+    return batch.report(), float((rounding / np.maximum(exchanged, 1e-300)).max())
+
+
+@pytest.mark.parametrize("mount", ["spring", "base"])
+@pytest.mark.parametrize("filling", [RigidMass(), Automaton(), Spheres()], ids=lambda f: f.label)
+def test_what_filling_and_container_exchange_is_accounted_for(filling, mount):
+    """Momentum of the particles = -N m g t - what they gave to the container."""
+    report, rounding = reported(filling, mount)
+    assert report.momentum_error < rounding < 1e-8
+
+
+@pytest.mark.parametrize("accounting", ["landing", "landing+ejection"])
+def test_an_accounting_that_leaves_blows_out_is_found_out(accounting):
+    """What is left out is of the order of what is counted: no rounding."""
+    report, _ = reported(Automaton(accounting=accounting), "base")
+    assert report.momentum_error > 0.1
+    assert f"{report.momentum_error:.2g} of what was exchanged" in str(report)
+
+
+def test_nothing_to_exchange_is_no_error():
+    assert reported(Empty(), "spring")[0].momentum_error == 0.0
+    table = SceneTable(1, 1, 1e-4, 6.0, 1e-3)
+    assert Batch(Automaton(), table).report().momentum_error == 0.0
+
+
+def test_report_says_what_bounds_the_step():
+    """Width over v_max of the automaton, five steps in a contact of spheres, nothing of a mass."""
+    automaton = Automaton(width=6e-3, v_max=4.0)
+    table = SceneTable(1, 1, 1e-4, 6.0, 1e-3)
+    text = str(Batch(automaton, table).report())
+    assert "step bound by      a cell crossed at v_max: 0.0015 s, 0.067 of it taken" in text
+    text = str(Batch(Spheres(), SceneTable(1, 1, 2e-5, 6.0, 1e-3)).report())
+    assert f"five steps in a contact: {Spheres().safe_step():.3g} s" in text
+    assert "step bound by" not in str(Batch(RigidMass(), table).report())
