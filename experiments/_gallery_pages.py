@@ -225,11 +225,11 @@ PAGES = (
         PRICE,
         "Which scenes at the edge does each method bear, by what margin, and which does it "
         "decline?",
-        "A panel a case, a line a method. Titles say how many pass, and the worst margin: bound of "
-        "physics over figure. A panel of words is a refusal; numbers in its place would count as "
-        "failed.",
+        "A row a case, a mark a method: right of the line it stays within what physics allows, left "
+        "it declines in words; numbers in the place of a refusal would count as failed. The sheets "
+        "show what each case did.",
         "10 min on one",
-        ("hard_cases.png",),
+        ("hard_cases.png", "hard_cases_blast.png", "hard_cases_damper.png"),
         ("*",),
     ),
     Page(

@@ -29,6 +29,7 @@ from _cli import (
 )
 from _hard_cases import judge, named, registry
 from _hard_cases._case import FAILED, PASSED, REFUSED
+from _hard_cases.margins import picture_margins
 from ca_damper.progress import Progress
 from taichi_dem.files import output_folder, write_csv
 from taichi_dem.plot_style import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, SKY, picture
@@ -69,6 +70,7 @@ def run(options):
         seen = [result for result in results if result.package == package]
         path = os.path.join(options.out, f"hard_cases_{package}.png")
         picture_sheet(path, own, seen, options.columns)
+    picture_margins(os.path.join(options.out, "hard_cases.png"), results)
     figures = figures_of(cases, results)
     spent = time.perf_counter() - started
     write_summary(
@@ -154,6 +156,8 @@ def draw_case(axis, own, looks, size):
     lowest, highest = axis.get_ylim()
     if axis.get_yscale() == "linear" and 0.0 < lowest < 0.95 * highest:
         axis.set_ylim(0.0, highest)
+    if any(result.shown for result in own):
+        axis.locator_params(axis="x", nbins=5)
     axis.tick_params(labelsize=size)
     axis.xaxis.label.set_size(size)
     axis.yaxis.label.set_size(size)

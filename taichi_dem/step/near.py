@@ -13,8 +13,6 @@ from taichi_dem.types import mat3, real
 #: Squarings of the block of near contacts: tr(A^32)^(1/32) exceeds its largest eigenvalue by at
 #: most 6^(1/32), 6 %, and is never below it.
 SQUARINGS = 5
-#: Counts of pairs that have not been evaluated yet, see ``Near``.
-UNSEEN, FRESH = -1, -2
 
 
 @ti.func
@@ -37,9 +35,8 @@ class Near:
 
     A sphere pair counts from the moment at which it could touch within some steps of the finer of
     its bodies: it is evaluated once a step, and the coarser body is woken before the next time.
-    count: how many of the sphere pairs of a body pair count; UNSEEN for a pair that is new in the
-    list, FRESH for one that a break has given new spheres, until it is evaluated. paid: tick up
-    to which a pair has given its impulse.
+    count: how many of the sphere pairs of a body pair count. paid: tick up to which a pair has
+    given its impulse.
     """
 
     constant_fields = ("ahead", "root_mass", "root_inertia")
@@ -74,13 +71,21 @@ class Near:
         self.old_count[p], self.old_paid[p] = self.count[p], self.paid[p]
 
     @ti.func
-    def renew(self, p, old, fresh):
+    def renew(self, p, old):
         """Take it over for the pair at place p; old: its former place, -1 for none."""
-        self.count[p], self.paid[p] = UNSEEN, 0
+        self.count[p], self.paid[p] = 0, 0
         if old >= 0:
             self.paid[p], self.count[p] = self.old_paid[old], self.old_count[old]
-        if fresh != 0:
-            self.count[p] = FRESH
+
+    @ti.func
+    def within(self, p):
+        """How many of the sphere pairs of the pair at place p count now."""
+        i, j, near = self.contacts.pair_body[p][0], self.contacts.pair_body[p][1], 0
+        margin = self.margin(i, j)
+        for k in range(self.contacts.pair_first[p], self.contacts.pair_first[p + 1]):
+            a, b = self.contacts.pair_sphere[k][0], self.contacts.pair_sphere[k][1]
+            near += ti.cast(self.contacts.gap(i, j, a, b) < margin, ti.i32)
+        return near
 
     @ti.func
     def eigenvalue(self, i):

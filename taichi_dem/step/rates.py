@@ -9,7 +9,7 @@ import taichi as ti
 
 from taichi_dem.fields import then
 from taichi_dem.quality import dashpots_of, springs_of, subset_rates
-from taichi_dem.step.near import FRESH, Near
+from taichi_dem.step.near import Near
 from taichi_dem.step_control import (
     BOND_C,
     BOND_K,
@@ -130,26 +130,25 @@ class Rates:
             self.listed[ti.atomic_add(self.listed_count[None], 1)] = i
 
     @ti.func
-    def notice_pair(self, p, count):
+    def notice_pair(self, p, count, event: ti.template()):
         """Note how many contacts of a pair are near; list both bodies if that is news."""
         if count != self.near.count[p]:
-            event = HIT
-            if self.near.count[p] == FRESH:
-                event = RELEASE
             self.near.count[p] = count
             for side in ti.static(range(2)):
                 self.notice(self.contacts.pair_body[p][side], event)
 
     @ti.func
     def take_pair(self, p, old, fresh):
-        """Take over what is known of a pair from its former place; list both bodies if nothing."""
-        self.near.renew(p, old, fresh)
-        if self.near.count[p] < 0:
-            event = HIT
-            if fresh != 0:
-                event = RELEASE
-            for side in ti.static(range(2)):
-                self.notice(self.contacts.pair_body[p][side], event)
+        """Take over what is known of a pair from its former place.
+
+        What is new in the list is no news of itself: a search lists what may come near, and how far
+        it looks must not matter. Spheres that a break has just set free may touch already.
+        """
+        self.near.renew(p, old)
+        if fresh != 0:
+            self.notice_pair(p, self.near.within(p), RELEASE)
+        elif old < 0:
+            self.notice_pair(p, self.near.within(p), HIT)
 
     @ti.func
     def done(self):

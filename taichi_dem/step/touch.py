@@ -4,6 +4,7 @@ import taichi as ti
 
 from taichi_dem.physics.rotation import zero3
 from taichi_dem.physics.sphere_pair import meeting
+from taichi_dem.step.rates import HIT
 from taichi_dem.types import vec3
 
 
@@ -57,7 +58,7 @@ class Touch:
             self.contacts.pair_heat[p] += dt * vec3(dragged, rubbed, 0.0)
         self.contacts.deepest[p] = deepest
         if ti.static(self.has_rates):
-            self.rates.notice_pair(p, near)
+            self.rates.notice_pair(p, near, HIT)
 
     @ti.func
     def _limited(self, value, scale):

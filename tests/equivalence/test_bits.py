@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from taichi_dem import Multirate, Simulation, Uniform
+from taichi_dem import Multirate, Simulation, StepControl, Uniform
 from tests.scenes import ROOT, brisk_scene
 
 ENVIRONMENT = {**os.environ, "PYTHONPATH": ROOT}
@@ -74,6 +74,17 @@ def test_skin_changes_no_bit(held):
     thin, simulation = state_after(Multirate(**COARSE), skin=2e-5)
     assert simulation.searches > held[1].searches + 20
     assert differing(held[0], thin, MOTION) == []
+
+
+def test_skin_changes_no_bit_where_steps_depend_on_what_is_near():
+    """A pair is news when it comes near, not when a search lists it: the same limits, and wakes."""
+    control = StepControl(dashpot_floor=1e-8, level_jump=None)
+    method = Multirate(4e-8, 1e-6, control=control, dashpot="limited")
+    wide, simulation = state_after(method, steps=1500)
+    thin, other = state_after(method, steps=1500, skin=1e-4)
+    assert other.searches > 2 * simulation.searches
+    assert simulation.report().broken_faces > 100
+    assert differing(wide, thin, MOTION) == []
 
 
 @pytest.mark.slow
