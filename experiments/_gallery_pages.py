@@ -225,9 +225,9 @@ PAGES = (
         PRICE,
         "Which scenes at the edge does each method bear, by what margin, and which does it "
         "decline?",
-        "A row a case, a mark a method: right of the line it stays within what physics allows, left "
-        "it declines in words; numbers in the place of a refusal would count as failed. The sheets "
-        "show what each case did.",
+        "A row a case, a mark a method: right of the line it stays within what physics allows, "
+        "left it declines in words; numbers in the place of a refusal would count as failed. The "
+        "sheets show what each case did.",
         "10 min on one",
         ("hard_cases.png", "hard_cases_blast.png", "hard_cases_damper.png"),
         ("*",),
