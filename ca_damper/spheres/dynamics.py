@@ -54,7 +54,7 @@ class BoundSpheres:
     def __init__(self, options, table):
         self.table = table
         self.bodies = Bodies(options, table)
-        self.law = ContactLaw(options.damping)
+        self.law, self.rubs = ContactLaw(options.damping), options.rubs
         self.rotation = Rotation() if options.rotation else NoRotation()
         self.search = make_search(options.search, options.radius)
         self.crushed = ti.field(ti.i32, shape=table.count)
@@ -118,23 +118,19 @@ class BoundSpheres:
         square = branch.norm_sqr()
         if square < contact.reach * contact.reach:
             distance = ti.sqrt(square)
-            normal, tangent, approach, slip = self._meeting(i, j, branch, distance)
-            push = self.law.normal(contact, contact.reach - distance, approach)
-            drag = self.law.friction(contact, push, slip)
-            force = drag * tangent - push * normal
+            normal = branch * (1.0 / distance)
+            relative = self.bodies.velocity[i] - self.bodies.velocity[j]
+            push = self.law.normal(contact, contact.reach - distance, relative.dot(normal))
+            force = -push * normal
+            if ti.static(self.rubs):
+                tangent, lever = vec2(-normal[1], normal[0]), 0.5 * distance
+                slip = self.rotation.slip_of_pair(i, j, lever, relative.dot(tangent))
+                drag = self.law.friction(contact, push, slip)
+                force += drag * tangent
+                self.rotation.twist(i, lever * drag)
+                self.rotation.twist(j, lever * drag)
             self.bodies.push(i, force)
             self.bodies.push(j, -force)
-            self.rotation.twist(i, 0.5 * distance * drag)
-            self.rotation.twist(j, 0.5 * distance * drag)
-
-    @ti.func
-    def _meeting(self, i, j, branch, distance):
-        """Normal, tangent, approach [m/s] and slip [m/s] of two spheres that touch."""
-        normal = branch * (1.0 / distance)
-        tangent = vec2(-normal[1], normal[0])
-        relative = self.bodies.velocity[i] - self.bodies.velocity[j]
-        slip = self.rotation.slip_of_pair(i, j, 0.5 * distance, relative.dot(tangent))
-        return normal, tangent, relative.dot(normal), slip
 
     @ti.func
     def _advance(self, s, dt, floor, speed):
@@ -173,13 +169,15 @@ class BoundSpheres:
     @ti.func
     def _wall(self, i, contact, normal, overlap, relative):
         """Force of the wall that lies along ``normal`` on sphere i [N]."""
-        tangent = vec2(-normal[1], normal[0])
-        lever = contact.reach - overlap
-        slip = self.rotation.slip_at_wall(i, lever, relative.dot(tangent))
         push = self.law.normal(contact, overlap, relative.dot(normal))
-        drag = self.law.friction(contact, push, slip)
-        self.rotation.twist(i, lever * drag)
-        return drag * tangent - push * normal
+        force = -push * normal
+        if ti.static(self.rubs):
+            tangent, lever = vec2(-normal[1], normal[0]), contact.reach - overlap
+            slip = self.rotation.slip_at_wall(i, lever, relative.dot(tangent))
+            drag = self.law.friction(contact, push, slip)
+            self.rotation.twist(i, lever * drag)
+            force += drag * tangent
+        return force
 
     @ti.func
     def energy(self, s):
@@ -267,12 +265,16 @@ class BoundSpheres:
         if distance < 0.5 * contact.reach:
             self.crushed[s] = 1
         if distance < contact.reach:
-            _, _, approach, slip = self._meeting(i, j, branch, distance)
-            overlap = contact.reach - distance
+            normal = branch * (1.0 / distance)
+            relative = self.bodies.velocity[i] - self.bodies.velocity[j]
+            approach, overlap, rubbed = relative.dot(normal), contact.reach - distance, 0.0
             push = self.law.normal(contact, overlap, approach)
-            drag = self.law.friction(contact, push, slip)
+            if ti.static(self.rubs):
+                along = relative.dot(vec2(-normal[1], normal[0]))
+                slip = self.rotation.slip_of_pair(i, j, 0.5 * distance, along)
+                rubbed = -self.law.friction(contact, push, slip) * slip
             dragged = (push - self.law.elastic(contact, overlap)) * approach
-            self.acted.touch(s, dragged, -drag * slip)
+            self.acted.touch(s, dragged, rubbed)
 
     def uses(self, effects):
         """What each of the named effects did."""

@@ -82,10 +82,14 @@ class Spheres:
             object.__setattr__(self, "start", self._checked_start())
 
     @property
+    def rubs(self):
+        """Whether there is any friction; without it none is compiled."""
+        return self.friction > 0.0 or self.wall_friction > 0.0
+
+    @property
     def effects(self):
         """What is computed, in words for the report."""
-        rough = self.friction > 0.0 or self.wall_friction > 0.0
-        asked = {"friction": rough, "rotation": self.rotation}
+        asked = {"friction": self.rubs, "rotation": self.rotation}
         return ("normal contact", *(name for name, there in asked.items() if there))
 
     @property

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+import taichi as ti
 
 from ca_damper.spheres import Spheres
+from ca_damper.spheres.contact_law import ContactLaw
 from tests.ca_spheres.rig import Rig
 
 G, MU, DT, RADIUS, MASS = 9.8, 0.5, 2e-5, 3e-3, 0.2e-3
@@ -131,3 +133,22 @@ def test_turning_spheres_keep_their_energy_without_friction():
     # After a contact the leapfrog is back at its energy but for the onset, d^(3/2): below h^2.
     assert rig.run(6000).energy() == pytest.approx(before, rel=(1e-6 / 4.6e-5) ** 2)
     assert np.all(rig.bound.snapshot(0)["spin"] == 0.0)
+
+
+def test_smooth_spheres_compile_no_friction_and_keep_their_bits(monkeypatch):
+    """A coefficient that rounds every force to zero computes friction, and changes no bit."""
+    nearly = Rig(Spheres(friction=0.0, wall_friction=5e-324), 40, DT, frequency=8.0, amplitude=0.02)
+
+    @ti.func
+    def forbidden(self, contact, push, slip):
+        ti.static_assert(False, "friction was compiled")
+
+    monkeypatch.setattr(ContactLaw, "friction", forbidden)
+    smooth = Rig(Spheres(friction=0.0, wall_friction=0.0), 40, DT, frequency=8.0, amplitude=0.02)
+    states = smooth.run(5000).state()
+    monkeypatch.undo()
+    for given, expected in zip(states, nearly.run(5000).state()):
+        assert np.array_equal(given, expected)
+    with pytest.raises(ti.TaichiCompilationError, match="friction was compiled"):
+        monkeypatch.setattr(ContactLaw, "friction", forbidden)
+        Rig(Spheres(), 2, DT).run(1)
