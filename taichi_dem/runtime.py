@@ -92,7 +92,7 @@ def settings():
 
 
 def _checked(arch, threads, debug):
-    if arch not in ARCHITECTURES:
+    if not isinstance(arch, str) or arch not in ARCHITECTURES:
         raise InputError(f"arch must be one of {', '.join(ARCHITECTURES)}, got {arch!r}")
     cores = os.cpu_count() or 1
     if hasattr(os, "sched_getaffinity"):
@@ -100,7 +100,9 @@ def _checked(arch, threads, debug):
     count = cores if threads is None else threads
     if not isinstance(count, int) or isinstance(count, bool) or not 1 <= count <= 1024:
         raise InputError(f"threads must be a whole number from 1 to 1024, got {threads!r}")
-    return Settings(arch, count, bool(debug))
+    if not isinstance(debug, bool):
+        raise InputError(f"debug must be True or False, got {debug!r}")
+    return Settings(arch, count, debug)
 
 
 def _initialise(wanted):

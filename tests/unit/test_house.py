@@ -41,7 +41,7 @@ LAYERS = {
     ),
     "ca_damper": (
         ("errors", "random_numbers", "lattice", "table", "progress", "measures", "report"),
-        ("filling", "rk45", "oscillator", "clock", "record"),
+        ("filling", "rk45", "oscillator", "clock", "record", "checks"),
         ("container", "automaton", "spheres"),
         ("coupling",),
         ("batch", "needed_effects"),
