@@ -90,9 +90,10 @@ def choice(name, value, allowed):
 
 def choices(name, values, allowed):
     """Words as a tuple; InputError unless they are a list or tuple of words allowed."""
-    if not isinstance(values, (list, tuple)):
+    several = isinstance(values, (list, tuple))
+    if not several or not all(isinstance(v, str) and v in tuple(allowed) for v in values):
         raise InputError(f"{name} must be a tuple out of {', '.join(allowed)}, got {shown(values)}")
-    return tuple(choice(name, value, allowed) for value in values)
+    return tuple(values)
 
 
 def word(name, value):

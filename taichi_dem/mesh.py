@@ -107,11 +107,11 @@ def _checked_points(points):
         raise InputError("points must be an array of numbers, shape (n, 3)")
     if points.ndim != 2 or points.shape[1] != 3:
         raise InputError(f"points must have shape (n, 3), got {points.shape}")
-    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    bad = np.flatnonzero(~(np.abs(points) <= _MOST_EXTENT).all(axis=1))
     if len(bad):
         raise InputError(
-            f"points must be finite, but {len(bad)} are not, the first is number {bad[0]}: "
-            f"{points[bad[0]].tolist()}"
+            f"points must be finite, within {_MOST_EXTENT:g} m, but {len(bad)} are not, the first "
+            f"is number {bad[0]}: {points[bad[0]].tolist()}"
         )
     return points
 
@@ -180,13 +180,10 @@ def _without_loose_points(points, tetrahedra, groups, notes):
 
 
 def _refuse_extent(points):
-    """Refuse a mesh so large or small that its inertia is no number any more."""
+    """Refuse a mesh so small that its inertia falls to zero."""
     extent = np.ptp(points, axis=0).max()
-    if not _LEAST_EXTENT <= extent <= _MOST_EXTENT or np.abs(points).max() > _MOST_EXTENT:
-        raise InputError(
-            f"points must span {_LEAST_EXTENT:g} to {_MOST_EXTENT:g} m and lie within the latter, "
-            f"got {extent:.3g} m around {points[0].tolist()}"
-        )
+    if extent < _LEAST_EXTENT:
+        raise InputError(f"points must span at least {_LEAST_EXTENT:g} m, got {extent:.3g} m")
 
 
 def _refuse_coincident(points):

@@ -15,10 +15,16 @@ from taichi_dem.checks import path_name, positive
 from taichi_dem.errors import InputError
 from taichi_dem.files import renamed_when_done, write_text
 from taichi_dem.mesh import Mesh, checked_mesh
+from taichi_dem.time_limit import within
 
 #: Cell types of meshio that are read, with the number of their corner points.
 _TETRAHEDRA = {"tetra": 4, "tetra10": 4}
 _TRIANGLES = {"triangle": 3, "triangle6": 3}
+
+#: Time that a reader may take [s], and what it reads at the slowest [byte/s]: some of meshio's wait
+#: for ever for the rest of a file that was cut off.
+_PATIENCE_S = 20.0
+_SLOWEST_BYTES_PER_S = 1e5
 
 
 def read_mesh(path, *, scale=1.0, weld_tolerance=0.0) -> Mesh:
@@ -98,9 +104,11 @@ def _read_raw(path):
         problem = "is a folder" if os.path.isdir(path) else problem
         raise InputError(f"mesh file {path} {problem}")
     said = io.StringIO()
+    seconds = _PATIENCE_S + os.path.getsize(path) / _SLOWEST_BYTES_PER_S
+    sentence = f"its reader found no end in {seconds:.3g} s, as in a file that was cut off"
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-            return meshio.read(path)
+            return within(seconds, lambda: meshio.read(path), sentence)
     except (Exception, SystemExit) as error:  # meshio raises anything, and exits on some files
         reason = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"mesh file {path} cannot be read: {reason}") from None

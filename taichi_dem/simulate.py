@@ -152,7 +152,7 @@ def _opened(scene, method, checkpoint, resume, last):
     if checkpoint is not None:
         # Before anything dear is done: too many of them are refused.
         checkpoint.marks(last, method.dt0)
-    begin = int(arrays["field/state.tick"]) if arrays else 0
+    begin = int(np.asarray(arrays.get("field/state.tick", 0)).max(initial=0)) if arrays else 0
     if begin > last * MACRO_TICKS:
         seconds = method.dt0 / MACRO_TICKS
         raise InputError(

@@ -1,0 +1,104 @@
+"""Small scenes of both packages with Taichi's checks on: no kernel reaches beyond a field.
+
+``make test-bounds`` runs this file alone. A release kernel that reads beyond a field says nothing.
+"""
+
+import numpy as np
+import pytest
+import taichi as ti
+
+from ca_damper import Automaton, Batch, RigidMass, SceneTable, Spheres
+from taichi_dem import CONCRETE, Multirate, Scene, Simulation, effects, runtime
+from taichi_dem.mesh_shapes import bar, single
+from taichi_dem.record import Recorder
+from taichi_dem.timeline import MACRO_TICKS
+from tests.bar_blast import METHODS, squeezed_scene
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module", autouse=True)
+def taichi_session():
+    """In place of the other tests' session: one that checks bounds."""
+    runtime.stop()
+    runtime.start(threads=2, debug=True)
+    yield
+    runtime.stop()
+
+
+@ti.kernel
+def _beyond(field: ti.template(), k: ti.i32) -> ti.f64:
+    return field[k]
+
+
+def test_a_place_beyond_a_field_is_noticed():
+    """Or else all that follows here would show nothing."""
+    field = ti.field(ti.f64, shape=3)
+    assert _beyond(field, 2) == 0.0
+    with pytest.raises(AssertionError, match=r"Accessing field .* of size \(3\) with indices \(3\)"):
+        _beyond(field, 3)
+
+
+BLASTS = {
+    **{f"{name} {driver}": (METHODS[name], driver) for name in METHODS for driver in ("resident",)},
+    "controlled parallel": (METHODS["controlled"], "parallel"),
+    "implicit parallel": (METHODS["implicit"], "parallel"),
+    "drifted": (Multirate(8e-8, 1e-7, "drifted"), "resident"),
+}
+
+
+@pytest.mark.parametrize("name", BLASTS)
+def test_a_blast_stays_within_its_fields(name):
+    """The bar breaks at one end from 1e-5 s on, and what broke is driven together at 7e-5 s."""
+    method, driver = BLASTS[name]
+    simulation = Simulation(squeezed_scene(), method, driver)
+    recorder = Recorder(simulation, "left")
+    simulation.start()
+    steps = round(8e-5 / method.dt0)
+    simulation.advance_to(steps)
+    recorder.sample()
+    recorder.snapshot()
+    assert simulation.state.tick[None] == steps * MACRO_TICKS
+    assert simulation.report().broken_faces > 0
+    assert simulation.searches > 1
+
+
+@pytest.mark.parametrize("mesh", [single(), bar(0.1, 0.05, (2, 1, 1))], ids=["one body", "bar"])
+def test_loads_and_supports_stay_within_their_fields(mesh):
+    """Also where there is no bond at all."""
+    group = sorted(mesh.groups)[0]
+    listed = [effects.Gravity(), effects.Fixed(group), effects.Softening(), effects.ShearSlip()]
+    contact = effects.SphereContact(outer_faces=True)
+    scene = Scene(mesh, CONCRETE, [*listed, contact, effects.BondDamping()])
+    simulation = Simulation(scene, METHODS["controlled"])
+    simulation.advance_to(50)
+    assert np.isfinite(simulation.state.position.to_numpy()).all()
+
+
+FILLINGS = {
+    "automaton": (Automaton(ledger=False), 1e-3),
+    "scan": (Automaton(traversal="scan", accounting="landing", ledger=True), 1e-3),
+    "one sided": (Automaton(pair_rule="one_sided", accounting="landing+ejection"), 1e-3),
+    "named cells": (Automaton(start=[(0, 0), (9, 15), (4, 7)]), 1e-3),
+    "one cell": (Automaton(columns=1, rows=1), 1e-3),
+    "spheres": (Spheres(), 1e-4),
+    "turning spheres": (Spheres(rotation=True, search="all_pairs"), 1e-4),
+    "one sphere": (Spheres(width=6e-3, height=6e-3), 1e-4),
+    "rigid": (RigidMass(), 1e-3),
+}
+
+
+@pytest.mark.parametrize("name", FILLINGS)
+def test_a_shaken_filling_stays_within_its_fields(name):
+    """Empty, nearly empty and full boxes, shaken over five cycles by four of gravity."""
+    filling, dt = FILLINGS[name]
+    most = min(filling.capacity, 160)
+    counts = [0, 1, most // 2, most]
+    if getattr(filling, "start", None) is not None:
+        counts = [len(filling.start)]
+    table = SceneTable(counts, range(1, 1 + len(counts)), dt, 8.0, 4.0 * 10.0 / 50.0**2)
+    batch = Batch(filling, table, mount="base", measured_cycles=2)
+    batch.start("rigid")
+    cycles = batch.run(3, 2)
+    assert np.isfinite(cycles.record).all()
+    assert all(np.isfinite(batch.snapshot(s)["position"]).all() for s in range(batch.count))
