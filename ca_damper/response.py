@@ -8,6 +8,7 @@ import numpy as np
 
 from ca_damper.batch import Batch
 from ca_damper.checks import check_run
+from ca_damper.clock import steps_per_cycle
 from ca_damper.filling import check_filling
 from ca_damper.measures import peak
 from ca_damper.oscillator import Oscillator
@@ -127,7 +128,7 @@ def frequency_response(
 
 
 class Grid:
-    """The checked axes of a response: particle numbers, frequency ratios, seeds."""
+    """The checked axes of a response: particle numbers, frequency ratios, seeds, and the step."""
 
     def __init__(self, filling, particles, ratios, seeds, oscillator, dt):
         self.filling = check_filling(filling)
@@ -146,6 +147,14 @@ class Grid:
             raise InputError(
                 f"particles x ratios x seeds must make at most {_MOST_SCENES} scenes, got {scenes}"
             )
+        self._check_steps()
+
+    def _check_steps(self):
+        """InputError for a step that fits no cycle, or that the filling refuses."""
+        for frequency in self.ratios * self.oscillator.natural_frequency:
+            dt = 1.0 / (frequency * steps_per_cycle(float(frequency), self.dt))
+            for particles in self.particles:
+                self.filling.check(particles, float(dt))
 
     def _particles(self, name, value):
         return whole(name, value, 0, self.filling.capacity)

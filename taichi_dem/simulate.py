@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from taichi_dem.checkpoint import digest, version_text
+from taichi_dem.checkpoint import Checkpoint, digest, version_text
 from taichi_dem.checks import callback, instance, shown
 from taichi_dem.errors import InputError, SimulationDiverged
 from taichi_dem.files import output_folder, write_csv, write_text
@@ -148,10 +148,10 @@ def simulate(
 
 def _opened(scene, method, checkpoint, resume, last):
     """What a run goes on from, arrays by name, or None; InputError for what it cannot."""
-    arrays = opened(checkpoint, resume, lambda: identity_of(scene, method))
-    if checkpoint is not None:
-        # Before anything dear is done: too many of them are refused.
+    if isinstance(checkpoint, Checkpoint):
+        # Refuses too many of them, before anything is done.
         checkpoint.marks(last, method.dt0)
+    arrays = opened(checkpoint, resume, lambda: identity_of(scene, method))
     begin = int(np.asarray(arrays.get("field/state.tick", 0)).max(initial=0)) if arrays else 0
     if begin > last * MACRO_TICKS:
         seconds = method.dt0 / MACRO_TICKS
