@@ -12,7 +12,8 @@ from taichi_dem import CONCRETE, Multirate, Scene, Simulation, Uniform, effects,
 from taichi_dem.mesh_shapes import bar, single
 from taichi_dem.record import Recorder
 from taichi_dem.timeline import MACRO_TICKS
-from tests.bar_blast import METHODS, squeezed_scene
+from tests.bar_blast import METHODS
+from tests.scenes import paper_effects
 
 pytestmark = pytest.mark.slow
 
@@ -44,38 +45,41 @@ def test_a_place_beyond_a_field_is_noticed():
 CONTROLLED = METHODS["controlled"]
 DRIFTED = Multirate(8e-8, 1e-5, "drifted", CONTROLLED.control, "limited")
 BLASTS = {
-    "uniform": (Uniform(4e-8, 4e-7, dashpot="limited"), "resident"),
+    "implicit": (METHODS["implicit"], "resident"),
     "multirate": (CONTROLLED, "parallel"),
     "drifted": (DRIFTED, "resident"),
-    "implicit": (METHODS["implicit"], "resident"),
+    "uniform": (Uniform(4e-8, dashpot="limited"), "resident"),
 }
+
+
+def blown_bar():
+    """Twelve bodies with all effects, under gas that breaks a bond by 2.4e-5 s; all have spheres."""
+    gas = effects.GasPressure("left", peak=5e9, rise=5e-6)
+    listed = [*paper_effects(outer_faces=True)[:-1], gas, effects.Gravity(), effects.Fixed("right")]
+    return Scene(bar(0.1, 0.05, (2, 1, 1)), CONCRETE, listed)
 
 
 @pytest.mark.parametrize("name", BLASTS)
 def test_a_blast_stays_within_its_fields(name):
-    """The bar is blown at one end: bonds break, and what broke touches, within 5.6e-5 s."""
+    """Bonds are released, what broke is searched for contacts and touches, rows are written."""
     method, driver = BLASTS[name]
-    simulation = Simulation(squeezed_scene(), method, driver)
+    simulation = Simulation(blown_bar(), method, driver)
     recorder = Recorder(simulation, "left")
     simulation.start()
-    steps = round(5.6e-5 / method.dt0)
+    steps = round(4e-5 / method.dt0)
     simulation.advance_to(steps)
     recorder.sample()
     recorder.snapshot()
+    report = simulation.report()
     assert simulation.state.tick[None] == steps * MACRO_TICKS
-    assert simulation.report().broken_faces > 0
-    assert simulation.searches > 1
-    assert simulation.report().pair_evaluations > 0
+    assert report.broken_faces > 0
+    assert report.pair_evaluations > 0
 
 
-@pytest.mark.parametrize("mesh", [single(), bar(0.1, 0.05, (2, 1, 1))], ids=["one body", "bar"])
-def test_loads_and_supports_stay_within_their_fields(mesh):
-    """Also where there is no bond at all."""
-    group = sorted(mesh.groups)[0]
-    listed = [effects.Gravity(), effects.Fixed(group), effects.Softening(), effects.ShearSlip()]
-    contact = effects.SphereContact(outer_faces=True)
-    scene = Scene(mesh, CONCRETE, [*listed, contact, effects.BondDamping()])
-    simulation = Simulation(scene, METHODS["controlled"])
+def test_a_body_without_bonds_stays_within_its_fields():
+    """Lists and tables of nothing."""
+    scene = Scene(single(), CONCRETE, [effects.Softening(), effects.SphereContact()])
+    simulation = Simulation(scene, CONTROLLED)
     simulation.advance_to(50)
     assert np.isfinite(simulation.state.position.to_numpy()).all()
 

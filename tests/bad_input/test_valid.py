@@ -45,8 +45,8 @@ def materials(draw):
         normal_damping=draw(st.just(0.0) | logarithmic(3, 7)),
         shear_damping=draw(st.just(0.0) | logarithmic(3, 7)),
         tensile_strength=strength,
-        cohesion=strength * draw(st.floats(0.0, 3.0)),
-        friction=draw(st.floats(0.0, 2.0)),
+        cohesion=strength * draw(st.just(0.0) | st.floats(0.01, 3.0)),
+        friction=draw(st.just(0.0) | st.floats(0.01, 2.0)),
         fracture_energy=least * draw(st.floats(1.1, 100.0)),
         contact_stiffness=draw(logarithmic(6, 10)),
         contact_damping=draw(st.just(0.0) | logarithmic(1, 6)),
@@ -122,7 +122,7 @@ def tables(draw, capacity, step):
             column(st.floats(0.05, 1.0)),
             column(st.floats(50.0, 500.0)),
             column(st.floats(0.001, 0.5)),
-            column(st.floats(0.0, 1e-3)),
+            column(st.just(0.0) | st.floats(1e-6, 1e-3)),
         )
     ]
     frequency = [draw(st.floats(0.5, 1.5)) * o.natural_frequency for o in structures]
@@ -141,10 +141,10 @@ automata = st.builds(
     accounting=st.sampled_from(["landing", "landing+ejection", "static"]),
     restitution=st.floats(0.0, 1.0),
     wall_restitution=st.floats(0.0, 1.0),
-    static_threshold=st.floats(0.0, 10.0),
+    static_threshold=st.just(0.0) | st.floats(0.1, 10.0),
     columns=st.integers(1, 8),
     rows=st.integers(1, 8),
-    gravity=st.floats(0.0, 20.0),
+    gravity=st.just(0.0) | st.floats(0.1, 20.0),
     v_max=st.floats(3.0, 20.0),
 )
 spheres = st.builds(
@@ -152,7 +152,7 @@ spheres = st.builds(
     damping=st.sampled_from(["tsuji", "printed"]),
     restitution=st.floats(0.3, 1.0),
     wall_restitution=st.floats(0.3, 1.0),
-    friction=st.floats(0.0, 1.0),
+    friction=st.just(0.0) | st.floats(0.01, 1.0),
     young=logarithmic(6, 8),
     wall_young=logarithmic(6, 8),
     poisson=st.floats(0.0, 0.5),
@@ -164,7 +164,7 @@ spheres = st.builds(
 FILLINGS = {
     "automaton": (automata, lambda filling: 1e-4),
     "spheres": (spheres, lambda filling: 0.5 * filling.safe_step()),
-    "rigid": (st.builds(RigidMass, logarithmic(-6, -2), st.floats(0.0, 20.0)), lambda f: 1e-3),
+    "rigid": (st.builds(RigidMass, logarithmic(-6, -2), st.floats(0.1, 20.0)), lambda f: 1e-3),
 }
 
 
