@@ -53,7 +53,7 @@ BLASTS = {
 
 
 def blown_bar():
-    """Twelve bodies with all effects, under gas that breaks a bond by 2.4e-5 s; all have spheres."""
+    """Twelve bodies with all effects, spheres on all faces, under gas that breaks a bond."""
     gas = effects.GasPressure("left", peak=5e9, rise=5e-6)
     listed = [*paper_effects(outer_faces=True)[:-1], gas, effects.Gravity(), effects.Fixed("right")]
     return Scene(bar(0.1, 0.05, (2, 1, 1)), CONCRETE, listed)
