@@ -214,7 +214,7 @@ DAMPERS = {
     "too many": (lambda: Batch(RigidMass(), table(particles=10**6 + 1)), "from 0 to 1000000"),
     "automaton full": (lambda: Batch(Automaton(), table(particles=161)), "from 0 to 160"),
     "places": (
-        lambda: Batch(Automaton(columns=62, rows=62), table(particles=np.zeros(9000, int))),
+        lambda: Batch(Automaton(columns=61, rows=61), table(particles=np.zeros(9000, int))),
         "scenes x places for particles must be at most 33554432",
     ),
     "start": (lambda: batch().start("moving"), "start must be one of"),
