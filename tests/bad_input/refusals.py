@@ -13,7 +13,7 @@ from taichi_dem import InputError
 from taichi_dem.checks import shown
 
 #: The same examples at every run, none of them kept in a folder.
-steady = settings(derandomize=True, database=None, deadline=None, max_examples=10)
+steady = settings(derandomize=True, database=None, deadline=None, max_examples=6)
 
 
 class Endless(Exception):

@@ -87,7 +87,10 @@ def methods(step):
     }
 
 
-@pytest.mark.parametrize("name", ["uniform", "multirate", "limited", "implicit"])
+SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in ("multirate", "limited", "implicit")]
+
+
+@pytest.mark.parametrize("name", ["uniform", *SLOW])
 def test_valid_scenes_run_and_stay_finite(name):
     """Twenty steps of a bar in one piece under gas and gravity, its left end held."""
 
