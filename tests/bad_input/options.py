@@ -112,7 +112,7 @@ BLAST = [
     *taken(ImplicitDashpots, "share", ("theta",)),
     *taken(ImplicitDashpots, "three numbers", ("sweeps",), ((1, 2),)),
     *taken(StepControl, "positive", ("safety", "angle", "ahead")),
-    *taken(StepControl, "zero or positive", ("dashpot_floor",), (1e-61, 5e-324)),
+    *taken(StepControl, "up to one", ("dashpot_floor",)),
     *taken(StepControl, "whole", ("level_jump",), (None,)),
     *taken(StepControl, "words", ("criteria", "wake"), ([],)),
     *taken(effects.GasPressure, "positive", ("peak", "rise", "decay_ratio")),

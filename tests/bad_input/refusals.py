@@ -69,6 +69,7 @@ WRONG = {
     "positive": [*_NO_SIZE, 0, 0.0, -0.0],
     "zero or positive": _NO_SIZE,
     "share": [*_NO_FLOAT, -1e-9, 1.0 + 1e-9, 2],
+    "up to one": [*_NO_FLOAT, -1, -1e-300, 1.5, 1e61],
     "poisson": [*_NO_FLOAT, -1, -1.5, 0.51, 2],
     "whole": [*_NO_FLOAT, 1.5, 2.0, -1, 2**70],
     "word": _NO_WORD,
