@@ -22,10 +22,10 @@ ifeq ($(strip $(HOME)),)
 export HOME := $(CURDIR)/.venv/home
 endif
 
-.PHONY: help venv demo test test-slow lint bench gallery api mesh clean
+.PHONY: help venv demo test test-slow test-bounds lint bench gallery api mesh clean
 
 help: ## print this list
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-9s %s\n", $$1, $$2}' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-11s %s\n", $$1, $$2}' Makefile
 
 venv: $(STAMP) ## set up .venv (about a minute; done by itself where needed)
 
@@ -37,6 +37,9 @@ test: $(STAMP) ## run the tests that a change must pass
 
 test-slow: $(STAMP) ## run those that take longer
 	$(BIN)/python $(TEST) -m slow $(TEST_OPTIONS)
+
+test-bounds: $(STAMP) ## run small scenes with every access to a field checked (also in test-slow)
+	$(BIN)/python -m pytest -q tests/bad_input/test_bounds.py $(TEST_OPTIONS)
 
 lint: $(STAMP) ## check style and format
 	$(BIN)/python -m ruff check .

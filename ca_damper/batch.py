@@ -12,29 +12,29 @@ import taichi as ti
 
 from ca_damper import measures
 from ca_damper.account import MomentumAccount
+from ca_damper.checks import MOST_CYCLES, STARTS, check_record_fits, for_all
 from ca_damper.clock import Clock, steps_per_cycle
 from ca_damper.container import DrivenContainer, SprungContainer
 from ca_damper.coupling import LOST, Coupling
 from ca_damper.errors import SimulationDiverged
+from ca_damper.filling import check_filling
 from ca_damper.oscillator import Oscillator
 from ca_damper.progress import Progress
 from ca_damper.report import RK45_STAGES, Report
+from ca_damper.table import SceneTable
 from taichi_dem import runtime
 from taichi_dem.checkpoint import version_text
-from taichi_dem.checks import choice, positive, whole
+from taichi_dem.checks import choice, instance, positive, whole
 from taichi_dem.errors import InputError
 from taichi_dem.fields import check_room
 from taichi_dem.restart import Keeper, NoKeeper, Saved, opened
 
 MOUNTS = ("spring", "base")
-STARTS = ("rest", "empty", "rigid")
 
 #: A launch is kept near this long [s].
 LAUNCH_SECONDS = 0.15
 _MOST_STEPS = 2**31 - 1
 _LOST_IN_WORDS = "lost its container, whose motion is no finite number"
-#: Largest field of measured sums: 1 GiB, half of what Taichi can count.
-_MOST_NUMBERS = 2**27
 _STRUCTURE = ("mass", "stiffness", "damping", "base_amplitude")
 
 
@@ -51,9 +51,12 @@ class Batch:
 
     def __init__(self, filling, table, *, mount="spring", measured_cycles=1, rtol=1e-9, atol=1e-12):
         self.generation = runtime.generation()
+        check_filling(filling)
+        instance("table", table, SceneTable)
         check_room()
         choice("mount", mount, MOUNTS)
         self.measured_cycles = whole("measured_cycles", measured_cycles, 0, 100_000)
+        check_record_fits(table.count, self.measured_cycles)
         positive("rtol", rtol, zero_allowed=True)
         positive("atol", atol)
         self.filling, self.table, self.count, self.mount = filling, table, table.count, mount
@@ -65,7 +68,6 @@ class Batch:
         if mount == "spring":
             container = SprungContainer(table, self.clock, filling.gravity, rtol, atol)
         self.bound = filling.bind(table)
-        _check_record_fits(self.count * max(1, self.measured_cycles) * len(measures.COLUMNS))
         self.account = MomentumAccount(table, filling.particle_mass * filling.gravity)
         self.coupling = Coupling(
             *(table, self.clock, container, self.bound, self.account),
@@ -101,7 +103,7 @@ class Batch:
         The base keeps its place and changes its speed. Raises InputError within a cycle.
         """
         self._check_cycle_is_full()
-        before, frequency = self.time_s, np.broadcast_to(frequency, self.count)
+        before, frequency = self.time_s, for_all("frequency", frequency, self.count)
         self._set_pace(frequency, self._fit_steps(frequency))
         self.coupling.renew()
         self.time_origin += before - self.time_s
@@ -113,7 +115,7 @@ class Batch:
         Raises InputError for numbers of cycles that are none, or within a cycle;
         SimulationDiverged.
         """
-        transient = whole("transient_cycles", transient_cycles, 0, 10_000_000)
+        transient = whole("transient_cycles", transient_cycles, 0, MOST_CYCLES)
         measured = whole("measured_cycles", measured_cycles, 0, self.measured_cycles)
         self._check_started()
         if not self.going_on:
@@ -131,10 +133,7 @@ class Batch:
         Raises InputError unless they are whole numbers from zero, SimulationDiverged.
         """
         self._check_started()
-        steps = np.asarray(steps)
-        if steps.dtype.kind not in "iu" or (steps < 0).any():
-            raise InputError(f"steps must be whole numbers from 0, got {steps.tolist()}")
-        steps = np.broadcast_to(steps.astype(np.int64), self.count)
+        steps = for_all("steps", steps, self.count, _MOST_STEPS).astype(np.int64)
         self._go(steps, steps, progress)
 
     @property
@@ -157,7 +156,7 @@ class Batch:
     def snapshot(self, s):
         """Positions and velocities of the particles of scene s, as the filling gives them."""
         self._check_started()
-        return self.bound.snapshot(s)
+        return self.bound.snapshot(whole("s", s, 0, self.count - 1))
 
     def attempts(self):
         """Steps that RK45 has tried since the start, (scenes,); one a step unless some failed."""
@@ -367,14 +366,6 @@ class Batch:
             time_s=now,
             dt=dt,
             dt_allowed=allowed,
-        )
-
-
-def _check_record_fits(numbers):
-    if numbers > _MOST_NUMBERS:
-        raise InputError(
-            f"scenes x measured_cycles must stay below {_MOST_NUMBERS // len(measures.COLUMNS)} "
-            f"in one batch, got {numbers // len(measures.COLUMNS)}: measure fewer cycles"
         )
 
 

@@ -36,7 +36,7 @@ from typing import ClassVar
 import numpy as np
 import taichi as ti
 
-from taichi_dem.checks import positive
+from taichi_dem.checks import positive, shown, whole
 from taichi_dem.errors import InputError
 
 
@@ -67,6 +67,31 @@ class Action:
     carried: ti.f64
 
 
+#: What a filling must have to be one.
+_MEMBERS = ("label", "default_dt", "capacity", "particle_mass", "gravity", "check", "bind")
+#: Places for particles in all scenes of a batch: a hundred bytes each, and counted in 32 bits.
+_MOST_PLACES = 2**25
+
+
+def check_filling(filling):
+    """The filling; InputError unless it is an object that has what a filling must have."""
+    if isinstance(filling, type) or not all(hasattr(filling, name) for name in _MEMBERS):
+        raise InputError(
+            f"filling must be one such as Automaton(), Spheres() or RigidMass(), "
+            f"got {shown(filling)}"
+        )
+    return filling
+
+
+def check_places(scenes, places):
+    """InputError where so many scenes with so many places for particles each find no room."""
+    if scenes * places > _MOST_PLACES:
+        raise InputError(
+            f"scenes x places for particles must be at most {_MOST_PLACES} in one batch, got "
+            f"{scenes} x {places}: run fewer scenes at a time"
+        )
+
+
 @dataclass(frozen=True)
 class Empty:
     """A container without particles."""
@@ -82,7 +107,7 @@ class Empty:
     def check(self, particles, dt):
         """InputError unless there are no particles."""
         if particles != 0:
-            raise InputError(f"particles must be 0 in an empty container, got {particles}")
+            raise InputError(f"particles must be 0 in an empty container, got {shown(particles)}")
 
     def divergence(self, code, particles, dt):
         """Nothing that could diverge; named because the protocol asks for it."""
@@ -115,8 +140,7 @@ class RigidMass:
 
     def check(self, particles, dt):
         """InputError for more than a million particles."""
-        if particles > self.capacity:
-            raise InputError(f"particles must be at most {self.capacity}, got {particles}")
+        whole("particles", particles, 0, self.capacity)
 
     def divergence(self, code, particles, dt):
         """A fixed mass has no state that could diverge; named because the protocol asks for it."""

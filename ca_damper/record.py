@@ -5,9 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ca_damper.progress import Stages
-from taichi_dem.checks import whole
+from taichi_dem.checks import shown, whole
+from taichi_dem.errors import InputError
 
 _MOST_STEPS = 2**31 - 1
+_MOST_MARKS = 1_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +46,8 @@ def film(batch, steps, *, sample_every=1, frame_every=None, progress=None):
     progress: called with a ``progress.Progress``.
     Raises InputError for numbers that are none, SimulationDiverged.
     """
+    if not hasattr(batch, "sample") or isinstance(batch, type):
+        raise InputError(f"batch must be a Batch that has been started, got {shown(batch)}")
     steps = whole("steps", steps, 1, _MOST_STEPS)
     samples = _marks("sample_every", sample_every, steps)
     frames = _marks("frame_every", frame_every, steps) if frame_every is not None else set()
@@ -63,8 +67,13 @@ def film(batch, steps, *, sample_every=1, frame_every=None, progress=None):
 
 
 def _marks(name, every, steps):
-    """Steps at which to record, from 0 on."""
-    return set(range(0, steps + 1, whole(name, every, 1, _MOST_STEPS)))
+    """Steps at which to record, from 0 on; InputError where they are too many to be kept."""
+    if whole(name, every, 1, _MOST_STEPS) * _MOST_MARKS < steps:
+        raise InputError(
+            f"{name} must be at least {-(-steps // _MOST_MARKS)} in a film of {steps} steps, "
+            f"got {every}"
+        )
+    return set(range(0, steps + 1, every))
 
 
 def _frame(batch, present, s):

@@ -1,16 +1,20 @@
 """Frequency response of the damped structure: every particle number, frequency and seed a scene."""
 
+import math
 from dataclasses import dataclass, replace
 from typing import Optional
 
 import numpy as np
 
 from ca_damper.batch import Batch
+from ca_damper.checks import check_run
+from ca_damper.clock import steps_per_cycle
+from ca_damper.filling import check_filling
 from ca_damper.measures import peak
 from ca_damper.oscillator import Oscillator
 from ca_damper.report import Report
 from ca_damper.table import SceneTable
-from taichi_dem.checks import positive, several, whole
+from taichi_dem.checks import instance, positive, several, whole
 from taichi_dem.errors import InputError
 from taichi_dem.files import write_csv
 
@@ -27,6 +31,7 @@ UNITS = {
     "energy": "J",
 }
 _MOST_SEEDS = 2**31 - 1
+_MOST_SCENES = 2**24
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +114,7 @@ def frequency_response(
     Raises InputError for what cannot be used, SimulationDiverged.
     """
     grid = Grid(filling, particles, ratios, seeds, oscillator, dt)
+    check_run(transient_cycles, start, progress)
     batch = grid.batch(grid.ratios, measured_cycles)
     batch.start(start)
     job = f"response, {grid.words()}, {transient_cycles} + {measured_cycles} cycles from {start}"
@@ -122,19 +128,33 @@ def frequency_response(
 
 
 class Grid:
-    """The checked axes of a response: particle numbers, frequency ratios, seeds."""
+    """The checked axes of a response: particle numbers, frequency ratios, seeds, and the step."""
 
     def __init__(self, filling, particles, ratios, seeds, oscillator, dt):
-        self.filling = filling
+        self.filling = check_filling(filling)
         self.oscillator = Oscillator() if oscillator is None else oscillator
+        instance("oscillator", self.oscillator, Oscillator)
         self.particles = several("particles", particles, self._particles)
         self.ratios = np.array(several("ratios", ratios, positive))
         if (np.diff(self.ratios) <= 0.0).any():
             raise InputError(f"ratios must ascend, got {self.ratios.tolist()}")
-        if not hasattr(seeds, "__iter__"):
+        if not hasattr(seeds, "__iter__") or isinstance(seeds, (str, bytes, dict)):
             seeds = range(1, whole("seeds", seeds, 1, 1_000_000) + 1)
         self.seeds = several("seeds", seeds, lambda name, x: whole(name, x, 0, _MOST_SEEDS))
         self.dt = filling.default_dt if dt is None else positive("dt", dt)
+        scenes = math.prod(self.shape)
+        if scenes > _MOST_SCENES:
+            raise InputError(
+                f"particles x ratios x seeds must make at most {_MOST_SCENES} scenes, got {scenes}"
+            )
+        self._check_steps()
+
+    def _check_steps(self):
+        """InputError for a step that fits no cycle, or that the filling refuses."""
+        for frequency in self.ratios * self.oscillator.natural_frequency:
+            dt = 1.0 / (frequency * steps_per_cycle(float(frequency), self.dt))
+            for particles in self.particles:
+                self.filling.check(particles, float(dt))
 
     def _particles(self, name, value):
         return whole(name, value, 0, self.filling.capacity)

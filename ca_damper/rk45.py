@@ -10,13 +10,12 @@ Source: Dormand and Prince, J. Comput. Appl. Math. 6 (1980) 19-26; step sizes af
 and Wanner, Solving Ordinary Differential Equations I, section II.4.
 """
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 import taichi as ti
 
-from taichi_dem.checks import positive
+from taichi_dem.checks import finite, positive, shown, whole
 from taichi_dem.errors import InputError
 
 #: Attempts after which an integration counts as stuck, unless the caller says otherwise.
@@ -161,9 +160,8 @@ def solve(rhs, span, y0, *, rtol=1e-6, atol=1e-9, at=None, first=None, most_atte
     Raises InputError for a bad argument or when the end is not reached within most_attempts.
     """
     t, t_end = _checked_span(span)
-    y = np.atleast_1d(np.array(y0, dtype=np.float64))
-    if not np.isfinite(y).all():
-        raise InputError(f"y0 must be finite numbers, got {y0!r}")
+    y = _checked_numbers("y0", y0)
+    whole("most_attempts", most_attempts, 1, 2**31 - 1)
     rtol = positive("rtol", rtol, zero_allowed=True)
     atol = positive("atol", atol)
     wanted = None if at is None else _checked_times(at, t, t_end)
@@ -221,15 +219,26 @@ class _Path:
 
 
 def _checked_times(at, t, t_end):
-    times = np.array(at, dtype=np.float64).ravel()
-    inside = np.isfinite(times).all() and (times >= t).all() and (times <= t_end).all()
+    times = _checked_numbers("at", at)
+    inside = (times >= t).all() and (times <= t_end).all()
     if not inside or (np.diff(times) < 0.0).any():
-        raise InputError(f"at must be ascending times in [{t:g}, {t_end:g}], got {at!r}")
+        raise InputError(f"at must be ascending times in [{t:g}, {t_end:g}], got {shown(at)}")
     return times
 
 
 def _checked_span(span):
-    t, t_end = (float(time) for time in span)
-    if not (math.isfinite(t) and math.isfinite(t_end) and t <= t_end):
-        raise InputError(f"span must be two finite times in order, got {span!r}")
-    return t, t_end
+    two = isinstance(span, (tuple, list)) and len(span) == 2 and all(finite(time) for time in span)
+    if not two or span[0] > span[1]:
+        raise InputError(f"span must be two finite times in order, got {shown(span)}")
+    return float(span[0]), float(span[1])
+
+
+def _checked_numbers(name, values):
+    """Finite numbers as an array (n,)."""
+    try:
+        numbers = np.atleast_1d(values)
+        if numbers.dtype.kind not in "iuf" or numbers.ndim != 1 or not np.isfinite(numbers).all():
+            raise ValueError
+    except ValueError:
+        raise InputError(f"{name} must be finite numbers, got {shown(values)}") from None
+    return numbers.astype(np.float64)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ca_damper.checks import check_run
 from ca_damper.progress import Stages
 from ca_damper.response import UNITS, Grid, Response
 
@@ -46,6 +47,7 @@ def sweep_up_and_down(
     are those of ``frequency_response``.
     """
     grid = Grid(filling, particles, ratios, seeds, oscillator, dt)
+    check_run(transient_cycles, start, progress)
     batch = grid.batch(grid.ratios[:1], measured_cycles)
     batch.start(start)
     way = _Way(grid)

@@ -3,6 +3,11 @@
 import numpy as np
 import taichi as ti
 
+from taichi_dem.checks import shown
+from taichi_dem.errors import InputError
+
+#: Scenes of a table, and the largest seed.
+_MOST_SCENES, _MOST_SEED = 2**24, 2**31 - 1
 _ROWS = ti.types.ndarray(dtype=ti.f64, ndim=2)
 
 
@@ -13,9 +18,10 @@ class SceneTable:
     particles [-], seed [-] (cast to u32 for hashing), dt [s], frequency [Hz] and base_amplitude [m]
     of the base motion, and the primary structure: mass [kg], stiffness [N/m], damping [N s/m].
 
-    The numbers are given as scalars or sequences and are broadcast against each other; they are
-    checked where users give them, not here. Whatever a scene does depends on its own row only (on
-    its seed, not on its index), so that no bit depends on what else is in the batch.
+    The numbers are given as scalars or sequences and are broadcast against each other. Here they
+    are checked to be numbers, whole ones where they count; a Batch checks their ranges. Whatever a
+    scene does depends on its own row only (on its seed, not on its index), so that no bit depends
+    on what else is in the batch. Raises InputError.
     """
 
     COLUMNS = (
@@ -35,7 +41,7 @@ class SceneTable:
         damping=0.08,
     ):
         values = (particles, seed, dt, frequency, base_amplitude, mass, stiffness, damping)
-        rows = np.broadcast_arrays(*(np.atleast_1d(value) for value in values))
+        rows = _broadcast(dict(zip(self.COLUMNS, values)))
         self.count = len(rows[0])
         self._host = dict(zip(self.COLUMNS, (row.copy() for row in rows)))
         for name in self.COLUMNS:
@@ -70,3 +76,39 @@ class SceneTable:
     def _drive(self, pair: _ROWS):
         for s in range(self.count):
             self.frequency[s], self.dt[s] = pair[0, s], pair[1, s]
+
+
+def _broadcast(values):
+    """Numbers by name as arrays of one shape (scenes,); InputError for what is none."""
+    columns = {name: _numbers(name, value) for name, value in values.items()}
+    for name in ("particles", "seed"):
+        _check_whole(name, columns[name])
+    lengths = {len(column) for column in columns.values()} - {1}
+    count = lengths.pop() if lengths else 1
+    if lengths or not 1 <= count <= _MOST_SCENES:
+        listed = ", ".join(f"{len(column)} of {name}" for name, column in columns.items())
+        raise InputError(
+            f"a table must have one number or one a scene of everything, from 1 to {_MOST_SCENES} "
+            f"scenes, got {listed}"
+        )
+    return [np.broadcast_to(column, count) for column in columns.values()]
+
+
+def _numbers(name, value):
+    """One number or a sequence as an array (n,) of its own type; InputError for anything else."""
+    try:
+        column = np.atleast_1d(value)
+    except ValueError:
+        column = np.zeros(0, dtype=object)
+    if column.ndim != 1 or column.dtype.kind not in "iuf":
+        raise InputError(f"{name} must be a number or a sequence of numbers, got {shown(value)}")
+    return column
+
+
+def _check_whole(name, column):
+    inside = (column >= 0) & (column <= _MOST_SEED)
+    bad = column[~(inside & (column == np.floor(column)))]
+    if len(bad):
+        raise InputError(
+            f"{name} must be whole numbers from 0 to {_MOST_SEED}, got {shown(bad[0].item())}"
+        )

@@ -19,10 +19,13 @@ def cached(folder, name, settings, packages, compute):
     """
     path = Path(output_folder(folder), f"{name}-{digest(settings, packages)}.json")
     try:
-        return json.loads(path.read_text(encoding="utf-8")), True
+        result = json.loads(path.read_text(encoding="utf-8"))
+        if not isinstance(result, dict):
+            raise ValueError("it holds no result")
+        return result, True
     except FileNotFoundError:
         pass
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"cannot read the kept result {path}: {error}; delete it") from None
     result = compute()
     write_text(path, json.dumps(result))

@@ -12,6 +12,7 @@ from importlib.metadata import version
 
 from taichi_dem import Checkpoint, InputError, SimulationDiverged, runtime
 from taichi_dem.checkpoint import Interrupted
+from taichi_dem.checks import shown
 from taichi_dem.files import write_text
 
 HERE = os.path.dirname(os.path.abspath(__file__))
@@ -45,7 +46,7 @@ def number(low, high, *, open_low=True):
         inside = low < value < high or (value == low and not open_low)
         if not inside:
             raise argparse.ArgumentTypeError(
-                f"must be a number in {left}{low:g}, {high:g}), got {text!r}"
+                f"must be a number in {left}{low:g}, {high:g}), got {shown(text)}"
             )
         return value
 
@@ -62,7 +63,7 @@ def whole(low, high):
             value = low - 1
         if not low <= value <= high:
             raise argparse.ArgumentTypeError(
-                f"must be a whole number from {low} to {high}, got {text!r}"
+                f"must be a whole number from {low} to {high}, got {shown(text)}"
             )
         return value
 
@@ -78,7 +79,7 @@ def interval(text):
         Checkpoint("any", **{unit: value})
     except (TypeError, ValueError, InputError):
         raise argparse.ArgumentTypeError(
-            f"must be like 600s (on the wall), 5000steps or 1e-5sim, got {text!r}"
+            f"must be like 600s (on the wall), 5000steps or 1e-5sim, got {shown(text)}"
         ) from None
     return {unit: value}
 
@@ -87,9 +88,13 @@ def several(kind):
     """Type of an option that is a comma-separated list of a type, without repetitions."""
 
     def parse(text):
-        values = [kind(part) for part in text.split(",")]
+        try:
+            values = [kind(part) for part in text.split(",")]
+        except InputError as error:
+            # Argparse would put words of its own in its place.
+            raise argparse.ArgumentTypeError(str(error)) from None
         if len(set(values)) < len(values):
-            raise argparse.ArgumentTypeError(f"must not name a value twice, got {text!r}")
+            raise argparse.ArgumentTypeError(f"must not name a value twice, got {shown(text)}")
         return values
 
     return parse

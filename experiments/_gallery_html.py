@@ -67,9 +67,10 @@ def shown(page, root, failed=""):
 def read_json(path):
     """Content of a JSON file, an empty dict where there is none that can be read."""
     try:
-        return json.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
+        content = json.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        content = {}
+    return content if isinstance(content, dict) else {}
 
 
 def figure_rows(figures, patterns):

@@ -35,6 +35,7 @@ from _cli import (
 )
 from _timing import Timing
 from taichi_dem import (
+    InputError,
     Multirate,
     Simulation,
     Uniform,
@@ -103,9 +104,14 @@ def follow(name, options, scene):
 
 def run(options):
     """Run all methods, compare, picture."""
-    for name, value in (QUICK if options.quick else FULL).items():
-        if getattr(options, name) is None:
+    defaults = QUICK if options.quick else FULL
+    for name, value in defaults.items():
+        if getattr(options, name) is None and name != "early":
             setattr(options, name, value)
+    if options.early is None:
+        options.early = min(defaults["early"], options.until)
+    if options.early > options.until:
+        raise InputError(f"early must be at most until, {options.until:g} s, got {options.early:g}")
     scene = paper_scene(options.mesh)
     output_folder(options.out)
     runs = {

@@ -104,8 +104,9 @@ def draw(path, found):
 
 def run(options):
     """Go from time to time, solve in every way, compare."""
+    scene = paper_scene(options.mesh)
     output_folder(options.out)
-    simulation = Simulation(paper_scene(options.mesh), ImplicitDashpots(refresh=4e-7))
+    simulation = Simulation(scene, ImplicitDashpots(refresh=4e-7))
     simulation.start()
     found = {}
     times = QUICK_TIMES if options.quick else TIMES

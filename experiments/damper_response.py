@@ -38,6 +38,7 @@ from _cli import (
 )
 from ca_damper import Automaton, Response, Spheres, Sweep, frequency_response, sweep_up_and_down
 from ca_damper.plot.response import picture_hysteresis, picture_measures, picture_responses
+from ca_damper.response import Grid
 from taichi_dem import InputError
 from taichi_dem.files import output_folder, write_csv
 
@@ -116,6 +117,8 @@ def run(options):
             setattr(options, name, value)
     chosen = chosen_fillings(options.fillings)
     check_resume(options)
+    for filling in chosen.values():
+        check(filling, options)
     output_folder(options.out)
     measured = {label: measure(filling, options) for label, filling in chosen.items()}
     write_tables(measured, options.out)
@@ -141,6 +144,14 @@ def chosen_fillings(labels):
         if label not in known:
             raise InputError(f"fillings must be some of {', '.join(known)}, got {label!r}")
     return {label: known[label] for label in labels}
+
+
+def check(filling, options):
+    """InputError for what either job of a filling would refuse after the others have run."""
+    ratios = QUICK_RATIOS if options.quick else RATIOS
+    dt = options.dem_dt if filling.label == "dem" else options.ca_dt
+    for particles in (options.particles, options.sweep_particles):
+        Grid(filling, particles, ratios, 1, None, dt)
 
 
 def measure(filling, options):

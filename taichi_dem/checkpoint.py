@@ -19,7 +19,7 @@ from typing import Optional
 
 import numpy as np
 
-from taichi_dem.checks import positive, whole
+from taichi_dem.checks import path_name, positive, whole
 from taichi_dem.errors import InputError
 from taichi_dem.files import renamed_when_done
 
@@ -27,6 +27,7 @@ from taichi_dem.files import renamed_when_done
 FORMAT = 1
 _ABOUT = "about"
 _MOST_STEPS = 2**53
+_MOST_MARKS = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -44,8 +45,7 @@ class Checkpoint:
     every_wall_s: Optional[float] = None
 
     def __post_init__(self):
-        if not isinstance(self.path, (str, os.PathLike)) or not os.fspath(self.path):
-            raise InputError(f"path must be the name of a file, got {self.path!r}")
+        path_name("path", self.path)
         if self.every_steps is not None:
             whole("every_steps", self.every_steps, 1, _MOST_STEPS)
         for name in ("every_s", "every_wall_s"):
@@ -53,10 +53,19 @@ class Checkpoint:
                 positive(name, getattr(self, name))
 
     def marks(self, last, dt):
-        """Steps of dt [s] from 0 to last at which it asks to be saved, a set."""
+        """Steps of dt [s] from 0 to last at which it asks to be saved, a set.
+
+        Raises InputError where they are more than a million.
+        """
         every = [self.every_steps] if self.every_steps else []
         if self.every_s is not None:
             every.append(max(1, math.ceil(self.every_s / dt - 1e-9)))
+        if every and last > _MOST_MARKS * min(every):
+            least = math.ceil(last / _MOST_MARKS)
+            raise InputError(
+                f"every_steps must be at least {least} and every_s {least * dt:.3g} s in a run of "
+                f"{last} steps, got {self.every_steps} and {self.every_s}"
+            )
         return {step for distance in every for step in range(0, last + 1, distance)}
 
 
@@ -163,6 +172,10 @@ def read_checkpoint(path, identity):
 
 def _read(path):
     """What the file says of itself, and its arrays; every part is checked against its sum."""
+    path = path_name("checkpoint", path)
+    if os.path.exists(path) and not os.path.isfile(path):
+        what = "it is a folder" if os.path.isdir(path) else "it is no file"
+        raise InputError(f"cannot read checkpoint {path}: {what}")
     try:
         with zipfile.ZipFile(path) as file:
             if file.testzip() is not None:

@@ -6,6 +6,7 @@ import os
 
 import numpy as np
 
+from taichi_dem.checks import path_name, shown
 from taichi_dem.errors import InputError
 
 
@@ -14,8 +15,9 @@ def output_folder(path):
 
     Raises InputError when it cannot be made or written to.
     """
-    if not os.fspath(path):
-        raise InputError("output folder must be the name of a folder, got ''")
+    name = os.fspath(path) if isinstance(path, (str, os.PathLike)) else ""
+    if not isinstance(name, str) or not name or "\0" in name:
+        raise InputError(f"output folder must be the name of a folder, got {shown(path)}")
     try:
         os.makedirs(path, exist_ok=True)
         probe = os.path.join(path, ".write-test")
@@ -31,7 +33,7 @@ def output_folder(path):
 @contextlib.contextmanager
 def renamed_when_done(path):
     """A temporary name beside ``path`` that becomes ``path`` only after a complete write."""
-    path = os.fspath(path)
+    path = path_name("file", path)
     folder, name = os.path.split(path)
     if not os.path.isdir(folder or "."):
         raise InputError(f"cannot write {path}: there is no folder {folder}")

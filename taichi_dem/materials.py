@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from dataclasses import dataclass
 
+from taichi_dem.checks import LARGEST, SMALLEST, finite, shown
 from taichi_dem.errors import InputError
 
 _MAY_BE_ZERO = frozenset(
@@ -67,14 +67,14 @@ class Material:
 
 def _check_number(name, value):
     """Raise InputError unless ``value`` is a finite number in the range of the field ``name``."""
-    allowed = "at least 0" if name in _MAY_BE_ZERO else "positive"
-    message = f"{name} must be a finite number, {allowed}, got {value!r}"
-    try:
-        number = math.nan if isinstance(value, (bool, str)) else float(value)
-    except (TypeError, ValueError):
-        raise InputError(message) from None
-    if not math.isfinite(number) or number < 0.0 or (number == 0.0 and "positive" in allowed):
-        raise InputError(message)
+    zero_allowed = name in _MAY_BE_ZERO
+    inside = finite(value) and (SMALLEST <= value <= LARGEST or (value == 0.0 and zero_allowed))
+    if not inside:
+        allowed = "at least 0" if zero_allowed else "positive"
+        raise InputError(
+            f"{name} must be a finite number, {allowed} and, where it is not 0, from {SMALLEST:g} "
+            f"to {LARGEST:g}, got {shown(value)}"
+        )
 
 
 #: Concrete of Konno et al., Table 1; the adhesive stress is both tensile strength and cohesion.

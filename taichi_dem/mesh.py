@@ -5,17 +5,20 @@ x points to the right, y up, z towards the viewer.
 
 from __future__ import annotations
 
-import math
-import numbers
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from taichi_dem import tetrahedra as geometry
+from taichi_dem.checks import finite, shown, word
 from taichi_dem.errors import InputError
 
 #: Below this share of (longest edge)^3 a volume counts as zero: what round-off leaves of it.
 FLAT = 1e-12
+
+#: The extent of a mesh lies between these [m]: a moment of inertia is its fifth power.
+_LEAST_EXTENT, _MOST_EXTENT = 1e-30, 1e30
 
 #: Points nearer than this share of the mesh's extent count as one and the same place.
 COINCIDENT = 1e-9
@@ -50,9 +53,9 @@ class Mesh:
 
     def group_faces(self, name) -> np.ndarray:
         """Outer faces of the group ``name``, shape (n, 3); InputError when there is none."""
-        if name not in self.groups:
+        if not isinstance(name, str) or name not in self.groups:
             known = ", ".join(sorted(self.groups)) or "none"
-            raise InputError(f"mesh has no face group {name!r}; its groups are: {known}")
+            raise InputError(f"mesh has no face group {shown(name)}; its groups are: {known}")
         return self.groups[name]
 
 
@@ -67,12 +70,6 @@ def group_area(mesh, name) -> float:
     return float(np.linalg.norm(vectors, axis=1).sum())
 
 
-def check_positive(name, value, unit="m"):
-    """Raise InputError unless ``value`` is a positive finite number."""
-    if not (isinstance(value, numbers.Real) and 0.0 < value < math.inf):
-        raise InputError(f"{name} must be positive and finite [{unit}], got {value!r}")
-
-
 def checked_mesh(points, tetrahedra, groups, source="", weld_tolerance=0.0) -> Mesh:
     """Build a Mesh from arrays, mend what can be mended (and say so), refuse the rest.
 
@@ -85,14 +82,12 @@ def checked_mesh(points, tetrahedra, groups, source="", weld_tolerance=0.0) -> M
     """
     points = _checked_points(points)
     tetrahedra = _checked_indices("tetrahedra", tetrahedra, 4, len(points))
-    groups = {
-        name: _checked_indices(f"group {name!r}", faces, 3, len(points))
-        for name, faces in dict(groups).items()
-    }
+    groups = _checked_groups(groups, len(points))
     notes = []
     if _checked_tolerance(weld_tolerance, points, tetrahedra) > 0.0:
         tetrahedra, groups = _welded(points, tetrahedra, groups, weld_tolerance, notes)
     points, tetrahedra, groups = _without_loose_points(points, tetrahedra, groups, notes)
+    _refuse_extent(points)
     _refuse_coincident(points)
     tetrahedra = _positive(points, tetrahedra, notes)
     _refuse_bad_sharing(tetrahedra)
@@ -104,23 +99,39 @@ def checked_mesh(points, tetrahedra, groups, source="", weld_tolerance=0.0) -> M
 def _checked_points(points):
     """Copy as (n, 3) float64, or InputError."""
     try:
-        points = np.array(points, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError("points must be an array of numbers, shape (n, 3)") from None
+        points = np.array(points)
+        points = points.astype(np.float64) if points.dtype.kind in "iuf" else None
+    except (TypeError, ValueError, OverflowError):
+        points = None
+    if points is None:
+        raise InputError("points must be an array of numbers, shape (n, 3)")
     if points.ndim != 2 or points.shape[1] != 3:
         raise InputError(f"points must have shape (n, 3), got {points.shape}")
-    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    bad = np.flatnonzero(~(np.abs(points) <= _MOST_EXTENT).all(axis=1))
     if len(bad):
         raise InputError(
-            f"points must be finite, but {len(bad)} are not, the first is number {bad[0]}: "
-            f"{points[bad[0]].tolist()}"
+            f"points must be finite, within {_MOST_EXTENT:g} m, but {len(bad)} are not, the first "
+            f"is number {bad[0]}: {points[bad[0]].tolist()}"
         )
     return points
 
 
+def _checked_groups(groups, point_count):
+    """Groups as a dict of name to (n, 3) int32, or InputError."""
+    if not isinstance(groups, Mapping):
+        raise InputError(f"groups must be a dict of name to faces, got {shown(groups)}")
+    return {
+        word("name of a group", name): _checked_indices(f"group {name!r}", faces, 3, point_count)
+        for name, faces in groups.items()
+    }
+
+
 def _checked_indices(what, indices, width, point_count):
     """Copy as (n, width) int32 with all values in range, or InputError."""
-    indices = np.asarray(indices)
+    try:
+        indices = np.asarray(indices)
+    except ValueError:
+        raise InputError(f"{what} must be rows of {width} point numbers each") from None
     if indices.size == 0:
         raise InputError(f"{what} must not be empty")
     if indices.ndim != 2 or indices.shape[1] != width:
@@ -140,10 +151,10 @@ def _checked_tolerance(tolerance, points, tetrahedra):
     """Refuse a tolerance that would weld the ends of an edge."""
     lengths = geometry.edge_lengths(points, tetrahedra)
     shortest = lengths[lengths > COINCIDENT * np.ptp(points, axis=0).max()].min(initial=np.inf)
-    if not (isinstance(tolerance, numbers.Real) and 0.0 <= tolerance < shortest):
+    if not (finite(tolerance) and 0.0 <= tolerance < shortest):
         raise InputError(
             f"weld_tolerance must lie in [0, {shortest:.6g}) m, the shortest edge, "
-            f"got {tolerance!r}"
+            f"got {shown(tolerance)}"
         )
     return tolerance
 
@@ -166,6 +177,13 @@ def _without_loose_points(points, tetrahedra, groups, notes):
     new = np.full(len(points), -1, dtype=np.int32)
     new[used] = np.arange(len(used), dtype=np.int32)
     return points[used], new[tetrahedra], {name: new[faces] for name, faces in groups.items()}
+
+
+def _refuse_extent(points):
+    """Refuse a mesh so small that its inertia falls to zero."""
+    extent = np.ptp(points, axis=0).max()
+    if extent < _LEAST_EXTENT:
+        raise InputError(f"points must span at least {_LEAST_EXTENT:g} m, got {extent:.3g} m")
 
 
 def _refuse_coincident(points):

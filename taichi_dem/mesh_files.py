@@ -11,13 +11,20 @@ from xml.sax.saxutils import quoteattr
 import meshio
 import numpy as np
 
+from taichi_dem.checks import path_name, positive
 from taichi_dem.errors import InputError
 from taichi_dem.files import renamed_when_done, write_text
-from taichi_dem.mesh import Mesh, check_positive, checked_mesh
+from taichi_dem.mesh import Mesh, checked_mesh
+from taichi_dem.time_limit import within
 
 #: Cell types of meshio that are read, with the number of their corner points.
 _TETRAHEDRA = {"tetra": 4, "tetra10": 4}
 _TRIANGLES = {"triangle": 3, "triangle6": 3}
+
+#: Time that a reader may take [s], and what it reads at the slowest [byte/s]: some of meshio's wait
+#: for ever for the rest of a file that was cut off.
+_PATIENCE_S = 20.0
+_SLOWEST_BYTES_PER_S = 1e5
 
 
 def read_mesh(path, *, scale=1.0, weld_tolerance=0.0) -> Mesh:
@@ -32,8 +39,7 @@ def read_mesh(path, *, scale=1.0, weld_tolerance=0.0) -> Mesh:
     Raises InputError, in one sentence, for a file that is missing, cannot be read, holds no
     tetrahedra, or whose mesh ``checked_mesh`` refuses.
     """
-    check_positive("scale", scale, "m per unit of the file")
-    path = os.fspath(path)
+    scale, path = positive("scale", scale), path_name("path", path)
     raw = _read_raw(path)
     notes = []
     tetrahedra = _corners(raw, _TETRAHEDRA, notes)
@@ -41,7 +47,8 @@ def read_mesh(path, *, scale=1.0, weld_tolerance=0.0) -> Mesh:
         kinds = ", ".join(sorted({block.type for block in raw.cells})) or "no cells"
         raise InputError(f"mesh file {path} holds no tetrahedra (it holds: {kinds})")
     try:
-        points = scale * np.asarray(raw.points, dtype=np.float64)
+        with np.errstate(over="ignore"):  # checked_mesh refuses what is no finite number
+            points = scale * np.asarray(raw.points, dtype=np.float64)
         mesh = checked_mesh(points, tetrahedra, _groups(raw), path, weld_tolerance)
     except InputError as error:
         raise InputError(f"mesh file {path}: {error}") from None
@@ -93,12 +100,15 @@ def write_pvd(path, times_s, file_names) -> None:
 def _read_raw(path):
     """The file as meshio sees it; whatever goes wrong inside becomes one InputError."""
     if not os.path.isfile(path):
-        problem = "is a folder" if os.path.isdir(path) else "does not exist"
+        problem = "is no file" if os.path.lexists(path) else "does not exist"
+        problem = "is a folder" if os.path.isdir(path) else problem
         raise InputError(f"mesh file {path} {problem}")
     said = io.StringIO()
+    seconds = _PATIENCE_S + os.path.getsize(path) / _SLOWEST_BYTES_PER_S
+    sentence = f"its reader found no end in {seconds:.3g} s, as in a file that was cut off"
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-            return meshio.read(path)
+            return within(seconds, lambda: meshio.read(path), sentence)
     except (Exception, SystemExit) as error:  # meshio raises anything, and exits on some files
         reason = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"mesh file {path} cannot be read: {reason}") from None
@@ -106,12 +116,12 @@ def _read_raw(path):
 
 def _corners(raw, kinds, notes):
     """Corner points of all cells of the given kinds, (n, corners)."""
-    found = [np.empty((0, next(iter(kinds.values()))), dtype=np.int32)]
+    found = [np.empty((0, next(iter(kinds.values()))), dtype=np.int64)]
     for block in raw.cells:
         if block.type not in kinds or len(block.data) == 0:
             continue
         corners = kinds[block.type]
-        found.append(block.data[:, :corners].astype(np.int32))
+        found.append(block.data[:, :corners])
         if block.data.shape[1] > corners:
             notes.append(f"read {len(block.data)} second-order elements as linear {block.type}")
     return np.vstack(found)

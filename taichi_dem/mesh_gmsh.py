@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import contextlib
-import numbers
-import os
 from dataclasses import dataclass
 
+from taichi_dem.checks import finite, path_name, positive, shown
 from taichi_dem.errors import InputError
 from taichi_dem.files import renamed_when_done
-from taichi_dem.mesh import check_positive
 
 #: Everything that could make two runs of the same Gmsh differ, and what may shape the elements.
 _OPTIONS = {
@@ -31,6 +29,10 @@ _OPTIONS = {
 }
 
 
+#: Chords around the hole.
+_MOST_SEGMENTS = 10000
+
+
 @dataclass(frozen=True)
 class _Block:
     """Shape and element sizes of a block with a hole [m]; checked."""
@@ -48,10 +50,12 @@ class _Block:
     def __post_init__(self):
         sizes = ("size_hole", "size_far", "distance_far")
         for name in ("width", "height", "depth", "hole_diameter", *sizes):
-            check_positive(name, getattr(self, name))
-        if self.hole_segments < 4 or self.hole_segments % 4:
+            object.__setattr__(self, name, positive(name, getattr(self, name)))
+        segments = self.hole_segments
+        if type(segments) is not int or not 4 <= segments <= _MOST_SEGMENTS or segments % 4:
             raise InputError(
-                f"hole_segments must be 4, 8, 12, ..., got {self.hole_segments} (four equal arcs)"
+                f"hole_segments must be 4, 8, 12, ... up to {_MOST_SEGMENTS} (four equal arcs), "
+                f"got {shown(segments)}"
             )
         self._check_hole()
 
@@ -59,12 +63,15 @@ class _Block:
         """Raise InputError unless the hole's axis leaves a wall on all four sides."""
         margin = 0.5 * self.hole_diameter
         right, top = self.width - margin, self.height - margin
-        numeric = len(self.hole) == 2 and all(isinstance(c, numbers.Real) for c in self.hole)
+        two = isinstance(self.hole, (tuple, list)) and len(self.hole) == 2
+        numeric = two and all(finite(c) for c in self.hole)
         if not (numeric and margin < self.hole[0] < right and margin < self.hole[1] < top):
             raise InputError(
                 f"hole must be (x, y) with x in ({margin:g}, {right:g}) m and "
-                f"y in ({margin:g}, {top:g}) m, got {self.hole}"
+                f"y in ({margin:g}, {top:g}) m, got {shown(self.hole)}"
             )
+        # Gmsh ends the process on a number that it cannot read, such as np.float64(0.5).
+        object.__setattr__(self, "hole", tuple(float(c) for c in self.hole))
 
 
 def block_with_hole(
@@ -93,7 +100,8 @@ def block_with_hole(
     written, and when gmsh is not installed or fails.
     Source of the defaults: Konno et al., section 4.1 and Fig 10.
     """
-    if not os.fspath(path).endswith(".msh"):
+    path = path_name("path", path)
+    if not path.endswith(".msh"):
         raise InputError(f"the name of the mesh file must end in .msh, got {path}")
     block = _Block(
         width,

@@ -6,8 +6,9 @@ import itertools
 
 import numpy as np
 
+from taichi_dem.checks import positive, shown
 from taichi_dem.errors import InputError
-from taichi_dem.mesh import Mesh, check_positive, checked_mesh
+from taichi_dem.mesh import Mesh, checked_mesh
 
 #: Groups of a bar: name -> (axis, 0 low or 1 high end).
 _SIDES = {
@@ -18,6 +19,9 @@ _SIDES = {
     "back": (2, 0),
     "front": (2, 1),
 }
+
+#: Boxes of a bar: ten million tetrahedra take some ten GiB to check.
+_MOST_BOXES = 1_666_666
 
 #: Orders in which a path may step along the axes; every second one winds the other way round.
 _EVEN_ORDERS = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
@@ -67,9 +71,8 @@ def bar(length, width, cells) -> Mesh:
 
 def _base(edge, height):
     """Equilateral triangle in x = 0 about the origin, normal +x, and the apex height [m]."""
-    check_positive("edge", edge)
-    height = edge * np.sqrt(2.0 / 3.0) if height is None else height
-    check_positive("height", height)
+    edge = positive("edge", edge)
+    height = positive("height", edge * np.sqrt(2.0 / 3.0) if height is None else height)
     angle = 2.0 * np.pi / 3.0 * np.arange(3)
     radius = edge / np.sqrt(3.0)
     triangle = np.column_stack([np.zeros(3), radius * np.cos(angle), radius * np.sin(angle)])
@@ -79,11 +82,16 @@ def _base(edge, height):
 def _checked_cells(length, width, cells):
     """Numbers of boxes as an array (3,)."""
     for name, value in (("length", length), ("width", width)):
-        check_positive(name, value)
-    cells = np.asarray(cells)
-    if cells.shape != (3,) or cells.dtype.kind not in "iu" or cells.min() < 1:
-        raise InputError(f"cells must be three integers of at least 1, got {cells.tolist()}")
-    return cells
+        positive(name, value)
+    try:
+        numbers = np.asarray(cells)
+    except ValueError:
+        numbers = np.zeros(0)
+    if numbers.shape != (3,) or numbers.dtype.kind not in "iu" or numbers.min() < 1:
+        raise InputError(f"cells must be three integers of at least 1, got {shown(cells)}")
+    if np.prod(numbers.astype(float)) > _MOST_BOXES:
+        raise InputError(f"cells must make at most {_MOST_BOXES} boxes, got {shown(cells)}")
+    return numbers
 
 
 def _kuhn(index):

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Optional
 
-from taichi_dem.checks import between, choice, positive
+from taichi_dem.checks import between, choice, positive, shown
 from taichi_dem.errors import InputError
 from taichi_dem.step_control import Displacement, FixedStep, StepControl
 
@@ -11,9 +11,16 @@ NEIGHBOURS = ("held", "drifted")
 DASHPOTS = ("full", "limited")
 
 
+def check_method(method):
+    """InputError unless the method is an object that says how to step, one of these or alike."""
+    known = ("dt0", "criterion", "uniform", "neighbour", "solves")
+    if isinstance(method, type) or not all(hasattr(method, name) for name in known):
+        raise InputError(f"method must be one such as ImplicitDashpots(), got {shown(method)}")
+
+
 def _check_options(method):
     if method.control is not None and not isinstance(method.control, StepControl):
-        raise InputError(f"control must be a StepControl or None, got {method.control!r}")
+        raise InputError(f"control must be a StepControl or None, got {shown(method.control)}")
     choice("dashpot", method.dashpot, DASHPOTS)
     floor = method.control.dashpot_floor if method.control is not None else 0.0
     if floor > 0.0 and method.dashpot != "limited":
@@ -169,5 +176,6 @@ def _check_sweeps(sweeps):
     whole = isinstance(sweeps, tuple) and all(type(s) is int for s in sweeps)
     if not (whole and len(sweeps) == 2 and 1 <= sweeps[0] <= sweeps[1] <= 1000):
         raise InputError(
-            f"sweeps must be two whole numbers, fewest and most, from 1 to 1000, got {sweeps!r}"
+            "sweeps must be two whole numbers, fewest and most, from 1 to 1000, "
+            f"got {shown(sweeps)}"
         )

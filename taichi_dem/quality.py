@@ -7,6 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichi_dem import tetrahedra as geometry
+from taichi_dem.checks import instance
+from taichi_dem.materials import Material
+from taichi_dem.mesh import Mesh
 from taichi_dem.topology import body_properties, face_vertices, topology_of
 
 #: Elements listed in the printed table.
@@ -98,7 +101,12 @@ class QualityReport:
 
 
 def quality_report(mesh, material) -> QualityReport:
-    """Shape and explicit step limits of every body of a mesh; infinite for one without bonds."""
+    """Shape and explicit step limits of every body of a mesh; infinite for one without bonds.
+
+    Raises InputError for what is no mesh or material.
+    """
+    instance("mesh", mesh, Mesh)
+    instance("material", material, Material)
     topology = topology_of(mesh)
     mass, _, _ = body_properties(mesh, material.density)
     altitude = smallest_altitudes(mesh)

@@ -43,7 +43,12 @@ class Saved:
             raise InputError(f"checkpoint {path} is of another version: field {missing} differs")
         self.memory.write(_under("field", arrays))
         for part, owner in self.parts.items():
-            owner.resume(_under(part, arrays))
+            try:
+                owner.resume(_under(part, arrays))
+            except (KeyError, IndexError, ValueError, TypeError):
+                raise InputError(
+                    f"checkpoint {path} is of another version: what it holds of the {part} differs"
+                ) from None
 
 
 def _under(part, arrays):

@@ -23,6 +23,7 @@ if not os.environ.get("HOME"):
 import taichi as ti
 from taichi.lang import impl
 
+from taichi_dem.checks import choice, flag, whole
 from taichi_dem.errors import InputError
 
 ARCHITECTURES = ("cpu", "cuda")
@@ -92,15 +93,12 @@ def settings():
 
 
 def _checked(arch, threads, debug):
-    if arch not in ARCHITECTURES:
-        raise InputError(f"arch must be one of {', '.join(ARCHITECTURES)}, got {arch!r}")
+    choice("arch", arch, ARCHITECTURES)
     cores = os.cpu_count() or 1
     if hasattr(os, "sched_getaffinity"):
         cores = len(os.sched_getaffinity(0))
-    count = cores if threads is None else threads
-    if not isinstance(count, int) or isinstance(count, bool) or not 1 <= count <= 1024:
-        raise InputError(f"threads must be a whole number from 1 to 1024, got {threads!r}")
-    return Settings(arch, count, bool(debug))
+    count = cores if threads is None else whole("threads", threads, 1, 1024)
+    return Settings(arch, count, flag("debug", debug))
 
 
 def _initialise(wanted):

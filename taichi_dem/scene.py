@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from taichi_dem.checks import positive, shown
 from taichi_dem.effects.base import MANY, Effect
 from taichi_dem.errors import InputError
 from taichi_dem.materials import Material
@@ -24,14 +25,15 @@ class Scene:
     max_speed: float = 1e4
 
     def __post_init__(self):
+        if not hasattr(self.effects, "__iter__") or getattr(self.effects, "ndim", 1) == 0:
+            raise InputError(f"effects must be a list of effects, got {shown(self.effects)}")
         object.__setattr__(self, "effects", tuple(self.effects))
         _check_types(self)
         _check_roles(self.effects)
         for effect in self.effects:
             if hasattr(effect, "group"):
                 self.mesh.group_faces(effect.group)
-        if not 0.0 < self.max_speed < float("inf"):
-            raise InputError(f"max_speed must be a positive finite number, got {self.max_speed!r}")
+        positive("max_speed", self.max_speed)
 
     def has(self, name):
         """Whether an effect of this name is listed."""
@@ -45,7 +47,9 @@ def _check_types(scene):
         raise InputError(f"material must be a Material, got {type(scene.material).__name__}")
     for effect in scene.effects:
         if not isinstance(effect, Effect):
-            raise InputError(f"effects must be objects from taichi_dem.effects, got {effect!r}")
+            raise InputError(
+                f"effects must be objects from taichi_dem.effects, got {shown(effect)}"
+            )
 
 
 def _check_roles(effects):

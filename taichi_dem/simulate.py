@@ -7,17 +7,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from taichi_dem.checkpoint import digest, version_text
+from taichi_dem.checkpoint import Checkpoint, digest, version_text
+from taichi_dem.checks import callback, instance, shown
 from taichi_dem.errors import InputError, SimulationDiverged
 from taichi_dem.files import output_folder, write_csv, write_text
 from taichi_dem.mesh_files import write_mesh
+from taichi_dem.methods import check_method
 from taichi_dem.record import (
     Recorder,
     write_paraview,
 )
 from taichi_dem.restart import Keeper, NoKeeper, Saved, opened
+from taichi_dem.scene import Scene
 from taichi_dem.simulation import Simulation, macro_steps
 from taichi_dem.timeline import MACRO_TICKS
+
+#: Samples or frames of a run: each costs a look at all bodies.
+_MOST_RECORDS = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -110,9 +116,12 @@ def simulate(
     Raises InputError for bad arguments, SimulationDiverged when the run leaves its bounds,
     Interrupted when Ctrl-C has saved the run.
     """
+    instance("scene", scene, Scene)
+    check_method(method)
     last = macro_steps(until, method.dt0)
     _check_count("samples", samples, 1)
     _check_count("frames", frames, 0)
+    callback("progress", progress)
     arrays = _opened(scene, method, checkpoint, resume, last)
     if output is not None:
         output_folder(output)
@@ -139,8 +148,11 @@ def simulate(
 
 def _opened(scene, method, checkpoint, resume, last):
     """What a run goes on from, arrays by name, or None; InputError for what it cannot."""
+    if isinstance(checkpoint, Checkpoint):
+        # Refuses too many of them, before anything is done.
+        checkpoint.marks(last, method.dt0)
     arrays = opened(checkpoint, resume, lambda: identity_of(scene, method))
-    begin = int(arrays["field/state.tick"]) if arrays else 0
+    begin = int(np.asarray(arrays.get("field/state.tick", 0)).max(initial=0)) if arrays else 0
     if begin > last * MACRO_TICKS:
         seconds = method.dt0 / MACRO_TICKS
         raise InputError(
@@ -244,8 +256,12 @@ def _marks(last, count):
 
 
 def _check_count(name, value, least):
-    if isinstance(value, bool) or not isinstance(value, int) or value < least:
-        raise InputError(f"{name} must be a whole number of at least {least}, got {value!r}")
+    wanted = isinstance(value, int) and not isinstance(value, bool)
+    if not wanted or not least <= value <= _MOST_RECORDS:
+        raise InputError(
+            f"{name} must be a whole number of at least {least} and at most {_MOST_RECORDS}, "
+            f"got {shown(value)}"
+        )
 
 
 def _watched_group(scene):

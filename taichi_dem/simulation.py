@@ -6,14 +6,17 @@ import time
 import numpy as np
 
 from taichi_dem import runtime
+from taichi_dem.checks import choice, instance, positive, whole
 from taichi_dem.effects_acted import effects_acted
 from taichi_dem.errors import InputError, SimulationDiverged
 from taichi_dem.fields import fields_first
 from taichi_dem.health import Health
 from taichi_dem.ledger import Ledger
+from taichi_dem.methods import check_method
 from taichi_dem.model import Model
 from taichi_dem.report import Report
 from taichi_dem.resolution import Resolution
+from taichi_dem.scene import Scene
 from taichi_dem.state import NEVER, State
 from taichi_dem.step.advance import Advance
 from taichi_dem.step.broad_phase import BroadPhase
@@ -27,6 +30,8 @@ from taichi_dem.step_control import counted_criteria
 from taichi_dem.timeline import MACRO_TICKS
 from taichi_dem.watch import Watch
 
+#: Largest steps of a run, of which the ticks are counted in 64 bits.
+MOST_STEPS = 2**42
 #: Bonds from which on a CPU with several threads the parallel driver is the faster one.
 PARALLEL_FROM = 20000
 
@@ -36,11 +41,14 @@ class Simulation:
 
     driver: "resident", "parallel", or "auto": parallel on a GPU and for large scenes.
     brute_force: contact search without cells, for tests.
-    Raises InputError for an unknown driver, or "resident" on a GPU.
+    Raises InputError for what is no scene or method, an unknown driver, or "resident" on a GPU.
     """
 
     def __init__(self, scene, method, driver="auto", brute_force=False):
         self.generation = runtime.generation()
+        instance("scene", scene, Scene)
+        check_method(method)
+        choice("driver", driver, ("auto", *DRIVERS))
         started = time.perf_counter()
         self.scene, self.method = scene, method
         self.solves = method.solves
@@ -129,12 +137,13 @@ class Simulation:
     def advance_to(self, macro_step, on_call=None):
         """Step until a number of largest steps; on_call() is called about five times a second.
 
-        Raises SimulationDiverged with place and reason when the run leaves its bounds.
+        Raises SimulationDiverged with place and reason when the run leaves its bounds, InputError
+        for a number that is none.
         """
         if self.generation != runtime.generation():
             raise InputError("this simulation belongs to a Taichi session that has been stopped")
+        end = whole("macro_step", macro_step, 0, MOST_STEPS) * MACRO_TICKS
         self.start()
-        end = macro_step * MACRO_TICKS
         self.started, self.started_cpu = time.perf_counter(), time.process_time()
         try:
             while self.state.tick[None] < end:
@@ -238,20 +247,20 @@ def _driver_name(name, bond_count):
     if name == "auto":
         large = bond_count >= PARALLEL_FROM and runtime.settings().threads > 1
         return "parallel" if arch == "cuda" or large else "resident"
-    if name not in DRIVERS:
-        raise InputError(f"driver must be one of auto, {', '.join(DRIVERS)}, got {name!r}")
     if name == "resident" and arch == "cuda":
         raise InputError("driver 'resident' runs on a CPU only: use 'parallel' with arch 'cuda'")
     return name
 
 
 def macro_steps(until, dt0):
-    """Number of largest steps that reach a time [s]; InputError unless it is positive, finite."""
-    if isinstance(until, bool) or not isinstance(until, (int, float)):
-        raise InputError(f"until must be a positive time in s, got {until!r}")
-    if not (math.isfinite(until) and until > 0.0):
-        raise InputError(f"until must be a positive time in s, got {until!r}")
-    return max(1, math.ceil(until / dt0 - 1e-9))
+    """Number of largest steps that reach a time [s]; InputError unless it can be counted to."""
+    steps = positive("until", until) / dt0
+    if steps > MOST_STEPS:
+        raise InputError(
+            f"until must be at most {MOST_STEPS * dt0:.3g} s, {MOST_STEPS} largest steps of "
+            f"{dt0:g} s, got {until:g}"
+        )
+    return max(1, math.ceil(steps - 1e-9))
 
 
 __all__ = ["Simulation", "SimulationDiverged", "macro_steps"]

@@ -6,7 +6,7 @@ from typing import Optional
 import numpy as np
 import taichi as ti
 
-from taichi_dem.checks import between, choice, whole
+from taichi_dem.checks import between, choices, whole
 from taichi_dem.fields import then
 from taichi_dem.timeline import MAX_LEVEL
 from taichi_dem.types import real
@@ -66,8 +66,7 @@ class StepControl:
         between("ahead", self.ahead, 1.0, 100.0)
         between("dashpot_floor", self.dashpot_floor, 0.0, 1.0)
         for name, known in (("criteria", OPTIONAL), ("wake", EVENTS)):
-            for entry in getattr(self, name):
-                choice(name, entry, known)
+            object.__setattr__(self, name, choices(name, getattr(self, name), known))
         if self.level_jump is not None:
             whole("level_jump", self.level_jump, 0, MAX_LEVEL)
 

@@ -6,7 +6,8 @@ from numbers import Integral
 from ca_damper.automaton.accumulator import READINGS
 from ca_damper.automaton.bound import BoundAutomaton
 from ca_damper.automaton.rivals import MOST_CELLS
-from taichi_dem.checks import choice, fraction, positive, whole
+from ca_damper.filling import check_places
+from taichi_dem.checks import choice, flag, fraction, positive, shown, whole
 from taichi_dem.errors import InputError
 
 ACCOUNTINGS = {"landing": "ca_landing", "landing+ejection": "ca_ejection", "static": "ca_static"}
@@ -64,8 +65,7 @@ class Automaton:
         self._check_lattice()
 
     def _check_rules(self):
-        if not isinstance(self.ledger, bool):
-            raise InputError(f"ledger must be True or False, got {self.ledger!r}")
+        flag("ledger", self.ledger)
         if self.ledger and self.accounting == "static":
             raise InputError(
                 "ledger must be False with accounting 'static', where everything acts on the "
@@ -91,16 +91,16 @@ class Automaton:
 
     def _checked_start(self):
         if not isinstance(self.start, (tuple, list)):
-            raise InputError(f"start must be a tuple of (column, row), got {self.start!r}")
+            raise InputError(f"start must be a tuple of (column, row), got {shown(self.start)}")
         cells = [tuple(cell) if isinstance(cell, (tuple, list)) else cell for cell in self.start]
         for cell in cells:
             if not (isinstance(cell, tuple) and len(cell) == 2 and self._inside(*cell)):
                 raise InputError(
                     f"start must hold (column, row) from (0, 0) to ({self.columns - 1}, "
-                    f"{self.rows - 1}), got {cell!r}"
+                    f"{self.rows - 1}), got {shown(cell)}"
                 )
         if len(set(cells)) < len(cells):
-            raise InputError(f"start must not name a cell twice, got {self.start!r}")
+            raise InputError(f"start must not name a cell twice, got {shown(self.start)}")
         return tuple(cells)
 
     def _inside(self, column, row):
@@ -159,4 +159,5 @@ class Automaton:
 
     def bind(self, table):
         """The automaton on the device, for all scenes of a SceneTable."""
+        check_places(table.count, (self.columns + 2) * (self.rows + 2))
         return BoundAutomaton(self, table)

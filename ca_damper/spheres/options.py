@@ -6,10 +6,11 @@ from typing import ClassVar, Optional
 
 import numpy as np
 
+from ca_damper.filling import check_places
 from ca_damper.spheres.contact_law import POWERS, contact_duration, pair_numbers
 from ca_damper.spheres.dynamics import DIVERGENCES, BoundSpheres
 from ca_damper.spheres.search import SEARCHES
-from taichi_dem.checks import choice, fraction, positive, whole
+from taichi_dem.checks import choice, finite, flag, fraction, positive, shown, whole
 from taichi_dem.errors import InputError
 
 # Spheres part ever more slowly the stronger the dashpot, but none keeps them from parting.
@@ -17,6 +18,9 @@ _LEAST_RESTITUTION = 0.01
 
 # Steps in a contact of two spheres that met at the speed of a fall through the box.
 _STEPS_PER_CONTACT = 5.0
+
+# Spheres of a box: steps grow with their number, memory with its scenes too.
+_MOST_SPHERES = 1_000_000
 
 # Room that rounding may take from a row of spheres that fits exactly.
 _ROUNDING = 1e-9
@@ -66,8 +70,7 @@ class Spheres:
         """InputError for a number or word outside its range."""
         choice("damping", self.damping, POWERS)
         choice("search", self.search, SEARCHES)
-        if not isinstance(self.rotation, bool):
-            raise InputError(f"rotation must be True or False, got {self.rotation!r}")
+        flag("rotation", self.rotation)
         for name in ("reference_speed", "young", "wall_young", "diameter", "particle_mass"):
             positive(name, getattr(self, name))
         for name in ("friction", "wall_friction", "gravity"):
@@ -78,6 +81,7 @@ class Spheres:
             self._check_poisson(name)
         for name in ("width", "height"):
             self._check_size(name)
+        self._check_capacity()
         if self.start is not None:
             object.__setattr__(self, "start", self._checked_start())
 
@@ -138,6 +142,7 @@ class Spheres:
 
     def bind(self, table):
         """The spheres on the device, for all scenes of a SceneTable."""
+        check_places(table.count, self.capacity)
         return BoundSpheres(self, table)
 
     def _check_restitution(self, name):
@@ -147,20 +152,32 @@ class Spheres:
 
     def _check_poisson(self, name):
         value = getattr(self, name)
-        if not isinstance(value, (int, float)) or not -1.0 < value <= 0.5:
-            raise InputError(f"{name} must lie above -1 and up to 0.5, got {value!r}")
+        if not finite(value) or not -1.0 < value <= 0.5:
+            raise InputError(f"{name} must lie above -1 and up to 0.5, got {shown(value)}")
 
     def _check_size(self, name):
         value = positive(name, getattr(self, name))
         if value < self.diameter * (1.0 - _ROUNDING):
             raise InputError(f"{name} must be at least the diameter {self.diameter}, got {value!r}")
 
+    def _check_capacity(self):
+        if self.capacity > _MOST_SPHERES:
+            columns, rows = self.lattice
+            raise InputError(
+                f"width and height must hold at most {_MOST_SPHERES} spheres of the diameter "
+                f"{self.diameter}, got {shown(columns)} x {shown(rows)}"
+            )
+
     def _checked_start(self):
         """The places as a tuple of pairs, none in a wall or in another sphere."""
         try:
             places = np.array(self.start, dtype=np.float64).reshape(-1, 2)
-        except (TypeError, ValueError) as error:
-            raise InputError("start must hold two coordinates [m] for each sphere") from error
+            whole("places in start", len(places), 0, self.capacity)
+        except (TypeError, ValueError, OverflowError):
+            raise InputError(
+                f"start must hold two coordinates [m] for each of at most {self.capacity} spheres, "
+                f"got {shown(self.start)}"
+            ) from None
         size, slack = np.array([self.width, self.height]), _ROUNDING * self.diameter
         inside = (places >= self.radius - slack) & (places <= size - self.radius + slack)
         if not inside.all():

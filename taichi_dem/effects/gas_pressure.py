@@ -5,7 +5,7 @@ import math
 import numpy as np
 import taichi as ti
 
-from taichi_dem.checks import positive
+from taichi_dem.checks import positive, word
 from taichi_dem.effects.base import Effect, parameters
 from taichi_dem.fields import then
 from taichi_dem.physics.rotation import zero3
@@ -38,7 +38,7 @@ class GasPressure(Effect):
     name = "gas_pressure"
 
     def __init__(self, group="hole", peak=575e6, rise=1.33e-4, decay_ratio=2.75):
-        self.group = group
+        self.group = word("group", group)
         self.peak = positive("peak", peak)
         self.rise = positive("rise", rise)
         self.decay_ratio = positive("decay_ratio", decay_ratio)

@@ -2,10 +2,12 @@
 
 import taichi as ti
 
-from taichi_dem.checks import positive
+from taichi_dem.checks import flag, positive, whole
 from taichi_dem.effects.base import Effect, parameters
-from taichi_dem.errors import InputError
 from taichi_dem.physics.sphere_pair import normal_force
+
+#: Entries of a list for each body: a thousand tetrahedra with as many take some GiB.
+_MOST_ROOM = 100_000
 
 
 @ti.data_oriented
@@ -30,14 +32,12 @@ class SphereContact(Effect):
         pairs_per_body=24,
         spheres_per_body=160,
     ):
-        if not isinstance(divisions, int) or not 3 <= divisions <= 20:
-            raise InputError(f"divisions must be a whole number from 3 to 20, got {divisions!r}")
-        self.divisions = divisions
-        self.outer_faces = bool(outer_faces)
+        self.divisions = whole("divisions", divisions, 3, 20)
+        self.outer_faces = flag("outer_faces", outer_faces)
         self.skin = positive("skin", skin)
-        self.neighbours_per_body = int(positive("neighbours_per_body", neighbours_per_body))
-        self.pairs_per_body = int(positive("pairs_per_body", pairs_per_body))
-        self.spheres_per_body = int(positive("spheres_per_body", spheres_per_body))
+        self.neighbours_per_body = whole("neighbours_per_body", neighbours_per_body, 1, _MOST_ROOM)
+        self.pairs_per_body = whole("pairs_per_body", pairs_per_body, 1, _MOST_ROOM)
+        self.spheres_per_body = whole("spheres_per_body", spheres_per_body, 1, _MOST_ROOM)
 
     def bind(self, model):
         """Take stiffness [N/m] and damping [N s/m] of a contact from the material."""

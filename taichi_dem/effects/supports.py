@@ -5,7 +5,7 @@ import math
 import numpy as np
 import taichi as ti
 
-from taichi_dem.checks import direction, positive
+from taichi_dem.checks import direction, positive, shown, word
 from taichi_dem.effects.base import Effect, parameters
 from taichi_dem.errors import InputError
 from taichi_dem.fields import then
@@ -21,7 +21,7 @@ class _Support(Effect):
     role = "support"
 
     def __init__(self, group):
-        self.group = group
+        self.group = word("group", group)
 
     def bind(self, model):
         """Mark the supported bodies; InputError when the mesh has no such group."""
@@ -63,7 +63,7 @@ class Roller(_Support):
         super().__init__(group)
         numbers = np.array(direction("normal", normal))
         if not np.linalg.norm(numbers) > 0.0:
-            raise InputError(f"normal must be longer than zero, got {normal!r}")
+            raise InputError(f"normal must be longer than zero, got {shown(normal)}")
         self._normal = numbers / np.linalg.norm(numbers)
 
     def bind(self, model):

@@ -16,8 +16,8 @@ ROOT = Path(__file__).resolve().parents[2]
 # row below. A folder counts as one module. A new module needs a place here.
 LAYERS = {
     "taichi_dem": (
-        ("errors", "types", "runtime"),
-        ("checks", "fields", "field_memory", "files", "effect_use"),
+        ("errors", "types", "checks", "runtime"),
+        ("fields", "field_memory", "files", "effect_use", "time_limit"),
         ("plot_style", "checkpoint"),
         ("restart",),
         (
@@ -41,7 +41,7 @@ LAYERS = {
     ),
     "ca_damper": (
         ("errors", "random_numbers", "lattice", "table", "progress", "measures", "report"),
-        ("filling", "rk45", "oscillator", "clock", "record", "account"),
+        ("filling", "rk45", "oscillator", "clock", "record", "account", "checks"),
         ("container", "automaton", "spheres"),
         ("coupling",),
         ("batch", "needed_effects"),

@@ -259,7 +259,7 @@ def test_shapes_refuse_senseless_lengths(length):
         lambda: single(length),
         lambda: pair(1.0, length),
     ):
-        with pytest.raises(InputError, match="must be positive and finite"):
+        with pytest.raises(InputError, match="must be a positive finite number"):
             build()
 
 

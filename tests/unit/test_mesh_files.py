@@ -185,7 +185,7 @@ def test_scale_turns_the_files_unit_into_metres(tmp_path, scale):
 @pytest.mark.parametrize("scale", [0.0, -1.0, np.nan, np.inf, "mm"])
 def test_senseless_scale_is_refused(scale):
     words = refused(BLOCK, scale=scale)
-    assert words.startswith("scale must be positive and finite") and repr(scale) in words
+    assert words.startswith("scale must be a positive finite number") and repr(scale) in words
 
 
 def test_weld_tolerance_reaches_the_check(tmp_path):
@@ -332,8 +332,8 @@ def test_block_follows_its_parameters(tmp_path):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"depth": 0.0}, "depth must be positive"),
-        ({"size_far": "coarse"}, "size_far must be positive"),
+        ({"depth": 0.0}, "depth must be a positive finite number"),
+        ({"size_far": "coarse"}, "size_far must be a positive finite number"),
         ({"hole_segments": 6}, "hole_segments must be 4, 8, 12"),
         ({"hole": (1.99, 1.0)}, "hole must be (x, y) with x in (0.025, 1.975) m"),
         ({"hole": (1.0, -1.0)}, "got (1.0, -1.0)"),

@@ -1,0 +1,49 @@
+"""What a run of a batch refuses, asked before its kernels are compiled."""
+
+import numpy as np
+
+from ca_damper import measures
+from taichi_dem.checks import callback, choice, shown, whole
+from taichi_dem.errors import InputError
+
+#: Motion of the container at the beginning of a run.
+STARTS = ("rest", "empty", "rigid")
+MOST_CYCLES = 10_000_000
+#: Largest field of measured sums: 1 GiB, half of what Taichi can count.
+_MOST_NUMBERS = 2**27
+
+
+def check_run(transient_cycles, start, progress):
+    """InputError for a number of cycles, a start or a progress that cannot be meant."""
+    whole("transient_cycles", transient_cycles, 0, MOST_CYCLES)
+    choice("start", start, STARTS)
+    callback("progress", progress)
+
+
+def check_record_fits(scenes, measured_cycles):
+    """InputError where so many scenes and cycles leave no room for what is measured."""
+    cycles = scenes * max(1, measured_cycles)
+    most = _MOST_NUMBERS // len(measures.COLUMNS)
+    if cycles > most:
+        raise InputError(
+            f"scenes x measured_cycles must be at most {most} in one batch, got {cycles}: measure "
+            "fewer cycles"
+        )
+
+
+def for_all(name, value, scenes, most=None):
+    """One number for all scenes or one for each, (scenes,); InputError for anything else.
+
+    most: the largest of whole numbers from zero; None for any numbers.
+    """
+    words, kinds = ("numbers", "iuf") if most is None else (f"whole numbers from 0 to {most}", "iu")
+    try:
+        given = np.asarray(value)
+        numbers = np.broadcast_to(given, scenes)
+        bad = given.dtype.kind not in kinds
+        bad = bad or (most is not None and ((numbers < 0) | (numbers > most)).any())
+    except ValueError:
+        bad = True
+    if bad:
+        raise InputError(f"{name} must be {words}, one for all or {scenes}, got {shown(value)}")
+    return numbers
