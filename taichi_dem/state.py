@@ -100,8 +100,8 @@ class State:
             )
 
     def expose(self, topology):
-        """Let all outer faces carry contact spheres from the start."""
-        marks = np.full(4 * self.model.body_count, NEVER, dtype=np.int64)
+        """Let all outer faces carry contact spheres from the start, beside those that do."""
+        marks = self.exposed_tick.to_numpy()
         marks[4 * topology.outer_body + topology.outer_face] = 0
         self.exposed_tick.from_numpy(marks)
 

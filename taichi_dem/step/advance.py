@@ -198,8 +198,7 @@ class Advance(Touch):
 
     @ti.func
     def _moved(self, i, elapsed, velocity, momentum):
-        """Let body i go on for elapsed [s], as its supports allow, and choose its next step."""
-        velocity, momentum = self._supported(i, elapsed, velocity, momentum)
+        """Let body i go on for elapsed [s] and choose its next step."""
         spin = self.spin(i, momentum)
         self._drift(i, elapsed, velocity, momentum, spin)
         self.state.velocity[i], self.state.angular_momentum[i] = velocity, momentum
@@ -249,12 +248,11 @@ class Advance(Touch):
 
     @ti.func
     def _kicked(self, i, elapsed, linear, angular):
-        """Velocity and angular momentum after all impulses; loads book their work."""
-        before, momentum = self.state.velocity[i], self.state.angular_momentum[i]
+        """Velocity and angular momentum after all impulses, as the supports allow; books work."""
         linear, angular, kick = self._loaded(i, elapsed, linear, angular)
-        velocity = before + linear * self.model.mass_inverse[i]
-        self._book_loads(i, kick, 0.5 * (before + velocity), momentum + 0.5 * angular)
-        return velocity, momentum + angular
+        velocity = self.state.velocity[i] + linear * self.model.mass_inverse[i]
+        momentum = self.state.angular_momentum[i] + angular
+        return self._supported(i, elapsed, kick, velocity, momentum)
 
     @ti.func
     def _loaded(self, i, elapsed, linear, angular):
@@ -282,11 +280,7 @@ class Advance(Touch):
 
     @ti.func
     def _book_loads(self, i, kick, velocity, momentum):
-        """Book what the loads gave body i.
-
-        With the means of its velocity and angular momentum before and after the whole kick, the
-        change of kinetic energy is exact.
-        """
+        """Book what the loads gave body i, at a mean velocity and angular momentum."""
         for e in ti.static(range(len(self.model.loads))):
             if self.model.loads[e].acts_on(i):
                 push = vec3(kick[e, 0], kick[e, 1], kick[e, 2])
@@ -300,20 +294,27 @@ class Advance(Touch):
         return spin_of(self.state.rotation[i], self.model.inertia_inverse[i], momentum)
 
     @ti.func
-    def _supported(self, i, elapsed, velocity, momentum):
-        """Velocity and angular momentum that the supports allow; their work is booked last."""
+    def _supported(self, i, elapsed, kick, velocity, momentum):
+        """Velocity and angular momentum that the supports allow; books their work and the loads'.
+
+        With the means of velocity and angular momentum before and after all impulses of the step,
+        bonds, loads and supports together, the change of kinetic energy is exact: what holds a body
+        still does no work.
+        """
+        free, free_momentum = velocity, momentum
         half = self.schedule.seconds(self.state.tick[None]) - 0.5 * elapsed
         for effect in ti.static(self.model.supports):
             if effect.acts_on(i):
-                after, momentum_after = effect.held(
+                velocity, momentum = effect.held(
                     i, half, self.state.rotation[i], velocity, momentum
                 )
-                push = self.model.mass[i] * (after - velocity)
-                twist = momentum_after - momentum
-                spin = self.spin(i, 0.5 * (momentum + momentum_after))
-                work = 0.5 * push.dot(velocity + after) + twist.dot(spin)
-                self._book(i, ti.static(len(self.model.loads)), work, push, twist)
-                velocity, momentum = after, momentum_after
+        mean = 0.5 * (self.state.velocity[i] + velocity)
+        mean_momentum = 0.5 * (self.state.angular_momentum[i] + momentum)
+        self._book_loads(i, kick, mean, mean_momentum)
+        if ti.static(len(self.model.supports) > 0):
+            push, twist = self.model.mass[i] * (velocity - free), momentum - free_momentum
+            work = push.dot(mean) + twist.dot(self.spin(i, mean_momentum))
+            self._book(i, ti.static(len(self.model.loads)), work, push, twist)
         return velocity, momentum
 
     @ti.func

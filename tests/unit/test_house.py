@@ -34,7 +34,7 @@ LAYERS = {
         ("ledger",),
         ("health", "watch", "resolution", "report", "step_report", "effects_acted"),
         ("simulation",),
-        ("monitor", "record"),
+        ("monitor", "record", "realised"),
         ("simulate", "needed_effects"),
         ("plot",),
         ("__init__",),

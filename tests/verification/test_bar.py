@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects
+from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, Uniform, effects
 from taichi_dem.mesh_shapes import bar, single
 from taichi_dem.topology import faces_of_group
 
@@ -231,3 +231,17 @@ def test_free_fall_is_late_by_exactly_half_a_step():
     assert np.abs(motion["velocity"][0] - gravity * time).max() < steps * EPS * 9.81 * time
     account = simulation.ledger.account()
     assert account["load_work"] == pytest.approx(account["kinetic"], rel=steps * EPS)
+
+
+@pytest.mark.parametrize("method", [Uniform(2e-8), ImplicitDashpots(4e-7)], ids=lambda m: m.name)
+def test_what_is_held_still_takes_no_work(method):
+    """A force on a body that does not move does none, whatever the step; nor does its load."""
+    listed = [effects.BondDamping(), effects.Fixed("right")]
+    listed += [effects.GasPressure(group, peak=1e6, rise=1e-5) for group in ("left", "right")]
+    simulation = Simulation(Scene(bar(0.3, 0.1, (3, 1, 1)), CONCRETE, listed), method)
+    simulation.advance_to(round(2e-5 / method.dt0))
+    report, works = simulation.report(), simulation.state.load_work.to_numpy()
+    held = faces_of_group(simulation.model.mesh, simulation.model.topology, "right")[0]
+    assert np.abs(simulation.state.load_impulse.to_numpy()[held]).max() > 0.0
+    assert np.array_equal(works[held], np.zeros_like(works[held]))
+    assert report.ledger["support_work"] == 0.0 < report.ledger["load_work"]

@@ -30,11 +30,9 @@ class SolvedAdvance(Advance):
     def body(self, i):
         """Bring a body to the present tick with what the sweeps found."""
         elapsed = self.schedule.elapsed(i)
-        before, momentum_before = self.state.velocity[i], self.state.angular_momentum[i]
         velocity, momentum = self.solver.motion.found(i)
         _, _, kick = self._loaded(i, elapsed, zero3(), zero3())
-        self._book_loads(i, kick, 0.5 * (before + velocity), 0.5 * (momentum_before + momentum))
-        velocity, momentum = self._supported(i, elapsed, velocity, momentum)
+        velocity, momentum = self._supported(i, elapsed, kick, velocity, momentum)
         spin = self.spin(i, momentum)
         self._drift(i, elapsed, velocity, momentum, spin)
         self.state.velocity[i], self.state.angular_momentum[i] = velocity, momentum

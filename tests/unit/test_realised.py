@@ -1,0 +1,46 @@
+"""What steps of different length really saved: a twin with one step for all, at the same state."""
+
+import math
+
+import numpy as np
+import pytest
+
+from taichi_dem import Multirate, Simulation, Uniform
+from taichi_dem.realised import _twin, realised_gain
+from taichi_dem.state import NEVER
+from tests.scenes import brisk_scene
+
+
+@pytest.fixture(scope="module")
+def broken():
+    """A run that broke bonds and stands at steps of several lengths."""
+    simulation = Simulation(brisk_scene(), Multirate(1e-8, 2e-7))
+    simulation.advance_to(2000)
+    return simulation
+
+
+def test_a_twin_stands_where_the_run_does_and_takes_its_smallest_step(broken):
+    report = broken.report()
+    assert report.broken_faces > 0 and report.ideal_gain > 1.1
+    twin = _twin(broken, report.smallest_step_s)
+    for name, values in broken.state.motion().items():
+        if name not in ("level", "rotation"):
+            assert np.array_equal(twin.state.motion()[name], values), name
+    both = [run.state.broken_tick.to_numpy() == NEVER for run in (broken, twin)]
+    assert np.array_equal(*both)
+    assert twin.method == Uniform(report.smallest_step_s)
+
+
+def test_gain_is_time_over_time_and_is_said_in_the_report(broken):
+    """Uniform evaluations over the run's, times what one takes; nothing of the run changes."""
+    before, report = broken.state.position.to_numpy(), broken.report()
+    gain = realised_gain(broken, seconds=0.05)
+    assert math.isfinite(gain) and gain > 0.0
+    assert np.array_equal(broken.state.position.to_numpy(), before)
+    assert broken.report() == report
+
+
+def test_one_step_for_all_gains_nothing():
+    simulation = Simulation(brisk_scene(), Uniform(1e-8))
+    simulation.start()
+    assert realised_gain(simulation) == 1.0
