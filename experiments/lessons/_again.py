@@ -37,6 +37,8 @@ class Again:
         schedule = made.schedule
         schedule.dt0, schedule.tick_seconds = step, step / MACRO_TICKS
         schedule.step_seconds.from_numpy(step / 2.0 ** np.arange(MAX_LEVEL + 1))
-        # Blocks of solved dashpots hold the step; at rest this changes nothing else.
+        # The step is in the first impulses, of springs not at rest in their last bit, and in the
+        # blocks of solved dashpots.
+        made.state.slot.fill(0.0)
         made.step.prime()
         return made

@@ -15,7 +15,7 @@ from ca_damper.record import Frame
 
 #: Frequencies by the natural one of the empty box, and the cycles before and while measuring.
 RATIOS = (0.88, 0.9, 0.92, 0.94, 0.95, 0.96, 0.97, 0.98, 0.99, 1.0, 1.02, 1.05)
-TRANSIENT, MEASURED = 40, 10
+TRANSIENT, MEASURED = 60, 15
 #: Grains, their share of the box's mass, and the base's amplitude [m] at the beginning.
 FIRST = {"grains": 30, "share": 0.07, "base": 0.6e-3, "ratio": 0.97}
 #: Pictures of one cycle.
@@ -88,7 +88,7 @@ def batch():
 def answer(grains, share, base, ratio):
     """The Answer to a choice: grains, their share of the box's mass, base [m], ratio of RATIOS."""
     o = structure(grains, share, base)
-    cycles = engine.kept((grains, share, base), lambda: shaken(grains, o))
+    cycles, frames = engine.kept((grains, share, base), lambda: shaken(grains, o))
     place = RATIOS.index(ratio)
     return Answer(
         grains=grains,
@@ -100,22 +100,39 @@ def answer(grains, share, base, ratio):
         amplitude=float(cycles.amplitude[place]),
         energy={name: float(value[place]) for name, value in energies(cycles, o).items()},
         damping_ratio=float(cycles.damping_ratio(o.mass, o.stiffness, o.damping)[place]),
-        frames=cycle(grains, o, place),
+        frames=frames[place],
     )
 
 
-def begun(grains, o):
-    """The batch with these numbers, where a rigid mass would have it swing."""
+def shaken(grains, o):
+    """Shake until all is as it will stay; returns Cycles at all RATIOS, and Frames of each."""
     made = batch()
     numbers = {"mass": o.mass, "stiffness": o.stiffness, "damping": o.damping}
     made.change(particles=grains, base_amplitude=o.base_amplitude, **numbers)
     made.start("rigid")
-    return made
+    made.run(TRANSIENT, 0)
+    frames = one_cycle(made)
+    return made.run(0, MEASURED), frames
 
 
-def shaken(grains, o):
-    """Measured Cycles at all RATIOS."""
-    return begun(grains, o).run(TRANSIENT, MEASURED)
+def one_cycle(made):
+    """Go on by a cycle; returns Frames at PICTURES even parts of it, a tuple for each scene."""
+    marks = [made.steps_per_cycle * k // PICTURES for k in range(PICTURES + 1)]
+    shots = []
+    for here, there in zip(marks, marks[1:]):
+        shots.append(frames_now(made))
+        made.advance(there - here)
+    return tuple(zip(*shots))
+
+
+def frames_now(made):
+    """A Frame of each scene as it is."""
+    present = [made.sample()[name].tolist() for name in ("time_s", "x", "y")]
+    seen = [made.snapshot(s) for s in range(made.count)]
+    return [
+        Frame(*numbers, shot["position"], shot["velocity"])
+        for *numbers, shot in zip(*present, seen)
+    ]
 
 
 def energies(cycles, o):
@@ -133,17 +150,3 @@ def energies(cycles, o):
         "grains": cycles.complex_power.real,
     }
     return {name: value / cycles.frequency for name, value in power.items()}
-
-
-def cycle(grains, o, place):
-    """Frames of one cycle of a scene, after the transient: the box is shaken up to there again."""
-    made = begun(grains, o)
-    made.run(TRANSIENT, 0)
-    frames = []
-    for _ in range(PICTURES):
-        present = made.sample()
-        time_s, x, y = (float(present[name][place]) for name in ("time_s", "x", "y"))
-        shot = made.snapshot(place)
-        frames.append(Frame(time_s, x, y, shot["position"], shot["velocity"]))
-        made.advance(made.steps_per_cycle // PICTURES)
-    return tuple(frames)

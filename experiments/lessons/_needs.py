@@ -91,7 +91,9 @@ class Answer:
 
 def allowed(names):
     """The effects that can be listed out of names, in order: friction acts in contacts only."""
-    kept = set(names) - (set() if "sphere_contact" in names else {"friction"})
+    kept = set(names)
+    if "sphere_contact" not in kept:
+        kept.discard("friction")
     return tuple(name for name in ALL if name in kept)
 
 
