@@ -1,12 +1,14 @@
 """Which effects a scene needs: a bar is pulled open and pressed together, with any effects.
 
-Every choice of effects is a program of its own, compiled when it is first asked for. Everything
-here runs on the engine's thread.
+Every choice of effects is a program of its own, and to compile one takes seconds. So answers come
+from two programs, with contact and without, in which numbers of the other effects are set to what
+never acts: the same bits (a test demands it). What a choice costs is measured with its own program,
+when somebody asks for that. Everything here runs on the engine's thread.
 """
 
-import itertools
+import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Optional
 
 import numpy as np
@@ -15,6 +17,7 @@ from _again import Again
 from _engine import engine
 from taichi_dem import CONCRETE, Scene, SimulationDiverged, Uniform, effects, needed_effects
 from taichi_dem.mesh_shapes import bar
+from taichi_dem.watch import unserved
 
 LENGTH, WIDTH, CELLS = 0.3, 0.1, (3, 2, 2)
 STEP, UNTIL, LOOKS = 2e-8, 9e-4, 20
@@ -31,6 +34,9 @@ EFFECTS = {
     "friction": effects.Friction,
 }
 ALL = tuple(EFFECTS)
+WITHOUT_CONTACT = ALL[:3]
+#: Times the strength that no effect left out shall reach.
+_STRONGER = 2.0**40
 WORDS = {
     "bond_damping": "dashpots of the bonds",
     "softening": "fracture",
@@ -45,8 +51,9 @@ class Outcome:
     """A run with some effects.
 
     names: of the effects. motions: of all bodies, by the names of SHOWN, so far as the run came.
-    broken: which bonds at the end, bool. step_s: CPU seconds of a step. advice: what
-    ``needed_effects`` says. sentence: what the program said where it ended the run, else "".
+    broken: which bonds at the end, bool. step_s: CPU seconds of a step, NaN where that was not
+    measured. advice: what ``needed_effects`` says. sentence: what the program said where it ended
+    the run, else "".
     """
 
     names: tuple
@@ -109,17 +116,50 @@ def again(names):
     return engine.kept(names, lambda: Again(scene(names), Uniform(STEP)))
 
 
-def ready(names, speed):
-    """The bar at rest, its right end about to move at a speed [m/s]."""
-    made = again(names).back(STEP)
+def silenced(made, names):
+    """Set the numbers of the effects that are not named to what never acts; watch out for them."""
+    model = made.model
+    dashpot, tension, shear, friction = model.dashpot, model.tension, model.shear, model.friction
+    if dashpot.name and dashpot.name not in names:
+        dashpot.law.fill(0.0)
+    if tension.name and tension.name not in names:
+        # As strong as nothing is: strength, its opening, and the failure beyond, by a power of two.
+        tension.law[0] *= _STRONGER
+        limits = tension.unit.to_numpy()
+        limits[:, 0] *= _STRONGER
+        tension.unit.from_numpy(limits)
+        tension.law[1] = 2.0 * float(limits[:, 0].max())
+    if shear.name and shear.name not in names:
+        shear.law[0] *= _STRONGER
+    if friction.name and friction.name not in names:
+        friction.law[0] = 0.0
+    made.watch.missed = unserved({EFFECTS[name].role for name in names})
+    return made
+
+
+def ready(program, names, speed):
+    """The bar at rest in a program, its right end about to move at a speed [m/s]."""
+    made = silenced(again(program).back(STEP), names)
     motion = made.model.supports[1].motion
     motion[0], motion[1] = speed, SIDEWAYS * speed
     return made
 
 
 def outcome(names, speed):
-    """Move the bar with these effects; returns an Outcome."""
-    made = ready(names, speed)
+    """Move the bar with these effects; the Outcome has a cost where the program is their own."""
+    program = ALL if "sphere_contact" in names else WITHOUT_CONTACT
+    found = moved(program, names, speed)
+    return found if program == names else replace(found, step_s=math.nan)
+
+
+def measured(names, speed):
+    """The same by the program of these effects alone, which knows its cost."""
+    return moved(names, names, speed)
+
+
+def moved(program, names, speed):
+    """Outcome of a program with the effects named; the others in it never act."""
+    made = ready(program, names, speed)
     every, motions, sentence, spent = round(UNTIL / LOOKS / STEP), {}, "", 0.0
     try:
         for k in range(1, LOOKS + 1):
@@ -131,12 +171,13 @@ def outcome(names, speed):
     except SimulationDiverged as diverged:
         sentence = str(diverged)
     report = made.report()
+    listed = tuple(use for use in report.acted if use.effect in names)
     return Outcome(
         names=names,
         motions=motions,
         broken=made.state.broken_tick.to_numpy()[: made.model.bond_count] >= 0,
         step_s=spent / max(1, report.substeps),
-        advice=needed_effects(report),
+        advice=needed_effects(replace(report, acted=listed)),
         sentence=sentence,
     )
 
@@ -148,11 +189,16 @@ def answer(names, speed):
     return Answer(speed, *found, again(ALL).simulation.model)
 
 
-def neighbours():
-    """All choices of effects, those near the complete one first."""
-    counts = range(len(ALL), -1, -1)
-    chosen = (allowed(names) for n in counts for names in itertools.combinations(ALL, n))
-    return tuple(dict.fromkeys(chosen))
+def price(names, speed):
+    """What ``answer`` gives, with the cost of a step by the program of these effects alone."""
+    found = engine.kept(("price", names, speed), lambda: measured(names, speed))
+    return replace(answer(names, speed), chosen=found)
+
+
+def compile_all():
+    """Compile both programs that answers come from, so that no later answer has to wait."""
+    for names in (ALL, WITHOUT_CONTACT):
+        again(names)
 
 
 def verdicts(answer):

@@ -169,6 +169,7 @@ def nearest(values, value):
     return min(values, key=lambda one: abs(one - value))
 
 
-def everything():
-    """All choices, the likely ones first: (method, step, rise)."""
-    return [(method, STEPS[0], rise) for rise in (RISES[1], *RISES) for method in METHODS]
+def compile_all():
+    """Compile the bar of every method, so that no later answer has to wait for it."""
+    for method in METHODS:
+        again(method)

@@ -72,7 +72,9 @@ def _(lesson, mo):
 @app.cell
 def _(engine, lesson, method, mo, percent, picture_time_step, rise, seconds, served, step):
     _choice = method.value, lesson.nearest(lesson.STEPS, 1e-9 * step.value)
-    with mo.status.spinner("Striking. The first strike of a method is compiled, some seconds."):
+    with mo.status.spinner("Striking. When a lesson is first opened it compiles, some seconds."):
+        if served:
+            engine.ask(lesson.compile_all)
         _answer = engine.ask(
             lesson.answer, *_choice, lesson.nearest(lesson.RISES, 1e-6 * rise.value)
         )
@@ -125,14 +127,6 @@ def _(mo):
             ),
         }
     )
-    return
-
-
-@app.cell
-def _(engine, lesson, served):
-    # While the class reads, the other answers are made.
-    for _choice in lesson.everything() if served else ():
-        engine.prepare(lesson.answer, *_choice)
     return
 
 

@@ -49,21 +49,28 @@ def _(lesson, mo):
         show_value=True,
         debounce=True,
     )
-    mo.hstack([mo.vstack(list(listed.elements.values())), speed], justify="start", gap=3)
-    return listed, speed
+    measure = mo.ui.run_button(label="measure what this choice costs (compiles it, some seconds)")
+    _switches = mo.vstack(list(listed.elements.values()))
+    mo.hstack([_switches, mo.vstack([speed, measure])], justify="start", gap=3)
+    return listed, measure, speed
 
 
 @app.cell
-def _(engine, lesson, listed, mo, percent, picture_needs, served, speed):
+def _(engine, lesson, listed, measure, mo, percent, picture_needs, served, speed):
     _names = lesson.allowed([name for name, on in listed.value.items() if on])
-    with mo.status.spinner("Pulling. New effects are a new program: compiled once, some seconds."):
-        _answer = engine.ask(lesson.answer, _names, speed.value)
+    with mo.status.spinner("Pulling. When a lesson is first opened it compiles, some seconds."):
+        if served:
+            engine.ask(lesson.compile_all)
+        _work = lesson.price if measure.value else lesson.answer
+        _answer = engine.ask(_work, _names, speed.value)
         _picture = engine.ask(picture_needs, _answer)
     _spared = 1.0 - _answer.chosen.step_s / _answer.complete.step_s
+    _known = _spared == _spared
+    _spares = f"spares **{percent(max(0.0, _spared))}** of a step" if _known else "is not measured"
     _change = "no comparison" if _answer.change is None else percent(_answer.change)
     _words = (
-        f"The end is pulled out by **{1e3 * _answer.stroke:.2g} mm**. Your choice spares "
-        f"**{percent(max(0.0, _spared))}** of a step; bodies end elsewhere by **{_change}**."
+        f"The end is pulled out by **{1e3 * _answer.stroke:.2g} mm**. Your choice {_spares}; "
+        f"bodies end elsewhere by **{_change}**."
     )
     if _answer.chosen.sentence:
         _words += f" The program says: *{_answer.chosen.sentence}.*"
@@ -105,7 +112,7 @@ def _(mo):
                 "ask for one, and others follow."
             ),
             "Which effect is dear, and is it the one that matters most?": mo.md(
-                "Compare the grey bar with yours, switch by switch. Dear and important are two "
+                "Leave out one at a time and press the button. Dear and important are two "
                 "things: look at the share of the energy in the table, and at where the bodies end."
             ),
             "Fracture takes 2 % of the energy. Can it go?": mo.md(
@@ -115,14 +122,6 @@ def _(mo):
             ),
         }
     )
-    return
-
-
-@app.cell
-def _(engine, lesson, served, speed):
-    # While the class reads, the programs of the other choices are compiled, the nearest first.
-    for _names in lesson.neighbours() if served else ():
-        engine.prepare(lesson.answer, _names, speed.value)
     return
 
 

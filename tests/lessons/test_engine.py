@@ -1,4 +1,4 @@
-"""One thread does all the work, what is waited for first; it ends and begins anew."""
+"""One thread does all the work, whoever asks; it ends and begins anew."""
 
 import threading
 
@@ -30,24 +30,6 @@ def test_all_who_ask_are_answered_on_one_thread_that_is_not_theirs(own):
     assert own.ask(runtime.settings).threads == 1
 
 
-def test_what_somebody_waits_for_comes_before_what_is_prepared(own):
-    """The first piece holds the thread until all others are there; then ranks decide."""
-    gate, done = threading.Event(), []
-    own.prepare(gate.wait)
-    for name in ("prepared", "prepared later"):
-        own.prepare(done.append, name)
-    asker = threading.Thread(target=own.ask, args=(done.append, "asked"))
-    asker.start()
-    while own._work.qsize() < 3:
-        asker.join(0.001)
-    gate.set()
-    asker.join()
-    own.prepare(done.append, "last")
-    while len(done) < 4:
-        asker.join(0.001)
-    assert done == ["asked", "prepared", "prepared later", "last"]
-
-
 def test_work_may_ask_for_more_work(own):
     assert own.ask(lambda: own.ask(lambda: 3) + 1) == 4
 
@@ -71,11 +53,17 @@ def test_a_fault_reaches_who_asked_and_the_next_is_answered(own):
     assert own.ask(lambda: 1) == 1
 
 
-def test_closing_ends_taichi_and_what_is_prepared(own):
-    gate, done = threading.Event(), []
-    own.prepare(gate.wait)
-    own.prepare(done.append, 1)
-    threading.Timer(0.05, gate.set).start()
+def test_closing_ends_taichi_after_what_has_been_asked_for(own):
+    begun, done = threading.Event(), []
+
+    def work():
+        begun.set()
+        done.append(runtime.settings())
+
+    asker = threading.Thread(target=own.ask, args=(work,))
+    asker.start()
+    begun.wait()
     own.close()
-    assert done == [] and runtime.settings() is None
+    asker.join()
+    assert done[0] is not None and runtime.settings() is None
     own.close()
