@@ -53,7 +53,7 @@ class Outcome:
     names: of the effects. motions: of all bodies, by the names of SHOWN, so far as the run came.
     broken: which bonds at the end, bool. step_s: CPU seconds of a step, NaN where that was not
     measured. advice: what ``needed_effects`` says. sentence: what the program said where it ended
-    the run, else "".
+    the run, else "". unresolved: its sentences about what the step is too long for.
     """
 
     names: tuple
@@ -62,6 +62,7 @@ class Outcome:
     step_s: float
     advice: object
     sentence: str
+    unresolved: tuple
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,6 +180,7 @@ def moved(program, names, speed):
         step_s=spent / max(1, report.substeps),
         advice=needed_effects(replace(report, acted=listed)),
         sentence=sentence,
+        unresolved=report.unresolved,
     )
 
 

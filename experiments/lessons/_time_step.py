@@ -25,8 +25,8 @@ from taichi_dem.mesh_shapes import bar
 
 LENGTH, WIDTH, CELLS = 0.4, 0.05, (12, 1, 1)
 #: Steps to choose from [s], and that of the truth.
-STEPS = tuple(2e-8 * 2**k for k in range(8))
-FINEST = 1e-8
+STEPS = tuple(4e-8 * 2**k for k in range(7))
+FINEST = 2e-8
 #: Samples after the first; each is a whole number of the longest steps after the one before.
 SAMPLES = 40
 UNTIL = SAMPLES * 3 * STEPS[-1]
