@@ -113,7 +113,7 @@ def _(mo):
                 "Nothing breaks, so nothing comes loose that could touch. Effects hang together: "
                 "ask for one, and others follow."
             ),
-            "The program warns of sphere dashpots when the pull is hard. How wrong is the answer?": (
+            "A hard pull makes the program warn of sphere dashpots. How wrong is it?": (
                 mo.md(
                     "By 0.2 %: so far do the bodies end elsewhere when the step is halved, and the "
                     "warning stays. Twice as long a step would be wrong by 2 %. A warning is a "

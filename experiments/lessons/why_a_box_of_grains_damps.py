@@ -48,7 +48,7 @@ def _(lesson, mo):
         **_look,
     )
     grains = mo.ui.slider(
-        steps=[5, 10, 20, 30, 40, 60, 80],
+        steps=[5, 10, 20, 30, 40, 60],
         value=lesson.FIRST["grains"],
         label="grains (160 fill the box)",
         **_look,
@@ -114,8 +114,8 @@ def _(mo):
                 "damping **limits itself**. As soon as the box comes near 1 g the grains stay down "
                 "and take nothing. Look at the acceleration: it stays above 1.3 g."
             ),
-            "Ten grains, or eighty of the same mass together: which damps better?": mo.md(
-                "About alike: 8.7 and 8.5 mm at the peak. What counts is the **mass that is thrown "
+            "Ten grains, or sixty of the same mass together: which damps better?": mo.md(
+                "About alike: 8.7 and 8.6 mm at the peak. What counts is the **mass that is thrown "
                 "and caught** and that it has way to fly. Few grains do it less evenly: look how "
                 "bumpy the curve gets with five."
             ),
