@@ -147,10 +147,9 @@ def ready(program, names, speed):
 
 
 def outcome(names, speed):
-    """Move the bar with these effects; the Outcome has a cost where the program is their own."""
+    """Move the bar with these effects; the Outcome knows no cost, as others stand silent by."""
     program = ALL if "sphere_contact" in names else WITHOUT_CONTACT
-    found = moved(program, names, speed)
-    return found if program == names else replace(found, step_s=math.nan)
+    return replace(moved(program, names, speed), step_s=math.nan)
 
 
 def measured(names, speed):
@@ -192,9 +191,10 @@ def answer(names, speed):
 
 
 def price(names, speed):
-    """What ``answer`` gives, with the cost of a step by the program of these effects alone."""
-    found = engine.kept(("price", names, speed), lambda: measured(names, speed))
-    return replace(answer(names, speed), chosen=found)
+    """What ``answer`` gives, with costs: both programs run one after the other."""
+    again(names)
+    chosen, complete = (measured(one, speed) for one in (names, ALL))
+    return replace(answer(names, speed), chosen=chosen, complete=complete)
 
 
 def compile_all():

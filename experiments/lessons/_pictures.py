@@ -191,13 +191,14 @@ def _pulled(axes, answer, outcome, instant):
 
 
 def _step_price(axes, answer):
-    """Time of a step; the choice's own where it has been measured."""
+    """Time of a step of both, where it has been measured."""
     values = [1e6 * outcome.step_s for outcome in (answer.chosen, answer.complete)]
-    known = np.isfinite(values[0])
-    _pair(axes, [values[0] if known else 0.0, values[1]], "%.3g" if known else "")
-    if not known:
-        axes.text(0.03 * values[1], 0, "not measured yet", va="center", fontsize=8.5)
     axes.set(xlabel="time of a step [µs]", title="what it costs")
+    if np.isfinite(values).all():
+        _pair(axes, values, "%.3g")
+    else:
+        axes.set(xticks=[], yticks=[])
+        axes.text(0.5, 0.5, "not measured yet: press the button", ha="center", va="center")
 
 
 def _broken(axes, answer):

@@ -77,16 +77,17 @@ def _(engine, lesson, listed, measure, mo, percent, picture_needs, served, speed
     for _warning in _answer.chosen.unresolved:
         _words += f" It warns: *{_warning}.*"
     _rows = [
-        {"effect": words, "listed": "yes" if on else "no", "it did": did, "the program": says}
+        f"| {words} | {'yes' if on else 'no'} | {did} | **{says}** |"
         for words, on, did, says in lesson.verdicts(_answer)
     ]
+    _head = ["| effect | listed | what it did | the program says |", "|---|---|---|---|"]
     if not served:
         print(_words)
     mo.vstack(
         [
             mo.image(_picture, alt="Bar with all effects and with those chosen, cost of a step"),
             mo.md(_words),
-            mo.ui.table(_rows, selection=None, pagination=False, show_download=False),
+            mo.md("\n".join([*_head, *_rows])),
         ]
     )
     return
