@@ -10,11 +10,15 @@ TEST_OPTIONS ?=
 BENCH_OPTIONS ?=
 MESH_OPTIONS ?=
 GALLERY_OPTIONS ?=
+LESSONS_OPTIONS ?=
 
 BIN := $(if $(filter Windows_NT,$(OS)),.venv/Scripts,.venv/bin)
 STAMP := .venv/stamp
 MESH_STAMP := .venv/stamp-mesh
 DOCS_STAMP := .venv/stamp-docs
+LESSONS_STAMP := .venv/stamp-lessons
+LESSONS := $(addprefix experiments/lessons/,$(addsuffix .py,what_a_time_step_costs \
+  why_a_box_of_grains_damps which_effects_a_scene_needs))
 GMSH_PACKAGES := libglu1-mesa libgl1 libxcursor1 libxft2 libxinerama1 libgomp1
 
 # taichi aborts where HOME is not set.
@@ -22,7 +26,7 @@ ifeq ($(strip $(HOME)),)
 export HOME := $(CURDIR)/.venv/home
 endif
 
-.PHONY: help venv demo test test-slow test-bounds lint bench gallery api mesh clean
+.PHONY: help venv demo test test-slow test-bounds lint bench gallery lessons api mesh clean
 
 help: ## print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-11s %s\n", $$1, $$2}' Makefile
@@ -51,6 +55,9 @@ bench: $(STAMP) ## measure speed
 gallery: $(STAMP) ## run all experiments and show them on one page (GALLERY_OPTIONS=--quick: minutes)
 	$(BIN)/python experiments/gallery.py $(GALLERY_OPTIONS)
 
+lessons: $(LESSONS_STAMP) ## serve three interactive lessons to this machine's browser (installs marimo)
+	$(BIN)/python -m marimo run $(LESSONS) --host 127.0.0.1 $(LESSONS_OPTIONS)
+
 api: $(DOCS_STAMP) ## pages of all functions from their docstrings, in results/api (installs pdoc)
 	$(BIN)/python docs/make_api.py results/api
 
@@ -74,4 +81,11 @@ $(MESH_STAMP): $(STAMP)
 $(DOCS_STAMP): $(STAMP)
 	@echo "Installing pdoc (a few seconds)."
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[docs]"
+	@touch $@
+
+$(LESSONS_STAMP): $(STAMP)
+	@echo "Installing marimo (about 15 seconds)."
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[lessons]"
+	@$(BIN)/python -c "import marimo" || { echo "The lessons need Python 3.10 or newer: type" \
+	  "make venv PYTHON=/path/to/python3.12"; exit 1; }
 	@touch $@

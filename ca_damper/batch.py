@@ -60,7 +60,7 @@ class Batch:
         positive("rtol", rtol, zero_allowed=True)
         positive("atol", atol)
         self.filling, self.table, self.count, self.mount = filling, table, table.count, mount
-        self.oscillators = [Oscillator(*row) for row in zip(*map(table.column, _STRUCTURE))]
+        self.oscillators = self._structures()
         self.largest_dt, self.clock = table.column("dt"), Clock(table)
         frequency = table.column("frequency")
         dt = self._fit_steps(frequency)
@@ -96,6 +96,23 @@ class Batch:
         self._started = True
         self.time_origin[:] = 0.0
         self._check_health()
+
+    def change(self, **numbers):
+        """Give the scenes other numbers, as ``SceneTable.change``; then ``start`` begins anew.
+
+        The bits are those of a batch that is made with them, and nothing is compiled.
+        Raises InputError for what that batch would refuse.
+        """
+        self._check_session()
+        self.table.change(**{"dt": self.largest_dt, **numbers})
+        self._started, self.largest_dt = False, self.table.column("dt")
+        self.oscillators = self._structures()
+        frequency = self.table.column("frequency")
+        self._set_pace(frequency, self._fit_steps(frequency))
+
+    def _structures(self):
+        """What every scene hangs on; InputError for numbers that cannot be meant."""
+        return [Oscillator(*row) for row in zip(*map(self.table.column, _STRUCTURE))]
 
     def drive(self, frequency):
         """Go on at another frequency [Hz], a scalar or (scenes,), at the end of a cycle.

@@ -3,11 +3,12 @@
 import numpy as np
 import taichi as ti
 
-from taichi_dem.checks import shown
+from taichi_dem.checks import choice, shown
 from taichi_dem.errors import InputError
 
 #: Scenes of a table, and the largest seed.
 _MOST_SCENES, _MOST_SEED = 2**24, 2**31 - 1
+
 _ROWS = ti.types.ndarray(dtype=ti.f64, ndim=2)
 
 
@@ -48,6 +49,17 @@ class SceneTable:
             kind = ti.i32 if name in ("particles", "seed") else ti.f64
             setattr(self, name, ti.field(kind, shape=self.count))
         self._load(np.stack(rows).astype(np.float64))
+
+    def change(self, **numbers):
+        """Give all scenes other numbers by name, each a scalar or (scenes,); compiles nothing.
+
+        Raises InputError for a name that is no column.
+        """
+        for name, values in numbers.items():
+            choice("number to change", name, self.COLUMNS)
+            kind = np.int64 if name in ("particles", "seed") else np.float64
+            self._host[name] = np.broadcast_to(values, self.count).astype(kind)
+        self._load(np.stack([self._host[name] for name in self.COLUMNS]).astype(np.float64))
 
     def drive(self, frequency, dt):
         """Change frequency [Hz] and step [s] of all scenes, each a scalar or (scenes,)."""

@@ -35,17 +35,26 @@ ORANGE, SKY, BLACK, GREY = "#E69F00", "#56B4E9", "#222222", "#8A8A8A"
 
 
 @contextlib.contextmanager
-def picture(path, rows=1, columns=1, size=(6.4, 4.2), **options):
-    """A figure and its axes in the common style, written as PNG when the block ends well.
+def styled(rows=1, columns=1, size=(6.4, 4.2), **options):
+    """A figure and its axes in the common style, which holds to the end of the block.
 
     size: in inches. rows: 0 for no axes, which the block then makes. options: of
     ``Figure.subplots``. The Agg canvas needs no display.
-    Raises InputError when the file cannot be written.
     """
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=size, layout="constrained")
         FigureCanvasAgg(figure)
         yield figure, figure.subplots(rows, columns, **options) if rows else None
+
+
+@contextlib.contextmanager
+def picture(path, *shape, **options):
+    """A figure and its axes, as of ``styled``, written as PNG when the block ends well.
+
+    Raises InputError when the file cannot be written.
+    """
+    with styled(*shape, **options) as (figure, axes):
+        yield figure, axes
         write_whole(path, lambda name: figure.savefig(name, format="png"))
 
 

@@ -42,6 +42,11 @@ _NEEDS = (
 )
 
 
+def unserved(roles):
+    """An empty ``Missed`` by role, for every need that no effect of these roles serves."""
+    return {role: Missed(effect, what) for role, effect, what in _NEEDS if role not in roles}
+
+
 @ti.data_oriented
 class Watch:
     """Counts the places where an absent effect would have acted, at recording times.
@@ -53,10 +58,7 @@ class Watch:
         self.model, self.state, self.advance = model, state, advance
         self.touching = self.looks = 0
         self.last_s = -1.0
-        listed = {effect.role for effect in model.effects if effect.name}
-        self.missed = {
-            role: Missed(effect, what) for role, effect, what in _NEEDS if role not in listed
-        }
+        self.missed = unserved({effect.role for effect in model.effects if effect.name})
         material = model.material
         self.limits = ti.Vector([material.tensile_strength, material.cohesion, material.friction])
 

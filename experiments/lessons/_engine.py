@@ -1,0 +1,62 @@
+"""The one thread that owns Taichi, for every page and every session of the lessons.
+
+Each browser that opens a lesson is served by a thread of its own, in one process. Taichi makes
+fields only on the thread that started it, and two starts would take each other's fields away. So
+all work is handed to this thread, and what it has built is kept for whoever asks next.
+"""
+
+import threading
+from concurrent.futures import ThreadPoolExecutor
+
+from taichi_dem import runtime
+
+
+class Engine:
+    """A thread that does work one piece after the other; it starts Taichi with its first piece.
+
+    threads: of the CPU, as in ``runtime.start``.
+    """
+
+    def __init__(self, threads=None):
+        self.threads, self._lock = threads, threading.Lock()
+        self._pool, self._thread, self._kept = None, None, {}
+
+    def ask(self, work, *arguments):
+        """Do work(*arguments) on the thread, in its turn; returns or raises what it does."""
+        if threading.current_thread() is self._thread:
+            return work(*arguments)
+        with self._lock:
+            if self._pool is None:
+                self._pool = ThreadPoolExecutor(1)
+            answer = self._pool.submit(self._do, work, arguments)
+        return answer.result()
+
+    def kept(self, key, make):
+        """What make() gave when it was first asked for under this key; on the engine's thread."""
+        if key not in self._kept:
+            self._kept[key] = make()
+        return self._kept[key]
+
+    def close(self):
+        """End Taichi and the thread, after what has been asked for; another ask begins anew."""
+        with self._lock:
+            pool, self._pool = self._pool, None
+            if pool is not None:
+                pool.submit(self._end)
+                pool.shutdown()
+
+    def _do(self, work, arguments):
+        if self._thread is None:
+            runtime.start(threads=self.threads)
+            self._thread = threading.current_thread()
+        return work(*arguments)
+
+    def _end(self):
+        self._kept.clear()
+        if self._thread is not None:
+            runtime.stop()
+        self._thread = None
+
+
+#: That of this process.
+engine = Engine()

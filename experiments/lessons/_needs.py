@@ -1,0 +1,221 @@
+"""Which effects a scene needs: a bar is pulled open and pressed together, with any effects.
+
+Every choice of effects is a program of its own, and to compile one takes seconds. So answers come
+from two programs, with contact and without, in which numbers of the other effects are set to what
+never acts: the same bits (a test demands it). What a choice costs is measured with its own program,
+when somebody asks for that. Everything here runs on the engine's thread.
+"""
+
+import math
+import time
+from dataclasses import dataclass, replace
+from typing import Optional
+
+import numpy as np
+
+from _again import Again
+from _engine import engine
+from taichi_dem import CONCRETE, Scene, SimulationDiverged, Uniform, effects, needed_effects
+from taichi_dem.mesh_shapes import bar
+from taichi_dem.watch import unserved
+
+LENGTH, WIDTH, CELLS = 0.3, 0.1, (3, 2, 2)
+STEP, UNTIL, LOOKS = 2e-8, 9e-4, 20
+#: The right end goes with v cos(2 pi f t), and sideways at half of it: v [m/s] to choose, f [Hz].
+SPEEDS = (0.05, 0.2, 0.5, 0.75, 1.0, 1.5, 2.0)
+SIDEWAYS, FREQUENCY = 0.5, 900.0
+#: Looks at which the bar is drawn: pulled open, and pressed together.
+SHOWN = {"pulled open": 6, "pressed together": LOOKS}
+EFFECTS = {
+    "bond_damping": effects.BondDamping,
+    "softening": effects.Softening,
+    "shear_slip": effects.ShearSlip,
+    "sphere_contact": effects.SphereContact,
+    "friction": effects.Friction,
+}
+ALL = tuple(EFFECTS)
+WITHOUT_CONTACT = ALL[:3]
+#: Times the strength that no effect left out shall reach.
+_STRONGER = 2.0**40
+WORDS = {
+    "bond_damping": "dashpots of the bonds",
+    "softening": "fracture",
+    "shear_slip": "slip in shear",
+    "sphere_contact": "contact of fragments",
+    "friction": "friction of fragments",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """A run with some effects.
+
+    names: of the effects. motions: of all bodies, by the names of SHOWN, so far as the run came.
+    broken: which bonds at the end, bool. step_s: CPU seconds of a step, NaN where that was not
+    measured. advice: what ``needed_effects`` says. sentence: what the program said where it ended
+    the run, else "". unresolved: its sentences about what the step is too long for.
+    """
+
+    names: tuple
+    motions: dict
+    broken: np.ndarray
+    step_s: float
+    advice: object
+    sentence: str
+    unresolved: tuple
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What one choice gives: the Outcome chosen and that with all effects; model: of the bar.
+
+    speed: at which the right end begins [m/s].
+    """
+
+    speed: float
+    chosen: Outcome
+    complete: Outcome
+    model: object
+
+    @property
+    def stroke(self):
+        """How far the right end is pulled out [m]."""
+        return self.speed / (2.0 * np.pi * FREQUENCY)
+
+    @property
+    def change(self):
+        """Mean distance of the bodies from where all effects bring them, by how far that is.
+
+        None where the chosen run did not come to its end.
+        """
+        if self.chosen.sentence or self.complete.sentence:
+            return None
+        here, there = (
+            made.motions["pressed together"]["position"] for made in (self.chosen, self.complete)
+        )
+        way = np.linalg.norm(there - self.model.centre, axis=1).mean()
+        return float(np.linalg.norm(here - there, axis=1).mean() / way)
+
+
+def allowed(names):
+    """The effects that can be listed out of names, in order: friction acts in contacts only."""
+    kept = set(names)
+    if "sphere_contact" not in kept:
+        kept.discard("friction")
+    return tuple(name for name in ALL if name in kept)
+
+
+def scene(names):
+    """The bar, held on the left and moved on the right, with some effects."""
+    moved = effects.PrescribedMotion("right", (1.0, SIDEWAYS, 0.0), FREQUENCY)
+    listed = [EFFECTS[name]() for name in names]
+    return Scene(bar(LENGTH, WIDTH, CELLS), CONCRETE, [*listed, effects.Fixed("left"), moved])
+
+
+def again(names):
+    """The compiled bar with these effects, made when it is first asked for."""
+    return engine.kept(names, lambda: Again(scene(names), Uniform(STEP)))
+
+
+def silenced(made, names):
+    """Set the numbers of the effects that are not named to what never acts; watch out for them."""
+    model = made.model
+    dashpot, tension, shear, friction = model.dashpot, model.tension, model.shear, model.friction
+    if dashpot.name and dashpot.name not in names:
+        dashpot.law.fill(0.0)
+    if tension.name and tension.name not in names:
+        # As strong as nothing is: strength, its opening, and the failure beyond, by a power of two.
+        tension.law[0] *= _STRONGER
+        limits = tension.unit.to_numpy()
+        limits[:, 0] *= _STRONGER
+        tension.unit.from_numpy(limits)
+        tension.law[1] = 2.0 * float(limits[:, 0].max())
+    if shear.name and shear.name not in names:
+        shear.law[0] *= _STRONGER
+    if friction.name and friction.name not in names:
+        friction.law[0] = 0.0
+    made.watch.missed = unserved({EFFECTS[name].role for name in names})
+    return made
+
+
+def ready(program, names, speed):
+    """The bar at rest in a program, its right end about to move at a speed [m/s]."""
+    made = silenced(again(program).back(STEP), names)
+    motion = made.model.supports[1].motion
+    motion[0], motion[1] = speed, SIDEWAYS * speed
+    return made
+
+
+def outcome(names, speed):
+    """Move the bar with these effects; the Outcome knows no cost, as others stand silent by."""
+    program = ALL if "sphere_contact" in names else WITHOUT_CONTACT
+    return replace(moved(program, names, speed), step_s=math.nan)
+
+
+def measured(names, speed):
+    """The same by the program of these effects alone, which knows its cost."""
+    return moved(names, names, speed)
+
+
+def moved(program, names, speed):
+    """Outcome of a program with the effects named; the others in it never act."""
+    made = ready(program, names, speed)
+    every, motions, sentence, spent = round(UNTIL / LOOKS / STEP), {}, "", 0.0
+    try:
+        for k in range(1, LOOKS + 1):
+            started = time.thread_time()
+            made.advance_to(k * every)
+            spent += time.thread_time() - started
+            made.look()
+            motions.update({name: made.state.motion() for name, at in SHOWN.items() if at == k})
+    except SimulationDiverged as diverged:
+        sentence = str(diverged)
+    report = made.report()
+    listed = tuple(use for use in report.acted if use.effect in names)
+    return Outcome(
+        names=names,
+        motions=motions,
+        broken=made.state.broken_tick.to_numpy()[: made.model.bond_count] >= 0,
+        step_s=spent / max(1, report.substeps),
+        advice=needed_effects(replace(report, acted=listed)),
+        sentence=sentence,
+        unresolved=report.unresolved,
+    )
+
+
+def answer(names, speed):
+    """The Answer to a choice: effects by name, as ``allowed`` gives them, and one of SPEEDS."""
+    wanted = (names, ALL)
+    found = [engine.kept((one, speed), lambda one=one: outcome(one, speed)) for one in wanted]
+    return Answer(speed, *found, again(ALL).simulation.model)
+
+
+def price(names, speed):
+    """What ``answer`` gives, with costs: both programs run one after the other."""
+    again(names)
+    chosen, complete = (measured(one, speed) for one in (names, ALL))
+    return replace(answer(names, speed), chosen=chosen, complete=complete)
+
+
+def compile_all():
+    """Compile both programs that answers come from, so that no later answer has to wait."""
+    for names in (ALL, WITHOUT_CONTACT):
+        again(names)
+
+
+def verdicts(answer):
+    """A row for every effect: (words, whether listed, what it did, what the program advises)."""
+    uses = {use.effect: use for use in answer.chosen.advice.uses}
+    missed = {finding.effect: finding for finding in answer.chosen.advice.missed}
+    return [
+        _verdict(name, uses.get(name), missed.get(EFFECTS[name].__name__), answer) for name in ALL
+    ]
+
+
+def _verdict(name, use, missed: Optional[object], answer):
+    if use is not None:
+        advice = "drop it" if name in answer.chosen.advice.droppable else "keep it"
+        return WORDS[name], True, str(use), advice
+    if missed is not None:
+        return WORDS[name], False, f"{missed.what}: up to {missed.most} at a time", "list it"
+    return WORDS[name], False, "left out", "not missed"

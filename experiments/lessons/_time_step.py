@@ -1,0 +1,175 @@
+"""What a time step costs: a bar is struck with any step by any method, and compared with the truth.
+
+The bar has 12 cells of six tetrahedra. Everything here runs on the engine's thread.
+"""
+
+import math
+import time
+from dataclasses import dataclass, replace
+from typing import Optional
+
+import numpy as np
+
+from _again import Again
+from _engine import engine
+from taichi_dem import (
+    CONCRETE,
+    ImplicitDashpots,
+    Scene,
+    SimulationDiverged,
+    Uniform,
+    effects,
+    quality_report,
+)
+from taichi_dem.mesh_shapes import bar
+
+LENGTH, WIDTH, CELLS = 0.4, 0.05, (12, 1, 1)
+#: Steps to choose from [s], and that of the truth.
+STEPS = tuple(4e-8 * 2**k for k in range(7))
+FINEST = 2e-8
+#: Samples after the first; each is a whole number of the longest steps after the one before.
+SAMPLES = 40
+UNTIL = SAMPLES * 3 * STEPS[-1]
+#: Times to the peak of the blow [s], and the peak [Pa].
+RISES = (1e-5, 2e-5, 5e-5)
+PEAK = 1e6
+#: Sample at which the bar is drawn: the wave is on its way.
+SHOWN = 18
+#: Method by name, as a user writes it; in words.
+METHODS = {
+    "explicit": Uniform(STEPS[0]),
+    "limited": Uniform(STEPS[0], dashpot="limited"),
+    "solved": ImplicitDashpots(STEPS[0], tolerance=1e-3),
+}
+WORDS = {
+    "explicit": "explicit",
+    "limited": "explicit, dashpots limited",
+    "solved": "dashpots solved together",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Strike:
+    """A run of the bar.
+
+    step [s]; moved: mean displacement of the far end [m], (SAMPLES + 1,), NaN after a divergence;
+    sentence: what the program said where it ended the run, "" where it did not; motion: of all
+    bodies at sample SHOWN, None where the run ended before. seconds: of one core for the run
+    without looks on the way, NaN where that was not measured.
+    """
+
+    step: float
+    moved: np.ndarray
+    sentence: str
+    motion: Optional[dict]
+    seconds: float = math.nan
+
+    def error(self, truth):
+        """Largest distance from the truth, over the largest displacement there; NaN if diverged."""
+        return float(np.abs(self.moved - truth.moved).max() / np.abs(truth.moved).max())
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What one choice gives.
+
+    method, rise [s]: the choice. chosen: its Strike. truth: that of the finest step. ladders: the
+    Strikes at all STEPS by method, of those asked for so far with this blow. model: of the bar.
+    """
+
+    method: str
+    rise: float
+    chosen: Strike
+    truth: Strike
+    ladders: dict
+    model: object
+
+    @property
+    def time(self):
+        """Of the samples [s]."""
+        return np.linspace(0.0, UNTIL, SAMPLES + 1)
+
+
+def scene():
+    """The bar under a short blow on its left end."""
+    blow = effects.GasPressure("left", peak=PEAK, rise=RISES[0], decay_ratio=1.0)
+    return Scene(bar(LENGTH, WIDTH, CELLS), CONCRETE, [blow, effects.BondDamping()])
+
+
+def limits():
+    """Longest stable explicit step of the worst body [s]: by its dashpots, and by its springs."""
+    report = quality_report(scene().mesh, CONCRETE)
+    return float(report.dashpot_step_s.min()), float(report.spring_step_s.min())
+
+
+def again(method):
+    """The compiled bar of a method, made when it is first asked for."""
+    return engine.kept(("bar", method), lambda: Again(scene(), METHODS[method]))
+
+
+def ready(method, step, rise):
+    """The bar at rest, with a step and a rise of the blow [s]."""
+    made = again(method).back(step)
+    # The law of GasPressure: peak, rise, and time of decay over rise.
+    made.model.loads[0].law[1] = rise
+    return made
+
+
+def strike(method, step, rise):
+    """Run the bar with a step and a rise of the blow [s], and look on; returns a Strike."""
+    made = ready(method, step, rise)
+    every = round(UNTIL / SAMPLES / step)
+    moved, motion, sentence = np.full(SAMPLES + 1, np.nan), None, ""
+    end = made.model.centre[:, 0] > LENGTH * (1.0 - 1.0 / CELLS[0])
+    try:
+        for k in range(SAMPLES + 1):
+            made.advance_to(every * k)
+            found = made.state.motion()
+            moved[k] = (found["position"] - made.model.centre)[end, 0].mean()
+            motion = found if k == SHOWN else motion
+    except SimulationDiverged as diverged:
+        moved[k:], sentence = np.nan, str(diverged)
+    return Strike(step, moved, sentence, motion)
+
+
+def timed(method, step, rise):
+    """The same with what it costs, from a second run without looks on the way."""
+    found = strike(method, step, rise)
+    if found.sentence:
+        return found
+    made = ready(method, step, rise)
+    started = time.thread_time()
+    made.advance_to(round(UNTIL / step))
+    return replace(found, seconds=time.thread_time() - started)
+
+
+def truth(rise):
+    """The Strike that all others are compared with."""
+    return engine.kept(("truth", rise), lambda: strike("solved", FINEST, rise))
+
+
+def ladder(method, rise):
+    """Strikes of a method at all STEPS."""
+    rungs = [("rung", method, step, rise) for step in STEPS]
+    return [engine.kept(key, lambda key=key: timed(*key[1:])) for key in rungs]
+
+
+def answer(method, step, rise):
+    """The Answer to a choice: method by name, step out of STEPS and rise out of RISES [s]."""
+    own = ladder(method, rise)
+    tried = engine.kept(("tried", rise), dict)
+    tried[method] = own
+    ladders = {name: tried[name] for name in METHODS if name in tried}
+    chosen = own[STEPS.index(step)]
+    return Answer(method, rise, chosen, truth(rise), ladders, again(method).simulation.model)
+
+
+def nearest(values, value):
+    """The one of some values that lies nearest to a value, as sliders round."""
+    return min(values, key=lambda one: abs(one - value))
+
+
+def compile_all():
+    """Compile the bar of every method, so that no later answer has to wait for it."""
+    for method in METHODS:
+        again(method)
