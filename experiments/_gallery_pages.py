@@ -165,6 +165,17 @@ PAGES = (
         "1.1 with it; 501 minutes instead of 541, 2702 with one.",
     ),
     Page(
+        "blast_block",
+        BLAST,
+        "How does the full block break, 3 m deep, which the paper could not afford?",
+        "Cracks in space and in two sections, by time of breaking: half-way along the hole they "
+        "are those of the flat block. Peak velocities fall as a power of the distance.",
+        "5 min on one",
+        ("cracks.png", "peaks.png", "energy.png"),
+        ("broken*", "ppv*", "seconds*", "memory*"),
+        "Section 4.1: the full block would take its rule more than a month.",
+    ),
+    Page(
         "damper_rebound",
         DAMPER,
         "Does a particle of the automaton fall and rebound as it should?",

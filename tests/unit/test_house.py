@@ -21,7 +21,7 @@ LAYERS = {
         ("plot_style", "checkpoint"),
         ("restart",),
         (
-            *("tetrahedra", "mesh", "mesh_files", "mesh_shapes", "mesh_gmsh"),
+            *("tetrahedra", "mesh", "mesh_files", "mesh_shapes", "mesh_gmsh", "mesh_order"),
             *("topology", "quality", "contact_spheres", "materials", "partition"),
         ),
         ("physics",),
