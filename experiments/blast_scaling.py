@@ -15,8 +15,8 @@ ticks bring few bodies, and those sit side by side, so workers with runs of bodi
 
 Two threads are measured, not simulated: whole steps of the parallel driver on a large bar and on
 the paper's block, each in a process of its own, fastest of repeats. Where other programs keep the
-cores busy, that figure says little. Writes scaling.png, scaling.csv, shares.csv and summary.json to
-results/blast_scaling/.
+cores busy, look at what the busiest thread took of the cores instead (..._busy). Writes scaling.png,
+scaling.csv, shares.csv and summary.json to results/blast_scaling/.
 """
 
 import json
@@ -62,6 +62,8 @@ PAPER_STATIC, PAPER_REBALANCED = 20381.0 / 3493.0, 9787.0 / 9023.0
 PAPER_ONE, PAPER_MANY, PAPER_FIXED, PAPER_SERIAL = 2702.0, 501.0, 541.0, 0.05
 #: Boxes of the bar for the threads, six tetrahedra each.
 CELLS, QUICK_CELLS = (40, 20, 20), (20, 10, 10)
+#: How often runs on one and on two threads take turns.
+ROUNDS = 2
 _WORKER = os.path.join(os.path.dirname(os.path.abspath(__file__)), "_scaling_worker.py")
 
 
@@ -96,12 +98,25 @@ def thread_job(mesh, cells, threads, steps, repeats):
 
 
 def thread_gain(mesh, cells, steps, repeats):
-    """Time of one thread over that of two, a row for the table; the bits must be the same."""
-    found = {threads: thread_job(mesh, cells, threads, steps, repeats) for threads in (1, 2)}
-    if found[1]["digest"] != found[2]["digest"]:
+    """Time of one thread over that of two, a row of figures; the bits must be the same.
+
+    Runs on one and on two threads take turns, as what else keeps the cores busy changes. busy: the
+    same of what the busiest thread took of the cores, None where the system does not tell.
+    """
+    least = {name: {1: np.inf, 2: np.inf} for name in ("seconds", "busy")}
+    digests = set()
+    for _ in range(ROUNDS):
+        for threads in (1, 2):
+            found = thread_job(mesh, cells, threads, steps, repeats)
+            digests.add(found["digest"])
+            for name, by_threads in least.items():
+                known = [value for value in found[name] if value is not None]
+                by_threads[threads] = min([by_threads[threads], *known])
+    if len(digests) > 1:
         raise InputError("one thread and two threads must give the same bits, and do not")
-    one, two = (min(found[threads]["seconds"]) for threads in (1, 2))
-    return {"bodies": found[1]["bodies"], "one_s": one, "two_s": two, "gain": one / two}
+    gains = {name: times[1] / times[2] for name, times in least.items()}
+    busy = gains["busy"] if np.isfinite(gains["busy"]) else None
+    return {"bodies": found["bodies"], "gain": gains["seconds"], "busy": busy}
 
 
 def figures_of(workers, shared, gains):
@@ -120,9 +135,10 @@ def figures_of(workers, shared, gains):
         name = "speedup_24_simulated" if way == "rebalanced" else f"speedup_24_{way}"
         made[name] = figure(gain, "1", paper.get(way))
     bar, block = gains
-    made["speedup_2_threads"] = figure(bar["gain"], "1")
+    for name, row in (("", bar), ("_paper_block", block)):
+        made[f"speedup_2_threads{name}"] = figure(row["gain"], "1")
+        made[f"speedup_2_threads_busy{name}"] = figure(row["busy"], "1")
     made["speedup_2_threads_bodies"] = figure(bar["bodies"], "1")
-    made["speedup_2_threads_paper_block"] = figure(block["gain"], "1")
     for name, price in zip(("bond", "pair", "sphere_pair"), workers.prices):
         made[f"ns_a_{name}"] = figure(1e9 * float(price), "ns")
     return made

@@ -219,7 +219,7 @@ class Resident:
 
     def __init__(self, step):
         self.step = step
-        self.substeps = 64
+        self.substeps = 4
 
     def settle(self):
         """Make the search that is due, without a step; compiles the kernel."""
@@ -236,7 +236,8 @@ class Resident:
         seconds = max(time.perf_counter() - start, 1e-5)
         if done == self.substeps:
             grown = int(done * _KERNEL_SECONDS / seconds)
-            self.substeps = max(64, min(4 * self.substeps, grown, _MAX_SUBSTEPS))
+            # A step of 100,000 bodies takes as long as a whole call should.
+            self.substeps = max(1, min(4 * self.substeps, grown, _MAX_SUBSTEPS))
 
     @ti.kernel
     def _run(self, end_tick: ti.i64, substeps: ti.i32) -> ti.i32:
