@@ -15,8 +15,9 @@ ticks bring few bodies, and those sit side by side, so workers with runs of bodi
 
 Two threads are measured, not simulated: whole steps of the parallel driver on a large bar and on
 the paper's block, each in a process of its own, fastest of repeats. Where other programs keep the
-cores busy, look at what the busiest thread took of the cores instead (..._busy). Writes scaling.png,
-scaling.csv, shares.csv and summary.json to results/blast_scaling/.
+cores busy, look at what the busiest thread took of the cores instead (..._busy).
+
+Writes scaling.png, scaling.csv, shares.csv and summary.json to results/blast_scaling/.
 """
 
 import json
