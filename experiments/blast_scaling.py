@@ -98,7 +98,7 @@ def thread_job(mesh, cells, threads, steps, repeats):
     return json.loads(done.stdout.splitlines()[-1])
 
 
-def thread_gain(mesh, cells, steps, repeats):
+def thread_gain(mesh, cells, steps, rounds, repeats):
     """Time of one thread over that of two, a row of figures; the bits must be the same.
 
     Runs on one and on two threads take turns, as what else keeps the cores busy changes. busy: the
@@ -106,7 +106,7 @@ def thread_gain(mesh, cells, steps, repeats):
     """
     least = {name: {1: np.inf, 2: np.inf} for name in ("seconds", "busy")}
     digests = set()
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         for threads in (1, 2):
             found = thread_job(mesh, cells, threads, steps, repeats)
             digests.add(found["digest"])
@@ -186,10 +186,10 @@ def run(options):
         recorded, simulation = record(scene, method, options.until, options.every, bar)
     workers = Workers(recorded)
     shared = simulated(workers, QUICK_COUNTS if options.quick else COUNTS)
-    cells, repeats = (QUICK_CELLS, 2) if options.quick else (CELLS, options.repeats)
+    cells, *often = (QUICK_CELLS, 1, 2) if options.quick else (CELLS, ROUNDS, options.repeats)
     gains = [
-        thread_gain("", cells, 10, repeats),
-        thread_gain(options.mesh, None, 400, repeats),
+        thread_gain("", cells, 10, *often),
+        thread_gain(options.mesh, None, 400, *often),
     ]
     figures = figures_of(workers, shared, gains)
     write_tables(options.out, workers, shared)
