@@ -102,10 +102,12 @@ class Record:
         What a bond costs contains what its bodies do, as both are due together.
         """
         work = self.counts.sum(axis=(1, 2)).astype(float)
-        table = np.column_stack([work, self.ticks.sum(axis=1), self.searches])
+        # As shares of each interval: early ones tell what a bond costs, late ones what a pair does.
+        seconds = np.maximum(self.seconds, 1e-12)[:, None]
+        table = np.column_stack([work, self.ticks.sum(axis=1), self.searches]) / seconds
         scale = table.max(axis=0)
         scale[scale == 0.0] = 1.0
-        fitted, _ = nnls(table / scale, self.seconds)
+        fitted, _ = nnls(table / scale, np.ones(len(table)))
         return fitted / scale
 
 

@@ -6,8 +6,8 @@ runs of bodies; runs cut anew after each interval by the workers' times (the pap
 by the bodies' own costs; and equal parts of what is due at each tick, which the lists of this
 program give for nothing. All wait at the end of a tick for the slowest; messages are free.
 
-Expect: fixed shares 5 to 10 times apart, as the work is where the block breaks; rebalanced ones
-within 1.1. In the paper 5.8 and 1.1, and 8 min less of 541. Balance over the run is not all: many
+Expect: fixed shares 5 to 15 times apart, as the work is where the block breaks; rebalanced ones
+within 1.2. In the paper 5.8 and 1.1, and 8 min less of 541. Balance over the run is not all: many
 ticks bring few bodies, and those sit side by side, so workers with runs of bodies often rest.
 
     python experiments/blast_scaling.py             # most of ten minutes
