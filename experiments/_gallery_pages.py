@@ -170,7 +170,7 @@ PAGES = (
         "How does the full block break, 3 m deep, which the paper could not afford?",
         "Cracks in space and in two sections, by time of breaking: half-way along the hole they "
         "are those of the flat block. Peak velocities fall as a power of the distance.",
-        "5 min on one",
+        "2 min on one",
         ("cracks.png", "peaks.png", "energy.png"),
         ("broken*", "ppv*", "seconds*", "memory*"),
         "Section 4.1: the full block would take its rule more than a month.",
