@@ -18,6 +18,7 @@ from taichi_dem.errors import InputError, SimulationDiverged
 from taichi_dem.materials import CONCRETE, Material
 from taichi_dem.mesh import Mesh, checked_mesh
 from taichi_dem.mesh_files import read_mesh
+from taichi_dem.mesh_order import in_space_order
 from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
 from taichi_dem.needed_effects import needed_effects
 from taichi_dem.quality import quality_report
@@ -45,6 +46,7 @@ __all__ = [
     "Uniform",
     "checked_mesh",
     "effects",
+    "in_space_order",
     "methods",
     "needed_effects",
     "quality_report",

@@ -57,7 +57,8 @@ class Frame:
 class Recorder:
     """Collects samples and frames of a simulation.
 
-    group: face group of the hole whose displacement is followed, None for none.
+    group: face group of the hole whose displacement is followed, None for none. peak_speed: the
+    largest of each body at all samples so far [m/s], (body_count,).
     """
 
     def __init__(self, simulation, group):
@@ -66,12 +67,14 @@ class Recorder:
         self.hole = HoleMonitor(self.model, group) if group else None
         self.rows = []
         self.frames = []
+        self.peak_speed = np.zeros(self.model.body_count)
 
     def compile(self):
         """Compile all that recording needs, so that nothing later keeps Ctrl-C waiting."""
         self.sample()
         self.snapshot()
         self.rows, self.frames = [], []
+        self.peak_speed = np.zeros(self.model.body_count)
 
     def sample(self):
         """Add a row to the time series."""
@@ -89,7 +92,9 @@ class Recorder:
         row.update({f"{name}_J": account[name] for name in ENERGY_COLUMNS})
         row["smallest_step_s"] = sim.method.dt0 / 2.0 ** int(motion["level"].max())
         row["load_work_J"], row["support_work_J"] = account["load_work"], account["support_work"]
-        row["largest_speed_m_s"] = float(np.linalg.norm(motion["velocity"], axis=1).max())
+        speed = np.linalg.norm(motion["velocity"], axis=1)
+        row["largest_speed_m_s"] = float(speed.max())
+        self.peak_speed = np.maximum(self.peak_speed, speed)
         self.rows.append(row)
 
     def snapshot(self):
@@ -118,10 +123,11 @@ class Recorder:
             for field in fields(Frame)
             if self.frames
         }
-        return {**rows, **stacks}
+        return {**rows, **stacks, "peak_speed": self.peak_speed}
 
     def resume(self, saved):
         """Take over what ``saved`` gave."""
+        self.peak_speed = saved.get("peak_speed", self.peak_speed)
         rows = {k[4:]: column.tolist() for k, column in saved.items() if k.startswith("row.")}
         self.rows = [dict(zip(rows, values)) for values in zip(*rows.values())]
         stacks = {k[6:]: stack for k, stack in saved.items() if k.startswith("frame.")}

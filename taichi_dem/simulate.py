@@ -65,8 +65,9 @@ class Result:
     """What a run produced.
 
     history: arrays by column name, one row a sample. frames: snapshots. broken_time: when each
-    bond was released [s], NaN while it holds. report: figures of the run. diverged: the sentence
-    of a run that left its bounds (all else then ends before that), else "".
+    bond was released [s], NaN while it holds. peak_speed: largest speed of each body at the
+    samples [m/s]. report: figures of the run. diverged: the sentence of a run that left its bounds
+    (all else then ends before that), else "".
     """
 
     scene: object
@@ -75,6 +76,7 @@ class Result:
     history: dict
     frames: tuple
     broken_time: np.ndarray
+    peak_speed: np.ndarray
     report: object
     diverged: str = ""
 
@@ -285,6 +287,7 @@ def _result(scene, method, simulation, recorder, error):
         history=recorder.history(),
         frames=tuple(recorder.frames),
         broken_time=recorder.broken_time(),
+        peak_speed=recorder.peak_speed,
         report=simulation.report(),
         diverged=str(error) if error else "",
     )

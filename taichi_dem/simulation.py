@@ -24,6 +24,7 @@ from taichi_dem.step.contacts import Contacts
 from taichi_dem.step.drivers import DRIVERS, SolvedStep, Step
 from taichi_dem.step.implicit.advance import SolvedAdvance
 from taichi_dem.step.implicit.solver import Solver
+from taichi_dem.step.quicker import Quicker
 from taichi_dem.step.rates import rates_for
 from taichi_dem.step.schedule import Schedule
 from taichi_dem.step_control import counted_criteria
@@ -32,14 +33,18 @@ from taichi_dem.watch import Watch
 
 #: Largest steps of a run, of which the ticks are counted in 64 bits.
 MOST_STEPS = 2**42
-#: Bonds from which on a CPU with several threads the parallel driver is the faster one.
-PARALLEL_FROM = 20000
+#: Bonds below which the resident driver is the quicker one, and above which the parallel one is,
+#: on a CPU with several threads whose cores are free; between them both are tried.
+RESIDENT_BELOW, PARALLEL_FROM = 4000, 100000
+#: What stands for the driver until it has been measured.
+_MEASURED = "measured"
 
 
 class Simulation:
     """One scene, one method, one driver.
 
-    driver: "resident", "parallel", or "auto": parallel on a GPU and for large scenes.
+    driver: "resident", "parallel", or "auto": parallel on a GPU and for large scenes, for those of
+    middle size on several threads whichever proves the quicker.
     brute_force: contact search without cells, for tests.
     Raises InputError for what is no scene or method, an unknown driver, or "resident" on a GPU.
     """
@@ -64,7 +69,7 @@ class Simulation:
                 self.broad_phase = BroadPhase(*parts, brute_force)
         kind = SolvedStep if self.solves else Step
         self.step = kind(self.advance, self.schedule, self.broad_phase)
-        self.driver = DRIVERS[driver](self.step)
+        self.driver = {**DRIVERS, _MEASURED: Quicker}[driver](self.step)
         self.ledger = None
         self.compile_seconds = time.perf_counter() - started
         self.run_seconds = self.run_cpu_seconds = 0.0
@@ -149,7 +154,7 @@ class Simulation:
             while self.state.tick[None] < end:
                 self.driver.run(end)
                 self._check_room()
-                self.health.check()
+                self.health.check(hurried=self.state.tick[None] < end)
                 if on_call is not None:
                     on_call()
         finally:
@@ -245,11 +250,16 @@ class Simulation:
 def _driver_name(name, bond_count):
     arch = runtime.settings().arch
     if name == "auto":
-        large = bond_count >= PARALLEL_FROM and runtime.settings().threads > 1
-        return "parallel" if arch == "cuda" or large else "resident"
+        return "parallel" if arch == "cuda" else _by_size(bond_count)
     if name == "resident" and arch == "cuda":
         raise InputError("driver 'resident' runs on a CPU only: use 'parallel' with arch 'cuda'")
     return name
+
+
+def _by_size(bond_count):
+    if runtime.settings().threads == 1 or bond_count < RESIDENT_BELOW:
+        return "resident"
+    return "parallel" if bond_count >= PARALLEL_FROM else _MEASURED
 
 
 def macro_steps(until, dt0):

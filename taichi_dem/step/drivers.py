@@ -219,11 +219,15 @@ class Resident:
 
     def __init__(self, step):
         self.step = step
-        self.substeps = 64
+        self.substeps = 4
 
     def settle(self):
         """Make the search that is due, without a step; compiles the kernel."""
         self._run(0, 0)
+
+    def few(self, end_tick, substeps):
+        """Advance some substeps, or to a tick or the next halt."""
+        self._run(end_tick, substeps)
 
     def run(self, end_tick):
         """Advance to a tick, to the next halt, or for about _KERNEL_SECONDS."""
@@ -232,7 +236,8 @@ class Resident:
         seconds = max(time.perf_counter() - start, 1e-5)
         if done == self.substeps:
             grown = int(done * _KERNEL_SECONDS / seconds)
-            self.substeps = max(64, min(4 * self.substeps, grown, _MAX_SUBSTEPS))
+            # A step of 100,000 bodies takes as long as a whole call should.
+            self.substeps = max(1, min(4 * self.substeps, grown, _MAX_SUBSTEPS))
 
     @ti.kernel
     def _run(self, end_tick: ti.i64, substeps: ti.i32) -> ti.i32:
@@ -265,9 +270,17 @@ class Parallel:
         self.step = step
 
     def settle(self):
-        """Make the search that is due, without a step."""
+        """Make the search that is due, without a step; compiles the kernels."""
+        for part in range(len(self.step.parts)):
+            self._run(part, 0, 0)
         if self.step.has_contact:
             self.step.search.renew()
+
+    def few(self, end_tick, substeps):
+        """Advance some substeps, or to a tick or the next halt."""
+        for _ in range(substeps):
+            if self._substep(end_tick):
+                break
 
     def run(self, end_tick):
         """Advance to a tick, to the next halt, or for about CALL_SECONDS."""
@@ -279,18 +292,19 @@ class Parallel:
         """All parts of a substep, and the search that is due; nonzero at the end or a halt."""
         state = 0
         for part in range(len(self.step.parts)):
-            state = self._run(part, end_tick)
+            state = self._run(part, end_tick, 1)
             while self.step.repeats(part):
-                state = self._run(part, end_tick)
+                state = self._run(part, end_tick, 1)
         if state & _SEARCH:
             self.step.search.renew()
         return state & ~_SEARCH
 
     @ti.kernel
-    def _run(self, part: ti.template(), end_tick: ti.i64) -> ti.i32:
+    def _run(self, part: ti.template(), end_tick: ti.i64, share: ti.i32) -> ti.i32:
+        # With a share of 0 nothing happens: compiled, and that is all.
         low = ti.static(self.step.schedule.low)
         for due, item in ti.static(self.step.parts[part]):
-            for a in range(due.count(low[None])):
+            for a in range(share * due.count(low[None])):
                 item(due.pick(a))
         finished = ti.cast(self.step.state.tick[None] >= end_tick, ti.i32)
         finished |= self.step.halted()

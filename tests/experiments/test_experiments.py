@@ -65,6 +65,14 @@ FIGURES = {
         for way in ("gauss_seidel", "jacobi", "momentum")
         for tolerance in ("0.05", "0.01", "0.001")
     },
+    "blast_block": {
+        *("tetrahedra", "broken_faces", "ppv_exponent", "ms_a_step", "seconds_per_simulated_ms"),
+        *("memory_MB", "fields_MB", "ledger_residual_fraction", "linear_momentum_error"),
+    },
+    "blast_scaling": {
+        *("imbalance_24_static", "imbalance_24_rebalanced", "imbalance_24_polyline"),
+        *("speedup_24_simulated", "speedup_24_static", "speedup_24_due", "speedup_2_threads"),
+    },
     "cost_of_effects": {
         *("overhead_absent_percent", "blast_seconds", "blast_chance_percent"),
         *(
@@ -97,6 +105,11 @@ FILES = {
         *("levels_multirate_held.png", "levels_multirate_drifted.png", "methods.png"),
     ),
     "blast_sweeps": ("sweeps.csv", "sweeps.png"),
+    "blast_block": (
+        *("cracks.png", "peaks.png", "energy.png", "peaks.csv", "history.csv", "mesh.msh"),
+        *("paraview/blast.pvd", "checkpoint.npz"),
+    ),
+    "blast_scaling": ("scaling.png", "scaling.csv", "shares.csv"),
     "cost_of_effects": ("effects.png", "blast.csv", "damper.csv"),
     "cost_of_accuracy_blast": (
         *("work_precision.png", "errors.png", "points.csv", "runs.csv", "answers.csv"),

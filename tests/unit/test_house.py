@@ -21,8 +21,8 @@ LAYERS = {
         ("plot_style", "checkpoint"),
         ("restart",),
         (
-            *("tetrahedra", "mesh", "mesh_files", "mesh_shapes", "mesh_gmsh"),
-            *("topology", "quality", "contact_spheres", "materials"),
+            *("tetrahedra", "mesh", "mesh_files", "mesh_shapes", "mesh_gmsh", "mesh_order"),
+            *("topology", "quality", "contact_spheres", "materials", "partition"),
         ),
         ("physics",),
         ("timeline", "step_control"),

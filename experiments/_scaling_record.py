@@ -1,0 +1,139 @@
+"""What a blast by the paper's rule evaluates, body by body and interval by interval.
+
+A body is charged with the bonds of which it is the master and the contact pairs of which it is the
+first, as the paper charges its master elements.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import taichi as ti
+from scipy.optimize import nnls
+
+from taichi_dem import Simulation
+from taichi_dem.fields import fields_first
+from taichi_dem.simulate import progress_of
+from taichi_dem.simulation import macro_steps
+from taichi_dem.step.drivers import Once, Resident, Step
+from taichi_dem.timeline import MAX_LEVEL
+
+#: What is counted: bonds, contact pairs, and the pairs of spheres that are compared in these.
+KINDS = ("bonds", "pairs", "spheres")
+
+
+@ti.data_oriented
+class Counter:
+    """Counts evaluations by body and by the coarsest level that was due at their tick.
+
+    A tick at which level k and all finer ones are due is of class k: within it nobody waits for
+    anybody, between ticks all wait for the last. counts: (bodies, classes) of KINDS. ticks: how
+    many there were of each class.
+    """
+
+    def __init__(self, simulation):
+        self.model, self.schedule = simulation.model, simulation.schedule
+        self.contacts = simulation.contacts
+        shape = (self.model.body_count, MAX_LEVEL + 1)
+        self.counts = ti.Vector.field(len(KINDS), ti.i32, shape=shape)
+        self.ticks = ti.field(ti.i32, shape=MAX_LEVEL + 1)
+
+    @ti.func
+    def tick(self, one):
+        """Count the tick."""
+        self.ticks[self.schedule.low[None]] += 1
+
+    @ti.func
+    def bond(self, b):
+        """Charge the master of a bond that is due."""
+        self.counts[self.model.bond_slots[b][0] >> 2, self.schedule.low[None]][0] += 1
+
+    @ti.func
+    def pair(self, p):
+        """Charge the first body of a contact pair that is due."""
+        place = self.contacts.pair_body[p][0], self.schedule.low[None]
+        self.counts[place][1] += 1
+        self.counts[place][2] += self.contacts.pair_first[p + 1] - self.contacts.pair_first[p]
+
+    def take(self):
+        """Counts (bodies, classes, kinds) and ticks (classes,) since the last time; then zero."""
+        taken = self.counts.to_numpy(), self.ticks.to_numpy()
+        self.counts.fill(0)
+        self.ticks.fill(0)
+        return taken
+
+
+class CountedStep(Step):
+    """A step that counts what is due before it is evaluated; in one serial kernel only."""
+
+    def __init__(self, counter, *parts):
+        self.counter = counter
+        super().__init__(*parts)
+
+    def _parts(self):
+        counter, schedule = self.counter, self.schedule
+        (phases,) = super()._parts()
+        return (
+            (
+                (schedule.pairs, counter.pair),
+                *phases,
+                (Once(), counter.tick),
+                (schedule.bonds, counter.bond),
+            ),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """Costs of a run, an entry an interval.
+
+    time: at the end of each [s]. counts: (intervals, bodies, classes, kinds). ticks: (intervals,
+    classes). seconds: CPU time of each. searches: contact searches in each.
+    """
+
+    time: np.ndarray
+    counts: np.ndarray
+    ticks: np.ndarray
+    seconds: np.ndarray
+    searches: np.ndarray
+
+    def prices(self):
+        """Seconds a bond, a pair, a pair of spheres, a tick, and a search, fitted to the intervals.
+
+        What a bond costs contains what its bodies do, as both are due together.
+        """
+        work = self.counts.sum(axis=(1, 2)).astype(float)
+        # As shares of each interval: early ones tell what a bond costs, late ones what a pair does.
+        seconds = np.maximum(self.seconds, 1e-12)[:, None]
+        table = np.column_stack([work, self.ticks.sum(axis=1), self.searches]) / seconds
+        scale = table.max(axis=0)
+        scale[scale == 0.0] = 1.0
+        fitted, _ = nnls(table / scale, np.ones(len(table)))
+        return fitted / scale
+
+
+def record(scene, method, until, every, bar):
+    """Run a scene and count, in intervals of some largest steps; a Record.
+
+    The run is stopped between two steps only, so its bits are those of an undisturbed one.
+    """
+    simulation = Simulation(scene, method, "resident")
+    with fields_first():
+        counter = Counter(simulation)
+    parts = simulation.advance, simulation.schedule, simulation.broad_phase
+    simulation.step = CountedStep(counter, *parts)
+    simulation.driver = Resident(simulation.step)
+    simulation.start()
+    counter.take()
+    rows, last = [], macro_steps(until, method.dt0)
+    before = np.zeros(2)
+    for end in (*range(every, last, every), last):
+        simulation.advance_to(end, lambda: bar(progress_of(simulation, last * method.dt0)))
+        now = np.array([simulation.run_cpu_seconds, simulation.searches])
+        rows.append((simulation.time_s, *counter.take(), *(now - before)))
+        before = now
+    time_s, counts, ticks, seconds, searches = zip(*rows)
+    ticks = np.array(ticks)
+    used = 1 + int(np.flatnonzero(ticks.any(axis=0)).max())
+    counts = np.array([table[:, :used] for table in counts])
+    arrays = np.array(time_s), counts, ticks[:, :used], np.array(seconds), np.array(searches)
+    return Record(*arrays), simulation

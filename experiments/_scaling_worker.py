@@ -1,0 +1,93 @@
+"""Time of whole steps of one blast in a process of its own: threads cannot change within one.
+
+    python _scaling_worker.py JOB.json
+
+Prints seconds a step, one a repeat, what the busiest thread took of the cores in a step, and a
+digest of where the bodies are in the end, as JSON.
+"""
+
+import glob
+import json
+import os
+import sys
+import time
+
+import numpy as np
+
+from _blast import METHODS, paper_effects
+from taichi_dem import CONCRETE, Scene, Simulation, effects, read_mesh, runtime
+from taichi_dem.checkpoint import digest
+from taichi_dem.mesh_order import in_space_order
+from taichi_dem.mesh_shapes import bar
+
+#: Length and width of the bar that stands for a block [m].
+BAR = (2.0, 1.0)
+
+
+def scene_of(mesh, cells):
+    """The paper's effects on a mesh file, or on a bar of some boxes under the same gas."""
+    if mesh:
+        return Scene(in_space_order(read_mesh(mesh)), CONCRETE, paper_effects())
+    blown = [e for e in paper_effects() if e.name != "gas_pressure"]
+    gas = effects.GasPressure(group="left")
+    return Scene(in_space_order(bar(*BAR, cells)), CONCRETE, [*blown, gas])
+
+
+def thread_seconds():
+    """CPU seconds of each thread of this process so far, by its number; empty where unknown."""
+    found = {}
+    for path in glob.glob("/proc/self/task/*/schedstat"):
+        with open(path, encoding="ascii") as handle:
+            found[int(path.split("/")[-2])] = 1e-9 * int(handle.read().split()[0])
+    return found
+
+
+def busiest(before, after):
+    """CPU seconds that nobody could spare: of the main thread, and of the busiest of the others.
+
+    The main thread waits while the others work, so on free cores a run takes no less. None where
+    threads are not known.
+    """
+    spent = {number: seconds - before.get(number, 0.0) for number, seconds in after.items()}
+    if not spent:
+        return None
+    main_thread = spent.pop(os.getpid())
+    return main_thread + max(spent.values(), default=0.0)
+
+
+def timed(simulation, warm, steps, repeats):
+    """Seconds a step, and those of the busiest thread, of some steps after warm ones, two lists."""
+    simulation.advance_to(warm)
+    seconds, busy = [], []
+    for k in range(repeats):
+        started, before = time.perf_counter(), thread_seconds()
+        simulation.advance_to(warm + (k + 1) * steps)
+        seconds.append((time.perf_counter() - started) / steps)
+        found = busiest(before, thread_seconds())
+        busy.append(found / steps if found is not None else None)
+    return seconds, busy
+
+
+def main(path):
+    """Do a job and print what it measured."""
+    with open(path, encoding="utf-8") as handle:
+        job = json.load(handle)
+    runtime.start("cpu", job["threads"])
+    make, step = METHODS[job["method"]]
+    scene = scene_of(job["mesh"], job["cells"])
+    simulation = Simulation(scene, make(step), job["driver"])
+    seconds, busy = timed(simulation, job["warm"], job["steps"], job["repeats"])
+    motion = simulation.state.motion()
+    found = {
+        "seconds": seconds,
+        "busy": busy,
+        "driver": simulation.driver.name,
+        "bodies": simulation.model.body_count,
+        "broken": int((simulation.state.broken_tick.to_numpy() >= 0).sum()),
+        "digest": digest(*(np.ascontiguousarray(motion[key]) for key in ("position", "velocity"))),
+    }
+    print(json.dumps(found))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

@@ -1,0 +1,208 @@
+"""What does it take to keep many workers busy while the work moves over the block?
+
+The paper's blast by the paper's rule is run once and what it evaluates is counted, body by body, in
+intervals of 50 largest steps. Then workers are simulated that share this work in four ways: fixed
+runs of bodies; runs cut anew after each interval by the workers' times (the paper, Figs 8 and 9) or
+by the bodies' own costs; and equal parts of what is due at each tick, which the lists of this
+program give for nothing. All wait at the end of a tick for the slowest; messages are free.
+
+Expect: fixed shares 5 to 15 times apart, as the work is where the block breaks; rebalanced ones
+within 1.2. In the paper 5.8 and 1.1, and 8 min less of 541. Balance over the run is not all: many
+ticks bring few bodies, and those sit side by side, so workers with runs of bodies often rest.
+
+    python experiments/blast_scaling.py             # most of ten minutes
+    python experiments/blast_scaling.py --l 1e-7    # a minute for the run
+
+Two threads are measured, not simulated: whole steps of the parallel driver on a large bar and on
+the paper's block, each in a process of its own, fastest of repeats. Where other programs keep the
+cores busy, look at what the busiest thread took of the cores instead (..._busy).
+
+Writes scaling.png, scaling.csv, shares.csv and summary.json to results/blast_scaling/.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+
+import numpy as np
+
+from _blast import paper_scene
+from _cli import (
+    PAPER_BLOCK,
+    ProgressBar,
+    figure,
+    main,
+    number,
+    parser,
+    print_figures,
+    print_table,
+    whole,
+    write_summary,
+)
+from _scaling_picture import picture_scaling
+from _scaling_record import record
+from _scaling_simulate import WAYS, Workers, acceleration
+from taichi_dem import InputError, Multirate
+from taichi_dem.files import output_folder, write_csv
+from taichi_dem.partition import imbalance
+
+NAME = "blast_scaling"
+QUICK = {"until": 1e-4, "l": 1e-7}
+FULL = {"until": 5e-4, "l": 1e-8}
+DT0 = 1e-8
+COUNTS = (*range(1, 25), 32, 48, 64, 96, 128, 192, 256)
+QUICK_COUNTS = (1, 2, 4, 8, 16, 24, 64, 256)
+#: Workers of the paper's Fig 15, and its shortest and longest time of one [s].
+PAPER_WORKERS = 24
+PAPER_STATIC, PAPER_REBALANCED = 20381.0 / 3493.0, 9787.0 / 9023.0
+#: Minutes of one process and of 24 with and without rebalancing (4.3, 4.4); share of one's time
+#: that is not contact.
+PAPER_ONE, PAPER_MANY, PAPER_FIXED, PAPER_SERIAL = 2702.0, 501.0, 541.0, 0.05
+#: Boxes of the bar for the threads, six tetrahedra each.
+CELLS, QUICK_CELLS = (40, 20, 20), (20, 10, 10)
+#: How often runs on one and on two threads take turns.
+ROUNDS = 2
+_WORKER = os.path.join(os.path.dirname(os.path.abspath(__file__)), "_scaling_worker.py")
+
+
+def options_parser():
+    """Options of this experiment."""
+    made = parser(NAME, __doc__)
+    made.add_argument("--mesh", default=PAPER_BLOCK, help="tetrahedra with a face group hole")
+    made.add_argument("--until", type=number(0, 1), help="simulated time [s], 5e-4")
+    made.add_argument("--l", type=number(0, 1), help="the paper's way of a body in a step [m]")
+    made.add_argument("--every", type=whole(1, 100000), default=50, help="steps an interval, 50")
+    made.add_argument("--repeats", type=whole(1, 100), default=5, help="of the threads' times")
+    return made
+
+
+def simulated(workers, counts):
+    """What every number of workers takes, a ``Shared`` by way and number."""
+    return {way: {count: workers.share(way, count) for count in counts} for way in WAYS}
+
+
+def thread_job(mesh, cells, threads, steps, repeats):
+    """Seconds a step of whole steps by the parallel driver, and where the bodies end (digest)."""
+    job = {"mesh": mesh, "cells": cells, "threads": threads, "driver": "parallel"}
+    job.update(method="paper_multirate", warm=2, steps=steps, repeats=repeats)
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "job.json")
+        with open(path, "w", encoding="utf-8") as handle:
+            json.dump(job, handle)
+        done = subprocess.run([sys.executable, _WORKER, path], capture_output=True, text=True)
+    if done.returncode != 0:
+        raise InputError(f"the run on {threads} threads ended with: {done.stderr.strip()[-300:]}")
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def thread_gain(mesh, cells, steps, rounds, repeats):
+    """Time of one thread over that of two, a row of figures; the bits must be the same.
+
+    Runs on one and on two threads take turns, as what else keeps the cores busy changes. busy: the
+    same of what the busiest thread took of the cores, None where the system does not tell.
+    """
+    least = {name: {1: np.inf, 2: np.inf} for name in ("seconds", "busy")}
+    digests = set()
+    for _ in range(rounds):
+        for threads in (1, 2):
+            found = thread_job(mesh, cells, threads, steps, repeats)
+            digests.add(found["digest"])
+            for name, by_threads in least.items():
+                known = [value for value in found[name] if value is not None]
+                by_threads[threads] = min([by_threads[threads], *known])
+    if len(digests) > 1:
+        raise InputError("one thread and two threads must give the same bits, and do not")
+    gains = {name: times[1] / times[2] for name, times in least.items()}
+    busy = gains["busy"] if np.isfinite(gains["busy"]) else None
+    return {"bodies": found["bodies"], "gain": gains["seconds"], "busy": busy}
+
+
+def figures_of(workers, shared, gains):
+    """Figures for summary.json, beside the paper's."""
+    made = {}
+    paper = {"static": PAPER_STATIC, "rebalanced": PAPER_REBALANCED}
+    for way in ("static", "polyline", "rebalanced"):
+        apart = imbalance(shared[way][PAPER_WORKERS].seconds)
+        made[f"imbalance_24_{way}"] = figure(apart, "1", paper.get(way))
+    paper = {"static": PAPER_ONE / PAPER_FIXED, "rebalanced": PAPER_ONE / PAPER_MANY}
+    for way in WAYS:
+        one = shared[way][PAPER_WORKERS]
+        contact = acceleration(workers.total, one.elapsed, 0.0)
+        made[f"contact_24_{way}"] = figure(contact, "1")
+        gain = acceleration(workers.total, one.elapsed, PAPER_SERIAL)
+        name = "speedup_24_simulated" if way == "rebalanced" else f"speedup_24_{way}"
+        made[name] = figure(gain, "1", paper.get(way))
+    bar, block = gains
+    for name, row in (("", bar), ("_paper_block", block)):
+        made[f"speedup_2_threads{name}"] = figure(row["gain"], "1")
+        made[f"speedup_2_threads_busy{name}"] = figure(row["busy"], "1")
+    made["speedup_2_threads_bodies"] = figure(bar["bodies"], "1")
+    for name, price in zip(("bond", "pair", "sphere_pair"), workers.prices):
+        made[f"ns_a_{name}"] = figure(1e9 * float(price), "ns")
+    return made
+
+
+def write_tables(folder, workers, shared):
+    """Acceleration and imbalance over the number of workers; times of each of 24."""
+    columns = {"workers": [], "way": [], "contact": [], "whole": [], "imbalance": []}
+    for way, by_count in shared.items():
+        for count, one in by_count.items():
+            gains = [acceleration(workers.total, one.elapsed, s) for s in (0.0, PAPER_SERIAL)]
+            for column, value in zip(columns.values(), (count, way, *gains)):
+                column.append(value)
+            columns["imbalance"].append(imbalance(one.seconds))
+    write_csv(os.path.join(folder, "scaling.csv"), columns)
+    each = {f"{way}_s": shared[way][PAPER_WORKERS].seconds for way in WAYS}
+    numbers = np.arange(1, PAPER_WORKERS + 1)
+    write_csv(os.path.join(folder, "shares.csv"), {"worker": numbers, **each})
+
+
+def show(workers, shared):
+    """Print what some numbers of workers gain."""
+    rows = []
+    for way, words in WAYS.items():
+        for count in (2, 4, PAPER_WORKERS, 256):
+            one = shared[way][count]
+            gains = [acceleration(workers.total, one.elapsed, s) for s in (0.0, PAPER_SERIAL)]
+            rows.append(
+                (words, count, f"{imbalance(one.seconds):.3g}", *(f"{g:.3g}" for g in gains))
+            )
+    print_table(rows, ["way of sharing", "workers", "slowest/fastest", "contact", "whole"])
+
+
+def run(options):
+    """Record, simulate, measure, picture."""
+    for name, value in (QUICK if options.quick else FULL).items():
+        if getattr(options, name) is None:
+            setattr(options, name, value)
+    scene = paper_scene(options.mesh)
+    output_folder(options.out)
+    started = time.perf_counter()
+    with ProgressBar("blast") as bar:
+        method = Multirate(DT0, options.l)
+        recorded, simulation = record(scene, method, options.until, options.every, bar)
+    workers = Workers(recorded)
+    shared = simulated(workers, QUICK_COUNTS if options.quick else COUNTS)
+    cells, *often = (QUICK_CELLS, 1, 2) if options.quick else (CELLS, ROUNDS, options.repeats)
+    gains = [
+        thread_gain("", cells, 10, *often),
+        thread_gain(options.mesh, None, 400, *often),
+    ]
+    figures = figures_of(workers, shared, gains)
+    write_tables(options.out, workers, shared)
+    path = os.path.join(options.out, "scaling.png")
+    paper = PAPER_ONE / PAPER_FIXED, PAPER_ONE / PAPER_MANY
+    picture_scaling(path, workers, shared, PAPER_WORKERS, PAPER_SERIAL, paper)
+    seconds = simulation.compile_seconds, time.perf_counter() - started
+    write_summary(options.out, NAME, figures, compile_seconds=seconds[0], run_seconds=seconds[1])
+    show(workers, shared)
+    print()
+    print_figures(figures)
+    print(f"\nThe picture and the tables are in {options.out}")
+
+
+if __name__ == "__main__":
+    sys.exit(main(run, options_parser()))

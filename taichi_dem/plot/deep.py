@@ -1,0 +1,112 @@
+"""Cracks of a block that is as deep as it is wide: in space, and in two sections."""
+
+import matplotlib
+import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.colors import ListedColormap
+from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
+
+from taichi_dem.plot_style import GREY, picture
+
+_AXES = "xyz"
+
+
+def plot_deep_cracks(path, mesh, topology, broken_time, time_s, hole):
+    """Broken faces of the block at rest by time of breaking: in space and cut by two planes.
+
+    broken_time: (bond_count,) [s], NaN while a bond holds. time_s: of the picture. hole: point on
+    the hole's axis (3,) [m], which runs along z; the planes are half-way along it, and through it.
+    """
+    broken = np.flatnonzero(broken_time <= time_s)
+    # The latest first: early ones, near the hole, stay visible.
+    broken = broken[np.argsort(-broken_time[broken], kind="stable")]
+    triangles, time_ms = mesh.points[topology.vertices[broken]], 1e3 * broken_time[broken]
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    look = _look(1e3 * time_s)
+    with picture(path, 0, size=(14.0, 5.2)) as (figure, _):
+        grid = figure.add_gridspec(1, 3, width_ratios=(1.25, 1.0, 0.8), wspace=0.1)
+        whole = figure.add_subplot(grid[0], projection="3d")
+        _in_space(whole, triangles, time_ms, low, high, look)
+        whole.set_title(f"{len(broken)} broken faces at {1e3 * time_s:.3g} ms")
+        middle = 0.5 * (low[2] + high[2])
+        panels = [figure.add_subplot(grid[k]) for k in (1, 2)]
+        lines = _section(panels[0], triangles, time_ms, 2, middle, (low, high), look)
+        _section(panels[1], triangles, time_ms, 1, hole[1], (low, high), look)
+        figure.colorbar(lines, ax=panels, label="time of breaking [ms]", shrink=0.8, aspect=25)
+
+
+def _look(end_ms):
+    """Colours by time, dark first; as in the pictures of flat blocks."""
+    shades = matplotlib.colormaps["plasma"](np.linspace(0.0, 0.88, 256))
+    return {"cmap": ListedColormap(shades), "norm": matplotlib.colors.Normalize(0.0, end_ms)}
+
+
+def _in_space(axes, triangles, time_ms, low, high, look):
+    """Broken faces, thin, in the outline of the block; the hole's axis stands upright."""
+    turned = triangles[..., [0, 2, 1]]
+    faces = Poly3DCollection(turned, linewidth=0.0, alpha=0.45, **look)
+    faces.set_array(time_ms)
+    axes.add_collection3d(faces, autolim=False)
+    corners = np.array([[low, high][bit][axis] for bit in (0, 1) for axis in range(3)])
+    box = corners.reshape(2, 3)[:, [0, 2, 1]]
+    axes.add_collection3d(Line3DCollection(_edges(box), color=GREY, linewidth=0.8), autolim=False)
+    axes.set(xlim=box[:, 0], ylim=box[:, 1], zlim=box[:, 2])
+    axes.set_box_aspect(np.ptp(box, axis=0))
+    axes.set(xlabel="x [m]", ylabel="z [m]", zlabel="y [m]")
+    axes.view_init(elev=22.0, azim=-55.0)
+    axes.locator_params(nbins=4)
+
+
+def _edges(box):
+    """The twelve edges of a box, given its two corners (2, 3)."""
+    found = []
+    for axis in range(3):
+        for a, b in ((0, 0), (0, 1), (1, 0), (1, 1)):
+            ends = np.empty((2, 3))
+            ends[:, axis] = box[:, axis]
+            ends[:, (axis + 1) % 3], ends[:, (axis + 2) % 3] = (
+                box[a, (axis + 1) % 3],
+                box[b, (axis + 2) % 3],
+            )
+            found.append(ends)
+    return found
+
+
+def _section(axes, triangles, time_ms, normal, place, bounds, look):
+    """Where broken faces cross the plane at a place on an axis."""
+    across, up = (0, 1) if normal == 2 else (0, 2)
+    segments, which = crossings(triangles, normal, place)
+    lines = LineCollection(segments[..., [across, up]], linewidth=1.3, **look)
+    lines.set_array(time_ms[which])
+    lines.set_capstyle("round")
+    axes.add_collection(lines)
+    low, high = bounds
+    axes.set(xlim=(low[across], high[across]), ylim=(low[up], high[up]))
+    axes.set(xlabel=f"{_AXES[across]} [m]", ylabel=f"{_AXES[up]} [m]")
+    axes.set_aspect("equal")
+    axes.set_title(f"Section at {_AXES[normal]} = {place:.3g} m")
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(True)
+    axes.grid(False)
+    return lines
+
+
+def crossings(triangles, normal, place):
+    """Where triangles (n, 3, 3) [m] cross the plane at a place on an axis.
+
+    Returns the ends of the lines (m, 2, 3) [m] and which triangle each belongs to (m,). One with a
+    corner in the plane counts as lying above it.
+    """
+    above = triangles[..., normal] >= place
+    which = np.flatnonzero(above.any(axis=1) & ~above.all(axis=1))
+    crossed, above = triangles[which], above[which]
+    # The corner that lies alone on its side comes first; both lines that cross start there.
+    alone = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), (~above).argmax(axis=1))
+    rows = np.arange(len(which))
+    first = crossed[rows, alone]
+    ends = [crossed[rows, (alone + k) % 3] for k in (1, 2)]
+    lines = []
+    for end in ends:
+        share = (place - first[:, normal]) / (end[:, normal] - first[:, normal])
+        lines.append(first + share[:, None] * (end - first))
+    return np.stack(lines, axis=1), which

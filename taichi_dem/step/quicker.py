@@ -1,0 +1,69 @@
+"""Goes on with whichever driver proves the quicker: both give the same bits, trying costs but time.
+
+Which one it is depends on how much is due in a step and on how free the cores are: the parallel
+driver pays for every phase with a launch, and much more where other programs hold a core.
+"""
+
+import time
+
+from taichi_dem.step.drivers import Parallel, Resident
+
+#: Substeps of a try, and how often each driver is tried; the better of its tries counts.
+_SUBSTEPS = 8
+_TRIES = 2
+#: Share of the time that goes into tries.
+_SHARE = 0.05
+
+
+class Quicker:
+    """Tries both drivers from time to time, a few substeps each.
+
+    seconds: for a member that was due, the best of the last tries by name of the driver. clock:
+    gives seconds; tests have their own.
+    """
+
+    def __init__(self, step, clock=time.perf_counter):
+        self.step, self.clock = step, clock
+        self.drivers = {driver.name: driver(step) for driver in (Parallel, Resident)}
+        self.chosen = Resident.name
+        self._begin()
+
+    def _begin(self):
+        """Try both again."""
+        self.ahead = list(self.drivers) * _TRIES
+        self.seconds, self.spent, self.since = {}, 0.0, 0.0
+
+    @property
+    def name(self):
+        """Name of the driver that goes on, and that this was measured."""
+        return f"{self.chosen} (measured)"
+
+    def settle(self):
+        """Make the search that is due, without a step; compiles both drivers."""
+        for driver in self.drivers.values():
+            driver.settle()
+
+    def run(self, end_tick):
+        """Advance to a tick, to the next halt, for a try, or for about as long as the driver."""
+        started = self.clock()
+        if self.ahead:
+            self._try(self.ahead.pop(0), end_tick)
+            self.spent += self.clock() - started
+        else:
+            self.drivers[self.chosen].run(end_tick)
+            self.since += self.clock() - started
+            if self.since * _SHARE > self.spent:
+                self._begin()
+
+    def _try(self, name, end_tick):
+        """Time some substeps by a driver; after the last try the quicker one goes on."""
+        before, started = self._visited(), self.clock()
+        self.drivers[name].few(end_tick, _SUBSTEPS)
+        seconds = (self.clock() - started) / max(1, self._visited() - before)
+        self.seconds[name] = min(seconds, self.seconds.get(name, seconds))
+        if not self.ahead:
+            self.chosen = min(self.seconds, key=self.seconds.get)
+
+    def _visited(self):
+        """Bodies, bonds and pairs that were due so far."""
+        return int(self.step.schedule.evaluations.to_numpy()[1:4].sum())
