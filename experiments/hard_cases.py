@@ -29,7 +29,7 @@ from _cli import (
 )
 from _hard_cases import judge, named, registry
 from _hard_cases._case import FAILED, PASSED, REFUSED
-from _hard_cases.margins import picture_margins
+from _hard_cases._margins import picture_margins
 from ca_damper.progress import Progress
 from taichi_dem.files import output_folder, write_csv
 from taichi_dem.plot_style import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, SKY, picture

@@ -42,7 +42,8 @@ def realised_gain(simulation, seconds=0.5):
 def _twin(simulation, step):
     """A simulation at the same state with one step [s] for all, at time zero."""
     method = Uniform(step, dashpot=simulation.method.dashpot)
-    twin = Simulation(simulation.scene, method, simulation.driver.name)
+    driver = simulation.driver.name.partition(" ")[0]
+    twin = Simulation(simulation.scene, method, driver)
     given = simulation.state.fields()
     for name, field in twin.state.fields().items():
         if name not in _ANEW:
