@@ -25,9 +25,9 @@ def realised_gain(simulation, seconds=0.5):
     smallest step that there is then. To compile it takes some seconds more.
     Raises SimulationDiverged when the twin leaves its bounds.
     """
-    report = simulation.report()
-    if simulation.method.uniform or report.run_cpu_seconds == 0.0:
+    if simulation.method.uniform or simulation.run_cpu_seconds == 0.0:
         return 1.0
+    report = simulation.report()
     twin = _twin(simulation, report.smallest_step_s)
     substeps, spent, done = _FIRST, 0.0, 0
     while spent < seconds:

@@ -58,11 +58,13 @@ def runs():
     return straight, simulation, names
 
 
+@pytest.mark.slow
 def test_the_quicker_driver_is_chosen_again_and_again(runs):
     assert runs[2] == ["resident (measured)", "parallel (measured)", "resident (measured)"]
     assert runs[1].report().driver == "resident (measured)"
 
 
+@pytest.mark.slow
 def test_changing_drivers_changes_no_bit(runs):
     straight, changing, _ = runs
     assert straight.report().broken_faces > 0 and straight.report().pair_evaluations > 0
@@ -72,6 +74,7 @@ def test_changing_drivers_changes_no_bit(runs):
     assert straight.evaluations() == changing.evaluations()
 
 
+@pytest.mark.slow
 def test_tries_take_their_share(runs):
     """Tries of 2 (1 + 0.01) s are repeated once the driver has gone on for twenty times as long."""
     _, simulation, _ = runs

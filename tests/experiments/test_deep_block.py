@@ -66,6 +66,7 @@ def test_power_law_of_inner_bodies_is_found(block):
     assert np.isnan(block.fitted(distance, speed, distance < 5.0)).all()
 
 
+@pytest.mark.slow
 def test_peaks_are_the_largest_of_all_samples():
     """The largest peak of all bodies is the largest of all rows; nobody is above it at the end."""
     gas = effects.GasPressure(group="left", peak=1e6, rise=2e-5)

@@ -68,6 +68,7 @@ def test_equal_parts_of_what_is_due_leave_nobody_waiting(workers):
     assert made.share("due", 16).elapsed == pytest.approx(elapsed, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_counted_run_counts_what_the_schedule_does_and_changes_no_bit(script):
     """A bar that breaks under gas, by the paper's rule, counted and as it is."""
     script("blast_scaling")

@@ -72,6 +72,7 @@ def wait(done):
         time.sleep(0.02)
 
 
+@pytest.mark.slow
 def test_moving_a_slider_changes_the_picture(page, address):
     """And nothing is fetched from elsewhere; an answer that is folded away unfolds."""
     asked, faults = [], []

@@ -60,6 +60,7 @@ def test_another_step_and_blow_give_the_bits_of_a_simulation_made_for_them(engin
     assert account["load_work"] > 0.0
 
 
+@pytest.mark.slow
 def test_solved_dashpots_are_of_second_order_and_explicit_ones_of_first(engine):
     """Halved steps: errors by 2^order. A quarter of an order for what higher orders add."""
 
@@ -146,6 +147,7 @@ def test_a_changed_batch_has_the_bits_of_a_new_one(engine):
     "names",
     [("bond_damping",), pytest.param(("shear_slip", "sphere_contact"), marks=pytest.mark.slow)],
 )
+@pytest.mark.slow
 def test_effects_that_are_silenced_give_the_bits_of_a_program_without_them(engine, names):
     """Under a pull that breaks the bar where it can break; all that the program says included."""
     silent, own = (engine.ask(work, names, 2.0) for work in (_needs.outcome, _needs.measured))
@@ -158,6 +160,7 @@ def test_effects_that_are_silenced_give_the_bits_of_a_program_without_them(engin
     assert math.isnan(silent.step_s) and own.step_s > 0.0
 
 
+@pytest.mark.slow
 def test_effects_that_never_act_change_no_bit(engine):
     """A gentle pull breaks nothing: dashpots alone give the bits of all effects."""
     answer = engine.ask(_needs.answer, ("bond_damping",), 0.2)

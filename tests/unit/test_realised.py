@@ -31,6 +31,7 @@ def test_a_twin_stands_where_the_run_does_and_takes_its_smallest_step(broken):
     assert twin.method == Uniform(report.smallest_step_s)
 
 
+@pytest.mark.slow
 def test_gain_is_time_over_time_and_is_said_in_the_report(broken):
     """Uniform evaluations over the run's, times what one takes; nothing of the run changes."""
     before, report = broken.state.position.to_numpy(), broken.report()
@@ -42,5 +43,4 @@ def test_gain_is_time_over_time_and_is_said_in_the_report(broken):
 
 def test_one_step_for_all_gains_nothing():
     simulation = Simulation(brisk_scene(), Uniform(1e-8))
-    simulation.start()
     assert realised_gain(simulation) == 1.0
