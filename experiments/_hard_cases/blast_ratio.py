@@ -69,5 +69,6 @@ MULTIRATE = ("multirate_drifted", "multirate_held")
 
 CASES = (
     blast_case(step_ratio_resonance, ("controlled", *MULTIRATE)),
-    blast_case(step_ratio_beyond_resonance, (), decline(MULTIRATE, "came from nowhere")),
+    # Energy from nowhere or a runaway, whichever is looked for first when it has grown.
+    blast_case(step_ratio_beyond_resonance, (), decline(MULTIRATE, "try a step")),
 )
