@@ -123,14 +123,20 @@ class BoundSpheres:
             push = self.law.normal(contact, contact.reach - distance, relative.dot(normal))
             force = -push * normal
             if ti.static(self.rubs):
-                tangent, lever = vec2(-normal[1], normal[0]), 0.5 * distance
-                slip = self.rotation.slip_of_pair(i, j, lever, relative.dot(tangent))
-                drag = self.law.friction(contact, push, slip)
+                lever = 0.5 * distance
+                tangent, _, drag = self._rub(i, j, contact, push, normal, relative, lever)
                 force += drag * tangent
                 self.rotation.twist(i, lever * drag)
                 self.rotation.twist(j, lever * drag)
             self.bodies.push(i, force)
             self.bodies.push(j, -force)
+
+    @ti.func
+    def _rub(self, i, j, contact, push, normal, relative, lever):
+        """Tangent of two spheres that touch, slip [m/s] and friction [N] of the first along it."""
+        tangent = vec2(-normal[1], normal[0])
+        slip = self.rotation.slip_of_pair(i, j, lever, relative.dot(tangent))
+        return tangent, slip, self.law.friction(contact, push, slip)
 
     @ti.func
     def _advance(self, s, dt, floor, speed):
@@ -270,9 +276,8 @@ class BoundSpheres:
             approach, overlap, rubbed = relative.dot(normal), contact.reach - distance, 0.0
             push = self.law.normal(contact, overlap, approach)
             if ti.static(self.rubs):
-                along = relative.dot(vec2(-normal[1], normal[0]))
-                slip = self.rotation.slip_of_pair(i, j, 0.5 * distance, along)
-                rubbed = -self.law.friction(contact, push, slip) * slip
+                _, slip, drag = self._rub(i, j, contact, push, normal, relative, 0.5 * distance)
+                rubbed = -drag * slip
             dragged = (push - self.law.elastic(contact, overlap)) * approach
             self.acted.touch(s, dragged, rubbed)
 

@@ -301,20 +301,22 @@ class Advance(Touch):
         bonds, loads and supports together, the change of kinetic energy is exact: what holds a body
         still does no work.
         """
-        free, free_momentum = velocity, momentum
+        free, free_momentum, held = velocity, momentum, 0
         half = self.schedule.seconds(self.state.tick[None]) - 0.5 * elapsed
         for effect in ti.static(self.model.supports):
             if effect.acts_on(i):
                 velocity, momentum = effect.held(
                     i, half, self.state.rotation[i], velocity, momentum
                 )
+                held = 1
         mean = 0.5 * (self.state.velocity[i] + velocity)
         mean_momentum = 0.5 * (self.state.angular_momentum[i] + momentum)
         self._book_loads(i, kick, mean, mean_momentum)
         if ti.static(len(self.model.supports) > 0):
-            push, twist = self.model.mass[i] * (velocity - free), momentum - free_momentum
-            work = push.dot(mean) + twist.dot(self.spin(i, mean_momentum))
-            self._book(i, ti.static(len(self.model.loads)), work, push, twist)
+            if held == 1:
+                push, twist = self.model.mass[i] * (velocity - free), momentum - free_momentum
+                work = push.dot(mean) + twist.dot(self.spin(i, mean_momentum))
+                self._book(i, ti.static(len(self.model.loads)), work, push, twist)
         return velocity, momentum
 
     @ti.func

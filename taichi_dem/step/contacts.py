@@ -69,14 +69,19 @@ class Contacts:
         return energy
 
     @ti.func
-    def touching(self, p):
-        """Number of sphere pairs of a pair of bodies that overlap now."""
+    def closer(self, p, margin):
+        """Number of sphere pairs of a pair of bodies with a gap below a margin [m] now."""
         count = 0
         pair = self.pair_body[p]
         for k in range(self.pair_first[p], self.pair_first[p + 1]):
             spheres = self.pair_sphere[k]
-            count += ti.cast(self.gap(pair[0], pair[1], spheres[0], spheres[1]) < 0.0, ti.i32)
+            count += ti.cast(self.gap(pair[0], pair[1], spheres[0], spheres[1]) < margin, ti.i32)
         return count
+
+    @ti.func
+    def touching(self, p):
+        """Number of sphere pairs of a pair of bodies that overlap now."""
+        return self.closer(p, 0.0)
 
     @ti.func
     def gather(self, i):

@@ -80,12 +80,8 @@ class Near:
     @ti.func
     def within(self, p):
         """How many of the sphere pairs of the pair at place p count now."""
-        i, j, near = self.contacts.pair_body[p][0], self.contacts.pair_body[p][1], 0
-        margin = self.margin(i, j)
-        for k in range(self.contacts.pair_first[p], self.contacts.pair_first[p + 1]):
-            a, b = self.contacts.pair_sphere[k][0], self.contacts.pair_sphere[k][1]
-            near += ti.cast(self.contacts.gap(i, j, a, b) < margin, ti.i32)
-        return near
+        pair = self.contacts.pair_body[p]
+        return self.contacts.closer(p, self.margin(pair[0], pair[1]))
 
     @ti.func
     def eigenvalue(self, i):
