@@ -94,22 +94,30 @@ class FixedStep:
 class Displacement:
     """No body moves by more than a given distance in a step (Konno et al., 3.1).
 
-    distance: l [m]. dt0: step of level 0 [s]. The level is the lowest k with
-    dt0 / 2^k <= l / |v|.
+    distance: l [m], or an angle [rad] for a body that turns. dt0: step of level 0 [s]. power: 1
+    for a speed, 2 for an acceleration. The level is the lowest k with rate (dt0 / 2^k)^power <= l.
     """
 
-    def __init__(self, distance, dt0):
+    constant_fields = ("rate2",)
+
+    def __init__(self, distance, dt0, power=1):
         steps = dt0 / 2.0 ** np.arange(MAX_LEVEL + 1)
-        self.speed2 = ti.field(real, shape=MAX_LEVEL + 2)
-        then(self.speed2.from_numpy, np.append((distance / steps) ** 2, np.inf))
+        self.rate2 = ti.field(real, shape=MAX_LEVEL + 2)
+        then(self.rate2.from_numpy, np.append((distance / steps**power) ** 2, np.inf))
+
+    @ti.func
+    def finer(self, level, rate2):
+        """Lowest level from a given one on for a squared rate, [m^2/s^2] for a speed."""
+        k = level
+        while rate2 > self.rate2[k] and k < MAX_LEVEL:
+            k += 1
+        return k
 
     @ti.func
     def wanted(self, level, speed2, low):
         """Level for a body now on a level, of squared speed [m^2/s^2]; low: coarsest allowed."""
-        k = level
-        while speed2 > self.speed2[k] and k < MAX_LEVEL:
-            k += 1
-        while k > low and speed2 <= self.speed2[ti.max(k - 1, 0)]:
+        k = self.finer(level, speed2)
+        while k > low and speed2 <= self.rate2[ti.max(k - 1, 0)]:
             k -= 1
         return k
 
@@ -131,6 +139,14 @@ def shorter(step, bound, other, criterion):
     if other < step:
         step, bound = other, criterion
     return step, bound
+
+
+@ti.func
+def finer(level, bound, other, criterion):
+    """The finer of two levels with what bounds it."""
+    if other > level:
+        level, bound = other, criterion
+    return level, bound
 
 
 @ti.func

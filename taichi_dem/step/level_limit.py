@@ -39,6 +39,11 @@ class LevelLimit:
                 p = self.contacts.touch[k]
                 if self.rates.near.count[p] > 0:
                     finest = ti.max(finest, self.known[self.contacts.pair_body[p][0]])
+        return self.least_beside(finest)
+
+    @ti.func
+    def least_beside(self, finest):
+        """Coarsest level that a body may have beside one of a level."""
         return finest - self.jump
 
     @ti.func

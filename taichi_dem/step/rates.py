@@ -21,8 +21,10 @@ from taichi_dem.step_control import (
     LARGEST,
     LOAD,
     ROTATION,
+    Displacement,
     StepControl,
     dashpot_limit,
+    finer,
     level_of,
     shorter,
     spring_limit,
@@ -44,9 +46,9 @@ class Rates:
 
     dashpot_table, spring_table: largest eigenvalue of the bonds' block by the set of intact
     bonds, [1/s] and [1/s^2]. bond_damping, contact_damping: rates of a body's dashpots [1/s].
-    limit, limit_by: longest stable step [s], and the criterion that sets it. listed,
-    listed_count: bodies to look at; events: why, as bits. woken: how many bodies were brought to
-    the present between their times.
+    limit, limit_level, limit_by: longest stable step [s], its level, and the criterion that sets
+    it. way, turn, leap: levels for speed, spin and acceleration. listed, listed_count: bodies to
+    look at; events: why, as bits. woken: how many were brought to the present between their times.
     control: a StepControl, None for a method that only limits dashpots; distance: l [m] or None.
 
     Limited dashpots share 1.7 by need. With X = 2 dt rate for bonds (b) and contacts (c) of a body
@@ -80,11 +82,15 @@ class Rates:
         self.has_contact = contacts is not None
         self.has_distance = method.distance is not None
         rule = self.control or StepControl()
-        self.dt0, self.distance, self.safety = method.dt0, method.distance, rule.safety
+        self.dt0, self.safety = method.dt0, rule.safety
         self.limited = method.dashpot == "limited"
-        self.angle, self.jump, self.floor = rule.angle, rule.level_jump, rule.dashpot_floor
+        self.jump, self.floor = rule.level_jump, rule.dashpot_floor
         self.counts = {name: name in rule.criteria for name in CRITERIA}
         self.has_load = self.counts["load"] and self.has_distance and bool(model.loads)
+        if self.has_distance:
+            self.way = Displacement(method.distance, method.dt0)
+            self.leap = Displacement(method.distance, method.dt0, power=2)
+        self.turn = Displacement(rule.angle, method.dt0)
         self.wakes = 0
         if self.control is not None:
             self.wakes = sum(1 << k for k, event in enumerate(EVENTS) if event in rule.wake)
@@ -99,6 +105,7 @@ class Rates:
         self.contact_damping = ti.field(real, shape=n)
         self.limit = ti.field(real, shape=n)
         self.limit_by = ti.field(ti.i32, shape=n)
+        self.limit_level = ti.field(ti.i32, shape=n)
         self.events = ti.field(ti.i32, shape=n)
         self.listed = ti.field(ti.i32, shape=n)
         self.listed_count = ti.field(ti.i32, shape=())
@@ -203,27 +210,32 @@ class Rates:
             borne = ti.max(borne, self.floor)
         step, by = shorter(step, by, borne, cause)
         self.limit[i], self.limit_by[i] = step, by
+        self.limit_level[i] = level_of(step, self.dt0)
 
     @ti.func
     def wanted(self, i, now):
-        """Level that body i wants at a time [s], and the criterion that asks for it."""
-        step, by = self.limit[i], self.limit_by[i]
+        """Level that body i wants at a time [s], and the criterion that asks for it.
+
+        A body asks at every step: squares and tables spare it roots and quotients.
+        """
+        level, by = self.limit_level[i], self.limit_by[i]
         if ti.static(self.has_distance):
-            way = self.distance / ti.max(self.state.velocity[i].norm(), 1e-200)
-            step, by = shorter(step, by, way, DISPLACEMENT)
+            speed2 = self.state.velocity[i].norm_sqr()
+            level, by = finer(level, by, self.way.finer(level, speed2), DISPLACEMENT)
         if ti.static(self.counts["rotation"]):
-            turn = self.angle / ti.max(self.state.spin[i].norm(), 1e-200)
-            step, by = shorter(step, by, turn, ROTATION)
+            spin2 = self.state.spin[i].norm_sqr()
+            level, by = finer(level, by, self.turn.finer(level, spin2), ROTATION)
         if ti.static(self.has_load):
-            step, by = shorter(step, by, self._load_step(i, now), LOAD)
-        return level_of(step, self.dt0), by
+            push2 = self._push2(i, now)
+            level, by = finer(level, by, self.leap.finer(level, push2), LOAD)
+        return level, by
 
     @ti.func
-    def _load_step(self, i, now):
-        """Step [s] in which the loads alone move body i by the distance: F / m dt^2 <= l.
+    def _push2(self, i, now):
+        """Square of the acceleration that the loads alone give body i [m^2/s^4].
 
-        The force is the larger one of now and a largest step ahead: a body does not leap into a
-        load that sets in while it sleeps.
+        The larger one of now and a largest step ahead: a body does not leap into a load that sets
+        in while it sleeps.
         """
         push2 = 0.0
         for e in ti.static(range(len(self.model.loads))):
@@ -233,7 +245,7 @@ class Rates:
                         i, now + ahead * self.dt0, self.state.rotation[i]
                     )
                     push2 = ti.max(push2, force.norm_sqr())
-        return ti.sqrt(self.distance * self.model.mass[i] / ti.max(ti.sqrt(push2), 1e-200))
+        return push2 * self.model.mass_inverse[i] ** 2
 
     @ti.func
     def bond_share(self, i, step):

@@ -116,9 +116,11 @@ class Schedule:
         """Level that the rates and the neighbours of body i ask for, and which criterion does."""
         wanted, bound = self.rates.wanted(i, self.seconds(self.state.tick[None]))
         if ti.static(self.spreads):
-            least = self.level_limit.least(i)
-            if least > wanted:
-                wanted, bound = least, NEIGHBOUR
+            # Its neighbours, many to visit, step no finer than the finest of all.
+            if self.level_limit.least_beside(self.finest[None]) > wanted:
+                least = self.level_limit.least(i)
+                if least > wanted:
+                    wanted, bound = least, NEIGHBOUR
         return wanted, bound
 
     @ti.func
