@@ -4,12 +4,12 @@ import os
 import subprocess
 import sys
 import tempfile
-import time
 
 import numpy as np
 
+from _bench_clock import seconds_of, spent
 from _blast import METHODS, paper_scene
-from taichi_dem import Multirate, Simulation, Uniform
+from taichi_dem import Multirate, Simulation, Uniform, runtime
 from taichi_dem.simulation import macro_steps
 
 UNTIL = 5e-4
@@ -19,7 +19,7 @@ import sys, time
 start = time.perf_counter()
 sys.path.insert(0, sys.argv[1])
 from taichi_dem import runtime
-runtime.start(threads=1)
+runtime.start(sys.argv[2], threads=1)
 from _bench_blast import paper_simulation
 from taichi_dem import Multirate
 paper_simulation(Multirate()).advance_to(1)
@@ -27,16 +27,16 @@ print(time.perf_counter() - start)
 """
 
 
-def paper_simulation(method, driver="resident"):
+def paper_simulation(method):
     """The paper's block with all of its effects."""
-    return Simulation(paper_scene(), method, driver)
+    return Simulation(paper_scene(), method)
 
 
-def cpu_seconds(simulation, steps):
-    """CPU time of advancing to a macro step [s]."""
-    start = time.process_time()
+def seconds_to(simulation, steps):
+    """What advancing to a macro step takes [s]."""
+    start = spent()
     simulation.advance_to(steps)
-    return time.process_time() - start
+    return spent() - start
 
 
 def bonded_phase(repeats, steps=4000):
@@ -45,7 +45,7 @@ def bonded_phase(repeats, steps=4000):
     simulation.advance_to(steps)
     rates = []
     for k in range(repeats):
-        seconds = cpu_seconds(simulation, (k + 2) * steps)
+        seconds = seconds_to(simulation, (k + 2) * steps)
         rates.append(3e-6 * simulation.model.bond_count * steps / seconds)
     return rates
 
@@ -60,16 +60,11 @@ def paper_problem(method, repeats):
     return reports
 
 
-def seconds_of(reports):
-    """CPU seconds of runs."""
-    return [report.run_cpu_seconds for report in reports]
-
-
 def first_step(cache):
     """Seconds from the start of Python to the end of the first step, with a given cache folder."""
     environment = {**os.environ, "TI_OFFLINE_CACHE_FILE_PATH": cache}
     here = os.path.dirname(os.path.abspath(__file__))
-    command = [sys.executable, "-c", FIRST_STEP, here]
+    command = [sys.executable, "-c", FIRST_STEP, here, runtime.settings().arch]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
     return float(done.stdout.split()[-1])
 

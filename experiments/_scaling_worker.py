@@ -13,10 +13,12 @@ import sys
 import time
 
 import numpy as np
+import taichi as ti
 
 from _blast import METHODS, paper_effects
 from taichi_dem import CONCRETE, Scene, Simulation, effects, read_mesh, runtime
 from taichi_dem.checkpoint import digest
+from taichi_dem.field_memory import FieldMemory
 from taichi_dem.mesh_order import in_space_order
 from taichi_dem.mesh_shapes import bar
 
@@ -68,11 +70,39 @@ def timed(simulation, warm, steps, repeats):
     return seconds, busy
 
 
+def bytes_a_step(simulation):
+    """Bytes that a step of all bodies must move at least: the model read, the state written too."""
+    sizes = {}
+    for part in ("model", "state"):
+        kept = FieldMemory(getattr(simulation, part), "constant" if part == "model" else "saved")
+        sizes[part] = sum(array.nbytes for array in kept.read().values())
+    return sizes["model"] + 2 * sizes["state"]
+
+
+@ti.kernel
+def _copy(a: ti.template(), b: ti.template()):
+    for k in a:
+        b[k] = a[k]
+
+
+def bandwidth(entries=1 << 24, repeats=5):
+    """Bytes a second that a copy of numbers reads and writes, the best of some."""
+    a, b = (ti.field(ti.f64, shape=entries) for _ in range(2))
+    best = 0.0
+    for _ in range(repeats + 1):
+        ti.sync()
+        started = time.perf_counter()
+        _copy(a, b)
+        ti.sync()
+        best = max(best, 16.0 * entries / (time.perf_counter() - started))
+    return best
+
+
 def main(path):
     """Do a job and print what it measured."""
     with open(path, encoding="utf-8") as handle:
         job = json.load(handle)
-    runtime.start("cpu", job["threads"])
+    runtime.start(job.get("arch", "cpu"), job["threads"])
     make, step = METHODS[job["method"]]
     scene = scene_of(job["mesh"], job["cells"])
     simulation = Simulation(scene, make(step), job["driver"])
@@ -83,6 +113,8 @@ def main(path):
         "busy": busy,
         "driver": simulation.driver.name,
         "bodies": simulation.model.body_count,
+        "bytes": bytes_a_step(simulation),
+        "bandwidth": bandwidth(),
         "broken": int((simulation.state.broken_tick.to_numpy() >= 0).sum()),
         "digest": digest(*(np.ascontiguousarray(motion[key]) for key in ("position", "velocity"))),
     }

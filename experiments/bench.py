@@ -3,17 +3,19 @@
     make bench                          # about eight minutes; writes results/bench.json
     python experiments/bench.py --quick # a minute
 
-Figures are CPU time of one core unless they say otherwise, compile time apart: median of repeats,
-and their spread.
+Figures are CPU time of one core unless they say otherwise, with --arch cuda time of the wall;
+compile time apart. Median of repeats, and their spread.
 """
 
 import json
 import os
 import sys
+from dataclasses import asdict
 
 import numpy as np
 
 import _bench_blast
+import _bench_block
 import _bench_damper
 from _cli import main, parser, print_table, processor, versions
 from taichi_dem import runtime
@@ -31,13 +33,13 @@ def run(options):
         results.append({"name": name, "unit": unit, "values": values, "bound": bound})
         print(f"  {name}: {np.median(values):.3g} {unit}", flush=True)
 
-    for part in (_bench_damper, _bench_blast):
+    for part in (_bench_damper, _bench_blast, _bench_block):
         part.measure(note, options.quick)
     print_table(
         [_row(result) for result in results], ["figure", "median", "spread", "unit", "bound"]
     )
     content = {"figures": results, "processor": processor(), "versions": versions()}
-    content["threads"] = runtime.settings().threads
+    content.update(asdict(runtime.settings()))
     text = json.dumps(content, indent=1)
     path = os.path.join(options.out, "bench.json")
     write_text(path, text)

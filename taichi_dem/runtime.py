@@ -103,7 +103,7 @@ def _checked(arch, threads, debug):
 
 def _initialise(wanted):
     # Taichi falls back to the CPU with a mere warning: ask first, and read back what it took.
-    if wanted.arch == "cuda" and not _cuda_present():
+    if wanted.arch == "cuda" and not cuda_present():
         raise InputError("arch 'cuda' was asked for, but no CUDA device answers here: use 'cpu'")
     _remove_stale_lock()
     with contextlib.redirect_stdout(io.StringIO()):
@@ -139,7 +139,8 @@ def _remove_stale_lock():
             lock.unlink()
 
 
-def _cuda_present():
+def cuda_present():
+    """Whether a CUDA device answers on this machine."""
     # Taichi would say on stderr that it finds no libcuda; the caller says it in a sentence.
     ti.set_logging_level(ti.ERROR)
     return bool(ti._lib.core.with_cuda())

@@ -33,6 +33,8 @@ from taichi_dem.watch import Watch
 
 #: Largest steps of a run, of which the ticks are counted in 64 bits.
 MOST_STEPS = 2**42
+#: What is said of the resident driver where its kernel cannot run.
+CPU_ONLY = "runs on a CPU only"
 #: Bonds below which the resident driver is the quicker one, and above which the parallel one is,
 #: on a CPU with several threads whose cores are free; between them both are tried.
 RESIDENT_BELOW, PARALLEL_FROM = 4000, 100000
@@ -252,7 +254,7 @@ def _driver_name(name, bond_count):
     if name == "auto":
         return "parallel" if arch == "cuda" else _by_size(bond_count)
     if name == "resident" and arch == "cuda":
-        raise InputError("driver 'resident' runs on a CPU only: use 'parallel' with arch 'cuda'")
+        raise InputError(f"driver 'resident' {CPU_ONLY}: use 'parallel' with arch 'cuda'")
     return name
 
 

@@ -1,8 +1,27 @@
-"""A Taichi session for every test file; tests of starting and stopping use subprocesses."""
+"""A Taichi session for every test file; tests of starting and stopping use subprocesses.
+
+``pytest --arch cuda`` runs all kernels of this process, and all experiments, on a CUDA device.
+"""
+
+import os
 
 import pytest
 
-from taichi_dem import runtime
+from taichi_dem import InputError, runtime
+from taichi_dem.simulation import CPU_ONLY
+
+#: Tells the processes that tests start; see ``tests.experiments.contract``.
+ARCH = "TEST_ARCH"
+
+
+def pytest_addoption(parser):
+    """The architecture, as every experiment has it."""
+    parser.addoption("--arch", default="cpu", choices=runtime.ARCHITECTURES)
+
+
+def pytest_configure(config):
+    """Hand the choice on."""
+    os.environ[ARCH] = config.getoption("--arch")
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -12,4 +31,28 @@ def taichi_session():
     A session a file: Taichi crashes beyond 512 groups of fields in one.
     """
     runtime.stop()
-    runtime.start(threads=2)
+    if os.environ[ARCH] == "cuda" and not runtime.cuda_present():
+        pytest.skip("no CUDA device answers here")
+    runtime.start(os.environ[ARCH], threads=2)
+
+
+def _skipping():
+    """Skip, with the reason, what needs the driver that only a CPU has."""
+    try:
+        return (yield)
+    except InputError as error:
+        if os.environ[ARCH] == "cuda" and CPU_ONLY in str(error):
+            pytest.skip(str(error))
+        raise
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_pyfunc_call(pyfuncitem):
+    """A test may ask for the resident driver."""
+    return (yield from _skipping())
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_fixture_setup(fixturedef, request):
+    """So may what it is given."""
+    return (yield from _skipping())

@@ -1,6 +1,7 @@
 """Runs of experiments: in processes of their own, each made once a file, and inside this one."""
 
 import importlib.util
+import os
 import sys
 
 import pytest
@@ -48,7 +49,7 @@ def main(script):
         module = script(name)
         import _cli
 
-        given = ["--threads", "2", *map(str, arguments)]
+        given = ["--threads", "2", "--arch", os.environ["TEST_ARCH"], *map(str, arguments)]
         return _cli.main(module.run, module.options_parser(), given)
 
     return run

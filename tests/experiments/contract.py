@@ -24,7 +24,8 @@ NAMES = sorted(
 
 def start(name, *arguments):
     """Run an experiment in a process of its own; two threads, output in pipes."""
-    line = [sys.executable, str(FOLDER / f"{name}.py"), "--threads", "2", *map(str, arguments)]
+    everywhere = ["--threads", "2", "--arch", os.environ["TEST_ARCH"]]
+    line = [sys.executable, str(FOLDER / f"{name}.py"), *everywhere, *map(str, arguments)]
     return subprocess.run(line, capture_output=True, text=True, timeout=1800)
 
 

@@ -28,7 +28,7 @@ refused("not started", lambda: Simulation(Scene(pair(), CONCRETE), Uniform()))
 refused("unknown", lambda: runtime.start(arch="gpu"))
 refused("no threads", lambda: runtime.start(threads=0))
 refused("threads text", lambda: runtime.start(threads="2"))
-runtime._cuda_present = lambda: False
+runtime.cuda_present = lambda: False
 refused("no cuda", lambda: runtime.start(arch="cuda"))
 said["before"] = runtime.settings() is None
 first = runtime.start(threads=1)
