@@ -155,7 +155,8 @@ def run(options):
         os.path.join(options.out, "methods.csv"),
         {key: [row[key] for row in rows] for key in rows[0]},
     )
-    plot.plot_methods(os.path.join(options.out, "methods.png"), {"reference": exact, **histories})
+    path, moved = os.path.join(options.out, "methods.png"), "hole_radial_displacement_mm"
+    plot.plot_methods(path, {"reference": exact, **histories}, moved)
     figures = figures_of(rows, best, wanted)
     write_summary(
         options.out,

@@ -242,7 +242,7 @@ def picture(series, options):
         write_csv(at(f"{name}.csv"), {**made, **levels})
         if name != "uniform":
             plot.plot_levels(at(f"levels_{name}.png"), made["time_s"], shares, options.dt0)
-    plot.plot_methods(at("methods.png"), series)
+    plot.plot_methods(at("methods.png"), series, "monitor_displacement_mm")
 
 
 def level_shares(levels):

@@ -158,11 +158,15 @@ def plot_levels(path, time_s, shares, dt0):
         figure.legend(areas[::-1], names[::-1], title="step", loc="outside right center")
 
 
-def plot_methods(path, series):
+#: Displacements that methods may be compared by, and how they are called.
+_COMPARED = {"hole_radial_displacement_mm": "hole", "monitor_displacement_mm": "body watched"}
+
+
+def plot_methods(path, series, column):
     """What methods cost over time, and how far their displacement lies apart.
 
-    series: title -> columns time_s, cpu_s, evaluations and monitor_displacement_mm; the first is
-    the one the others are compared with.
+    series: title -> columns time_s, cpu_s, evaluations and the one compared, a displacement of the
+    hole or of the body watched; the first is the one the others are compared with.
     """
     with picture(path, 1, 3, size=(12.5, 3.4)) as (_, (cost, work, moved)):
         first = next(iter(series.values()))
@@ -171,22 +175,27 @@ def plot_methods(path, series):
             time = 1e3 * np.asarray(made["time_s"])
             cost.plot(time, made["cpu_s"], **look)
             work.plot(time, 1e-6 * np.asarray(made["evaluations"]), **look)
-            here = np.asarray(made["monitor_displacement_mm"])
+            here = np.asarray(made[column])
             # Largest steps differ, and with them the times of the samples.
-            there = np.interp(time, 1e3 * first["time_s"], first["monitor_displacement_mm"])
+            there = np.interp(time, 1e3 * first["time_s"], first[column])
             share = np.where(
                 there > 1e-3 * there.max(), here / np.where(there > 0, there, 1), np.nan
             )
             moved.plot(time, 100.0 * (share - 1.0), **look)
         cost.set(ylabel="CPU time of stepping [s]")
         work.set(ylabel="evaluations [millions]")
-        for axes, name in ((cost, "cpu_s"), (work, "evaluations")):
-            last = [made[name][-1] for made in series.values()]
+        for axes, name, unit in ((cost, "cpu_s", 1.0), (work, "evaluations", 1e6)):
+            last = [made[name][-1] / unit for made in series.values()]
             if max(last) > 20.0 * min(last):
                 axes.set_yscale("log")
+                # A run begins with nothing done, where a logarithm has no end.
+                axes.set_ylim(0.01 * min(last), None)
             else:
                 axes.set_ylim(0.0, None)
-        moved.set(ylabel=f"displacement, difference\nfrom {next(iter(series))} [%]")
+        moved.set(
+            ylabel=f"displacement of the {_COMPARED[column]},\n"
+            f"difference from {next(iter(series))} [%]"
+        )
         for axes in (cost, work, moved):
             axes.set(xlabel="time [ms]")
             _span(axes, time)
