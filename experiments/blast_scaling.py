@@ -20,11 +20,8 @@ cores busy, look at what the busiest thread took of the cores instead (..._busy)
 Writes scaling.png, scaling.csv, shares.csv and summary.json to results/blast_scaling/.
 """
 
-import json
 import os
-import subprocess
 import sys
-import tempfile
 import time
 
 import numpy as np
@@ -45,7 +42,8 @@ from _cli import (
 from _scaling_picture import picture_scaling
 from _scaling_record import record
 from _scaling_simulate import WAYS, Workers, acceleration
-from taichi_dem import InputError, Multirate
+from _scaling_threads import ROUNDS, thread_gain
+from taichi_dem import Multirate
 from taichi_dem.files import output_folder, write_csv
 from taichi_dem.partition import imbalance
 
@@ -63,9 +61,6 @@ PAPER_STATIC, PAPER_REBALANCED = 20381.0 / 3493.0, 9787.0 / 9023.0
 PAPER_ONE, PAPER_MANY, PAPER_FIXED, PAPER_SERIAL = 2702.0, 501.0, 541.0, 0.05
 #: Boxes of the bar for the threads, six tetrahedra each.
 CELLS, QUICK_CELLS = (40, 20, 20), (20, 10, 10)
-#: How often runs on one and on two threads take turns.
-ROUNDS = 2
-_WORKER = os.path.join(os.path.dirname(os.path.abspath(__file__)), "_scaling_worker.py")
 
 
 def options_parser():
@@ -82,42 +77,6 @@ def options_parser():
 def simulated(workers, counts):
     """What every number of workers takes, a ``Shared`` by way and number."""
     return {way: {count: workers.share(way, count) for count in counts} for way in WAYS}
-
-
-def thread_job(mesh, cells, threads, steps, repeats):
-    """Seconds a step of whole steps by the parallel driver, and where the bodies end (digest)."""
-    job = {"mesh": mesh, "cells": cells, "threads": threads, "driver": "parallel"}
-    job.update(method="paper_multirate", warm=2, steps=steps, repeats=repeats)
-    with tempfile.TemporaryDirectory() as folder:
-        path = os.path.join(folder, "job.json")
-        with open(path, "w", encoding="utf-8") as handle:
-            json.dump(job, handle)
-        done = subprocess.run([sys.executable, _WORKER, path], capture_output=True, text=True)
-    if done.returncode != 0:
-        raise InputError(f"the run on {threads} threads ended with: {done.stderr.strip()[-300:]}")
-    return json.loads(done.stdout.splitlines()[-1])
-
-
-def thread_gain(mesh, cells, steps, rounds, repeats):
-    """Time of one thread over that of two, a row of figures; the bits must be the same.
-
-    Runs on one and on two threads take turns, as what else keeps the cores busy changes. busy: the
-    same of what the busiest thread took of the cores, None where the system does not tell.
-    """
-    least = {name: {1: np.inf, 2: np.inf} for name in ("seconds", "busy")}
-    digests = set()
-    for _ in range(rounds):
-        for threads in (1, 2):
-            found = thread_job(mesh, cells, threads, steps, repeats)
-            digests.add(found["digest"])
-            for name, by_threads in least.items():
-                known = [value for value in found[name] if value is not None]
-                by_threads[threads] = min([by_threads[threads], *known])
-    if len(digests) > 1:
-        raise InputError("one thread and two threads must give the same bits, and do not")
-    gains = {name: times[1] / times[2] for name, times in least.items()}
-    busy = gains["busy"] if np.isfinite(gains["busy"]) else None
-    return {"bodies": found["bodies"], "gain": gains["seconds"], "busy": busy}
 
 
 def figures_of(workers, shared, gains):
@@ -188,8 +147,8 @@ def run(options):
     shared = simulated(workers, QUICK_COUNTS if options.quick else COUNTS)
     cells, *often = (QUICK_CELLS, 1, 2) if options.quick else (CELLS, ROUNDS, options.repeats)
     gains = [
-        thread_gain("", cells, 10, *often),
-        thread_gain(options.mesh, None, 400, *often),
+        thread_gain("", cells, "paper_multirate", 10, *often),
+        thread_gain(options.mesh, None, "paper_multirate", 400, *often),
     ]
     figures = figures_of(workers, shared, gains)
     write_tables(options.out, workers, shared)
