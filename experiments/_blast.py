@@ -45,7 +45,8 @@ def paper_multirate(step):
 
 def multirate_controlled(step):
     """Steps for each by what limits them, down to an eighth, with dashpots limited to that."""
-    control = StepControl(dashpot_floor=step / 8.0)
+    # With the usual 0.25 the hole is 0.24 % off at 5e-4 s, with 0.2 less than 0.2 %.
+    control = StepControl(safety=0.2, dashpot_floor=step / 8.0)
     return Multirate(step, 1e-5, control=control, dashpot="limited")
 
 
