@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -79,7 +80,7 @@ def figure_rows(figures, patterns):
     figures: of summary.json. Key are those with a paper's value and those that match a pattern.
     """
     rows = [
-        (name.replace("_", " "), short(item["value"]), item["unit"], short(item["paper"]))
+        (in_words(name, item["unit"]), short(item["value"]), item["unit"], short(item["paper"]))
         for name, item in figures.items()
     ]
     wanted = [
@@ -90,6 +91,13 @@ def figure_rows(figures, patterns):
     key = sorted((row for row, want in zip(rows, wanted) if want), key=lambda row: not row[3])
     rest = [row for row, want in zip(rows, wanted) if not want]
     return tuple(key[:MOST_KEY_FIGURES]), tuple(key[MOST_KEY_FIGURES:] + rest)
+
+
+def in_words(name, unit):
+    """A key of summary.json without underscores, and without the unit at its end."""
+    if unit == "1":
+        return name.replace("_", " ")
+    return name.removesuffix("_" + re.sub("[ /]", "_", unit)).replace("_", " ")
 
 
 def short(value):

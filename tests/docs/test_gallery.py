@@ -159,3 +159,16 @@ def test_figures_with_a_papers_value_are_never_folded_away():
     key, rest = _gallery_html.figure_rows(figures, ("f*",))
     assert key[0] == ("known", "2702", "s", "3,897")
     assert len(key) == 12 and len(rest) == 3
+
+
+@pytest.mark.parametrize(
+    "name, unit, words",
+    [
+        ("apparent_damping_N_s_m", "N s/m", "apparent damping"),
+        ("limit_dashpots_s", "s", "limit dashpots"),
+        ("errors_of_order_1", "1", "errors of order 1"),
+        ("broken_faces", "mm", "broken faces"),
+    ],
+)
+def test_a_unit_stands_beside_a_figure_and_not_in_its_name(name, unit, words):
+    assert _gallery_html.in_words(name, unit) == words
