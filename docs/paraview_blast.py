@@ -1,14 +1,17 @@
 """Four linked views of a blast in ParaView, and a picture of each snapshot.
 
     pvpython docs/paraview_blast.py SERIES.pvd [FOLDER]
+    paraview --script=docs/paraview_blast.py
 
-Inside ParaView (View, Python Shell, Run Script) set SERIES first; the views stay open.
+Inside ParaView (also File, Load State) SERIES below is shown, and the views stay open.
 """
 
 import math
 import os
 import sys
 
+#: What is shown where no command line names it, from the folder in which ParaView was started.
+SERIES = "results/blast_fracture/paraview/blast.pvd"
 #: Cell values that are shown, one a view, what is written above them, and the decades of a scale
 #: that has to show a wave beside fragments a thousand times as fast; 0 for an even scale.
 SHOWN = {
@@ -82,8 +85,11 @@ def write_pictures(layout, folder):
 
 
 if __name__ == "__main__":
-    if len(sys.argv) < 2:
-        sys.exit("Give the series: pvpython docs/paraview_blast.py SERIES.pvd [FOLDER]")
-    arranged = views(sys.argv[1])
-    if len(sys.argv) > 2:
-        write_pictures(arranged, sys.argv[2])
+    # Inside ParaView there is no command line of one's own.
+    given = [word for word in sys.argv[1:] if not word.startswith("-")]
+    chosen = given[0] if given else SERIES
+    if not os.path.isfile(chosen):
+        sys.exit(f"series must be the name of a .pvd file, got {chosen!r}")
+    arranged = views(os.path.abspath(chosen))
+    if len(given) > 1:
+        write_pictures(arranged, given[1])
