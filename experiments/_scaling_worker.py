@@ -102,7 +102,7 @@ def main(path):
     """Do a job and print what it measured."""
     with open(path, encoding="utf-8") as handle:
         job = json.load(handle)
-    runtime.start(job.get("arch", "cpu"), job["threads"])
+    runtime.start(job["arch"], job["threads"])
     make, step = METHODS[job["method"]]
     scene = scene_of(job["mesh"], job["cells"])
     simulation = Simulation(scene, make(step), job["driver"])

@@ -3,15 +3,11 @@
 ``pytest --arch cuda`` runs all kernels of this process, and all experiments, on a CUDA device.
 """
 
-import os
-
 import pytest
 
 from taichi_dem import InputError, runtime
 from taichi_dem.simulation import CPU_ONLY
-
-#: Tells the processes that tests start; see ``tests.experiments.contract``.
-ARCH = "TEST_ARCH"
+from tests import arch
 
 
 def pytest_addoption(parser):
@@ -21,7 +17,7 @@ def pytest_addoption(parser):
 
 def pytest_configure(config):
     """Hand the choice on."""
-    os.environ[ARCH] = config.getoption("--arch")
+    arch.choose(config.getoption("--arch"))
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -31,9 +27,9 @@ def taichi_session():
     A session a file: Taichi crashes beyond 512 groups of fields in one.
     """
     runtime.stop()
-    if os.environ[ARCH] == "cuda" and not runtime.cuda_present():
+    if arch.chosen() == "cuda" and not runtime.cuda_present():
         pytest.skip("no CUDA device answers here")
-    runtime.start(os.environ[ARCH], threads=2)
+    runtime.start(arch.chosen(), threads=2)
 
 
 def _skipping():
@@ -41,7 +37,7 @@ def _skipping():
     try:
         return (yield)
     except InputError as error:
-        if os.environ[ARCH] == "cuda" and CPU_ONLY in str(error):
+        if arch.chosen() == "cuda" and CPU_ONLY in str(error):
             pytest.skip(str(error))
         raise
 

@@ -49,7 +49,7 @@ class Rates:
     limit, limit_level, limit_by: longest stable step [s], its level, and the criterion that sets
     it. way, turn, leap: levels for speed, spin and acceleration. listed, listed_count: bodies to
     look at; events: why, as bits. woken: how many were brought to the present between their times.
-    control: a StepControl, None for a method that only limits dashpots; distance: l [m] or None.
+    control: a StepControl, None for a method that only limits dashpots.
 
     Limited dashpots share 1.7 by need. With X = 2 dt rate for bonds (b) and contacts (c) of a body
     at its step, bonds keep min(X_b, 1.7 - min(X_c, 0.5)) of X_b and contacts min(X_c, 1, 1.7 -
@@ -89,8 +89,10 @@ class Rates:
         self.has_load = self.counts["load"] and self.has_distance and bool(model.loads)
         if self.has_distance:
             self.way = Displacement(method.distance, method.dt0)
+        if self.has_load:
             self.leap = Displacement(method.distance, method.dt0, power=2)
-        self.turn = Displacement(rule.angle, method.dt0)
+        if self.counts["rotation"]:
+            self.turn = Displacement(rule.angle, method.dt0)
         self.wakes = 0
         if self.control is not None:
             self.wakes = sum(1 << k for k, event in enumerate(EVENTS) if event in rule.wake)

@@ -1,11 +1,11 @@
 """Runs of experiments: in processes of their own, each made once a file, and inside this one."""
 
 import importlib.util
-import os
 import sys
 
 import pytest
 
+from tests import arch
 from tests.experiments.contract import FOLDER, start
 
 
@@ -49,7 +49,7 @@ def main(script):
         module = script(name)
         import _cli
 
-        given = ["--threads", "2", "--arch", os.environ["TEST_ARCH"], *map(str, arguments)]
+        given = ["--threads", "2", "--arch", arch.chosen(), *map(str, arguments)]
         return _cli.main(module.run, module.options_parser(), given)
 
     return run

@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from tests import arch
+
 FOLDER = Path(__file__).resolve().parents[2] / "experiments"
 NO_EXPERIMENTS = ("make_meshes", "bench", "gallery")
 NAMES = sorted(
@@ -24,7 +26,7 @@ NAMES = sorted(
 
 def start(name, *arguments):
     """Run an experiment in a process of its own; two threads, output in pipes."""
-    everywhere = ["--threads", "2", "--arch", os.environ["TEST_ARCH"]]
+    everywhere = ["--threads", "2", "--arch", arch.chosen()]
     line = [sys.executable, str(FOLDER / f"{name}.py"), *everywhere, *map(str, arguments)]
     return subprocess.run(line, capture_output=True, text=True, timeout=1800)
 
