@@ -9,9 +9,9 @@ import taichi as ti
 
 from taichi_dem.errors import InputError
 from taichi_dem.step.cells import group
+from taichi_dem.step.near_spheres import NearSpheres
 from taichi_dem.step.neighbours import FAR, Neighbours
 from taichi_dem.step.old_pairs import OldPairs
-from taichi_dem.types import real
 
 _ROOM = ("", "pairs_per_body", "spheres_per_body", "neighbours_per_body")
 
@@ -37,6 +37,7 @@ class BroadPhase:
         self.rough = ti.field(ti.i32, shape=n)
         self.rough_count = ti.field(ti.i32, shape=())
         self.near = Neighbours(contacts, brute_force)
+        self.spheres = NearSpheres(contacts, self.near)
         self.pair_faces = ti.field(ti.i32, shape=contacts.capacity)
         self.searched = ti.field(ti.i64, shape=())
         self.looked = ti.field(ti.i32, shape=n)
@@ -45,7 +46,6 @@ class BroadPhase:
         self.old = OldPairs(contacts)
         self.full = ti.field(ti.i32, shape=())
         self.searches = ti.field(ti.i32, shape=())
-        self.sphere = ti.Vector.field(3, real, shape=4 * n * self.model.spheres_per_face)
 
     def ask(self, everywhere=False):
         """Let the driver make a search before its next step."""
@@ -76,6 +76,7 @@ class BroadPhase:
             (self._once, self._list_rough),
             (self._rough_bodies, self._choose),
             (self._once, self._begin),
+            (self._bodies, self.near.list_anew),
             (self._bodies, self.near.count),
             (self._once, self._allot),
             (self._bodies, self.near.fill),
@@ -178,7 +179,7 @@ class BroadPhase:
 
     @ti.func
     def _place(self, a):
-        """Note where the spheres of a body are that is looked at; computed once for many that ask.
+        """Note where a body is that is looked at.
 
         The others count as lying where they were when they were last looked at: they have used up
         that much of their skin since. All are looked at while the list of neighbours is made anew.
@@ -187,18 +188,9 @@ class BroadPhase:
         if self.near.making():
             self.looked[i] = 1
         if self.looked[i] == 1:
+            self.near.place(i, self.contacts.travel[i])
             self.contacts.travel[i] = 0.0
-            self.near.place(i)
-            self._place_spheres(i)
-
-    @ti.func
-    def _place_spheres(self, i):
-        size = ti.static(self.model.spheres_per_face)
-        position, rotation = self.state.position[i], self.state.rotation[i]
-        for face in range(4 * i, 4 * i + 4):
-            if self.state.exposed_tick[face] >= 0:
-                for s in range(size * face, size * face + size):
-                    self.sphere[s] = position + rotation @ self.model.sphere[s].xyz
+            self.spheres.place(i)
 
     @ti.func
     def _bonded(self, i, j):
@@ -221,14 +213,21 @@ class BroadPhase:
     def _count_spheres(self, a):
         """Number of sphere pairs of a rough body with each neighbour that this search looks at."""
         i = self.rough[a]
+        looked = self.looked[i]
         for k in range(self.near.first[i], self.near.last[i]):
             j = self.near.body[k]
-            if self.looked[i] | self.looked[j] != 0:
-                faces, spheres = self.near.faces[k] & self._broken_faces(i, j), 0
-                if faces != 0:
-                    if not self._bonded(i, j):
-                        spheres = self._spheres_near(i, j, faces, 0, False)
-                self.near.broken[k], self.near.spheres[k] = faces, spheres
+            if looked | self.looked[j] != 0:
+                faces = self.near.faces[k] & self._broken_faces(i, j)
+                if self.everywhere[None] == 1 or self.near.may_touch(k, i, faces):
+                    self._count_pair(k, i, j, faces)
+
+    @ti.func
+    def _count_pair(self, k, i, j, faces):
+        """Number of sphere pairs of entry k of the neighbours, and how far apart the others are."""
+        count, least = 0, 0.0
+        if not self._bonded(i, j):
+            count, least = self.spheres.of_pair(i, j, faces, 0, False)
+        self.near.found(k, i, faces, count, least)
 
     @ti.func
     def _broken_faces(self, i, j):
@@ -237,34 +236,6 @@ class BroadPhase:
         # Bit f of the first goes to bit 4 f, and each such bit then takes a copy of the second.
         spread = (first & 1) | ((first & 2) << 3) | ((first & 4) << 6) | ((first & 8) << 9)
         return spread * second
-
-    @ti.func
-    def _spheres_near(self, i, j, faces, start, write):
-        """Number of sphere pairs of two bodies within the skin; writes them from start on."""
-        count = 0
-        for fg in range(16):
-            if (faces >> fg) & 1 == 1:
-                face_i, face_j = 4 * i + fg // 4, 4 * j + fg % 4
-                if self.near.clusters_near(face_i, face_j, self.contacts.skin[None]):
-                    count += self._face_spheres(face_i, face_j, start + count, write)
-        return count
-
-    @ti.func
-    def _face_spheres(self, face_i, face_j, start, write):
-        count = 0
-        size = ti.static(self.model.spheres_per_face)
-        for a in range(size * face_i, size * face_i + size):
-            reach = self.model.sphere[a][3] + self.contacts.skin[None]
-            whole = reach + self.model.cluster[face_j][3]
-            # A sphere that misses the ball around the other six misses all of them.
-            if (self.near.cluster[face_j] - self.sphere[a]).norm_sqr() < whole * whole:
-                for b in range(size * face_j, size * face_j + size):
-                    gap = reach + self.model.sphere[b][3]
-                    if (self.sphere[b] - self.sphere[a]).norm_sqr() < gap * gap:
-                        if write:
-                            self.contacts.pair_sphere[start + count] = [a, b]
-                        count += 1
-        return count
 
     @ti.func
     def _number_pairs(self, one):
@@ -284,11 +255,14 @@ class BroadPhase:
     def _number_of(self, i):
         """Number the pairs of which body i is the first."""
         old, last = self.old.first_of[i], self.old.first_of[i + 1]
-        for k in range(self.near.first[i], self.near.last[i]):
+        k, left = self.near.first[i], self.near.met[i]
+        while left > 0:
             if self.near.spheres[k] > 0:
                 j = self.near.body[k]
                 old = self._number_waiting(i, old, last, j)
-                self._number(i, j, self.near.broken[k], self.near.spheres[k])
+                self._number(i, j, self.near.take_news(k), self.near.spheres[k])
+                left -= 1
+            k += 1
         self._number_waiting(i, old, last, self.model.body_count)
 
     @ti.func
@@ -321,8 +295,8 @@ class BroadPhase:
         """Write a pair's spheres, take over what waited for it, book what its birth injects."""
         i, j = self.contacts.pair_body[p][0], self.contacts.pair_body[p][1]
         old, injected = self.old.place(i, j), 0.0
-        if self.looked[i] | self.looked[j] != 0:
-            self._spheres_near(i, j, self.pair_faces[p], self.contacts.pair_first[p], True)
+        if self.pair_faces[p] != 0:
+            self.spheres.of_pair(i, j, self.pair_faces[p], self.contacts.pair_first[p], True)
             injected = self._injected(p, i, j)
         else:
             self.old.copy_spheres(p, old)

@@ -25,11 +25,14 @@ class Neighbours:
 
     first[i] .. last[i]: those of body i, in body, with some room behind. faces: which of the two
     bodies' faces are near, bit 4 f + g for faces f and g; broken: which of these are broken too,
-    and spheres: how many of their spheres are within the skin, for ``BroadPhase``. cluster: centre
-    of the ball around the spheres of a face, where the body was last looked at [m]. placed_at,
-    turned_to: where a body was when it was listed. gone: bodies that have left the list's reach
-    since, left: 1 for them; their entries are made anew, as a few fragments fly faster than all
-    the rest. stale: STALE when all are. full: 1 when there is no room.
+    and spheres: how many of their spheres are within the skin, for ``BroadPhase``; met: how many
+    entries of a body have any. cluster: centre of the ball around the spheres of a face, where the
+    body was last looked at [m], and way: how far any point of it had gone by then [m]; until: how
+    far the two of an entry may go, together, before spheres can come within the skin [m].
+    placed_at, turned_to, listed: where a body was when it was listed, and its clusters. gone:
+    bodies that have left the list's reach since, left: 1 for them; they are listed anew, as a few
+    fragments fly faster than all the rest. stale: STALE when all are. full: 1 when there is no
+    room.
     """
 
     def __init__(self, contacts, brute_force=False):
@@ -43,9 +46,14 @@ class Neighbours:
         self.faces = ti.field(ti.i32, shape=self.capacity)
         self.broken = ti.field(ti.i32, shape=self.capacity)
         self.spheres = ti.field(ti.i32, shape=self.capacity)
+        self.news = ti.field(ti.i32, shape=self.capacity)
+        self.met = ti.field(ti.i32, shape=n)
+        self.until = ti.field(real, shape=self.capacity)
+        self.way = ti.field(real, shape=n)
         self.cluster = ti.Vector.field(3, real, shape=4 * n)
         self.placed_at = ti.Vector.field(3, real, shape=n)
         self.turned_to = ti.Matrix.field(3, 3, real, shape=n)
+        self.listed = ti.Vector.field(3, real, shape=4 * n)
         self.gone = ti.field(ti.i32, shape=n)
         self.gone_count = ti.field(ti.i32, shape=())
         self.left = ti.field(ti.i32, shape=n)
@@ -59,15 +67,23 @@ class Neighbours:
         # No point of the body went further than this: a norm of a matrix bounds what it does.
         way = (self.state.position[i] - self.placed_at[i]).norm()
         way += (self.state.rotation[i] - self.turned_to[i]).norm() * self.model.radius[i]
-        # It goes on for FAR before it is looked at again; and each of two bodies may go from one
-        # end of its way to the other after one of them is listed anew.
-        if not way < (0.25 * (REACH - 1.0) - FAR) * self.skin[None]:
+        # It goes on for FAR before it is looked at again, and so may what it meets.
+        if not way < (0.5 * (REACH - 1.0) - FAR) * self.skin[None]:
             self.left[i] = 1
             self.gone[ti.atomic_add(self.gone_count[None], 1)] = i
+            self._list(i)
 
     @ti.func
-    def place(self, i):
-        """Note where the clusters of body i are."""
+    def _list(self, i):
+        """Note where body i and its clusters are now."""
+        self.placed_at[i], self.turned_to[i] = self.state.position[i], self.state.rotation[i]
+        for face in range(4 * i, 4 * i + 4):
+            self.listed[face] = self._middle(i, face)
+
+    @ti.func
+    def place(self, i, travel):
+        """Note where the clusters of body i are, which has come a way of travel [m] since."""
+        self.way[i] += travel
         for face in range(4 * i, 4 * i + 4):
             self.cluster[face] = self._middle(i, face)
 
@@ -87,15 +103,16 @@ class Neighbours:
             self.grid.fill(REACH * self.skin[None])
 
     @ti.func
+    def list_anew(self, i):
+        """Note where body i is, when the list is stale."""
+        if self.stale[None] == MAKING:
+            self._list(i)
+
+    @ti.func
     def count(self, i):
         """Count the neighbours of body i, when the list is stale."""
         if self.stale[None] == MAKING:
-            self._listed(i)
             self.first[i + 1] = self._visit(i, 0, False) + ROOM
-
-    @ti.func
-    def _listed(self, i):
-        self.placed_at[i], self.turned_to[i] = self.state.position[i], self.state.rotation[i]
 
     @ti.func
     def allot(self):
@@ -115,6 +132,7 @@ class Neighbours:
     def fill(self, i):
         """List the neighbours of body i, when the list is stale and has room; else amend them."""
         if self.stale[None] == MAKING:
+            self.met[i] = 0
             if self.full[None] == 0:
                 self.last[i] = self.first[i] + self._visit(i, self.first[i], True)
         elif self.gone_count[None] > 0:
@@ -122,36 +140,44 @@ class Neighbours:
 
     @ti.func
     def _amend(self, i):
-        """Take those that are gone off the neighbours of body i, and list them where they are.
+        """List those that are gone where they are now, among the neighbours of body i.
 
-        A row without room leaves the list stale, to be made anew.
+        Entries where they were stay, until all are made anew: nothing comes of them but a look. A
+        row without room leaves the list stale.
         """
         if self.left[i] == 1:
-            self.last[i] = self.first[i]
             for j in range(i + 1, self.model.body_count):
                 self._add(i, j)
         else:
-            end = self.first[i]
-            for k in range(self.first[i], self.last[i]):
-                if self.left[self.body[k]] == 0:
-                    if k != end:
-                        self._move(k, end)
-                    end += 1
-            self.last[i] = end
             for a in range(self.gone_count[None]):
                 if self.gone[a] > i:
                     self._add(i, self.gone[a])
 
     @ti.func
     def _add(self, i, j):
-        """List body j as neighbour of body i, if it is one."""
+        """List body j as neighbour of body i, if it is one, with the faces that are near."""
         faces = self._faces_near(i, j)
         if faces != 0:
-            if self.last[i] < self.first[i + 1]:
-                self._insert(self.first[i], self.last[i], j, faces)
+            place = self._place_of(i, j)
+            if place < self.last[i] and self.body[ti.min(place, self.capacity - 1)] == j:
+                self.faces[place] = faces
+            elif self.last[i] < self.first[i + 1]:
+                self._insert(place, self.last[i], j, faces)
                 self.last[i] += 1
             else:
                 self.stale[None] = STALE
+
+    @ti.func
+    def _place_of(self, i, j):
+        """First place among the neighbours of body i whose body is not before j."""
+        low, high = self.first[i], self.last[i]
+        while low < high:
+            middle = (low + high) // 2
+            if self.body[middle] < j:
+                low = middle + 1
+            else:
+                high = middle
+        return low
 
     @ti.func
     def making(self):
@@ -162,7 +188,6 @@ class Neighbours:
     def end(self):
         """The list serves until a body has left its reach."""
         for a in range(self.gone_count[None]):
-            self._listed(self.gone[a])
             self.left[self.gone[a]] = 0
         self.gone_count[None] = 0
         if self.stale[None] == MAKING:
@@ -194,33 +219,60 @@ class Neighbours:
             place -= 1
         self.body[place], self.faces[place] = j, faces
         self.broken[place], self.spheres[place] = 0, 0
+        self.until[place], self.news[place] = 0.0, 0
 
     @ti.func
     def _move(self, k, place):
         """Move an entry."""
         self.body[place], self.faces[place] = self.body[k], self.faces[k]
         self.broken[place], self.spheres[place] = self.broken[k], self.spheres[k]
+        self.until[place], self.news[place] = self.until[k], self.news[k]
+
+    @ti.func
+    def may_touch(self, k, i, faces):
+        """Whether entry k, of body i, may have more spheres within the skin; faces: broken now."""
+        gone_on = faces != 0 and self._way(k, i) > self.until[k]
+        return gone_on or self.broken[k] != faces
+
+    @ti.func
+    def found(self, k, i, faces, spheres, gap):
+        """Note the spheres of entry k within the skin; gap: the smallest of the others [m]."""
+        self.news[k] = 1
+        self.met[i] += ti.cast(spheres > 0, ti.i32) - ti.cast(self.spheres[k] > 0, ti.i32)
+        self.broken[k], self.spheres[k] = faces, spheres
+        self.until[k] = self._way(k, i) + gap - self.skin[None]
+
+    @ti.func
+    def take_news(self, k):
+        """Broken faces of entry k if its spheres have just been found, else 0; once."""
+        faces = self.news[k] * self.broken[k]
+        self.news[k] = 0
+        return faces
+
+    @ti.func
+    def _way(self, k, i):
+        """How far the two bodies of entry k have gone, together [m]."""
+        return self.way[i] + self.way[self.body[k]]
 
     @ti.func
     def _faces_near(self, i, j):
         """Which faces of two bodies are near; balls around the bodies are compared first."""
         wide, faces = REACH * self.skin[None], 0
         reach = self.model.radius[i] + self.model.radius[j] + wide
-        if (self.state.position[j] - self.state.position[i]).norm_sqr() < reach * reach:
+        if (self.placed_at[j] - self.placed_at[i]).norm_sqr() < reach * reach:
             for f in range(4):
-                faces |= self._near_face(i, f, j, wide) << (4 * f)
+                faces |= self._near_face(4 * i + f, j, wide) << (4 * f)
         return faces
 
     @ti.func
-    def _near_face(self, i, f, j, wide):
-        """Which faces of body j, a bit each, come near face f of body i."""
-        faces, face = 0, 4 * i + f
-        middle, reach = self._middle(i, face), self.model.cluster[face][3] + wide
+    def _near_face(self, face, j, wide):
+        """Which faces of body j, a bit each, come near a face of another."""
+        faces, reach = 0, self.model.cluster[face][3] + wide
         whole = reach + self.model.radius[j]
-        if (self.state.position[j] - middle).norm_sqr() < whole * whole:
+        if (self.placed_at[j] - self.listed[face]).norm_sqr() < whole * whole:
             for g in range(4):
                 other = reach + self.model.cluster[4 * j + g][3]
-                apart = self._middle(j, 4 * j + g) - middle
+                apart = self.listed[4 * j + g] - self.listed[face]
                 faces |= ti.cast(apart.norm_sqr() < other * other, ti.i32) << g
         return faces
 

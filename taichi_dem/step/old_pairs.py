@@ -78,12 +78,23 @@ class OldPairs:
             self.contacts.pair_sphere[k] = self.sphere[self.first[old] + k - start]
 
     @ti.func
-    def candidate(self, old, spheres):
-        """Place of a pair of spheres among the candidates of an old pair, -1 if it was not."""
-        place = -1
+    def candidate(self, old, spheres, place):
+        """Which of the candidates of an old pair a pair of spheres was, -1 for none of them.
+
+        place: where it was, if nothing came or went before it.
+        """
+        found = -1
         if old >= 0:
-            for k in range(self.first[old], self.first[old + 1]):
-                same = self.sphere[k] == spheres
-                if same.all():
-                    place = k
-        return place
+            first, last = self.first[old], self.first[old + 1]
+            if first + place < last and self._is(first + place, spheres):
+                found = first + place
+            else:
+                for k in range(first, last):
+                    if self._is(k, spheres):
+                        found = k
+        return found
+
+    @ti.func
+    def _is(self, k, spheres):
+        same = self.sphere[k] == spheres
+        return same.all()

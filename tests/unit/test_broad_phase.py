@@ -165,8 +165,8 @@ def near_faces(simulation, skin):
 def test_one_list_of_neighbours_serves_until_a_body_has_left_its_reach(drift, turn):
     """Bodies drift and turn, each its own way, in small steps: whatever is near is in the list.
 
-    It is made anew when a sixteenth of them has gone (REACH - 1) / 4 - FAR = 1.5 skins, here at the
-    earliest by their second step, not at every search.
+    It is made anew when a sixteenth of them has gone (REACH - 1) / 2 - FAR = 3.25 skins, here by
+    their fourth step at the earliest, not at every search.
     """
     skin, random = 2e-3, np.random.default_rng(7)
     simulation = scattered(skin, 0.1)
@@ -184,6 +184,30 @@ def test_one_list_of_neighbours_serves_until_a_body_has_left_its_reach(drift, tu
         before, listed_at = listed_at, near.turned_to.to_numpy()
         made += (listed_at != before).any(axis=(1, 2)).mean() > 0.5
     assert 3 <= made <= 40 // 2
+
+
+@pytest.mark.parametrize("far", [0.2, 0.45])
+def test_spheres_that_touch_are_listed_however_seldom_a_pair_is_looked_at(far):
+    """Bodies drift, each its own way, by up to a share of the skin between two searches.
+
+    A search leaves out the pairs that cannot meet yet, by how far their bodies have gone; half the
+    skin is what a body may go before the next one.
+    """
+    skin, random = 2e-3, np.random.default_rng(11)
+    simulation = scattered(skin, 0.03)
+    broad, contacts = simulation.broad_phase, simulation.contacts
+    motion = simulation.state.motion()
+    way = random.standard_normal(motion["position"].shape)
+    way *= far * skin * random.random((len(way), 1)) / np.linalg.norm(way, axis=1, keepdims=True)
+    found = []
+    for step in range(1, 61):
+        simulation.state.place(motion["position"] + step * way, motion["orientation"])
+        travel = contacts.travel.to_numpy() + np.linalg.norm(way, axis=1)
+        contacts.travel.from_numpy(np.where(contacts.rough.to_numpy() != 0, travel, 0.0))
+        assert expected(simulation, 0.0) <= set(listed(simulation))
+        broad.search(everywhere=False)
+        found.append(len(expected(simulation, 0.0)))
+    assert max(found) > min(found) + 20
 
 
 @pytest.mark.parametrize("room", ["neighbours_per_body", "pairs_per_body", "spheres_per_body"])

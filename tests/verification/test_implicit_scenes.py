@@ -237,10 +237,10 @@ def test_a_roller_keeps_the_angular_momentum_about_its_normal(runs, implicit, pl
 
 
 def test_one_fast_fragment_keeps_the_list_of_neighbours_right(implicit):
-    """It flies through the target in leaps of several skins: its entries alone are made anew.
+    """It flies through the target in leaps of several skins: it alone is listed anew.
 
-    All the list holds, then, is what is within its reach, by all faces against all, and the
-    candidates are the spheres within the skin.
+    All that is within the list's reach, by all faces against all, is in it, nothing twice, and the
+    candidates are the spheres within the skin: what it has left behind brings none.
     """
     simulation, fragment = implicit.again.simulation, implicit.bodies["fragment"][0]
     implicit.restart(STEP)
@@ -256,7 +256,7 @@ def test_one_fast_fragment_keeps_the_list_of_neighbours_right(implicit):
         # What steps would have noted of its way.
         simulation.contacts.travel[fragment] = 1e-2
         simulation.broad_phase.search(everywhere=False)
-        assert neighbouring_faces(near) == near_faces(simulation, REACH * skin)
+        assert near_faces(simulation, REACH * skin) <= neighbouring_faces(near)
         assert set(listed(simulation)) == expected(simulation, skin)
         counts.append(len(listed(simulation)))
         assert simulation.broad_phase.looked.to_numpy().sum() == 1

@@ -63,8 +63,9 @@ class PairDashpots:
     @ti.func
     def take(self, p, place, old):
         """Take them over for the pair at place p; place: its former one in the ``OldPairs`` old."""
-        for k in range(self.contacts.pair_first[p], self.contacts.pair_first[p + 1]):
-            former = old.candidate(place, self.contacts.pair_sphere[k])
+        start = self.contacts.pair_first[p]
+        for k in range(start, self.contacts.pair_first[p + 1]):
+            former = old.candidate(place, self.contacts.pair_sphere[k], k - start)
             self.impulse[k] = zero3()
             if former >= 0:
                 self.impulse[k] = self.old_impulse[former]
