@@ -25,6 +25,7 @@ from taichi.lang import impl
 
 from taichi_dem.checks import choice, flag, whole
 from taichi_dem.errors import InputError
+from taichi_dem.source_lines import remember
 
 ARCHITECTURES = ("cpu", "cuda")
 
@@ -106,6 +107,7 @@ def _initialise(wanted):
     if wanted.arch == "cuda" and not cuda_present():
         raise InputError("arch 'cuda' was asked for, but no CUDA device answers here: use 'cpu'")
     _remove_stale_lock()
+    remember()
     with contextlib.redirect_stdout(io.StringIO()):
         ti.init(
             arch=ti.cuda if wanted.arch == "cuda" else ti.cpu,

@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[2]
 # row below. A folder counts as one module. A new module needs a place here.
 LAYERS = {
     "taichi_dem": (
-        ("errors", "types", "checks", "runtime"),
+        ("errors", "types", "checks", "source_lines", "runtime"),
         ("fields", "field_memory", "files", "effect_use", "time_limit"),
         ("plot_style", "checkpoint"),
         ("restart",),

@@ -1,0 +1,55 @@
+"""Keeps Taichi from doing over and over the same work on source lines while it reads kernels.
+
+For the message of an error that may come it notes, at every name and operator, the line and a mark
+below it, broken at 80 characters; and wherever a function is called it takes its source apart to
+find where it ends. Together that is half of the time in which it reads the kernels of a step, each
+time a program starts. What comes of it is kept here.
+"""
+
+import functools
+import textwrap
+
+from taichi.lang import kernel_impl
+from taichi.lang.ast import ast_transformer_utils
+
+#: Lines and marks that are kept; the kernels of a step have some ten thousand.
+_MOST = 1 << 16
+
+
+@functools.lru_cache(maxsize=_MOST)
+def broken(text, width):
+    """A text in lines of at most some characters, a tuple, as ``textwrap.wrap`` breaks it."""
+    return tuple(textwrap.wrap(text, width))
+
+
+class RememberingWrapper(textwrap.TextWrapper):
+    """A ``textwrap.TextWrapper`` with the usual options that looks up what it broke before."""
+
+    def wrap(self, text):
+        """Lines of a text, a list."""
+        return list(broken(text, self.width))
+
+
+def remembering(find):
+    """A function's source lines and where they begin, as find gives them, each looked for once."""
+    known = {}
+
+    @functools.wraps(find)
+    def lines(function):
+        # Equal code of two files may differ in what is no code: annotations.
+        key = (function.__code__.co_filename, function.__code__)
+        if key not in known:
+            known[key] = find(function)
+        return known[key]
+
+    lines.known = known
+    return lines
+
+
+def remember():
+    """Let Taichi use both, where it has them by the names of Taichi 1.7; once is enough."""
+    if hasattr(ast_transformer_utils, "TextWrapper"):
+        ast_transformer_utils.TextWrapper = RememberingWrapper
+    find = getattr(kernel_impl, "getsourcelines", None)
+    if find is not None and not hasattr(find, "known"):
+        kernel_impl.getsourcelines = remembering(find)
