@@ -34,8 +34,8 @@ def remembering(find):
     """A function's source lines and where they begin, as find gives them, each looked for once."""
     known = {}
 
-    @functools.wraps(find)
     def lines(function):
+        """Source lines of a function and the number of the first."""
         # Equal code of two files may differ in what is no code: annotations.
         key = (function.__code__.co_filename, function.__code__)
         if key not in known:

@@ -86,9 +86,10 @@ class OldPairs:
         found = -1
         if old >= 0:
             first, last = self.first[old], self.first[old + 1]
-            if first + place < last and self._is(first + place, spheres):
-                found = first + place
-            else:
+            if first + place < last:
+                if self._is(first + place, spheres):
+                    found = first + place
+            if found < 0:
                 for k in range(first, last):
                     if self._is(k, spheres):
                         found = k

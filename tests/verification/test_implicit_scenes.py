@@ -239,8 +239,8 @@ def test_a_roller_keeps_the_angular_momentum_about_its_normal(runs, implicit, pl
 def test_one_fast_fragment_keeps_the_list_of_neighbours_right(implicit):
     """It flies through the target in leaps of several skins: it alone is listed anew.
 
-    All that is within the list's reach, by all faces against all, is in it, nothing twice, and the
-    candidates are the spheres within the skin: what it has left behind brings none.
+    All that is within the list's reach, by all faces against all, is in it, and no body twice; what
+    is there besides, the fragment has left behind. The candidates are the spheres within the skin.
     """
     simulation, fragment = implicit.again.simulation, implicit.bodies["fragment"][0]
     implicit.restart(STEP)
@@ -256,7 +256,12 @@ def test_one_fast_fragment_keeps_the_list_of_neighbours_right(implicit):
         # What steps would have noted of its way.
         simulation.contacts.travel[fragment] = 1e-2
         simulation.broad_phase.search(everywhere=False)
-        assert near_faces(simulation, REACH * skin) <= neighbouring_faces(near)
+        wanted, found = near_faces(simulation, REACH * skin), neighbouring_faces(near)
+        assert wanted <= found
+        assert all(fragment in (a // 4, b // 4) for a, b in found - wanted)
+        body, last = near.body.to_numpy(), near.last.to_numpy()
+        for start, end in zip(near.first.to_numpy(), last):
+            assert (np.diff(body[start:end]) > 0).all()
         assert set(listed(simulation)) == expected(simulation, skin)
         counts.append(len(listed(simulation)))
         assert simulation.broad_phase.looked.to_numpy().sum() == 1
