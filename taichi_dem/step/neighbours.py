@@ -25,8 +25,8 @@ class Neighbours:
 
     first[i] .. last[i]: those of body i, in body, with some room behind. faces: which of the two
     bodies' faces are near, bit 4 f + g for faces f and g; broken: which of these are broken too,
-    and spheres: how many of their spheres are within the skin, for ``BroadPhase``; met: how many
-    entries of a body have any. cluster: centre of the ball around the spheres of a face, where the
+    and spheres: how many of their spheres are within the skin, for ``BroadPhase``; news: 1 until
+    that is taken note of; met: how many entries of a body have any. cluster: centre of the ball around the spheres of a face, where the
     body was last looked at [m], and way: how far any point of it had gone by then [m]; until: how
     far the two of an entry may go, together, before spheres can come within the skin [m].
     placed_at, turned_to, listed: where a body was when it was listed, and its clusters. gone:
