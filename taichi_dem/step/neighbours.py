@@ -26,13 +26,13 @@ class Neighbours:
     first[i] .. last[i]: those of body i, in body, with some room behind. faces: which of the two
     bodies' faces are near, bit 4 f + g for faces f and g; broken: which of these are broken too,
     and spheres: how many of their spheres are within the skin, for ``BroadPhase``; news: 1 until
-    that is taken note of; met: how many entries of a body have any. cluster: centre of the ball around the spheres of a face, where the
-    body was last looked at [m], and way: how far any point of it had gone by then [m]; until: how
-    far the two of an entry may go, together, before spheres can come within the skin [m].
-    placed_at, turned_to, listed: where a body was when it was listed, and its clusters. gone:
-    bodies that have left the list's reach since, left: 1 for them; they are listed anew, as a few
-    fragments fly faster than all the rest. stale: STALE when all are. full: 1 when there is no
-    room.
+    that is taken note of; met: how many entries of a body have any. cluster: centre of the ball
+    around the spheres of a face, where the body was last looked at [m], and way: how far any point
+    of it had gone by then [m]; until: how far the two of an entry may go, together, before spheres
+    can come within the skin [m]. placed_at, turned_to, listed: where a body was when it was listed,
+    and its clusters. gone: bodies that have left the list's reach since, left: 1 for them; they are
+    listed anew, as a few fragments fly faster than all the rest. stale: STALE when all are. full: 1
+    when there is no room.
     """
 
     def __init__(self, contacts, brute_force=False):
