@@ -17,17 +17,18 @@ from taichi_dem.types import mat3, real, vec4
 class Model:
     """Constant tables of a scene and the effects bound to them.
 
-    mass [kg] and inertia [kg m^2] with their inverses, and radius (of the ball around the body,
-    [m]), have one entry a body. bond_slots names the two faces of a bond as 4 * body + local
-    face, master first; bond_frame has rows normal, xi, eta in the master's body frame;
-    bond_stiffness normal and shear [Pa/m]. vertex_master (face frame) and vertex_slave (body
-    frame) [m] have one entry a contact unit, unit_area [m^2] one a bond. neighbour is the body
-    behind local face f, entry 4 * body + f, -1 where it is outer; face_bond the bond there.
+    mass [kg] and inertia [kg m^2] with their inverses, radius (of the ball around the body, [m])
+    and, with contact, extent (of that around its spheres, [m]) have one entry a body. bond_slots
+    names the two faces of a bond as 4 * body + local face, master first; bond_frame has rows
+    normal, xi, eta in the master's body frame; bond_stiffness normal and shear [Pa/m].
+    vertex_master (face frame) and vertex_slave (body frame) [m] have one entry a contact unit,
+    unit_area [m^2] one a bond. neighbour is the body behind local face f, entry 4 * body + f, -1
+    where it is outer; face_bond the bond there.
     Body frames coincide with the world axes at the start. Source: Konno et al., section 2.
     """
 
     constant_fields = (
-        *("mass", "mass_inverse", "radius", "inertia", "inertia_inverse"),
+        *("mass", "mass_inverse", "radius", "extent", "inertia", "inertia_inverse"),
         *("bond_slots", "bond_frame", "bond_stiffness", "unit_area"),
         *("vertex_master", "vertex_slave", "neighbour", "face_bond", "sphere", "cluster"),
     )
@@ -167,6 +168,8 @@ class Model:
         self.cluster = ti.Vector.field(4, real, shape=faces)
         ball = np.concatenate([spheres.centre, spheres.radius[..., None]], axis=-1)
         then(self._load_spheres, ball.reshape(-1, 4), spheres.cluster.reshape(-1, 4))
+        self.extent = ti.field(real, shape=self.body_count)
+        then(self.extent.from_numpy, spheres.extent)
 
     @ti.kernel
     def _load_spheres(

@@ -81,7 +81,7 @@ class Simulation:
         model, state, method = self.model, self.state, self.method
         self.contacts = None
         if model.has_contact:
-            self.contacts = Contacts(model, state, method.ahead)
+            self.contacts = Contacts(model, state, method.dt0, method.ahead)
         drifted = method.neighbour == "drifted"
         rates = rates_for(model, state, self.contacts, method)
         self.schedule = Schedule(

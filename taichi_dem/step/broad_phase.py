@@ -37,7 +37,8 @@ class BroadPhase:
         self.rough = ti.field(ti.i32, shape=n)
         self.rough_count = ti.field(ti.i32, shape=())
         self.near = Neighbours(contacts, brute_force)
-        self.spheres = NearSpheres(contacts, self.near)
+        self.known = self.near.known
+        self.spheres = NearSpheres(contacts, self.known)
         self.pair_faces = ti.field(ti.i32, shape=contacts.capacity)
         self.searched = ti.field(ti.i64, shape=())
         self.looked = ti.field(ti.i32, shape=n)
@@ -76,10 +77,12 @@ class BroadPhase:
             (self._once, self._list_rough),
             (self._rough_bodies, self._choose),
             (self._once, self._begin),
-            (self._bodies, self.near.list_anew),
-            (self._bodies, self.near.count),
-            (self._once, self._allot),
-            (self._bodies, self.near.fill),
+            (self._all_anew, self.near.list_anew),
+            (self.near.making, self._sort),
+            (self._all_anew, self.near.count),
+            (self.near.making, self._allot),
+            (self._all_anew, self.near.fill),
+            (self._all_amended, self.near.amend),
             (self._rough_bodies, self._place),
             (self._pairs, self._keep),
             (self._rough_bodies, self._count_spheres),
@@ -113,6 +116,14 @@ class BroadPhase:
         return self.rough_count[None]
 
     @ti.func
+    def _all_anew(self):
+        return self.near.making() * self.model.body_count
+
+    @ti.func
+    def _all_amended(self):
+        return self.near.amending() * self.model.body_count
+
+    @ti.func
     def _pairs(self):
         return self.contacts.pair_count[None]
 
@@ -124,6 +135,10 @@ class BroadPhase:
     def _begin(self, one):
         self.near.begin()
         self.searched[None] = self.state.tick[None]
+
+    @ti.func
+    def _sort(self, one):
+        self.near.grid.fill()
 
     @ti.func
     def _allot(self, one):
@@ -169,12 +184,13 @@ class BroadPhase:
     def _choose(self, a):
         """Look at a rough body if it went far into its skin, or if a break has exposed it."""
         i = self.rough[a]
-        far = self.contacts.travel[i] > FAR * self.contacts.skin[None]
+        far = self.contacts.travel[i] > FAR * self.contacts.leeway[i]
         looked = self.everywhere[None] | ti.cast(far, ti.i32)
         for face in range(4 * i, 4 * i + 4):
             looked |= ti.cast(self.state.exposed_tick[face] > self.searched[None], ti.i32)
         self.looked[i] = looked
         if looked == 1:
+            self.contacts.give_leeway(i)
             self.near.notice(i)
 
     @ti.func
@@ -185,10 +201,10 @@ class BroadPhase:
         that much of their skin since. All are looked at while the list of neighbours is made anew.
         """
         i = self.rough[a]
-        if self.near.making():
+        if self.near.making() == 1:
             self.looked[i] = 1
         if self.looked[i] == 1:
-            self.near.place(i, self.contacts.travel[i])
+            self.known.place(i, self.contacts.travel[i])
             self.contacts.travel[i] = 0.0
             self.spheres.place(i)
 
@@ -216,18 +232,23 @@ class BroadPhase:
         looked = self.looked[i]
         for k in range(self.near.first[i], self.near.last[i]):
             j = self.near.body[k]
-            if looked | self.looked[j] != 0:
-                faces = self.near.faces[k] & self._broken_faces(i, j)
-                if self.everywhere[None] == 1 or self.near.may_touch(k, i, faces):
-                    self._count_pair(k, i, j, faces)
+            if looked | self.looked[j] != 0 and self.contacts.rough[j] != 0:
+                faces = self.known.faces[k] & self._broken_faces(i, j)
+                if self.everywhere[None] == 1 or self.known.may_touch(k, i, j, faces):
+                    self._look_into(k, i, j, faces)
 
     @ti.func
-    def _count_pair(self, k, i, j, faces):
-        """Number of sphere pairs of entry k of the neighbours, and how far apart the others are."""
-        count, least = 0, 0.0
+    def _look_into(self, k, i, j, faces):
+        """Count the spheres of entry k of the neighbours, and find how far apart the others are."""
+        count, hits, gap = 0, 0, 0.0
         if not self._bonded(i, j):
-            count, least = self.spheres.of_pair(i, j, faces, 0, False)
-        self.near.found(k, i, faces, count, least)
+            asked = faces
+            if self.everywhere[None] == 0:
+                asked = self.known.to_ask(k, i, j, faces)
+            count, hits, gap = self.spheres.of_pair(i, j, asked, 0, False)
+            if asked != faces:
+                gap = ti.min(gap, self.known.gap(k, i, j))
+        self.known.found(k, i, j, faces, count, hits, gap)
 
     @ti.func
     def _broken_faces(self, i, j):
@@ -255,12 +276,12 @@ class BroadPhase:
     def _number_of(self, i):
         """Number the pairs of which body i is the first."""
         old, last = self.old.first_of[i], self.old.first_of[i + 1]
-        k, left = self.near.first[i], self.near.met[i]
+        k, left = self.near.first[i], self.known.met[i]
         while left > 0:
-            if self.near.spheres[k] > 0:
+            if self.known.spheres[k] > 0:
                 j = self.near.body[k]
                 old = self._number_waiting(i, old, last, j)
-                self._number(i, j, self.near.take_news(k), self.near.spheres[k])
+                self._number(i, j, self.known.take_news(k), self.known.spheres[k])
                 left -= 1
             k += 1
         self._number_waiting(i, old, last, self.model.body_count)
@@ -304,7 +325,7 @@ class BroadPhase:
         if ti.static(self.schedule.has_rates):
             self.schedule.rates.take_pair(p, old, self._exposed_now(i) | self._exposed_now(j))
         if ti.static(self.solves):
-            self.solver.pairs.take(p, old, self.old)
+            self.solver.pairs.take(p, old, self.old, self.pair_faces[p] == 0)
 
     @ti.func
     def _exposed_now(self, i):

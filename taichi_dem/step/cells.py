@@ -9,14 +9,15 @@ from taichi_dem.types import real
 class CellGrid:
     """Sorts all bodies by cell, so that a body asks only the cells that others near it may be in.
 
+    ball: radius of the ball around a body within which others are near whose balls it meets [m].
     member: bodies, cell by cell. brute_force: a single cell.
     """
 
     scratch_fields = ("first", "member", "cell", "counts", "corner", "edge", "largest")
 
-    def __init__(self, model, state, brute_force=False):
+    def __init__(self, model, state, ball, brute_force=False):
         n = model.body_count
-        self.model, self.state, self.brute_force = model, state, brute_force
+        self.model, self.state, self.ball, self.brute_force = model, state, ball, brute_force
         self.capacity = 4 * n + 64
         self.first = ti.field(ti.i32, shape=self.capacity + 2)
         self.member = ti.field(ti.i32, shape=n)
@@ -27,9 +28,9 @@ class CellGrid:
         self.largest = ti.field(real, shape=())
 
     @ti.func
-    def fill(self, margin):
-        """Sort the bodies into cells about as wide as one of them and a margin [m]."""
-        self._size(margin)
+    def fill(self):
+        """Sort the bodies into cells about as wide as one of their balls."""
+        self._size()
         counts = self.counts[None]
         for i in range(self.model.body_count):
             cell = self._cell_of(self.state.position[i])
@@ -38,13 +39,10 @@ class CellGrid:
         group(self.first, self.member, total, self.model.body_count, self._cell_of_member)
 
     @ti.func
-    def around(self, i, margin):
-        """Cells with the centres of all bodies within a margin of body i: lowest, one past highest.
-
-        "Within" is meant for the balls around the bodies.
-        """
+    def around(self, i):
+        """Cells with the centres of all whose balls meet that of body i: lowest, past highest."""
         position = self.state.position[i]
-        reach = self.model.radius[i] + self.largest[None] + margin
+        reach = self.ball[i] + self.largest[None]
         low = ti.max(self._cell_of(position - reach), 0)
         high = ti.min(self._cell_of(position + reach) + 1, self.counts[None])
         return low, high
@@ -59,14 +57,14 @@ class CellGrid:
         return self.first[cell + low], self.first[cell + high]
 
     @ti.func
-    def _size(self, margin):
+    def _size(self):
         low, high, mean = self.state.position[0], self.state.position[0], 0.0
         self.largest[None] = 0.0
         for i in range(self.model.body_count):
             low, high = ti.min(low, self.state.position[i]), ti.max(high, self.state.position[i])
-            mean += self.model.radius[i] / self.model.body_count
-            self.largest[None] = ti.max(self.largest[None], self.model.radius[i])
-        edge = 2.0 * mean + margin
+            mean += self.ball[i] / self.model.body_count
+            self.largest[None] = ti.max(self.largest[None], self.ball[i])
+        edge = 2.0 * mean
         if ti.static(self.brute_force):
             edge += (high - low).max()
         while _product(ti.floor((high - low) / edge) + 1.0) > self.capacity:

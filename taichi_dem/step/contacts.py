@@ -9,6 +9,11 @@ import taichi as ti
 from taichi_dem.fields import then
 from taichi_dem.types import real, vec3
 
+#: Largest steps that a fast body makes before the search looks at it again.
+STEPS = 16.0
+#: Share of its extent beyond which it is looked at whatever its speed.
+FARTHEST = 0.25
+
 
 @ti.data_oriented
 class Contacts:
@@ -20,16 +25,17 @@ class Contacts:
     first body takes it. pair_full[2 p + side]: 1 while something waits there; most pairs do not
     touch, and to ask is cheaper than to add zeros. first_of[i]: first pair whose first body is i;
     touch_first, touch: pairs whose second body is i. rough: bit f for a broken face f.
-    travel: bound of the way any point of a body went since it was last looked at [m]. ahead: steps
-    of a body by which its contacts are counted before they touch. search_due: 1 when the list may
-    miss one of them. deepest: overlap of a pair as a share of the distance at which its spheres
-    touch.
+    travel: bound of the way any point of a body went since it was last looked at [m]. leeway: how
+    far that may be before it is looked at again [m]; a pair holds the spheres whose gap is below
+    the leeway of both. ahead: steps of a body by which its contacts are counted before they touch.
+    search_due: 1 when the list may miss one of them. deepest: overlap of a pair as a share of the
+    distance at which its spheres touch.
     """
 
-    def __init__(self, model, state, ahead=0.0):
+    def __init__(self, model, state, dt0, ahead=0.0):
         n, effect = model.body_count, model.contact
         self.model, self.state, self.law, self.friction = model, state, effect, model.friction
-        self.ahead = ahead
+        self.dt0, self.ahead = dt0, ahead
         self.capacity = n * effect.pairs_per_body + 64
         self.sphere_capacity = n * effect.spheres_per_body + 4096
         self.pair_count = ti.field(ti.i32, shape=())
@@ -44,6 +50,7 @@ class Contacts:
         self.touch = ti.field(ti.i32, shape=self.capacity)
         self.rough = ti.field(ti.i32, shape=n)
         self.travel = ti.field(real, shape=n)
+        self.leeway = ti.field(real, shape=n)
         self.skin = ti.field(real, shape=())
         then(self.skin.fill, effect.skin)
         self.search_due = ti.field(ti.i32, shape=())
@@ -122,8 +129,23 @@ class Contacts:
     def moved(self, i, velocity, spin, elapsed):
         """Add to the way of body i and ask for a search once it may have left the skin."""
         if self.rough[i] != 0:
-            speed = velocity.norm() + spin.norm() * self.model.radius[i]
+            speed = velocity.norm() + spin.norm() * self.model.extent[i]
             way = self.travel[i] + speed * elapsed
             self.travel[i] = way
-            if way + self.ahead * elapsed * speed > 0.5 * self.skin[None]:
+            if way + self.ahead * elapsed * speed > self.leeway[i]:
                 self.search_due[None] = 1
+
+    @ti.func
+    def give_leeway(self, i):
+        """Set the leeway of body i: half the skin, or more where it is fast.
+
+        A few fragments fly faster than all others: they would ask for most of the searches.
+        """
+        speed = self.state.velocity[i].norm() + self.state.spin[i].norm() * self.model.extent[i]
+        way = ti.min(STEPS * self.dt0 * speed, FARTHEST * self.model.extent[i])
+        self.leeway[i] = ti.max(0.5 * self.skin[None], way)
+
+    @ti.func
+    def margin(self, i, j):
+        """Gap below which spheres of two bodies are candidates [m]."""
+        return self.leeway[i] + self.leeway[j]

@@ -1,24 +1,26 @@
-"""Spheres of two bodies that are within the skin of the contact search, and how far the others."""
+"""Spheres of two bodies that are candidates for contact, and how far apart the others are."""
 
 import taichi as ti
 
-from taichi_dem.step.neighbours import REACH
-from taichi_dem.types import real
+from taichi_dem.types import real, vec4
+
+#: Skins beyond their margin within which the gap of two spheres is found; others count as farther.
+OUTLOOK = 7.0
 
 
 @ti.data_oriented
 class NearSpheres:
     """Compares the spheres on the faces of two bodies, where these were last looked at.
 
-    sphere: centre of every sphere there [m]. near: the ``Neighbours``, which know where the balls
-    around those of a face are.
+    sphere: centre and radius of every sphere there [m]. known: the ``Lookout``, which knows where
+    the balls around those of a face are.
     """
 
-    def __init__(self, contacts, near):
+    def __init__(self, contacts, known):
         self.contacts, self.model, self.state = contacts, contacts.model, contacts.state
-        self.near = near
+        self.known = known
         count = 4 * self.model.body_count * self.model.spheres_per_face
-        self.sphere = ti.Vector.field(3, real, shape=count)
+        self.sphere = ti.Vector.field(4, real, shape=count)
 
     @ti.func
     def place(self, i):
@@ -28,40 +30,46 @@ class NearSpheres:
         for face in range(4 * i, 4 * i + 4):
             if self.state.exposed_tick[face] >= 0:
                 for s in range(size * face, size * face + size):
-                    self.sphere[s] = position + rotation @ self.model.sphere[s].xyz
+                    sphere = self.model.sphere[s]
+                    place = position + rotation @ sphere.xyz
+                    self.sphere[s] = vec4(place[0], place[1], place[2], sphere[3])
 
     @ti.func
     def of_pair(self, i, j, faces, start, write):
-        """Number of sphere pairs of two bodies within the skin, and the smallest other gap [m].
+        """Sphere pairs of two bodies within their margin: how many, and on which faces.
 
-        faces: bit 4 f + g for faces f and g to compare. The gap is that of spheres outside the
-        skin, and no more than the reach of the ``Neighbours``. write: enter the pairs among the
-        candidates, from start on; then other gaps are of no interest.
+        Besides the smallest gap of others [m], no more than OUTLOOK skins beyond the margin. faces:
+        bit 4 f + g for faces f and g to compare. write: enter the pairs among the candidates, from
+        start on; then other gaps are of no interest.
         """
-        count, least = 0, self.contacts.skin[None]
+        margin = self.contacts.margin(i, j)
+        count, hits, least = 0, 0, margin
         if not write:
-            least *= REACH
+            least += OUTLOOK * self.contacts.skin[None]
         for fg in range(16):
             if (faces >> fg) & 1 == 1:
                 face_i, face_j = 4 * i + fg // 4, 4 * j + fg % 4
-                if self.near.clusters_near(face_i, face_j, least):
-                    more, least = self._of_faces(face_i, face_j, start + count, least, write)
+                if self.known.clusters_near(face_i, face_j, least):
+                    place = start + count
+                    more, least = self._of_faces(face_i, face_j, place, margin, least, write)
                     count += more
-        return count, least
+                    hits |= ti.cast(more > 0, ti.i32) << fg
+        return count, hits, least
 
     @ti.func
-    def _of_faces(self, face_i, face_j, start, least, write):
+    def _of_faces(self, face_i, face_j, start, margin, least, write):
         count = 0
-        size, skin = ti.static(self.model.spheres_per_face), self.contacts.skin[None]
+        size = ti.static(self.model.spheres_per_face)
         for a in range(size * face_i, size * face_i + size):
-            mine = self.model.sphere[a][3]
-            whole = mine + self.model.cluster[face_j][3] + least
+            mine = self.sphere[a]
+            whole = mine[3] + self.model.cluster[face_j][3] + least
             # A sphere far from the ball around those of the other face is as far from all of them.
-            if (self.near.cluster[face_j] - self.sphere[a]).norm_sqr() < whole * whole:
+            if (self.known.cluster[face_j] - mine.xyz).norm_sqr() < whole * whole:
                 for b in range(size * face_j, size * face_j + size):
-                    reach = mine + self.model.sphere[b][3]
-                    apart2 = (self.sphere[b] - self.sphere[a]).norm_sqr()
-                    if apart2 < (reach + skin) * (reach + skin):
+                    other = self.sphere[b]
+                    reach = mine[3] + other[3]
+                    apart2 = (other.xyz - mine.xyz).norm_sqr()
+                    if apart2 < (reach + margin) * (reach + margin):
                         if write:
                             self.contacts.pair_sphere[start + count] = [a, b]
                         count += 1

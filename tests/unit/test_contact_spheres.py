@@ -82,9 +82,21 @@ def test_spheres_sit_at_the_crossings(block):
         assert np.abs(fifths - np.round(fifths))[whole].max() < 1e-6
 
 
-def test_cluster_holds_the_spheres_of_its_face(block):
+def test_extent_holds_the_spheres_of_its_body_and_no_more(block):
+    """The ball around the centre touches the farthest sphere from outside."""
+    mesh, centre = block
+    spheres = spheres_of_faces(mesh, centre, 5)
+    reach = np.linalg.norm(spheres.centre, axis=-1) + spheres.radius
+    assert np.array_equal(spheres.extent, reach.reshape(len(reach), -1).max(axis=1))
+
+
+def test_cluster_holds_the_spheres_of_its_face_closely(block):
+    """It is smaller than the ball around their middle, most of the time."""
     mesh, centre = block
     spheres = spheres_of_faces(mesh, centre, 5)
     middle, reach = spheres.cluster[:, :, None, :3], spheres.cluster[:, :, None, 3]
     outermost = np.linalg.norm(spheres.centre - middle, axis=-1) + spheres.radius
     assert (outermost <= reach * (1.0 + 4 * EPS)).all()
+    away = spheres.centre - spheres.centre.mean(axis=2, keepdims=True)
+    plain = (np.linalg.norm(away, axis=-1) + spheres.radius).max(axis=2)
+    assert np.mean(spheres.cluster[..., 3] < plain) > 0.9

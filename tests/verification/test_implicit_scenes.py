@@ -6,10 +6,16 @@ import pytest
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Uniform, effects
 from taichi_dem.mesh import checked_mesh
 from taichi_dem.mesh_shapes import bar, pair, single
-from taichi_dem.step.neighbours import REACH
+from taichi_dem.step.neighbours import LEEWAYS, SKINS
 from taichi_dem.timeline import MACRO_TICKS
 from tests.again import Again
-from tests.unit.test_broad_phase import expected, listed, near_faces, neighbouring_faces
+from tests.unit.test_broad_phase import (
+    expected,
+    listed,
+    near_balls,
+    near_faces,
+    neighbouring_faces,
+)
 
 EPS = np.finfo(float).eps
 #: Distance of the scenes from each other [m]: they never meet.
@@ -239,12 +245,14 @@ def test_a_roller_keeps_the_angular_momentum_about_its_normal(runs, implicit, pl
 def test_one_fast_fragment_keeps_the_list_of_neighbours_right(implicit):
     """It flies through the target in leaps of several skins: it alone is listed anew.
 
-    All that is within the list's reach, by all faces against all, is in it, and no body twice; what
-    is there besides, the fragment has left behind. The candidates are the spheres within the skin.
+    All that is within the list's reach, by all spheres against all, is in it, and no body twice;
+    what is there besides has balls within it, or the fragment has left it behind. The candidates
+    are the spheres within the skin.
     """
     simulation, fragment = implicit.again.simulation, implicit.bodies["fragment"][0]
     implicit.restart(STEP)
     near, skin = simulation.broad_phase.near, simulation.contacts.skin[None]
+    reach = (LEEWAYS + 2.0 * SKINS) * skin
     rooms, place, still = near.first.to_numpy(), implicit.place.copy(), implicit.spin * 0.0
     turn = np.tile([1.0, 0.0, 0.0, 0.0], (len(place), 1))
     counts = []
@@ -256,9 +264,10 @@ def test_one_fast_fragment_keeps_the_list_of_neighbours_right(implicit):
         # What steps would have noted of its way.
         simulation.contacts.travel[fragment] = 1e-2
         simulation.broad_phase.search(everywhere=False)
-        wanted, found = near_faces(simulation, REACH * skin), neighbouring_faces(near)
+        wanted, found = near_faces(simulation, reach), neighbouring_faces(near)
         assert wanted <= found
-        assert all(fragment in (a // 4, b // 4) for a, b in found - wanted)
+        besides = found - near_balls(simulation, reach)
+        assert all(fragment in (a // 4, b // 4) for a, b in besides)
         body, last = near.body.to_numpy(), near.last.to_numpy()
         for start, end in zip(near.first.to_numpy(), last):
             assert (np.diff(body[start:end]) > 0).all()

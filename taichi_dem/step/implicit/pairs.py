@@ -61,11 +61,16 @@ class PairDashpots:
             self.old_impulse[k] = self.impulse[k]
 
     @ti.func
-    def take(self, p, place, old):
-        """Take them over for the pair at place p; place: its former one in the ``OldPairs`` old."""
+    def take(self, p, place, old, same):
+        """Take them over for the pair at place p; place: its former one in the ``OldPairs`` old.
+
+        same: whether its spheres are those that it had.
+        """
         start = self.contacts.pair_first[p]
         for k in range(start, self.contacts.pair_first[p + 1]):
-            former = old.candidate(place, self.contacts.pair_sphere[k], k - start)
+            former = old.first[place] + k - start
+            if not same:
+                former = old.candidate(place, self.contacts.pair_sphere[k], k - start)
             self.impulse[k] = zero3()
             if former >= 0:
                 self.impulse[k] = self.old_impulse[former]
@@ -145,8 +150,8 @@ class PairDashpots:
     def _speed(self, i, j):
         """Bound of the speed at which two bodies' surfaces approach [m/s]."""
         speed = (self.state.velocity[j] - self.state.velocity[i]).norm()
-        speed += self.state.spin[i].norm() * self.model.radius[i]
-        return speed + self.state.spin[j].norm() * self.model.radius[j]
+        speed += self.state.spin[i].norm() * self.model.extent[i]
+        return speed + self.state.spin[j].norm() * self.model.extent[j]
 
     @ti.func
     def _share(self, i, j, branch, arm, normal):
