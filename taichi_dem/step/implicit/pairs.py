@@ -68,8 +68,10 @@ class PairDashpots:
         """
         start = self.contacts.pair_first[p]
         for k in range(start, self.contacts.pair_first[p + 1]):
-            former = old.first[place] + k - start
-            if not same:
+            former = -1
+            if same:
+                former = old.first[place] + k - start
+            else:
                 former = old.candidate(place, self.contacts.pair_sphere[k], k - start)
             self.impulse[k] = zero3()
             if former >= 0:
