@@ -16,7 +16,8 @@ class SphereContact(Effect):
 
     divisions: equal parts of a face's edges; 5 gives the paper's six spheres a face.
     outer_faces: free outer faces carry spheres from the start too (the paper: no).
-    skin: how far apart spheres still enter the candidate list [m]; changes time, not results.
+    skin: how far apart spheres still enter the candidate list, at least; farther where bodies are
+        fast [m]. It changes time, not results.
     neighbours_per_body, pairs_per_body, spheres_per_body: room of the lists, on average.
     """
 

@@ -1,6 +1,6 @@
 """Search for contact pairs: the broken ones among the neighbouring faces, then their spheres.
 
-The list is renewed when a body may have left the skin, or at once when a bond breaks: a search
+The list is renewed when a body may have used up its leeway, or at once when a bond breaks: a search
 looks at the bodies that moved or broke, and keeps what it knows of the others. Impulses that wait
 in the slots of a pair are carried over, so results do not depend on when a search is made.
 """
@@ -108,10 +108,6 @@ class BroadPhase:
         return ti.cast(self.full[None] != 0, ti.i32)
 
     @ti.func
-    def _bodies(self):
-        return self.model.body_count
-
-    @ti.func
     def _rough_bodies(self):
         return self.rough_count[None]
 
@@ -182,7 +178,7 @@ class BroadPhase:
 
     @ti.func
     def _choose(self, a):
-        """Look at a rough body if it went far into its skin, or if a break has exposed it."""
+        """Look at a rough body if it used up much of its leeway, or if a break has exposed it."""
         i = self.rough[a]
         far = self.contacts.travel[i] > FAR * self.contacts.leeway[i]
         looked = self.everywhere[None] | ti.cast(far, ti.i32)
@@ -198,7 +194,8 @@ class BroadPhase:
         """Note where a body is that is looked at.
 
         The others count as lying where they were when they were last looked at: they have used up
-        that much of their skin since. All are looked at while the list of neighbours is made anew.
+        that much of their leeway since. All are looked at while the list of neighbours is made
+        anew.
         """
         i = self.rough[a]
         if self.near.making() == 1:

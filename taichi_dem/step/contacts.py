@@ -1,7 +1,8 @@
 """Pairs of bodies in contact: packed candidate lists and the impulses they exchange.
 
-A pair holds the sphere pairs that were nearer than the skin at the last search. Lists are sorted by
-(first body, second body), so that sums over a body's pairs have one order, whoever searched when.
+A pair holds the sphere pairs that were nearer than the leeway of its bodies at the last search.
+Lists are sorted by (first body, second body), so that sums over a body's pairs have one order,
+whoever searched when.
 """
 
 import taichi as ti
@@ -127,9 +128,9 @@ class Contacts:
 
     @ti.func
     def moved(self, i, velocity, spin, elapsed):
-        """Add to the way of body i and ask for a search once it may have left the skin."""
+        """Add to the way of body i and ask for a search once it may have used up its leeway."""
         if self.rough[i] != 0:
-            speed = velocity.norm() + spin.norm() * self.model.extent[i]
+            speed = self._speed(i, velocity, spin)
             way = self.travel[i] + speed * elapsed
             self.travel[i] = way
             if way + self.ahead * elapsed * speed > self.leeway[i]:
@@ -141,9 +142,21 @@ class Contacts:
 
         A few fragments fly faster than all others: they would ask for most of the searches.
         """
-        speed = self.state.velocity[i].norm() + self.state.spin[i].norm() * self.model.extent[i]
+        speed = self._speed(i, self.state.velocity[i], self.state.spin[i])
         way = ti.min(STEPS * self.dt0 * speed, FARTHEST * self.model.extent[i])
         self.leeway[i] = ti.max(0.5 * self.skin[None], way)
+
+    @ti.func
+    def _speed(self, i, velocity, spin):
+        """Bound of the speed of any point on the spheres of body i [m/s]."""
+        return velocity.norm() + spin.norm() * self.model.extent[i]
+
+    @ti.func
+    def approach(self, i, j):
+        """Bound of the speed at which spheres of two bodies approach each other [m/s]."""
+        between = self.state.velocity[j] - self.state.velocity[i]
+        first = self._speed(i, between, self.state.spin[i])
+        return first + self.state.spin[j].norm() * self.model.extent[j]
 
     @ti.func
     def margin(self, i, j):

@@ -60,10 +60,8 @@ class Near:
     @ti.func
     def margin(self, i, j):
         """Gap [m] that two bodies can close in the time that is looked ahead."""
-        speed = (self.state.velocity[j] - self.state.velocity[i]).norm()
-        speed += self.state.spin[i].norm() * self.model.extent[i]
-        speed += self.state.spin[j].norm() * self.model.extent[j]
-        return self.ahead[ti.max(self.state.level[i], self.state.level[j])] * speed
+        ahead = self.ahead[ti.max(self.state.level[i], self.state.level[j])]
+        return ahead * self.contacts.approach(i, j)
 
     @ti.func
     def keep(self, p):

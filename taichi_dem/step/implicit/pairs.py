@@ -121,7 +121,7 @@ class PairDashpots:
         branch = self.state.position[j] - self.state.position[i]
         back = self.state.rotation[i].transpose()
         turn, offset = back @ self.state.rotation[j], back @ branch
-        ahead = dt * self._speed(i, j)
+        ahead = dt * self.contacts.approach(i, j)
         force, moment, deepest = zero3(), zero3(), 0.0
         start = self.contacts.pair_first[p]
         end = start
@@ -147,13 +147,6 @@ class PairDashpots:
         self.contacts.deepest[p], self.touching[p], self.branch[p] = deepest, end - start, branch
         if end > start:
             self._deposit(p, branch, force, moment)
-
-    @ti.func
-    def _speed(self, i, j):
-        """Bound of the speed at which two bodies' surfaces approach [m/s]."""
-        speed = (self.state.velocity[j] - self.state.velocity[i]).norm()
-        speed += self.state.spin[i].norm() * self.model.extent[i]
-        return speed + self.state.spin[j].norm() * self.model.extent[j]
 
     @ti.func
     def _share(self, i, j, branch, arm, normal):
