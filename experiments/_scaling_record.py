@@ -52,7 +52,7 @@ class Counter:
         """Charge the first body of a contact pair that is due."""
         place = self.contacts.pair_body[p][0], self.schedule.low[None]
         self.counts[place][1] += 1
-        self.counts[place][2] += self.contacts.pair_first[p + 1] - self.contacts.pair_first[p]
+        self.counts[place][2] += self.contacts.pair_last[p] - self.contacts.pair_first[p]
 
     def take(self):
         """Counts (bodies, classes, kinds) and ticks (classes,) since the last time; then zero."""

@@ -149,10 +149,10 @@ class Health:
 
     def _contact_rates(self):
         """Sphere pairs near every body over its mass [1/kg], (body_count,)."""
-        first = self.contacts.pair_first.to_numpy()
+        counts = self.contacts.pair_last.to_numpy() - self.contacts.pair_first.to_numpy()
         rates = np.zeros(self.model.body_count)
         for pair, bodies in enumerate(self._pairs()):
-            count = max(1, first[pair + 1] - first[pair])
+            count = max(1, counts[pair])
             rates[bodies] = np.maximum(rates[bodies], count / self.model.body_mass[bodies])
         return rates
 

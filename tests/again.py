@@ -42,8 +42,9 @@ class Again:
 
     def _forget_contacts(self):
         contacts = self.simulation.contacts
-        for field in (contacts.pair_count, contacts.first_of, contacts.pair_full):
+        for field in (contacts.pair_count, contacts.pair_slot, contacts.pair_full):
             field.fill(0)
+        contacts.first_of.fill(0)
         contacts.touch_first.fill(0)
         contacts.search_due.fill(0)
         self.simulation.broad_phase.near.stale.fill(1)

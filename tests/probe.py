@@ -149,7 +149,7 @@ class ContactProbe:
             if swap == 1:
                 self.contacts.pair_body[0] = [1, 0]
                 self.contacts.pair_sphere[0] = [b, a]
-            self.contacts.pair_first[0], self.contacts.pair_first[1] = 0, 1
+            self.contacts.pair_first[0], self.contacts.pair_last[0] = 0, 1
             self.contacts.pair_heat[0] = 0.0 * self.contacts.pair_heat[0]
             for side in ti.static(range(2)):
                 self.contacts.pair_slot[side] = 0.0 * self.contacts.pair_slot[side]

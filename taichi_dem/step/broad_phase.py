@@ -8,9 +8,11 @@ in the slots of a pair are carried over, so results do not depend on when a sear
 import taichi as ti
 
 from taichi_dem.errors import InputError
+from taichi_dem.step.candidates import Candidates
 from taichi_dem.step.cells import group
 from taichi_dem.step.near_spheres import NearSpheres
 from taichi_dem.step.neighbours import FAR, Neighbours
+from taichi_dem.step.numbering import Numbering
 from taichi_dem.step.old_pairs import OldPairs
 
 _ROOM = ("", "pairs_per_body", "spheres_per_body", "neighbours_per_body")
@@ -27,7 +29,7 @@ class BroadPhase:
     a place in ``_ROOM``.
     """
 
-    scratch_fields = ("rough", "rough_count", "pair_faces", "looked")
+    scratch_fields = ("rough", "rough_count", "looked")
 
     def __init__(self, contacts, schedule, solver=None, brute_force=False):
         n = contacts.model.body_count
@@ -39,13 +41,14 @@ class BroadPhase:
         self.near = Neighbours(contacts, brute_force)
         self.known = self.near.known
         self.spheres = NearSpheres(contacts, self.known)
-        self.pair_faces = ti.field(ti.i32, shape=contacts.capacity)
         self.searched = ti.field(ti.i64, shape=())
         self.looked = ti.field(ti.i32, shape=n)
         self.everywhere = ti.field(ti.i32, shape=())
         self.fresh = ti.field(ti.i32, shape=())
         self.old = OldPairs(contacts)
+        self.candidates = Candidates(contacts, solver)
         self.full = ti.field(ti.i32, shape=())
+        self.numbering = Numbering(contacts, self.near, self.old, self.candidates, self.full)
         self.searches = ti.field(ti.i32, shape=())
 
     def ask(self, everywhere=False):
@@ -84,9 +87,10 @@ class BroadPhase:
             (self._all_anew, self.near.fill),
             (self._all_amended, self.near.amend),
             (self._rough_bodies, self._place),
+            (self._once, self.candidates.pack),
             (self._pairs, self._keep),
             (self._rough_bodies, self._count_spheres),
-            (self._once, self._number_pairs),
+            (self._once, self.numbering.number_pairs),
             (self._pairs, self._fill_pair),
             (self._once, self._end),
         )
@@ -219,8 +223,6 @@ class BroadPhase:
         self.old.keep(p)
         if ti.static(self.schedule.has_rates):
             self.schedule.rates.near.keep(p)
-        if ti.static(self.solves):
-            self.solver.pairs.keep(p)
 
     @ti.func
     def _count_spheres(self, a):
@@ -256,73 +258,20 @@ class BroadPhase:
         return spread * second
 
     @ti.func
-    def _number_pairs(self, one):
-        """Give the pairs that have spheres near, or an impulse waiting, a place in order."""
-        for i in range(self.model.body_count + 1):
-            self.old.first_of[i] = self.contacts.first_of[i]
-        self.contacts.pair_count[None] = 0
-        self.contacts.pair_first[0] = 0
-        for i in range(self.model.body_count):
-            self.contacts.first_of[i] = self.contacts.pair_count[None]
-            # A body without spheres is in no pair, now or before.
-            if self.contacts.rough[i] != 0:
-                self._number_of(i)
-        self.contacts.first_of[self.model.body_count] = self.contacts.pair_count[None]
-
-    @ti.func
-    def _number_of(self, i):
-        """Number the pairs of which body i is the first."""
-        old, last = self.old.first_of[i], self.old.first_of[i + 1]
-        k, left = self.near.first[i], self.known.met[i]
-        while left > 0:
-            if self.known.spheres[k] > 0:
-                j = self.near.body[k]
-                old = self._number_waiting(i, old, last, j)
-                self._number(i, j, self.known.take_news(k), self.known.spheres[k])
-                left -= 1
-            k += 1
-        self._number_waiting(i, old, last, self.model.body_count)
-
-    @ti.func
-    def _number_waiting(self, i, old, last, j):
-        """Number the old pairs of body i before partner j that hold something; next old pair."""
-        while old < last and self.old.body[ti.min(old, last - 1)][1] <= j:
-            partner = self.old.body[old][1]
-            if partner < j:
-                if self.old.waits(old):
-                    self._number(i, partner, 0, 0)
-            old += 1
-        return old
-
-    @ti.func
-    def _number(self, i, j, faces, spheres):
-        p = self.contacts.pair_count[None]
-        last = self.contacts.pair_first[p] + spheres
-        if p >= self.contacts.capacity:
-            self.full[None] = 1
-        elif last > self.contacts.sphere_capacity:
-            self.full[None] = 2
-        else:
-            self.contacts.pair_body[p] = [i, j]
-            self.pair_faces[p] = faces
-            self.contacts.pair_first[p + 1] = last
-            self.contacts.pair_count[None] = p + 1
-
-    @ti.func
     def _fill_pair(self, p):
         """Write a pair's spheres, take over what waited for it, book what its birth injects."""
         i, j = self.contacts.pair_body[p][0], self.contacts.pair_body[p][1]
-        old, injected = self.old.place(i, j), 0.0
-        if self.pair_faces[p] != 0:
-            self.spheres.of_pair(i, j, self.pair_faces[p], self.contacts.pair_first[p], True)
+        injected = 0.0
+        faces = self.numbering.faces[p]
+        if faces != 0:
+            self.spheres.of_pair(i, j, faces, self.contacts.pair_first[p], True)
             injected = self._injected(p, i, j)
-        else:
-            self.old.copy_spheres(p, old)
-        self.old.hand_over(p, old, injected)
+            if ti.static(self.solves):
+                self.solver.pairs.take(p, self.old)
+        self.old.hand_over(p, injected)
         if ti.static(self.schedule.has_rates):
-            self.schedule.rates.take_pair(p, old, self._exposed_now(i) | self._exposed_now(j))
-        if ti.static(self.solves):
-            self.solver.pairs.take(p, old, self.old, self.pair_faces[p] == 0)
+            fresh = self._exposed_now(i) | self._exposed_now(j)
+            self.schedule.rates.take_pair(p, self.old.former[p], fresh)
 
     @ti.func
     def _exposed_now(self, i):
@@ -338,7 +287,7 @@ class BroadPhase:
         energy, tick = 0.0, self.state.tick[None]
         size = ti.static(self.model.spheres_per_face)
         fresh, freed = self.fresh[None] == 1, self._freed_at(i, j, tick)
-        for k in range(self.contacts.pair_first[p], self.contacts.pair_first[p + 1]):
+        for k in range(self.contacts.pair_first[p], self.contacts.pair_last[p]):
             a, b = self.contacts.pair_sphere[k][0], self.contacts.pair_sphere[k][1]
             born = ti.max(self.state.exposed_tick[a // size], self.state.exposed_tick[b // size])
             if fresh and (freed or born == tick):

@@ -20,10 +20,11 @@ FARTHEST = 0.25
 class Contacts:
     """Candidate pairs of bodies with broken faces.
 
-    pair_body: the two bodies, first < second. pair_first[p] .. pair_first[p + 1]: sphere pairs in
-    pair_sphere. pair_slot[2 p + side]: impulse [N s] and moment about the body's centre [N m s]
-    gathered for that side. pair_heat: energy into dashpots, friction, and injected [J], until the
-    first body takes it. pair_full[2 p + side]: 1 while something waits there; most pairs do not
+    pair_body: the two bodies, first < second. pair_first[p] .. pair_last[p]: sphere pairs in
+    pair_sphere, of which sphere_count are in use and sphere_end lies behind all. pair_slot[2 p +
+    side]: impulse [N s] and moment about the body's centre [N m s] gathered for that side.
+    pair_heat: energy into dashpots, friction, and injected [J], until the first body takes it.
+    pair_full[2 p + side]: 1 while something waits there, else its slot is zero; most pairs do not
     touch, and to ask is cheaper than to add zeros. first_of[i]: first pair whose first body is i;
     touch_first, touch: pairs whose second body is i. rough: bit f for a broken face f.
     travel: bound of the way any point of a body went since it was last looked at [m]. leeway: how
@@ -41,8 +42,11 @@ class Contacts:
         self.sphere_capacity = n * effect.spheres_per_body + 4096
         self.pair_count = ti.field(ti.i32, shape=())
         self.pair_body = ti.Vector.field(2, ti.i32, shape=self.capacity)
-        self.pair_first = ti.field(ti.i32, shape=self.capacity + 1)
+        self.pair_first = ti.field(ti.i32, shape=self.capacity)
+        self.pair_last = ti.field(ti.i32, shape=self.capacity)
         self.pair_sphere = ti.Vector.field(2, ti.i32, shape=self.sphere_capacity)
+        self.sphere_count = ti.field(ti.i32, shape=())
+        self.sphere_end = ti.field(ti.i32, shape=())
         self.pair_slot = ti.Vector.field(6, real, shape=2 * self.capacity)
         self.pair_full = ti.field(ti.i32, shape=2 * self.capacity)
         self.pair_heat = ti.Vector.field(3, real, shape=self.capacity)
@@ -70,7 +74,7 @@ class Contacts:
         """Elastic energy of a pair's overlaps now [J]."""
         energy = 0.0
         pair = self.pair_body[p]
-        for k in range(self.pair_first[p], self.pair_first[p + 1]):
+        for k in range(self.pair_first[p], self.pair_last[p]):
             spheres = self.pair_sphere[k]
             overlap = -self.gap(pair[0], pair[1], spheres[0], spheres[1])
             energy += self.law.stored(ti.max(0.0, overlap))
@@ -81,7 +85,7 @@ class Contacts:
         """Number of sphere pairs of a pair of bodies with a gap below a margin [m] now."""
         count = 0
         pair = self.pair_body[p]
-        for k in range(self.pair_first[p], self.pair_first[p + 1]):
+        for k in range(self.pair_first[p], self.pair_last[p]):
             spheres = self.pair_sphere[k]
             count += ti.cast(self.gap(pair[0], pair[1], spheres[0], spheres[1]) < margin, ti.i32)
         return count

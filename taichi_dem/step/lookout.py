@@ -14,8 +14,9 @@ class Lookout:
     many of their spheres are within the margin of the two; news: faces among which these have just
     been found; until: how far the two have gone, together, when the gap of others may be 0 [m].
 
-    Of a body: met: how many of its entries have spheres; way: how far any point of it had gone when
-    it was last looked at [m]; cluster: where the ball around the spheres of a face was then [m].
+    Of a body: met: how many of its entries have spheres; changed: 1 when these may be others; way:
+    how far any point of it had gone when it was last looked at [m]; cluster: where the ball around
+    the spheres of a face was then [m].
     """
 
     def __init__(self, contacts, capacity):
@@ -25,6 +26,7 @@ class Lookout:
         ti.root.dense(ti.i, capacity).place(*entry)
         self.faces, self.broken, self.spheres, self.news, self.until = entry
         self.met = ti.field(ti.i32, shape=n)
+        self.changed = ti.field(ti.i32, shape=n)
         self.way = ti.field(real, shape=n)
         self.cluster = ti.Vector.field(3, real, shape=4 * n)
 
@@ -38,6 +40,7 @@ class Lookout:
     def forget(self, k, i):
         """Entry k of body i goes: its spheres, if it had any, are far apart by now."""
         self.met[i] -= ti.cast(self.spheres[k] > 0, ti.i32)
+        self.changed[i] = 1
 
     @ti.func
     def move(self, k, place):
@@ -88,6 +91,7 @@ class Lookout:
         """Note the spheres of entry k, on which faces they are, and the smallest other gap [m]."""
         self.met[i] += ti.cast(spheres > 0, ti.i32) - ti.cast(self.spheres[k] > 0, ti.i32)
         self.broken[k], self.spheres[k], self.news[k] = faces, spheres, hits
+        self.changed[i] = 1
         self.until[k] = self.way[i] + self.way[j] + gap
 
     @ti.func
@@ -96,6 +100,13 @@ class Lookout:
         faces = self.news[k]
         self.news[k] = 0
         return faces
+
+    @ti.func
+    def take_change(self, i):
+        """1 if the entries of body i that have spheres may be others than at the last call."""
+        changed = self.changed[i]
+        self.changed[i] = 0
+        return changed
 
     @ti.func
     def clusters_near(self, face_i, face_j, wide):

@@ -108,7 +108,7 @@ class Near:
         back, margin = self.state.rotation[i].transpose(), self.margin(i, j)
         turn = back @ self.state.rotation[j]
         offset = back @ (self.state.position[j] - self.state.position[i])
-        for k in range(self.contacts.pair_first[p], self.contacts.pair_first[p + 1]):
+        for k in range(self.contacts.pair_first[p], self.contacts.pair_last[p]):
             spheres = self.contacts.pair_sphere[k]
             mine, other = self.model.sphere[spheres[0]], self.model.sphere[spheres[1]]
             if side == 1:

@@ -128,7 +128,7 @@ class Neighbours:
     @ti.func
     def fill(self, i):
         """List the neighbours of body i, when there is room."""
-        self.known.met[i] = 0
+        self.known.met[i], self.known.changed[i] = 0, 1
         if self.full[None] == 0:
             self.last[i] = self.first[i] + self._visit(i, self.first[i], True)
 

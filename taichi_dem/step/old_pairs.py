@@ -9,44 +9,45 @@ from taichi_dem.types import real, vec3
 class OldPairs:
     """A copy of the pairs of a ``Contacts`` with what waits in their slots.
 
-    Fields have the names of those they copy. first_of: first pair of each body then.
+    Fields have the names of those they copy. first_of: first pair of each body then. former: place
+    here of each pair of the new list, -1 for one that is new.
     """
 
-    scratch_fields = ("first_of", "body", "first", "sphere", "slot", "full", "heat")
+    scratch_fields = ("first_of", "body", "first", "last", "former", "slot", "full", "heat")
 
     def __init__(self, contacts):
         self.contacts = contacts
-        n, pairs, spheres = contacts.model.body_count, contacts.capacity, contacts.sphere_capacity
+        n, pairs = contacts.model.body_count, contacts.capacity
         self.first_of = ti.field(ti.i32, shape=n + 1)
         self.body = ti.Vector.field(2, ti.i32, shape=pairs)
-        self.first = ti.field(ti.i32, shape=pairs + 1)
-        self.sphere = ti.Vector.field(2, ti.i32, shape=spheres)
+        self.first = ti.field(ti.i32, shape=pairs)
+        self.last = ti.field(ti.i32, shape=pairs)
+        self.former = ti.field(ti.i32, shape=pairs)
         self.slot = ti.Vector.field(6, real, shape=2 * pairs)
         self.full = ti.field(ti.i32, shape=2 * pairs)
         self.heat = ti.Vector.field(3, real, shape=pairs)
 
     @ti.func
     def keep(self, p):
-        """Copy the pair at place p."""
+        """Copy the pair at place p and empty its slots: another may come to this place."""
         self.body[p] = self.contacts.pair_body[p]
-        first, last = self.contacts.pair_first[p], self.contacts.pair_first[p + 1]
-        self.first[p] = first
-        if p + 1 == self.contacts.pair_count[None]:
-            self.first[p + 1] = last
-        for k in range(first, last):
-            self.sphere[k] = self.contacts.pair_sphere[k]
-        for side in ti.static(range(2)):
-            self.slot[2 * p + side] = self.contacts.pair_slot[2 * p + side]
-            self.full[2 * p + side] = self.contacts.pair_full[2 * p + side]
+        self.first[p], self.last[p] = self.contacts.pair_first[p], self.contacts.pair_last[p]
+        for slot in range(2 * p, 2 * p + 2):
+            full = self.contacts.pair_full[slot]
+            self.full[slot] = full
+            if full == 1:
+                self.slot[slot] = self.contacts.pair_slot[slot]
+                self.contacts.pair_slot[slot] = 0.0 * self.slot[slot]
+                self.contacts.pair_full[slot] = 0
         self.heat[p] = self.contacts.pair_heat[p]
 
     @ti.func
-    def place(self, i, j):
-        """Place of a pair of bodies in the old list, -1 if it was not there."""
+    def place(self, old, last, j):
+        """Place old of a row that ends at last if the partner there is body j, else -1."""
         place = -1
-        for p in range(self.first_of[i], self.first_of[i + 1]):
-            if self.body[p][1] == j:
-                place = p
+        if old < last:
+            if self.body[old][1] == j:
+                place = old
         return place
 
     @ti.func
@@ -55,37 +56,29 @@ class OldPairs:
         return self.full[2 * p] == 1 or self.full[2 * p + 1] == 1
 
     @ti.func
-    def hand_over(self, p, old, injected):
-        """Give the new pair p what waits for it; old: its former place, or -1; injected [J]."""
-        for side in ti.static(range(2)):
-            waiting, full = 0.0 * self.contacts.pair_slot[2 * p + side], 0
-            if old >= 0:
-                waiting, full = self.slot[2 * old + side], self.full[2 * old + side]
-            self.contacts.pair_slot[2 * p + side] = waiting
-            self.contacts.pair_full[2 * p + side] = full
+    def hand_over(self, p, injected):
+        """Give the new pair p what waits for it, and the energy that its birth injects [J]."""
+        old = self.former[p]
         heat = vec3(0.0, 0.0, injected)
         if old >= 0:
             heat += self.heat[old]
+            for side in range(2):
+                if self.full[2 * old + side] == 1:
+                    self.contacts.pair_slot[2 * p + side] = self.slot[2 * old + side]
+                    self.contacts.pair_full[2 * p + side] = 1
         self.contacts.pair_heat[p] = heat
         if injected > 0.0:
             self.contacts.pair_full[2 * p] = 1
 
     @ti.func
-    def copy_spheres(self, p, old):
-        """Give the new pair p the spheres that it had."""
-        start = self.contacts.pair_first[p]
-        for k in range(start, self.contacts.pair_first[p + 1]):
-            self.contacts.pair_sphere[k] = self.sphere[self.first[old] + k - start]
+    def candidate(self, p, spheres, place):
+        """Which of its former candidates a pair of spheres of pair p was, -1 for none of them.
 
-    @ti.func
-    def candidate(self, old, spheres, place):
-        """Which of the candidates of an old pair a pair of spheres was, -1 for none of them.
-
-        place: where it was, if nothing came or went before it.
+        place: where it was among them, if nothing came or went before it.
         """
-        found = -1
+        old, found = self.former[p], -1
         if old >= 0:
-            first, last = self.first[old], self.first[old + 1]
+            first, last = self.first[old], self.last[old]
             if first + place < last:
                 if self._is(first + place, spheres):
                     found = first + place
@@ -97,5 +90,5 @@ class OldPairs:
 
     @ti.func
     def _is(self, k, spheres):
-        same = self.sphere[k] == spheres
+        same = self.contacts.pair_sphere[k] == spheres
         return same.all()

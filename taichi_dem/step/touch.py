@@ -28,7 +28,7 @@ class Touch:
             scale = self.contact_share(i, j)
         if ti.static(self.has_rates):
             margin = self.rates.near.margin(i, j)
-        for k in range(self.contacts.pair_first[p], self.contacts.pair_first[p + 1]):
+        for k in range(self.contacts.pair_first[p], self.contacts.pair_last[p]):
             a, b = self.contacts.pair_sphere[k][0], self.contacts.pair_sphere[k][1]
             first, second = self.model.sphere[a], self.model.sphere[b]
             apart = turn @ second.xyz + offset - first.xyz

@@ -29,7 +29,7 @@ class PairDashpots:
 
     scratch_fields = (
         *("touching", "touch", "normal", "arm", "push", "share", "branch"),
-        *("active", "order", "colour", "taken", "colour_first", "old_impulse"),
+        *("active", "order", "colour", "taken", "colour_first"),
     )
 
     def __init__(self, model, state, schedule, contacts, motion):
@@ -52,30 +52,19 @@ class PairDashpots:
         self.colour = ti.field(ti.i32, shape=pairs)
         self.taken = ti.field(ti.i32, shape=n)
         self.colour_first = ti.field(ti.i32, shape=COLOURS + 3)
-        self.old_impulse = ti.Vector.field(3, real, shape=spheres)
 
     @ti.func
-    def keep(self, p):
-        """Save the impulses of a pair before the list is renewed."""
-        for k in range(self.contacts.pair_first[p], self.contacts.pair_first[p + 1]):
-            self.old_impulse[k] = self.impulse[k]
+    def take(self, p, old):
+        """Give the pair at place p, whose spheres are new, the impulses of those it had before.
 
-    @ti.func
-    def take(self, p, place, old, same):
-        """Take them over for the pair at place p; place: its former one in the ``OldPairs`` old.
-
-        same: whether its spheres are those that it had.
+        old: the ``OldPairs``, which know where these lie.
         """
         start = self.contacts.pair_first[p]
-        for k in range(start, self.contacts.pair_first[p + 1]):
-            former = -1
-            if same:
-                former = old.first[place] + k - start
-            else:
-                former = old.candidate(place, self.contacts.pair_sphere[k], k - start)
+        for k in range(start, self.contacts.pair_last[p]):
+            former = old.candidate(p, self.contacts.pair_sphere[k], k - start)
             self.impulse[k] = zero3()
             if former >= 0:
-                self.impulse[k] = self.old_impulse[former]
+                self.impulse[k] = self.impulse[former]
 
     @ti.func
     def sort(self, one):
@@ -125,7 +114,7 @@ class PairDashpots:
         force, moment, deepest = zero3(), zero3(), 0.0
         start = self.contacts.pair_first[p]
         end = start
-        for k in range(start, self.contacts.pair_first[p + 1]):
+        for k in range(start, self.contacts.pair_last[p]):
             a, b = self.contacts.pair_sphere[k][0], self.contacts.pair_sphere[k][1]
             first, second = self.model.sphere[a], self.model.sphere[b]
             apart = turn @ second.xyz + offset - first.xyz
