@@ -36,11 +36,11 @@ class Again:
             )
         self.simulation.step.prime()
         if self.simulation.contacts is not None:
-            self._forget_contacts()
-            self.simulation.broad_phase.search()
+            self.search_anew()
         self._open_account()
 
-    def _forget_contacts(self):
+    def search_anew(self):
+        """Forget all contacts and find those that there are now."""
         contacts = self.simulation.contacts
         for field in (contacts.pair_count, contacts.pair_slot, contacts.pair_full):
             field.fill(0)
@@ -48,6 +48,7 @@ class Again:
         contacts.touch_first.fill(0)
         contacts.search_due.fill(0)
         self.simulation.broad_phase.near.stale.fill(1)
+        self.simulation.broad_phase.search()
 
     def _open_account(self):
         ledger = self.simulation.ledger

@@ -77,6 +77,7 @@ def test_skin_changes_no_bit(held):
     assert differing(held[0], thin, MOTION) == []
 
 
+@pytest.mark.slow
 def test_skin_changes_no_bit_where_steps_depend_on_what_is_near(monkeypatch):
     """A pair is news when it comes near, not when a search lists it: the same limits, and wakes.
 

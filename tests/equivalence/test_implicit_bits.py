@@ -81,6 +81,7 @@ def test_whole_searches_give_the_same_bits(block, reference):
     assert differing(reference[0], fields_of(block.state), MOTION) == []
 
 
+@pytest.mark.slow
 def test_packing_what_pairs_list_changes_no_bit(block, reference, monkeypatch):
     """At every search, impulses that the sweeps begin with included; the others left gaps."""
     monkeypatch.setattr(candidates, "SLACK", -(1 << 30))

@@ -4,8 +4,15 @@ import pytest
 
 from _hard_cases import judge, registry
 
+#: They differ from others by one law or account, which other tests are about.
+VARIANTS = ("spheres_printed", "automaton_ejection")
 ASKED = [
-    pytest.param(case, method, id=f"{case.name}-{method}")
+    pytest.param(
+        case,
+        method,
+        id=f"{case.name}-{method}",
+        marks=pytest.mark.slow if method in VARIANTS else (),
+    )
     for case in registry()
     if case.package == "damper"
     for method in case.asked

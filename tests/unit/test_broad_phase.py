@@ -7,14 +7,27 @@ from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects
 from taichi_dem.mesh_shapes import bar
 from taichi_dem.step import neighbours
 from taichi_dem.step.contacts import FARTHEST, STEPS
+from tests.again import Again
+
+DT = 1e-9
 
 
-def scattered(skin, spread, brute_force=False, seed=2):
-    """A bar whose bodies are thrown about by `spread` [m], half of its faces broken."""
-    scene = Scene(bar(0.6, 0.2, (6, 2, 2)), CONCRETE, [effects.SphereContact(skin=skin)])
-    simulation = Simulation(scene, Uniform(1e-9), brute_force=brute_force)
-    random = np.random.default_rng(seed)
+def bodies():
+    """A bar, to be thrown about."""
+    return Again(Scene(bar(0.6, 0.2, (6, 2, 2)), CONCRETE, [effects.SphereContact()]), Uniform(DT))
+
+
+@pytest.fixture(scope="module")
+def again():
+    """One for most tests, compiled once."""
+    return bodies()
+
+
+def scattered(again, skin, spread):
+    """Its simulation, bodies thrown about by `spread` [m], half of its faces broken."""
+    simulation, random = again.simulation, np.random.default_rng(2)
     model, state = simulation.model, simulation.state
+    again.restart(DT)
     turn = random.standard_normal((model.body_count, 4))
     turn /= np.linalg.norm(turn, axis=1, keepdims=True)
     place = model.centre + spread * random.standard_normal((model.body_count, 3))
@@ -24,7 +37,10 @@ def scattered(skin, spread, brute_force=False, seed=2):
     exposed = np.full(4 * model.body_count, -1, dtype=np.int64)
     exposed[model.bond_slots.to_numpy()[broken].ravel()] = 0
     state.exposed_tick.from_numpy(exposed)
-    simulation.start()
+    # What has been broken from the start injects nothing.
+    state.injected_tick[None] = 0
+    simulation.contacts.skin[None] = skin
+    again.search_anew()
     return simulation
 
 
@@ -63,8 +79,8 @@ def expected(simulation, skin):
 
 
 @pytest.mark.parametrize(("skin", "spread"), [(2e-4, 0.01), (3e-3, 0.03)])
-def test_the_search_lists_all_near_spheres_and_no_others(skin, spread):
-    simulation = scattered(skin, spread)
+def test_the_search_lists_all_near_spheres_and_no_others(again, skin, spread):
+    simulation = scattered(again, skin, spread)
     found = listed(simulation)
     wanted = expected(simulation, skin)
     assert len(wanted) > 200
@@ -72,9 +88,9 @@ def test_the_search_lists_all_near_spheres_and_no_others(skin, spread):
     assert set(found) == wanted
 
 
-def test_pairs_stand_in_order_and_are_indexed_from_both_bodies():
+def test_pairs_stand_in_order_and_are_indexed_from_both_bodies(again):
     """Sums over a body's pairs have one order only if the lists do."""
-    contacts = scattered(2e-4, 0.01).contacts
+    contacts = scattered(again, 2e-4, 0.01).contacts
     count = contacts.pair_count[None]
     bodies = contacts.pair_body.to_numpy()[:count]
     assert np.all(bodies[:, 0] < bodies[:, 1])
@@ -87,9 +103,9 @@ def test_pairs_stand_in_order_and_are_indexed_from_both_bodies():
         assert seconds == np.flatnonzero(bodies[:, 1] == i).tolist()
 
 
-def test_waiting_impulses_survive_a_search():
+def test_waiting_impulses_survive_a_search(again):
     """A slot keeps its bits, also when its pair has moved out of reach; what is new has none."""
-    simulation = scattered(2e-4, 0.01)
+    simulation = scattered(again, 2e-4, 0.01)
     contacts = simulation.contacts
     count = contacts.pair_count[None]
     slots = np.zeros((2 * contacts.capacity, 6))
@@ -127,9 +143,9 @@ def overlap_energy(simulation, born_after):
     return energy
 
 
-def test_a_break_injects_the_energy_of_the_overlaps_that_it_brings_once():
+def test_a_break_injects_the_energy_of_the_overlaps_that_it_brings_once(again):
     """Faces that break now bring k d^2 / 2 an overlap; a second search at the tick nothing."""
-    simulation = scattered(2e-4, 0.02)
+    simulation = scattered(again, 2e-4, 0.02)
     state, contacts = simulation.state, simulation.contacts
     assert not contacts.pair_heat.to_numpy().any()
     exposed = state.exposed_tick.to_numpy()
@@ -186,14 +202,14 @@ def near_balls(simulation, wide):
 
 
 @pytest.mark.parametrize(("drift", "turn"), [(0.8, 1e-4), (0.0, 4e-3)])
-def test_one_list_of_neighbours_serves_until_a_body_has_left_its_reach(drift, turn):
+def test_one_list_of_neighbours_serves_until_a_body_has_left_its_reach(again, drift, turn):
     """Bodies drift and turn, each its own way, in small steps: whatever is near is in the list.
 
     It is made anew when a sixteenth of them has gone (LEEWAYS - 1) / 2 + SKINS = 4 skins, here by
     their fifth step at the earliest, not at every search.
     """
     skin, random = 2e-3, np.random.default_rng(7)
-    simulation = scattered(skin, 0.1)
+    simulation = scattered(again, skin, 0.1)
     near, motion = simulation.broad_phase.near, simulation.state.motion()
     way = random.standard_normal(motion["position"].shape)
     way *= drift * skin / np.linalg.norm(way, axis=1, keepdims=True)
@@ -217,7 +233,7 @@ def test_a_full_row_drops_what_its_body_has_left(monkeypatch):
     """
     monkeypatch.setattr(neighbours, "ROOM", 8)
     skin, random = 2e-3, np.random.default_rng(5)
-    simulation = scattered(skin, 0.05)
+    simulation = scattered(bodies(), skin, 0.05)
     near, motion = simulation.broad_phase.near, simulation.state.motion()
     rough = np.flatnonzero(simulation.contacts.rough.to_numpy())
     leaping, rest = rough[:: len(rough) // 2], motion["position"].copy()
@@ -236,14 +252,14 @@ def test_a_full_row_drops_what_its_body_has_left(monkeypatch):
 
 
 @pytest.mark.parametrize("far", [0.2, 0.45])
-def test_spheres_that_touch_are_listed_however_seldom_a_pair_is_looked_at(far):
+def test_spheres_that_touch_are_listed_however_seldom_a_pair_is_looked_at(again, far):
     """Bodies drift, each its own way, by up to a share of the skin between two searches.
 
     A search leaves out the pairs that cannot meet yet, by how far their bodies have gone; half the
     skin is what a body may go before the next one.
     """
     skin, random = 2e-3, np.random.default_rng(11)
-    simulation = scattered(skin, 0.03)
+    simulation = scattered(again, skin, 0.03)
     broad, contacts = simulation.broad_phase, simulation.contacts
     motion = simulation.state.motion()
     way = random.standard_normal(motion["position"].shape)
@@ -260,14 +276,14 @@ def test_spheres_that_touch_are_listed_however_seldom_a_pair_is_looked_at(far):
     assert max(found) > min(found) + 20
 
 
-def test_a_fast_body_has_leeway_for_some_steps():
+def test_a_fast_body_has_leeway_for_some_steps(again):
     """Each goes STEPS largest steps at its speed, spin included, between half a skin and a cap.
 
     Spheres are candidates where their gap is below the leeway of both; no search is asked for until
     one has used up its own.
     """
     skin, random = 2e-3, np.random.default_rng(3)
-    simulation = scattered(skin, 0.03)
+    simulation = scattered(again, skin, 0.03)
     contacts, model = simulation.contacts, simulation.model
     motion, horizon = simulation.state.motion(), STEPS * simulation.schedule.dt0
     extent = model.extent.to_numpy()

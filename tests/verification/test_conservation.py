@@ -52,7 +52,7 @@ def test_momentum_is_kept_through_fracture_and_contact(reports, name):
     assert report.angular_momentum_error < bound
 
 
-@pytest.mark.parametrize("name", ["held", "drifted"])
+@pytest.mark.parametrize("name", ["held", pytest.param("drifted", marks=pytest.mark.slow)])
 def test_ledger_residual_halves_with_step_and_distance(reports, name):
     """First order in the step, through fracture and contact: half the step, half the residual.
 

@@ -25,7 +25,7 @@ def uniform():
     return coarse, error, simulation
 
 
-@pytest.mark.parametrize("neighbour", ["held", "drifted"])
+@pytest.mark.parametrize("neighbour", ["held", pytest.param("drifted", marks=pytest.mark.slow)])
 def test_multirate_stays_within_the_error_of_its_steps(uniform, neighbour):
     """A body's step is at most 2^levels that of the uniform run, its error in proportion.
 
