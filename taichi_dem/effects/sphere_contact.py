@@ -18,7 +18,8 @@ class SphereContact(Effect):
     outer_faces: free outer faces carry spheres from the start too (the paper: no).
     skin: how far apart spheres still enter the candidate list, at least; farther where bodies are
         fast [m]. It changes time, not results.
-    neighbours_per_body, pairs_per_body, spheres_per_body: room of the lists, on average.
+    neighbours_per_body, pairs_per_body, spheres_per_body: room of the lists, on average; that of
+        the spheres also takes what the next search finds, before what it replaces is let go.
     """
 
     role = "contact"
