@@ -1,6 +1,6 @@
 """The picture of ``cost_of_effects.py``: what an effect costs beside what it is good for."""
 
-from taichi_dem.plot_style import BLACK, BLUE, GREY, RED, picture
+from taichi_dem.plot_style import BLACK, BLUE, GREY, RED, area_key, line_key, picture
 
 #: Changes are drawn from the first on [%].
 _TICKS = (0.01, 0.1, 1.0, 10.0, 100.0)
@@ -24,10 +24,11 @@ def picture_effects(path, parts):
         high = max(ax.get_xlim()[1] for ax in axes[:, 0])
         for ax in axes[:, 0]:
             ax.set_xlim(low, 1.2 * high)
-        axes[-1][0].set_xlabel(
-            "cost: share of a step's time [%]\n(line: range of repeats; below 0: slower without it)"
-        )
-        axes[-1][1].set_xlabel("use: change of the result without it [%]\n(grey: by chance alone)")
+        axes[-1][0].set_xlabel("cost: share of a step's time [%]\n(below 0: slower without it)")
+        axes[-1][1].set_xlabel("use: change of the result without it [%]")
+        marks = [line_key("range of the repeats", color=BLACK, lw=1.0)]
+        marks.append(area_key("change by chance alone (round-off, seeds)", fc=GREY, alpha=0.3))
+        figure.legend(handles=marks, loc="outside lower right", ncols=2)
         figure.suptitle("What does an effect cost, and what is it good for?")
 
 

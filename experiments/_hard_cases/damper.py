@@ -83,7 +83,7 @@ def full_rebound(method, quick):
 def _energy_in_time(history, method):
     energy = history["energy"][:, 0]
     lines = {method: (history["time_s"][:, 0], energy / energy[0])}
-    return Curves("time [s]", "energy / energy at the start", lines)
+    return Curves("time [s]", "energy / energy at the start [1]", lines)
 
 
 def no_gravity(method, quick):

@@ -34,10 +34,12 @@ def picture_energy(path, runs):
         for axes, limit in zip(panels[0], limits):
             for k, made in enumerate(m for m in runs if m.limit == limit):
                 _residual(axes, made, _LOOKS[k % len(_LOOKS)])
-            axes.axhline(1.0, color=GREY, linestyle=":", linewidth=1.0)
+            axes.axhline(1.0, color=GREY, ls=":", lw=1.0, label="all that was put in")
+            if any(made.sentence for made in runs if made.limit == limit):
+                axes.plot([], [], "X", color=BLACK, ms=7, ls="none", label="ended by the program")
             axes.set(title=f"limited by its {limit}", xlabel="time [µs]")
             axes.legend(loc="lower left", title="step")
-        panels[0, 0].set_ylabel("unexplained energy / energy put in")
+        panels[0, 0].set_ylabel("unexplained energy / energy put in [1]")
         width = 62 * len(limits)
         words = [f"{made.limit}, {made.share:g} × limit: “{made.sentence}”" for made in said]
         words = "\n".join(textwrap.fill(text, width) for text in words)
@@ -70,7 +72,7 @@ def film_shaken(path, safe, bad, count):
         end = float(bad.time[-1])
         curves = [_curve(energy, made, colour) for made, colour in ((safe, GREEN), (bad, RED))]
         energy.set(yscale="log", ylim=_RANGE, xlim=(0.0, 1.03e6 * end))
-        energy.set(xlabel="time [µs]", ylabel="unexplained /\nput in")
+        energy.set(xlabel="time [µs]", ylabel="unexplained\nenergy /\nput in [1]")
         energy.legend(loc="upper left")
         for now in _instants(end, count):
             for block in blocks:
