@@ -9,6 +9,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import LogFormatterSciNotation
 from PIL import Image
 
 from taichi_dem.files import write_whole
@@ -23,8 +24,6 @@ STYLE = {
     "axes.spines.right": False,
     "axes.grid": True,
     "axes.axisbelow": True,
-    # 0.001 to 1000 on logarithmic axes as they are, powers of ten beyond.
-    "axes.formatter.min_exponent": 4,
     "grid.alpha": 0.25,
     "grid.linewidth": 0.6,
     "legend.frameon": False,
@@ -126,7 +125,28 @@ def picture(path, *shape, **options):
     """
     with styled(*shape, **options) as (figure, axes):
         yield figure, axes
+        _write_plain_numbers(figure)
         write_whole(path, lambda name: figure.savefig(name, format="png"))
+
+
+class _PlainLogFormatter(LogFormatterSciNotation):
+    """0.01, 0.1, 1 instead of powers of ten on axes that lie between 0.001 and 10000."""
+
+    def __call__(self, x, pos=None):
+        text = super().__call__(x, pos)
+        low, high = sorted(self.axis.get_view_interval())
+        return f"{x:g}" if text and low > 5e-4 and high < 2e4 else text
+
+
+def _write_plain_numbers(figure):
+    """Give logarithmic axes that have matplotlib's own formatters plain numbers."""
+    for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
+        for level, give in (
+            ("major", axis.set_major_formatter),
+            ("minor", axis.set_minor_formatter),
+        ):
+            if type(getattr(axis, f"get_{level}_formatter")()) is LogFormatterSciNotation:
+                give(_PlainLogFormatter())
 
 
 @contextlib.contextmanager
@@ -142,6 +162,8 @@ def filming(size, dpi, style):
 
         def shoot():
             """Take the figure as the next image."""
+            if not images:
+                _write_plain_numbers(figure)
             canvas.draw()
             images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())[:, :, :3].copy()))
             figure.set_layout_engine("none")

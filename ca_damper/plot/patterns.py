@@ -24,13 +24,15 @@ def plot_patterns(path, rows, amplitude, fastest):
                 share = np.cos(2.0 * np.pi * k / count)
                 drawn = _frame(axes, box, frame, amplitude, fastest, share)
             _name_row(line[0], styles_of(rows)[name].label)
+        words = "one cycle of the container; arrows: its velocity, where it is not slow"
+        figure.supxlabel(words, fontsize=9)
         first = next(iter(rows.values()))[1]
         for axes, frame in zip(panels[0], first):
             axes.set_title(f"{1e3 * (frame.time_s - first[0].time_s):.0f} ms", loc="center")
         figure.colorbar(
             drawn.particles,
             ax=panels,
-            label="vertical speed of particles [m/s]; arrows: velocity of the container",
+            label="vertical speed of particles [m/s]",
             aspect=45,
             pad=0.01,
         )
@@ -61,12 +63,12 @@ def _mark_motion(axes, box, lift, share):
 def plot_cycle(path, cycles, container):
     """Mean height of the particles and how many touch floor and ceiling, over one cycle.
 
-    cycles: particles -> name of the filling -> dict of phase (from 0 to 1), height_mm (in the room),
+    cycles: particles -> name of the filling -> dict of phase (0 to 1), height_mm (in the room),
     spread_mm, floor and ceiling (shares of the particles). container: phase and displacement [mm].
     """
     with picture(
-        path, 2, len(cycles), size=(4.2 * len(cycles) + 0.6, 5.4), sharex=True, sharey="row"
-    ) as (_, panels):
+        path, 2, len(cycles), size=(4.2 * len(cycles) + 0.6, 5.7), sharex=True, sharey="row"
+    ) as (figure, panels):
         panels = np.reshape(panels, (2, -1))
         for (top, bottom), (particles, fillings) in zip(panels.T, cycles.items()):
             top.plot(*container, color=GREY, linestyle=":", label="container")
@@ -78,12 +80,12 @@ def plot_cycle(path, cycles, container):
             bottom.set(xlabel="phase of the container [cycles]", xlim=(0.0, 1.0), ylim=(0.0, None))
         panels[0, 0].set_ylabel("mean height in the room\nless that at rest [mm]")
         panels[1, 0].set_ylabel("particles that touch [%]")
-        ends = {"-": "the floor", "--": "the ceiling"}
+        ends = {"-": "floor", "--": "ceiling"}
         keys = [line_key(words, color=BLACK, ls=line) for line, words in ends.items()]
         panels[1, 0].legend(handles=keys, loc="upper right")
         keys, _ = panels[0, 0].get_legend_handles_labels()
         keys.append(area_key("± standard deviation of the cycles", fc=GREY, alpha=0.3))
-        panels[0, 0].legend(handles=keys, loc="upper right")
+        figure.legend(handles=keys, loc="outside upper left", ncols=len(keys))
 
 
 def _touching(axes, cycle, colour):

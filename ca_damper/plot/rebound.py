@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from taichi_dem.plot_style import BLACK, RED, picture, styles_of
+from taichi_dem.plot_style import BLACK, VIOLET, picture, styles_of
 
 #: Errors below this [ms] would lengthen a logarithmic axis for nothing.
 _SHORTEST = 5e-3
@@ -50,7 +50,7 @@ def _plot_errors(axes, errors, allowed_ms):
         rows = np.array(there) + 0.19 * (k - 0.5 * (count - 1))
         axes.barh(rows, values, 0.17, color=_SHADES[k % len(_SHADES)], label=f"impact {k + 1}")
     words = f"most that passes, {allowed_ms:g} ms"
-    axes.axvline(allowed_ms, color=RED, linewidth=1.0, linestyle="--", label=words)
+    axes.axvline(allowed_ms, color=VIOLET, linewidth=1.0, linestyle="--", label=words)
     axes.set_yticks(range(len(titles)), titles)
     axes.set(xscale="log", xlabel="error of the time of impact [ms]")
     axes.set_xlim(_SHORTEST, None)
