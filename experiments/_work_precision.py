@@ -164,12 +164,14 @@ def picture_work_precision(
             _draw_ideal(axis, points, cost, order)
             _draw_failures(axis, points, looks, cost)
         axes[0].set(xlabel=time_name, ylabel=error_name)
-        axes[1].set(xlabel=work_name)
+        axes[1].set(xlabel=work_name, ylabel=error_name)
         if residual_names:
             _draw_residuals(axes[2], points, looks, step_unit)
             axes[2].set(xlabel=residual_names[0], ylabel=residual_names[1])
         figure.legend(*_legend(axes[0], titles), loc="outside upper left", ncols=3)
-        figure.supxlabel(f"{caption}\n{machine_words()}", fontsize=7.5, x=0.01, ha="left")
+        marks = "At the points: what is swept. Bars: to the slowest repeat."
+        words = f"{caption}\n{marks} {machine_words()}"
+        figure.supxlabel(words, fontsize=7.5, x=0.01, ha="left")
         # Where a label has room is known when everything else has its place.
         figure.draw_without_rendering()
         for axis, cost in zip(axes, _COSTS):
@@ -191,7 +193,7 @@ def picture_errors(path, errors, titles, *, time_name, caption):
                 height = [max(error, bottom) for _, error in pairs]
                 axis.plot([cost for cost, _ in pairs], height, label=method, **looks[method])
             axis.set(xscale="log", yscale="log", title=words, xlabel=time_name)
-        axes[0].set_ylabel("error [1]")
+            axis.set_ylabel("error [1]")
         figure.legend(*_legend(axes[0], titles), loc="outside upper left", ncols=4)
         figure.supxlabel(f"{caption}\n{machine_words()}", fontsize=7.5, x=0.01, ha="left")
 

@@ -32,7 +32,7 @@ from _hard_cases._case import FAILED, PASSED, REFUSED
 from _hard_cases._margins import case_title, method_styles, picture_margins
 from ca_damper.progress import Progress
 from taichi_dem.files import output_folder, write_csv
-from taichi_dem.plot_style import GREY, RED, picture
+from taichi_dem.plot_style import GREY, RED, picture, power
 
 NAME = "hard_cases"
 #: Cases of a quick run, one of each kind; the tests ask all, at quick size.
@@ -151,7 +151,7 @@ def draw_case(axis, own, looks, size):
             draw_curves(axis, result.shown, looks[result.method])
     if not any(result.shown for result in own):
         axis.set(xticks=[], yticks=[])
-        said = textwrap.fill(own[0].words, 44)
+        said = textwrap.fill(f"“{own[0].words}”", 44)
         axis.text(0.03, 0.92, said, fontsize=size, va="top", transform=axis.transAxes)
     lowest, highest = axis.get_ylim()
     if axis.get_yscale() == "linear" and 0.0 < lowest < 0.95 * highest:
@@ -173,7 +173,8 @@ def verdict(own):
     said = [f"{counts[word]} {words[word]}" for word in words if counts[word]]
     margins = [result.margin for result in own if result.limit]
     if margins and math.isfinite(min(margins)):
-        said.append(f"margin {min(margins):.2g}")
+        least = min(margins)
+        said.append(f"margin {power(least) if least >= 1e4 else format(least, '.2g')}")
     return ", ".join(said)
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_hex
 from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
 from taichi_dem.plot_style import STYLES
@@ -105,15 +106,24 @@ def unexplained_lines(figure):
             drawn = line.get_visible() and len(line.get_xdata()) and look[1] not in ("-", "None")
             if drawn and look not in known and look[1] not in styles:
                 yield f"no legend says what a line {look[1]} means, in {axes.get_title('left')!r}"
+        for stripe in stripes_of(axes):
+            if colour_of(stripe) not in {colour_of(handle) for _, handle in entries_of(figure)}:
+                yield f"no legend says what a stripe means, in {axes.get_title('left')!r}"
         bands = [c for c in axes.collections if type(c).__name__ == "FillBetweenPolyCollection"]
         bands = [band for band in bands if band.get_alpha() is not None]
         if bands and not any(hasattr(h, "get_facecolor") for _, h in entries_of(figure)):
-            yield f"no legend says what the band means (axes {axes.get_title('left')!r})"
+            yield f"no legend says what the band means, in {axes.get_title('left')!r}"
+
+
+def stripes_of(axes):
+    """Coloured areas that are no bars."""
+    bars = {id(patch) for container in axes.containers for patch in container}
+    return [patch for patch in axes.patches if axes.axison and id(patch) not in bars]
 
 
 def line_of(artist):
-    """Line style, None where there is none."""
-    return artist.get_linestyle() if hasattr(artist, "get_linestyle") else None
+    """Line style of a line, None of anything else."""
+    return artist.get_linestyle() if isinstance(artist, Line2D) else None
 
 
 def missing_units(axes):

@@ -33,7 +33,12 @@ def picture_margins(path, results):
     with picture(path, 1, len(panels), size, squeeze=False) as (_, axes):
         for axis, own, package in zip(axes[0], panels, packages):
             _panel(axis, own)
-            axis.set_title(f"{package}: {len(own)} runs", pad=40.0)
+            axis.set_title(f"{package}: {len(own)} runs", pad=14.0 + 10.5 * -(-_entries(own) // 2))
+
+
+def _entries(own):
+    """Entries of a panel's legend: methods, the bound, and failures where there are any."""
+    return len(_named(own, "method")) + 1 + any(result.status == FAILED for result in own)
 
 
 def _named(own, what):
