@@ -22,7 +22,7 @@ def picture_scaling(path, workers, shared, count, serial, paper, measured):
     accelerations with count, fixed and rebalanced. measured: of real threads, by what was stepped:
     (threads, acceleration).
     """
-    with picture(path, 2, 2, size=(11.0, 8.0)) as (figure, panels):
+    with picture(path, 2, 2, size=(11.0, 9.0)) as (figure, panels):
         _acceleration(panels[0, 0], workers, shared, count, serial)
         for gain, filled, words in zip(paper, (RED, PURPLE), ("fixed", "rebalanced")):
             look = {"color": filled, "label": f"measured in the paper, {words}"}
@@ -33,14 +33,15 @@ def picture_scaling(path, workers, shared, count, serial, paper, measured):
         panels[0, 0].set(xlim=(0, count + 1), ylim=(0, None))
         words = f"Whole run, simulated workers, {100 * serial:g} % not shared (Fig 14)"
         panels[0, 0].set_title(words)
-        panels[0, 0].legend(loc="upper left")
+        handles, labels = panels[0, 0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=3)
         _acceleration(panels[0, 1], workers, shared, np.inf, 0.0)
         panels[0, 1].set(xscale="log", yscale="log")
         panels[0, 1].set_title("Contact calculation alone, many simulated workers")
         _shares(panels[1, 0], shared, count)
         _cuts(panels[1, 1], workers, shared["rebalanced"][count].cuts)
-        words = f"{count} workers are simulated from what one recorded run evaluates, tick by tick"
-        figure.suptitle(f"{words}; only points marked as measured are times of real processes")
+        words = "Lines: simulated workers that share the work of one recorded run"
+        figure.suptitle(f"{words}; points: measured times of processes or threads")
 
 
 def _acceleration(axes, workers, shared, most, serial):
