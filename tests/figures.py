@@ -98,14 +98,13 @@ def other_colours(figure):
 
 def unexplained_lines(figure):
     """Dashed and dotted lines and bands that no legend of the figure names."""
-    known = {(colour_of(handle), line_of(handle)) for _, handle in entries_of(figure)}
-    styles = {line for _, line in known}
+    styles = {line.get_linestyle() for key in legends_of(figure) for line in key.findobj(Line2D)}
     for axes in figure.axes:
         for line in axes.lines:
-            look = (colour_of(line), line_of(line))
-            drawn = line.get_visible() and len(line.get_xdata()) and look[1] not in ("-", "None")
-            if drawn and look not in known and look[1] not in styles:
-                yield f"no legend says what a line {look[1]} means, in {axes.get_title('left')!r}"
+            look = line.get_linestyle()
+            drawn = line.get_visible() and len(line.get_xdata()) and look not in ("-", "None")
+            if drawn and look not in styles:
+                yield f"no legend says what a line {look} means, in {axes.get_title('left')!r}"
         for stripe in stripes_of(axes):
             if colour_of(stripe) not in {colour_of(handle) for _, handle in entries_of(figure)}:
                 yield f"no legend says what a stripe means, in {axes.get_title('left')!r}"
@@ -119,11 +118,6 @@ def stripes_of(axes):
     """Coloured areas that are no bars."""
     bars = {id(patch) for container in axes.containers for patch in container}
     return [patch for patch in axes.patches if axes.axison and id(patch) not in bars]
-
-
-def line_of(artist):
-    """Line style of a line, None of anything else."""
-    return artist.get_linestyle() if isinstance(artist, Line2D) else None
 
 
 def missing_units(axes):

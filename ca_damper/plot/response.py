@@ -33,7 +33,7 @@ def _draw_curves(axis, response):
     """Median over seeds as lines, lowest and highest as bands; the empty container dotted."""
     for k, particles in enumerate(response.particles):
         colour = _shade(response, k)
-        _band(axis, response.ratios, 1e3 * response.rms[k], colour, f"N = {particles}")
+        _band(axis, response.ratios, 1e3 * response.rms[k], colour, f"{particles} particles")
     oscillator = response.oscillator
     fine = np.linspace(response.ratios[0], response.ratios[-1], _FINE)
     empty = oscillator.base_amplitude * np.abs(
@@ -88,7 +88,11 @@ def _draw_peaks(place, height, responses, particle_mass):
     place.set_ylabel("f / f$_0$ of the peak [1]")
     height.set(title="how high; bars: range of the seeds", xlabel="particles N [1]")
     height.set(ylabel="peak RMS displacement [mm]", ylim=(0, None))
-    place.legend()
+    place.legend(handles=place.lines[-1:], loc="lower left")
+    keys, labels = height.get_legend_handles_labels()
+    height.legend(keys, labels, loc="lower left")
+    for axis in (place, height):
+        axis.set_xticks(first.particles)
 
 
 def picture_measures(path, responses, particle_mass):
@@ -106,7 +110,7 @@ def picture_measures(path, responses, particle_mass):
             column[0].set_title(styles_of(responses)[label].label)
             column[0].axhline(1.0, color=GREY, ls=":", lw=1.0, label="rigid mass")
             column[1].set_xlabel("frequency f / f$_0$ [1]")
-        axes[0, 0].set_ylabel("apparent mass / mass of the particles [1]")
+        axes[0, 0].set_ylabel("apparent mass /\nmass of the particles [1]")
         axes[1, 0].set_ylabel("loss factor [1]")
         _legend_of_bands(axes[0, 0])
 
@@ -114,7 +118,7 @@ def picture_measures(path, responses, particle_mass):
 def _draw_measures(column, response, k, particle_mass):
     particles, colour = response.particles[k], _shade(response, k)
     share = response.apparent_mass[k] / (particles * particle_mass)
-    _band(column[0], response.ratios, share, colour, f"N = {particles}")
+    _band(column[0], response.ratios, share, colour, f"{particles} particles")
     _band(column[1], response.ratios, response.loss_factor[k], colour, None)
 
 
@@ -131,7 +135,7 @@ def picture_hysteresis(path, sweeps):
                 _draw_ways(axis, sweep, k)
             column[-1].set_xlabel("frequency f / f$_0$ [1]")
         for k, axis in enumerate(axes[:, 0]):
-            axis.set_ylabel(f"N = {particles[k]}: RMS displacement [mm]")
+            axis.set_ylabel(f"{particles[k]} particles:\nRMS displacement [mm]")
         axes[0, 0].legend()
 
 
