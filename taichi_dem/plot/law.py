@@ -44,6 +44,9 @@ def film_law(path, lines, curves, pressures, points, count):
         panels[1, 0].set_title("tension")
         panels[1, 1].set_title("shear under pressure")
         marks = [_mark(panels[1, min(k, 1)], _COLOURS[k]) for k in range(len(curves))]
+        panels[1, 0].lines[0].set_label("law")
+        marks[0][0].set_label("measured")
+        panels[1, 0].legend(loc="upper right")
         last = len(curves) - 1
         opened, shifted = (f"× {factor:g}" for factor in _MAGNIFY)
         pulled = _Specimen(panels[0, 0], points, f"opening {opened}", _COLOURS[0])

@@ -65,6 +65,8 @@ def film_shaken(path, safe, bad, count):
             _Block(figure, grid[0, k], grid[1, k], made, fastest)
             for k, made in enumerate((safe, bad))
         ]
+        words = f"bodies: colour and points show their speed, displacement × {_MAGNIFY:g}"
+        figure.suptitle(words, fontsize=6.5)
         energy = figure.add_subplot(grid[2, :])
         words = figure.add_subplot(grid[3, :])
         words.set_axis_off()

@@ -120,7 +120,7 @@ class _Bar:
         self.left = np.arange(cells) * self.cell
         self.boxes = axes.bar(self.left, 1.0, self.cell, align="edge", linewidth=0.0)
         axes.set(xlim=(-0.05 * length, 1.16 * length), ylim=(-0.3, 1.3), yticks=[])
-        axes.set(xlabel=f"place [m], displacement × {_MAGNIFY:g}")
+        axes.set(xlabel=f"place [m]; displacement × {_MAGNIFY:g}, red: tension, blue: pressure")
         axes.spines["left"].set_visible(False)
         axes.grid(False)
         (self.gaps,) = axes.plot([], [], "|", color=ORANGE, ms=22, mew=1.8)
