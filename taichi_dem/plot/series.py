@@ -164,7 +164,7 @@ def plot_methods(path, series, column):
     series: method -> columns time_s, cpu_s, evaluations and the one compared, a displacement of the
     hole or of the body watched; the first is the one the others are compared with.
     """
-    with picture(path, 1, 3, size=(12.5, 3.4)) as (_, (cost, work, moved)):
+    with picture(path, 1, 3, size=(12.5, 4.0)) as (figure, (cost, work, moved)):
         first = next(iter(series.values()))
         styles = styles_of(series)
         for name, made in series.items():
@@ -192,9 +192,10 @@ def plot_methods(path, series, column):
                 axes.set_ylim(0.0, None)
         moved.set(
             ylabel=f"displacement of the {_COMPARED[column]},\n"
-            f"difference from that of:\n{next(iter(styles.values())).label} [%]"
+            f"difference from\n{next(iter(styles.values())).label} [%]"
         )
         for axes in (cost, work, moved):
             axes.set(xlabel="time [ms]")
             _span(axes, time)
-        moved.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0))
+        handles, labels = moved.get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=3)
