@@ -33,7 +33,7 @@ def picture_wave(path, length, time, velocity, gates):
             name = f"at {place[cell]:.2f} m" if cell < cells - 1 else "free end"
             over.plot(1e3 * time, 1e3 * velocity[:, cell], color=colour, label=name)
             along.axvline(place[cell], color=colour, linewidth=0.8, linestyle="--", label=name)
-        along.legend(loc="upper left", title="seen on the right")
+        along.legend(loc="upper left", title="seen on the right", frameon=True, framealpha=0.9)
         second = 1e3 * velocity[:, gates[1]].max()
         over.axhline(2.0 * second, color=GREY, linestyle=":", label="twice the wave's peak")
         over.set(xlabel="time [ms]", ylabel="velocity [mm/s]", title="the free end doubles it")
@@ -69,7 +69,7 @@ def _depths(axes, cell, rows):
     share = np.array([row["arrived_MPa"] for row in rows])
     product = rows[0]["formula_m"] * rows[0]["arrived_MPa"]
     line = np.linspace(0.8 * share.min(), 1.1 * share.max(), 100)
-    axes.plot(line, product / line, color=GREY, label="formula: λ σ$_t$ / (2 s$_0$)")
+    axes.plot(line, product / line, color=GREY, label="pulse length × strength / (2 s$_0$)")
     depth = [row["depth_m"] for row in rows]
     axes.errorbar(share, depth, yerr=cell, fmt="o", color=RED, ms=5, label="broke, ± one cell")
     axes.set(xlabel="pulse s$_0$ that arrived [MPa]", ylabel="depth of the first break [m]")
