@@ -139,10 +139,10 @@ def simulate(
                 _run(simulation, recorder, keeper, marks, report_progress)
         except SimulationDiverged as diverged:
             error = diverged
-    result = _result(scene, method, simulation, recorder, error)
-    if measure_gain and error is None:
-        report = replace(result.report, realised_gain=realised_gain(simulation))
-        result = replace(result, report=report)
+        result = _result(scene, method, simulation, recorder, error)
+        if measure_gain and error is None:
+            report = replace(result.report, realised_gain=realised_gain(simulation))
+            result = replace(result, report=report)
     if output is not None:
         _write(result, output, keeper)
     if error is not None:
