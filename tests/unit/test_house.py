@@ -16,8 +16,8 @@ ROOT = Path(__file__).resolve().parents[2]
 # row below. A folder counts as one module. A new module needs a place here.
 LAYERS = {
     "taichi_dem": (
-        ("errors", "types", "checks", "source_lines", "runtime"),
-        ("fields", "field_memory", "files", "effect_use", "time_limit"),
+        ("errors", "types", "checks", "source_lines", "runtime", "progress"),
+        ("fields", "field_memory", "files", "effect_use", "time_limit", "progress_bar"),
         ("plot_style", "checkpoint"),
         ("restart",),
         (
@@ -57,6 +57,7 @@ ACROSS = {
         *("taichi_dem.runtime", "taichi_dem.errors", "taichi_dem.checks", "taichi_dem.fields"),
         *("taichi_dem.files", "taichi_dem.plot_style", "taichi_dem.effect_use"),
         *("taichi_dem.checkpoint", "taichi_dem.restart"),
+        *("taichi_dem.progress", "taichi_dem.progress_bar"),
     )
 }
 
