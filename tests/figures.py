@@ -116,8 +116,10 @@ def unexplained_lines(figure):
 
 def stripes_of(axes):
     """Coloured areas that are no bars."""
+    if axes.get_label() == "<colorbar>" or not axes.axison:
+        return []
     bars = {id(patch) for container in axes.containers for patch in container}
-    return [patch for patch in axes.patches if axes.axison and id(patch) not in bars]
+    return [patch for patch in axes.patches if id(patch) not in bars]
 
 
 def missing_units(axes):

@@ -22,13 +22,13 @@ def picture_law(path, lines, curves, pressures):
         panels[0].lines[0].set_label("law")
         for k, (way, traction) in enumerate(curves):
             some = _evenly(way, traction)
-            label = f"{1e-6 * pressures[k - 1]:g} MPa" if k else "measured"
+            label = f"measured at {1e-6 * pressures[k - 1]:g} MPa" if k else "measured"
             axes = panels[min(k, 1)]
             look = {"marker": "o", "ms": 3.4, "ls": "none", "color": _COLOURS[k]}
             axes.plot(1e6 * way[some], 1e-6 * traction[some], label=label, **look)
         panels[0].legend(loc="upper right")
         panels[1].lines[0].set_label("law")
-        panels[1].legend(title="measured, at a pressure of", loc="lower right")
+        panels[1].legend(loc="lower right")
         panels[0].set_title("pulled, unloaded, pressed, pulled until it breaks")
         panels[1].set_title("slid, back and on, under four pressures")
 

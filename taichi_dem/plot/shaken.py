@@ -72,7 +72,9 @@ def film_shaken(path, safe, bad, count):
         words.set_axis_off()
         said = words.text(-0.12, 1.0, "", va="top", fontsize=5.8, family="monospace")
         end = float(bad.time[-1])
-        curves = [_curve(energy, made, colour) for made, colour in ((safe, GREEN), (bad, RED))]
+        curves = [
+            _curve(energy, made, colour) for made, colour in zip((safe, bad), _LOOKS.values())
+        ]
         energy.set(yscale="log", ylim=_RANGE, xlim=(0.0, 1.03e6 * end))
         energy.set(xlabel="time [µs]", ylabel="unexplained\nenergy /\nput in [1]")
         energy.legend(loc="upper left")
@@ -81,7 +83,7 @@ def film_shaken(path, safe, bad, count):
                 block.show(now)
             for line, time, values in curves:
                 line.set_data(time[time <= 1e6 * now], values[time <= 1e6 * now])
-            said.set_text(textwrap.fill(bad.sentence, 74) if now == end else "")
+            said.set_text(textwrap.fill(bad.sentence, 66) if now == end else "")
             shoot()
 
 
