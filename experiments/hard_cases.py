@@ -28,7 +28,7 @@ from _cli import (
 )
 from _hard_cases import judge, named, registry
 from _hard_cases._case import FAILED, PASSED, REFUSED
-from _hard_cases._margins import case_title, method_styles, picture_margins
+from _hard_cases._margins import case_title, method_styles, picture_margins, with_powers
 from taichi_dem.files import output_folder, write_csv
 from taichi_dem.plot_style import GREY, RED, picture, power
 from taichi_dem.progress_bar import ProgressBar
@@ -119,7 +119,9 @@ def picture_case(path, case, results):
     own = [result for result in results if result.case == case.name]
     with picture(path, 1, 1, (7.0, 4.6)) as (figure, axis):
         draw_case(axis, own, looks_of(own), size=8.0)
-        figure.suptitle(textwrap.fill(case.question, 100), fontsize=9.0, x=0.02, ha="left")
+        figure.suptitle(
+            textwrap.fill(with_powers(case.question), 100), fontsize=9.0, x=0.02, ha="left"
+        )
         handles, labels = axis.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=3)
 

@@ -34,7 +34,7 @@ LABELS = sorted(((s.label, s.colour) for s in STYLES.values()), key=lambda pair:
 
 def defects(figure):
     """Sentences: what a drawn figure lacks; none if it says all that it shows."""
-    found = [*bad_words(figure), *other_colours(figure), *unexplained_lines(figure)]
+    found = [*bad_words_in(texts_of(figure)), *other_colours(figure), *unexplained_lines(figure)]
     for axes in figure.axes:
         found += missing_units(axes)
     return found
@@ -52,9 +52,9 @@ def texts_of(figure):
     return [text.get_text() for text in shown if text not in hidden]
 
 
-def bad_words(figure):
+def bad_words_in(texts):
     """Names of the code and numbers as a program prints them."""
-    for text in texts_of(figure):
+    for text in texts:
         plain = COMMIT.sub("", QUOTE.sub("", MATHS.sub("", text)))
         if CODE_NAME.search(plain):
             yield f"a name of the code in {text!r}"

@@ -15,7 +15,13 @@ _MOST, _REFUSED, _FAILS = 1e4, 0.05, 0.4
 def case_title(name):
     """Name of a case in words: fragment_at_1_km_s -> fragment at 1 km/s."""
     words = re.sub(r"(\d+_k?m)_s(?![a-z])", r"\1/s", name).replace("_", " ")
-    return re.sub(r"\d+e\d+", lambda number: power(float(number[0])), words)
+    return with_powers(words)
+
+
+def with_powers(words):
+    """Words with powers of ten for numbers as a program prints them: 1e4 -> 10⁴."""
+    number = r"\d+(?:\.\d+)?e[-+]?\d+"
+    return re.sub(number, lambda found: power(float(found[0])), words)
 
 
 def method_styles(methods):

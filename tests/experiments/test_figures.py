@@ -2,9 +2,10 @@
 
 import pytest
 
-from _hard_cases._margins import case_title
+from _hard_cases import registry
+from _hard_cases._margins import case_title, with_powers
 from taichi_dem.plot_style import RED, STYLES, power, styled, styles_of
-from tests.figures import defects
+from tests.figures import bad_words_in, defects
 
 
 def of(draw):
@@ -98,3 +99,8 @@ def test_power_has_two_figures(value, words):
 )
 def test_case_is_told_in_words(name, words):
     assert case_title(name) == words
+
+
+@pytest.mark.parametrize("case", registry(), ids=lambda case: case.name)
+def test_names_and_questions_of_hard_cases_are_words(case):
+    assert not list(bad_words_in((case_title(case.name), with_powers(case.question))))
