@@ -4,7 +4,7 @@ import math
 import re
 
 from _hard_cases._case import FAILED, REFUSED
-from taichi_dem.plot_style import GREY, RED, picture, power, styles_of
+from taichi_dem.plot_style import BLACK, GREY, picture, power, styles_of
 
 #: A uniform step of a hard case is fixed: the paper's rule does not shorten it.
 _MEANT = {"uniform": "fixed"}
@@ -62,9 +62,11 @@ def _panel(axis, own):
         style = styles[method]
         axis.plot(where, level, "o", ms=3.4, mew=0.0, color=style.colour, label=style.label)
         failed = [k for k, result in enumerate(mine) if result.status == FAILED]
-        axis.plot([where[k] for k in failed], [level[k] for k in failed], "X", ms=8.0, color=RED)
+        axis.plot(
+            [where[k] for k in failed], [level[k] for k in failed], "X", ms=8.0, color=style.colour
+        )
     if any(result.status == FAILED for result in own):
-        axis.plot([], [], "X", ms=8.0, color=RED, ls="none", label="failed")
+        axis.plot([], [], "X", ms=8.0, color=BLACK, ls="none", label="failed")
     axis.axvline(1.0, color=GREY, lw=1.0, label="at the bound")
     axis.set(xscale="log", xlim=(0.02, 2.5 * _MOST), ylim=(len(cases) - 0.3, -0.7))
     axis.set_yticks(range(len(cases)), [case_title(case) for case in cases], fontsize=6.5)
