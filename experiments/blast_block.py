@@ -165,7 +165,13 @@ def picture_peaks(path, distance, speed, inner, law):
         ends = np.array([FROM_RADII, distance[inner].max()])
         axes.plot(ends, level * ends**slope, color=BLACK, label=f"power {slope:.2f} (fitted)")
         start = level * ends[0] ** slope
-        axes.plot(ends, start * (ends / ends[0]) ** -0.5, ":", color=BLACK, label="power -0.5")
+        axes.plot(
+            ends,
+            start * (ends / ends[0]) ** -0.5,
+            ":",
+            color=BLACK,
+            label="power -0.5 (cylindrical wave)",
+        )
         axes.set(
             xscale="log", yscale="log", xlabel="distance from the axis / radius of the hole [1]"
         )
