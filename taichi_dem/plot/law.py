@@ -28,7 +28,7 @@ def picture_law(path, lines, curves, pressures):
             axes.plot(1e6 * way[some], 1e-6 * traction[some], label=label, **look)
         panels[0].legend(loc="upper right")
         panels[1].lines[0].set_label("law")
-        panels[1].legend(loc="lower right")
+        panels[1].legend(loc="upper left")
         panels[0].set_title("pulled, unloaded, pressed, pulled until it breaks")
         panels[1].set_title("slid, back and on, under four pressures")
 
