@@ -10,6 +10,8 @@ import subprocess
 import sys
 from importlib.metadata import version
 
+# The experiments take the mesh from here, as they do all that they share.
+from taichi_dem import PAPER_BLOCK as PAPER_BLOCK
 from taichi_dem import Checkpoint, InputError, SimulationDiverged, runtime
 from taichi_dem.checkpoint import Interrupted
 from taichi_dem.checks import shown
@@ -23,7 +25,6 @@ _INTERVALS = {
     "sim": "every_s",
 }
 BLAST_DRIVERS = ("auto", "resident", "parallel")
-PAPER_BLOCK = os.path.join(HERE, "meshes", "paper_block.msh")
 
 
 class Parser(argparse.ArgumentParser):

@@ -19,6 +19,7 @@ from taichi_dem.materials import CONCRETE, Material
 from taichi_dem.mesh import Mesh, checked_mesh
 from taichi_dem.mesh_files import read_mesh
 from taichi_dem.mesh_order import in_space_order
+from taichi_dem.meshes import PAPER_BLOCK
 from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
 from taichi_dem.needed_effects import needed_effects
 from taichi_dem.quality import quality_report
@@ -33,6 +34,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "CONCRETE",
+    "PAPER_BLOCK",
     "Checkpoint",
     "ImplicitDashpots",
     "InputError",

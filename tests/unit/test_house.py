@@ -22,7 +22,7 @@ LAYERS = {
         ("restart",),
         (
             *("tetrahedra", "mesh", "mesh_files", "mesh_shapes", "mesh_gmsh", "mesh_order"),
-            *("topology", "quality", "contact_spheres", "materials", "partition"),
+            *("meshes", "topology", "quality", "contact_spheres", "materials", "partition"),
         ),
         ("physics",),
         ("timeline", "step_control"),
