@@ -8,7 +8,8 @@ import platform
 import re
 import subprocess
 import sys
-from importlib.metadata import version
+
+import numpy as np
 
 # The experiments take the mesh from here, as they do all that they share.
 from taichi_dem import PAPER_BLOCK as PAPER_BLOCK
@@ -16,6 +17,7 @@ from taichi_dem import Checkpoint, InputError, SimulationDiverged, runtime
 from taichi_dem.checkpoint import Interrupted
 from taichi_dem.checks import shown
 from taichi_dem.files import write_text
+from taichi_dem.version import __version__, taichi_version
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 _INTERVALS = {
@@ -249,7 +251,7 @@ def processor():
 
 def versions():
     """Versions of what computes, and the commit where there is one."""
-    found = {name: version(name) for name in ("taichi", "numpy", "taichi-dem")}
+    found = {"taichi": taichi_version(), "numpy": np.__version__, "taichi-dem": __version__}
     found["python"] = platform.python_version()
     git = ["git", "-C", HERE, "rev-parse", "--short", "HEAD"]
     try:

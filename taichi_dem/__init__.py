@@ -29,8 +29,7 @@ from taichi_dem.simulate import simulate
 from taichi_dem.simulation import Simulation
 from taichi_dem.step_control import StepControl
 from taichi_dem.step_report import step_report
-
-__version__ = "0.1.0"
+from taichi_dem.version import __version__
 
 __all__ = [
     "CONCRETE",
@@ -46,6 +45,7 @@ __all__ = [
     "SimulationDiverged",
     "StepControl",
     "Uniform",
+    "__version__",
     "checked_mesh",
     "effects",
     "in_space_order",

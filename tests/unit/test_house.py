@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[2]
 # row below. A folder counts as one module. A new module needs a place here.
 LAYERS = {
     "taichi_dem": (
-        ("errors", "types", "checks", "source_lines", "runtime"),
+        ("errors", "types", "checks", "source_lines", "runtime", "version"),
         ("fields", "field_memory", "files", "effect_use", "time_limit"),
         ("plot_style", "checkpoint"),
         ("restart",),
@@ -56,7 +56,7 @@ ACROSS = {
     "ca_damper": (
         *("taichi_dem.runtime", "taichi_dem.errors", "taichi_dem.checks", "taichi_dem.fields"),
         *("taichi_dem.files", "taichi_dem.plot_style", "taichi_dem.effect_use"),
-        *("taichi_dem.checkpoint", "taichi_dem.restart"),
+        *("taichi_dem.checkpoint", "taichi_dem.restart", "taichi_dem.version"),
     )
 }
 
