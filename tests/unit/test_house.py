@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[2]
 LAYERS = {
     "taichi_dem": (
         ("errors", "types", "checks", "source_lines", "runtime", "version"),
-        ("fields", "field_memory", "files", "effect_use", "time_limit"),
+        ("fields", "field_memory", "files", "effect_use", "time_limit", "listing"),
         ("plot_style", "checkpoint"),
         ("restart",),
         (
@@ -38,6 +38,7 @@ LAYERS = {
         ("simulate", "needed_effects"),
         ("plot",),
         ("__init__",),
+        ("__main__",),
     ),
     "ca_damper": (
         ("errors", "random_numbers", "lattice", "table", "progress", "measures", "report"),
@@ -49,6 +50,7 @@ LAYERS = {
         ("sweep",),
         ("plot",),
         ("__init__",),
+        ("__main__",),
     ),
 }
 # What one package may take from another.
@@ -56,7 +58,8 @@ ACROSS = {
     "ca_damper": (
         *("taichi_dem.runtime", "taichi_dem.errors", "taichi_dem.checks", "taichi_dem.fields"),
         *("taichi_dem.files", "taichi_dem.plot_style", "taichi_dem.effect_use"),
-        *("taichi_dem.checkpoint", "taichi_dem.restart", "taichi_dem.version"),
+        *("taichi_dem.checkpoint", "taichi_dem.restart"),
+        *("taichi_dem.version", "taichi_dem.listing"),
     )
 }
 
