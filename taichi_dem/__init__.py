@@ -2,11 +2,16 @@
 
 A scene is a mesh, a material and the effects that act; ``simulate`` runs it::
 
-    from taichi_dem import CONCRETE, ImplicitDashpots, Scene, effects, read_mesh, runtime, simulate
+    from taichi_dem import CONCRETE, PAPER_BLOCK, ImplicitDashpots, Scene
+    from taichi_dem import effects, read_mesh, runtime, simulate
 
     runtime.start()
-    scene = Scene(mesh=read_mesh("block.msh"), material=CONCRETE, effects=[...])
+    blow = effects.GasPressure(group="hole", peak=5e6)
+    scene = Scene(mesh=read_mesh(PAPER_BLOCK), material=CONCRETE, effects=[blow])
     result = simulate(scene, method=ImplicitDashpots(), until=1e-4)
+    print(result.report)
+
+``python -m taichi_dem`` lists what else there is.
 """
 
 # First, out of order: it prepares the environment for ``import taichi``.
