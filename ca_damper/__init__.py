@@ -9,13 +9,13 @@ from ca_damper.errors import InputError, SimulationDiverged
 from ca_damper.filling import Empty, RigidMass
 from ca_damper.needed_effects import needed_effects
 from ca_damper.oscillator import Oscillator
-from ca_damper.progress import Progress
 from ca_damper.record import film
 from ca_damper.report import Report
 from ca_damper.response import Response, frequency_response
 from ca_damper.spheres import Spheres
 from ca_damper.sweep import Sweep, sweep_up_and_down
 from ca_damper.table import SceneTable
+from taichi_dem.progress import Progress
 from taichi_dem.version import __version__
 
 __all__ = [

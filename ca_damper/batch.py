@@ -19,7 +19,7 @@ from ca_damper.coupling import LOST, Coupling
 from ca_damper.errors import SimulationDiverged
 from ca_damper.filling import check_filling
 from ca_damper.oscillator import Oscillator
-from ca_damper.progress import Progress
+from ca_damper.progress import BatchProgress
 from ca_damper.report import RK45_STAGES, Report
 from ca_damper.table import SceneTable
 from taichi_dem import runtime
@@ -27,6 +27,7 @@ from taichi_dem.checkpoint import version_text
 from taichi_dem.checks import choice, instance, positive, whole
 from taichi_dem.errors import InputError
 from taichi_dem.fields import check_room
+from taichi_dem.progress import compiling
 from taichi_dem.restart import Keeper, NoKeeper, Saved, opened
 
 MOUNTS = ("spring", "base")
@@ -59,6 +60,7 @@ class Batch:
         check_record_fits(table.count, self.measured_cycles)
         positive("rtol", rtol, zero_allowed=True)
         positive("atol", atol)
+        compiling("set-up", 0.0)
         self.filling, self.table, self.count, self.mount = filling, table, table.count, mount
         self.oscillators = self._structures()
         self.largest_dt, self.clock = table.column("dt"), Clock(table)
@@ -92,6 +94,7 @@ class Batch:
         """
         self._check_session()
         choice("start", start, STARTS)
+        compiling("placing", 0.2)
         self.coupling.start(np.ascontiguousarray(self._initial(start)))
         self._started = True
         self.time_origin[:] = 0.0
@@ -128,7 +131,7 @@ class Batch:
     def run(self, transient_cycles, measured_cycles, progress=None):
         """Run whole cycles and measure the last of them; returns ``measures.Cycles``.
 
-        progress: called with a Progress about six times a second.
+        progress: called with a BatchProgress about six times a second.
         Raises InputError for numbers of cycles that are none, or within a cycle;
         SimulationDiverged.
         """
@@ -322,6 +325,7 @@ class Batch:
         """Compile the launch without stepping."""
         if not self._compiled:
             started = time.perf_counter()
+            compiling("time step", 0.4)
             self.coupling.advance(0.0)
             self.compile_seconds += time.perf_counter() - started
             self._compiled = True
@@ -339,7 +343,7 @@ class Batch:
             if done < 1.0 == self._done:
                 self._count(steps)
             if progress is not None:
-                progress(Progress(self._done, self._seconds, round(self._done * total)))
+                progress(BatchProgress(self._done, self._seconds, round(self._done * total)))
             self.keeper.look()
             done = self._done
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ca_damper import measures
-from taichi_dem.checks import callback, choice, shown, whole
+from taichi_dem.checks import choice, progress_option, shown, whole
 from taichi_dem.errors import InputError
 
 #: Motion of the container at the beginning of a run.
@@ -17,7 +17,7 @@ def check_run(transient_cycles, start, progress):
     """InputError for a number of cycles, a start or a progress that cannot be meant."""
     whole("transient_cycles", transient_cycles, 0, MOST_CYCLES)
     choice("start", start, STARTS)
-    callback("progress", progress)
+    progress_option("progress", progress)
 
 
 def check_record_fits(scenes, measured_cycles):

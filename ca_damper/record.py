@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ca_damper.progress import Stages
-from taichi_dem.checks import shown, whole
+from taichi_dem.checks import AUTO, shown, whole
 from taichi_dem.errors import InputError
+from taichi_dem.progress_bar import reporting
 
 _MOST_STEPS = 2**31 - 1
 _MOST_MARKS = 1_000_000
@@ -39,11 +40,11 @@ class Film:
     frames: tuple
 
 
-def film(batch, steps, *, sample_every=1, frame_every=None, progress=None):
+def film(batch, steps, *, sample_every=1, frame_every=None, progress=AUTO):
     """Run a batch of few scenes on by a number of steps and record it; returns a Film.
 
     The present state is recorded first, then every so many steps; frame_every: None for no frames.
-    progress: called with a ``progress.Progress``.
+    progress: as in ``frequency_response``.
     Raises InputError for numbers that are none, SimulationDiverged.
     """
     if not hasattr(batch, "sample") or isinstance(batch, type):
@@ -52,16 +53,17 @@ def film(batch, steps, *, sample_every=1, frame_every=None, progress=None):
     samples = _marks("sample_every", sample_every, steps)
     frames = _marks("frame_every", frame_every, steps) if frame_every is not None else set()
     marks = sorted(samples | frames | {steps})
-    tell = Stages(progress, [mark / steps for mark in marks[1:]])
     rows, shots = [], []
-    for before, mark in zip([0, *marks], marks):
-        if mark > before:
-            batch.advance(mark - before, tell)
-        present = batch.sample()
-        if mark in samples:
-            rows.append(present)
-        if mark in frames:
-            shots.append([_frame(batch, present, s) for s in range(batch.count)])
+    with reporting(progress, "film") as report_progress:
+        tell = Stages(report_progress, [mark / steps for mark in marks[1:]])
+        for before, mark in zip([0, *marks], marks):
+            if mark > before:
+                batch.advance(mark - before, tell)
+            present = batch.sample()
+            if mark in samples:
+                rows.append(present)
+            if mark in frames:
+                shots.append([_frame(batch, present, s) for s in range(batch.count)])
     history = {name: np.stack([row[name] for row in rows]) for name in rows[0]}
     return Film(history, tuple(zip(*shots)))
 

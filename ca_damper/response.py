@@ -14,9 +14,10 @@ from ca_damper.measures import peak
 from ca_damper.oscillator import Oscillator
 from ca_damper.report import Report
 from ca_damper.table import SceneTable
-from taichi_dem.checks import instance, positive, several, whole
+from taichi_dem.checks import AUTO, instance, positive, several, whole
 from taichi_dem.errors import InputError
 from taichi_dem.files import write_csv
+from taichi_dem.progress_bar import reporting
 
 #: Measures of a response and the unit that a CSV file says behind their names.
 UNITS = {
@@ -98,7 +99,7 @@ def frequency_response(
     transient_cycles=150,
     measured_cycles=20,
     start="rest",
-    progress=None,
+    progress=AUTO,
     checkpoint=None,
     resume=None,
 ):
@@ -107,20 +108,22 @@ def frequency_response(
     particles: one number or several. ratios: ascending frequency ratios f/f0, f0 of the empty
     container. seeds: how many, counted from 1, or the seeds themselves. oscillator: the primary
     structure, the paper's if None. dt: largest step [s], the filling's own if None.
-    start: the container's motion at the beginning, see ``Batch.start``. progress: called with a
-    ``batch.Progress`` about six times a second. checkpoint: a Checkpoint that says where and when
-    the run saves itself, besides at its end and on Ctrl-C. resume: such a file to go on from; the
-    bits are those of a run that was never stopped.
+    start: the container's motion at the beginning, see ``Batch.start``. progress: "auto"
+    for a bar on a terminal and in Jupyter, None for silence, or a function that is called with a
+    Progress while kernels are compiled, and then about six times a second. checkpoint: a
+    Checkpoint that says where and when the run saves itself, besides at its end and on Ctrl-C.
+    resume: such a file to go on from; the bits are those of a run that was never stopped.
     Raises InputError for what cannot be used, SimulationDiverged.
     """
     grid = Grid(filling, particles, ratios, seeds, oscillator, dt)
     check_run(transient_cycles, start, progress)
-    batch = grid.batch(grid.ratios, measured_cycles)
-    batch.start(start)
     job = f"response, {grid.words()}, {transient_cycles} + {measured_cycles} cycles from {start}"
-    with batch.keep(checkpoint, resume, {"job": job}) as keeper:
-        cycles = batch.run(transient_cycles, measured_cycles, progress)
-        keeper.keep()
+    with reporting(progress, "response") as report_progress:
+        batch = grid.batch(grid.ratios, measured_cycles)
+        batch.start(start)
+        with batch.keep(checkpoint, resume, {"job": job}) as keeper:
+            cycles = batch.run(transient_cycles, measured_cycles, report_progress)
+            keeper.keep()
     shape = grid.shape
     steps = batch.steps_per_cycle.reshape(shape)[0, :, 0]
     values = {name: value.reshape(shape) for name, value in grid.measures(cycles).items()}

@@ -11,6 +11,8 @@ import numpy as np
 from ca_damper.checks import check_run
 from ca_damper.progress import Stages
 from ca_damper.response import UNITS, Grid, Response
+from taichi_dem.checks import AUTO
+from taichi_dem.progress_bar import reporting
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +39,7 @@ def sweep_up_and_down(
     transient_cycles=60,
     measured_cycles=20,
     start="rest",
-    progress=None,
+    progress=AUTO,
     checkpoint=None,
     resume=None,
 ):
@@ -48,18 +50,19 @@ def sweep_up_and_down(
     """
     grid = Grid(filling, particles, ratios, seeds, oscillator, dt)
     check_run(transient_cycles, start, progress)
-    batch = grid.batch(grid.ratios[:1], measured_cycles)
-    batch.start(start)
     way = _Way(grid)
-    job = f"sweep, {grid.words()}, {transient_cycles} + {measured_cycles} cycles from {start}"
-    with batch.keep(checkpoint, resume, {"job": job}, way.parts()) as keeper:
-        tell = Stages(progress, way.ends())
-        for k in way.ahead():
-            if not batch.going_on:
-                batch.drive(grid.ratios[k] * grid.oscillator.natural_frequency)
-            cycles = batch.run(transient_cycles, measured_cycles, tell)
-            way.keep(k, batch, cycles)
-        keeper.keep()
+    with reporting(progress, "sweep") as report_progress:
+        batch = grid.batch(grid.ratios[:1], measured_cycles)
+        batch.start(start)
+        job = f"sweep, {grid.words()}, {transient_cycles} + {measured_cycles} cycles from {start}"
+        with batch.keep(checkpoint, resume, {"job": job}, way.parts()) as keeper:
+            tell = Stages(report_progress, way.ends())
+            for k in way.ahead():
+                if not batch.going_on:
+                    batch.drive(grid.ratios[k] * grid.oscillator.natural_frequency)
+                cycles = batch.run(transient_cycles, measured_cycles, tell)
+                way.keep(k, batch, cycles)
+            keeper.keep()
     return Sweep(way.up.response(), way.down.response())
 
 

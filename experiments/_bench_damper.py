@@ -26,8 +26,8 @@ for label in sys.argv[3:]:
     cpu = time.process_time()
     frequency_response(experiment.fillings()[label], particles=experiment.FULL["particles"],
         ratios=experiment.RATIOS, seeds=5, transient_cycles=int(sys.argv[2]),
-        measured_cycles=20, progress=lambda progress: told.append(progress.seconds))
-    print(label, told[-1], time.process_time() - cpu)
+        measured_cycles=20, progress=told.append)
+    print(label, told[-1].seconds, time.process_time() - cpu)
 """
 
 

@@ -1,6 +1,7 @@
 """What all experiments share: options, exit codes, progress, summary.json."""
 
 import argparse
+import contextlib
 import json
 import math
 import os
@@ -147,7 +148,13 @@ def main(run, made, arguments=None):
     """Parse, start Taichi, run; returns the exit code.
 
     0 done, 2 bad input, 3 diverged, 130 interrupted: each of the latter with one line on stderr.
+    The reader of the output may leave before its end (``| head -1``): the files are still written.
     """
+    with lasting_output():
+        return _guarded(run, made, arguments)
+
+
+def _guarded(run, made, arguments):
     try:
         options = made.parse_args(arguments)
         runtime.start(options.arch, options.threads)
@@ -163,54 +170,63 @@ def main(run, made, arguments=None):
     return 0
 
 
+@contextlib.contextmanager
+def lasting_output():
+    """Let prints in the block go nowhere, without a word, once nobody reads them."""
+    for number, name in ((1, "stdout"), (2, "stderr")):
+        if getattr(sys, name) is None:
+            # Closed from the beginning: keep the next file that is opened from taking its number.
+            setattr(sys, name, _opened_nowhere(number))
+    output = _LastingOutput(sys.stdout)
+    with contextlib.redirect_stdout(output):
+        yield
+    output.flush()
+
+
+def _opened_nowhere(number):
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    if nowhere != number:
+        os.dup2(nowhere, number)
+        os.close(nowhere)
+    return os.fdopen(number, "w")
+
+
+class _LastingOutput:
+    """A text stream that drops what can no longer be written: its reader has left, say."""
+
+    def __init__(self, stream):
+        self._stream = stream
+
+    def write(self, text):
+        """Write text, or drop it."""
+        try:
+            self._stream.write(text)
+        except OSError as error:
+            self._drop(error)
+        return len(text)
+
+    def flush(self):
+        """Send what waits in the buffer, or drop it."""
+        try:
+            self._stream.flush()
+        except OSError as error:
+            self._drop(error)
+
+    def _drop(self, error):
+        if not isinstance(error, BrokenPipeError):
+            _say(f"standard output cannot be written to: {error.strerror}", 1)
+        # The buffer keeps what it could not send, and Python would complain of it at the exit.
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, self._stream.fileno())
+        os.close(nowhere)
+
+    def __getattr__(self, name):
+        return getattr(self._stream, name)
+
+
 def _say(message, code):
     print(" ".join(str(message).split()), file=sys.stderr)
     return code
-
-
-class ProgressBar:
-    """Progress with time left and speed on a terminal; silent in a pipe."""
-
-    def __init__(self, title):
-        self.title = title
-        self.bar = None
-
-    def __enter__(self):
-        if sys.stderr.isatty():
-            from rich.console import Console
-            from rich.progress import BarColumn, Progress, TextColumn
-
-            self.bar = Progress(
-                TextColumn("{task.description}"),
-                BarColumn(),
-                TextColumn("{task.percentage:>3.0f} %  {task.fields[speed]}  {task.fields[left]}"),
-                console=Console(stderr=True),
-                transient=True,
-            )
-            self.bar.start()
-            self.task = self.bar.add_task(self.title, total=1.0, speed="compiling", left="")
-        return self
-
-    def __call__(self, progress):
-        """Show a Progress of either package: its share, and what it says of its speed."""
-        if self.bar is not None:
-            left = time_left(progress.seconds_left)
-            self.bar.update(self.task, completed=progress.share, speed=str(progress), left=left)
-
-    def __exit__(self, *_):
-        if self.bar is not None:
-            self.bar.stop()
-
-
-def time_left(seconds):
-    """A time that is left [s] in words, no finer than it is known."""
-    if not math.isfinite(seconds):
-        return ""
-    if seconds < 90.0:
-        return f"{seconds:.0f} s left"
-    if seconds < 5400.0:
-        return f"{seconds / 60.0:.0f} min left"
-    return f"{seconds / 3600.0:.1f} h left"
 
 
 def figure(value, unit, paper=None):

@@ -2,32 +2,12 @@
 
 import os
 import textwrap
-from dataclasses import dataclass
 
 import numpy as np
 
-from _cli import ProgressBar, print_figures, write_summary
+from _cli import print_figures, write_summary
 from taichi_dem import checked_mesh
 from taichi_dem.files import write_text
-
-
-@dataclass(frozen=True)
-class Share:
-    """Progress of a loop that knows its share, and no speed worth telling."""
-
-    share: float
-
-    def __str__(self):
-        """Nothing."""
-        return ""
-
-
-class ShareBar(ProgressBar):
-    """A progress bar that is given the share alone."""
-
-    def __call__(self, share):
-        """Show a share in [0, 1]."""
-        super().__call__(Share(share))
 
 
 def placed_together(parts):

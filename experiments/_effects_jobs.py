@@ -48,26 +48,10 @@ class Job:
         return Timing.of([1e3 * r["run_s"] / r["steps"] for r in self.results])
 
 
-@dataclass(frozen=True)
-class Share:
-    """How many of all runs are done, as a progress bar wants it."""
-
-    done: int
-    total: int
-
-    @property
-    def share(self):
-        """Of the runs, in [0, 1]."""
-        return self.done / self.total
-
-    def __str__(self):
-        """In words."""
-        return f"{self.done} of {self.total} runs"
-
-
-def run_all(jobs, repeats, workers, arch, progress):
+def run_all(jobs, repeats, workers, arch, bar):
     """Run every job ``repeats`` times (``absent`` once), some at a time; returns wall seconds.
 
+    bar: a ProgressBar.
     All first runs come before all second ones, so that a busy minute of the machine does not fall
     on one job alone.
     """
@@ -79,7 +63,7 @@ def run_all(jobs, repeats, workers, arch, progress):
         for some in rounds:
             for _ in pool.map(lambda job: _measure(job, places[id(job)], arch), some):
                 done += 1
-                progress(Share(done, total))
+                bar.count(done, total)
     return time.perf_counter() - started
 
 

@@ -29,7 +29,6 @@ import numpy as np
 from _blast import paper_effects
 from _cli import (
     BLAST_DRIVERS,
-    ProgressBar,
     add_checkpoints,
     checkpoint_of,
     figure,
@@ -37,7 +36,6 @@ from _cli import (
     number,
     parser,
     print_figures,
-    time_left,
     whole,
     write_summary,
 )
@@ -49,6 +47,8 @@ from taichi_dem.mesh_order import in_space_order
 from taichi_dem.monitor import HoleMonitor
 from taichi_dem.plot.deep import plot_deep_cracks
 from taichi_dem.plot_style import BLACK, BLUE, GREY, picture
+from taichi_dem.progress import time_left
+from taichi_dem.progress_bar import ProgressBar
 
 NAME = "blast_block"
 QUICK = {"until": 1e-4, "samples": 20, "frames": 1}
@@ -97,8 +97,8 @@ class Lines:
     def __call__(self, progress):
         """Take the progress of the run."""
         self.bar(progress)
-        now = progress.time_s, progress.run_seconds
-        if progress.share >= self.next_share:
+        if progress.phase == "running" and progress.share >= self.next_share:
+            now = progress.time_s, progress.seconds
             if self.last is not None and now[0] > self.last[0]:
                 self._say(progress, now)
             self.last = now

@@ -25,7 +25,6 @@ from _blast import explicit_limited, multirate_controlled
 from _cli import (
     BLAST_DRIVERS,
     PAPER_BLOCK,
-    ProgressBar,
     add_checkpoints,
     checkpoint_of,
     figure,
@@ -51,6 +50,7 @@ from taichi_dem import (
     simulate,
 )
 from taichi_dem.files import write_csv
+from taichi_dem.progress_bar import ProgressBar
 
 NAME = "blast_fracture"
 #: Method by name: how it is made of the largest step and the way l; its largest step [s], l [m].

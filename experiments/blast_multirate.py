@@ -23,7 +23,6 @@ from _blast import paper_scene
 from _cli import (
     BLAST_DRIVERS,
     PAPER_BLOCK,
-    ProgressBar,
     figure,
     main,
     number,
@@ -42,6 +41,7 @@ from taichi_dem import (
     plot,
 )
 from taichi_dem.files import output_folder, write_csv
+from taichi_dem.progress_bar import ProgressBar
 from taichi_dem.record import Recorder
 from taichi_dem.simulate import progress_of
 from taichi_dem.simulation import macro_steps

@@ -29,7 +29,6 @@ import numpy as np
 from _blast import paper_scene
 from _cli import (
     PAPER_BLOCK,
-    ProgressBar,
     figure,
     main,
     number,
@@ -46,6 +45,7 @@ from _scaling_threads import ROUNDS, thread_gain
 from taichi_dem import Multirate
 from taichi_dem.files import output_folder, write_csv
 from taichi_dem.partition import imbalance
+from taichi_dem.progress_bar import ProgressBar
 
 NAME = "blast_scaling"
 QUICK = {"until": 1e-4, "l": 1e-7}

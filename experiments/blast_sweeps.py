@@ -23,7 +23,6 @@ import numpy as np
 from _blast import paper_scene
 from _cli import (
     PAPER_BLOCK,
-    ProgressBar,
     figure,
     main,
     parser,
@@ -35,6 +34,7 @@ from _dashpot_system import DashpotSystem
 from taichi_dem import ImplicitDashpots, Simulation
 from taichi_dem.files import output_folder, write_csv
 from taichi_dem.plot_style import BLUE, GREEN, RED, picture
+from taichi_dem.progress_bar import ProgressBar
 from taichi_dem.simulate import progress_of
 from taichi_dem.simulation import macro_steps
 

@@ -33,7 +33,6 @@ from _cache import cached
 from _cli import (
     BLAST_DRIVERS,
     PAPER_BLOCK,
-    ProgressBar,
     figure,
     main,
     parser,
@@ -56,6 +55,7 @@ from _work_precision import (
 from taichi_dem import ImplicitDashpots, Multirate, StepControl, Uniform, read_mesh
 from taichi_dem.files import output_folder, write_csv
 from taichi_dem.plot_style import seconds as seconds_in_words
+from taichi_dem.progress_bar import ProgressBar
 
 NAME = "cost_of_accuracy_blast"
 PAPER_DT0 = 1e-8

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from _cache import cached
-from _cli import ProgressBar, figure, main, parser, print_figures, print_table, write_summary
+from _cli import figure, main, parser, print_figures, print_table, write_summary
 from _cost_rk45 import TITLES as RK45_TITLES
 from _cost_rk45 import rk45_points
 from _damper_response import (
@@ -45,6 +45,7 @@ from ca_damper.plot.cost import picture_curves
 from taichi_dem import InputError
 from taichi_dem.files import output_folder, write_csv
 from taichi_dem.plot_style import seconds as seconds_in_words
+from taichi_dem.progress_bar import ProgressBar
 
 NAME = "cost_of_accuracy_damper"
 SPHERES = "dem_tsuji"

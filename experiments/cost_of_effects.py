@@ -20,7 +20,6 @@ import sys
 import numpy as np
 
 from _cli import (
-    ProgressBar,
     figure,
     main,
     number,
@@ -34,6 +33,7 @@ from _damper_response import distance
 from _effects_jobs import Job, run_all
 from _effects_picture import picture_effects
 from taichi_dem.files import output_folder, write_csv
+from taichi_dem.progress_bar import ProgressBar
 
 NAME = "cost_of_effects"
 #: Effects in the order in which they are added; the load is always there.
@@ -99,8 +99,8 @@ def run(options):
     output_folder(options.out)
     jobs = [*blast_jobs(options), *damper_jobs(options), absent_job(options)]
     workers = options.threads or min(2, os.cpu_count() or 1)
-    with ProgressBar("measuring") as progress:
-        seconds = run_all(jobs, options.repeats, workers, options.arch, progress)
+    with ProgressBar("measuring") as bar:
+        seconds = run_all(jobs, options.repeats, workers, options.arch, bar)
     blast, damper = blast_rows(jobs), damper_rows(jobs)
     figures = figures_of(jobs, blast, damper)
     write_rows(os.path.join(options.out, "blast.csv"), blast)

@@ -14,7 +14,6 @@ import sys
 import time
 
 from _cli import (
-    ProgressBar,
     figure,
     main,
     parser,
@@ -27,9 +26,9 @@ from _cli import (
 from _timing import Timing
 from ca_damper import Automaton, Batch, SceneTable, SimulationDiverged, Spheres
 from ca_damper.plot.cost import picture_cost, picture_steps
-from ca_damper.progress import Progress
 from taichi_dem import InputError
 from taichi_dem.files import output_folder, write_csv
+from taichi_dem.progress_bar import ProgressBar
 
 NAME = "damper_cost"
 FREQUENCY = 6.0
@@ -107,7 +106,7 @@ def time_all(options):
             for k in range(len(options.particles)):
                 timings.append(time_cycle(batch, k, options))
                 done += 1
-                bar(Progress(done / total, batch.run_seconds, done * steps))
+                bar.count(done, total)
             costs[label] = {"timings": timings, "steps": steps}
             costs[label]["compile_s"] = batch.compile_seconds
     return costs

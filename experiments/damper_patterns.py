@@ -19,11 +19,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from _cli import ProgressBar, figure, main, number, parser, print_table, whole, write_summary
+from _cli import figure, main, number, parser, print_table, whole, write_summary
 from ca_damper import Automaton, Batch, SceneTable, Spheres, film, plot
 from ca_damper.automaton import ACCOUNTINGS
 from ca_damper.progress import Stages
 from taichi_dem.files import output_folder, write_csv
+from taichi_dem.progress_bar import ProgressBar
 
 NAME = "damper_patterns"
 QUICK = {"transient": 5, "cycles": 1, "seeds": 2}

@@ -20,12 +20,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from _cli import ProgressBar, figure, main, number, parser, print_table, write_summary
+from _cli import figure, main, number, parser, print_table, write_summary
 from ca_damper import Batch, SceneTable, film, plot
 from ca_damper.automaton import Automaton
 from ca_damper.automaton.accumulator import READINGS
 from ca_damper.spheres import Spheres
 from taichi_dem.files import output_folder, write_csv
+from taichi_dem.progress_bar import ProgressBar
 
 NAME = "damper_rebound"
 QUICK = {"impacts": 4, "every_s": 1e-3}

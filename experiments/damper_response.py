@@ -23,7 +23,6 @@ from pathlib import Path
 import numpy as np
 
 from _cli import (
-    ProgressBar,
     add_checkpoints,
     checkpoint_of,
     figure,
@@ -41,6 +40,7 @@ from ca_damper.plot.response import picture_hysteresis, picture_measures, pictur
 from ca_damper.response import Grid
 from taichi_dem import InputError
 from taichi_dem.files import output_folder, write_csv
+from taichi_dem.progress_bar import ProgressBar
 
 NAME = "damper_response"
 #: 33 ratios f/f0, every 0.005 where the peaks of 0 to 50 particles lie.
@@ -209,7 +209,8 @@ def timed(title, work):
     with ProgressBar(title) as bar:
 
         def progress(present):
-            told[0] = present.seconds
+            if present.phase == "running":
+                told[0] = present.seconds
             bar(present)
 
         made = work(progress)

@@ -18,10 +18,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from _cli import ProgressBar, figure, main, number, parser, whole, write_summary
+from _cli import figure, main, number, parser, whole, write_summary
 from ca_damper import Automaton, Batch, Empty, Oscillator, SceneTable, Spheres, film, plot
 from ca_damper.progress import Stages
 from taichi_dem.files import output_folder, write_csv
+from taichi_dem.progress_bar import ProgressBar
 
 NAME = "demo_damper"
 QUICK = {"begin": 10, "measured": 5}

@@ -20,12 +20,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from _cli import figure, main, parser, print_table, whole
-from _demo import ShareBar, conclude, placed_together
+from _demo import conclude, placed_together
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects
 from taichi_dem.files import output_folder, write_csv
 from taichi_dem.mesh import group_area
 from taichi_dem.mesh_shapes import pair, single
 from taichi_dem.plot.law import film_law, picture_law
+from taichi_dem.progress_bar import ProgressBar
 
 NAME = "demo_fracture_law"
 QUICK, FULL = {"steps": 1000}, {"steps": 5000}
@@ -125,8 +126,8 @@ def run(options):
     steps = options.steps or (QUICK if options.quick else FULL)["steps"]
     output_folder(options.out)
     simulation = Simulation(bench(), Uniform(STEP))
-    with ShareBar("bench") as bar:
-        made = measure(simulation, steps, bar)
+    with ProgressBar("bench") as bar:
+        made = measure(simulation, steps, bar.at)
     rows = comparison(made)
     picture(made, options)
     caption = (

@@ -21,12 +21,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from _cli import BLAST_DRIVERS, ProgressBar, figure, main, number, parser, print_table
+from _cli import BLAST_DRIVERS, figure, main, number, parser, print_table
 from _demo import conclude, placed_together
 from taichi_dem import CONCRETE, Multirate, Scene, Simulation, Uniform, effects
 from taichi_dem.files import output_folder, write_csv
 from taichi_dem.mesh_shapes import bar
 from taichi_dem.plot.blow import film_blow, picture_blow
+from taichi_dem.progress_bar import ProgressBar
 from taichi_dem.record import Recorder
 from taichi_dem.simulate import progress_of
 from taichi_dem.simulation import macro_steps

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from _cli import figure, main, number, parser, print_table
-from _demo import ShareBar, conclude
+from _demo import conclude
 from taichi_dem import (
     CONCRETE,
     Scene,
@@ -33,6 +33,7 @@ from taichi_dem import (
 from taichi_dem.files import output_folder, write_csv
 from taichi_dem.mesh_shapes import bar
 from taichi_dem.plot.shaken import film_shaken, picture_energy
+from taichi_dem.progress_bar import ProgressBar
 from taichi_dem.record import Recorder
 from taichi_dem.simulation import macro_steps
 
@@ -103,7 +104,7 @@ def strike(limit, share, peak):
     recorder, speeds, times, account = Recorder(simulation, None), [], [], []
     simulation.start()
     last, sentence = macro_steps(UNTIL[limit], step), ""
-    with ShareBar(f"{share:g} x the limit of {limit}") as shown:
+    with ProgressBar(f"{share:g} x the limit of {limit}") as shown:
         for mark in sorted({round(last * k / SAMPLES) for k in range(SAMPLES + 1)}):
             try:
                 simulation.advance_to(mark)
@@ -113,7 +114,7 @@ def strike(limit, share, peak):
             speeds.append(corner_speeds(simulation))
             times.append(simulation.time_s)
             account.append(simulation.ledger.account())
-            shown(mark / last)
+            shown.at(mark / last)
             if sentence:
                 break
     found = tuple(recorder.frames), np.array(speeds), np.array(times), tuple(account)

@@ -22,11 +22,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from _cli import figure, main, parser, print_table, whole
-from _demo import ShareBar, conclude, placed_together
+from _demo import conclude, placed_together
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects
 from taichi_dem.files import output_folder, write_csv
 from taichi_dem.mesh_shapes import bar
 from taichi_dem.plot.wave import film_spall, picture_spall, picture_wave
+from taichi_dem.progress_bar import ProgressBar
 
 NAME = "demo_wave_and_spall"
 LENGTH, WIDTH = 4.0, 0.1
@@ -193,11 +194,11 @@ def run(options):
     settings = QUICK if options.quick else FULL
     cells, ratios = options.cells or settings["cells"], settings["ratios"]
     output_folder(options.out)
-    with ShareBar("wave") as bar_shown:
-        wave, first = push(cells, bar_shown)
+    with ProgressBar("wave") as bar_shown:
+        wave, first = push(cells, bar_shown.at)
     speed = wave_speed(wave)
-    with ShareBar("spall") as bar_shown:
-        made, second = spall(cells, ratios, speed, bar_shown)
+    with ProgressBar("spall") as bar_shown:
+        made, second = spall(cells, ratios, speed, bar_shown.at)
     rows = spalled(made, ratios, speed)
     print_rows(rows)
     picture(wave, made, rows, speed, options)

@@ -20,7 +20,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from _cli import Parser, several
+from _cli import Parser, lasting_output, several
 from _gallery_html import RUN, shown, write_page
 from _gallery_pages import SMALL_PICTURES, TOOLS, pages, readme_table
 from taichi_dem import InputError
@@ -184,4 +184,6 @@ def main(arguments=None):
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    with lasting_output():
+        code = main()
+    sys.exit(code)

@@ -17,7 +17,6 @@ import textwrap
 import time
 
 from _cli import (
-    ProgressBar,
     figure,
     main,
     parser,
@@ -30,9 +29,9 @@ from _cli import (
 from _hard_cases import judge, named, registry
 from _hard_cases._case import FAILED, PASSED, REFUSED
 from _hard_cases._margins import picture_margins
-from ca_damper.progress import Progress
 from taichi_dem.files import output_folder, write_csv
 from taichi_dem.plot_style import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, SKY, picture
+from taichi_dem.progress_bar import ProgressBar
 
 NAME = "hard_cases"
 #: Cases of a quick run, one of each kind; the tests ask all, at quick size.
@@ -85,11 +84,11 @@ def run(options):
 def ask(cases, quick):
     """Results of all cases and methods."""
     asked = [(case, method) for case in cases for method in case.asked]
-    results, started = [], time.perf_counter()
+    results = []
     with ProgressBar("hard cases") as bar:
         for k, (case, method) in enumerate(asked):
             results.append(judge(case, method, quick))
-            bar(Progress((k + 1) / len(asked), time.perf_counter() - started, k + 1))
+            bar.count(k + 1, len(asked))
     return results
 
 

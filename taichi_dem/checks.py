@@ -10,6 +10,8 @@ from taichi_dem.errors import InputError
 #: overflows to infinity or falls to zero, and a run ends in NaN without a reason. In SI units
 #: nothing that there is comes near.
 SMALLEST, LARGEST = 1e-60, 1e60
+#: Value of an argument ``progress`` that asks for a bar where somebody watches.
+AUTO = "auto"
 #: Letters of a value that a sentence quotes.
 _QUOTED = 80
 
@@ -116,11 +118,11 @@ def instance(name, value, kind):
     return value
 
 
-def callback(name, value):
-    """The value; InputError unless it is None or can be called."""
-    if value is not None and not callable(value):
-        raise InputError(f"{name} must be a function or None, got {shown(value)}")
-    return value
+def progress_option(name, value):
+    """The value; InputError unless it is a function, "auto" (a bar where watched) or None."""
+    if value is None or callable(value) or (isinstance(value, str) and value == AUTO):
+        return value
+    raise InputError(f'{name} must be a function, "{AUTO}" or None, got {shown(value)}')
 
 
 def path_name(name, value):

@@ -1,8 +1,8 @@
 """The only place that starts Taichi: architecture, threads, and the settings that keep bits equal.
 
-Imported before any other module of the package, because two environment variables must stand
-before the first ``import taichi``: HOME (Taichi aborts without it) and the switch that keeps it
-from asking the network for a newer version.
+Imported before any other module of the package, because some environment variables must stand
+before the first ``import taichi``: HOME (Taichi aborts without it), and the switches that keep it
+from asking the network for a newer version and from talking.
 """
 
 import contextlib
@@ -15,6 +15,8 @@ from pathlib import Path
 
 os.environ.setdefault("TI_SKIP_VERSION_CHECK", "ON")
 os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
+# In Jupyter Taichi would say when it is imported that it found a graphical shell.
+os.environ.setdefault("TI_LOG_LEVEL", "error")
 # TI_ARCH would overrule the architecture that the caller asks for without a word.
 os.environ.pop("TI_ARCH", None)
 if not os.environ.get("HOME"):

@@ -8,11 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from taichi_dem.checkpoint import Checkpoint, digest, version_text
-from taichi_dem.checks import callback, instance, shown
+from taichi_dem.checks import AUTO, instance, progress_option, shown
 from taichi_dem.errors import InputError, SimulationDiverged
 from taichi_dem.files import output_folder, write_csv, write_text
 from taichi_dem.mesh_files import write_mesh
 from taichi_dem.methods import check_method
+from taichi_dem.progress import Progress, compiling
+from taichi_dem.progress_bar import reporting
 from taichi_dem.realised import realised_gain
 from taichi_dem.record import (
     Recorder,
@@ -28,8 +30,8 @@ _MOST_RECORDS = 1_000_000
 
 
 @dataclass(frozen=True)
-class Progress:
-    """How far a run is: time_s of until_s; bonds and pairs evaluated, in run_seconds.
+class RunProgress(Progress):
+    """How far a run is: time_s of until_s; bonds and pairs evaluated.
 
     ahead: bonds and pairs to evaluate in a simulated second at the present levels [1/s].
     """
@@ -37,13 +39,7 @@ class Progress:
     time_s: float
     until_s: float
     evaluations: int
-    run_seconds: float
     ahead: float
-
-    @property
-    def share(self):
-        """Of the way, in [0, 1]."""
-        return self.time_s / self.until_s
 
     @property
     def seconds_left(self):
@@ -51,11 +47,12 @@ class Progress:
         if not self.evaluations:
             return math.inf
         work = max(0.0, self.until_s - self.time_s) * self.ahead
-        return work * self.run_seconds / self.evaluations
+        return work * self.seconds / self.evaluations
 
-    def __str__(self):
-        """How fast it goes."""
-        seconds = max(self.run_seconds, 1e-9)
+    @property
+    def speed(self):
+        """Simulated time and evaluations a second."""
+        seconds = max(self.seconds, 1e-9)
         rate = 1e-6 * self.evaluations / seconds
         return f"{1e6 * self.time_s / seconds:.3g} us/s, {rate:.3g} M evaluations/s"
 
@@ -102,7 +99,7 @@ def simulate(
     driver="auto",
     samples=200,
     frames=0,
-    progress=None,
+    progress=AUTO,
     output=None,
     checkpoint=None,
     resume=None,
@@ -112,7 +109,9 @@ def simulate(
 
     method: from ``taichi_dem.methods``. until: simulated time [s], rounded up to whole largest
     steps. samples, frames: how many evenly spaced rows of the time series, and snapshots, after
-    the one at the start. progress: called with a Progress about five times a second.
+    the one at the start. progress: "auto" for a bar on a terminal and in Jupyter, None for silence,
+    or a function that is called with a Progress while kernels are compiled, and then with a
+    RunProgress about five times a second; ``progress=print`` prints percent and time left.
     output: folder for the result, written at the end, or up to the last good sample when the
     run diverges. checkpoint: a Checkpoint that says where and when the run saves itself, besides
     at its end and on Ctrl-C. resume: a checkpoint file to go on from, of the same scene and method;
@@ -126,32 +125,40 @@ def simulate(
     last = macro_steps(until, method.dt0)
     _check_count("samples", samples, 1)
     _check_count("frames", frames, 0)
-    callback("progress", progress)
+    progress_option("progress", progress)
     arrays = _opened(scene, method, checkpoint, resume, last)
     if output is not None:
         output_folder(output)
-    simulation = Simulation(scene, method, driver)
-    recorder = Recorder(simulation, _watched_group(scene))
-    simulation.start()
-    recorder.compile()
-    keeper = _keeper(simulation, recorder, checkpoint, resume, arrays)
     error = None
-    try:
-        with keeper:
-            marks = _marks(last, samples), _marks(last, frames)
-            _run(simulation, recorder, keeper, marks, progress)
-    except SimulationDiverged as diverged:
-        error = diverged
-    result = _result(scene, method, simulation, recorder, error)
-    if measure_gain and error is None:
-        report = replace(result.report, realised_gain=realised_gain(simulation))
-        result = replace(result, report=report)
+    with reporting(progress, "simulating") as report_progress:
+        simulation, recorder = _started(scene, method, driver)
+        keeper = _keeper(simulation, recorder, checkpoint, resume, arrays)
+        marks = _marks(last, samples), _marks(last, frames)
+        try:
+            with keeper:
+                _run(simulation, recorder, keeper, marks, report_progress)
+        except SimulationDiverged as diverged:
+            error = diverged
+        result = _result(scene, method, simulation, recorder, error)
+        if measure_gain and error is None:
+            report = replace(result.report, realised_gain=realised_gain(simulation))
+            result = replace(result, report=report)
     if output is not None:
         _write(result, output, keeper)
     if error is not None:
         error.result = result
         raise error
     return result
+
+
+def _started(scene, method, driver):
+    """A simulation ready to step and its recorder, with all kernels compiled."""
+    simulation = Simulation(scene, method, driver)
+    recorder = Recorder(simulation, _watched_group(scene))
+    simulation.start()
+    compiling("recording", 0.95)
+    recorder.compile()
+    return simulation, recorder
 
 
 def _opened(scene, method, checkpoint, resume, last):
@@ -215,7 +222,7 @@ def identity_of(scene, method):
     }
 
 
-def _run(simulation, recorder, keeper, marks, progress):
+def _run(simulation, recorder, keeper, marks, report_progress):
     """Step from mark to mark; every mark is sampled, photographed, or only looked at.
 
     marks: largest steps to sample, and to photograph, two sets. Those up to which a resumed run
@@ -229,8 +236,8 @@ def _run(simulation, recorder, keeper, marks, progress):
 
         def tell(end=step * MACRO_TICKS):
             """Tell how far the run is, and save it if due; at a mark its rows come first."""
-            if progress is not None:
-                progress(progress_of(simulation, last * simulation.method.dt0))
+            if report_progress is not None:
+                report_progress(progress_of(simulation, last * simulation.method.dt0))
             if simulation.state.tick[None] < end:
                 keeper.look()
 
@@ -252,10 +259,11 @@ def _write(result, folder, keeper):
 
 
 def progress_of(simulation, until):
-    """Progress of a simulation towards a time [s]."""
+    """RunProgress of a simulation towards a time [s]."""
     done, seconds = simulation.evaluations(), simulation.running_seconds()
     ahead = simulation.evaluations_ahead()
-    return Progress(simulation.time_s, until, done, seconds, ahead)
+    time_s = simulation.time_s
+    return RunProgress(min(1.0, time_s / until), seconds, time_s, until, done, ahead)
 
 
 def _marks(last, count):

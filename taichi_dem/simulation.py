@@ -14,6 +14,7 @@ from taichi_dem.health import Health
 from taichi_dem.ledger import Ledger
 from taichi_dem.methods import check_method
 from taichi_dem.model import Model
+from taichi_dem.progress import compiling
 from taichi_dem.report import Report
 from taichi_dem.resolution import Resolution
 from taichi_dem.scene import Scene
@@ -57,6 +58,7 @@ class Simulation:
         check_method(method)
         choice("driver", driver, ("auto", *DRIVERS))
         started = time.perf_counter()
+        compiling("set-up", 0.0)
         self.scene, self.method = scene, method
         self.solves = method.solves
         with fields_first():
@@ -115,13 +117,16 @@ class Simulation:
         if self.ledger is not None:
             return
         started = time.perf_counter()
+        compiling("first step", 0.2)
         if self.model.has_contact and self.model.contact.outer_faces:
             self.state.expose(self.model.topology)
         self.step.prime()
         if self.contacts is not None:
             self.broad_phase.ask(everywhere=True)
+        compiling("time step", 0.35)
         self.driver.settle()
         self._check_room()
+        compiling("energy balance", 0.85)
         self.ledger = Ledger(self.model, self.state, self.advance, self.contacts)
         self.health = Health(
             self.model, self.state, self.schedule, self.contacts, self.ledger, self.solves

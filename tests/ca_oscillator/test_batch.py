@@ -16,7 +16,6 @@ from ca_damper import (
     Batch,
     Empty,
     InputError,
-    Progress,
     RigidMass,
     SceneTable,
     SimulationDiverged,
@@ -25,7 +24,7 @@ from ca_damper import (
 from ca_damper import batch as batch_module
 from ca_damper.batch import dealt
 from ca_damper.clock import steps_per_cycle
-from ca_damper.progress import Stages
+from ca_damper.progress import BatchProgress, Stages
 from tests.ca_oscillator.kicks import BAD_SEED, CODE, Kicks
 from tests.scenes import ROOT
 
@@ -234,13 +233,13 @@ def test_launches_are_bounded_and_progress_is_told():
 
 
 def test_time_left_and_stages():
-    assert Progress(0.25, 3.0, 10).seconds_left == 9.0
-    assert Progress(0.0, 0.0, 0).seconds_left == math.inf
+    assert BatchProgress(0.25, 3.0, 10).seconds_left == 9.0
+    assert BatchProgress(0.0, 0.0, 0).seconds_left == math.inf
     told = []
     stages = Stages(told.append, [0.5, 1.0])
     for share in (0.5, 1.0, 0.5, 1.0):
         stages.told = -math.inf
-        stages(Progress(share, 2.0 * share, round(10 * share)))
+        stages(BatchProgress(share, 2.0 * share, round(10 * share)))
     assert [progress.share for progress in told] == [0.25, 0.5, 0.75, 1.0]
     assert [progress.seconds for progress in told] == [1.0, 2.0, 3.0, 4.0]
     assert [progress.steps for progress in told] == [5, 10, 15, 20]

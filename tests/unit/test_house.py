@@ -16,8 +16,11 @@ ROOT = Path(__file__).resolve().parents[2]
 # row below. A folder counts as one module. A new module needs a place here.
 LAYERS = {
     "taichi_dem": (
-        ("errors", "types", "checks", "source_lines", "runtime", "version"),
-        ("fields", "field_memory", "files", "effect_use", "time_limit", "listing"),
+        ("errors", "types", "checks", "source_lines", "runtime", "version", "progress"),
+        (
+            *("fields", "field_memory", "files", "effect_use", "time_limit", "listing"),
+            "progress_bar",
+        ),
         ("plot_style", "checkpoint"),
         ("restart",),
         (
@@ -60,6 +63,7 @@ ACROSS = {
         *("taichi_dem.files", "taichi_dem.plot_style", "taichi_dem.effect_use"),
         *("taichi_dem.checkpoint", "taichi_dem.restart"),
         *("taichi_dem.version", "taichi_dem.listing"),
+        *("taichi_dem.progress", "taichi_dem.progress_bar"),
     )
 }
 

@@ -1,0 +1,99 @@
+"""How far a job is: the one thing that progress bars and progress callbacks are given."""
+
+import contextlib
+import math
+import time
+from dataclasses import dataclass
+from typing import ClassVar
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a job is; every job of both packages and of the experiments reports one of these.
+
+    share: done, in [0, 1]. seconds: spent on it so far, without compiling [s].
+    """
+
+    phase: ClassVar[str] = "running"
+    share: float
+    seconds: float
+
+    @property
+    def seconds_left(self):
+        """Time expected until the end [s]; infinite while nothing is known of it."""
+        if self.share <= 0.0:
+            return math.inf
+        return max(0.0, self.seconds * (1.0 / self.share - 1.0))
+
+    @property
+    def speed(self):
+        """How fast the job goes, in words; empty where there is nothing to tell."""
+        return ""
+
+    def __str__(self):
+        """Percent done, time left and speed in one line."""
+        parts = f"{100.0 * self.share:3.0f} %", time_left(self.seconds_left), self.speed
+        return ", ".join(part for part in parts if part)
+
+
+@dataclass(frozen=True)
+class Counted(Progress):
+    """Progress of a job that consists of a number of runs; done of total are finished."""
+
+    done: int
+    total: int
+
+    @property
+    def speed(self):
+        """How many runs are done."""
+        return f"{self.done} of {self.total} runs"
+
+
+@dataclass(frozen=True)
+class Compiling(Progress):
+    """Progress of compiling kernels before the first step. part: which of them, in words."""
+
+    phase: ClassVar[str] = "compiling"
+    part: str
+
+    @property
+    def seconds_left(self):
+        """Unknown, infinite: a part may come from the cache of kernels or be compiled anew."""
+        return math.inf
+
+    def __str__(self):
+        """What is being compiled, how far it is, and why the user will wait less next time."""
+        share = f"{100.0 * self.share:3.0f} %"
+        return f"{share}, compiling {self.part} kernels, the next start is faster"
+
+
+def time_left(seconds):
+    """A time that is left [s] in words, no finer than it is known; "" when it is unknown."""
+    if not math.isfinite(seconds):
+        return ""
+    if seconds < 90.0:
+        return f"{seconds:.0f} s left"
+    if seconds < 5400.0:
+        return f"{seconds / 60.0:.0f} min left"
+    return f"{seconds / 3600.0:.1f} h left"
+
+
+#: Who is told of compiling, the innermost last, and since when each listens [s].
+_listeners = []
+
+
+@contextlib.contextmanager
+def listening(listener):
+    """Call listener(Compiling) whenever kernels are compiled in the block; inner blocks win."""
+    _listeners.append((listener, time.perf_counter()))
+    try:
+        yield
+    finally:
+        _listeners.pop()
+
+
+def compiling(part, share):
+    """Tell the listener that a part of the kernels is compiled next; share: of all of them."""
+    if _listeners:
+        listener, since = _listeners[-1]
+        listener(Compiling(share, time.perf_counter() - since, part))

@@ -1,0 +1,143 @@
+"""A progress bar where somebody watches: on a terminal and in Jupyter; silent elsewhere."""
+
+import contextlib
+import html
+import sys
+import time
+
+from taichi_dem.checks import AUTO, progress_option, shown
+from taichi_dem.progress import Counted, Progress, listening
+
+#: Least time between two updates of a cell in Jupyter [s].
+_NOTEBOOK_SECONDS = 0.2
+#: Bars that are shown now; a second one below the first would garble both.
+_open_bars = []
+
+
+class ProgressBar:
+    """A bar with percent, time left and speed, from entering to leaving its block.
+
+    It is drawn on stderr where that is a terminal, and in the cell of a Jupyter notebook; it leaves
+    nothing behind. Call it with a Progress; while kernels are compiled in its block it says so by
+    itself. title: what is being done.
+    """
+
+    def __init__(self, title):
+        self.title, self._display = title, None
+        self._listening = listening(self)
+
+    def __enter__(self):
+        self._started = time.perf_counter()
+        self._display = _Nothing() if _open_bars else _display_for(self.title)
+        _open_bars.append(self)
+        self._listening.__enter__()
+        return self
+
+    def __call__(self, progress):
+        """Show a Progress. Raises TypeError for anything else, watched or not."""
+        if not isinstance(progress, Progress):
+            raise TypeError(f"a progress bar takes a Progress, got {shown(progress)}")
+        self._display.show(progress)
+
+    def at(self, share):
+        """Show a share in [0, 1] of a job that knows no more of itself."""
+        self(Progress(share, time.perf_counter() - self._started))
+
+    def count(self, done, total):
+        """Show how many runs are done of a job that consists of several."""
+        self(Counted(done / total, time.perf_counter() - self._started, done, total))
+
+    def __exit__(self, *error):
+        self._listening.__exit__(*error)
+        _open_bars.remove(self)
+        self._display.close()
+
+
+@contextlib.contextmanager
+def reporting(progress, title):
+    """What a job is to report its Progress to, given its argument ``progress``; None for nobody.
+
+    "auto" gives a bar where somebody watches. A function is also told of compiling.
+    """
+    if progress_option("progress", progress) is None:
+        yield None
+    elif progress == AUTO:
+        with ProgressBar(title) as bar:
+            yield bar
+    else:
+        with listening(progress):
+            yield progress
+
+
+class _Nothing:
+    """Nobody watches."""
+
+    def show(self, progress):
+        """Do nothing."""
+
+    def close(self):
+        """Do nothing."""
+
+
+class _Terminal:
+    """A bar on a terminal, by rich."""
+
+    def __init__(self, title):
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
+
+        texts = TextColumn("{task.description}"), TextColumn("{task.fields[words]}")
+        columns = SpinnerColumn(), texts[0], BarColumn(None), texts[1]
+        # The bar takes what the words leave of a line.
+        self._bar = Progress(*columns, console=Console(stderr=True), transient=True, expand=True)
+        self._bar.start()
+        self._task = self._bar.add_task(title, total=1.0, words="")
+
+    def show(self, progress):
+        """Draw how far the job is, and what it says of itself."""
+        # Rich's own thread redraws ten times a second, but not while Taichi compiles a kernel.
+        at_once = progress.phase == "compiling"
+        self._bar.update(self._task, completed=progress.share, words=str(progress), refresh=at_once)
+
+    def close(self):
+        """Remove the bar."""
+        self._bar.stop()
+
+
+class _Notebook:
+    """A bar below the cell of a Jupyter notebook that is running."""
+
+    def __init__(self, title, display):
+        self._title, self._due = title, 0.0
+        self._handle = display(self._drawn(0.0, ""), raw=True, display_id=True)
+
+    def _drawn(self, share, words):
+        bar = f'<progress value="{share:.3f}" max="1"></progress>'
+        marked = f"{html.escape(self._title)} {bar} {html.escape(words)}"
+        return {"text/plain": f"{self._title}: {words}", "text/html": marked}
+
+    def show(self, progress):
+        """Draw how far the job is, and what it says of itself."""
+        if progress.phase == "compiling" or time.perf_counter() >= self._due:
+            self._due = time.perf_counter() + _NOTEBOOK_SECONDS
+            self._handle.update(self._drawn(progress.share, str(progress)), raw=True)
+
+    def close(self):
+        """Empty the place of the bar."""
+        self._handle.update({"text/plain": "", "text/html": ""}, raw=True)
+
+
+def _display_for(title):
+    shell = _notebook_shell()
+    if shell is not None:
+        return _Notebook(title, sys.modules["IPython"].display.display)
+    if sys.stderr is not None and sys.stderr.isatty():
+        return _Terminal(title)
+    return _Nothing()
+
+
+def _notebook_shell():
+    """The shell of a Jupyter kernel that this process is, or None."""
+    python = sys.modules.get("IPython")
+    shell = python.get_ipython() if python is not None else None
+    return shell if shell is not None and hasattr(shell, "kernel") else None
