@@ -73,7 +73,7 @@ FIGURES = {
         *("speedup_24_simulated", "speedup_24_static", "speedup_24_due", "speedup_2_threads"),
     },
     "cost_of_effects": {
-        *("overhead_absent_percent", "blast_seconds", "blast_chance_percent"),
+        *("overhead_absent_percent", "blast_seconds"),
         *(
             f"{effect}_{what}"
             for effect in ("sphere_contact", "friction")
