@@ -18,7 +18,7 @@ SHOWN = {
     "displacement_m": ("displacement [m]", 4),
     "speed_m_s": ("speed [m/s]", 4),
     "damage": ("damage, 0 intact to 1 failed", 0),
-    "level": ("level: step dt0 / 2^level", 0),
+    "level": ("level: step of level 0 / 2^level", 0),
 }
 #: Pixels of a picture: views wider than high leave room for their scales.
 SIZE = [1600, 1200]
@@ -62,9 +62,13 @@ def show(source, name, words, decades):
     scale = simple.GetScalarBar(colours, view)
     scale.Title = scale.ComponentTitle = ""
     scale.LabelColor, scale.WindowLocation = INK, "Lower Right Corner"
+    scale.UseCustomLabels, scale.AddRangeLabels = 1, 0
     if decades:
-        scale.UseCustomLabels, scale.AddRangeLabels = 1, 0
         scale.CustomLabels = [most * 10.0**-k for k in range(decades + 1)]
+    else:
+        most = colours.RGBPoints[-4]
+        even = [0.0, 0.5 * most, most] if most <= 1.0 else [float(k) for k in range(int(most) + 1)]
+        scale.CustomLabels = even
     text = simple.Show(simple.Text(Text=words), view)
     text.Color, text.WindowLocation = INK, "Upper Center"
     view.ResetCamera()

@@ -6,12 +6,9 @@ from _damper_response import OSCILLATOR
 from _timing import measure
 from _work_precision import Point
 from ca_damper import Batch, Empty, SceneTable, rk45
+from taichi_dem.plot_style import power
 
-TITLES = {
-    "rk45_tolerance": "RK45 in the kernel, over rtol (step at most 3.9 ms)",
-    "rk45_step": "RK45 in the kernel, over the longest step (rtol 1e-2)",
-    "rk45_python": "RK45 in Python, steps free, over rtol",
-}
+WAYS = ("rk45_tolerance", "rk45_step", "rk45_python")
 TOLERANCES = (1e-6, 1e-8, 1e-10, 1e-12)
 STEPS = (3.9e-3, 1e-3, 2e-4)
 PYTHON_TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8)
@@ -26,16 +23,14 @@ def rk45_points(job, repeats, quick):
     """(Points of all ways, seconds spent on compiling); quick: every other point."""
     every = 2 if quick else 1
     points, compiling = [], 0.0
-    kernel = [
-        ("rk45_tolerance", rtol, f"{rtol:.0e}", LONGEST, rtol) for rtol in TOLERANCES[::every]
-    ]
+    kernel = [("rk45_tolerance", rtol, power(rtol), LONGEST, rtol) for rtol in TOLERANCES[::every]]
     kernel += [("rk45_step", dt, f"{1e3 * dt:g} ms", dt, 1e-2) for dt in STEPS[::every]]
     for method, swept, label, dt, rtol in kernel:
         point, seconds = _in_kernel(job, repeats, dt, rtol)
         points.append(Point(method, swept, label, *point))
         compiling += seconds
     for rtol in PYTHON_TOLERANCES[::every]:
-        points.append(Point("rk45_python", rtol, f"{rtol:.0e}", *_in_python(job, rtol)))
+        points.append(Point("rk45_python", rtol, power(rtol), *_in_python(job, rtol)))
     return points, compiling
 
 

@@ -1,6 +1,6 @@
 """The picture of ``cost_of_effects.py``: what an effect costs beside what it is good for."""
 
-from taichi_dem.plot_style import BLACK, BLUE, GREY, RED, picture
+from taichi_dem.plot_style import BLACK, BLUE, GREY, RED, area_key, line_key, picture
 
 #: Changes are drawn from the first on [%].
 _TICKS = (0.01, 0.1, 1.0, 10.0, 100.0)
@@ -13,7 +13,7 @@ def picture_effects(path, parts):
     repeats, change [%]); chance [%]: what the result owes to round-off or to its seed.
     """
     heights = [max(1, len(effects)) for _, effects, _ in parts]
-    size = (8.2, 1.6 + 0.42 * sum(heights) + 0.4 * len(parts))
+    size = (9.4, 1.6 + 0.42 * sum(heights) + 0.7 * len(parts))
     options = {"gridspec_kw": {"height_ratios": heights, "width_ratios": [1, 1.25]}}
     with picture(path, len(parts), 2, size, squeeze=False, **options) as (figure, axes):
         for (left, right), (title, effects, chance) in zip(axes, parts):
@@ -24,10 +24,12 @@ def picture_effects(path, parts):
         high = max(ax.get_xlim()[1] for ax in axes[:, 0])
         for ax in axes[:, 0]:
             ax.set_xlim(low, 1.2 * high)
-        axes[-1][0].set_xlabel(
-            "cost: share of a step's time [%]\n(line: range of repeats; below 0: slower without it)"
-        )
-        axes[-1][1].set_xlabel("use: change of the result without it [%]\n(grey: by chance alone)")
+        for left, right in axes:
+            left.set_xlabel("cost: share of a step's time [%], below 0: slower without it")
+            right.set_xlabel("use: change of the result without it [%]")
+        marks = [line_key("range of the repeats", color=BLACK, lw=1.0)]
+        marks.append(area_key("change by chance alone (round-off, seeds)", fc=GREY, alpha=0.3))
+        figure.legend(handles=marks, loc="outside lower right", ncols=2)
         figure.suptitle("What does an effect cost, and what is it good for?")
 
 

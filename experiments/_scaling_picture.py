@@ -4,7 +4,7 @@ import numpy as np
 
 from _scaling_simulate import WAYS, acceleration
 from taichi_dem.partition import imbalance
-from taichi_dem.plot_style import BLUE, GREEN, GREY, PURPLE, RED, picture
+from taichi_dem.plot_style import BLACK, BLUE, GREEN, GREY, PURPLE, RED, picture
 
 _LOOK = {
     "static": (RED, "-"),
@@ -14,25 +14,34 @@ _LOOK = {
 }
 
 
-def picture_scaling(path, workers, shared, count, serial, paper):
+def picture_scaling(path, workers, shared, count, serial, paper, measured):
     """Write the picture.
 
     workers: a ``Workers``; shared: ``Shared`` by way and number of workers. count: workers of the
     panels below. serial: share of a run that cannot be shared. paper: its
-    accelerations with count, fixed and rebalanced.
+    accelerations with count, fixed and rebalanced. measured: of real threads, by what was stepped:
+    (threads, acceleration).
     """
-    with picture(path, 2, 2, size=(11.0, 8.0)) as (_, panels):
+    with picture(path, 2, 2, size=(11.0, 9.0)) as (figure, panels):
         _acceleration(panels[0, 0], workers, shared, count, serial)
-        for gain, filled, words in zip(paper, (RED, BLUE), ("fixed", "rebalanced")):
-            panels[0, 0].plot([count], [gain], "o", color=filled, label=f"the paper, {words}")
+        for gain, filled, words in zip(paper, (RED, PURPLE), ("fixed", "rebalanced")):
+            look = {"color": filled, "label": f"measured in the paper, {words}"}
+            panels[0, 0].plot([count], [gain], "o", **look)
+        for mark, (words, (threads, gain)) in zip("*P", measured.items()):
+            look = {"color": BLACK, "ms": 9, "ls": "none", "label": f"measured here, {words}"}
+            panels[0, 0].plot([threads], [gain], mark, **look)
         panels[0, 0].set(xlim=(0, count + 1), ylim=(0, None))
-        panels[0, 0].set_title(f"Whole run, {100 * serial:g} % of it not shared (Fig 14)")
-        panels[0, 0].legend(loc="upper left")
+        words = f"Whole run, simulated workers, {100 * serial:g} % not shared (Fig 14)"
+        panels[0, 0].set_title(words)
+        handles, labels = panels[0, 0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=3)
         _acceleration(panels[0, 1], workers, shared, np.inf, 0.0)
         panels[0, 1].set(xscale="log", yscale="log")
-        panels[0, 1].set_title("Contact calculation alone, many workers")
+        panels[0, 1].set_title("Contact calculation alone, many simulated workers")
         _shares(panels[1, 0], shared, count)
         _cuts(panels[1, 1], workers, shared["rebalanced"][count].cuts)
+        words = "Lines: simulated workers that share the work of one recorded run"
+        figure.suptitle(f"{words}; points: measured times of processes or threads")
 
 
 def _acceleration(axes, workers, shared, most, serial):
@@ -42,8 +51,8 @@ def _acceleration(axes, workers, shared, most, serial):
         gains = [acceleration(workers.total, shared[way][c].elapsed, serial) for c in counts]
         axes.plot(counts, gains, line, color=colour, label=WAYS[way])
     bound = counts / (1.0 + serial * (counts - 1.0))
-    axes.plot(counts, bound, ":", color=GREY, label="nobody ever waits")
-    axes.set(xlabel="workers", ylabel="acceleration")
+    axes.plot(counts, bound, ":", color=GREY, label="bound: nobody ever waits")
+    axes.set(xlabel="workers [1]", ylabel="acceleration [1]")
 
 
 def _shares(axes, shared, count):
@@ -57,10 +66,12 @@ def _shares(axes, shared, count):
                 numbers, seconds / seconds.mean(), line, where="mid", color=colour, label=label
             )
     axes.set(
-        xlabel="worker", ylabel="time of its work / mean", ylim=(0.0, 1.4 * axes.get_ylim()[1])
+        xlabel="number of the worker [1]",
+        ylabel="time of its work / mean [1]",
+        ylim=(0.0, 1.4 * axes.get_ylim()[1]),
     )
     axes.set(xlim=(0.5, count + 0.5))
-    axes.set_title("Slowest over fastest of all in the run (Fig 15)")
+    axes.set_title("Simulated workers: slowest over fastest in the run (Fig 15)")
     axes.legend(loc="upper right")
 
 
@@ -68,6 +79,6 @@ def _cuts(axes, workers, cuts):
     """Where the shares of bodies begin, over time (Fig 9)."""
     time_ms = 1e3 * workers.record.time
     axes.plot(time_ms, cuts[:, 1:-1], color=BLUE, linewidth=0.5)
-    axes.set(xlabel="time [ms]", ylabel="number of the body", ylim=(0, workers.bodies))
+    axes.set(xlabel="time [ms]", ylabel="number of the body [1]", ylim=(0, workers.bodies))
     axes.set(xlim=(0.0, time_ms[-1]))
-    axes.set_title("Cuts of the shares: close together where the work is (Fig 9)")
+    axes.set_title("Lines: where simulated workers' shares begin (Fig 9)")

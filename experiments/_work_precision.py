@@ -14,10 +14,8 @@ from _cli import processor, versions
 from _timing import Timing
 from taichi_dem import runtime
 from taichi_dem.files import write_csv
-from taichi_dem.plot_style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, RED, SKY, picture
+from taichi_dem.plot_style import GREY, picture, styles_of
 
-_COLOURS = (RED, BLUE, GREEN, ORANGE, PURPLE, SKY, BLACK)
-_MARKS = "osD^vPX"
 _SMALL = 6.5
 #: Where a label's centre may stand: right and up in widths and heights of the label, and a gap.
 _PLACES = ((1, 1), (-1, -1), (1, -1), (-1, 1), (1, 0), (-1, 0), (0, 2), (0, -2), (1, 3), (-1, -3))
@@ -145,14 +143,16 @@ def picture_work_precision(
     work_name,
     time_name=WALL,
     residual_names=(),
+    step_unit=1.0,
     order=1,
 ):
     """Error over wall time and over evaluations; the residual of each run over its step.
 
     titles: of the methods, in the order of the legend. time_name: what the times are. floors:
     dotted, by method. order: of the line of ideal gain, error ~ cost^-order, drawn through the
-    best buy. residual_names: of a third panel's axes (step, residual), none if empty. Failures are
-    crosses on the top edge, above what they would have cost, with their reason.
+    best buy. residual_names: of a third panel's axes (step, residual), none if empty; step_unit: of
+    its step [s]. Failures are crosses on the top edge, above what they would have cost, with their
+    reason.
     """
     panels = 3 if residual_names else 2
     ratios = {"width_ratios": (1.0, 1.0, 0.62)[:panels]}
@@ -164,12 +164,14 @@ def picture_work_precision(
             _draw_ideal(axis, points, cost, order)
             _draw_failures(axis, points, looks, cost)
         axes[0].set(xlabel=time_name, ylabel=error_name)
-        axes[1].set(xlabel=work_name)
+        axes[1].set(xlabel=work_name, ylabel=error_name)
         if residual_names:
-            _draw_residuals(axes[2], points, looks)
+            _draw_residuals(axes[2], points, looks, step_unit)
             axes[2].set(xlabel=residual_names[0], ylabel=residual_names[1])
         figure.legend(*_legend(axes[0], titles), loc="outside upper left", ncols=3)
-        figure.supxlabel(f"{caption}\n{machine_words()}", fontsize=7.5, x=0.01, ha="left")
+        marks = "At the points: what is swept. Bars: to the slowest repeat."
+        words = f"{caption}\n{marks} {machine_words()}"
+        figure.supxlabel(words, fontsize=7.5, x=0.01, ha="left")
         # Where a label has room is known when everything else has its place.
         figure.draw_without_rendering()
         for axis, cost in zip(axes, _COSTS):
@@ -191,17 +193,16 @@ def picture_errors(path, errors, titles, *, time_name, caption):
                 height = [max(error, bottom) for _, error in pairs]
                 axis.plot([cost for cost, _ in pairs], height, label=method, **looks[method])
             axis.set(xscale="log", yscale="log", title=words, xlabel=time_name)
-        axes[0].set_ylabel("error")
+            axis.set_ylabel("error [1]")
         figure.legend(*_legend(axes[0], titles), loc="outside upper left", ncols=4)
         figure.supxlabel(f"{caption}\n{machine_words()}", fontsize=7.5, x=0.01, ha="left")
 
 
 def _looks(titles):
     """Colour and mark of every method."""
-    count = len(_COLOURS)
     return {
-        method: {"color": _COLOURS[k % count], "marker": _MARKS[k % count], "ms": 5, "lw": 1.2}
-        for k, method in enumerate(titles)
+        method: {"color": style.colour, "marker": style.marker, "ms": 5, "lw": 1.2}
+        for method, style in styles_of(titles).items()
     }
 
 
@@ -270,7 +271,7 @@ def _draw_failures(axis, points, looks, cost):
     bottom, top = axis.get_ylim()
     step = (top / bottom) ** 0.055
     edge = top * step ** (len(rows) + 0.3)
-    axis.axhspan(top, edge, color="0.94", lw=0)
+    axis.axhspan(top, edge, color="0.94", lw=0, label="× no result: its cost, but no error")
     axis.set_ylim(bottom, edge)
     widest = [cost_of(p, points, cost) for own in rows.values() for p in own]
     left, right = axis.get_xlim()
@@ -294,11 +295,11 @@ def _coarse(point):
     return -point.step
 
 
-def _draw_residuals(axis, points, looks):
+def _draw_residuals(axis, points, looks, unit):
     axis.set(xscale="log", yscale="log")
     for method, look in looks.items():
         own = [p for p in _good(points, method) if p.residual > 0.0]
-        axis.plot([p.step for p in own], [p.residual for p in own], **look)
+        axis.plot([p.step / unit for p in own], [p.residual for p in own], **look)
     # Within a decade a log axis writes all its minor ticks, wide as they are.
     axis.xaxis.set_minor_formatter("")
 

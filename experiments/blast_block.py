@@ -165,8 +165,16 @@ def picture_peaks(path, distance, speed, inner, law):
         ends = np.array([FROM_RADII, distance[inner].max()])
         axes.plot(ends, level * ends**slope, color=BLACK, label=f"power {slope:.2f} (fitted)")
         start = level * ends[0] ** slope
-        axes.plot(ends, start * (ends / ends[0]) ** -0.5, ":", color=BLACK, label="power -0.5")
-        axes.set(xscale="log", yscale="log", xlabel="distance from the axis / radius of the hole")
+        axes.plot(
+            ends,
+            start * (ends / ends[0]) ** -0.5,
+            ":",
+            color=BLACK,
+            label="power -0.5 (cylindrical wave)",
+        )
+        axes.set(
+            xscale="log", yscale="log", xlabel="distance from the axis / radius of the hole [1]"
+        )
         axes.set(ylabel="peak particle velocity [m/s]")
         positive = speed[speed > 0.0]
         axes.set_ylim(0.5 * np.percentile(positive, 0.1), 2.0 * positive.max())

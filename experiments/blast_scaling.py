@@ -154,7 +154,8 @@ def run(options):
     write_tables(options.out, workers, shared)
     path = os.path.join(options.out, "scaling.png")
     paper = PAPER_ONE / PAPER_FIXED, PAPER_ONE / PAPER_MANY
-    picture_scaling(path, workers, shared, PAPER_WORKERS, PAPER_SERIAL, paper)
+    measured = dict(zip(("2 threads, bar", "2 threads, block"), ((2, g["gain"]) for g in gains)))
+    picture_scaling(path, workers, shared, PAPER_WORKERS, PAPER_SERIAL, paper, measured)
     seconds = simulation.compile_seconds, time.perf_counter() - started
     write_summary(options.out, NAME, figures, compile_seconds=seconds[0], run_seconds=seconds[1])
     show(workers, shared)

@@ -33,18 +33,18 @@ from _cli import (
 from _dashpot_system import DashpotSystem
 from taichi_dem import ImplicitDashpots, Simulation
 from taichi_dem.files import output_folder, write_csv
-from taichi_dem.plot_style import BLUE, GREEN, RED, picture
+from taichi_dem.plot_style import BROWN, GREY, STYLES, VIOLET, picture
 from taichi_dem.progress_bar import ProgressBar
 from taichi_dem.simulate import progress_of
 from taichi_dem.simulation import macro_steps
 
 NAME = "blast_sweeps"
 TIMES, QUICK_TIMES = (2e-5, 1e-4, 2e-4, 4e-4), (5e-6, 2e-5)
-#: Way -> (words, colour).
+#: Way -> (words, colour); the first is that of the method with solved dashpots.
 WAYS = {
-    "gauss_seidel": ("Gauss-Seidel by colours", BLUE),
-    "jacobi": ("Jacobi, split masses", RED),
-    "momentum": ("Jacobi with momentum", GREEN),
+    "gauss_seidel": ("Gauss-Seidel by colours", STYLES["implicit"].colour),
+    "jacobi": ("Jacobi, split masses", BROWN),
+    "momentum": ("Jacobi with momentum", VIOLET),
 }
 TOLERANCES = (0.05, 0.01, 1e-3)
 KICK, SWEEPS = 0.05, 30
@@ -95,10 +95,12 @@ def draw(path, found):
                 label = words if place == 0 else None
                 axes.semilogy(errors[name], color=colour, alpha=0.7, label=label)
         for tolerance in TOLERANCES:
-            axes.axhline(tolerance, color="0.6", linewidth=0.8, linestyle=":")
-        axes.set(xlabel="sweeps", ylabel="error of velocities [1]", xlim=(0, 20), ylim=(1e-9, 1))
+            axes.axhline(tolerance, color=GREY, linewidth=0.8, linestyle=":")
+        axes.lines[-1].set_label("errors of 5, 1 and 0.1 %")
+        axes.set(xlabel="sweeps [1]", ylabel="error of velocities [1]")
+        axes.set(xlim=(0, 20), ylim=(1e-9, 1))
         axes.set_xticks(range(0, 21, 2))
-        axes.set_title("A line a time of the blast; dotted: 5, 1 and 0.1 %")
+        axes.set_title("Each line: one time of the blast")
         axes.legend()
 
 

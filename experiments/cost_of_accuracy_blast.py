@@ -54,6 +54,7 @@ from _work_precision import (
 )
 from taichi_dem import ImplicitDashpots, Multirate, StepControl, Uniform, read_mesh
 from taichi_dem.files import output_folder, write_csv
+from taichi_dem.plot_style import power, styles_of
 from taichi_dem.plot_style import seconds as seconds_in_words
 from taichi_dem.progress_bar import ProgressBar
 
@@ -71,7 +72,6 @@ TIME = "CPU time of one thread [s], least of its runs"
 class Method:
     """A way to step: make(step) gives the method; steps: coarse to fine [s], or [m] if by_way."""
 
-    title: str
     make: Callable
     steps: tuple
     steps_of_quick: tuple = ()
@@ -90,42 +90,36 @@ def controlled(dt0):
 
 METHODS = {
     "uniform": Method(
-        "paper's rule, one step for all",
         lambda way: Uniform(PAPER_DT0, way),
         (1e-6, 3e-7, 1e-7, PAPER_L),
         by_way=True,
     ),
     "multirate_held": Method(
-        "paper's rule, multirate",
         lambda way: Multirate(PAPER_DT0, way),
         (1e-6, 3e-7, 1e-7, 3e-8, PAPER_L),
         (1e-7,),
         by_way=True,
     ),
     "multirate_drifted": Method(
-        "the same, neighbours drifted",
         lambda way: Multirate(PAPER_DT0, way, "drifted"),
         (3e-7, 1e-7, 3e-8),
         by_way=True,
     ),
     "controlled": Method(
-        "multirate, step control, limited dashpots",
         controlled,
         (3.2e-7, 1.6e-7, 8e-8, 4e-8, 2e-8),
     ),
     "limited": Method(
-        "one fixed step, limited dashpots",
         lambda dt: Uniform(dt, dashpot="limited"),
         (1e-7, 4e-8, 2e-8, 1e-8, 5e-9),
         (2e-8,),
     ),
     "implicit": Method(
-        "one fixed step, dashpots solved",
         ImplicitDashpots,
         (4e-6, 2e-6, 1e-6, 5e-7, 2.5e-7, 1e-7, 5e-8),
         (5e-7,),
     ),
-    "fixed": Method("one fixed step, full dashpots", Uniform, (1e-8, 4e-9, 2e-9, 1e-9)),
+    "fixed": Method(Uniform, (1e-8, 4e-9, 2e-9, 1e-9)),
 }
 FULL = {"until": 1e-4, "methods": tuple(METHODS), "reference": 1.25e-8, "twins": tuple(METHODS)}
 QUICK = {
@@ -248,7 +242,7 @@ class Sweep:
 
 def titles_of(made):
     """Titles by method."""
-    return {name: METHODS[name].title for name in made}
+    return {name: style.label for name, style in styles_of(made).items()}
 
 
 def write_all(folder, made, points, floors, rows, reference):
@@ -304,19 +298,20 @@ def picture_all(folder, made, points, floors, reference, sizes):
     # Floors far below all errors would only squeeze the picture.
     least = min(point.error for point in points if point.error > 0.0)
     shown = {name: floor for name, floor in floors.items() if floor > 0.1 * least}
-    chaos = f"Runs that differ by 1e-12 m at the start end {max(floors.values()):.1g} apart"
+    chaos = f"Runs that differ by 1 pm at the start end {power(max(floors.values()))} apart"
     picture_work_precision(
         os.path.join(folder, "work_precision.png"),
         points,
         titles_of(made),
         floors=shown,
         time_name=TIME,
-        error_name="error of the displacement field",
-        work_name="bonds and contact pairs evaluated",
-        residual_names=("step [s], way in a step l [m]", "energy that the ledger misses / work"),
+        error_name="error of the displacement field [1]",
+        work_name="evaluations of bonds and contact pairs [1]",
+        residual_names=("step [ns], or displacement limit l [nm]", "unexplained energy / work [1]"),
+        step_unit=1e-9,
         caption=f"Paper's block, {scene}. Error: RMS over all bodies of (displacement - reference) "
-        f"/ RMS of the reference.\n{against}; the paper's multirate rule at its finest lies "
-        f"{percent(check)} from it. {chaos}.",
+        f"/ RMS of the reference. Step control has limited dashpots.\n{against}; "
+        f"the paper's multirate rule at its finest lies {percent(check)} from it. {chaos}.",
     )
     errors = {}
     for measure, words in (

@@ -24,6 +24,7 @@ from ca_damper import Automaton, Batch, SceneTable, Spheres, film, plot
 from ca_damper.automaton import ACCOUNTINGS
 from ca_damper.progress import Stages
 from taichi_dem.files import output_folder, write_csv
+from taichi_dem.plot_style import STYLES
 from taichi_dem.progress_bar import ProgressBar
 
 NAME = "damper_patterns"
@@ -50,6 +51,11 @@ class Shaken:
     frames: dict
     seeds: int
     batch: Batch
+
+    @property
+    def filling(self):
+        """Label of the filling."""
+        return self.batch.filling.label
 
     def measures(self, particles):
         """Arrays (cycles of all seeds, frames) by name; heights [mm] and shares of the particles.
@@ -183,15 +189,16 @@ def picture(runs, measures, phase, options):
     rows = {}
     for particles in PARTICLES:
         lines = {
-            TITLES[name]: (made.box, made.frames[particles][0][::SHOWN])
+            made.filling: (made.box, made.frames[particles][0][::SHOWN])
             for name, made in runs.items()
         }
         plot.plot_patterns(at(f"patterns_{particles}.png"), lines, amplitude, fastest)
-        for name, made in runs.items():
-            rows[f"{TITLES[name]}, {particles}"] = made.box, made.frames[particles][0]
+        for made in runs.values():
+            title = STYLES[made.filling].label.replace(", ", ",\n")
+            rows[f"{title}\n{particles} particles"] = made.box, made.frames[particles][0]
     plot.animate_patterns(at("patterns.gif"), rows, amplitude, fastest)
     cycles = {
-        particles: {TITLES[name]: over_cycle(phase, one) for name, one in fillings.items()}
+        particles: {runs[name].filling: over_cycle(phase, one) for name, one in fillings.items()}
         for particles, fillings in measures.items()
     }
     time = np.linspace(0.0, 1.0, 200)

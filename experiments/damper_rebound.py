@@ -203,7 +203,7 @@ def write(runs, folder):
     """Picture and tables."""
     default, spheres = runs[Automaton().accumulator], runs["dem"]
     falls = {}
-    for title, made in (("automaton", default), ("spheres", spheres)):
+    for title, made in (("ca_static", default), ("dem", spheres)):
         time = np.linspace(0.0, made.time_s[-1], 2000)
         exact = f"closed form, g = {made.fall.gravity:g} m/s²"
         falls[title] = (made.time_s, made.height_m, time, made.fall.heights(time), exact)

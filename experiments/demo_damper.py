@@ -159,14 +159,16 @@ def picture(full, empty, oscillator, filling, options):
     """Write the curves, their table and the animation."""
     curves, bare = series(full, oscillator), series(empty, oscillator)
     title = counted(options.particles)
-    plot.plot_motion(os.path.join(options.out, "motion.png"), title, curves, bare)
+    path = os.path.join(options.out, "motion.png")
+    plot.plot_motion(path, title, curves, bare, filling=filling.label)
     columns = {"x_empty_mm": bare["x_mm"], "energy_empty_mJ": bare["energy_mJ"]}
     write_csv(os.path.join(options.out, "motion.csv"), {**curves, **columns})
     omega = 2.0 * np.pi * options.frequency * oscillator.natural_frequency
     fastest = SCALE * omega * max(float(made.cycles.amplitude[0]) for made in (full, empty))
     box = FILLINGS[options.filling][1](filling)
     path = os.path.join(options.out, "damper.gif")
-    plot.animate_motion(path, title, box, full.frames, empty.frames, fastest)
+    moving = (full.frames, empty.frames)
+    plot.animate_motion(path, title, box, *moving, fastest, filling=filling.label)
 
 
 def caption(figures, filling, oscillator, options):

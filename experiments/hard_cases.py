@@ -28,9 +28,9 @@ from _cli import (
 )
 from _hard_cases import judge, named, registry
 from _hard_cases._case import FAILED, PASSED, REFUSED
-from _hard_cases._margins import picture_margins
+from _hard_cases._margins import case_title, method_styles, picture_margins, with_powers
 from taichi_dem.files import output_folder, write_csv
-from taichi_dem.plot_style import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, SKY, picture
+from taichi_dem.plot_style import GREY, RED, picture, power
 from taichi_dem.progress_bar import ProgressBar
 
 NAME = "hard_cases"
@@ -41,7 +41,6 @@ OF_QUICK = (
     *("faster_than_the_bound", "flat_element", "step_that_is_no_number"),
 )
 COLUMNS = 5
-_COLOURS = (RED, BLUE, GREEN, ORANGE, PURPLE, SKY)
 
 
 def options_parser():
@@ -107,11 +106,11 @@ def write_table(path, results):
 
 
 def looks_of(results):
-    """Colour and line width of every method; the first are drawn thick, so that all are seen."""
-    methods = list(dict.fromkeys(result.method for result in results))
+    """Label, colour and line width of every method; the first are thick, so that all are seen."""
+    styles = method_styles(list(dict.fromkeys(result.method for result in results)))
     return {
-        method: {"color": _COLOURS[k % len(_COLOURS)], "lw": max(0.8, 3.0 - 0.45 * k)}
-        for k, method in enumerate(methods)
+        method: {"label": style.label, "color": style.colour, "lw": max(0.8, 3.0 - 0.45 * k)}
+        for k, (method, style) in enumerate(styles.items())
     }
 
 
@@ -120,9 +119,11 @@ def picture_case(path, case, results):
     own = [result for result in results if result.case == case.name]
     with picture(path, 1, 1, (7.0, 4.6)) as (figure, axis):
         draw_case(axis, own, looks_of(own), size=8.0)
-        figure.suptitle(textwrap.fill(case.question, 100), fontsize=9.0, x=0.02, ha="left")
+        figure.suptitle(
+            textwrap.fill(with_powers(case.question), 100), fontsize=9.0, x=0.02, ha="left"
+        )
         handles, labels = axis.get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=5)
+        figure.legend(handles, labels, loc="outside lower center", ncols=3)
 
 
 def picture_sheet(path, cases, results, columns):
@@ -137,7 +138,8 @@ def picture_sheet(path, cases, results, columns):
             axis.set_axis_off()
         shown = dict.fromkeys(result.method for result in results if result.shown)
         lines = [panels[0].plot([], [], **looks[method])[0] for method in shown]
-        figure.legend(lines, list(shown), loc="outside upper left", ncols=len(lines) or 1)
+        lines += panels[0].plot([], [], color=GREY, ls=":", lw=1.0, label="bound of physics")
+        figure.legend(handles=lines, loc="outside upper left", ncols=3)
 
 
 def draw_case(axis, own, looks, size):
@@ -147,10 +149,10 @@ def draw_case(axis, own, looks, size):
     """
     for result in own:
         if result.shown is not None:
-            draw_curves(axis, result.shown, result.method, looks[result.method])
+            draw_curves(axis, result.shown, looks[result.method])
     if not any(result.shown for result in own):
         axis.set(xticks=[], yticks=[])
-        said = textwrap.fill(own[0].words, 44)
+        said = textwrap.fill(f"“{own[0].words}”", 44)
         axis.text(0.03, 0.92, said, fontsize=size, va="top", transform=axis.transAxes)
     lowest, highest = axis.get_ylim()
     if axis.get_yscale() == "linear" and 0.0 < lowest < 0.95 * highest:
@@ -160,33 +162,35 @@ def draw_case(axis, own, looks, size):
     axis.tick_params(labelsize=size)
     axis.xaxis.label.set_size(size)
     axis.yaxis.label.set_size(size)
-    axis.set_title(f"{own[0].case.replace('_', ' ')}: {verdict(own)}", fontsize=size + 1.0)
+    axis.set_title(f"{case_title(own[0].case)}: {verdict(own)}", fontsize=size + 1.0)
     if any(result.status == FAILED for result in own):
         axis.title.set_color(RED)
 
 
 def verdict(own):
     """How the methods of a case fared, in words."""
-    words = {PASSED: "pass", REFUSED: "decline", FAILED: "FAIL"}
+    words = {PASSED: "passed", REFUSED: "refused", FAILED: "FAILED"}
     counts = {word: sum(result.status == word for result in own) for word in words}
     said = [f"{counts[word]} {words[word]}" for word in words if counts[word]]
     margins = [result.margin for result in own if result.limit]
     if margins and math.isfinite(min(margins)):
-        said.append(f"margin {min(margins):.2g}")
+        least = min(margins)
+        said.append(f"margin {power(least) if least >= 1e4 else format(least, '.2g')}")
     return ", ".join(said)
 
 
-def draw_curves(axis, shown, method, look):
+def draw_curves(axis, shown, look):
     """Lines of one method, its bounds dotted."""
     for k, (x, y) in enumerate(shown.lines.values()):
-        label = method if k == 0 else None
+        own = {**look, "label": None if k else look["label"]}
         if shown.dots:
-            dots = {"ms": 1.6 * look["lw"] + 1.0, "mfc": "none", "color": look["color"]}
-            axis.plot(x, y, "o", label=label, **dots)
-        else:
-            axis.plot(x, y, label=label, **look)
+            own.update(ls="none", marker="o", ms=1.6 * look["lw"] + 1.0, mfc="none", lw=1.0)
+        axis.plot(x, y, **own)
+    known = axis.get_legend_handles_labels()[1]
     for bound in shown.bounds:
-        axis.axhline(bound, color=GREY, ls=":", lw=1.0)
+        words = None if "bound of physics" in known else "bound of physics"
+        axis.axhline(bound, color=GREY, ls=":", lw=1.0, label=words)
+        known = [*known, words]
     axis.set(xlabel=shown.xlabel, ylabel=shown.ylabel)
     if shown.log:
         axis.set_yscale("log")

@@ -33,6 +33,9 @@ def animate_patterns(path, rows, amplitude, fastest, milliseconds=60):
             frame_panel(axes, box, amplitude)
             axes.set_title(title, loc="center")
             drawn.append(DrawnBox(axes, box, fastest))
+        bar = {"location": "bottom", "aspect": 40, "pad": 0.02}
+        words = "vertical speed of particles [m/s]"
+        figure.colorbar(drawn[0].particles, ax=panels.tolist(), label=words, **bar)
         for shots in zip(*(frames for _, frames in rows.values())):
             for one, frame in zip(drawn, shots):
                 one.show(frame)

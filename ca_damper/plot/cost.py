@@ -2,26 +2,24 @@
 
 import numpy as np
 
-from taichi_dem.plot_style import picture
+from taichi_dem.plot_style import BLACK, GREY, STYLES, picture, styles_of
 
-TITLES = {
-    "dem_pairs": "spheres, all pairs, 2e-5 s",
-    "dem_cells": "spheres, cells, 2e-5 s",
-    "ca_scan_1e-4": "automaton, scan, 1e-4 s",
-    "ca_list_1e-4": "automaton, list, 1e-4 s",
-    "ca_scan_2e-5": "automaton, scan, 2e-5 s",
-    "ca_list_2e-5": "automaton, list, 2e-5 s",
+#: Filling, search or traversal with the step, marker and line of each variant; the paper's way is
+#: dashed, markers tell the automaton's steps apart.
+_VARIANTS = {
+    "dem_pairs": ("dem", "all pairs, 20 µs", "^", "--"),
+    "dem_cells": ("dem", "cells, 20 µs", "^", "-"),
+    "ca_scan_1e-4": ("ca_static", "scan, 100 µs", "o", "--"),
+    "ca_list_1e-4": ("ca_static", "list, 100 µs", "o", "-"),
+    "ca_scan_2e-5": ("ca_static", "scan, 20 µs", "s", "--"),
+    "ca_list_2e-5": ("ca_static", "list, 20 µs", "s", "-"),
 }
-#: Colour, mark, and line of each variant: spheres red, automata blue; the paper's way dashed.
-_LOOKS = {
-    "dem_pairs": ("#D55E00", "s", "--"),
-    "dem_cells": ("#D55E00", "s", "-"),
-    "ca_scan_1e-4": ("#0072B2", "o", "--"),
-    "ca_list_1e-4": ("#0072B2", "o", "-"),
-    "ca_scan_2e-5": ("#56B4E9", "^", "--"),
-    "ca_list_2e-5": ("#56B4E9", "^", "-"),
+#: What became of a run: words and marker.
+_OUTCOMES = {
+    "runs": ("runs", "o"),
+    "diverges": ("diverges", "X"),
+    "refused": ("refused before the first step", "|"),
 }
-_OUTCOMES = {"runs": ("#009E73", "o"), "diverges": ("#D55E00", "X"), "refused": ("0.6", "|")}
 
 
 def picture_cost(path, particles, costs):
@@ -29,47 +27,55 @@ def picture_cost(path, particles, costs):
 
     costs: {variant: {"timings": a Timing [s] for each number}}.
     """
-    with picture(path, 1, 2, (10.0, 4.4)) as (_, axes):
+    with picture(path, 1, 2, (10.0, 5.0)) as (figure, axes):
         for label, cost in costs.items():
-            colour, mark, line = _LOOKS[label]
-            look = {"color": colour, "marker": mark, "ms": 4, "ls": line, "label": TITLES[label]}
+            filling, words, mark, line = _VARIANTS[label]
+            look = {"color": STYLES[filling].colour, "marker": mark, "ms": 4, "ls": line}
+            look["label"] = f"{STYLES[filling].label}, {words}"
             middle = [1e3 * timing.median for timing in cost["timings"]]
             low = [1e3 * (timing.median - timing.low) for timing in cost["timings"]]
             high = [1e3 * (timing.high - timing.median) for timing in cost["timings"]]
             for axis in axes:
                 axis.errorbar(particles, middle, yerr=[low, high], lw=1.2, **look)
-        axes[1].set(yscale="log", xlabel="particles N")
-        axes[0].set(xlabel="particles N", ylabel="CPU time of a cycle [ms]", ylim=(0, None))
-        axes[0].legend(loc="upper left")
+        axes[1].set(yscale="log", xlabel="particles N [1]", title="the same, logarithmic")
+        axes[0].set(xlabel="particles N [1]", ylim=(0, None), title="bars: range of the repeats")
+        for axis in axes:
+            axis.set_ylabel("CPU time of a cycle [ms]")
+        handles, labels = axes[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper left", ncols=3)
 
 
 def picture_steps(path, borne):
-    """What becomes of a run at each step: a row a filling. borne: {label: [(dt [s], outcome)]}."""
+    """What becomes of a run at each step: a row a filling. borne: {name: [(dt [s], outcome)]}."""
+    styles = styles_of(borne)
     with picture(path, 1, 1, (7.0, 1.2 + 0.5 * len(borne))) as (_, axis):
-        for row, found in enumerate(borne.values()):
-            for word, (colour, mark) in _OUTCOMES.items():
-                steps = [dt for dt, outcome in found if outcome == word]
-                label = word if row == 0 else None
-                axis.plot(steps, [row] * len(steps), mark, color=colour, label=label, ms=7)
-        axis.set(xscale="log", xlabel="step [s]", ylim=(-0.6, len(borne) - 0.4))
-        axis.set_yticks(range(len(borne)), list(borne))
+        for word, (words, mark) in _OUTCOMES.items():
+            axis.plot([], [], mark, color=BLACK, label=words, ms=7)
+            for row, (name, found) in enumerate(borne.items()):
+                steps = [1e6 * dt for dt, outcome in found if outcome == word]
+                axis.plot(steps, [row] * len(steps), mark, color=styles[name].colour, ms=7)
+        axis.set(xscale="log", xlabel="step [µs]", ylim=(-0.6, len(borne) - 0.4))
+        axis.set_yticks(range(len(borne)), [style.label for style in styles.values()])
         axis.legend(ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
 
 
 def picture_curves(path, curves, oscillator):
-    """Response curves by title: means over seeds as lines, their range as bars; empty dotted.
+    """Response curves by filling: means over seeds as lines, range as bars; empty dotted.
 
-    curves: {title: (ratios, rms [mm], (ratios, seeds))}.
+    curves: {name: (ratios, rms [mm], (ratios, seeds))}.
     """
+    styles = styles_of(curves)
     with picture(path, 1, 1, (7.0, 4.6)) as (_, axis):
-        for (title, (ratios, rms)), mark in zip(curves.items(), "osD^vP*X"):
-            middle = rms.mean(axis=1)
+        for name, (ratios, rms) in curves.items():
+            style, middle = styles[name], rms.mean(axis=1)
             bars = [middle - rms.min(axis=1), rms.max(axis=1) - middle]
-            axis.errorbar(ratios, middle, yerr=bars, marker=mark, ms=4, lw=1.2, label=title)
+            look = {"color": style.colour, "marker": style.marker, "ms": 4, "lw": 1.2}
+            axis.errorbar(ratios, middle, yerr=bars, label=style.label, **look)
         fine = np.linspace(min(ratios), max(ratios), 300)
         empty = abs(oscillator.transfer(fine * oscillator.natural_frequency))
         empty *= 1e3 * oscillator.base_amplitude / np.sqrt(2.0)
         top = 1.15 * max(rms.max() for _, rms in curves.values())
-        axis.plot(fine, empty, ":", color="0.5", lw=1.0, label="empty container")
-        axis.set(xlabel="frequency f / f$_0$", ylabel="RMS displacement [mm]", ylim=(0.0, top))
+        axis.plot(fine, empty, ":", color=GREY, lw=1.0, label=STYLES["empty"].label)
+        axis.set_title("mean over seeds; bars: their range")
+        axis.set(xlabel="frequency f / f$_0$ [1]", ylabel="RMS displacement [mm]", ylim=(0.0, top))
         axis.legend()

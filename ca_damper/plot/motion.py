@@ -4,7 +4,7 @@ import numpy as np
 
 from ca_damper.plot.animation import moving_picture
 from ca_damper.plot.box import Box, DrawnBox
-from taichi_dem.plot_style import BLACK, BLUE, GREY, RED, picture
+from taichi_dem.plot_style import BLACK, GREY, STYLES, picture, styles_of
 
 #: The spring hangs from the base, this far over a box in its middle [mm]; its coils and half width.
 _HANGS, _COILS, _HALF = 75.0, 9, 7.0
@@ -12,30 +12,37 @@ _HANGS, _COILS, _HALF = 75.0, 9, 7.0
 _LEAD = 6.0
 
 
-def plot_motion(path, title, full, empty):
+def plot_motion(path, title, full, empty, filling="automaton"):
     """Displacement and energy over time, with particles and without.
 
-    full, empty: dict of time_s, x_mm and energy_mJ of the container; full also particles_mJ.
+    title: the particles in words. full, empty: dict of time_s, x_mm and energy_mJ of the container;
+    full also particles_mJ. filling: its label, for the colour.
     """
+    style, bare = styles_of([filling])[filling], STYLES["empty"].label
+    words, colour = f"{style.label}, {title}", style.colour
     with picture(path, 2, 1, size=(8.6, 5.6), sharex=True) as (_, (motion, energy)):
-        motion.plot(empty["time_s"], empty["x_mm"], color=GREY, linewidth=0.8, label="empty")
-        motion.plot(full["time_s"], full["x_mm"], color=BLUE, linewidth=0.9, label=title)
+        motion.plot(empty["time_s"], empty["x_mm"], color=GREY, linewidth=0.8, label=bare)
+        motion.plot(full["time_s"], full["x_mm"], color=colour, linewidth=0.9, label=words)
         motion.set(ylabel="displacement of\nthe container [mm]")
         look = {"color": GREY, "linestyle": "--"}
-        energy.plot(empty["time_s"], empty["energy_mJ"], label="container, empty", **look)
-        energy.plot(full["time_s"], full["energy_mJ"], color=BLUE, label=f"container, {title}")
-        energy.plot(full["time_s"], full["particles_mJ"], color=RED, label="the particles")
+        energy.plot(empty["time_s"], empty["energy_mJ"], label=bare, **look)
+        energy.plot(
+            full["time_s"], full["energy_mJ"], color=colour, label=f"container with {title}"
+        )
+        energy.plot(full["time_s"], full["particles_mJ"], color=BLACK, label="the particles alone")
         energy.set(xlabel="time [s]", ylabel="energy [mJ]", ylim=(0.0, None))
         energy.set_xlim(0.0, full["time_s"][-1])
         for axes in (motion, energy):
             axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
 
 
-def animate_motion(path, title, box, frames, empty_frames, fastest, milliseconds=60):
+def animate_motion(
+    path, title, box, frames, empty_frames, fastest, milliseconds=60, filling="automaton"
+):
     """The empty container and the full one on their springs, and their displacement, as a GIF.
 
-    frames, empty_frames: as many of each, at the same times. fastest: vertical speed at the ends
-    of the colour scale [m/s].
+    title, filling: as of ``plot_motion``. frames, empty_frames: as many of each, at the same times.
+    fastest: vertical speed at the ends of the colour scale [m/s].
     """
     swing = 1.1 * max(abs(frame.x) for frame in (*frames, *empty_frames))
     with moving_picture(path, (4.0, 3.0), milliseconds) as (figure, shoot):
@@ -43,7 +50,12 @@ def animate_motion(path, title, box, frames, empty_frames, fastest, milliseconds
         shift = 1.35 * box.width
         pair = _Hung(bench, box, fastest, shift), _Hung(bench, _plain(box), fastest, 0.0)
         _frame_bench(bench, box, shift, swing, title)
-        dots = _curves(curve, frames, empty_frames, swing)
+        looks = {styles_of([filling])[filling].colour: title, GREY: "empty"}
+        dots = _curves(curve, looks, (frames, empty_frames), swing)
+        bar = {"location": "bottom", "aspect": 30, "pad": 0.02}
+        figure.colorbar(
+            pair[0].drawn.particles, ax=bench, label="vertical speed of particles [m/s]", **bar
+        )
         for shots in zip(frames, empty_frames):
             for one, dot, frame in zip(pair, dots, shots):
                 one.show(frame)
@@ -90,12 +102,14 @@ def _frame_bench(axes, box, shift, swing, title):
     axes.text(1e3 * shift + 0.5 * width, under, title, ha="center")
 
 
-def _curves(axes, frames, empty_frames, swing):
+def _curves(axes, looks, runs, swing):
+    """Displacement of each run with a dot for the present; looks: words by colour, as the runs."""
     dots = []
-    for shots, colour in ((frames, BLUE), (empty_frames, GREY)):
-        time = [frame.time_s - frames[0].time_s for frame in shots]
-        axes.plot(time, [1e3 * frame.x for frame in shots], color=colour, linewidth=0.9)
+    for shots, (colour, words) in zip(runs, looks.items()):
+        time = [frame.time_s - shots[0].time_s for frame in shots]
+        x = [1e3 * frame.x for frame in shots]
+        axes.plot(time, x, color=colour, linewidth=0.9, label=words)
         dots += axes.plot([], [], "o", color=colour, markersize=4)
-    axes.set(ylim=(-1e3 * swing, 1e3 * swing), xlabel="time [s]")
-    axes.set_title("displacement [mm]")
+    axes.set(ylim=(-1e3 * swing, 1e3 * swing), xlabel="time [s]", ylabel="displacement [mm]")
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0))
     return dots

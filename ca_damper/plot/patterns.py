@@ -3,9 +3,8 @@
 import numpy as np
 
 from ca_damper.plot.box import DrawnBox, frame_panel
-from taichi_dem.plot_style import BLACK, BLUE, GREY, RED, picture
+from taichi_dem.plot_style import BLACK, GREY, area_key, line_key, picture, styles_of
 
-_COLOURS = (RED, BLUE)
 #: A container slower than this share of its fastest gets no arrow.
 _SLOW = 0.1
 
@@ -13,18 +12,20 @@ _SLOW = 0.1
 def plot_patterns(path, rows, amplitude, fastest):
     """A row of frames for every filling, from left to right through one cycle.
 
-    rows: title -> (Box, frames); as many frames in every row, evenly over the cycle, which begins
-    when the container passes its middle upwards; arrows show its velocity. amplitude:
+    rows: name of the filling -> (Box, frames); as many frames in every row, evenly over the cycle,
+    which begins when the container passes its middle upwards; arrows show its velocity. amplitude:
     of the container [m]. fastest: vertical speed at the ends of the colour scale [m/s].
     """
     count = len(next(iter(rows.values()))[1])
     size = (1.14 * count + 0.9, 2.45 * len(rows) + 0.3)
     with picture(path, len(rows), count, size=size, squeeze=False) as (figure, panels):
-        for line, (title, (box, frames)) in zip(panels, rows.items()):
+        for line, (name, (box, frames)) in zip(panels, rows.items()):
             for k, (axes, frame) in enumerate(zip(line, frames)):
                 share = np.cos(2.0 * np.pi * k / count)
                 drawn = _frame(axes, box, frame, amplitude, fastest, share)
-            _name_row(line[0], title)
+            _name_row(line[0], styles_of(rows)[name].label)
+        words = "one cycle of the container; arrows: its velocity, where it is not slow"
+        figure.supxlabel(words, fontsize=9)
         first = next(iter(rows.values()))[1]
         for axes, frame in zip(panels[0], first):
             axes.set_title(f"{1e3 * (frame.time_s - first[0].time_s):.0f} ms", loc="center")
@@ -62,28 +63,39 @@ def _mark_motion(axes, box, lift, share):
 def plot_cycle(path, cycles, container):
     """Mean height of the particles and how many touch floor and ceiling, over one cycle.
 
-    cycles: particles -> title -> dict of phase (from 0 to 1), height_mm (in the room), spread_mm,
-    floor and ceiling (shares of the particles). container: phase and displacement [mm].
+    cycles: particles -> name of the filling -> dict of phase (0 to 1), height_mm (in the room),
+    spread_mm, floor and ceiling (shares of the particles). container: phase and displacement [mm].
     """
     with picture(
-        path, 2, len(cycles), size=(4.2 * len(cycles) + 0.6, 5.4), sharex=True, sharey="row"
-    ) as (_, panels):
+        path, 2, len(cycles), size=(4.2 * len(cycles) + 0.6, 5.7), sharex=True, sharey="row"
+    ) as (figure, panels):
         panels = np.reshape(panels, (2, -1))
         for (top, bottom), (particles, fillings) in zip(panels.T, cycles.items()):
             top.plot(*container, color=GREY, linestyle=":", label="container")
-            for (title, cycle), colour in zip(fillings.items(), _COLOURS):
-                _heights(top, cycle, colour, title)
-                bottom.plot(cycle["phase"], 100.0 * cycle["floor"], color=colour, label=title)
-                bottom.plot(cycle["phase"], 100.0 * cycle["ceiling"], color=colour, linestyle="--")
+            for name, cycle in fillings.items():
+                style = styles_of(fillings)[name]
+                _heights(top, cycle, style)
+                _touching(bottom, cycle, style.colour)
             top.set_title(f"{particles} particles")
             bottom.set(xlabel="phase of the container [cycles]", xlim=(0.0, 1.0), ylim=(0.0, None))
         panels[0, 0].set_ylabel("mean height in the room\nless that at rest [mm]")
-        panels[1, 0].set_ylabel("particles at floor (solid)\nand ceiling (dashed) [%]")
-        panels[0, 0].legend(loc="upper right")
+        panels[1, 0].set_ylabel("particles that touch [%]")
+        ends = {"-": "floor", "--": "ceiling"}
+        keys = [line_key(words, color=BLACK, ls=line) for line, words in ends.items()]
+        panels[1, 0].legend(handles=keys, loc="upper right")
+        keys, _ = panels[0, 0].get_legend_handles_labels()
+        keys.append(area_key("± standard deviation of the cycles", fc=GREY, alpha=0.3))
+        figure.legend(handles=keys, loc="outside upper left", ncols=len(keys))
 
 
-def _heights(axes, cycle, colour, title):
+def _touching(axes, cycle, colour):
+    axes.plot(cycle["phase"], 100.0 * cycle["floor"], color=colour)
+    axes.plot(cycle["phase"], 100.0 * cycle["ceiling"], color=colour, linestyle="--")
+
+
+def _heights(axes, cycle, style):
     height, spread = cycle["height_mm"], cycle["spread_mm"]
-    axes.plot(cycle["phase"], height, color=colour, label=title)
+    colour = style.colour
+    axes.plot(cycle["phase"], height, color=colour, label=style.label)
     band = (height - spread, height + spread)
     axes.fill_between(cycle["phase"], *band, color=colour, alpha=0.18, linewidth=0)

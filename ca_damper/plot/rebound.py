@@ -2,18 +2,19 @@
 
 import numpy as np
 
-from taichi_dem.plot_style import BLACK, BLUE, GREY, ORANGE, RED, picture
+from taichi_dem.plot_style import BLACK, VIOLET, picture, styles_of
 
 #: Errors below this [ms] would lengthen a logarithmic axis for nothing.
 _SHORTEST = 5e-3
-_MARKS = (("o", RED), ("s", BLUE))
-_SHADES = (ORANGE, RED, BLUE, BLACK)
+#: First impact to fourth: light to dark, as no colour of a filling is meant.
+_SHADES = ("#D0D0D0", "#A0A0A0", "#6A6A6A", "#2A2A2A")
 
 
 def plot_rebound(path, falls, errors, allowed_ms):
     """Height over time beside the closed form, and errors of the times of impact.
 
-    falls: title -> (time [s], height [m], time and height of the closed form, its title).
+    falls: name of the filling -> (time [s], height [m], time and height of the closed form, its
+    title).
     errors: title -> errors of the impacts [ms], as many as there were. allowed_ms: the largest
     that passes, a line.
     """
@@ -22,21 +23,21 @@ def plot_rebound(path, falls, errors, allowed_ms):
         panels = figure.subplot_mosaic(mosaic, width_ratios=[1.7, 1.0])
         until = max(time[-1] for time, *_ in falls.values())
         pair = (panels["first"], panels["second"])
-        for axes, (title, fall), look in zip(pair, falls.items(), _MARKS):
-            _plot_fall(axes, title, fall, look)
+        for axes, (name, fall) in zip(pair, falls.items()):
+            _plot_fall(axes, styles_of(falls)[name], fall)
             axes.set(xlim=(0.0, until), ylim=(-3.0, None), ylabel="height over floor [mm]")
         panels["first"].tick_params(labelbottom=False)
         panels["second"].set_xlabel("time [s]")
         _plot_errors(panels["errors"], errors, allowed_ms)
 
 
-def _plot_fall(axes, title, fall, look):
+def _plot_fall(axes, style, fall):
     time, height, exact_time, exact_height, exact_title = fall
-    mark, colour = look
     axes.plot(exact_time, 1e3 * exact_height, color=BLACK, linewidth=0.9, label=exact_title)
     every = max(1, len(time) // 130)
     points = time[::every], 1e3 * height[::every]
-    axes.plot(*points, mark, color=colour, markersize=3.6, markerfacecolor="none", label=title)
+    look = {"color": style.colour, "markersize": 3.6, "markerfacecolor": "none"}
+    axes.plot(*points, style.marker, label=style.label, **look)
     axes.legend(loc="upper right")
 
 
@@ -48,10 +49,11 @@ def _plot_errors(axes, errors, allowed_ms):
         values = [max(_SHORTEST, abs(errors[titles[row]][k])) for row in there]
         rows = np.array(there) + 0.19 * (k - 0.5 * (count - 1))
         axes.barh(rows, values, 0.17, color=_SHADES[k % len(_SHADES)], label=f"impact {k + 1}")
-    axes.axvline(allowed_ms, color=GREY, linewidth=1.0, linestyle="--", label=f"{allowed_ms:g} ms")
+    words = f"most that passes, {allowed_ms:g} ms"
+    axes.axvline(allowed_ms, color=VIOLET, linewidth=1.0, linestyle="--", label=words)
     axes.set_yticks(range(len(titles)), titles)
     axes.set(xscale="log", xlabel="error of the time of impact [ms]")
     axes.set_xlim(_SHORTEST, None)
     axes.invert_yaxis()
     axes.grid(False, axis="y")
-    axes.legend(loc="lower center", bbox_to_anchor=(0.4, 1.0), ncols=3, columnspacing=1.2)
+    axes.legend(loc="lower center", bbox_to_anchor=(0.4, 1.0), ncols=2, columnspacing=1.2)

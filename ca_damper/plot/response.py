@@ -3,18 +3,9 @@
 import numpy as np
 from matplotlib import colormaps
 
-from taichi_dem.plot_style import picture
+from taichi_dem.plot_style import GREY, STYLES, area_key, picture, styles_of
 
-#: Titles of the fillings in words.
-TITLES = {
-    "dem": "spheres",
-    "ca_landing": "automaton: landing",
-    "ca_ejection": "automaton: landing + ejection",
-    "ca_static": "automaton: static contact",
-}
 _SHADES = colormaps["viridis"]
-#: Okabe and Ito's, one a filling.
-_COLOURS = ("#D55E00", "#E69F00", "#009E73", "#0072B2", "#CC79A7")
 _FINE = 400
 
 
@@ -31,7 +22,7 @@ def picture_responses(path, responses, particle_mass):
         panels = axes.ravel()
         for axis, (label, response) in zip(panels, responses.items()):
             _draw_curves(axis, response)
-            axis.set_title(TITLES.get(label, label))
+            axis.set_title(styles_of(responses)[label].label)
         _share_height(panels[:count])
         _draw_peaks(panels[count], panels[count + 1], responses, particle_mass)
         for axis in panels[count + 2 :]:
@@ -42,21 +33,29 @@ def _draw_curves(axis, response):
     """Median over seeds as lines, lowest and highest as bands; the empty container dotted."""
     for k, particles in enumerate(response.particles):
         colour = _shade(response, k)
-        _band(axis, response.ratios, 1e3 * response.rms[k], colour, f"N = {particles}")
+        _band(axis, response.ratios, 1e3 * response.rms[k], colour, f"{particles} particles")
     oscillator = response.oscillator
     fine = np.linspace(response.ratios[0], response.ratios[-1], _FINE)
     empty = oscillator.base_amplitude * np.abs(
         oscillator.transfer(fine * oscillator.natural_frequency)
     )
-    axis.plot(fine, 1e3 * empty / np.sqrt(2.0), color="0.5", ls=":", lw=1.0, label="empty")
-    axis.set(xlabel="frequency f / f$_0$", ylabel="RMS displacement [mm]")
-    axis.legend()
+    bare = STYLES["empty"].label
+    axis.plot(fine, 1e3 * empty / np.sqrt(2.0), color=GREY, ls=":", lw=1.0, label=bare)
+    axis.set(xlabel="frequency f / f$_0$ [1]", ylabel="RMS displacement [mm]")
+    _legend_of_bands(axis)
 
 
 def _band(axis, x, values, colour, label):
     """values: (points, seeds)."""
     axis.plot(x, np.median(values, axis=1), color=colour, label=label)
     axis.fill_between(x, values.min(axis=1), values.max(axis=1), color=colour, alpha=0.25, lw=0)
+
+
+def _legend_of_bands(axis):
+    """Legend of an axis with bands: what they are is its last entry."""
+    handles, _ = axis.get_legend_handles_labels()
+    band = area_key("lowest to highest seed", fc=GREY, alpha=0.3)
+    axis.legend(handles=[*handles, band])
 
 
 def _shade(response, k):
@@ -72,19 +71,28 @@ def _share_height(panels):
 
 def _draw_peaks(place, height, responses, particle_mass):
     """Where the curves peak and how high, over the particle number; bars from seed to seed."""
-    for mark, colour, (label, response) in zip("osD^v", _COLOURS, responses.items()):
+    styles = styles_of(responses)
+    for label, response in responses.items():
+        style = styles[label]
         ratio, rms = response.peaks()
         for axis, values in ((place, ratio), (height, 1e3 * rms)):
             middle = np.median(values, axis=1)
             bars = [middle - values.min(axis=1), values.max(axis=1) - middle]
-            look = {"marker": mark, "ms": 4.5, "color": colour, "label": TITLES.get(label, label)}
-            axis.errorbar(response.particles, middle, yerr=bars, lw=1.2, **look)
+            look = {"marker": style.marker, "ms": 4.5, "color": style.colour, "lw": 1.2}
+            axis.errorbar(response.particles, middle, yerr=bars, label=style.label, **look)
     first = next(iter(responses.values()))
     rigid = [first.oscillator.peak(n * particle_mass) for n in first.particles]
-    place.plot(first.particles, [r for r, _ in rigid], color="0.5", ls=":", label="rigid mass")
-    place.set(title="where they peak", xlabel="particles N", ylabel="f / f$_0$ of the peak")
-    height.set(title="how high", xlabel="particles N", ylabel="peak RMS [mm]", ylim=(0, None))
-    place.legend()
+    words = "rigid mass of the same weight"
+    place.plot(first.particles, [r for r, _ in rigid], color=GREY, ls=":", label=words)
+    place.set(title="where they peak; bars: range of the seeds", xlabel="particles N [1]")
+    place.set_ylabel("f / f$_0$ of the peak [1]")
+    height.set(title="how high; bars: range of the seeds", xlabel="particles N [1]")
+    height.set(ylabel="peak RMS displacement [mm]", ylim=(0, None))
+    place.legend(handles=place.lines[-1:], loc="lower left")
+    keys, labels = height.get_legend_handles_labels()
+    height.legend(keys, labels, loc="lower left")
+    for axis in (place, height):
+        axis.set_xticks(first.particles)
 
 
 def picture_measures(path, responses, particle_mass):
@@ -99,18 +107,18 @@ def picture_measures(path, responses, particle_mass):
             for k, particles in enumerate(response.particles):
                 if particles > 0:
                     _draw_measures(column, response, k, particle_mass)
-            column[0].set_title(TITLES.get(label, label))
-            column[0].axhline(1.0, color="0.5", ls=":", lw=1.0)
-            column[1].set_xlabel("frequency f / f$_0$")
-        axes[0, 0].set_ylabel("apparent mass / N m")
-        axes[1, 0].set_ylabel("loss factor")
-        axes[0, 0].legend()
+            column[0].set_title(styles_of(responses)[label].label)
+            column[0].axhline(1.0, color=GREY, ls=":", lw=1.0, label="rigid mass")
+            column[1].set_xlabel("frequency f / f$_0$ [1]")
+        axes[0, 0].set_ylabel("apparent mass /\nmass of the particles [1]")
+        axes[1, 0].set_ylabel("loss factor [1]")
+        _legend_of_bands(axes[0, 0])
 
 
 def _draw_measures(column, response, k, particle_mass):
     particles, colour = response.particles[k], _shade(response, k)
     share = response.apparent_mass[k] / (particles * particle_mass)
-    _band(column[0], response.ratios, share, colour, f"N = {particles}")
+    _band(column[0], response.ratios, share, colour, f"{particles} particles")
     _band(column[1], response.ratios, response.loss_factor[k], colour, None)
 
 
@@ -122,19 +130,20 @@ def picture_hysteresis(path, sweeps):
     shape = {"squeeze": False, "sharex": True, "sharey": "row"}
     with picture(path, len(particles), count, size, **shape) as (_, axes):
         for column, (label, sweep) in zip(axes.T, sweeps.items()):
-            column[0].set_title(TITLES.get(label, label))
+            column[0].set_title(styles_of(sweeps)[label].label)
             for k, axis in enumerate(column):
                 _draw_ways(axis, sweep, k)
-            column[-1].set_xlabel("frequency f / f$_0$")
+            column[-1].set_xlabel("frequency f / f$_0$ [1]")
         for k, axis in enumerate(axes[:, 0]):
-            axis.set_ylabel(f"N = {particles[k]}: RMS [mm]")
+            axis.set_ylabel(f"{particles[k]} particles:\nRMS displacement [mm]")
         axes[0, 0].legend()
 
 
 def _draw_ways(axis, sweep, k):
     """Each seed a line; up and down apart by colour and mark."""
     for seed in range(len(sweep.up.seeds)):
-        name = {"up": "up", "down": "down"} if seed == 0 else {}
+        words = {"up": "frequency rising", "down": "frequency falling"}
+        name = words if seed == 0 else {}
         up, down = 1e3 * sweep.up.rms[k, :, seed], 1e3 * sweep.down.rms[k, :, seed]
         axis.plot(sweep.up.ratios, up, color=_SHADES(0.15), marker=">", ms=3, label=name.get("up"))
         axis.plot(

@@ -165,14 +165,14 @@ def energies(run, method):
     """Energy of the particles at the end of every cycle, to draw."""
     energy = 1e3 * run.column("energy")
     cycle = np.arange(1, len(energy) + 1)
-    return Curves("cycle", "energy of the particles [mJ]", {method: (cycle, energy)})
+    return Curves("cycle [1]", "energy of the particles [mJ]", {method: (cycle, energy)})
 
 
 def swings(run, method):
     """Highest and lowest displacement of every cycle, to draw."""
     cycle = np.arange(1, len(run.column("x_max")) + 1)
     lines = {method: (cycle, 1e3 * run.column("x_max")), "": (cycle, 1e3 * run.column("x_min"))}
-    return Curves("cycle", "highest and lowest x [mm]", lines)
+    return Curves("cycle [1]", "highest and lowest x [mm]", lines)
 
 
 def places(run, method):

@@ -49,7 +49,7 @@ def _spin(axis, method, quick):
         Limit("angular momentum error", float(kept), steps * EPS, "n eps: rounding"),
         Limit("drift of the centre [m]", float(abs(track.moved).max()), 0.0, "nothing acts"),
     )
-    return measured(track, method, limits, energy - 1.0, "energy of spin / at the start - 1")
+    return measured(track, method, limits, energy - 1.0, "energy of spin / at the start - 1 [1]")
 
 
 def spin_about_x(method, quick):
@@ -108,7 +108,7 @@ def fragment_hits_block(method, quick):
         no_energy_made(track, given, 1e-3, "kinetic <= kinetic at the start"),
         Limit("block not reached", float(others == 0.0), 0.0, "it was hit"),
     )
-    return measured(track, method, limits, track.kinetic() / given, "kinetic energy / given")
+    return measured(track, method, limits, track.kinetic() / given, "kinetic energy / given [1]")
 
 
 def deep_overlap_at_start(method, quick):
@@ -126,7 +126,7 @@ def deep_overlap_at_start(method, quick):
         "error of the way apart / way", parted[early], gone[early], gone[early][-1]
     )
     limits = (momentum_kept(track), error)
-    return measured(track, method, limits, 1e6 * parted, "way apart [µm]")
+    return measured(track, method, limits, 1e6 * parted, "distance [µm]")
 
 
 def strained_block_in_flight(method, quick):
@@ -167,7 +167,7 @@ def zero_gap_on_breakage(method, quick):
         momentum_kept(track),
         energy_left(track, left, track.mass[0] / 2.0),
     )
-    return measured(track, method, limits, track.kinetic() / given, "kinetic energy / given")
+    return measured(track, method, limits, track.kinetic() / given, "kinetic energy / given [1]")
 
 
 def four_broken_faces(method, quick):
@@ -184,7 +184,7 @@ def four_broken_faces(method, quick):
         energy_left(track, left, track.mass[1]),
         Limit("drift of the middle / way of a neighbour", float(drift.max()), 1e-2, "symmetry"),
     )
-    return measured(track, method, limits, track.kinetic() / given, "kinetic energy / given")
+    return measured(track, method, limits, track.kinetic() / given, "kinetic energy / given [1]")
 
 
 def energy_left(track, left, mass):

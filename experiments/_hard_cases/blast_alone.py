@@ -51,7 +51,7 @@ def jump_of_ten_levels(method, quick):
         no_energy_made(track, given, 1e-3, "kinetic <= kinetic at the start"),
         Limit("10 / jump at the start", 10.0 / jump, 1.0, "log2(v dt0 / l)"),
     )
-    return measured(track, method, limits, track.kinetic() / given, "kinetic energy / given")
+    return measured(track, method, limits, track.kinetic() / given, "kinetic energy / given [1]")
 
 
 def mass_ratio_1e4(method, quick):

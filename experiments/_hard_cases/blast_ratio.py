@@ -48,7 +48,9 @@ def _scan(method, ratio, quick):
     first = next(iter(tracks.values()))
     kept = first.kinetic() / first.kinetic()[0]
     lines = {method: (1e6 * first.time_s, kept)}
-    return Measured(limits, Curves("time [µs]", "kinetic energy / given", lines), first.compile_s)
+    return Measured(
+        limits, Curves("time [µs]", "kinetic energy / given [1]", lines), first.compile_s
+    )
 
 
 def _trio(edge):

@@ -83,7 +83,7 @@ def full_rebound(method, quick):
 def _energy_in_time(history, method):
     energy = history["energy"][:, 0]
     lines = {method: (history["time_s"][:, 0], energy / energy[0])}
-    return Curves("time [s]", "energy / energy at the start", lines)
+    return Curves("time [s]", "energy / energy at the start [1]", lines)
 
 
 def no_gravity(method, quick):
@@ -108,13 +108,13 @@ def wall_above_a_cell_a_step(method, quick):
 
 
 def longest_steps(method, quick):
-    """Steps of 1.1 ms, of the 1.2 ms in which v_max crosses a cell, shaken at 3.5 g."""
+    """Steps of 1.1 ms, of the 1.2 ms in which the largest speed crosses a cell, shaken at 3.5 g."""
     run = scenes.drive(filling(method), 50, 20 if quick else 200, dt=1.1e-3)
     return _sound(run, method, scenes.speed_bounded(run))
 
 
 def step_above_limit(method, quick):
-    """A step in which a particle at v_max would cross more than a cell."""
+    """A step in which a particle at the largest speed would cross more than a cell."""
     return _sound(scenes.drive(filling(method), 50, 1, dt=2e-3), method)
 
 

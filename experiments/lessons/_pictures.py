@@ -11,9 +11,10 @@ from _time_step import METHODS, SHOWN, STEPS, WORDS
 from ca_damper.plot import Box
 from ca_damper.plot.box import DrawnBox, frame_panel
 from taichi_dem.plot.bodies import draw_bodies
-from taichi_dem.plot_style import BLACK, BLUE, GREEN, GREY, ORANGE, RED, seconds, styled
+from taichi_dem.plot_style import BLACK, BLUE, GREEN, GREY, RED, STYLES, seconds, styled, styles_of
 
-_LOOKS = {"explicit": (RED, "o"), "limited": (ORANGE, "s"), "solved": (BLUE, "D")}
+_LOOKS = {name: (style.colour, style.marker) for name, style in styles_of(METHODS).items()}
+_FILLING = STYLES["ca_static"].colour
 #: Of the displacement of the struck bar.
 _MAGNIFY = 1500.0
 
@@ -69,9 +70,8 @@ def _far_end(axes, answer):
 def _price(axes, answer):
     """Error over seconds at every step of the methods tried so far, the chosen one ringed."""
     axes.set(xscale="log", yscale="log", xlim=(7e-4, 1.0), ylim=(3e-8, 3.0))
-    axes.axhspan(1.0, 3.0, color="0.94", lw=0)
-    axes.axhline(1e-2, color=GREY, ls=":", lw=1.0)
-    axes.text(0.9, 1.2e-2, "1 %", ha="right", color=GREY, fontsize=8)
+    axes.axhspan(1.0, 3.0, color="0.94", lw=0, label="× diverged: its cost, but no error")
+    axes.axhline(1e-2, color=GREY, ls=":", lw=1.0, label="error of 1 %")
     for method, strikes in answer.ladders.items():
         colour, mark = _LOOKS[method]
         good = [made for made in strikes if not made.sentence]
@@ -88,8 +88,8 @@ def _price(axes, answer):
         axes.annotate(
             seconds(chosen.step), place, (10, 8), textcoords="offset points", weight="bold"
         )
-    axes.set(xlabel="seconds of one core", ylabel="largest error of the far end")
-    axes.set_title("left is cheap, low is exact, × diverged")
+    axes.set(xlabel="CPU time of one core [s]", ylabel="largest error of the far end [1]")
+    axes.set_title("lower left is better")
     axes.legend(loc="lower left")
 
 
@@ -112,12 +112,12 @@ def picture_grains(answer):
 def _response(axes, answer):
     fine, empty = answer.without()
     _, rigid = answer.without(answer.share * answer.oscillator.mass)
-    axes.plot(fine, 1e3 * empty, color=GREY, ls=":", label="empty")
+    axes.plot(fine, 1e3 * empty, color=GREY, ls=":", label=STYLES["empty"].label)
     axes.plot(fine, 1e3 * rigid, color=GREY, ls="--", lw=1.0, label="grains glued to the floor")
-    axes.plot(RATIOS, 1e3 * answer.rms, "o-", color=BLUE, ms=4, label=f"{answer.grains} grains")
+    axes.plot(RATIOS, 1e3 * answer.rms, "o-", color=_FILLING, ms=4, label=f"{answer.grains} grains")
     place = answer.ratio, 1e3 * answer.rms[answer.place]
     axes.plot(*place, "o", ms=12, mfc="none", mec=BLACK, mew=1.5)
-    axes.set(xlabel="frequency of the base / own frequency of the empty box", ylim=(0.0, None))
+    axes.set(xlabel="frequency of the base / own frequency of the empty box [1]", ylim=(0.0, None))
     axes.set(ylabel="RMS displacement [mm]", title="how far the box swings")
     axes.legend()
 
@@ -208,7 +208,7 @@ def _broken(axes, answer):
     words = (
         "one of both did not end" if change is None else f"bodies end {percent(change)} elsewhere"
     )
-    axes.set(xlabel="broken bonds", title=words)
+    axes.set(xlabel="broken bonds [1]", title=words)
 
 
 def percent(share):

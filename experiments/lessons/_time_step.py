@@ -22,6 +22,7 @@ from taichi_dem import (
     quality_report,
 )
 from taichi_dem.mesh_shapes import bar
+from taichi_dem.plot_style import styles_of
 
 LENGTH, WIDTH, CELLS = 0.4, 0.05, (12, 1, 1)
 #: Steps to choose from [s], and that of the truth.
@@ -41,11 +42,7 @@ METHODS = {
     "limited": Uniform(STEPS[0], dashpot="limited"),
     "solved": ImplicitDashpots(STEPS[0], tolerance=1e-3),
 }
-WORDS = {
-    "explicit": "explicit",
-    "limited": "explicit, dashpots limited",
-    "solved": "dashpots solved together",
-}
+WORDS = {name: style.label for name, style in styles_of(METHODS).items()}
 
 
 @dataclass(frozen=True, eq=False)

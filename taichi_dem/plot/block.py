@@ -6,7 +6,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap
 
 from taichi_dem.plot.view import View, surface, traces
-from taichi_dem.plot_style import picture, seconds
+from taichi_dem.plot_style import area_key, picture, seconds
 from taichi_dem.record import body_corners
 
 _STONE, _JOINT, _INSIDE = "#E4E0D6", "#C9C3B5", "#B5AD9C"
@@ -51,6 +51,9 @@ def plot_cracks(path, model, frame, broken_time, magnify=5.0, axis=(0.0, 0.0, 1.
             for collection in (drawn, lines):
                 collection.set_clim(0.0, 1e3 * frame.time_s or 1.0)
         scale = "true scale" if magnify == 1.0 else f"displacement × {magnify:g}"
+        marks = [area_key("outer faces", fc=_STONE, ec=_JOINT)]
+        marks.append(area_key("crack faces, seen where cracks open", fc=_INSIDE))
+        figure.legend(handles=marks, loc="outside lower left", ncols=2)
         panels[1].set_title(f"t = {1e3 * frame.time_s:.3g} ms, {scale}")
         panels[2].set_title(f"t = {1e3 * frame.time_s:.3g} ms, close up, true scale")
         for axes in panels:
@@ -139,7 +142,7 @@ def plot_steps(path, model, frames, dt0, broken_time=None, axis=(0.0, 0.0, 1.0))
         bar.ax.set_yticklabels([seconds(dt0 / 2.0**k) for k in range(top + 1)])
         bar.ax.tick_params(length=0)
         bar.ax.invert_yaxis()
-        bar.set_label("step")
+        bar.set_label("step of a body")
 
 
 def _levels(axes, view, model, frame, broken_time, shades, norm):

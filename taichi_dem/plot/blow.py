@@ -1,6 +1,7 @@
-"""A fragment hits a bar: bodies by their step, ways of the ends, evaluations of each method.
+"""A fragment hits a bar: bodies by their step, motion of the ends, evaluations of each method.
 
-A blow has: name, simulation, frames, time [s], struck and far [m] (ways of the bar's ends), levels
+A blow has: name (of its method), simulation, frames, time [s], struck and far [m] (displacements of
+the bar's ends), levels
 (frames, bodies), evaluations and broken; one entry a frame.
 """
 
@@ -12,55 +13,62 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from taichi_dem.plot.block import displaced
 from taichi_dem.plot.film import moving_picture
 from taichi_dem.plot.view import View, surface
-from taichi_dem.plot_style import BLACK, BLUE, GREY, RED, picture, seconds
+from taichi_dem.plot_style import BLACK, GREY, picture, seconds, styles_of
 
-_LOOKS = {0: (BLACK, "-"), 1: (RED, "--"), 2: (BLUE, ":")}
 #: Of the displacement in the film.
 _MAGNIFY = 40.0
 
 
 def picture_blow(path, blows, dt0):
-    """Ways of the ends, evaluations, and share of bodies on each level of the second method."""
+    """Motion of the ends, evaluations, and share of bodies on each level of the second method."""
+    styles = styles_of([blow.name for blow in blows])
     with picture(path, 1, 3, size=(12.0, 3.6)) as (figure, (way, work, share)):
-        for k, blow in enumerate(blows):
-            colour, line = _LOOKS[k % len(_LOOKS)]
-            look = {"color": colour, "linestyle": line}
+        for blow, style in zip(blows, styles.values()):
+            look = {"color": style.colour, "linestyle": style.line}
             time = 1e6 * blow.time
-            way.plot(time, 1e6 * blow.struck, label=f"struck end, {blow.name}", **look)
+            way.plot(time, 1e6 * blow.struck, label=style.label, **look)
             way.plot(time, 1e6 * blow.far, linewidth=0.8, **look)
-            work.plot(time, 1e-6 * blow.evaluations, label=blow.name, **look)
-        way.set(xlabel="time [µs]", ylabel="way [µm]", title="the answer (thin: far end)")
-        work.set(xlabel="time [µs]", ylabel="evaluations [millions]", title="the price")
-        way.legend(loc="upper left")
-        work.legend(loc="upper left")
+            work.plot(time, 1e-6 * blow.evaluations, label=style.label, **look)
+        way.set(xlabel="time [µs]", ylabel="displacement [µm]", title="the answer")
+        work.set(xlabel="time [µs]", ylabel="evaluations of bonds and pairs [10⁶]")
+        work.set(title="the price")
+        handles, labels = work.get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower left", ncols=len(blows))
+        ends = [way.plot([], [], color=GREY, lw=width)[0] for width in (1.5, 0.8)]
+        way.legend(ends, ["struck end (thick)", "far end (thin)"], loc="upper left")
         levels = blows[1].levels
         top = int(levels.max()) + 1
         shares = np.array([np.bincount(row, minlength=top) / len(row) for row in levels])
         areas = share.stackplot(1e6 * blows[1].time, 100.0 * shares.T, colors=_shades(top))
         share.set(xlabel="time [µs]", ylabel="share of bodies [%]", ylim=(0.0, 100.0))
-        share.set(title=f"steps, {blows[1].name}", xlim=(0.0, 1e6 * blows[1].time[-1]))
+        share.set(
+            title=f"steps: {styles[blows[1].name].label}", xlim=(0.0, 1e6 * blows[1].time[-1])
+        )
         names = [seconds(dt0 / 2.0**level) for level in range(top)]
         figure.legend(areas[::-1], names[::-1], title="step", loc="outside right center")
 
 
 def film_blow(path, base, other, dt0, count):
-    """Both bars by their bodies' steps, and the way of the struck end. count: of frames."""
+    """Both bars by their bodies' steps, and how far the struck end moves. count: of frames."""
+    styles = styles_of([base.name, other.name])
     top = int(max(base.levels.max(), other.levels.max())) + 1
     with moving_picture(path, (4.0, 3.8), 120) as (figure, shoot):
         panels = figure.subplots(3, 1, height_ratios=(1.0, 1.0, 1.25))
         blocks = [_Block(axes, blow, top) for axes, blow in zip(panels, (base, other))]
         both = panels[:2].tolist()
-        look = {"location": "bottom", "aspect": 40, "label": "step of a body"}
+        words = f"step of a body; displacement × {_MAGNIFY:g}; thick line: mean of the struck end"
+        look = {"location": "bottom", "aspect": 40, "label": words}
         bar = figure.colorbar(blocks[0].drawn, ax=both, **look)
         bar.ax.set_xticks(np.arange(top), [seconds(dt0 / 2.0**k) for k in range(top)])
         bar.ax.minorticks_off()
         way = panels[2]
         lines = []
-        for blow, (colour, line) in zip((base, other), _LOOKS.values()):
-            lines += way.plot([], [], color=colour, linestyle=line, label=blow.name)
+        for style in styles.values():
+            look = {"color": style.colour, "linestyle": style.line, "label": style.label}
+            lines += way.plot([], [], **look)
         highest = 1e6 * max(base.struck.max(), other.struck.max())
         way.set(xlim=(0.0, 1e6 * base.time[-1]), ylim=(-0.05 * highest, 1.1 * highest))
-        way.set(xlabel="time [µs]", ylabel="way of the\nstruck end [µm]")
+        way.set(xlabel="time [µs]", ylabel="displacement of\nthe struck end [µm]")
         way.legend(loc="lower right")
         for row in np.linspace(0, len(base.time) - 1, count).round().astype(int):
             for block, blow, line in zip(blocks, (base, other), lines):
@@ -82,7 +90,7 @@ class _Block:
         low, high = flat.min(axis=0), flat.max(axis=0)
         axes.set(xlim=(low[0] - 0.08, high[0] + 0.02), ylim=(low[1] - 0.03, high[1] + 0.03))
         end = self.model.mesh.group_faces("bar_right")
-        (self.edge,) = axes.plot([], [], color=BLUE, linewidth=1.6)
+        (self.edge,) = axes.plot([], [], color=BLACK, linewidth=1.6)
         self.end, self.height = self.model.mesh.points[end].mean(axis=(0, 1))[0], (low[1], high[1])
         axes.set_aspect("equal")
         axes.set_axis_off()
@@ -90,7 +98,7 @@ class _Block:
         shades = ListedColormap(_shades(top)[:top])
         self.drawn = PolyCollection([], cmap=shades, norm=norm, linewidth=0.25, edgecolor=GREY)
         axes.add_collection(self.drawn)
-        self.axes = axes
+        self.axes, self.name = axes, styles_of([blow.name])[blow.name].label
         self.broken_tick = blow.simulation.state.broken_tick.to_numpy()[: self.model.bond_count]
         self.tick = blow.simulation.schedule.tick_seconds
 
@@ -104,5 +112,5 @@ class _Block:
         self.drawn.set_array(frame.level[body].astype(float))
         self.edge.set_data([self.end - _MAGNIFY * blow.struck[row]] * 2, self.height)
         count = f"{1e-6 * blow.evaluations[row]:.1f} million evaluations"
-        text = f"{blow.name}: {count} after {1e6 * frame.time_s:.0f} µs"
+        text = f"{self.name}:\n{count} after {1e6 * frame.time_s:.0f} µs"
         self.axes.set_title(text)

@@ -22,12 +22,13 @@ def picture_law(path, lines, curves, pressures):
         panels[0].lines[0].set_label("law")
         for k, (way, traction) in enumerate(curves):
             some = _evenly(way, traction)
-            label = f"{1e-6 * pressures[k - 1]:g} MPa" if k else "measured"
+            label = f"measured at {1e-6 * pressures[k - 1]:g} MPa" if k else "measured"
             axes = panels[min(k, 1)]
             look = {"marker": "o", "ms": 3.4, "ls": "none", "color": _COLOURS[k]}
             axes.plot(1e6 * way[some], 1e-6 * traction[some], label=label, **look)
         panels[0].legend(loc="upper right")
-        panels[1].legend(title="measured at", loc="lower right")
+        panels[1].lines[0].set_label("law")
+        panels[1].legend(loc="lower right")
         panels[0].set_title("pulled, unloaded, pressed, pulled until it breaks")
         panels[1].set_title("slid, back and on, under four pressures")
 
@@ -43,6 +44,9 @@ def film_law(path, lines, curves, pressures, points, count):
         panels[1, 0].set_title("tension")
         panels[1, 1].set_title("shear under pressure")
         marks = [_mark(panels[1, min(k, 1)], _COLOURS[k]) for k in range(len(curves))]
+        panels[1, 0].lines[0].set_label("law")
+        marks[0][0].set_label("measured")
+        panels[1, 0].legend(loc="upper right")
         last = len(curves) - 1
         opened, shifted = (f"× {factor:g}" for factor in _MAGNIFY)
         pulled = _Specimen(panels[0, 0], points, f"opening {opened}", _COLOURS[0])

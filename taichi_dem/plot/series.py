@@ -3,7 +3,7 @@
 import matplotlib
 import numpy as np
 
-from taichi_dem.plot_style import BLUE, GREEN, PURPLE, RED, picture, seconds
+from taichi_dem.plot_style import BLUE, GREEN, PURPLE, RED, picture, seconds, styles_of
 
 #: Ledger terms from the bottom of the stack up: blue is held, red lost in bonds, green in contacts.
 _TERMS = {
@@ -17,11 +17,6 @@ _TERMS = {
     "sphere_dashpot_J": ("sphere dashpots", "#C7E5B4"),
     "friction_J": ("friction", "#3E9B52"),
 }
-#: Colour and line of methods that are compared.
-_STROKES = (
-    *((BLUE, "-"), (RED, "--"), (GREEN, ":"), (PURPLE, "-.")),
-    *(("black", "-"), ("#8C6D31", "--")),
-)
 _GIVEN = {
     "gas_work_J": ("gas work", "black", "--"),
     "injected_J": ("injected at release", PURPLE, ":"),
@@ -38,7 +33,6 @@ def plot_pressure(path, time_s, pressure_pa, until_s=None):
     with picture(path, size=(5.6, 3.2)) as (_, axes):
         time_ms, pressure = 1e3 * np.asarray(time_s), 1e-6 * np.asarray(pressure_pa)
         axes.plot(time_ms, pressure, color=RED)
-        axes.fill_between(time_ms, pressure, color=RED, alpha=0.12, linewidth=0)
         peak = int(pressure.argmax())
         axes.annotate(
             f"{pressure[peak]:.4g} MPa at {time_ms[peak]:.3g} ms",
@@ -47,9 +41,9 @@ def plot_pressure(path, time_s, pressure_pa, until_s=None):
             textcoords="offset points",
         )
         if until_s is not None:
-            axes.axvline(1e3 * until_s, color="black", linewidth=0.8, linestyle=":")
-            side = "right" if 1e3 * until_s > 0.7 * time_ms[-1] else "left"
-            axes.text(1e3 * until_s, 0.9 * pressure[peak], " end of run ", ha=side)
+            look = {"color": "black", "linewidth": 0.8, "linestyle": ":", "label": "end of the run"}
+            axes.axvline(1e3 * until_s, **look)
+            axes.legend(loc="upper right")
         axes.set(xlabel="time [ms]", ylabel="pressure on the hole [MPa]")
         axes.set(xlim=(0.0, time_ms[-1]), ylim=(0.0, 1.12 * pressure[peak]))
 
@@ -75,9 +69,9 @@ def plot_history(path, history):
             top.legend(loc="upper left")
         top.set(ylabel="displacement [mm]", ylim=(0.0, None))
         middle.step(time, history["broken_faces"], where="post", color=BLUE)
-        middle.set(ylabel="broken faces", ylim=(0.0, None))
-        bottom.step(time, history["smallest_step_s"], where="post", color=GREEN)
-        bottom.set(xlabel="time [ms]", ylabel="smallest step [s]", yscale="log")
+        middle.set(ylabel="broken faces [1]", ylim=(0.0, None))
+        bottom.step(time, 1e9 * history["smallest_step_s"], where="post", color=GREEN)
+        bottom.set(xlabel="time [ms]", ylabel="smallest step [ns]", yscale="log")
         _span(bottom, time)
 
 
@@ -104,8 +98,10 @@ def _stack(axes, time, history, terms):
     colours = [colour for _, colour in terms.values()]
     axes.stackplot(time, values, colors=colours, edgecolor="white", linewidth=0.3)
     given = history["load_work_J"] + history["support_work_J"] + history["injected_J"]
-    axes.plot(time, 1e-3 * given, color="black", linestyle="--", linewidth=1.2)
-    axes.set(ylabel="energy [kJ]", title="Held and lost; dashed: gas work + injected")
+    words = "work done + injected"
+    axes.plot(time, 1e-3 * given, color="black", linestyle="--", linewidth=1.2, label=words)
+    axes.set(ylabel="energy [kJ]", title="Held and lost, stacked")
+    axes.legend(handles=axes.lines, loc="upper left")
 
 
 def _lines(axes, time, history, terms):
@@ -127,7 +123,7 @@ def _positive(values):
 def _residual(axes, time, history):
     axes.plot(time, 1e-3 * history["residual_J"], color=RED)
     axes.axhline(0.0, color="black", linewidth=0.6)
-    axes.set(ylabel="residual [kJ]")
+    axes.set(ylabel="unexplained\nenergy [kJ]")
 
 
 def _momentary(axes, time, history):
@@ -138,7 +134,7 @@ def _momentary(axes, time, history):
         late, 100.0 * np.abs(history["residual_J"]) / np.where(late, work, 1.0), np.nan
     )
     axes.plot(time, share, color=RED)
-    axes.set(ylabel="residual\n[% of work so far]", ylim=(0.0, None))
+    axes.set(ylabel="unexplained\n[% of work so far]", ylim=(0.0, None))
 
 
 def plot_levels(path, time_s, shares, dt0):
@@ -165,13 +161,15 @@ _COMPARED = {"hole_radial_displacement_mm": "hole", "monitor_displacement_mm": "
 def plot_methods(path, series, column):
     """What methods cost over time, and how far their displacement lies apart.
 
-    series: title -> columns time_s, cpu_s, evaluations and the one compared, a displacement of the
+    series: method -> columns time_s, cpu_s, evaluations and the one compared, a displacement of the
     hole or of the body watched; the first is the one the others are compared with.
     """
-    with picture(path, 1, 3, size=(12.5, 3.4)) as (_, (cost, work, moved)):
+    with picture(path, 1, 3, size=(12.5, 4.0)) as (figure, (cost, work, moved)):
         first = next(iter(series.values()))
-        for (title, made), (colour, line) in zip(series.items(), _STROKES):
-            look = {"color": colour, "linestyle": line, "label": title}
+        styles = styles_of(series)
+        for name, made in series.items():
+            style = styles[name]
+            look = {"color": style.colour, "linestyle": style.line, "label": style.label}
             time = 1e3 * np.asarray(made["time_s"])
             cost.plot(time, made["cpu_s"], **look)
             work.plot(time, 1e-6 * np.asarray(made["evaluations"]), **look)
@@ -183,7 +181,7 @@ def plot_methods(path, series, column):
             )
             moved.plot(time, 100.0 * (share - 1.0), **look)
         cost.set(ylabel="CPU time of stepping [s]")
-        work.set(ylabel="evaluations [millions]")
+        work.set(ylabel="evaluations of bonds\nand contact pairs [10⁶]")
         for axes, name, unit in ((cost, "cpu_s", 1.0), (work, "evaluations", 1e6)):
             last = [made[name][-1] / unit for made in series.values()]
             if max(last) > 20.0 * min(last):
@@ -194,9 +192,10 @@ def plot_methods(path, series, column):
                 axes.set_ylim(0.0, None)
         moved.set(
             ylabel=f"displacement of the {_COMPARED[column]},\n"
-            f"difference from {next(iter(series))} [%]"
+            f"difference from\n{next(iter(styles.values())).label} [%]"
         )
         for axes in (cost, work, moved):
             axes.set(xlabel="time [ms]")
             _span(axes, time)
-        moved.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0))
+        handles, labels = moved.get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=3)

@@ -34,10 +34,12 @@ def picture_energy(path, runs):
         for axes, limit in zip(panels[0], limits):
             for k, made in enumerate(m for m in runs if m.limit == limit):
                 _residual(axes, made, _LOOKS[k % len(_LOOKS)])
-            axes.axhline(1.0, color=GREY, linestyle=":", linewidth=1.0)
+            axes.axhline(1.0, color=GREY, ls=":", lw=1.0, label="all that was put in")
+            if any(made.sentence for made in runs if made.limit == limit):
+                axes.plot([], [], "X", color=BLACK, ms=7, ls="none", label="ended by the program")
             axes.set(title=f"limited by its {limit}", xlabel="time [µs]")
             axes.legend(loc="lower left", title="step")
-        panels[0, 0].set_ylabel("unexplained energy / energy put in")
+        panels[0, 0].set_ylabel("unexplained energy / energy put in [1]")
         width = 62 * len(limits)
         words = [f"{made.limit}, {made.share:g} × limit: “{made.sentence}”" for made in said]
         words = "\n".join(textwrap.fill(text, width) for text in words)
@@ -63,21 +65,25 @@ def film_shaken(path, safe, bad, count):
             _Block(figure, grid[0, k], grid[1, k], made, fastest)
             for k, made in enumerate((safe, bad))
         ]
+        words = f"bodies: colour and points show their speed, displacement × {_MAGNIFY:g}"
+        figure.suptitle(words, fontsize=6.5)
         energy = figure.add_subplot(grid[2, :])
         words = figure.add_subplot(grid[3, :])
         words.set_axis_off()
         said = words.text(-0.12, 1.0, "", va="top", fontsize=5.8, family="monospace")
         end = float(bad.time[-1])
-        curves = [_curve(energy, made, colour) for made, colour in ((safe, GREEN), (bad, RED))]
+        curves = [
+            _curve(energy, made, colour) for made, colour in zip((safe, bad), _LOOKS.values())
+        ]
         energy.set(yscale="log", ylim=_RANGE, xlim=(0.0, 1.03e6 * end))
-        energy.set(xlabel="time [µs]", ylabel="unexplained /\nput in")
+        energy.set(xlabel="time [µs]", ylabel="unexplained\nenergy /\nput in [1]")
         energy.legend(loc="upper left")
         for now in _instants(end, count):
             for block in blocks:
                 block.show(now)
             for line, time, values in curves:
                 line.set_data(time[time <= 1e6 * now], values[time <= 1e6 * now])
-            said.set_text(textwrap.fill(bad.sentence, 74) if now == end else "")
+            said.set_text(textwrap.fill(bad.sentence, 66) if now == end else "")
             shoot()
 
 

@@ -32,7 +32,8 @@ def picture_wave(path, length, time, velocity, gates):
         for cell, colour in zip((*gates, cells - 1), (BLUE, GREEN, RED)):
             name = f"at {place[cell]:.2f} m" if cell < cells - 1 else "free end"
             over.plot(1e3 * time, 1e3 * velocity[:, cell], color=colour, label=name)
-            along.axvline(place[cell], color=colour, linewidth=0.8, linestyle="--")
+            along.axvline(place[cell], color=colour, linewidth=0.8, linestyle="--", label=name)
+        along.legend(loc="upper left", title="seen on the right", frameon=True, framealpha=0.9)
         second = 1e3 * velocity[:, gates[1]].max()
         over.axhline(2.0 * second, color=GREY, linestyle=":", label="twice the wave's peak")
         over.set(xlabel="time [ms]", ylabel="velocity [mm/s]", title="the free end doubles it")
@@ -54,11 +55,12 @@ def picture_spall(path, length, made, stress, rows):
             drawn = axes.pcolormesh(joint, 1e3 * made.time, 1e-6 * stress[:, k], **look)
             when, where = np.nonzero(np.diff(made.joints[:, k].astype(int), axis=0, prepend=0) > 0)
             axes.plot(joint[where], 1e3 * made.time[when], "x", color=BLACK, ms=6, label="breaks")
-            axes.axvline(length - row["formula_m"], color=BLACK, ls=":", lw=1.0, label="formula")
+            words = "first break by the formula"
+            axes.axvline(length - row["formula_m"], color=BLACK, ls=":", lw=1.0, label=words)
             title = f"pulse of {row['ratio']:g} × strength"
             axes.set(xlabel="place [m]", ylabel="time [ms]", title=title)
             axes.legend(loc="lower left")
-        figure.colorbar(drawn, ax=panels[len(picked) - 1], label="stress [MPa], tension positive")
+        figure.colorbar(drawn, ax=panels[len(picked) - 1], label="stress, tension positive [MPa]")
         _depths(panels[-1], length / (stress.shape[2] + 1), rows)
 
 
@@ -67,10 +69,10 @@ def _depths(axes, cell, rows):
     share = np.array([row["arrived_MPa"] for row in rows])
     product = rows[0]["formula_m"] * rows[0]["arrived_MPa"]
     line = np.linspace(0.8 * share.min(), 1.1 * share.max(), 100)
-    axes.plot(line, product / line, color=GREY, label="λ σt / (2 s0)")
+    axes.plot(line, product / line, color=GREY, label="pulse length × strength / (2 s$_0$)")
     depth = [row["depth_m"] for row in rows]
     axes.errorbar(share, depth, yerr=cell, fmt="o", color=RED, ms=5, label="broke, ± one cell")
-    axes.set(xlabel="pulse s0 that arrived [MPa]", ylabel="depth of the first break [m]")
+    axes.set(xlabel="pulse s$_0$ that arrived [MPa]", ylabel="depth of the first break [m]")
     axes.set(ylim=(0.0, None), title="the stronger, the thinner")
     axes.legend(loc="upper right")
 
@@ -100,7 +102,7 @@ def film_spall(path, length, made, stress, shown, strength, count):
             loaded.set_data(joint, pull[row])
             breaks.set_data(joint[broken], np.zeros(broken.sum()))
             drawn.show(made.displacement[row, shown], pull[row], broken)
-            fast.set_title(f"t = {1e3 * made.time[row]:.2f} ms, × marks broken faces")
+            fast.set_title(f"t = {1e3 * made.time[row]:.2f} ms, × and | mark broken faces")
             shoot()
 
 
@@ -118,7 +120,7 @@ class _Bar:
         self.left = np.arange(cells) * self.cell
         self.boxes = axes.bar(self.left, 1.0, self.cell, align="edge", linewidth=0.0)
         axes.set(xlim=(-0.05 * length, 1.16 * length), ylim=(-0.3, 1.3), yticks=[])
-        axes.set(xlabel=f"place [m], displacement × {_MAGNIFY:g}")
+        axes.set(xlabel=f"place [m]; displacement × {_MAGNIFY:g}, red: tension, blue: pressure")
         axes.spines["left"].set_visible(False)
         axes.grid(False)
         (self.gaps,) = axes.plot([], [], "|", color=ORANGE, ms=22, mew=1.8)

@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from tests import arch
-from tests.experiments.contract import FOLDER, start
+from tests.experiments.contract import FOLDER, figure_report, start
 
 
 @pytest.fixture(scope="module")
@@ -18,7 +18,8 @@ def quick_run(tmp_path_factory):
         key = (name, *options)
         if key not in made:
             folder = tmp_path_factory.mktemp(name)
-            made[key] = folder, start(name, "--quick", "--out", folder, *options)
+            report = figure_report(folder)
+            made[key] = folder, start(name, "--quick", "--out", folder, *options, report=report)
         return made[key]
 
     return run

@@ -17,6 +17,7 @@ from PIL import Image
 from tests import arch
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments"
+READER = Path(__file__).resolve().parents[1] / "figures.py"
 NO_EXPERIMENTS = ("make_meshes", "bench", "gallery")
 NAMES = sorted(
     path.stem
@@ -25,11 +26,20 @@ NAMES = sorted(
 )
 
 
-def start(name, *arguments):
-    """Run an experiment in a process of its own; two threads, output in pipes."""
+def start(name, *arguments, report=None):
+    """Run an experiment in a process of its own; two threads, output in pipes.
+
+    report: file for what its figures lack, see ``tests.figures``.
+    """
     everywhere = ["--threads", "2", "--arch", arch.chosen()]
-    line = [sys.executable, str(FOLDER / f"{name}.py"), *everywhere, *map(str, arguments)]
+    reader = [] if report is None else [str(READER), str(report)]
+    line = [sys.executable, *reader, str(FOLDER / f"{name}.py"), *everywhere, *map(str, arguments)]
     return subprocess.run(line, capture_output=True, text=True, timeout=1800)
+
+
+def figure_report(folder):
+    """File of what the figures lack of a quick run in a folder."""
+    return folder.parent / f"{folder.name}_figures.json"
 
 
 def quick_runs(names):
@@ -100,6 +110,12 @@ class QuickRun:
         for figure in summary["figures"].values():
             assert set(figure) == {"value", "unit", "paper"}
             assert is_figure(figure["value"]), figure
+
+    def test_figures_say_what_they_show(self, quick):
+        name, folder, _ = quick
+        report = json.loads(figure_report(folder).read_text())
+        assert report["figures"] > 0 or not list(folder.glob("*.png")), name
+        assert report["defects"] == []
 
     def test_pictures_are_neither_tiny_nor_empty(self, quick):
         _, folder, _ = quick

@@ -8,6 +8,7 @@ first method that claims it and the first that declines it, among the slow tests
 import pytest
 
 from _hard_cases import blast, judge, registry
+from tests.figures import UNIT
 
 SHARED = ("multirate_drifted", "implicit")
 
@@ -35,6 +36,8 @@ def test_method_bears_the_case_or_declines_it_in_words(case, method):
     result = judge(case, method, quick=True)
     wanted = "refused" if method in case.declines else "passed"
     assert result.status == wanted, result.words
+    shown = result.shown
+    assert shown is None or all(map(UNIT.search, (shown.xlabel, shown.ylabel)))
 
 
 def test_there_are_enough_cases():

@@ -3,6 +3,7 @@
 import pytest
 
 from _hard_cases import judge, registry
+from tests.figures import UNIT
 
 #: They differ from others by one law or account, which other tests are about.
 VARIANTS = ("spheres_printed", "automaton_ejection")
@@ -24,6 +25,8 @@ def test_method_bears_the_case_or_declines_it_in_words(case, method):
     result = judge(case, method, quick=True)
     wanted = "refused" if method in case.declines else "passed"
     assert result.status == wanted, result.words
+    shown = result.shown
+    assert shown is None or all(map(UNIT.search, (shown.xlabel, shown.ylabel)))
 
 
 def test_there_are_enough_cases():

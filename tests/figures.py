@@ -1,0 +1,178 @@
+"""What a figure must say for itself, and a way to run an experiment while its figures are read.
+
+    python tests/figures.py REPORT experiments/NAME.py ARGUMENTS
+
+runs the experiment as if it were called directly and writes to REPORT, a JSON file, what its
+figures lack: {"figures": count, "defects": [sentence]}.
+"""
+
+import itertools
+import json
+import os
+import re
+import runpy
+import sys
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_hex
+from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
+from matplotlib.text import Text
+
+from taichi_dem.plot_style import STYLES
+
+CODE_NAME = re.compile(r"[A-Za-z0-9]_[A-Za-z0-9]")
+PROGRAM_NUMBER = re.compile(r"\d[eE][-+]?\d+(?![0-9a-zA-Z])")
+COMMIT = re.compile(r"commit \w+")
+MATHS = re.compile(r"\$[^$]*\$")
+UNIT = re.compile(r"\[[^\]]+\]")
+#: The program's own sentences are quoted as they are.
+QUOTE = re.compile(r"“[^”]*”", re.DOTALL)
+LABELS = sorted(((s.label, s.colour) for s in STYLES.values()), key=lambda pair: -len(pair[0]))
+
+
+def defects(figure):
+    """Sentences: what a drawn figure lacks; none if it says all that it shows."""
+    found = [*bad_words_in(texts_of(figure)), *other_colours(figure), *unexplained_lines(figure)]
+    for axes in figure.axes:
+        found += missing_units(axes)
+    return found
+
+
+def texts_of(figure):
+    """All texts that one sees."""
+    shown = [text for text in figure.findobj(Text) if text.get_visible() and text.get_text()]
+    hidden = {
+        text
+        for axes in figure.axes
+        for text in axes.findobj(Text)
+        if not axes.axison and text in (*axes.xaxis.findobj(Text), *axes.yaxis.findobj(Text))
+    }
+    return [text.get_text() for text in shown if text not in hidden]
+
+
+def bad_words_in(texts):
+    """Names of the code and numbers as a program prints them."""
+    for text in texts:
+        plain = COMMIT.sub("", QUOTE.sub("", MATHS.sub("", text)))
+        if CODE_NAME.search(plain):
+            yield f"a name of the code in {text!r}"
+        if PROGRAM_NUMBER.search(plain):
+            yield f"a number as programs print it in {text!r}"
+
+
+def legends_of(figure):
+    """All legends of a figure and its axes."""
+    return figure.findobj(Legend)
+
+
+def entries_of(figure):
+    """(Words, handle) of all legends."""
+    for legend in legends_of(figure):
+        words = [text.get_text() for text in legend.get_texts()]
+        yield from zip(words, legend.legend_handles)
+
+
+def colour_of(artist):
+    """Colour as #rrggbb, None where the artist has none of its own or several."""
+    for name in ("get_color", "get_facecolor"):
+        if hasattr(artist, name):
+            value = np.atleast_2d(np.asarray(getattr(artist, name)(), dtype=object))
+            value = getattr(artist, name)() if value.shape[0] <= 1 else None
+            if value is not None and len(value):
+                return to_hex(value if isinstance(value, str) else np.ravel(value))
+    return None
+
+
+def other_colours(figure):
+    """Methods and fillings in a colour that is not that of the table."""
+    for words, handle in entries_of(figure):
+        for label, colour in LABELS:
+            if label in words:
+                seen = colour_of(handle)
+                if seen and seen.lower() != to_hex(colour).lower():
+                    yield f"{words!r} is drawn in {seen}, and {label!r} is {colour}"
+                break
+
+
+def unexplained_lines(figure):
+    """Dashed and dotted lines and bands that no legend of the figure names."""
+    styles = {line.get_linestyle() for key in legends_of(figure) for line in key.findobj(Line2D)}
+    for axes in figure.axes:
+        for line in axes.lines:
+            look = line.get_linestyle()
+            drawn = line.get_visible() and len(line.get_xdata()) and look not in ("-", "None")
+            if drawn and look not in styles:
+                yield f"no legend says what a line {look} means, in {axes.get_title('left')!r}"
+        for stripe in stripes_of(axes):
+            if colour_of(stripe) not in {colour_of(handle) for _, handle in entries_of(figure)}:
+                yield f"no legend says what a stripe means, in {axes.get_title('left')!r}"
+        bands = [c for c in axes.collections if type(c).__name__ == "FillBetweenPolyCollection"]
+        bands = [band for band in bands if band.get_alpha() is not None]
+        if bands and not any(hasattr(h, "get_facecolor") for _, h in entries_of(figure)):
+            yield f"no legend says what the band means, in {axes.get_title('left')!r}"
+
+
+def stripes_of(axes):
+    """Coloured areas that are no bars."""
+    if axes.get_label() == "<colorbar>" or not axes.axison:
+        return []
+    bars = {id(patch) for container in axes.containers for patch in container}
+    return [patch for patch in axes.patches if id(patch) not in bars]
+
+
+def missing_units(axes):
+    """Axes with numbers but without a label that ends with its unit."""
+    if not axes.get_visible() or not axes.axison:
+        return
+    named = [UNIT.search(axis.get_label_text()) for axis in (axes.xaxis, axes.yaxis)]
+    if axes.get_label() == "<colorbar>":
+        words = [t.get_text() for axis in (axes.xaxis, axes.yaxis) for t in axis.get_ticklabels()]
+        if not any(named) and not any(re.search("[a-zµ]", word) for word in words):
+            yield "a colour bar without a unit"
+        return
+    for axis, unit in zip((axes.xaxis, axes.yaxis), named):
+        if not unit and has_numbers(axis):
+            words = axis.get_label_text()
+            yield f"axis {axis.axis_name} ({words!r}) without a unit, of {axes.get_title('left')!r}"
+
+
+def has_numbers(axis):
+    """Whether an axis shows numbers at its ticks; words need no unit."""
+    ticks = [label for label in axis.get_ticklabels() if label.get_visible()]
+    words = [label.get_text() for label in ticks if label.get_text()]
+    return bool(words) and not any(re.search(r"[a-z]{2}", MATHS.sub("", word)) for word in words)
+
+
+def watch(report):
+    """Note what every figure lacks that is drawn from now on, once a figure, in a list."""
+    drawn, seen = FigureCanvasAgg.draw, {}
+
+    def draw(canvas):
+        drawn(canvas)
+        # A figure is kept, as another one could get its number.
+        if id(canvas.figure) not in seen:
+            seen[id(canvas.figure)] = canvas.figure
+            report.extend(defects(canvas.figure))
+
+    FigureCanvasAgg.draw = draw
+    return seen
+
+
+def main(path, script, *arguments):
+    """Run the experiment and write the report however it ends."""
+    sys.argv = [script, *arguments]
+    sys.path[0] = os.path.dirname(os.path.abspath(script))
+    found = []
+    seen = watch(found)
+    try:
+        runpy.run_path(script, run_name="__main__")
+    finally:
+        kept = [sentence for sentence, _ in itertools.groupby(sorted(found))]
+        with open(path, "w", encoding="utf-8") as file:
+            json.dump({"figures": len(seen), "defects": kept}, file)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
