@@ -16,6 +16,7 @@ from ca_damper.spheres import Spheres
 from ca_damper.sweep import Sweep, sweep_up_and_down
 from ca_damper.table import SceneTable
 from taichi_dem.progress import Progress
+from taichi_dem.version import __version__
 
 __all__ = [
     "Automaton",
@@ -31,6 +32,7 @@ __all__ = [
     "SimulationDiverged",
     "Spheres",
     "Sweep",
+    "__version__",
     "film",
     "frequency_response",
     "needed_effects",

@@ -7,14 +7,19 @@ import math
 import os
 import platform
 import re
+import shlex
 import subprocess
 import sys
-from importlib.metadata import version
 
+import numpy as np
+
+# The experiments take the mesh from here, as they do all that they share.
+from taichi_dem import PAPER_BLOCK as PAPER_BLOCK
 from taichi_dem import Checkpoint, InputError, SimulationDiverged, runtime
 from taichi_dem.checkpoint import Interrupted
 from taichi_dem.checks import shown
 from taichi_dem.files import write_text
+from taichi_dem.version import __version__, taichi_version
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 _INTERVALS = {
@@ -24,7 +29,8 @@ _INTERVALS = {
     "sim": "every_s",
 }
 BLAST_DRIVERS = ("auto", "resident", "parallel")
-PAPER_BLOCK = os.path.join(HERE, "meshes", "paper_block.msh")
+#: Cells of a table that say nothing.
+BLANK = ("", "None", "nan")
 
 
 class Parser(argparse.ArgumentParser):
@@ -227,13 +233,21 @@ def _say(message, code):
 
 
 def figure(value, unit, paper=None):
-    """One figure of summary.json."""
+    """One figure of summary.json; what was not measured is left out instead.
+
+    value: None where it was looked for in vain; NaN and infinity, which JSON lacks, count as None.
+    """
+    if isinstance(value, float) and not math.isfinite(value):
+        value = None
     return {"value": value, "unit": unit, "paper": paper}
 
 
 def write_summary(folder, name, figures, *, compile_seconds, run_seconds):
-    """Write summary.json: figures, machine, versions, seconds; see ``figure``."""
-    settings = runtime.settings()
+    """Write summary.json: figures, machine, versions, seconds, command; see ``figure``.
+
+    quick: whether the command asked for the smaller job, which the gallery's texts do not describe.
+    """
+    settings, arguments = runtime.settings(), sys.argv[1:]
     content = {
         "experiment": name,
         "figures": figures,
@@ -246,7 +260,8 @@ def write_summary(folder, name, figures, *, compile_seconds, run_seconds):
         },
         "versions": versions(),
         "seconds": {"compile": compile_seconds, "run": run_seconds},
-        "command": " ".join([f"experiments/{name}.py", *sys.argv[1:]]),
+        "command": shlex.join([f"experiments/{name}.py", *arguments]),
+        "quick": "--quick" in arguments,
     }
     text = json.dumps(content, indent=1)
     write_text(os.path.join(folder, "summary.json"), text)
@@ -264,7 +279,7 @@ def processor():
 
 def versions():
     """Versions of what computes, and the commit where there is one."""
-    found = {name: version(name) for name in ("taichi", "numpy", "taichi-dem")}
+    found = {"taichi": taichi_version(), "numpy": np.__version__, "taichi-dem": __version__}
     found["python"] = platform.python_version()
     git = ["git", "-C", HERE, "rev-parse", "--short", "HEAD"]
     try:
@@ -275,23 +290,27 @@ def versions():
 
 
 def print_table(rows, header):
-    """Print rows of cells under a header, columns as wide as they need to be."""
-    cells = [header, *[[str(cell) for cell in row] for row in rows]]
+    """Print rows of cells under a header, columns as wide as they need to be; blanks as a dash."""
+    cells = [header, *[["-" if str(cell) in BLANK else str(cell) for cell in row] for row in rows]]
     widths = [max(len(row[k]) for row in cells) for k in range(len(header))]
     for row in cells:
         print("  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip())
 
 
 def print_figures(figures):
-    """Print the figures of summary.json beside the paper's values."""
-    rows = [
-        (name, _short(item["value"]), item["unit"], _short(item["paper"]))
-        for name, item in figures.items()
-    ]
-    print_table(rows, ["figure", "value", "unit", "paper"])
+    """Print the figures of summary.json, beside the paper's values where it gives any."""
+    header = ["figure", "value", "unit"]
+    rows = [[name, value_in_words(one["value"]), one["unit"]] for name, one in figures.items()]
+    papers = [one["paper"] for one in figures.values()]
+    if any(paper is not None for paper in papers):
+        header.append("paper")
+        for row, paper in zip(rows, papers):
+            row.append("" if paper is None else value_in_words(paper))
+    print_table(rows, header)
 
 
-def _short(value):
+def value_in_words(value):
+    """A figure's value: four digits, or "not found" where the run looked for one in vain."""
     if value is None or isinstance(value, str):
-        return value or ""
+        return value or "not found"
     return f"{value:,}" if isinstance(value, int) else f"{value:.4g}"

@@ -76,7 +76,7 @@ PAGES = (
         "demo_multirate",
         START,
         "Do steps that differ by body change what one sees of a blow?",
-        "Colours are levels: short steps follow the wave through the bar. Both curves of the "
+        "Colours are levels: short steps follow the wave into the bar. Both curves of the "
         "displacement lie on each other; only the number of evaluations differs.",
         "35 s",
         ("blow.png", "blow.gif"),

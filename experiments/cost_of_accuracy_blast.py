@@ -65,7 +65,7 @@ PAPER_L = 1e-8
 TARGETS = (0.1, 0.01, 0.001)
 #: A run that took longer is not made a second time [s].
 ENOUGH = 4.0
-TIME = "CPU time of one thread [s], the faster of two runs"
+TIME = "CPU time of one thread [s], least of its runs"
 
 
 @dataclass(frozen=True)

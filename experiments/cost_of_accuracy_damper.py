@@ -264,6 +264,8 @@ def picture_all(folder, made, own, toward, empty, floors, sizes):
     )
     names = {name: style.label for name, style in styles_of(made).items()}
     shared = {"titles": names, "floors": floors, "work_name": "particle steps [1]"}
+    truth = seconds_in_words(made[SPHERES].reference["step"])
+    shorter = max(sweep.reference["step"] / min(sweep.curves) for sweep in made.values())
     error = "Error: RMS over the frequencies of (response - reference), mean over seeds,"
     picture_work_precision(
         os.path.join(folder, "work_precision.png"),
@@ -274,15 +276,17 @@ def picture_all(folder, made, own, toward, empty, floors, sizes):
             "mean force on the container: missing share of the weight [1]",
         ),
         step_unit=1e-6,
-        caption=f"{scenes}. {error} as a share of the peak.\nReference of each method: itself at a "
-        "far shorter step with other seeds. Dotted: what seeds alone make of it.",
+        caption=f"{scenes}. {error} as a share of the peak.\nReference of each method: itself with "
+        f"other seeds, at {shorter:.2g} of its finest step or less. Dotted: what seeds alone make "
+        "of it.",
         **shared,
     )
     picture_work_precision(
         os.path.join(folder, "against_spheres.png"),
         toward,
         error_name="difference to the spheres' curve / its peak [1]",
-        caption=f"{scenes}. {error} as a share of the peak.\nReference of all: spheres at 5 µs.",
+        caption=f"{scenes}. {error} as a share of the peak.\n"
+        f"Reference of all: spheres, p = 1/4, at {truth}.",
         **shared,
     )
     picture_work_precision(
@@ -324,7 +328,8 @@ def figures_of(made, own, toward, empty, floors):
         seconds = best.point.seconds.low if best.point else None
         figures[f"seconds_at_1_percent_{label}"] = figure(seconds, "s")
         figures[f"chaos_floor_{label}"] = figure(sweep.floor, "1")
-        figures[f"roundoff_spread_{label}"] = figure(sweep.roundoff, "1")
+        if sweep.roundoff is not None:
+            figures[f"roundoff_spread_{label}"] = figure(sweep.roundoff, "1")
         figures[f"seed_spread_{label}"] = figure(sweep.seed_spread, "1")
         figures[f"check_step_{label}"] = figure(sweep.check_step, "1")
         figures[f"check_force_{label}"] = figure(sweep.reference["force_check"], "1")

@@ -118,7 +118,7 @@ def run(options):
 def picture(blast, damper, path):
     """Bars: what an effect costs, and what changes without it."""
     parts = [
-        ("Blast of the paper's block", verdicts(blast, ("blast",)), _chance(blast)),
+        ("Blast of the paper's block", verdicts(blast, ("blast",)), _chance(blast) or 0.0),
         ("Damper, spheres", verdicts(damper, ("spheres",)), _floor(damper, "spheres")),
         ("Damper, automaton", verdicts(damper, ("automaton",)), _floor(damper, "automaton")),
     ]
@@ -130,8 +130,8 @@ def _floor(rows, group):
 
 
 def _chance(blast):
-    """What a change of the load's last bit changes [%], 0 where that was not tried."""
-    return next((row["change_percent"] for row in blast if row["scene"] == LAST_BIT), 0.0)
+    """What a change of the load's last bit changes [%], None where that was not tried."""
+    return next((row["change_percent"] for row in blast if row["scene"] == LAST_BIT), None)
 
 
 def blast_jobs(options):
@@ -270,7 +270,8 @@ def figures_of(jobs, blast, damper):
     figures["overhead_absent_low_percent"] = figure(float(low), "%")
     figures["overhead_absent_high_percent"] = figure(float(high), "%")
     figures["blast_seconds"] = figure(blast[0]["run_s"], "s")
-    figures["blast_chance_percent"] = figure(_chance(blast), "%")
+    if _chance(blast) is not None:
+        figures["blast_chance_percent"] = figure(_chance(blast), "%")
     for row in blast:
         if row["scene"].startswith("without "):
             name = row["scene"].split()[1]

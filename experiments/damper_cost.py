@@ -195,7 +195,7 @@ def figures_of(costs, borne, options):
         figures[f"growth_{label}"] = figure(seconds[-1] / seconds[0], "1")
     for label, found in borne.items():
         running = [dt for dt, word in found if word == "runs"]
-        figures[f"longest_step_{label}"] = figure(max(running, default=0.0), "s")
+        figures[f"longest_step_{label}"] = figure(max(running, default=None), "s")
     return figures
 
 

@@ -9,7 +9,7 @@ swings most) and amplitudes of the shaking base.
     python experiments/demo_damper.py --particles 60 --frequency 0.95
     python experiments/demo_damper.py --filling spheres --amplitude 1.2
 
-Writes damper.gif, motion.png, motion.csv and summary.json to results/demo_damper/.
+Writes damper.gif, motion.png, motion.csv, caption.txt and summary.json to results/demo_damper/.
 """
 
 import os
@@ -21,7 +21,7 @@ import numpy as np
 from _cli import figure, main, number, parser, whole, write_summary
 from ca_damper import Automaton, Batch, Empty, Oscillator, SceneTable, Spheres, film, plot
 from ca_damper.progress import Stages
-from taichi_dem.files import output_folder, write_csv
+from taichi_dem.files import output_folder, write_csv, write_text
 from taichi_dem.progress_bar import ProgressBar
 
 NAME = "demo_damper"
@@ -110,7 +110,9 @@ def run(options):
         compile_seconds=sum(made.batch.compile_seconds for made in runs.values()),
         run_seconds=sum(made.batch.run_seconds for made in runs.values()),
     )
-    tell(figures, filling, oscillator, options)
+    sentences = caption(figures, filling, oscillator, options)
+    write_text(os.path.join(options.out, "caption.txt"), " ".join(sentences) + "\n")
+    print("\n".join(sentences))
     report = runs["full"].batch.report()
     report.write(os.path.join(options.out, "report.json"))
     print(f"\n{report}")
@@ -169,25 +171,33 @@ def picture(full, empty, oscillator, filling, options):
     plot.animate_motion(path, title, box, *moving, fastest, filling=filling.label)
 
 
-def tell(figures, filling, oscillator, options):
-    """Say in sentences what one sees."""
+def caption(figures, filling, oscillator, options):
+    """What one sees, a sentence an entry."""
     value = {name: item["value"] for name, item in figures.items()}
-    frequency, own = options.frequency * oscillator.natural_frequency, oscillator.natural_frequency
+    own = oscillator.natural_frequency
     load = 1e3 * options.particles * filling.particle_mass
     share = 0.1 * load / oscillator.mass
-    print(f"The container weighs {1e3 * oscillator.mass:g} g and swings by itself at {own:.2f} Hz.")
-    print(f"Its base shakes it at {frequency:.2f} Hz, by {options.amplitude:g} mm up and down.")
-    print(f"Empty, it then swings by {value['amplitude_empty_mm']:.1f} mm.")
-    print(
+    return (
+        f"The container weighs {1e3 * oscillator.mass:g} g and swings by itself at {own:.2f} Hz.",
+        f"Its base shakes it at {options.frequency * own:.2f} Hz, by {options.amplitude:g} mm up "
+        "and down.",
+        f"Empty, it then swings by {value['amplitude_empty_mm']:.3g} mm.",
         f"With {counted(options.particles)} ({load:g} g, {share:.0f} % of its mass) it swings by "
-        f"{value['amplitude_mm']:.1f} mm: {100.0 * value['amplitude_left']:.0f} % of that."
+        f"{value['amplitude_mm']:.3g} mm: {100.0 * value['amplitude_left']:.3g} % of that.",
+        *(taken(value) if options.particles else ()),
     )
-    print(
-        f"The particles take {value['power_mW']:.2g} mW from it, as a dashpot of "
-        f"{value['apparent_damping_N_s_m']:.2g} N s/m would: the damping ratio is "
-        f"{value['damping_ratio']:.2g} instead of {value['damping_ratio_empty']:.2g}."
+
+
+def taken(value):
+    """What particles do to the container, a sentence an entry; value: of the figures, by name."""
+    takes = value["power_mW"] > 0.0
+    power, damping = abs(value["power_mW"]), value["apparent_damping_N_s_m"]
+    return (
+        f"The particles {'take' if takes else 'give'} {power:.2g} mW {'from' if takes else 'to'} "
+        f"it, as a dashpot of {damping:.2g} N s/m would: the damping ratio is "
+        f"{value['damping_ratio']:.2g} instead of {value['damping_ratio_empty']:.2g}.",
+        f"In the swing they weigh as much as {value['apparent_mass_g']:.1f} g fixed to it.",
     )
-    print(f"In the swing they weigh as much as {value['apparent_mass_g']:.1f} g fixed to it.")
 
 
 if __name__ == "__main__":

@@ -130,20 +130,27 @@ def run(options):
         made = measure(simulation, steps, bar.at)
     rows = comparison(made)
     picture(made, options)
-    caption = (
-        f"One bond, {steps} samples. Left: pulled beyond its strength it softens; unloaded and "
-        "reloaded it runs on the line to the origin, pressed it is as stiff as ever; at "
-        f"{rows['failure_opening_um'][0]:.2f} um it lets go. Right: under pressure it slides at "
-        "cohesion + friction x pressure, and elastically back and forth below that. Points are "
-        "measured with a load cell, lines are the law."
-    )
     print_table(
         [(name, f"{is_:.4f}", f"{should:.4f}", unit, f"{100 * (is_ / should - 1):+.3f} %")
          for name, (is_, should, unit) in rows.items()],
-        ["", "measured", "law", "unit", "difference"],
+        ["quantity", "measured", "law", "unit", "difference"],
     )  # fmt: skip
     print()
-    conclude(options, NAME, figures_of(rows), caption, [simulation])
+    conclude(options, NAME, figures_of(rows), caption(rows, steps), [simulation])
+
+
+def caption(rows, steps):
+    """What to see; rows: of ``comparison``."""
+    pressures = ", ".join(f"{1e-6 * pressure:g}" for pressure in PRESSURES)
+    off = max(abs(found / law - 1.0) for found, law, _ in rows.values())
+    return (
+        f"{len(ways())} bonds, {steps} samples of each. Left: pulled beyond its strength a bond "
+        "softens; unloaded and reloaded it runs on the line to the origin, pressed it is as stiff "
+        f"as ever; at {rows['failure_opening_um'][0]:.2f} um it lets go. Right: under pressures of "
+        f"{pressures} MPa it slides at cohesion + friction x pressure, and elastically back and "
+        "forth below that. Points are measured with a load cell, lines are the law; the figures "
+        f"differ by at most {100 * off:.2g} %."
+    )
 
 
 def comparison(made):

@@ -202,19 +202,26 @@ def run(options):
     rows = spalled(made, ratios, speed)
     print_rows(rows)
     picture(wave, made, rows, speed, options)
-    conclude(options, NAME, figures_of(wave, rows, speed, cells), caption(rows), [first, second])
+    figures, words = figures_of(wave, rows, speed, cells), caption(rows, doubling(wave))
+    conclude(options, NAME, figures, words, [first, second])
 
 
-def caption(rows):
-    """What to see."""
-    one = min(rows, key=lambda row: abs(row["ratio"] - 1.5))
+def caption(rows, ends):
+    """What to see; ends: peak velocity of the free end over that of the wave behind it."""
+    one = rows[shown(rows)]
     return (
-        "A compressive pulse (blue) reaches the free end on the right, which moves twice as fast "
-        "as the wave behind it and sends it back as tension (red). Where the sum first reaches "
-        f"the strength the bar breaks: at {one['depth_m']:.2f} m from the end, the formula says "
+        "A compressive pulse (blue) reaches the free end on the right and comes back as tension "
+        f"(red); that end moves {ends:.2f} times as fast as the wave behind it, measured in a weak "
+        f"one. Where the sum first reaches the strength the bar breaks: at {one['depth_m']:.2f} m "
+        f"from the end for a pulse of {one['ratio']:g} times the strength, the formula says "
         f"{one['formula_m']:.2f} m. The piece flies off with the momentum that is trapped in it, "
         "and the new end sends back what is left of the pulse."
     )
+
+
+def shown(rows):
+    """Number of the bar that the film shows."""
+    return int(np.argmin([abs(row["ratio"] - 1.5) for row in rows]))
 
 
 def print_rows(rows):
@@ -267,9 +274,8 @@ def picture(wave, made, rows, speed, options):
     write_csv(at("spall.csv"), {name: [row[name] for row in rows] for name in rows[0]})
     picture_wave(at("wave.png"), LENGTH, wave.time, wave.velocity[:, 0], gates)
     picture_spall(at("spall.png"), LENGTH, made, made.stress(modulus), rows)
-    shown = int(np.argmin([abs(row["ratio"] - 1.5) for row in rows]))
     strength = CONCRETE.tensile_strength
-    film_spall(at("spall.gif"), LENGTH, made, made.stress(modulus), shown, strength, FRAMES)
+    film_spall(at("spall.gif"), LENGTH, made, made.stress(modulus), shown(rows), strength, FRAMES)
 
 
 if __name__ == "__main__":

@@ -21,14 +21,14 @@ from pathlib import Path
 from PIL import Image
 
 from _cli import Parser, lasting_output, several
-from _gallery_html import RUN, shown, write_page
+from _gallery_html import CAPTION, RUN, THUMBNAILS, shown, write_page
 from _gallery_pages import SMALL_PICTURES, TOOLS, pages, readme_table
 from taichi_dem import InputError
 from taichi_dem.files import output_folder, write_text, write_whole
 
 HERE = Path(__file__).resolve().parent
-#: A small picture for the repository: widest side [pixels] and colours.
-SMALL = (960, 256)
+#: Small pictures for the repository and for the page's list: widest side [pixels] and colours.
+SMALL, THUMBNAIL = (960, 256), (480, 64)
 
 
 def options_parser():
@@ -68,7 +68,7 @@ def chosen(only):
 def run_one(page, out, quick):
     """Run an experiment and note what it printed; returns why it failed, or ""."""
     folder = os.path.join(out, page.name)
-    _forget(folder)
+    _forget(folder, page.pictures)
     line = [sys.executable, str(HERE / f"{page.name}.py"), *page.options.split()]
     line += ["--out", folder, *(["--quick"] if quick else [])]
     started = time.perf_counter()
@@ -81,9 +81,9 @@ def run_one(page, out, quick):
     return f"exit code {done.returncode}: {said[-1]}"
 
 
-def _forget(folder):
-    """Remove the summary of an earlier run, so that none of its figures pass for this one's."""
-    for name in ("summary.json", RUN):
+def _forget(folder, pictures):
+    """Remove what the page shows of an earlier run, so that none of it passes for this one's."""
+    for name in ("summary.json", RUN, CAPTION, *pictures):
         Path(folder, name).unlink(missing_ok=True)
 
 
@@ -105,6 +105,7 @@ def build(options):
     """Run what is asked for and write the page; returns a line for each thing amiss."""
     wanted, out = chosen(options.only), output_folder(options.out)
     failed = run_all(wanted, options)
+    write_thumbnails(out)
     items = [shown(page, out, failed.get(page.name, "")) for page in pages()]
     path = os.path.join(out, "index.html")
     write_page(path, items)
@@ -121,28 +122,47 @@ def without_entry():
     return sorted(set(scripts()) - {page.name for page in pages()})
 
 
+def write_thumbnails(out):
+    """Small pictures for the page's list; none of a picture that cannot be read."""
+    folder = output_folder(os.path.join(out, THUMBNAILS))
+    for page in pages():
+        try:
+            shrink_picture(page, out, folder, THUMBNAIL)
+        except InputError:
+            Path(folder, f"{page.name}.png").unlink(missing_ok=True)
+
+
 def shrink_pictures(out, folder):
     """Small copies of each experiment's first picture for the repository; the names written."""
-    written = []
-    for page in pages():
-        source = Path(out, page.name, page.pictures[0])
-        if source.is_file():
-            target = os.path.join(folder, f"{page.name}.png")
-            write_whole(target, small_copy(source))
-            written.append(target)
-    return written
+    written = [shrink_picture(page, out, folder, SMALL) for page in pages()]
+    return list(filter(None, written))
 
 
-def small_copy(source):
-    """A function that writes a picture, the last image of a film, within SMALL as PNG."""
+def shrink_picture(page, out, folder, size):
+    """Small copy of an experiment's first picture; its name, None without a picture. size: SMALL.
+
+    Raises InputError when the picture cannot be read or the copy not be written.
+    """
+    source, target = (
+        Path(out, page.name, page.pictures[0]),
+        os.path.join(folder, f"{page.name}.png"),
+    )
+    if not source.is_file():
+        return None
+    write_whole(target, small_copy(source, *size))
+    return target
+
+
+def small_copy(source, side, colours):
+    """A function that writes a picture, the last image of a film, within a side [pixels] as PNG."""
 
     def write(name):
         with Image.open(source) as image:
             image.seek(getattr(image, "n_frames", 1) - 1)
             made = image.convert("RGB")
-        made.thumbnail((SMALL[0], SMALL[0]))
+        made.thumbnail((side, side))
         # With too few colours, or without the means, thin lines take those of their neighbours.
-        made = made.quantize(SMALL[1], kmeans=3, dither=Image.Dither.NONE)
+        made = made.quantize(colours, kmeans=3, dither=Image.Dither.NONE)
         made.save(name, format="PNG", optimize=True)
 
     return write

@@ -1,10 +1,11 @@
-"""Make the meshes that the experiments read; needed only to change them.
+"""Make the meshes that the package carries; needed only to change them.
 
-Writes paper_block.msh, the block of Konno et al., section 4.1 and Fig 10: 2.0 m x 2.0 m, 0.2 m
-deep, a hole of 5 cm diameter 40 cm from the right face. The paper's mesh has 277 nodes and 962
-tetrahedra; this one has 966 tetrahedra and 302 nodes: the circle is cut into 8 chords of 2 cm,
-elements measure 5.5 cm along the hole and grow linearly to 50 cm at 1.1 m from it. Far size,
-growth and diagonals were chosen, among 1500 meshes tried, for the largest stable time step.
+Writes paper_block.msh into taichi_dem/meshes: the block of Konno et al., section 4.1 and Fig 10,
+2.0 m x 2.0 m, 0.2 m deep, a hole of 5 cm diameter 40 cm from the right face. The paper's mesh has
+277 nodes and 962 tetrahedra; this one has 966 tetrahedra and 302 nodes: the circle is cut into 8
+chords of 2 cm, elements measure 5.5 cm along the hole and grow linearly to 50 cm at 1.1 m from it.
+Far size, growth and diagonals were chosen, among 1500 meshes tried, for the largest stable time
+step.
 
 Needs gmsh: ``make mesh`` installs it and runs this script. Takes two seconds.
 """
@@ -12,16 +13,16 @@ Needs gmsh: ``make mesh`` installs it and runs this script. Takes two seconds.
 import argparse
 import os
 
-from taichi_dem import CONCRETE, quality_report, read_mesh
+from taichi_dem import CONCRETE, PAPER_BLOCK, quality_report, read_mesh
 from taichi_dem.mesh_gmsh import block_with_hole
 
-HERE = os.path.dirname(os.path.abspath(__file__))
+MESHES = os.path.dirname(PAPER_BLOCK)
 
 
 def main(arguments=None):
     """Write the meshes and print what they are like."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", default=os.path.join(HERE, "meshes"), help="folder to write to")
+    parser.add_argument("--out", default=MESHES, help="folder to write to")
     folder = parser.parse_args(arguments).out
     os.makedirs(folder, exist_ok=True)
     path = os.path.join(folder, "paper_block.msh")

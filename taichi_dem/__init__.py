@@ -2,11 +2,16 @@
 
 A scene is a mesh, a material and the effects that act; ``simulate`` runs it::
 
-    from taichi_dem import CONCRETE, ImplicitDashpots, Scene, effects, read_mesh, runtime, simulate
+    from taichi_dem import CONCRETE, PAPER_BLOCK, ImplicitDashpots, Scene
+    from taichi_dem import effects, read_mesh, runtime, simulate
 
     runtime.start()
-    scene = Scene(mesh=read_mesh("block.msh"), material=CONCRETE, effects=[...])
+    blow = effects.GasPressure(group="hole", peak=5e6)
+    scene = Scene(mesh=read_mesh(PAPER_BLOCK), material=CONCRETE, effects=[blow])
     result = simulate(scene, method=ImplicitDashpots(), until=1e-4)
+    print(result.report)
+
+``python -m taichi_dem`` lists what else there is.
 """
 
 # First, out of order: it prepares the environment for ``import taichi``.
@@ -19,6 +24,7 @@ from taichi_dem.materials import CONCRETE, Material
 from taichi_dem.mesh import Mesh, checked_mesh
 from taichi_dem.mesh_files import read_mesh
 from taichi_dem.mesh_order import in_space_order
+from taichi_dem.meshes import PAPER_BLOCK
 from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
 from taichi_dem.needed_effects import needed_effects
 from taichi_dem.quality import quality_report
@@ -28,11 +34,11 @@ from taichi_dem.simulate import simulate
 from taichi_dem.simulation import Simulation
 from taichi_dem.step_control import StepControl
 from taichi_dem.step_report import step_report
-
-__version__ = "0.1.0"
+from taichi_dem.version import __version__
 
 __all__ = [
     "CONCRETE",
+    "PAPER_BLOCK",
     "Checkpoint",
     "ImplicitDashpots",
     "InputError",
@@ -44,6 +50,7 @@ __all__ = [
     "SimulationDiverged",
     "StepControl",
     "Uniform",
+    "__version__",
     "checked_mesh",
     "effects",
     "in_space_order",

@@ -14,7 +14,6 @@ import time
 import zipfile
 import zlib
 from dataclasses import dataclass
-from importlib.metadata import version
 from typing import Optional
 
 import numpy as np
@@ -22,6 +21,7 @@ import numpy as np
 from taichi_dem.checks import path_name, positive, whole
 from taichi_dem.errors import InputError
 from taichi_dem.files import renamed_when_done
+from taichi_dem.version import __version__, taichi_version
 
 #: Of the file; another one cannot be read.
 FORMAT = 1
@@ -135,7 +135,7 @@ def digest(*arrays):
 
 def version_text():
     """Versions that a checkpoint is bound to."""
-    return f"{version('taichi-dem')} on taichi {version('taichi')}"
+    return f"{__version__} on taichi {taichi_version()}"
 
 
 def write_checkpoint(path, identity, arrays):

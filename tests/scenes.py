@@ -2,10 +2,9 @@
 
 import os
 
-from taichi_dem import CONCRETE, Scene, effects, read_mesh
+from taichi_dem import CONCRETE, PAPER_BLOCK, Scene, effects, read_mesh
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-PAPER_BLOCK = os.path.join(ROOT, "experiments", "meshes", "paper_block.msh")
 
 
 def paper_effects(peak=575e6, rise=1.33e-4, **contact):

@@ -77,6 +77,8 @@ LINES = [
     ("demo_damper", ("--filling", "water"), ("--filling", "automaton")),
     ("demo_fracture_law", ("--steps", "3"), ("--steps", "200")),
     ("demo_multirate", ("--speed", "1e9"), ("--speed", "(0, 50)")),
+    ("demo_multirate", ("--speed", "0.19"), ("speed must be at least 0.2 m/s", "0.19")),
+    ("demo_multirate", ("--quick", "--speed", "0.9"), ("speed must be at least 1 m/s", "0.9")),
     ("demo_step_too_large", ("--peak", "0"), ("--peak",)),
     ("demo_wave_and_spall", ("--cells", "5"), ("--cells", "20 to 160")),
     ("hard_cases", ("--only", "nonsense"), ("nonsense",)),

@@ -12,13 +12,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import taichi_dem.mesh_files as mesh_files
-from taichi_dem import InputError, read_mesh
+from taichi_dem import PAPER_BLOCK, InputError, read_mesh
 from taichi_dem.checkpoint import read_checkpoint, write_checkpoint
 from taichi_dem.files import output_folder, write_csv, write_text
 from taichi_dem.mesh_files import write_mesh, write_vtu
 from taichi_dem.mesh_shapes import bar
 from tests.bad_input.refusals import Endless, assert_refused, ends_within, steady
-from tests.scenes import PAPER_BLOCK
+from tests.scenes import ROOT
 
 BAR = bar(0.2, 0.1, (2, 1, 1))
 IDENTITY = {"version": "1", "mesh": "a cube"}
@@ -203,7 +203,7 @@ def test_a_damaged_checkpoint_is_refused_or_unharmed(tmp_path_factory, share, bi
     "content", [b"", b"{", b"[]", b"null", b"3", b'"x"', b"\xff\xfe", b"[" * 100_000, b"\0" * 9]
 )
 def test_a_kept_result_that_is_none_is_refused_and_left_alone(tmp_path, monkeypatch, content):
-    monkeypatch.syspath_prepend(os.path.join(os.path.dirname(PAPER_BLOCK), ".."))
+    monkeypatch.syspath_prepend(os.path.join(ROOT, "experiments"))
     import _cache
     from _gallery_html import read_json
 

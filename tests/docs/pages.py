@@ -1,7 +1,10 @@
 """What tests read out of the pages: code blocks, links, and what a block leaves behind."""
 
-import runpy
+import pickle
+import subprocess
+import sys
 from pathlib import Path
+from typing import NamedTuple
 
 from markdown_it import MarkdownIt
 
@@ -21,9 +24,10 @@ def tokens(page):
         yield from token.children or ()
 
 
-def blocks(page, language="python"):
-    """Code blocks of a page in a language, in order."""
-    return [t.content for t in tokens(page) if t.type == "fence" and t.info == language]
+def blocks(page):
+    """Python blocks of a page, in order, under whatever name the language goes."""
+    fences = [token for token in tokens(page) if token.type == "fence"]
+    return [token.content for token in fences if token.info.strip().lower().startswith("py")]
 
 
 def links(page):
@@ -47,8 +51,30 @@ def headings(page):
             yield number + 1, everything[number + 1].content
 
 
-def run_block(text, folder):
-    """Run a block as a script in a folder; returns the names it leaves."""
-    script = folder / "block.py"
-    script.write_text(text, encoding="utf-8")
-    return runpy.run_path(str(script), run_name="block")
+class Program(NamedTuple):
+    """A block that has run: the folder with its files, what it printed, and what was wanted."""
+
+    folder: Path
+    said: str
+    left: object
+
+
+#: Runs a file as Python does, and keeps the value that an expression has at its end.
+_RUNNER = """
+import pickle, runpy, sys
+left = runpy.run_path("pasted.py", run_name="__main__")
+with open("left.pickle", "wb") as file:
+    pickle.dump(eval(sys.argv[1], left), file)
+"""
+
+
+def run_pasted(text, folder, wanted="None"):
+    """Run a block as a user does: as it stands, in a file in a folder, by a process of its own.
+
+    wanted: expression of names that the program leaves, whose value tests look at.
+    """
+    (folder / "pasted.py").write_text(text, encoding="utf-8")
+    line = [sys.executable, "-c", _RUNNER, wanted]
+    done = subprocess.run(line, cwd=folder, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0 and done.stderr == "", done.stderr
+    return Program(folder, done.stdout, pickle.loads((folder / "left.pickle").read_bytes()))

@@ -23,14 +23,20 @@ folder = sys.argv[sys.argv.index("--out") + 1]
 name = os.path.basename(folder)
 if "bad" in name:
     sys.exit("diverged at t = 1 s: <it> ran away")
+quick = "--quick" in sys.argv
 os.makedirs(folder, exist_ok=True)
 Image.new("RGB", (1200, 600), "red").save(os.path.join(folder, "first.png"))
 figures = {"seconds": {"value": 1.5, "unit": "s", "paper": None},
-           "peak_mm": {"value": 2, "unit": "mm", "paper": 1.93}}
+           "peak_mm": {"value": 2, "unit": "mm", "paper": 1.93},
+           "steps": {"value": 5, "unit": "1", "paper": None},
+           "best_method": {"value": "it", "unit": "", "paper": None},
+           "exponent": {"value": None if quick else 1.5, "unit": "1", "paper": None}}
 machine = {"processor": "P", "cores": 2, "arch": "cpu"}
 json.dump({"figures": figures, "command": "experiments/" + name, "machine": machine,
-           "versions": {"taichi": "1", "numpy": "2"}, "seconds": {"compile": 1, "run": 2}},
+           "versions": {"taichi": "1", "numpy": "2"}, "seconds": {"compile": 1, "run": 2},
+           "quick": quick},
           open(os.path.join(folder, "summary.json"), "w"))
+open(os.path.join(folder, "caption.txt"), "w").write(f"Seen in a run with quick {quick}.")
 print("a table <with> brackets & signs")
 """
 
@@ -41,6 +47,7 @@ class Page_(HTMLParser):
     def __init__(self, text):
         super().__init__()
         self.open, self.links, self.ids, self.text = [], [], set(), []
+        self.cells, self.cards, self.listed = [], {}, []
         self.feed(text)
         assert self.open == [], f"never closed: {self.open}"
 
@@ -52,6 +59,11 @@ class Page_(HTMLParser):
         self.links += [values[key] for key in ("src", "href") if key in values]
         if tag == "img":
             assert values.get("alt"), "a picture without words"
+            self.listed += [values["src"]] if "nav" in self.open else []
+        if tag == "article":
+            self.cards[values["id"]] = ""
+        if tag in ("td", "th"):
+            self.cells.append("")
 
     def handle_endtag(self, tag):
         assert self.open and self.open[-1] == tag, f"{tag} closes {self.open}"
@@ -59,6 +71,10 @@ class Page_(HTMLParser):
 
     def handle_data(self, data):
         self.text.append(data)
+        if "article" in self.open:
+            self.cards[list(self.cards)[-1]] += data
+        if self.open and self.open[-1] in ("td", "th"):
+            self.cells[-1] += data.strip()
 
 
 @pytest.fixture
@@ -68,7 +84,10 @@ def stand_ins(tmp_path, monkeypatch):
     def make(*names, entries=None):
         for name in names:
             (tmp_path / f"{name}.py").write_text(SCRIPT)
-        made = [Page(n, "Part", f"What of {n}?", "Look.", "1 s", ("first.png",)) for n in names]
+        made = [
+            Page(n, "Part", f"What of {n}?", "Look.", "1 s", ("first.png",), ("steps",))
+            for n in names
+        ]
         monkeypatch.setattr(gallery, "HERE", tmp_path)
         monkeypatch.setattr(_gallery_pages, "HERE", tmp_path)
         monkeypatch.setattr(_gallery_pages, "PAGES", tuple(made[: entries or len(made)]))
@@ -137,6 +156,84 @@ def test_reuse_runs_only_what_has_no_result(stand_ins, capsys):
     assert "one ..." not in said and "two ..." in said
 
 
+NOTE = "Quick run: the text describes the full one."
+
+
+def built(out):
+    """The page that a gallery has written."""
+    return Page_((out / "index.html").read_text(encoding="utf-8"))
+
+
+def test_a_quick_result_says_so_however_the_page_is_made(stand_ins):
+    """It is known from the result: a page may show both, and be made anew without running."""
+    out = stand_ins("one", "two")
+    assert gallery.main(["--out", str(out), "--only", "one", "--quick"]) == 0
+    assert gallery.main(["--out", str(out), "--only", "two"]) == 0
+    for again in ([], ["--quick"]):
+        assert gallery.main(["--out", str(out), "--reuse", *again]) == 0
+        page = built(out)
+        assert NOTE in page.cards["one"] and NOTE not in page.cards["two"]
+        assert "1 of 2 results are of quick runs" in " ".join(page.text)
+
+
+@pytest.mark.parametrize(("option", "quick"), [(" --quick", True), (" --out quick", False)])
+def test_a_result_of_an_older_version_is_known_by_its_command(stand_ins, option, quick):
+    out = stand_ins("old")
+    gallery.main(["--out", str(out)])
+    summary = json.loads((out / "old" / "summary.json").read_text())
+    del summary["quick"]
+    summary["command"] = f"experiments/old.py{option}"
+    (out / "old" / "summary.json").write_text(json.dumps(summary))
+    gallery.main(["--out", str(out), "--reuse"])
+    assert (NOTE in built(out).cards["old"]) == quick
+
+
+@pytest.mark.parametrize("options", [(), ("--quick",)])
+def test_no_cell_of_the_page_is_empty(stand_ins, options):
+    out = stand_ins("one")
+    gallery.main(["--out", str(out), *options])
+    cells = built(out).cells
+    assert cells and not set(cells) & {"", "None", "nan"}
+    assert "not found" in cells if options else "1.5" in cells
+    # Of two key figures the paper gives one.
+    assert cells.count("–") == 1 and "1.93 mm" in cells
+
+
+def test_a_table_without_a_papers_value_has_no_column_for_it(stand_ins):
+    out = stand_ins("one")
+    gallery.main(["--out", str(out)])
+    assert built(out).cells.count("paper") == 1
+    summary = json.loads((out / "one" / "summary.json").read_text())
+    summary["figures"]["peak_mm"]["paper"] = None
+    (out / "one" / "summary.json").write_text(json.dumps(summary))
+    gallery.main(["--out", str(out), "--reuse"])
+    assert not set(built(out).cells) & {"paper", "–"}
+
+
+def test_a_run_speaks_for_itself_and_an_earlier_one_does_not(stand_ins):
+    out = stand_ins("one", "bad")
+    (out / "bad").mkdir(parents=True)
+    (out / "bad" / "caption.txt").write_text("Seen in another run.")
+    Image.new("RGB", (60, 30)).save(out / "bad" / "first.png")
+    gallery.main(["--out", str(out)])
+    cards = built(out).cards
+    assert "Seen in a run with quick False." in cards["one"]
+    assert "No result" in cards["bad"] and "another" not in cards["bad"]
+    assert not (out / "bad" / "first.png").exists()
+
+
+def test_the_list_has_a_small_picture_beside_each_result(stand_ins):
+    out = stand_ins("one", "two", "bad")
+    gallery.main(["--out", str(out)])
+    assert built(out).listed == ["thumbnails/one.png", "thumbnails/two.png"]
+    with Image.open(out / "thumbnails" / "one.png") as image:
+        assert image.size == (480, 240)
+    (out / "two" / "first.png").unlink()
+    (out / "one" / "first.png").write_bytes(b"no picture")
+    assert gallery.main(["--out", str(out), "--reuse", "--only", "one"]) == 0
+    assert built(out).listed == []
+
+
 def test_an_unknown_name_is_refused_in_one_sentence(tmp_path, capsys):
     assert gallery.main(["--out", str(tmp_path), "--only", "nothing"]) == 2
     said = capsys.readouterr().err
@@ -157,7 +254,7 @@ def test_figures_with_a_papers_value_are_never_folded_away():
     figures = {f"f{k}": {"value": k, "unit": "1", "paper": None} for k in range(14)}
     figures["known"] = {"value": 2702.0, "unit": "s", "paper": 3897}
     key, rest = _gallery_html.figure_rows(figures, ("f*",))
-    assert key[0] == ("known", "2702", "s", "3,897")
+    assert key[0] == ("known", "2702 s", "3,897 s")
     assert len(key) == 12 and len(rest) == 3
 
 
@@ -166,6 +263,8 @@ def test_figures_with_a_papers_value_are_never_folded_away():
     [
         ("apparent_damping_N_s_m", "N s/m", "apparent damping"),
         ("limit_dashpots_s", "s", "limit dashpots"),
+        # The unit is that of the number before it.
+        ("plateau_at_2.5_MPa", "MPa", "plateau at 2.5 MPa"),
         ("errors_of_order_1", "1", "errors of order 1"),
         ("broken_faces", "mm", "broken faces"),
     ],

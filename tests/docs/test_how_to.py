@@ -1,23 +1,53 @@
-"""The examples of the pages "How to add ...": run as they stand, judged by their formulas."""
+"""Python blocks of all pages but the first: run as they stand, judged by their formulas."""
 
 import numpy as np
 import pytest
 
-from taichi_dem import runtime
-from tests.docs.pages import blocks, run_block
+from tests.docs.pages import PAGES, blocks, run_pasted
+
+#: What the tests below look at, in the program of the one block of a page.
+WANTED = {
+    "docs/add_an_effect.md": "dict(moved=moved, mass=result.model.body_mass[0],"
+    " ledger=result.report.ledger)",
+    "docs/add_a_contact_law.md": "dict(mass=simulation.model.body_mass[0], speed=speed,"
+    " stiffness=stiffness, deepest=deepest, rebound=rebound, account=account,"
+    " unexplained=unexplained)",
+    "docs/add_a_time_integrator.md": "dict(area=model.unit_area[0], mass=model.body_mass[0],"
+    " step=step, count=count, euler=euler, leapfrog=leapfrog)",
+}
+BLOCKS = [
+    (page, number) for page in PAGES if page != "README.md" for number in range(len(blocks(page)))
+]
+
+
+@pytest.fixture(scope="module")
+def program(tmp_path_factory):
+    """``program(page, number)``: a block that has run, once for all tests."""
+    made = {}
+
+    def run(page, number=0):
+        if (page, number) not in made:
+            wanted = WANTED.get(page, "None") if number == 0 else "None"
+            folder = tmp_path_factory.mktemp("page")
+            made[page, number] = run_pasted(blocks(page)[number], folder, wanted)
+        return made[page, number]
+
+    return run
 
 
 @pytest.fixture
-def left_by(tmp_path, monkeypatch):
-    """``left_by(page)``: names that the one block of a page leaves; it starts Taichi itself."""
+def left_by(program):
+    """``left_by(name)``: what ``WANTED`` asks of the page docs/name.md."""
+    return lambda name: program(f"docs/{name}.md").left
 
-    def run(page):
-        (text,) = blocks(f"docs/{page}.md")
-        runtime.stop()
-        monkeypatch.chdir(tmp_path)
-        return run_block(text, tmp_path)
 
-    return run
+def test_each_how_to_has_a_block():
+    assert {page for page, _ in BLOCKS} >= {page for page in PAGES if page.startswith("docs/add_")}
+
+
+@pytest.mark.parametrize(("page", "number"), BLOCKS)
+def test_a_block_runs_as_it_stands_and_says_something(program, page, number):
+    assert program(page, number).said.strip()
 
 
 def test_the_effect_moves_a_body_as_the_leapfrog_must(left_by):
@@ -30,9 +60,9 @@ def test_the_effect_moves_a_body_as_the_leapfrog_must(left_by):
     expected = 0.5 * amplitude * period * step / np.tan(np.pi * step / period)
     assert left["moved"] == pytest.approx(expected, abs=200 * 2.0**-53 * 0.02)
     # Of the largest kinetic energy on the way, m (2 a / w)^2 / 2, as at the end there is none.
-    mass = left["result"].model.body_mass[0]
+    mass = left["mass"]
     most = 0.5 * mass * (amplitude * period / np.pi) ** 2
-    assert abs(left["result"].report.ledger["residual"]) < 200 * 2.0**-52 * most
+    assert abs(left["ledger"]["residual"]) < 200 * 2.0**-52 * most
 
 
 def test_the_contact_law_stores_what_it_takes(left_by):
@@ -44,7 +74,7 @@ def test_the_contact_law_stores_what_it_takes(left_by):
     half a step old, and the account is off by F v dt / 2, at most w dt / 2 of the energy.
     """
     left = left_by("add_a_contact_law")
-    mass, speed, stiffness = left["simulation"].model.body_mass[0], left["speed"], left["stiffness"]
+    mass, speed, stiffness = left["mass"], left["speed"], left["stiffness"]
     depth = (mass * speed**2 / (39 * 0.4 * stiffness)) ** 0.4
     second_order = 117.0 * stiffness * np.sqrt(depth) / mass * 1e-7**2
     assert left["deepest"] == pytest.approx(depth, rel=(1 + 2.5**2 / 2) * second_order)
@@ -58,8 +88,8 @@ def test_the_contact_law_stores_what_it_takes(left_by):
 def test_the_integrator_gains_energy_by_its_factor(left_by):
     """E_n = E_0 (1 + (w dt)^2)^n; openings of 1e-8 m beside coordinates of 0.01 m keep 1e-10."""
     left = left_by("add_a_time_integrator")
-    model, step = left["model"], left["step"]
-    rate2 = 2.0 * 450e9 * 3.0 * model.unit_area[0] / model.body_mass[0]
+    step = left["step"]
+    rate2 = 2.0 * 450e9 * 3.0 * left["area"] / left["mass"]
     expected = (1.0 + rate2 * step**2) ** np.arange(left["count"] + 1)
     assert left["euler"] / left["euler"][0] == pytest.approx(expected, rel=1e-7)
     # The leapfrog's velocity is half a step old: its energy is off by w dt / 2 at most.

@@ -1,47 +1,36 @@
 """The first page: its scenes run as they stand, its table and its pictures are those there are."""
 
 import csv
+import inspect
+import json
 import re
 from pathlib import Path
 
 import meshio
 import pytest
 
+import taichi_dem
 from _gallery_pages import SMALL_PICTURES, readme_table
 from gallery import renew_readme
-from taichi_dem import runtime
-from tests.docs.pages import FOLDER, PAGES, blocks, links, run_block, words
-from tests.scenes import ROOT
+from tests.docs.pages import FOLDER, PAGES, blocks, links, run_pasted, words
 
 README = FOLDER / "README.md"
 MOST_LINES = 20
 MOST_BYTES = 3_000_000
 
 
-@pytest.fixture
-def left_by(tmp_path, monkeypatch):
-    """``left_by(k)``: names that the k-th Python block of the page leaves, run in a folder."""
-
-    def run(k):
-        runtime.stop()
-        (tmp_path / "experiments").symlink_to(Path(ROOT) / "experiments")
-        monkeypatch.chdir(tmp_path)
-        return run_block(blocks("README.md")[k], tmp_path)
-
-    return run
-
-
-def test_the_scenes_are_short():
-    """Two scenes, and the long run, which tests/equivalence/test_restart.py runs in its way."""
+def test_the_scenes_are_short_and_all_run_below():
+    """Two scenes and the long run."""
     assert [len(text.splitlines()) <= MOST_LINES for text in blocks("README.md")] == [True] * 3
 
 
-def test_the_blast_runs_and_leaves_what_the_page_says(left_by, tmp_path):
-    report = left_by(0)["result"].report
-    assert report.broken_faces > 0 and not report.needs
+def test_the_blast_runs_and_leaves_what_the_page_says(tmp_path):
+    run_pasted(blocks("README.md")[0], tmp_path)
     mine = tmp_path / "results" / "mine"
     for name in ("history.csv", "mesh.msh", "report.json", "paraview/blast.pvd"):
         assert (mine / name).is_file(), name
+    report = json.loads((mine / "report.json").read_text(encoding="utf-8"))
+    assert report["broken_faces"] > 0 and not report["needs"]
     # The cell values that docs/paraview.md lists are those of the last snapshot.
     last = meshio.read(sorted((mine / "paraview").glob("*.vtu"))[-1])
     page = words("docs/paraview.md")
@@ -49,17 +38,33 @@ def test_the_blast_runs_and_leaves_what_the_page_says(left_by, tmp_path):
     assert all(name in page for name in last.cell_data)
 
 
-def test_the_damper_runs_and_both_fillings_agree(left_by, tmp_path):
+def test_the_damper_runs_and_both_fillings_agree(tmp_path):
     """30 grains of 0.2 g pull the peak down as a rigid mass does: sqrt(86 / 92) f0 = 0.967.
 
     Within the 0.01 by which the ratios are apart.
     """
-    left = left_by(1)
-    assert left["filling"].label == "dem"
-    assert left["ratio"][0, 0] == pytest.approx((86.0 / 92.0) ** 0.5, abs=0.01)
-    for label in ("dem", "ca_static"):
+    said = run_pasted(blocks("README.md")[1], tmp_path).said
+    peaks = dict(re.findall(r"^(\w+): peak at ([\d.]+) f0", said, re.MULTILINE))
+    assert list(peaks) == ["ca_static", "dem"]
+    for label, ratio in peaks.items():
+        assert float(ratio) == pytest.approx((86.0 / 92.0) ** 0.5, abs=0.01)
         with open(tmp_path / f"{label}.csv", newline="") as rows:
             assert len(list(csv.DictReader(rows))) == 4
+
+
+def test_the_long_run_goes_on_from_its_checkpoint(tmp_path):
+    """The start, the 200 samples of the first run, and those of the second half of 200."""
+    wanted = "list(result.history['time_s']), result.report.needs"
+    times, needs = run_pasted(blocks("README.md")[2], tmp_path, wanted).left
+    assert len(times) == 1 + 200 + 100 and times[-1] == pytest.approx(2e-3)
+    assert not needs and (tmp_path / "run.npz").is_file()
+
+
+@pytest.mark.slow
+def test_the_example_in_the_docstring_runs(tmp_path):
+    """Its shorter sister is the first scene of the page."""
+    (text,) = re.findall(r"::\n\n(.+?)\n\n(?=\S)", taichi_dem.__doc__, re.DOTALL)
+    assert "0 of 1688 bonds broken" in run_pasted(inspect.cleandoc(text), tmp_path).said
 
 
 def test_the_table_is_that_of_the_gallery():

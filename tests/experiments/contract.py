@@ -4,6 +4,7 @@ import csv
 import json
 import math
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -87,6 +88,8 @@ class QuickRun:
         assert "\x1b" not in done.stdout
         assert "\r" not in done.stdout
         assert len(done.stdout.splitlines()) > 5
+        # Two spaces part the cells of a table.
+        assert not re.search(r"(^|  )(nan|None)(  |$)", done.stdout, re.MULTILINE)
 
     def test_quick_run_leaves_its_files_whole(self, quick):
         name, folder, _ = quick
@@ -102,6 +105,7 @@ class QuickRun:
         assert set(summary["seconds"]) == {"compile", "run"}
         assert min(summary["seconds"].values()) > 0.0
         assert {"taichi", "numpy", "python"} <= set(summary["versions"])
+        assert summary["quick"] is True
         assert set(summary["figures"]) >= self.figures.get(name, set())
         for figure in summary["figures"].values():
             assert set(figure) == {"value", "unit", "paper"}

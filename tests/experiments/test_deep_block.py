@@ -3,12 +3,19 @@
 import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE, ImplicitDashpots, Scene, effects, read_mesh, simulate
+from taichi_dem import (
+    CONCRETE,
+    PAPER_BLOCK,
+    ImplicitDashpots,
+    Scene,
+    effects,
+    read_mesh,
+    simulate,
+)
 from taichi_dem.mesh import group_area, volumes
 from taichi_dem.mesh_shapes import bar
 from taichi_dem.plot.deep import crossings
 from taichi_dem.topology import topology_of
-from tests.experiments.contract import FOLDER
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +27,7 @@ def block(script):
 @pytest.mark.parametrize("copies", [1, 2, 3])
 def test_mirrored_copies_are_one_block(block, copies):
     """All bonds of each copy and one for every face of a seam; nothing stands alone between."""
-    flat = read_mesh(FOLDER / "meshes" / "paper_block.msh")
+    flat = read_mesh(PAPER_BLOCK)
     deep = block.stacked_block(copies)
     bonds = [topology_of(mesh).bond_count for mesh in (flat, deep)]
     seams = sum(len(flat.groups[("front", "back")[k % 2]]) for k in range(copies - 1))

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from taichi_dem import read_mesh
+from taichi_dem import PAPER_BLOCK, read_mesh
 from taichi_dem.contact_spheres import interior_crossings, spheres_of_faces
-from tests.scenes import PAPER_BLOCK
 
 EPS = np.finfo(float).eps
 

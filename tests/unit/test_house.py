@@ -16,13 +16,16 @@ ROOT = Path(__file__).resolve().parents[2]
 # row below. A folder counts as one module. A new module needs a place here.
 LAYERS = {
     "taichi_dem": (
-        ("errors", "types", "checks", "source_lines", "runtime", "progress"),
-        ("fields", "field_memory", "files", "effect_use", "time_limit", "progress_bar"),
+        ("errors", "types", "checks", "source_lines", "runtime", "version", "progress"),
+        (
+            *("fields", "field_memory", "files", "effect_use", "time_limit", "listing"),
+            "progress_bar",
+        ),
         ("plot_style", "checkpoint"),
         ("restart",),
         (
             *("tetrahedra", "mesh", "mesh_files", "mesh_shapes", "mesh_gmsh", "mesh_order"),
-            *("topology", "quality", "contact_spheres", "materials", "partition"),
+            *("meshes", "topology", "quality", "contact_spheres", "materials", "partition"),
         ),
         ("physics",),
         ("timeline", "step_control"),
@@ -38,6 +41,7 @@ LAYERS = {
         ("simulate", "needed_effects"),
         ("plot",),
         ("__init__",),
+        ("__main__",),
     ),
     "ca_damper": (
         ("errors", "random_numbers", "lattice", "table", "progress", "measures", "report"),
@@ -49,6 +53,7 @@ LAYERS = {
         ("sweep",),
         ("plot",),
         ("__init__",),
+        ("__main__",),
     ),
 }
 # What one package may take from another.
@@ -57,6 +62,7 @@ ACROSS = {
         *("taichi_dem.runtime", "taichi_dem.errors", "taichi_dem.checks", "taichi_dem.fields"),
         *("taichi_dem.files", "taichi_dem.plot_style", "taichi_dem.effect_use"),
         *("taichi_dem.checkpoint", "taichi_dem.restart"),
+        *("taichi_dem.version", "taichi_dem.listing"),
         *("taichi_dem.progress", "taichi_dem.progress_bar"),
     )
 }

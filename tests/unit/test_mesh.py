@@ -1,17 +1,14 @@
 """Meshes: what checked_mesh mends (and says), what it refuses (and how), and the known shapes."""
 
 import itertools
-import os
 
 import numpy as np
 import pytest
 
-from taichi_dem import InputError, checked_mesh, read_mesh
+from taichi_dem import PAPER_BLOCK, InputError, checked_mesh, read_mesh
 from taichi_dem import tetrahedra as geometry
 from taichi_dem.mesh import group_area, volumes
 from taichi_dem.mesh_shapes import bar, pair, single
-
-BLOCK = os.path.join(os.path.dirname(__file__), "../../experiments/meshes/paper_block.msh")
 
 # Two tetrahedra on both sides of the triangle 0 1 2, apexes 3 (z > 0) and 4 (z < 0).
 POINTS = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.2, 0.2, 1], [0.2, 0.2, -1]]
@@ -286,7 +283,7 @@ def test_pair_is_its_own_mirror_image():
 
 
 def test_paper_block_has_the_size_of_the_papers_mesh():
-    mesh = read_mesh(BLOCK)
+    mesh = read_mesh(PAPER_BLOCK)
     assert abs(mesh.body_count - 962) <= 10
     assert abs(mesh.point_count - 277) <= 30
     assert mesh.notes == ()
@@ -295,7 +292,7 @@ def test_paper_block_has_the_size_of_the_papers_mesh():
 
 def test_paper_block_fills_the_block_less_the_hole():
     # The hole is a regular octagon of circumradius 2.5 cm: area 4 sin 45 R^2, side 2 R sin 22.5.
-    mesh = read_mesh(BLOCK)
+    mesh = read_mesh(PAPER_BLOCK)
     octagon = 4.0 * np.sin(np.pi / 4.0) * 0.025**2
     assert volumes(mesh).sum() == pytest.approx((2.0 * 2.0 - octagon) * 0.2, rel=1e-12)
     perimeter = 8.0 * 2.0 * 0.025 * np.sin(np.pi / 8.0)
@@ -305,14 +302,14 @@ def test_paper_block_fills_the_block_less_the_hole():
 
 
 def test_paper_blocks_hole_lies_40_cm_from_the_right_face():
-    mesh = read_mesh(BLOCK)
+    mesh = read_mesh(PAPER_BLOCK)
     wall = mesh.points[np.unique(mesh.group_faces("hole"))]
     assert np.hypot(wall[:, 0] - 1.6, wall[:, 1] - 1.0) == pytest.approx(0.025, rel=1e-9)
     assert np.all(mesh.points[mesh.group_faces("right")][..., 0] == 2.0)
 
 
 def test_paper_blocks_faces_belong_to_one_group_each():
-    mesh = read_mesh(BLOCK)
+    mesh = read_mesh(PAPER_BLOCK)
     faces = np.vstack(list(mesh.groups.values()))
     outer = 4 * mesh.body_count - 2 * len(geometry.shared_faces(mesh.tetrahedra))
     assert len(np.unique(np.sort(faces, axis=1), axis=0)) == len(faces) == outer

@@ -8,12 +8,11 @@ import meshio
 import numpy as np
 import pytest
 
-from taichi_dem import InputError, checked_mesh, read_mesh
+from taichi_dem import PAPER_BLOCK, InputError, checked_mesh, read_mesh
 from taichi_dem.mesh_files import write_mesh, write_pvd, write_vtu
 from taichi_dem.mesh_gmsh import block_with_hole
 from taichi_dem.mesh_shapes import bar, single
 
-BLOCK = os.path.join(os.path.dirname(__file__), "../../experiments/meshes/paper_block.msh")
 BAR = bar(1.0, 0.3, (3, 1, 2))
 
 try:
@@ -59,7 +58,7 @@ def gmsh_box():
     gmsh.finalize()
 
 
-@pytest.mark.parametrize("mesh", [BAR, read_mesh(BLOCK)], ids=["bar", "block"])
+@pytest.mark.parametrize("mesh", [BAR, read_mesh(PAPER_BLOCK)], ids=["bar", "block"])
 def test_written_mesh_comes_back_bit_for_bit(tmp_path, mesh):
     path = tmp_path / "mesh.msh"
     write_mesh(path, mesh)
@@ -88,13 +87,13 @@ def test_every_gmsh_format_gives_the_same_mesh(tmp_path, version, binary):
     gmsh.initialize(interruptible=False, readConfigFiles=False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
-        gmsh.open(BLOCK)
+        gmsh.open(PAPER_BLOCK)
         gmsh.option.setNumber("Mesh.MshFileVersion", version)
         gmsh.option.setNumber("Mesh.Binary", binary)
         gmsh.write(path)
     finally:
         gmsh.finalize()
-    expected, mesh = read_mesh(BLOCK), read_mesh(path)
+    expected, mesh = read_mesh(PAPER_BLOCK), read_mesh(path)
     assert np.allclose(mesh.points, expected.points, rtol=1e-15, atol=1e-16)
     assert np.array_equal(mesh.tetrahedra, expected.tetrahedra)
     assert mesh.groups.keys() == expected.groups.keys()
@@ -184,7 +183,7 @@ def test_scale_turns_the_files_unit_into_metres(tmp_path, scale):
 
 @pytest.mark.parametrize("scale", [0.0, -1.0, np.nan, np.inf, "mm"])
 def test_senseless_scale_is_refused(scale):
-    words = refused(BLOCK, scale=scale)
+    words = refused(PAPER_BLOCK, scale=scale)
     assert words.startswith("scale must be a positive finite number") and repr(scale) in words
 
 
@@ -216,7 +215,7 @@ def test_unreadable_file_is_refused_without_noise(tmp_path, capfd, name, content
 
 @pytest.mark.parametrize("share", [0.2, 0.5, 0.8, 0.99])
 def test_cut_off_file_is_refused(tmp_path, share):
-    with open(BLOCK, encoding="utf-8") as file:
+    with open(PAPER_BLOCK, encoding="utf-8") as file:
         text = file.read()
     path = tmp_path / "half.msh"
     path.write_text(text[: int(share * len(text))])
@@ -249,7 +248,7 @@ def test_vtu_holds_points_and_data(tmp_path):
 
 
 def test_vtu_is_compressed(tmp_path):
-    mesh = read_mesh(BLOCK)
+    mesh = read_mesh(PAPER_BLOCK)
     path = tmp_path / "frame.vtu"
     write_vtu(path, mesh.points, mesh.tetrahedra, cell_data={"zero": np.zeros((966, 100))})
     assert path.stat().st_size < 966 * 100 * 8 / 5
@@ -308,7 +307,7 @@ def test_stored_block_is_what_the_generator_writes_twice(tmp_path):
     block_with_hole(tmp_path / "a.msh")
     block_with_hole(tmp_path / "b.msh")
     assert (tmp_path / "a.msh").read_bytes() == (tmp_path / "b.msh").read_bytes()
-    mesh, stored = read_mesh(tmp_path / "a.msh"), read_mesh(BLOCK)
+    mesh, stored = read_mesh(tmp_path / "a.msh"), read_mesh(PAPER_BLOCK)
     # Another release of Gmsh may place points otherwise; groups and sizes hold.
     assert mesh.groups.keys() == stored.groups.keys()
     assert abs(mesh.body_count - stored.body_count) < 100

@@ -1,17 +1,15 @@
 """Quality report: shapes by closed forms, step limits by independent assembly."""
 
 import dataclasses
-import os
 
 import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE, quality_report, read_mesh
+from taichi_dem import CONCRETE, PAPER_BLOCK, quality_report, read_mesh
 from taichi_dem.mesh_shapes import bar, pair, single
 from taichi_dem.quality import bond_rates, dashpots_of, smallest_altitudes, springs_of
 from taichi_dem.topology import body_properties, topology_of
 
-BLOCK = os.path.join(os.path.dirname(__file__), "../../experiments/meshes/paper_block.msh")
 EDGE = 0.05
 
 
@@ -152,7 +150,7 @@ def test_undamped_material_is_limited_by_its_springs_only():
 
 
 def test_price_is_what_the_mesh_gains_without_the_worst_bodies():
-    report = quality_report(read_mesh(BLOCK), CONCRETE)
+    report = quality_report(read_mesh(PAPER_BLOCK), CONCRETE)
     worst = report.worst(5)
     for count in range(1, 6):
         kept = np.delete(report.critical_step_s, worst[:count])
@@ -162,7 +160,7 @@ def test_price_is_what_the_mesh_gains_without_the_worst_bodies():
 
 
 def test_printed_report_names_the_counts_and_the_worst_body():
-    report = quality_report(read_mesh(BLOCK), CONCRETE)
+    report = quality_report(read_mesh(PAPER_BLOCK), CONCRETE)
     text = str(report)
     assert text.startswith(f"{report.body_count} bodies, {report.point_count} points")
     assert f"{report.worst(1)[0]:8d}" in text
@@ -173,7 +171,7 @@ def test_paper_block_has_the_limits_of_the_papers_mesh():
     # An independent mesh of the same block and size gave 5.7e-8 s (dashpots) and 2.4e-6 s
     # (springs); the smallest body decides, and 8 chords of 2 cm make it smaller than 5 cm ones:
     # within a factor of two. Table 1's c/k = 50 us lets the dashpots bind everywhere.
-    report = quality_report(read_mesh(BLOCK), CONCRETE)
+    report = quality_report(read_mesh(PAPER_BLOCK), CONCRETE)
     assert 0.5 < report.dashpot_step_s.min() / 5.7e-8 < 2.0
     assert 0.5 < report.spring_step_s.min() / 2.4e-6 < 2.0
     assert np.all(report.dashpot_step_s < report.spring_step_s)

@@ -5,6 +5,7 @@ import pytest
 
 from taichi_dem import (
     CONCRETE,
+    PAPER_BLOCK,
     InputError,
     Multirate,
     Scene,
@@ -20,7 +21,6 @@ from taichi_dem.mesh_shapes import bar, pair
 from taichi_dem.quality import bond_rates, dashpot_step, dashpots_of, subset_rates
 from taichi_dem.step_control import CRITERIA
 from taichi_dem.topology import topology_of
-from tests.scenes import PAPER_BLOCK
 
 
 @pytest.mark.parametrize(

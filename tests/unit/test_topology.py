@@ -1,21 +1,18 @@
 """Bonds and outer faces by counting and geometry; mass properties by independent integration."""
 
-import os
-
 import numpy as np
 import pytest
 
-from taichi_dem import InputError, checked_mesh, read_mesh
+from taichi_dem import PAPER_BLOCK, InputError, checked_mesh, read_mesh
 from taichi_dem import tetrahedra as geometry
 from taichi_dem.mesh_shapes import bar, pair, single
 from taichi_dem.topology import body_properties, face_vertices, faces_of_group, topology_of
 
-BLOCK = os.path.join(os.path.dirname(__file__), "../../experiments/meshes/paper_block.msh")
 MESHES = {
     "single": single(),
     "pair": pair(),
     "bar": bar(1.0, 0.2, (5, 2, 3)),
-    "block": read_mesh(BLOCK),
+    "block": read_mesh(PAPER_BLOCK),
 }
 EACH = pytest.mark.parametrize("name", MESHES)
 

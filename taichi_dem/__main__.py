@@ -1,0 +1,40 @@
+"""``python -m taichi_dem``: effects, methods, materials, meshes and experiments there are."""
+
+import inspect
+
+import taichi_dem
+from taichi_dem import effects, listing, materials, meshes, methods
+
+
+def sections():
+    """(Title, rows) of what the package offers; each name of ``__all__`` stands in one of them."""
+    made = [
+        ("Effects", listing.described("taichi_dem.effects", effects, effects.__all__)),
+        ("Methods", _rows([(methods, listing.own(methods, inspect.isclass))])),
+        ("Materials", _rows([(materials, listing.instances(materials, materials.Material))])),
+        ("Meshes", _rows([(meshes, listing.instances(meshes, str)), *_mesh_functions()])),
+    ]
+    shown = {name for _, rows in made for name, _ in rows}
+    rest = listing.described("taichi_dem", taichi_dem, taichi_dem.__all__)
+    rest = [row for row in rest if row[0] not in shown and "__" not in row[0]]
+    return [*made, ("Scenes, runs and results", rest)]
+
+
+def _mesh_functions():
+    """Functions that make, read, write, check or reorder meshes, by module."""
+    found = listing.modules(taichi_dem, "mesh")
+    return [(module, listing.own(module, inspect.isfunction)) for module in found]
+
+
+def _rows(members):
+    """Rows of [(module, names)], under the shortest name that can be imported."""
+    rows = []
+    for module, names in members:
+        for name in names:
+            short = "taichi_dem" if name in taichi_dem.__all__ else module.__name__
+            rows += listing.described(short, module, [name])
+    return rows
+
+
+if __name__ == "__main__":
+    listing.run(taichi_dem, sections())

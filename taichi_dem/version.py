@@ -1,0 +1,14 @@
+"""The version of both packages, written here only, and that of Taichi beneath them."""
+
+import taichi as ti
+
+# pyproject.toml reads it from here, as text: keep it a literal.
+__version__ = "0.1.0"
+
+
+def taichi_version():
+    """Version of Taichi, such as 1.7.4.
+
+    From the module: a package that runs from a path has no metadata to ask.
+    """
+    return ".".join(map(str, ti.__version__))

@@ -1,0 +1,117 @@
+"""The wheel: what it carries, and that it runs where it is only unpacked; one version for all."""
+
+import email
+import importlib.metadata
+import os
+import shutil
+import subprocess
+import sys
+import zipfile
+
+import pytest
+
+import _cli
+import ca_damper
+import taichi_dem
+from taichi_dem import PAPER_BLOCK
+from taichi_dem.checkpoint import version_text
+from tests.docs.pages import FOLDER
+
+SOURCES = ("taichi_dem", "ca_damper", "pyproject.toml", "README.md", "LICENSE")
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    """The wheel, made without the network of nothing but its sources."""
+    folder = tmp_path_factory.mktemp("wheel")
+    ignored = shutil.ignore_patterns("__pycache__")
+    for name in SOURCES:
+        copy = shutil.copy if (FOLDER / name).is_file() else shutil.copytree
+        options = {} if (FOLDER / name).is_file() else {"ignore": ignored}
+        copy(FOLDER / name, folder / name, **options)
+    line = [sys.executable, "-m", "pip", "--disable-pip-version-check", "wheel", "--no-index"]
+    line += ["--no-deps", "--no-build-isolation", "--wheel-dir", "made", "."]
+    done = subprocess.run(line, cwd=folder, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stdout + done.stderr
+    (path,) = (folder / "made").glob("*.whl")
+    return zipfile.ZipFile(path)
+
+
+@pytest.fixture(scope="module")
+def unpacked(wheel, tmp_path_factory):
+    """Where the wheel is unpacked, by no installer."""
+    folder = tmp_path_factory.mktemp("unpacked")
+    wheel.extractall(folder)
+    return folder
+
+
+def about(wheel):
+    """Metadata of the wheel."""
+    (name,) = [name for name in wheel.namelist() if name.endswith(".dist-info/METADATA")]
+    return email.message_from_string(wheel.read(name).decode())
+
+
+def said(folder, tmp_path, *arguments):
+    """What Python prints, in another folder, where packages are found in this one first."""
+    done = subprocess.run(
+        [sys.executable, *arguments],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(folder)},
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.returncode == 0 and done.stderr == "", done.stderr
+    return done.stdout
+
+
+def test_the_wheel_carries_all_files_of_both_packages_and_no_others(wheel):
+    expected = {
+        path.relative_to(FOLDER).as_posix()
+        for package in ("taichi_dem", "ca_damper")
+        for path in (FOLDER / package).rglob("*")
+        if path.is_file() and path.suffix != ".pyc"
+    }
+    assert {name for name in wheel.namelist() if ".dist-info/" not in name} == expected
+    assert {"taichi_dem/py.typed", "ca_damper/py.typed"} <= expected
+    with open(PAPER_BLOCK, "rb") as mesh:
+        assert wheel.read("taichi_dem/meshes/paper_block.msh") == mesh.read()
+
+
+def test_the_wheel_says_what_it_is(wheel):
+    fields = about(wheel)
+    assert fields["Version"] == taichi_dem.__version__ == ca_damper.__version__
+    assert fields["Author"] == "The taichi-dem developers"
+    assert fields["License-Expression"] == "MIT"
+    assert fields["Description-Content-Type"] == "text/markdown"
+    assert fields.get_payload().strip() == (FOLDER / "README.md").read_text("utf-8").strip()
+    (licence,) = [name for name in wheel.namelist() if name.endswith("/LICENSE")]
+    assert wheel.read(licence) == (FOLDER / "LICENSE").read_bytes()
+
+
+def test_what_is_unpacked_runs_and_reads_its_own_mesh(unpacked, tmp_path):
+    text = "import taichi_dem as t; print(t.__file__, t.read_mesh(t.PAPER_BLOCK).source)"
+    for path in said(unpacked, tmp_path, "-c", text).split():
+        assert path.startswith(str(unpacked))
+
+
+def test_what_is_unpacked_lists_no_experiments_and_says_where_the_first_page_is(unpacked, tmp_path):
+    text = said(unpacked, tmp_path, "-m", "taichi_dem")
+    assert "experiments/" not in text
+    (first_page,) = unpacked.glob("*.dist-info/METADATA")
+    assert str(first_page) in text
+
+
+def test_versions_need_no_metadata(monkeypatch):
+    """What runs from a path is known to no installer; the words are those of one that is."""
+    words, versions = version_text(), _cli.versions()
+    assert words == f"{taichi_dem.__version__} on taichi {importlib.metadata.version('taichi')}"
+    for name in ("taichi", "numpy"):
+        assert versions[name] == importlib.metadata.version(name)
+    assert versions["taichi-dem"] == taichi_dem.__version__
+
+    def absent(name):
+        raise importlib.metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(importlib.metadata.Distribution, "from_name", absent)
+    assert version_text() == words and _cli.versions() == versions
