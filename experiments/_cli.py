@@ -1,7 +1,6 @@
 """What all experiments share: options, exit codes, progress, summary.json."""
 
 import argparse
-import contextlib
 import json
 import math
 import os
@@ -12,6 +11,8 @@ import subprocess
 import sys
 
 import numpy as np
+
+from _output import lasting_output
 
 # The experiments take the mesh from here, as they do all that they share.
 from taichi_dem import PAPER_BLOCK as PAPER_BLOCK
@@ -148,20 +149,29 @@ def checkpoint_of(options, name="checkpoint"):
 
 
 def main(run, made, arguments=None):
-    """Parse, start Taichi, run; returns the exit code.
+    """Parse, start Taichi, run; returns the exit code of ``exit_code``."""
 
-    0 done, 2 bad input, 3 diverged, 130 interrupted: each of the latter with one line on stderr.
-    The reader of the output may leave before its end (``| head -1``): the files are still written.
-    """
-    with lasting_output():
-        return _guarded(run, made, arguments)
-
-
-def _guarded(run, made, arguments):
-    try:
+    def work():
         options = made.parse_args(arguments)
         runtime.start(options.arch, options.threads)
         run(options)
+
+    return exit_code(work)
+
+
+def exit_code(work):
+    """Exit code of a program that does work(): 0 done, or what work returns.
+
+    2 bad input, 3 diverged, 130 interrupted: each with one line on stderr. The reader of the output
+    may leave before its end (``| head -1``): the files are still written.
+    """
+    with lasting_output():
+        return _guarded(work)
+
+
+def _guarded(work):
+    try:
+        return work() or 0
     except InputError as error:
         return _say(error, 2)
     except SimulationDiverged as error:
@@ -170,61 +180,6 @@ def _guarded(run, made, arguments):
         return _say(f"{error}: go on with --resume", 130)
     except KeyboardInterrupt:
         return _say("interrupted", 130)
-    return 0
-
-
-@contextlib.contextmanager
-def lasting_output():
-    """Let prints in the block go nowhere, without a word, once nobody reads them."""
-    for number, name in ((1, "stdout"), (2, "stderr")):
-        if getattr(sys, name) is None:
-            # Closed from the beginning: keep the next file that is opened from taking its number.
-            setattr(sys, name, _opened_nowhere(number))
-    output = _LastingOutput(sys.stdout)
-    with contextlib.redirect_stdout(output):
-        yield
-    output.flush()
-
-
-def _opened_nowhere(number):
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    if nowhere != number:
-        os.dup2(nowhere, number)
-        os.close(nowhere)
-    return os.fdopen(number, "w")
-
-
-class _LastingOutput:
-    """A text stream that drops what can no longer be written: its reader has left, say."""
-
-    def __init__(self, stream):
-        self._stream = stream
-
-    def write(self, text):
-        """Write text, or drop it."""
-        try:
-            self._stream.write(text)
-        except OSError as error:
-            self._drop(error)
-        return len(text)
-
-    def flush(self):
-        """Send what waits in the buffer, or drop it."""
-        try:
-            self._stream.flush()
-        except OSError as error:
-            self._drop(error)
-
-    def _drop(self, error):
-        if not isinstance(error, BrokenPipeError):
-            _say(f"standard output cannot be written to: {error.strerror}", 1)
-        # The buffer keeps what it could not send, and Python would complain of it at the exit.
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, self._stream.fileno())
-        os.close(nowhere)
-
-    def __getattr__(self, name):
-        return getattr(self._stream, name)
 
 
 def _say(message, code):

@@ -20,7 +20,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from _cli import Parser, lasting_output, several
+from _cli import Parser, exit_code, several
 from _gallery_html import CAPTION, RUN, THUMBNAILS, shown, write_page
 from _gallery_pages import SMALL_PICTURES, TOOLS, pages, readme_table
 from taichi_dem import InputError
@@ -182,28 +182,20 @@ def renew_readme(root):
 
 
 def main(arguments=None):
-    """Run the gallery; returns the exit code: 0, 1 with a list, 2 for bad input."""
-    try:
-        options = options_parser().parse_args(arguments)
-        if options.readme:
-            renew_readme(HERE.parent)
-            return 0
-        if options.pictures:
-            print("\n".join(shrink_pictures(options.out, HERE.parent / SMALL_PICTURES)))
-            return 0
-        amiss = build(options)
-    except InputError as error:
-        print(" ".join(str(error).split()), file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
-        return 130
+    """Run the gallery; returns the exit code: as an experiment's, or 1 with a list on stderr."""
+    return exit_code(lambda: _work(options_parser().parse_args(arguments)))
+
+
+def _work(options):
+    if options.readme:
+        return renew_readme(HERE.parent)
+    if options.pictures:
+        return print("\n".join(shrink_pictures(options.out, HERE.parent / SMALL_PICTURES)))
+    amiss = build(options)
     if amiss:
         print("\n".join(["Without a result:", *amiss]), file=sys.stderr)
     return 1 if amiss else 0
 
 
 if __name__ == "__main__":
-    with lasting_output():
-        code = main()
-    sys.exit(code)
+    sys.exit(main())

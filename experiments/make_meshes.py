@@ -10,21 +10,27 @@ step.
 Needs gmsh: ``make mesh`` installs it and runs this script. Takes two seconds.
 """
 
-import argparse
 import os
+import sys
 
+from _cli import Parser, exit_code
 from taichi_dem import CONCRETE, PAPER_BLOCK, quality_report, read_mesh
+from taichi_dem.files import output_folder
 from taichi_dem.mesh_gmsh import block_with_hole
 
 MESHES = os.path.dirname(PAPER_BLOCK)
 
 
 def main(arguments=None):
-    """Write the meshes and print what they are like."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    """Write the meshes and print what they are like; returns the exit code."""
+    parser = Parser(prog="python experiments/make_meshes.py", description=__doc__.splitlines()[0])
     parser.add_argument("--out", default=MESHES, help="folder to write to")
-    folder = parser.parse_args(arguments).out
-    os.makedirs(folder, exist_ok=True)
+    return exit_code(lambda: write(parser.parse_args(arguments).out))
+
+
+def write(folder):
+    """Write the meshes to a folder and print what they are like."""
+    output_folder(folder)
     path = os.path.join(folder, "paper_block.msh")
     block_with_hole(path)
     print(path)
@@ -32,4 +38,4 @@ def main(arguments=None):
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

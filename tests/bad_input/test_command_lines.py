@@ -140,6 +140,22 @@ def test_a_bad_line_is_one_sentence_and_writes_nothing(
     assert everything(tmp_path) == before
 
 
+@pytest.mark.parametrize(
+    ("name", "line", "word"),
+    [
+        ("make_meshes", ("--out", "{file}"), "writable"),
+        ("make_meshes", ("--size", "2"), "--size"),
+        ("gallery", ("--only", "none"), "only must name"),
+        ("gallery", ("--out", "{file}"), "writable"),
+    ],
+)
+def test_a_tool_ends_in_one_sentence_too(scripts, capsys, places, name, line, word):
+    code = scripts(name).main([part.format(file=places["file.msh"]) for part in line])
+    said = capsys.readouterr().err
+    assert code == 2, said
+    assert word in said and said.count("\n") == 1
+
+
 def everything(folder):
     """All names below a folder."""
     return sorted(str(path) for path in folder.rglob("*"))

@@ -1,0 +1,59 @@
+"""Standard output of a program whose reader may leave before its end."""
+
+import contextlib
+import os
+import sys
+
+
+@contextlib.contextmanager
+def lasting_output():
+    """Let prints in the block go nowhere, without a word, once nobody reads them."""
+    for number, name in ((1, "stdout"), (2, "stderr")):
+        if getattr(sys, name) is None:
+            # Closed from the beginning: keep the next file that is opened from taking its number.
+            setattr(sys, name, _opened_nowhere(number))
+    output = _LastingOutput(sys.stdout)
+    with contextlib.redirect_stdout(output):
+        yield
+    output.flush()
+
+
+def _opened_nowhere(number):
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    if nowhere != number:
+        os.dup2(nowhere, number)
+        os.close(nowhere)
+    return os.fdopen(number, "w")
+
+
+class _LastingOutput:
+    """A text stream that drops what can no longer be written: its reader has left, say."""
+
+    def __init__(self, stream):
+        self._stream = stream
+
+    def write(self, text):
+        """Write text, or drop it."""
+        try:
+            self._stream.write(text)
+        except OSError as error:
+            self._drop(error)
+        return len(text)
+
+    def flush(self):
+        """Send what waits in the buffer, or drop it."""
+        try:
+            self._stream.flush()
+        except OSError as error:
+            self._drop(error)
+
+    def _drop(self, error):
+        if not isinstance(error, BrokenPipeError):
+            print(f"standard output cannot be written to: {error.strerror}", file=sys.stderr)
+        # The buffer keeps what it could not send, and Python would complain of it at the exit.
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, self._stream.fileno())
+        os.close(nowhere)
+
+    def __getattr__(self, name):
+        return getattr(self._stream, name)
