@@ -16,6 +16,7 @@ from ca_damper.spheres import Spheres
 from ca_damper.sweep import Sweep, sweep_up_and_down
 from ca_damper.table import SceneTable
 from taichi_dem.progress import Progress
+from taichi_dem.progress_bar import ProgressBar
 from taichi_dem.version import __version__
 
 __all__ = [
@@ -25,6 +26,7 @@ __all__ = [
     "InputError",
     "Oscillator",
     "Progress",
+    "ProgressBar",
     "Report",
     "Response",
     "RigidMass",

@@ -27,6 +27,8 @@ from taichi_dem.mesh_order import in_space_order
 from taichi_dem.meshes import PAPER_BLOCK
 from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
 from taichi_dem.needed_effects import needed_effects
+from taichi_dem.progress import Progress
+from taichi_dem.progress_bar import ProgressBar
 from taichi_dem.quality import quality_report
 from taichi_dem.record import write_paraview
 from taichi_dem.scene import Scene
@@ -45,6 +47,8 @@ __all__ = [
     "Material",
     "Mesh",
     "Multirate",
+    "Progress",
+    "ProgressBar",
     "Scene",
     "Simulation",
     "SimulationDiverged",
