@@ -171,7 +171,8 @@ class Schedule:
                 self._move_pair(self.contacts.touch[k], 0)
 
     @ti.func
-    def _move_pair(self, p, partner):
+    def _move_pair(self, p, partner: ti.template()):
+        # As a plain argument, the component's number crashes the compiler of Quadrants.
         self.pairs.move(p, self._pair_key(p))
         if ti.static(self.drifted):
             j = self.contacts.pair_body[p][partner]
