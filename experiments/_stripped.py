@@ -49,7 +49,7 @@ class ByHand(Advance):
         orientation = turned(self.state.orientation[i], turning, elapsed)
         self.state.orientation[i] = orientation
         self.state.rotation[i] = rotation_matrix(orientation)
-        self.state.position[i] += elapsed * velocity
+        self.state.position[i] = self.state.position[i] + elapsed * velocity
         self.state.last_tick[i] = self.state.tick[None]
         speed2 = velocity.norm_sqr()
         if not (speed2 + spin.norm_sqr() * self.model.radius[i] ** 2 < self.state.max_speed2[None]):

@@ -136,7 +136,7 @@ class Ledger:
             moving = self.model.mass[i] * self.state.velocity[i].norm_sqr()
             table[i, 0] = 0.5 * (moving + turning)
             for e in ti.static(range(len(self.model.loads))):
-                table[i, 1] += self.state.load_work[i][e]
+                table[i, 1] = table[i, 1] + self.state.load_work[i][e]
             table[i, 2] = self.state.load_work[i][ti.static(len(self.model.loads))]
             if ti.static(self.model.has_contact):
                 for k in ti.static(range(3)):
@@ -151,7 +151,7 @@ class Ledger:
                     table[b, 1 + k] = self.state.bond_heat[b][k]
             for q in range(3):
                 spent = self.model.tension.spent(b, 3 * b + q)
-                table[b, 4] += self.model.unit_area[b] * spent
+                table[b, 4] = table[b, 4] + self.model.unit_area[b] * spent
 
     @ti.kernel
     def _read_pairs(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):

@@ -144,7 +144,7 @@ class Recorder:
             if self.state.broken_tick[b] < 0:
                 damage[b] = 0.0
                 for q in range(3):
-                    damage[b] += self.model.tension.damage(b, 3 * b + q) / 3.0
+                    damage[b] = damage[b] + self.model.tension.damage(b, 3 * b + q) / 3.0
 
     def _body_damage(self, damage):
         bond = self.model.topology.body_bond

@@ -41,7 +41,7 @@ class Ejection:
             way = 1
         elif stair < self.cells.stair[s]:
             way = -1
-        self.cells.stair[s] += way
+        self.cells.stair[s] = self.cells.stair[s] + way
         self.cells.offset[s] = motion.x - width * self.cells.stair[s]
         gained = ti.cast(0, ti.i64)
         if way != 0:

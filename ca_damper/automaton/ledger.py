@@ -38,7 +38,7 @@ class Ledger:
     @ti.func
     def add(self, s, item: ti.template(), velocity):
         """Enter a gain in velocity along x [m/s]."""
-        self.gained[s, item] += quanta(velocity)
+        self.gained[s, item] = self.gained[s, item] + quanta(velocity)
 
 
 @ti.data_oriented

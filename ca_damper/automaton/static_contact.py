@@ -58,7 +58,7 @@ class StaticContact:
     def hold(self, s, cell):
         """Hold a particle from now on."""
         self.cells.put(s, cell, HELD, 0.0, 0.0)
-        self.held[s] += 1
+        self.held[s] = self.held[s] + 1
 
     @ti.func
     def caught(self, s, cell, velocity):

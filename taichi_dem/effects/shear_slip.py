@@ -41,7 +41,7 @@ class ShearSlip(Effect):
             slip = slip_beyond(stiffness, limit, elastic)
             # Mean of the tractions before and after, so that stored plus spent is exact.
             spent = (stiffness * (elastic - 0.5 * slip)).dot(slip)
-            self.slip[u] += slip
+            self.slip[u] = self.slip[u] + slip
             elastic -= slip
         return stiffness * elastic, spent
 

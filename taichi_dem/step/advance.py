@@ -70,11 +70,12 @@ class Advance(Touch):
             if failed == 0:
                 self._pull_together(slots, motion, force * (area * dt), torque * (area * dt))
                 if ti.static(self.has_heat):
-                    self.state.bond_heat[b] += area * vec3(dragged * dt, slipped, 0.0)
+                    heat = area * vec3(dragged * dt, slipped, 0.0)
+                    self.state.bond_heat[b] = self.state.bond_heat[b] + heat
             else:
                 if ti.static(self.model.has_bond_heat):
-                    heat = vec3(0.0, slipped, self._stored(b, motion))
-                    self.state.bond_heat[b] += area * heat
+                    heat = area * vec3(0.0, slipped, self._stored(b, motion))
+                    self.state.bond_heat[b] = self.state.bond_heat[b] + heat
                 self._release(b, slots)
             if ti.static(self.solves_bonds):
                 self._renew(b, slots, motion, failed, dragged * (area * dt))
@@ -88,7 +89,7 @@ class Advance(Touch):
             self.solver.bonds.end(b)
             if ti.static(self.model.has_bond_heat):
                 # Dashpots are booked for the step before: it was full, though a unit fails now.
-                self.state.bond_heat[b][0] += dragged
+                self.state.bond_heat[b][0] = self.state.bond_heat[b][0] + dragged
 
     @ti.func
     def _owes(self, b):
@@ -140,8 +141,8 @@ class Advance(Touch):
     @ti.func
     def _add(self, slot, linear, angular):
         for k in ti.static(range(3)):
-            self.state.slot[slot][k] += linear[k]
-            self.state.slot[slot][3 + k] += angular[k]
+            self.state.slot[slot][k] = self.state.slot[slot][k] + linear[k]
+            self.state.slot[slot][3 + k] = self.state.slot[slot][3 + k] + angular[k]
 
     @ti.func
     def _stored(self, b, motion):
@@ -212,7 +213,7 @@ class Advance(Touch):
         orientation = turned(self.state.orientation[i], turning, elapsed)
         self.state.orientation[i] = orientation
         self.state.rotation[i] = rotation_matrix(orientation)
-        self.state.position[i] += elapsed * velocity
+        self.state.position[i] = self.state.position[i] + elapsed * velocity
         self.state.last_tick[i] = self.state.tick[None]
         if ti.static(self.has_contact):
             self.contacts.moved(i, velocity, spin, elapsed)
@@ -322,8 +323,8 @@ class Advance(Touch):
     @ti.func
     def _book(self, i, account, work, push, twist):
         """Book work [J] to an account, and impulse and moment about the origin to body i."""
-        self.state.load_work[i][account] += work
+        self.state.load_work[i][account] = self.state.load_work[i][account] + work
         twist += self.state.position[i].cross(push)
         for k in ti.static(range(3)):
-            self.state.load_impulse[i][k] += push[k]
-            self.state.load_impulse[i][3 + k] += twist[k]
+            self.state.load_impulse[i][k] = self.state.load_impulse[i][k] + push[k]
+            self.state.load_impulse[i][3 + k] = self.state.load_impulse[i][3 + k] + twist[k]

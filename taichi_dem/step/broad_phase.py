@@ -152,7 +152,7 @@ class BroadPhase:
         self._index_second()
         self.schedule.start_pairs()
         self.everywhere[None] = 0
-        self.searches[None] += 1
+        self.searches[None] = self.searches[None] + 1
         # A row of neighbours without room calls for another search, which makes the list anew.
         again = self.near.stale[None] != 0 and self.full[None] == 0
         self.contacts.search_due[None] = ti.cast(again, ti.i32)

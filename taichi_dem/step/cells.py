@@ -95,9 +95,10 @@ def group(first: ti.template(), order: ti.template(), keys, count, key_of: ti.te
     for c in range(keys + 2):
         first[c] = 0
     for a in range(count):
-        first[key_of(a) + 2] += 1
+        key = key_of(a)
+        first[key + 2] = first[key + 2] + 1
     for c in range(keys):
-        first[c + 2] += first[c + 1]
+        first[c + 2] = first[c + 2] + first[c + 1]
     for a in range(count):
         place = first[key_of(a) + 1]
         order[place] = a

@@ -96,6 +96,14 @@ class Contacts:
         return self.closer(p, 0.0)
 
     @ti.func
+    def add_impulse(self, slot, linear, angular):
+        """Add an impulse [N s] and its moment [N m s] to what waits in a slot."""
+        self.pair_full[slot] = 1
+        for k in ti.static(range(3)):
+            self.pair_slot[slot][k] = self.pair_slot[slot][k] + linear[k]
+            self.pair_slot[slot][3 + k] = self.pair_slot[slot][3 + k] + angular[k]
+
+    @ti.func
     def gather(self, i):
         """Impulse and moment that contacts have given to body i; empties its slots.
 
@@ -105,7 +113,7 @@ class Contacts:
         for p in range(self.first_of[i], self.first_of[i + 1]):
             if self.pair_full[2 * p] == 1:
                 linear, angular = self._take(2 * p, linear, angular)
-                self.state.contact_heat[i] += self.pair_heat[p]
+                self.state.contact_heat[i] = self.state.contact_heat[i] + self.pair_heat[p]
                 self.pair_heat[p] = vec3(0.0)
         for k in range(self.touch_first[i], self.touch_first[i + 1]):
             slot = 2 * self.touch[k] + 1

@@ -39,7 +39,7 @@ class DueList:
             key = key_of(m)
             self.key[m] = key
             if key >= 0:
-                self.end[key] += 1
+                self.end[key] = self.end[key] + 1
         total = 0
         for back in range(MAX_LEVEL + 1):
             members = self.end[MAX_LEVEL - back]
@@ -49,7 +49,7 @@ class DueList:
             key = self.key[m]
             if key >= 0:
                 self._put(m, self.end[key])
-                self.end[key] += 1
+                self.end[key] = self.end[key] + 1
 
     @ti.func
     def move(self, m, key):
@@ -62,9 +62,9 @@ class DueList:
         while present < key and present >= 0:
             present += 1
             self._swap(m, self.end[present])
-            self.end[present] += 1
+            self.end[present] = self.end[present] + 1
         while present > key:
-            self.end[present] -= 1
+            self.end[present] = self.end[present] - 1
             self._swap(m, self.end[present])
             present -= 1
 

@@ -39,7 +39,7 @@ class Lookout:
     @ti.func
     def forget(self, k, i):
         """Entry k of body i goes: its spheres, if it had any, are far apart by now."""
-        self.met[i] -= ti.cast(self.spheres[k] > 0, ti.i32)
+        self.met[i] = self.met[i] - ti.cast(self.spheres[k] > 0, ti.i32)
         self.changed[i] = 1
 
     @ti.func
@@ -52,7 +52,7 @@ class Lookout:
     @ti.func
     def place(self, i, travel):
         """Note where the clusters of body i are, which has come a way of travel [m] since."""
-        self.way[i] += travel
+        self.way[i] = self.way[i] + travel
         for face in range(4 * i, 4 * i + 4):
             self.cluster[face] = self.middle(i, face)
 
@@ -89,7 +89,8 @@ class Lookout:
     @ti.func
     def found(self, k, i, j, faces, spheres, hits, gap):
         """Note the spheres of entry k, on which faces they are, and the smallest other gap [m]."""
-        self.met[i] += ti.cast(spheres > 0, ti.i32) - ti.cast(self.spheres[k] > 0, ti.i32)
+        had = ti.cast(self.spheres[k] > 0, ti.i32)
+        self.met[i] = self.met[i] - had + ti.cast(spheres > 0, ti.i32)
         self.broken[k], self.spheres[k], self.news[k] = faces, spheres, hits
         self.changed[i] = 1
         self.until[k] = self.way[i] + self.way[j] + gap

@@ -117,7 +117,7 @@ class Neighbours:
         """Give every body its part of the list."""
         self.first[0] = 0
         for i in range(self.model.body_count):
-            self.first[i + 1] += self.first[i]
+            self.first[i + 1] = self.first[i + 1] + self.first[i]
         if self.first[self.model.body_count] > self.capacity:
             self.full[None] = 1
             for i in range(self.model.body_count + 1):
@@ -167,7 +167,7 @@ class Neighbours:
                 self._make_room(i)
                 if self.last[i] < self.first[i + 1]:
                     self._insert(self.first[i], self.last[i], j, faces)
-                    self.last[i] += 1
+                    self.last[i] = self.last[i] + 1
                 else:
                     self.stale[None] = STALE
 

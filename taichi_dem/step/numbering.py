@@ -87,5 +87,5 @@ class Numbering:
             self.contacts.pair_body[p] = [i, j]
             self.faces[p], self.old.former[p] = faces, former
             self.contacts.pair_first[p], self.contacts.pair_last[p] = start, start + spheres
-            self.contacts.sphere_count[None] += spheres
+            self.contacts.sphere_count[None] = self.contacts.sphere_count[None] + spheres
             self.contacts.pair_count[None] = p + 1

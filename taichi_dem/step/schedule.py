@@ -86,9 +86,9 @@ class Schedule:
     def tick_on(self, one):
         """Move the clock to the next tick at which a body is due."""
         if ti.static(self.has_contact):
-            self.evaluations[3] += self.pairs.end[self.low[None]]
-            self.evaluations[4] += self.pairs.end[0]
-        self.state.tick[None] += device_ticks_of(self.finest[None])
+            self.evaluations[3] = self.evaluations[3] + self.pairs.end[self.low[None]]
+            self.evaluations[4] = self.evaluations[4] + self.pairs.end[0]
+        self.state.tick[None] = self.state.tick[None] + device_ticks_of(self.finest[None])
         self.low[None] = device_coarsest_due(self.state.tick[None])
         self.wanted[None] = 0
 
@@ -171,7 +171,8 @@ class Schedule:
                 self._move_pair(self.contacts.touch[k], 0)
 
     @ti.func
-    def _move_pair(self, p, partner):
+    def _move_pair(self, p, partner: ti.template()):
+        # As a plain argument, the component's number crashes the compiler of Quadrants.
         self.pairs.move(p, self._pair_key(p))
         if ti.static(self.drifted):
             j = self.contacts.pair_body[p][partner]
@@ -224,10 +225,10 @@ class Schedule:
     def _count(self):
         """Count what this tick evaluates: substeps, bodies, bonds, contact pairs."""
         low = self.low[None]
-        self.evaluations[0] += 1
-        self.evaluations[1] += self.bodies.count(low)
-        self.evaluations[2] += self.bonds.count(low)
-        self.evaluations[4] += self.bonds.end[0]
+        self.evaluations[0] = self.evaluations[0] + 1
+        self.evaluations[1] = self.evaluations[1] + self.bodies.count(low)
+        self.evaluations[2] = self.evaluations[2] + self.bonds.count(low)
+        self.evaluations[4] = self.evaluations[4] + self.bonds.end[0]
 
     @ti.func
     def count_sweep(self, with_bonds: ti.template()):
@@ -235,11 +236,11 @@ class Schedule:
         visits = ti.cast(0, ti.i64)
         if ti.static(with_bonds):
             visits += self.bonds.end[0]
-            self.evaluations[2] += visits
+            self.evaluations[2] = self.evaluations[2] + visits
         if ti.static(self.has_contact):
-            self.evaluations[3] += self.pairs.end[0]
+            self.evaluations[3] = self.evaluations[3] + self.pairs.end[0]
             visits += self.pairs.end[0]
-        self.evaluations[4] += visits
+        self.evaluations[4] = self.evaluations[4] + visits
 
     @ti.func
     def _bond_key(self, b):

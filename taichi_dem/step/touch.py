@@ -53,9 +53,10 @@ class Touch:
                 deepest = ti.max(deepest, overlap / reach)
         if deepest > 0.0:
             dt = self._pair_step(p, i, j)
-            self._push_apart(2 * p, -force * dt, moment_i * dt)
-            self._push_apart(2 * p + 1, force * dt, moment_j * dt)
-            self.contacts.pair_heat[p] += dt * vec3(dragged, rubbed, 0.0)
+            self.contacts.add_impulse(2 * p, -force * dt, moment_i * dt)
+            self.contacts.add_impulse(2 * p + 1, force * dt, moment_j * dt)
+            heat = dt * vec3(dragged, rubbed, 0.0)
+            self.contacts.pair_heat[p] = self.contacts.pair_heat[p] + heat
         self.contacts.deepest[p] = deepest
         if ti.static(self.has_rates):
             self.rates.notice_pair(p, near, HIT)
@@ -80,13 +81,6 @@ class Touch:
     @ti.func
     def _velocity_at(self, i, arm):
         return self.state.velocity[i] + self.state.spin[i].cross(arm)
-
-    @ti.func
-    def _push_apart(self, slot, linear, angular):
-        self.contacts.pair_full[slot] = 1
-        for k in ti.static(range(3)):
-            self.contacts.pair_slot[slot][k] += linear[k]
-            self.contacts.pair_slot[slot][3 + k] += angular[k]
 
     @ti.func
     def contact_share(self, i, j):

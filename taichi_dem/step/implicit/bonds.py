@@ -61,7 +61,7 @@ class BondDashpots:
         k = self.place[b]
         self.bodies[k], self.branch[k] = [i, j], branch
         now = self._twist(i, j, branch)
-        self.last[k] += self.earlier * (self.start[k] - now)
+        self.last[k] = self.last[k] + self.earlier * (self.start[k] - now)
         self.start[k] = now
         if (self.state.tick[None] // MACRO_TICKS) % self.refresh_every == 0:
             self._refresh(b, k, i, j)

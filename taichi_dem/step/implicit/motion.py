@@ -111,13 +111,13 @@ class Motion:
         else:
             first, second = self.lightness[i] * force, self.lightness[j] * force
         for k in ti.static(range(3)):
-            self.twist[i][k] += first[k]
-            self.twist[i][3 + k] += turned[k]
-            self.twist[j][k] -= second[k]
-            self.twist[j][3 + k] -= back[k]
+            self.twist[i][k] = self.twist[i][k] + first[k]
+            self.twist[i][3 + k] = self.twist[i][3 + k] + turned[k]
+            self.twist[j][k] = self.twist[j][k] - second[k]
+            self.twist[j][3 + k] = self.twist[j][3 + k] - back[k]
 
     @ti.func
     def _give(self, i, impulse, moment):
         for k in ti.static(range(3)):
-            self.given[i][k] += impulse[k]
-            self.given[i][3 + k] += moment[k]
+            self.given[i][k] = self.given[i][k] + impulse[k]
+            self.given[i][3 + k] = self.given[i][3 + k] + moment[k]

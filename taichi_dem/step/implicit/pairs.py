@@ -86,8 +86,8 @@ class PairDashpots:
             while (taken >> colour) & 1 == 1 and colour < COLOURS:
                 colour += 1
             if colour < COLOURS:
-                self.taken[i] |= 1 << colour
-                self.taken[j] |= 1 << colour
+                self.taken[i] = self.taken[i] | (1 << colour)
+                self.taken[j] = self.taken[j] | (1 << colour)
             self.colour[a] = colour
         self.count[None] = count
         group(self.colour_first, self.order, COLOURS + 1, count, self._colour_of)
@@ -124,8 +124,8 @@ class PairDashpots:
                 overlap, normal, arm = met.overlap, met.normal, met.arm - branch
                 self.touch[end], self.normal[end], self.arm[end] = k, normal, arm
                 # Spheres still apart may approach until they touch, at the end of the step.
-                self.push[end] = dt * self.contacts.law.elastic(ti.max(overlap, 0.0))
-                self.push[end] += self.contacts.law.damping() * ti.min(overlap, 0.0)
+                push = dt * self.contacts.law.elastic(ti.max(overlap, 0.0))
+                self.push[end] = push + self.contacts.law.damping() * ti.min(overlap, 0.0)
                 self.share[end] = self._share(i, j, branch, arm, normal)
                 force += self.impulse[k]
                 moment += arm.cross(self.impulse[k])
@@ -158,13 +158,8 @@ class PairDashpots:
     def _deposit(self, p, branch, force, moment):
         """Let both bodies have the first guess: force on the second, moment about its centre."""
         around = moment + branch.cross(force)
-        self.contacts.pair_full[2 * p] = 1
-        self.contacts.pair_full[2 * p + 1] = 1
-        for k in ti.static(range(3)):
-            self.contacts.pair_slot[2 * p][k] -= force[k]
-            self.contacts.pair_slot[2 * p][3 + k] -= around[k]
-            self.contacts.pair_slot[2 * p + 1][k] += force[k]
-            self.contacts.pair_slot[2 * p + 1][3 + k] += moment[k]
+        self.contacts.add_impulse(2 * p, -force, -around)
+        self.contacts.add_impulse(2 * p + 1, force, moment)
 
     @ti.func
     def visit(self, p):
@@ -220,4 +215,4 @@ class PairDashpots:
                 pressed, rate = impulse.dot(normal), velocity.dot(normal)
                 dragged += (ti.max(self.push[c], 0.0) - pressed) * rate
                 rubbed -= (impulse - pressed * normal).dot(velocity)
-            self.contacts.pair_heat[p] += vec3(dragged, rubbed, 0.0)
+            self.contacts.pair_heat[p] = self.contacts.pair_heat[p] + vec3(dragged, rubbed, 0.0)

@@ -80,8 +80,8 @@ class Solver:
     @ti.func
     def judge(self, one):
         """End a sweep: is another one called for?"""
-        self.sweeps[None] += 1
-        self.total_sweeps[None] += 1
+        self.sweeps[None] = self.sweeps[None] + 1
+        self.total_sweeps[None] = self.total_sweeps[None] + 1
         self.residual2[None] = self.change2[None]
         self.change2[None] = 0.0
         bound = self.tolerance * self.tolerance * self.speed2[None]
