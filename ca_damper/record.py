@@ -6,6 +6,7 @@ import numpy as np
 
 from ca_damper.progress import Stages
 from taichi_dem.checks import shown, whole
+from taichi_dem.display import by_fields, counted, in_brief
 from taichi_dem.errors import InputError
 
 _MOST_STEPS = 2**31 - 1
@@ -26,6 +27,9 @@ class Frame:
     position: np.ndarray
     velocity: np.ndarray
 
+    def __repr__(self):
+        return by_fields(self)
+
 
 @dataclass(frozen=True, eq=False)
 class Film:
@@ -37,6 +41,12 @@ class Film:
 
     history: dict
     frames: tuple
+
+    def __repr__(self):
+        samples, scenes = np.shape(self.history.get("time_s", np.zeros((0, 0))))
+        most = max((len(frames) for frames in self.frames), default=0)
+        of_each = f"{counted(most, 'frame')} of each" if most else "no frames"
+        return in_brief(self, counted(samples, "sample"), counted(scenes, "scene"), of_each)
 
 
 def film(batch, steps, *, sample_every=1, frame_every=None, progress=None):

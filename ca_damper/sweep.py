@@ -11,6 +11,7 @@ import numpy as np
 from ca_damper.checks import check_run
 from ca_damper.progress import Stages
 from ca_damper.response import UNITS, Grid, Response
+from taichi_dem.display import in_brief
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,6 +20,9 @@ class Sweep:
 
     up: Response
     down: Response
+
+    def __repr__(self):
+        return in_brief(self, self.up.axes_in_words(), "up and down")
 
     @property
     def hysteresis(self):

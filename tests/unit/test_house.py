@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[2]
 # row below. A folder counts as one module. A new module needs a place here.
 LAYERS = {
     "taichi_dem": (
-        ("errors", "types", "checks", "source_lines", "runtime"),
+        ("errors", "types", "checks", "display", "source_lines", "runtime"),
         ("fields", "field_memory", "files", "effect_use", "time_limit"),
         ("plot_style", "checkpoint"),
         ("restart",),
@@ -35,8 +35,9 @@ LAYERS = {
         ("health", "watch", "resolution", "report", "step_report", "effects_acted"),
         ("simulation",),
         ("monitor", "record", "realised"),
-        ("simulate", "needed_effects"),
         ("plot",),
+        ("result",),
+        ("simulate", "needed_effects"),
         ("__init__",),
     ),
     "ca_damper": (
@@ -45,9 +46,9 @@ LAYERS = {
         ("container", "automaton", "spheres"),
         ("coupling",),
         ("batch", "needed_effects"),
+        ("plot",),
         ("response",),
         ("sweep",),
-        ("plot",),
         ("__init__",),
     ),
 }
@@ -56,6 +57,7 @@ ACROSS = {
     "ca_damper": (
         *("taichi_dem.runtime", "taichi_dem.errors", "taichi_dem.checks", "taichi_dem.fields"),
         *("taichi_dem.files", "taichi_dem.plot_style", "taichi_dem.effect_use"),
+        *("taichi_dem.display",),
         *("taichi_dem.checkpoint", "taichi_dem.restart"),
     )
 }
