@@ -1,6 +1,7 @@
 """One look for all pictures of both packages."""
 
 import contextlib
+import io
 
 import matplotlib
 import numpy as np
@@ -56,6 +57,13 @@ def picture(path, *shape, **options):
     with styled(*shape, **options) as (figure, axes):
         yield figure, axes
         write_whole(path, lambda name: figure.savefig(name, format="png"))
+
+
+def png_of(figure, dpi=110):
+    """A figure as PNG, in bytes; within the block of ``styled``."""
+    content = io.BytesIO()
+    figure.savefig(content, format="png", dpi=dpi)
+    return content.getvalue()
 
 
 @contextlib.contextmanager
