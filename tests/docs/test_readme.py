@@ -40,7 +40,7 @@ def test_the_blast_runs_and_leaves_what_the_page_says(left_by, tmp_path):
     report = left_by(0)["result"].report
     assert report.broken_faces > 0 and not report.needs
     mine = tmp_path / "results" / "mine"
-    for name in ("history.csv", "mesh.msh", "report.json", "paraview/blast.pvd"):
+    for name in ("history.csv", "bonds.csv", "mesh.msh", "report.json", "paraview/mine.pvd"):
         assert (mine / name).is_file(), name
     # The cell values that docs/paraview.md lists are those of the last snapshot.
     last = meshio.read(sorted((mine / "paraview").glob("*.vtu"))[-1])
