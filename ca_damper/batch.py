@@ -25,6 +25,7 @@ from ca_damper.table import SceneTable
 from taichi_dem import runtime
 from taichi_dem.checkpoint import version_text
 from taichi_dem.checks import choice, instance, positive, whole
+from taichi_dem.display import in_brief
 from taichi_dem.errors import InputError
 from taichi_dem.fields import check_room
 from taichi_dem.progress import compiling
@@ -85,6 +86,9 @@ class Batch:
         # Of the present run: share done and seconds it took; whether it goes on from a checkpoint.
         self._done, self._seconds, self.going_on = 0.0, 0.0, False
         self.keeper = NoKeeper()
+
+    def __repr__(self):
+        return in_brief(self, self.filling.label, f"{self.count:,} scenes", f"on the {self.mount}")
 
     def start(self, start="rest"):
         """Place the particles anew and begin at time zero, the base passing upwards through zero.

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from taichi_dem.display import by_fields
+
 #: Summed over the steps of a cycle; _cos and _sin: times cos(w t) and sin(w t).
 SUMS = ("x", "x_squared", "x_cos", "x_sin", "v_cos", "v_sin", "f", "f_cos", "f_sin")
 #: What is written for a cycle; energy: of the particles, at its end [J].
@@ -33,6 +35,9 @@ class Cycles:
     frequency: np.ndarray
     steps: np.ndarray
     record: np.ndarray
+
+    def __repr__(self):
+        return by_fields(self)
 
     def mean_of(self, name):
         """Mean of a column over cycles, (scenes,)."""

@@ -6,6 +6,7 @@ import numpy as np
 
 from ca_damper.progress import Stages
 from taichi_dem.checks import AUTO, shown, whole
+from taichi_dem.display import by_fields, counted, in_brief
 from taichi_dem.errors import InputError
 from taichi_dem.progress_bar import reporting
 
@@ -27,6 +28,9 @@ class Frame:
     position: np.ndarray
     velocity: np.ndarray
 
+    def __repr__(self):
+        return by_fields(self)
+
 
 @dataclass(frozen=True, eq=False)
 class Film:
@@ -38,6 +42,12 @@ class Film:
 
     history: dict
     frames: tuple
+
+    def __repr__(self):
+        samples, scenes = np.shape(self.history.get("time_s", np.zeros((0, 0))))
+        most = max((len(frames) for frames in self.frames), default=0)
+        of_each = f"{counted(most, 'frame')} of each" if most else "no frames"
+        return in_brief(self, counted(samples, "sample"), counted(scenes, "scene"), of_each)
 
 
 def film(batch, steps, *, sample_every=1, frame_every=None, progress=AUTO):

@@ -4,6 +4,7 @@ import json
 from dataclasses import asdict, dataclass
 from typing import Optional
 
+from taichi_dem.display import counted, in_brief
 from taichi_dem.files import write_text
 
 #: Evaluations of the right-hand side in an attempt of RK45; the first slope is the last one's.
@@ -40,6 +41,12 @@ class Report:
     container_evaluations: int
     compile_seconds: float
     run_seconds: float
+
+    def __repr__(self):
+        particles = f"{_range(self.particles)} particles"
+        times = f"{self.simulated_s:.4g} s simulated", f"{self.run_seconds:.3g} s run"
+        scenes = f"{counted(self.scenes, 'scene')} with {particles}"
+        return in_brief(self, self.method, scenes, *times, "print it for all figures")
 
     @property
     def particle_steps_per_second(self):

@@ -15,6 +15,7 @@ from ca_damper.oscillator import Oscillator
 from ca_damper.report import Report
 from ca_damper.table import SceneTable
 from taichi_dem.checks import AUTO, instance, positive, several, whole
+from taichi_dem.display import counted, embedded, in_brief, listed, table, titled, unfolded
 from taichi_dem.errors import InputError
 from taichi_dem.files import write_csv
 from taichi_dem.progress_bar import reporting
@@ -31,8 +32,16 @@ UNITS = {
     "damping_ratio": "",
     "energy": "J",
 }
+#: Particle numbers that a notebook shows, evenly over those there are.
+_MOST_SHOWN = 8
 _MOST_SEEDS = 2**31 - 1
 _MOST_SCENES = 2**24
+
+
+_PEAK_COLUMNS = (
+    *("particles", "peak at f/f0", "peak at [Hz]"),
+    *("peak RMS [mm], median over seeds", "lowest to highest"),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +57,8 @@ class Response:
     container [N]. apparent_mass [kg], apparent_damping [N s/m], loss_factor, damping_ratio: of
     ``measures.Cycles``. energy: of the particles [J]. report: what was done and what it cost; None
     for one way of a sweep.
+
+    As the last line of a notebook's cell it shows its curves and a table of the peaks.
     """
 
     label: str
@@ -67,6 +78,44 @@ class Response:
     damping_ratio: np.ndarray
     energy: np.ndarray
     report: Optional[Report] = None
+
+    def __repr__(self):
+        highest = f"largest RMS {1e3 * np.fmax.reduce(self.rms, axis=None, initial=np.nan):.4g} mm"
+        return in_brief(self, self.axes_in_words(), highest)
+
+    def axes_in_words(self):
+        """Filling, particles, ratios and seeds in words."""
+        axes = f"particles {listed(self.particles)}, f/f0 {listed(self.ratios)}"
+        return f"{self.label}, {axes}, {counted(len(self.seeds), 'seed')}"
+
+    def _repr_html_(self):
+        # Whoever never looks at a picture need not wait for matplotlib.
+        from ca_damper.plot.response import picture_of_response
+
+        count = len(self.particles)
+        rows = np.unique(np.linspace(0, count - 1, _MOST_SHOWN).round().astype(int))
+        png = picture_of_response(self, rows)
+        some = f" ({len(rows)} of {count} particle numbers)" if len(rows) < count else ""
+        return titled(
+            f"Response: {self.axes_in_words()}{some}",
+            embedded(png, "RMS displacement over frequency"),
+            table(self._peak_rows(rows), _PEAK_COLUMNS),
+            unfolded("All figures of the run", str(self.report)) if self.report else "",
+        )
+
+    def _peak_rows(self, rows):
+        """Cells of the table of peaks: median over the seeds, and lowest to highest RMS."""
+        natural = self.oscillator.natural_frequency
+        found = []
+        for k, ratio, rms in zip(rows, *(measure[rows] for measure in self.peaks())):
+            middle, spread = np.median(ratio), 1e3 * rms
+            found.append(
+                (
+                    *(f"{self.particles[k]}", f"{middle:.4f}", f"{natural * middle:.4g}"),
+                    *(f"{np.median(spread):.4g}", f"{spread.min():.4g} to {spread.max():.4g}"),
+                )
+            )
+        return found
 
     def peaks(self):
         """Where each curve peaks: (ratio, rms [m]), two arrays (particles, seeds)."""

@@ -16,6 +16,7 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem.checks import finite, positive, shown, whole
+from taichi_dem.display import by_fields
 from taichi_dem.errors import InputError
 
 #: Attempts after which an integration counts as stuck, unless the caller says otherwise.
@@ -148,6 +149,9 @@ class Solution:
     y: np.ndarray
     rejected: int
     evaluations: int
+
+    def __repr__(self):
+        return by_fields(self)
 
 
 def solve(rhs, span, y0, *, rtol=1e-6, atol=1e-9, at=None, first=None, most_attempts=MOST_ATTEMPTS):

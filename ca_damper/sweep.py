@@ -12,6 +12,7 @@ from ca_damper.checks import check_run
 from ca_damper.progress import Stages
 from ca_damper.response import UNITS, Grid, Response
 from taichi_dem.checks import AUTO
+from taichi_dem.display import in_brief
 from taichi_dem.progress_bar import reporting
 
 
@@ -21,6 +22,9 @@ class Sweep:
 
     up: Response
     down: Response
+
+    def __repr__(self):
+        return in_brief(self, self.up.axes_in_words(), "up and down")
 
     @property
     def hysteresis(self):

@@ -4,6 +4,7 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem.checks import choice, shown
+from taichi_dem.display import counted, in_brief
 from taichi_dem.errors import InputError
 
 #: Scenes of a table, and the largest seed.
@@ -49,6 +50,14 @@ class SceneTable:
             kind = ti.i32 if name in ("particles", "seed") else ti.f64
             setattr(self, name, ti.field(kind, shape=self.count))
         self._load(np.stack(rows).astype(np.float64))
+
+    def __repr__(self):
+        ends = {name: (of.min(), of.max()) for name, of in self._host.items()}
+        words = (
+            f"{name} {low:.6g}" + (f" to {high:.6g}" if high > low else "")
+            for name, (low, high) in ends.items()
+        )
+        return in_brief(self, counted(self.count, "scene"), *words)
 
     def change(self, **numbers):
         """Give all scenes other numbers by name, each a scalar or (scenes,); compiles nothing.

@@ -11,7 +11,7 @@ import os
 import sys
 
 #: What is shown where no command line names it, from the folder in which ParaView was started.
-SERIES = "results/blast_fracture/paraview/blast.pvd"
+SERIES = "results/blast_fracture/paraview/blast_fracture.pvd"
 #: Cell values that are shown, one a view, what is written above them, and the decades of a scale
 #: that has to show a wave beside fragments a thousand times as fast; 0 for an even scale.
 SHOWN = {

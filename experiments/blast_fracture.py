@@ -12,8 +12,9 @@ the same command with --resume goes on from there, also with a larger --until.
 
 Dashpots are solved together unless another method is asked for; blast_methods.py compares them.
 
-Writes pictures, an animation, history.csv, the mesh used, CSV of all that is plotted, summary.json
-and a ParaView series (paraview/blast.pvd) to results/blast_fracture/.
+Writes pictures, an animation, history.csv, bonds.csv (when each bond broke), the mesh used, CSV of
+all that is plotted, summary.json and a ParaView series (paraview/blast_fracture.pvd) to
+results/blast_fracture/.
 """
 
 import os
@@ -189,7 +190,7 @@ def picture(result, folder):
     def at(name):
         return os.path.join(folder, name)
 
-    _write_tables(result, at)
+    _write_bodies(result, at("bodies.csv"))
     gas = [load for load in result.model.loads if load.name == "gas_pressure"]
     if gas:
         time_s = np.linspace(0.0, 1.1 * (gas[0].decay_ratio + 1.0) * gas[0].rise, 400)
@@ -224,23 +225,10 @@ def level_shares(level, top):
     return np.bincount(level, minlength=top + 1) / len(level)
 
 
-def _write_tables(result, at):
-    top = result.model.topology
-    middle = result.model.mesh.points[top.vertices].mean(axis=1)
-    write_csv(
-        at("bonds.csv"),
-        {
-            "master": top.master,
-            "slave": top.slave,
-            "x_m": middle[:, 0],
-            "y_m": middle[:, 1],
-            "z_m": middle[:, 2],
-            "broken_time_s": result.broken_time,
-        },
-    )
+def _write_bodies(result, path):
     frames, bodies = result.frames, result.model.body_count
     write_csv(
-        at("bodies.csv"),
+        path,
         {
             "time_s": np.repeat([frame.time_s for frame in frames], bodies),
             "body": np.tile(np.arange(bodies), len(frames)),

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from taichi_dem.display import by_fields
 from taichi_dem.tetrahedra import all_faces, area_vectors
 
 #: Steps towards the centre of a small ball around spheres, and what stands for no distance [m].
@@ -28,6 +29,9 @@ class ContactSpheres:
     radius: np.ndarray
     cluster: np.ndarray
     extent: np.ndarray
+
+    def __repr__(self):
+        return by_fields(self)
 
     @property
     def per_face(self):

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Optional
 
+from taichi_dem.display import in_brief
+
 
 @dataclass(frozen=True)
 class EffectUse:
@@ -69,6 +71,14 @@ class Advice:
     def droppable(self):
         """Names of the effects that the scene could do without."""
         return self.never_acted + self.negligible
+
+    def __repr__(self):
+        lists = {
+            "keep": [use.effect for use in self.uses if use.effect not in self.droppable],
+            "drop": self.droppable,
+            "missed": [str(getattr(finding, "effect", finding)) for finding in self.missed],
+        }
+        return in_brief(self, *(f"{word} {', '.join(of)}" for word, of in lists.items() if of))
 
     def __str__(self):
         """A line for every effect, then what was missed."""

@@ -12,6 +12,7 @@ import numpy as np
 
 from taichi_dem import tetrahedra as geometry
 from taichi_dem.checks import finite, shown, word
+from taichi_dem.display import counted, in_brief
 from taichi_dem.errors import InputError
 
 #: Below this share of (longest edge)^3 a volume counts as zero: what round-off leaves of it.
@@ -40,6 +41,11 @@ class Mesh:
     groups: dict
     notes: tuple = ()
     source: str = ""
+
+    def __repr__(self):
+        groups = f"groups {', '.join(self.groups)}" if self.groups else "no groups"
+        bodies, points = counted(self.body_count, "body"), counted(self.point_count, "point")
+        return in_brief(self, bodies, points, groups, self.source)
 
     @property
     def body_count(self) -> int:

@@ -6,6 +6,7 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem.contact_spheres import spheres_of_faces
+from taichi_dem.display import counted, in_brief
 from taichi_dem.effects.base import ABSENT, MANY, ROLES
 from taichi_dem.fields import then
 from taichi_dem.tetrahedra import area_vectors
@@ -43,6 +44,10 @@ class Model:
         self._allocate_bodies()
         self._allocate_bonds()
         self._take_in(effects)
+
+    def __repr__(self):
+        bodies, bonds = counted(self.body_count, "body"), counted(self.bond_count, "bond")
+        return in_brief(self, bodies, bonds, *(effect.name for effect in self.effects))
 
     def _take_in(self, effects):
         """Sort the effects by role, put null objects where none is listed, and bind them.

@@ -1,6 +1,7 @@
 """One look for all pictures of both packages."""
 
 import contextlib
+import io
 from dataclasses import dataclass
 
 import matplotlib
@@ -147,6 +148,13 @@ def _write_plain_numbers(figure):
         ):
             if type(getattr(axis, f"get_{level}_formatter")()) is LogFormatterSciNotation:
                 give(_PlainLogFormatter())
+
+
+def png_of(figure, dpi=110):
+    """A figure as PNG, in bytes; within the block of ``styled``."""
+    content = io.BytesIO()
+    figure.savefig(content, format="png", dpi=dpi)
+    return content.getvalue()
 
 
 @contextlib.contextmanager

@@ -8,6 +8,7 @@ import numpy as np
 
 from taichi_dem import tetrahedra as geometry
 from taichi_dem.checks import instance
+from taichi_dem.display import counted, in_brief
 from taichi_dem.materials import Material
 from taichi_dem.mesh import Mesh
 from taichi_dem.topology import body_properties, face_vertices, topology_of
@@ -59,6 +60,11 @@ class QualityReport:
         steps = np.append(np.sort(self.critical_step_s), np.inf)
         gained = steps[1 : count + 1]
         return gained / steps[0] if np.isfinite(steps[0]) else np.ones_like(gained)
+
+    def __repr__(self) -> str:
+        bodies, bonds = counted(self.body_count, "body"), counted(self.bond_count, "bond")
+        step = f"critical step {self.critical_step_s.min(initial=np.inf):.3g} s"
+        return in_brief(self, bodies, bonds, step, "print it for the table")
 
     def __str__(self) -> str:
         """Counts, ranges and the worst bodies as a table."""

@@ -1,15 +1,18 @@
 """What a run leaves behind: time series, snapshots, ParaView files; written whole or not at all."""
 
 import os
+import re
 from dataclasses import dataclass, fields
 
 import numpy as np
 import taichi as ti
 
-from taichi_dem.files import output_folder
+from taichi_dem.display import by_fields
+from taichi_dem.files import output_folder, write_csv
 from taichi_dem.mesh_files import write_pvd, write_vtu
 from taichi_dem.monitor import HoleMonitor
 from taichi_dem.state import NEVER
+from taichi_dem.tetrahedra import area_vectors
 from taichi_dem.timeline import MAX_LEVEL
 
 #: Ledger terms that have a column of their own in the time series, in its order.
@@ -29,6 +32,10 @@ ENERGY_COLUMNS = (
 )
 
 
+#: Letters of a series' name.
+_LONGEST_NAME = 50
+
+
 @dataclass(frozen=True, eq=False)
 class Frame:
     """The block at one time.
@@ -46,6 +53,9 @@ class Frame:
     level: np.ndarray
     damage: np.ndarray
     bound: np.ndarray
+
+    def __repr__(self):
+        return by_fields(self)
 
     @property
     def speed(self):
@@ -169,13 +179,46 @@ def body_corners(model, frame):
     return frame.position[:, None] + np.einsum("nij,nkj->nki", frame.rotation, arms)
 
 
-def write_paraview(folder, model, frames, name="blast"):
+def write_bonds(path, model, broken_time):
+    """Write a CSV row a bond: its bodies, centre and area of its face, and when it broke.
+
+    broken_time: (bond_count,) [s], NaN while a bond holds; its cell is then empty.
+    Raises InputError when the file cannot be written.
+    """
+    top, points = model.topology, model.mesh.points
+    centre = points[top.vertices].mean(axis=1)
+    times = np.array(broken_time, dtype=object)
+    times[np.isnan(broken_time)] = ""
+    columns = {
+        "bond": np.arange(top.bond_count),
+        "master": top.master,
+        "slave": top.slave,
+        **{f"{axis}_m": centre[:, k] for k, axis in enumerate("xyz")},
+        "area_m2": np.linalg.norm(area_vectors(points, top.vertices), axis=1),
+        "broken_time_s": times,
+    }
+    write_csv(path, columns)
+
+
+def series_name(folder):
+    """Name of a series after its folder, fit for files everywhere; "run" where nothing is left.
+
+    Letters and digits of any script, "-", "_" and "." stay; all else becomes "_". At most
+    50 letters, so that numbers and endings find room in a file name.
+    """
+    name = os.path.basename(os.path.abspath(folder))
+    return re.sub(r"[^\w.-]+", "_", name)[:_LONGEST_NAME].strip("._-") or "run"
+
+
+def write_paraview(folder, model, frames, name=None):
     """Write frames as a ParaView series: folder/name.pvd and a VTU file a frame.
 
+    name: of the files, that of the folder if None (``series_name``).
     Cells carry body_id, level, speed_m_s, displacement_m, damage and step_bound_by, the place
     in ``step_control.CRITERIA`` of what bounds a body's step.
     """
     output_folder(folder)
+    name = series_name(folder) if name is None else name
     cells = np.arange(4 * model.body_count, dtype=np.int32).reshape(-1, 4)
     names = []
     for number, frame in enumerate(frames):

@@ -3,6 +3,8 @@
 from dataclasses import asdict, dataclass
 from typing import Optional
 
+from taichi_dem.display import in_brief
+
 
 @dataclass(frozen=True)
 class Report:
@@ -50,6 +52,16 @@ class Report:
     unresolved: tuple
     bound_by: dict
     realised_gain: Optional[float] = None
+
+    def __repr__(self):
+        took = f"{self.run_seconds:.3g} s run"
+        return in_brief(self, self.outcome, took, "print it for all figures")
+
+    @property
+    def outcome(self):
+        """Method, simulated time and broken bonds in words."""
+        broken = f"{self.broken_faces:,} of {self.bond_count:,} bonds broken"
+        return f"{self.method}, {self.until_s:.4g} s simulated, {broken}"
 
     @property
     def needs(self):

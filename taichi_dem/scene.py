@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from taichi_dem.checks import positive, shown
+from taichi_dem.display import counted, in_brief
 from taichi_dem.effects.base import MANY, Effect
 from taichi_dem.errors import InputError
 from taichi_dem.materials import Material
@@ -34,6 +35,11 @@ class Scene:
             if hasattr(effect, "group"):
                 self.mesh.group_faces(effect.group)
         positive("max_speed", self.max_speed)
+
+    def __repr__(self):
+        effects = ", ".join(effect.name or type(effect).__name__ for effect in self.effects)
+        words = f"effects {effects}" if effects else "no effects"
+        return in_brief(self, counted(self.mesh.body_count, "body"), words)
 
     def has(self, name):
         """Whether an effect of this name is listed."""

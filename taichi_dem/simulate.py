@@ -1,8 +1,6 @@
 """The loop a user calls: step, sample, keep frames, and hand everything back as one result."""
 
-import json
 import math
-import os
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,17 +8,14 @@ import numpy as np
 from taichi_dem.checkpoint import Checkpoint, digest, version_text
 from taichi_dem.checks import AUTO, instance, progress_option, shown
 from taichi_dem.errors import InputError, SimulationDiverged
-from taichi_dem.files import output_folder, write_csv, write_text
-from taichi_dem.mesh_files import write_mesh
+from taichi_dem.files import output_folder
 from taichi_dem.methods import check_method
 from taichi_dem.progress import Progress, compiling
 from taichi_dem.progress_bar import reporting
 from taichi_dem.realised import realised_gain
-from taichi_dem.record import (
-    Recorder,
-    write_paraview,
-)
+from taichi_dem.record import Recorder
 from taichi_dem.restart import Keeper, NoKeeper, Saved, opened
+from taichi_dem.result import Result
 from taichi_dem.scene import Scene
 from taichi_dem.simulation import Simulation, macro_steps
 from taichi_dem.timeline import MACRO_TICKS
@@ -55,40 +50,6 @@ class RunProgress(Progress):
         seconds = max(self.seconds, 1e-9)
         rate = 1e-6 * self.evaluations / seconds
         return f"{1e6 * self.time_s / seconds:.3g} us/s, {rate:.3g} M evaluations/s"
-
-
-@dataclass(frozen=True, eq=False)
-class Result:
-    """What a run produced.
-
-    history: arrays by column name, one row a sample. frames: snapshots. broken_time: when each
-    bond was released [s], NaN while it holds. peak_speed: largest speed of each body at the
-    samples [m/s]. report: figures of the run. diverged: the sentence of a run that left its bounds
-    (all else then ends before that), else "".
-    """
-
-    scene: object
-    method: object
-    model: object
-    history: dict
-    frames: tuple
-    broken_time: np.ndarray
-    peak_speed: np.ndarray
-    report: object
-    diverged: str = ""
-
-    def write(self, folder):
-        """Write history.csv, mesh.msh, report.json and the ParaView series to a folder.
-
-        Raises InputError when the folder cannot be written to.
-        """
-        output_folder(folder)
-        write_csv(os.path.join(folder, "history.csv"), self.history)
-        write_mesh(os.path.join(folder, "mesh.msh"), self.scene.mesh)
-        text = json.dumps({**self.report.as_dict(), "diverged": self.diverged}, indent=1)
-        write_text(os.path.join(folder, "report.json"), text)
-        if self.frames:
-            write_paraview(os.path.join(folder, "paraview"), self.model, self.frames)
 
 
 def simulate(

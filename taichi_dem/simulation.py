@@ -7,6 +7,7 @@ import numpy as np
 
 from taichi_dem import runtime
 from taichi_dem.checks import choice, instance, positive, whole
+from taichi_dem.display import counted, in_brief
 from taichi_dem.effects_acted import effects_acted
 from taichi_dem.errors import InputError, SimulationDiverged
 from taichi_dem.fields import fields_first
@@ -78,6 +79,11 @@ class Simulation:
         self.compile_seconds = time.perf_counter() - started
         self.run_seconds = self.run_cpu_seconds = 0.0
         self.started = None
+
+    def __repr__(self):
+        bodies = counted(self.model.body_count, "body")
+        bonds = counted(self.model.bond_count, "bond")
+        return in_brief(self, bodies, bonds, self.method.name, f"{self.driver.name} driver")
 
     def _build_schedule(self):
         model, state, method = self.model, self.state, self.method

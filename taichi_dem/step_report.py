@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichi_dem.contact_spheres import spheres_of_faces
+from taichi_dem.display import counted, in_brief
 from taichi_dem.errors import InputError
 from taichi_dem.materials import Material
 from taichi_dem.mesh import Mesh
@@ -65,6 +66,12 @@ class StepReport:
         """Share of the body updates, each at its own step, that the count worst bodies take."""
         updates = 1.0 / self.step_s
         return float(updates[self.worst(count)].sum() / max(updates.sum(), 1e-300))
+
+    def __repr__(self):
+        worst = self.worst(1)[0]
+        step = f"smallest step {self.step_s[worst]:.3g} s by {self.binding[worst]}"
+        bodies = counted(len(self.step_s), "body")
+        return in_brief(self, bodies, step, "print it for the table")
 
     def __str__(self):
         """Which criterion binds how many bodies, the worst bodies, and what they cost."""

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichi_dem import tetrahedra as geometry
+from taichi_dem.display import by_fields
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +33,9 @@ class Topology:
     body_bond: np.ndarray
     outer_body: np.ndarray
     outer_face: np.ndarray
+
+    def __repr__(self):
+        return by_fields(self)
 
     @property
     def bond_count(self) -> int:

@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib import colormaps
 
-from taichi_dem.plot_style import GREY, STYLES, area_key, picture, styles_of
+from taichi_dem.plot_style import GREY, STYLES, area_key, picture, png_of, styled, styles_of
 
 _SHADES = colormaps["viridis"]
 _FINE = 400
@@ -29,11 +29,30 @@ def picture_responses(path, responses, particle_mass):
             axis.set_axis_off()
 
 
-def _draw_curves(axis, response):
-    """Median over seeds as lines, lowest and highest as bands; the empty container dotted."""
-    for k, particles in enumerate(response.particles):
-        colour = _shade(response, k)
-        _band(axis, response.ratios, 1e3 * response.rms[k], colour, f"{particles} particles")
+def picture_of_response(response, rows):
+    """PNG, in bytes: RMS over frequency; rows: which of the particle numbers are drawn."""
+    with styled(size=(7.2, 4.0)) as (figure, axis):
+        # Without damping the empty container has no end at its natural frequency.
+        with np.errstate(divide="ignore", invalid="ignore"):
+            _draw_curves(axis, response, rows)
+        if len(response.ratios) == 1:
+            for line in axis.lines:
+                line.set_marker("o")
+        axis.set_ylim(0.0, None)
+        axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        if len(response.seeds) > 1:
+            axis.set_title(f"median of {len(response.seeds)} seeds, shaded: lowest to highest")
+        return png_of(figure)
+
+
+def _draw_curves(axis, response, rows=None):
+    """Median over seeds as lines, lowest and highest as bands; the empty container dotted.
+
+    rows: which of the particle numbers; all if None.
+    """
+    for k in range(len(response.particles)) if rows is None else rows:
+        label = f"{response.particles[k]} particles"
+        _band(axis, response.ratios, 1e3 * response.rms[k], _shade(response, k), label)
     oscillator = response.oscillator
     fine = np.linspace(response.ratios[0], response.ratios[-1], _FINE)
     empty = oscillator.base_amplitude * np.abs(

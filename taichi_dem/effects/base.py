@@ -19,6 +19,7 @@ b is a bond, u one of its three contact units (3 b, 3 b + 1, 3 b + 2), i a body.
 import numpy as np
 import taichi as ti
 
+from taichi_dem.display import by_arguments
 from taichi_dem.fields import then
 from taichi_dem.types import real, vec3
 
@@ -34,6 +35,9 @@ class Effect:
 
     role = ""
     name = ""
+
+    def __repr__(self):
+        return by_arguments(self)
 
     def bind(self, model):
         """Check the effect against the model and allocate its parameters and state there."""

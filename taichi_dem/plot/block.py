@@ -44,7 +44,7 @@ def plot_cracks(path, model, frame, broken_time, magnify=5.0, axis=(0.0, 0.0, 1.
     view = View(axis)
     broken_time = np.where(broken_time <= frame.time_s, broken_time, np.nan)
     with picture(path, 1, 3, size=(13.2, 4.6)) as (figure, panels):
-        drawn = _all_breaks(panels[0], view, model, broken_time)
+        drawn = draw_breaks(panels[0], view, model, broken_time)
         panels[0].set_title(f"{np.sum(~np.isnan(broken_time))} broken faces, block at rest")
         for axes, factor in ((panels[1], magnify), (panels[2], 1.0)):
             lines = _deformed(axes, view, model, displaced(model, frame, factor), broken_time)
@@ -63,7 +63,7 @@ def plot_cracks(path, model, frame, broken_time, magnify=5.0, axis=(0.0, 0.0, 1.
         figure.colorbar(drawn, ax=panels, label="time of breaking [ms]", shrink=0.8, aspect=25)
 
 
-def _all_breaks(axes, view, model, broken_time):
+def draw_breaks(axes, view, model, broken_time):
     """Every broken face of the block at rest, also inside it; the earliest on top."""
     rest = model.mesh.points[model.mesh.tetrahedra]
     polygons, _, _ = surface(model.topology, view, rest, np.zeros(model.bond_count, dtype=bool))

@@ -27,7 +27,7 @@ def test_the_scenes_are_short_and_all_run_below():
 def test_the_blast_runs_and_leaves_what_the_page_says(tmp_path):
     run_pasted(blocks("README.md")[0], tmp_path)
     mine = tmp_path / "results" / "mine"
-    for name in ("history.csv", "mesh.msh", "report.json", "paraview/blast.pvd"):
+    for name in ("history.csv", "bonds.csv", "mesh.msh", "report.json", "paraview/mine.pvd"):
         assert (mine / name).is_file(), name
     report = json.loads((mine / "report.json").read_text(encoding="utf-8"))
     assert report["broken_faces"] > 0 and not report["needs"]

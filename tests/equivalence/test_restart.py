@@ -246,7 +246,7 @@ def test_a_full_disk_at_the_end_names_the_checkpoint(light, tmp_path, monkeypatc
     def full(name, columns):
         raise InputError(f"cannot write {name}: No space left on device")
 
-    monkeypatch.setattr(sys.modules["taichi_dem.simulate"], "write_csv", full)
+    monkeypatch.setattr(sys.modules["taichi_dem.result"], "write_csv", full)
     keep = Checkpoint(tmp_path / "run.npz")
     words = (
         r"history.csv: No space left on device; checkpoint .*run.npz holds the run at t = 5e-06 s"

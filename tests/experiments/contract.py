@@ -75,7 +75,10 @@ def assert_refused(code, captured, folder, *words):
 
 @pytest.mark.slow
 class QuickRun:
-    """The contract; a test file names it TestQuickRun, with ``quick`` and what it expects."""
+    """The contract; a test file names it TestQuickRun, with ``quick`` and what it expects.
+
+    "{folder}" in a file's name stands for the name of the folder.
+    """
 
     figures: ClassVar[dict] = {}
     files: ClassVar[dict] = {}
@@ -94,7 +97,7 @@ class QuickRun:
     def test_quick_run_leaves_its_files_whole(self, quick):
         name, folder, _ = quick
         for file in (*self.files.get(name, ()), "summary.json"):
-            assert (folder / file).is_file(), file
+            assert (folder / file.format(folder=folder.name)).is_file(), file
         assert not list(folder.rglob("*.part*"))
 
     def test_summary_keeps_the_contract(self, quick):

@@ -96,7 +96,7 @@ FILES = {
     "blast_fracture": (
         *("history.csv", "mesh.msh", "report.json", "bonds.csv", "bodies.csv", "pressure.csv"),
         *("pressure.png", "cracks.png", "energy.png", "history.png"),
-        *("blast.gif", "paraview/blast.pvd", "paraview/blast_0000.vtu"),
+        *("blast.gif", "paraview/{folder}.pvd", "paraview/{folder}_0000.vtu"),
     ),
     "blast_methods": ("methods.csv", "methods.png", "history_reference.csv"),
     "blast_multirate": (
@@ -106,7 +106,7 @@ FILES = {
     "blast_sweeps": ("sweeps.csv", "sweeps.png"),
     "blast_block": (
         *("cracks.png", "peaks.png", "energy.png", "peaks.csv", "history.csv", "mesh.msh"),
-        *("paraview/blast.pvd", "checkpoint.npz"),
+        *("paraview/{folder}.pvd", "checkpoint.npz"),
     ),
     "blast_scaling": ("scaling.png", "scaling.csv", "shares.csv"),
     "cost_of_effects": ("effects.png", "blast.csv", "damper.csv"),
@@ -300,8 +300,9 @@ def test_interrupted_blast_goes_on_to_the_same_files(script, monkeypatch, capsys
     assert re.fullmatch(rf"interrupted at t = \S+ s, saved in {path}: go on with --resume\n", said)
     assert os.listdir(path.parent) == [path.name]
     assert run("stopped", "--resume") == (0, "")
-    for name in ("history.csv", "mesh.msh", "paraview/blast_0006.vtu"):
-        assert (path.parent / name).read_bytes() == (tmp_path / "straight" / name).read_bytes()
+    for name in ("history.csv", "bonds.csv", "mesh.msh", "paraview/{folder}_0006.vtu"):
+        files = [tmp_path / k / name.format(folder=k) for k in ("stopped", "straight")]
+        assert files[0].read_bytes() == files[1].read_bytes()
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[2]
 # row below. A folder counts as one module. A new module needs a place here.
 LAYERS = {
     "taichi_dem": (
-        ("errors", "types", "checks", "source_lines", "runtime", "version", "progress"),
+        ("errors", "types", "checks", "display", "source_lines", "runtime", "version", "progress"),
         (
             *("fields", "field_memory", "files", "effect_use", "time_limit", "listing"),
             "progress_bar",
@@ -38,8 +38,9 @@ LAYERS = {
         ("health", "watch", "resolution", "report", "step_report", "effects_acted"),
         ("simulation",),
         ("monitor", "record", "realised"),
-        ("simulate", "needed_effects"),
         ("plot",),
+        ("result",),
+        ("simulate", "needed_effects"),
         ("__init__",),
         ("__main__",),
     ),
@@ -49,9 +50,9 @@ LAYERS = {
         ("container", "automaton", "spheres"),
         ("coupling",),
         ("batch", "needed_effects"),
+        ("plot",),
         ("response",),
         ("sweep",),
-        ("plot",),
         ("__init__",),
         ("__main__",),
     ),
@@ -61,6 +62,7 @@ ACROSS = {
     "ca_damper": (
         *("taichi_dem.runtime", "taichi_dem.errors", "taichi_dem.checks", "taichi_dem.fields"),
         *("taichi_dem.files", "taichi_dem.plot_style", "taichi_dem.effect_use"),
+        *("taichi_dem.display",),
         *("taichi_dem.checkpoint", "taichi_dem.restart"),
         *("taichi_dem.version", "taichi_dem.listing"),
         *("taichi_dem.progress", "taichi_dem.progress_bar"),

@@ -1,0 +1,188 @@
+"""One picture of a run for a notebook: the block, and energy and events over time."""
+
+import math
+
+import matplotlib
+import numpy as np
+
+from taichi_dem.plot.block import draw_breaks, frame_block
+from taichi_dem.plot.bodies import draw_bodies
+from taichi_dem.plot.view import View
+from taichi_dem.plot_style import BLACK, BLUE, png_of, styled
+
+#: From this ratio of its sides on, a block lies above the curves and not beside them.
+_LONG = 2.2
+#: Elongation along z from which on a block is seen from the side and not along z.
+_DEEP = 2.0
+#: Share of the block's size that the largest displacement has in the picture.
+_VISIBLE = 0.08
+#: Displacements below this share of the block's size are round-off, and not magnified.
+_ROUND_OFF = 1e-12
+_BROKEN = "broken bonds"
+_PREFIXES = ("p", "n", "µ", "m", "", "k", "M", "G", "T")
+#: Energies by what they are: terms of the account that add up to them, and look; the colours are
+#: near those of ``series.plot_energy``.
+_ENERGIES = {
+    # Above the curve that it may lie on.
+    "work put in": (
+        ("load_work", "support_work"),
+        {"color": BLACK, "linestyle": "--", "zorder": 3},
+    ),
+    "kinetic": (("kinetic",), {"color": "#08306B"}),
+    "strain": (("bond_strain", "sphere_strain"), {"color": "#3A87C2"}),
+    "dissipated": (
+        ("bond_dashpot", "softening", "release", "slip", "sphere_dashpot", "friction"),
+        {"color": "#E6700F"},
+    ),
+}
+
+
+def picture_of_run(model, history, frames, broken_time, peak_speed):
+    """PNG, in bytes: the block beside energy and broken bonds over time.
+
+    history, frames, broken_time, peak_speed: as in ``Result``. Where no bond broke, the block shows
+    the displacement in the last frame, or the largest speeds where there is none that can be drawn;
+    the curve of broken bonds gives way to that of the hole or of the largest speed.
+    """
+    view = View(viewed_along(model.mesh.points))
+    sides = np.ptp(view.project(model.mesh.points), axis=0)
+    long = sides[0] > _LONG * sides[1]
+    with styled(0, size=(9.6, 5.2 if long else 4.2)) as (figure, _):
+        figure.get_layout_engine().set(w_pad=0.08)
+        places = [["block", "block"], ["energy", "events"]]
+        if not long:
+            places = [["block", "energy"], ["block", "events"]]
+        panels = figure.subplot_mosaic(places, height_ratios=(1.0, 1.3) if long else (1.0, 1.0))
+        drawn, label = _draw_block(panels["block"], view, model, frames, broken_time, peak_speed)
+        figure.colorbar(drawn, ax=panels["block"], label=label, aspect=25)
+        _draw_curves(panels, history)
+        return png_of(figure)
+
+
+def viewed_along(points):
+    """Direction to the viewer: z, or the shortest side where the block is long in z."""
+    sides = np.ptp(points, axis=0)
+    return np.eye(3)[int(sides.argmin()) if sides[2] > _DEEP * sides.min() else 2]
+
+
+def _draw_block(axes, view, model, frames, broken_time, peak_speed):
+    """Draw what happened to the block; returns the coloured collection and the scale's label."""
+    frame_block(axes, view, model)
+    axes.set(xlabel=view.labels()[0], ylabel=view.labels()[1])
+    count = int(np.isfinite(broken_time).sum())
+    if count:
+        last = np.nanmax(broken_time)
+        factor, unit = scale(last, "s")
+        axes.set_title(f"{count:,} broken bonds, block undeformed")
+        lines = draw_breaks(axes, view, model, broken_time)
+        lines.set_array(factor * np.sort(broken_time[np.isfinite(broken_time)])[::-1])
+        lines.set_clim(0.0, factor * last or 1.0)
+        return lines, f"time of breaking [{unit}]"
+    extent = np.ptp(model.mesh.points, axis=0).max()
+    moved = np.linalg.norm(frames[-1].displacement, axis=1) if frames else np.full(1, np.nan)
+    # What flew off, or fell as a whole, would leave the picture.
+    if moved.max() < extent:
+        return _draw_displaced(axes, view, model, frames[-1], moved)
+    return _draw_speeds(axes, view, model, peak_speed)
+
+
+def _draw_displaced(axes, view, model, frame, moved):
+    """The block as it was in a frame, its displacement magnified to be seen."""
+    extent = np.ptp(model.mesh.points, axis=0).max()
+    magnify = 1.0
+    if _ROUND_OFF < moved.max() / extent < _VISIBLE:
+        magnify = _round_down(_VISIBLE * extent / moved.max())
+    factor, unit = scale(moved.max(), "m")
+    drawn = draw_bodies(
+        axes,
+        model,
+        {"position": frame.position, "rotation": frame.rotation},
+        factor * moved,
+        magnify=magnify,
+        limits=(0.0, factor * moved.max() or 1.0),
+        colours="viridis",
+        axis=view.toward,
+    )
+    axes.autoscale()
+    words = f", displacement × {magnify:,.0f}" if magnify > 1.0 else ""
+    time, time_unit = scale(frame.time_s, "s")
+    axes.set_title(f"t = {time * frame.time_s:.3g} {time_unit}{words}")
+    return drawn, f"displacement [{unit}]"
+
+
+def _draw_speeds(axes, view, model, peak_speed):
+    """The block at rest, coloured by the largest speed of each body."""
+    factor, unit = scale(_largest(peak_speed), "m/s")
+    rest = {"position": model.centre, "rotation": np.tile(np.eye(3), (model.body_count, 1, 1))}
+    drawn = draw_bodies(
+        axes,
+        model,
+        rest,
+        factor * np.ma.masked_invalid(peak_speed),
+        magnify=1.0,
+        limits=(0.0, factor * _largest(peak_speed) or 1.0),
+        colours=matplotlib.colormaps["viridis"],
+        axis=view.toward,
+    )
+    axes.set_title("no broken bonds, block undeformed")
+    return drawn, f"largest speed [{unit}]"
+
+
+def _draw_curves(panels, history):
+    """Energies, and what happened, over time."""
+    time_s = history.get("time_s", np.zeros(0))
+    factor, unit = scale(_largest(time_s), "s")
+    none = np.full(len(time_s), np.nan)
+    sums = [
+        sum(history.get(f"{term}_J", none) for term in terms) for terms, _ in _ENERGIES.values()
+    ]
+    per_joule, joule = scale(max(map(_largest, sums)), "J")
+    for (name, (_, look)), values in zip(_ENERGIES.items(), sums):
+        _line(panels["energy"], factor * time_s, per_joule * values, label=name, **look)
+    panels["energy"].set(ylabel=f"energy [{joule}]")
+    panels["energy"].legend()
+    values, label = _events(history)
+    style = "steps-post" if label == _BROKEN else "default"
+    _line(panels["events"], factor * time_s, values, color=BLUE, drawstyle=style)
+    panels["events"].set(ylabel=label)
+    for name in ("energy", "events"):
+        panels[name].set(xlabel=f"time [{unit}]")
+        panels[name].locator_params(axis="x", nbins=6)
+
+
+def _line(axes, x, y, **look):
+    """A curve, or a point where there is but one sample."""
+    axes.plot(x, y, marker="o" if len(x) == 1 else None, **look)
+
+
+def _events(history):
+    """What is drawn below the energy: values and label of the first column that says something."""
+    nothing = np.full(len(history.get("time_s", ())), np.nan)
+    if _largest(history.get("broken_faces", nothing)) > 0.0:
+        return history["broken_faces"], _BROKEN
+    if "hole_radial_displacement_mm" in history:
+        values = 1e-3 * history["hole_radial_displacement_mm"]
+        factor, unit = scale(_largest(values), "m")
+        return factor * values, f"hole, mean outward\ndisplacement [{unit}]"
+    values = history.get("largest_speed_m_s", nothing)
+    factor, unit = scale(_largest(values), "m/s")
+    return factor * values, f"largest speed [{unit}]"
+
+
+def _largest(values):
+    """Largest finite size of values, 0 where there is none."""
+    values = np.abs(np.asarray(values, dtype=float))
+    return float(values[np.isfinite(values)].max(initial=0.0))
+
+
+def scale(largest, unit):
+    """Factor and name of the unit in which a value has one to three digits before the point."""
+    power = math.floor(math.log10(largest) / 3.0 + 1e-9) if largest > 0.0 else 0
+    power = min(max(power, -4), len(_PREFIXES) - 5)
+    return 1e3**-power, f"{_PREFIXES[power + 4]}{unit}"
+
+
+def _round_down(factor):
+    """The largest of 1, 2, 5, 10, 20, ... that is no larger than a factor."""
+    decade = 10.0 ** math.floor(math.log10(factor) + 1e-9)
+    return max(step for step in (1.0, 2.0, 5.0) if step * decade <= factor * (1.0 + 1e-9)) * decade

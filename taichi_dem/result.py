@@ -1,0 +1,93 @@
+"""What ``simulate`` returns: how it shows itself in a notebook, and what it writes to a folder."""
+
+import json
+import os
+from dataclasses import dataclass
+
+import numpy as np
+
+from taichi_dem.display import counted, embedded, in_brief, table, titled, unfolded
+from taichi_dem.files import output_folder, write_csv, write_text
+from taichi_dem.mesh_files import write_mesh
+from taichi_dem.record import series_name, write_bonds, write_paraview
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What a run produced.
+
+    history: arrays by column name, one row a sample. frames: snapshots. broken_time: when each
+    bond was released [s], NaN while it holds. peak_speed: largest speed of each body at the
+    samples [m/s]. report: figures of the run. diverged: the sentence of a run that left its bounds
+    (all else then ends before that), else "".
+
+    As the last line of a notebook's cell it shows a picture and a table.
+    """
+
+    scene: object
+    method: object
+    model: object
+    history: dict
+    frames: tuple
+    broken_time: np.ndarray
+    peak_speed: np.ndarray
+    report: object
+    diverged: str = ""
+
+    def __repr__(self):
+        samples = counted(len(self.history.get("time_s", ())), "sample")
+        frames, early = counted(len(self.frames), "frame"), "diverged" if self.diverged else ""
+        return in_brief(self, self.report.outcome, samples, frames, early)
+
+    def _repr_html_(self):
+        # Whoever never looks at a picture need not wait for matplotlib.
+        from taichi_dem.plot.summary import picture_of_run
+
+        png = picture_of_run(
+            self.model, self.history, self.frames, self.broken_time, self.peak_speed
+        )
+        return titled(
+            f"Result: {self.report.outcome}",
+            embedded(png, "The block, its energy and what happened in it over time"),
+            table(self._figures()),
+            unfolded("All figures of the run", str(self.report)),
+            warning=self.diverged,
+        )
+
+    def _figures(self):
+        """The main figures of the run, (name, text) each."""
+        report, model, history = self.report, self.model, self.history
+        parts = counted(model.body_count, "body"), counted(model.bond_count, "bond")
+        work = report.ledger["load_work"] + report.ledger["support_work"]
+        rows = [
+            ("simulated", f"{report.until_s:.4g} s"),
+            ("method", f"{report.method}, {report.driver} driver"),
+            ("smallest step", f"{report.smallest_step_s:.3g} s"),
+            ("scene", ", ".join(parts)),
+            ("effects", ", ".join(report.effects) or "none"),
+            ("broken bonds", f"{report.broken_faces:,}"),
+            ("largest speed", f"{np.fmax.reduce(self.peak_speed, initial=np.nan):.4g} m/s"),
+            ("work put in", f"{work:.4g} J"),
+            ("energy not explained", f"{100.0 * report.ledger_residual_fraction:.3g} % of it"),
+            ("time", f"{report.compile_seconds:.1f} s compiling, {report.run_seconds:.1f} s run"),
+        ]
+        moved = history.get("hole_radial_displacement_mm", ())
+        if len(moved):
+            rows.insert(7, ("hole, mean outward displacement", f"{moved[-1]:.4g} mm"))
+        return [*rows, *(("warning", need) for need in report.needs)]
+
+    def write(self, folder):
+        """Write history.csv, bonds.csv, mesh.msh, report.json and a ParaView series to a folder.
+
+        The series, in paraview/ of that folder, has the folder's name.
+        Raises InputError when the folder cannot be written to.
+        """
+        output_folder(folder)
+        write_csv(os.path.join(folder, "history.csv"), self.history)
+        write_bonds(os.path.join(folder, "bonds.csv"), self.model, self.broken_time)
+        write_mesh(os.path.join(folder, "mesh.msh"), self.scene.mesh)
+        text = json.dumps({**self.report.as_dict(), "diverged": self.diverged}, indent=1)
+        write_text(os.path.join(folder, "report.json"), text)
+        if self.frames:
+            place = os.path.join(folder, "paraview")
+            write_paraview(place, self.model, self.frames, series_name(folder))
