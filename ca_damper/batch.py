@@ -21,7 +21,7 @@ from ca_damper.filling import check_filling
 from ca_damper.oscillator import Oscillator
 from ca_damper.progress import BatchProgress
 from ca_damper.report import RK45_STAGES, Report
-from ca_damper.table import SceneTable
+from ca_damper.table import SceneTable, dealt
 from taichi_dem import runtime
 from taichi_dem.checkpoint import version_text
 from taichi_dem.checks import choice, instance, positive, whole
@@ -392,13 +392,3 @@ class Batch:
             dt=dt,
             dt_allowed=allowed,
         )
-
-
-def dealt(cost, threads):
-    """Scene numbers in an order that gives each thread the same cost, (scenes,) i32.
-
-    A thread takes a contiguous part of the loop, so dear and cheap scenes are dealt out like cards.
-    """
-    dear_first = np.argsort(-cost, kind="stable")
-    hands = [dear_first[k::threads] for k in range(threads)]
-    return np.concatenate(hands)

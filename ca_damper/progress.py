@@ -35,7 +35,12 @@ class Stages:
         self.told = -math.inf
 
     def __call__(self, progress):
-        """Take note of the present stage's progress; the stage ends with a share of 1."""
+        """Take note of the present stage's progress; the stage ends with a share of 1.
+
+        Progress of compiling is passed on as it is: it is no part of a stage.
+        """
+        if progress.phase == "compiling":
+            return self._pass_on(progress)
         begin, end = self.before.share, self.ends[self.stage]
         share = end if progress.share == 1.0 else begin + (end - begin) * progress.share
         seconds = self.before.seconds + progress.seconds
@@ -44,6 +49,10 @@ class Stages:
         if progress.share == 1.0:
             self.stage, self.before = self.stage + 1, whole
         late = time.perf_counter() - self.told > _LEAST_SECONDS
-        if self.progress is not None and (late or self.stage == len(self.ends)):
+        if late or self.stage == len(self.ends):
             self.told = time.perf_counter()
-            self.progress(whole)
+            self._pass_on(whole)
+
+    def _pass_on(self, progress):
+        if self.progress is not None:
+            self.progress(progress)

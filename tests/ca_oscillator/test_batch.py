@@ -22,9 +22,10 @@ from ca_damper import (
     runtime,
 )
 from ca_damper import batch as batch_module
-from ca_damper.batch import dealt
 from ca_damper.clock import steps_per_cycle
 from ca_damper.progress import BatchProgress, Stages
+from ca_damper.table import dealt
+from taichi_dem.progress import Compiling
 from tests.ca_oscillator.kicks import BAD_SEED, CODE, Kicks
 from tests.scenes import ROOT
 
@@ -243,6 +244,17 @@ def test_time_left_and_stages():
     assert [progress.share for progress in told] == [0.25, 0.5, 0.75, 1.0]
     assert [progress.seconds for progress in told] == [1.0, 2.0, 3.0, 4.0]
     assert [progress.steps for progress in told] == [5, 10, 15, 20]
+
+
+def test_stages_pass_compiling_on_and_count_it_for_no_stage():
+    told = []
+    stages = Stages(told.append, [0.5, 1.0])
+    compiling = Compiling(1.0, 3.0, "time step")
+    stages(compiling)
+    stages(BatchProgress(1.0, 2.0, 10))
+    assert told[0] is compiling
+    assert (told[1].share, told[1].seconds) == (0.5, 2.0)
+    Stages(None, [1.0])(compiling)
 
 
 # A shell that started the tests in the background may have left the signal ignored.

@@ -71,7 +71,7 @@ def of_the_damper():
     cycles = measures.Cycles(np.ones(2), np.ones(2), np.zeros((2, 1, len(measures.COLUMNS))))
     yield from (response, response.report, ca_damper.Sweep(response, response), batch, batch.table)
     yield from (film, film.frames[0][0], cycles, ca_damper.needed_effects(response))
-    yield from (rk45.solve(lambda t, y: -y, (0.0, 1.0), [1.0]), ca_damper.Progress(0.5, 1.0, 7))
+    yield from (rk45.solve(lambda t, y: -y, (0.0, 1.0), [1.0]), ca_damper.Progress(0.5, 1.0))
 
 
 @pytest.fixture(scope="module")
