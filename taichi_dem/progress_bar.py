@@ -6,6 +6,7 @@ import sys
 import time
 
 from taichi_dem.checks import AUTO, progress_option, shown
+from taichi_dem.display import in_brief
 from taichi_dem.progress import Counted, Progress, listening
 
 #: Least time between two updates of a cell in Jupyter [s].
@@ -25,6 +26,9 @@ class ProgressBar:
     def __init__(self, title):
         self.title, self._display = title, None
         self._listening = listening(self)
+
+    def __repr__(self):
+        return in_brief(self, self.title)
 
     def __enter__(self):
         self._started = time.perf_counter()
