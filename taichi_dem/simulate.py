@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import warnings
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +14,7 @@ from taichi_dem.errors import InputError, SimulationDiverged
 from taichi_dem.files import output_folder, write_csv, write_text
 from taichi_dem.mesh_files import write_mesh
 from taichi_dem.methods import check_method
+from taichi_dem.outer_faces import outer_faces_warnings
 from taichi_dem.realised import realised_gain
 from taichi_dem.record import (
     Recorder,
@@ -119,7 +121,8 @@ def simulate(
     the bits are those of a run that was never stopped. measure_gain: whether the report says how
     much time steps of different length saved, which takes some seconds more (``realised_gain``).
     Raises InputError for bad arguments, SimulationDiverged when the run leaves its bounds,
-    Interrupted when Ctrl-C has saved the run.
+    Interrupted when Ctrl-C has saved the run. Warns, as a UserWarning before the first step, of
+    parts of the mesh that can pass through each other (``outer_faces_warnings``).
     """
     instance("scene", scene, Scene)
     check_method(method)
@@ -130,6 +133,8 @@ def simulate(
     arrays = _opened(scene, method, checkpoint, resume, last)
     if output is not None:
         output_folder(output)
+    for sentence in outer_faces_warnings(scene):
+        warnings.warn(sentence, stacklevel=2)
     simulation = Simulation(scene, method, driver)
     recorder = Recorder(simulation, _watched_group(scene))
     simulation.start()

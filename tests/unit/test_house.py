@@ -32,7 +32,10 @@ LAYERS = {
         ("state",),
         ("step",),
         ("ledger",),
-        ("health", "watch", "resolution", "report", "step_report", "effects_acted"),
+        (
+            *("outer_faces", "health", "watch", "resolution"),
+            *("report", "step_report", "effects_acted"),
+        ),
         ("simulation",),
         ("monitor", "record", "realised"),
         ("simulate", "needed_effects"),
