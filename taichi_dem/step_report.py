@@ -89,7 +89,7 @@ class StepReport:
     def price(self, count=_WORST):
         """Gain in the step of all without the count worst bodies, a factor of at least 1."""
         steps = np.append(np.sort(self.step_s), np.inf)
-        return float(steps[min(count, len(steps) - 1)] / steps[0])
+        return float(steps[min(count, len(steps) - 1)] / steps[0]) if steps[0] < np.inf else 1.0
 
     def work_share(self, count=_WORST):
         """Share of the body updates, each at its own step, that the count worst bodies take."""

@@ -21,8 +21,16 @@ LAYERS = {
         ("plot_style", "checkpoint"),
         ("restart",),
         (
-            *("tetrahedra", "mesh", "mesh_files", "mesh_shapes", "mesh_gmsh", "mesh_order"),
-            *("topology", "quality", "contact_spheres", "materials", "partition"),
+            *("tetrahedra", "mesh", "mesh_content", "mesh_files", "mesh_shapes", "mesh_gmsh"),
+            *(
+                "mesh_split",
+                "mesh_order",
+                "topology",
+                "quality",
+                "contact_spheres",
+                "materials",
+                "partition",
+            ),
         ),
         ("physics",),
         ("timeline", "step_control"),
