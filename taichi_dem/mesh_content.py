@@ -10,11 +10,11 @@ from taichi_dem.mesh_split import shape_of
 #: Gmsh's groups by their dimension.
 _KINDS = {0: "points", 1: "lines", 3: "volumes"}
 _SPLIT = "split them into tetrahedra, for example by ParaView's filter Tetrahedralize"
+#: Of a script that does not end with a new line Gmsh leaves out the last: echo adds one.
 _FILL = (
     "fill this surface, if it is closed, with tetrahedra, for example by Gmsh (pip install gmsh): "
-    "{saved}write "
-    'Merge "{name}"; Surface Loop(1) = Surface{{:}}; Volume(1) = {{1}}; into a file fill.geo and '
-    "run gmsh -3 fill.geo -o filled.msh"
+    "{saved}echo 'Merge \"{name}\"; Surface Loop(1) = Surface{{:}}; Volume(1) = {{1}};' > fill.geo "
+    "&& gmsh -3 fill.geo -o filled.msh"
 )
 _IN_A_GROUP = (
     "mesh in three dimensions (gmsh -3), and make a physical group of the volume too, as Gmsh "
