@@ -47,9 +47,16 @@ def tetrahedra_in(points, kind, cells):
                 base = triangles_in(here[:, face])
                 tip = np.repeat(here[:, apex], len(base) // len(here))
                 found.append(np.column_stack([tip, base]))
-    tetrahedra = np.vstack(found)
-    turned = signed_volumes(np.asarray(points, dtype=np.float64), tetrahedra) < 0.0
-    tetrahedra[turned] = tetrahedra[turned][:, [0, 1, 3, 2]]
+    return _positive(np.asarray(points, dtype=np.float64), np.vstack(found))
+
+
+def _positive(points, tetrahedra):
+    """Turn those of negative volume; numbers or points that make no sense are left as they are."""
+    known = (tetrahedra >= 0).all() and tetrahedra.max(initial=-1) < len(points)
+    if known and points.ndim == 2 and points.shape[1] == 3:
+        with np.errstate(over="ignore", invalid="ignore"):
+            turned = signed_volumes(points, tetrahedra) < 0.0
+        tetrahedra[turned] = tetrahedra[turned][:, [0, 1, 3, 2]]
     return tetrahedra
 
 

@@ -110,6 +110,14 @@ def test_hexahedra_beside_tetrahedra_leave_no_holes(tmp_path):
     assert mesh.body_count == 8 and topology_of(mesh).bond_count == 6 + 2 + 1
 
 
+@pytest.mark.parametrize("wrong", [-1, 10**10])
+def test_hexahedra_of_points_that_are_not_there_are_refused(tmp_path, wrong):
+    points, cells = boxes((1, 1, 1))
+    cells[0, 3] = wrong
+    meshio.write(tmp_path / "mesh.vtu", meshio.Mesh(points, [("hexahedron", cells)]))
+    assert "point numbers must lie in [0, 7]" in refused(tmp_path / "mesh.vtu")
+
+
 def test_cells_that_cannot_be_cut_are_refused(tmp_path):
     points, cells = boxes((1, 1, 1))
     faces = [cells[0, face] for face in ([0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4])]
