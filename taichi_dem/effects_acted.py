@@ -15,19 +15,21 @@ _POSED = {
     "support": "a support is part of the question, and holds without doing work",
 }
 _OWN = "the account need not show what an effect of your own does"
+_UNTOUCHED = "bodies overlap where faces lack the spheres for it"
 _NO_TRACE = "without sphere dashpots a touch between two recordings leaves no trace"
 
 
-def effects_acted(model, ledger, tables, account, touching):
+def effects_acted(model, ledger, tables, account, watch):
     """An EffectUse for every listed effect, in the model's order.
 
-    tables, account: what the ledger's methods of that name gave. touching: most pairs of bodies
-    that a recording saw in contact. Judged by role, so that an effect of one's own is judged like
-    those of the package; but it is never called idle where only its own code could tell.
+    tables, account: what the ledger's methods of that name gave. watch: the ``Watch`` of the run.
+    Judged by role, so that an effect of one's own is judged like those of the package; but it is
+    never called idle where only its own code could tell.
     """
     given = abs(account["load_work"]) + abs(account["support_work"]) + ledger.start_energy
-    found = [_by_role(model, ledger, tables, touching, effect) for effect in _listed(model)]
-    return tuple(_use(account, given, model, ledger.state, *entry) for entry in found)
+    found = [_by_role(model, ledger, tables, watch.touching, effect) for effect in _listed(model)]
+    lacking = watch.outer.times > 0
+    return tuple(_use(account, given, model, ledger.state, lacking, *entry) for entry in found)
 
 
 def _listed(model):
@@ -54,7 +56,7 @@ def _by_role(model, ledger, tables, touching, effect):
     }[effect.role]
 
 
-def _use(account, given, model, state, effect, what, events, energy):
+def _use(account, given, model, state, lacking, effect, what, events, energy):
     if isinstance(energy, tuple):
         energy = sum(account[term] for term in energy)
     whole, total = "the energy put in", given
@@ -71,15 +73,21 @@ def _use(account, given, model, state, effect, what, events, energy):
         share=float(energy / total) if total > 0.0 else 0.0,
         whole=whole,
         steers=effect.role in _STEERING,
-        kept=_why_kept(model, state, effect, events),
+        kept=_why_kept(model, state, lacking, effect, events),
     )
 
 
-def _why_kept(model, state, effect, events):
-    """Why an effect cannot be left out whatever was counted, in words; "" where the count tells."""
+def _why_kept(model, state, lacking, effect, events):
+    """Why an effect cannot be left out whatever was counted, in words; "" where the count tells.
+
+    lacking: whether bodies were seen to overlap where faces carry no spheres.
+    """
     reason = _POSED.get(effect.role, "" if _of_the_package(effect) else _OWN)
-    if effect.role in ("contact", "friction") and not _spheres(model, state):
-        return ""
+    if effect.role in ("contact", "friction"):
+        if lacking:
+            return _UNTOUCHED
+        if not _spheres(model, state):
+            return ""
     if effect.role == "contact" and not reason and not events:
         return "" if model.material.contact_damping > 0.0 else _NO_TRACE
     return reason

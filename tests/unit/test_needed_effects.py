@@ -86,10 +86,11 @@ def test_dropping_what_never_acted_changes_no_bit(scene, request):
         np.testing.assert_array_equal(again.history[name], column, err_msg=name)
 
 
-def used(listed, material=CONCRETE, exposed=True, heat=0.0, **account):
+def used(listed, material=CONCRETE, exposed=True, heat=0.0, lacking=0, **account):
     """What is said of effects whose account holds these terms [J]; every effect by its name.
 
     exposed: whether faces carry spheres. heat: of each body's contacts, and in each bond [J].
+    lacking: recordings that saw bodies overlap where faces carry none.
     """
     model = Model(pair(), material, listed)
     state = State(model, 1e4)
@@ -99,7 +100,8 @@ def used(listed, material=CONCRETE, exposed=True, heat=0.0, **account):
     tables[0][:, 3:5] = heat
     none = SimpleNamespace(state=state, start_energy=0.0)
     filled = {**dict.fromkeys(TERMS, 0.0), **account}
-    return {use.effect: use for use in effects_acted(model, none, tables, filled, 0)}
+    watch = SimpleNamespace(touching=0, outer=SimpleNamespace(times=lacking))
+    return {use.effect: use for use in effects_acted(model, none, tables, filled, watch)}
 
 
 class OwnContact(effects.SphereContact):
@@ -137,6 +139,11 @@ def test_friction_of_ones_own_is_dropped_only_with_the_contact_it_acts_in(expose
     found = used([effects.SphereContact(), OwnFriction()], exposed=exposed)
     assert found["friction"].idle != exposed
     assert found["sphere_contact"].idle
+
+
+def test_contact_is_not_dropped_where_spheres_on_outer_faces_are_missed():
+    found = used([effects.SphereContact(), effects.Friction()], exposed=False, lacking=1)
+    assert not any(use.idle for use in found.values())
 
 
 STEERING = (effects.Softening, effects.ShearSlip, effects.SphereContact, effects.Friction)
