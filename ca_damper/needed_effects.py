@@ -10,7 +10,8 @@ def needed_effects(result, tolerance=1e-3):
     """Advice about the effects of a run; print it, or ask for its ``droppable``.
 
     result: a Response, or the Report of a Batch. tolerance: share of the energy taken (friction)
-    or in motion (rotation) below which an effect counts as nothing, in [0, 1].
+    or in motion (rotation) below which an effect counts as nothing, in [0, 1]. Spheres are looked
+    at every few steps: what no look saw, and may have acted between two, is kept.
     Raises InputError for a result that is none, or a tolerance out of range.
     """
     report = getattr(result, "report", result)

@@ -13,7 +13,8 @@ class EffectUse:
     effect: its name. what: the events in words. events: how many, of at most ``of`` (0 where there
     is no most). energy_J: taken or given, None where it is not booked. share: of ``whole``, in
     words; None where there is nothing to compare with. steers: whether it directs the rest even
-    where it takes little, as a crack does: then only one that never acted can be left out.
+    where it takes little, as a crack does: then only one that never acted can be left out. kept:
+    why it cannot be left out whatever was counted, in words, or "".
     """
 
     effect: str
@@ -24,20 +25,26 @@ class EffectUse:
     share: Optional[float] = None
     whole: str = "the energy put in"
     steers: bool = False
+    kept: str = ""
 
     @property
     def acted(self):
-        """Whether it had any part in the run."""
+        """Whether any event was counted."""
         return self.events > 0
+
+    @property
+    def idle(self):
+        """Whether it is known to have had no part in the run."""
+        return not self.acted and not self.kept
 
     def negligible(self, tolerance):
         """Whether it acted, and booked less than a share of the energy."""
-        judged = self.acted and not self.steers and self.share is not None
+        judged = self.acted and not (self.steers or self.kept) and self.share is not None
         return judged and self.share < tolerance
 
     def __str__(self):
         """One line without the name."""
-        if not self.acted:
+        if self.idle:
             return f"never acted (0 {self.what})"
         most = f" of {self.of:,}" if self.of else ""
         energy = f", {self.energy_J:.3g} J" if self.energy_J is not None else ""
@@ -60,7 +67,7 @@ class Advice:
     @property
     def never_acted(self):
         """Names of the effects that had no part; without them not a bit would differ."""
-        return tuple(use.effect for use in self.uses if not use.acted)
+        return tuple(use.effect for use in self.uses if use.idle)
 
     @property
     def negligible(self):
@@ -82,8 +89,10 @@ class Advice:
 
     def __str__(self):
         """A line for every effect, then what was missed."""
-        lines = [f"{self._verdict(use):10s} {use.effect:16s} {use}" for use in self.uses]
+        lines = [self._line(use) for use in self.uses]
         return "\n".join([*lines, *(f"missed     {finding}" for finding in self.missed)])
 
-    def _verdict(self, use):
-        return "drop" if use.effect in self.droppable else "keep"
+    def _line(self, use):
+        verdict = "drop" if use.idle or use.negligible(self.tolerance) else "keep"
+        reason = f"; {use.kept}" if use.kept else ""
+        return f"{verdict:10s} {use.effect:16s} {use}{reason}"

@@ -4,17 +4,32 @@ import numpy as np
 
 from taichi_dem.effect_use import EffectUse
 
+#: Terms of the account that pass through bonds: what their dashpots took is a share of these.
+_THROUGH_BONDS = ("bond_strain", "bond_dashpot", "softening", "release", "slip")
+#: Roles judged by whether they acted: a crack, a slip, a wall or what sticks decides much and
+#: takes little.
+_STEERING = ("tension", "shear", "contact", "friction", "support")
+#: Roles whose absence poses another question, whatever work they did.
+_POSED = {
+    "load": "a load is part of the question",
+    "support": "a support is part of the question, and holds without doing work",
+}
+_OWN = "the account need not show what an effect of your own does"
+_UNTOUCHED = "bodies overlap where faces lack the spheres for it"
+_NO_TRACE = "without sphere dashpots a touch between two recordings leaves no trace"
 
-def effects_acted(model, ledger, tables, account, touching):
+
+def effects_acted(model, ledger, tables, account, watch):
     """An EffectUse for every listed effect, in the model's order.
 
-    tables, account: what the ledger's methods of that name gave. touching: most pairs of bodies
-    that a recording saw in contact. Judged by role, so that an effect of one's own is judged like
-    those of the package.
+    tables, account: what the ledger's methods of that name gave. watch: the ``Watch`` of the run.
+    Judged by role, so that an effect of one's own is judged like those of the package; but it is
+    never called idle where only its own code could tell.
     """
     given = abs(account["load_work"]) + abs(account["support_work"]) + ledger.start_energy
-    found = [_by_role(model, ledger, tables, touching, effect) for effect in _listed(model)]
-    return tuple(_use(account, given, model, *entry) for entry in found)
+    found = [_by_role(model, ledger, tables, watch.touching, effect) for effect in _listed(model)]
+    lacking = watch.outer.times > 0
+    return tuple(_use(account, given, model, ledger.state, lacking, *entry) for entry in found)
 
 
 def _listed(model):
@@ -26,10 +41,10 @@ def _by_role(model, ledger, tables, touching, effect):
     body, bond, pair = tables
     if effect.role == "load":
         work = ledger.load_works(model.loads.index(effect))
-        return effect, "bodies pushed", _count(work), np.abs(work).sum()
+        return effect, "bodies given work", _count(work), np.abs(work).sum()
     if effect.role == "support":
         work = ledger.support_works(model.supports.index(effect))
-        return effect, "bodies held", _count(work), np.abs(work).sum()
+        return effect, "bodies held", int((~np.isnan(work)).sum()), np.nansum(np.abs(work))
     touched = max(touching, _count(body[:, 3]) + _count(pair[:, 1]))
     rubbed = _count(body[:, 4]) + _count(pair[:, 2])
     return {
@@ -41,9 +56,13 @@ def _by_role(model, ledger, tables, touching, effect):
     }[effect.role]
 
 
-def _use(account, given, model, effect, what, events, energy):
+def _use(account, given, model, state, lacking, effect, what, events, energy):
     if isinstance(energy, tuple):
         energy = sum(account[term] for term in energy)
+    whole, total = "the energy put in", given
+    if effect.role == "dashpot":
+        # Of all the energy put in, a fall takes most: its vibration may be damped all the same.
+        whole, total = "what bonds took and hold", sum(account[term] for term in _THROUGH_BONDS)
     of = {"bonds": model.bond_count, "bodies": model.body_count}.get(what.split()[0], 0)
     return EffectUse(
         effect=effect.name,
@@ -51,10 +70,37 @@ def _use(account, given, model, effect, what, events, energy):
         events=events,
         of=of,
         energy_J=float(energy),
-        share=float(energy / given) if given > 0.0 else 0.0,
-        # They direct forces; a crack or a wall decides much and takes little.
-        steers=effect.role in ("tension", "contact", "support"),
+        share=float(energy / total) if total > 0.0 else 0.0,
+        whole=whole,
+        steers=effect.role in _STEERING,
+        kept=_why_kept(model, state, lacking, effect, events),
     )
+
+
+def _why_kept(model, state, lacking, effect, events):
+    """Why an effect cannot be left out whatever was counted, in words; "" where the count tells.
+
+    lacking: whether bodies were seen to overlap where faces carry no spheres.
+    """
+    reason = _POSED.get(effect.role, "" if _of_the_package(effect) else _OWN)
+    if effect.role in ("contact", "friction"):
+        if lacking:
+            return _UNTOUCHED
+        if not _spheres(model, state):
+            return ""
+    if effect.role == "contact" and not reason and not events:
+        return "" if model.material.contact_damping > 0.0 else _NO_TRACE
+    return reason
+
+
+def _of_the_package(effect):
+    """Whether the class itself is the package's: one derived from it may act in other ways."""
+    return type(effect).__module__.startswith("taichi_dem.effects.")
+
+
+def _spheres(model, state):
+    """Whether any face carries contact spheres; else nothing can have touched."""
+    return model.has_contact and bool((state.exposed_tick.to_numpy() >= 0).any())
 
 
 def _count(values):

@@ -102,8 +102,11 @@ class Ledger:
         return work
 
     def support_works(self, index):
-        """Work [J] of all supports on the bodies that one of them holds, (body_count,)."""
-        work = np.zeros(self.model.body_count)
+        """Work [J] of all supports on the bodies that one of them holds, (body_count,).
+
+        NaN for a body that it does not hold.
+        """
+        work = np.full(self.model.body_count, np.nan)
         self._read_support(index, work)
         return work
 

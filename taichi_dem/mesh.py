@@ -34,6 +34,7 @@ class Mesh:
     groups: name -> (n, 3) int32 point indices of outer faces, normals outward.
     notes: sentences about what the checks mended or found remarkable.
     source: name of the file, "" for a mesh built in memory.
+    unread: groups of the file that are not of faces, pairs of name and what they are of.
     """
 
     points: np.ndarray
@@ -41,6 +42,7 @@ class Mesh:
     groups: dict
     notes: tuple = ()
     source: str = ""
+    unread: tuple = ()
 
     def __repr__(self):
         groups = f"groups {', '.join(self.groups)}" if self.groups else "no groups"
@@ -61,7 +63,9 @@ class Mesh:
         """Outer faces of the group ``name``, shape (n, 3); InputError when there is none."""
         if not isinstance(name, str) or name not in self.groups:
             known = ", ".join(sorted(self.groups)) or "none"
-            raise InputError(f"mesh has no face group {shown(name)}; its groups are: {known}")
+            kinds = [kind for other, kind in self.unread if other == name]
+            why = f" ({name} is a group of {kinds[0]}: make one of faces)" if kinds else ""
+            raise InputError(f"mesh has no face group {shown(name)}{why}; its groups are: {known}")
         return self.groups[name]
 
 

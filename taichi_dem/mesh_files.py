@@ -5,7 +5,9 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import warnings
 from collections import defaultdict
+from dataclasses import replace
 from xml.sax.saxutils import quoteattr
 
 import meshio
@@ -15,11 +17,18 @@ from taichi_dem.checks import path_name, positive
 from taichi_dem.errors import InputError
 from taichi_dem.files import renamed_when_done, write_text
 from taichi_dem.mesh import Mesh, checked_mesh
+from taichi_dem.mesh_content import (
+    is_quadrangle,
+    is_tetrahedron,
+    is_triangle,
+    others_dropped,
+    refuse_uncut,
+    refuse_without_tetrahedra,
+    unread_groups,
+    volumes_dropped,
+)
+from taichi_dem.mesh_split import shape_of, tetrahedra_in, triangles_in
 from taichi_dem.time_limit import within
-
-#: Cell types of meshio that are read, with the number of their corner points.
-_TETRAHEDRA = {"tetra": 4, "tetra10": 4}
-_TRIANGLES = {"triangle": 3, "triangle6": 3}
 
 #: Time that a reader may take [s], and what it reads at the slowest [byte/s]: some of meshio's wait
 #: for ever for the rest of a file that was cut off.
@@ -28,31 +37,39 @@ _SLOWEST_BYTES_PER_S = 1e5
 
 
 def read_mesh(path, *, scale=1.0, weld_tolerance=0.0) -> Mesh:
-    """Read tetrahedra and named face groups from a file (Gmsh 2.2 or 4.1, VTK, VTU, ...).
+    """Read solid cells and named face groups from a file (Gmsh 2.2 or 4.1, VTK, VTU, ...).
 
     scale: length of one unit of the file [m], e.g. 0.001 for a drawing in mm.
     weld_tolerance: points not farther apart [m] become one; 0 welds nothing.
     Groups come from Gmsh's physical surfaces ("physical_TAG" where they have no name); in other
     formats from integer data on triangles, as "data name_value".
-    Elements of second order are read as linear ones, with a note.
+    Elements of higher order are read as linear ones; hexahedra, prisms and pyramids are cut into
+    tetrahedra; groups of points, lines and volumes are not read: the mesh's notes say so, and a
+    UserWarning if there are several groups of volumes.
 
-    Raises InputError, in one sentence, for a file that is missing, cannot be read, holds no
-    tetrahedra, or whose mesh ``checked_mesh`` refuses.
+    Raises InputError, in one sentence, for a file that is missing, cannot be read, holds no solid
+    cells or such as cannot be cut, or whose mesh ``checked_mesh`` refuses.
     """
     scale, path = positive("scale", scale), path_name("path", path)
     raw = _read_raw(path)
     notes = []
-    tetrahedra = _corners(raw, _TETRAHEDRA, notes)
+    refuse_uncut(raw, path)
+    tetrahedra = _tetrahedra(raw, notes)
     if len(tetrahedra) == 0:
-        kinds = ", ".join(sorted({block.type for block in raw.cells})) or "no cells"
-        raise InputError(f"mesh file {path} holds no tetrahedra (it holds: {kinds})")
+        refuse_without_tetrahedra(raw, path)
+    unread = unread_groups(raw)
+    notes += others_dropped(raw, unread)
+    volumes = volumes_dropped(unread)
+    if volumes:
+        notes.append(volumes)
+        warnings.warn(f"mesh file {path}: {volumes}", stacklevel=2)
     try:
         with np.errstate(over="ignore"):  # checked_mesh refuses what is no finite number
             points = scale * np.asarray(raw.points, dtype=np.float64)
         mesh = checked_mesh(points, tetrahedra, _groups(raw), path, weld_tolerance)
     except InputError as error:
         raise InputError(f"mesh file {path}: {error}") from None
-    return Mesh(mesh.points, mesh.tetrahedra, mesh.groups, (*notes, *mesh.notes), path)
+    return replace(mesh, notes=(*notes, *mesh.notes), source=path, unread=unread)
 
 
 def write_mesh(path, mesh) -> None:
@@ -108,23 +125,32 @@ def _read_raw(path):
     sentence = f"its reader found no end in {seconds:.3g} s, as in a file that was cut off"
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-            return within(seconds, lambda: meshio.read(path), sentence)
+            return within(seconds, lambda: _meshio_read(path), sentence)
     except (Exception, SystemExit) as error:  # meshio raises anything, and exits on some files
         reason = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"mesh file {path} cannot be read: {reason}") from None
 
 
-def _corners(raw, kinds, notes):
-    """Corner points of all cells of the given kinds, (n, corners)."""
-    found = [np.empty((0, next(iter(kinds.values()))), dtype=np.int64)]
-    for block in raw.cells:
-        if block.type not in kinds or len(block.data) == 0:
-            continue
-        corners = kinds[block.type]
-        found.append(block.data[:, :corners])
-        if block.data.shape[1] > corners:
-            notes.append(f"read {len(block.data)} second-order elements as linear {block.type}")
-    return np.vstack(found)
+def _meshio_read(path):
+    with np.errstate(over="ignore"):  # an STL's text, tried as if it were binary
+        return meshio.read(path)
+
+
+def _tetrahedra(raw, notes):
+    """Corner points of all tetrahedra, (n, 4), those that other cells are cut into last."""
+    found, cut = [np.empty((0, 4), dtype=np.int64)], []
+    for block in (block for block in raw.cells if len(block.data)):
+        if is_tetrahedron(block.type):
+            found.append(block.data[:, :4])
+            if block.data.shape[1] > 4:
+                order = "second" if block.data.shape[1] == 10 else "higher"
+                notes.append(
+                    f"read {len(block.data)} {order}-order elements as linear {block.type}"
+                )
+        elif shape_of(block.type):
+            cut.append(tetrahedra_in(raw.points, block.type, block.data))
+            notes.append(f"cut {len(block.data)} {block.type} into {len(cut[-1])} tetrahedra")
+    return np.vstack([*found, *cut])
 
 
 def _groups(raw):
@@ -148,9 +174,9 @@ def _groups(raw):
 def _labelled(raw, data):
     """Triangles that carry one integer value, as (faces (n, 3), value), for every value."""
     for block, values in zip(raw.cells, map(np.asarray, data)):
-        if block.type in _TRIANGLES and values.ndim == 1 and values.dtype.kind in "iu":
+        if _is_face(block.type) and values.ndim == 1 and values.dtype.kind in "iu":
             for value in np.unique(values):
-                yield block.data[values == value, :3], value
+                yield _corners(block, values == value), value
 
 
 def _sets(raw, names):
@@ -158,6 +184,15 @@ def _sets(raw, names):
     found = defaultdict(list)
     for name in names:
         for block, members in zip(raw.cells, raw.cell_sets.get(name, ())):
-            if block.type in _TRIANGLES and members is not None and len(members):
-                found[name].append(block.data[members, :3])
+            if _is_face(block.type) and members is not None and len(members):
+                found[name].append(_corners(block, members))
     return found
+
+
+def _is_face(kind):
+    return is_triangle(kind) or is_quadrangle(kind)
+
+
+def _corners(block, members):
+    """Triangles of some faces of a block, (n, 3); quadrangles as ``tetrahedra_in`` cuts them."""
+    return triangles_in(block.data[members, : 3 if is_triangle(block.type) else 4])

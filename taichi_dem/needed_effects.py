@@ -9,9 +9,11 @@ from taichi_dem.report import Report
 def needed_effects(result, tolerance=1e-3):
     """Advice about the effects of a run; print it, or ask for its ``droppable`` and ``missed``.
 
-    result: what ``simulate`` gave, or its report. tolerance: share of the work put in below which
-    what an effect booked counts as nothing, in [0, 1]. Effects that steer (fracture, contact,
-    supports) take little and decide much: they are dropped only where they never acted.
+    result: what ``simulate`` gave, or its report. tolerance: share of the energy that passed
+    through bonds below which their damping counts as nothing, in [0, 1]. Effects that steer
+    (fracture, slip, contact, friction) take little and decide much: they are dropped only where
+    they never acted. Loads and supports pose the question and are always kept; so is an effect of
+    one's own unless it cannot have acted, as the account need not show what it does.
     Raises InputError for a result that is none, or a tolerance out of range.
     """
     report = getattr(result, "report", result)

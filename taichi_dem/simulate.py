@@ -1,6 +1,7 @@
 """The loop a user calls: step, sample, keep frames, and hand everything back as one result."""
 
 import math
+import warnings
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,6 +11,7 @@ from taichi_dem.checks import AUTO, instance, progress_option, shown
 from taichi_dem.errors import InputError, SimulationDiverged
 from taichi_dem.files import output_folder
 from taichi_dem.methods import check_method
+from taichi_dem.outer_faces import outer_faces_warnings
 from taichi_dem.progress import Progress, compiling
 from taichi_dem.progress_bar import reporting
 from taichi_dem.realised import realised_gain
@@ -79,7 +81,8 @@ def simulate(
     the bits are those of a run that was never stopped. measure_gain: whether the report says how
     much time steps of different length saved, which takes some seconds more (``realised_gain``).
     Raises InputError for bad arguments, SimulationDiverged when the run leaves its bounds,
-    Interrupted when Ctrl-C has saved the run.
+    Interrupted when Ctrl-C has saved the run. Warns, as a UserWarning before the first step, of
+    parts of the mesh that can pass through each other (``outer_faces_warnings``).
     """
     instance("scene", scene, Scene)
     check_method(method)
@@ -90,6 +93,8 @@ def simulate(
     arrays = _opened(scene, method, checkpoint, resume, last)
     if output is not None:
         output_folder(output)
+    for sentence in outer_faces_warnings(scene):
+        warnings.warn(sentence, stacklevel=2)
     error = None
     with reporting(progress, "simulating") as report_progress:
         simulation, recorder = _started(scene, method, driver)

@@ -1,4 +1,4 @@
-"""What limits the explicit step of a mesh and material, element by element, before any run."""
+"""What limits the step of a mesh and material, by method and element by element, before any run."""
 
 from dataclasses import dataclass
 
@@ -9,6 +9,7 @@ from taichi_dem.display import counted, in_brief
 from taichi_dem.errors import InputError
 from taichi_dem.materials import Material
 from taichi_dem.mesh import Mesh
+from taichi_dem.outer_faces import outer_faces_warnings
 from taichi_dem.quality import (
     bond_rates,
     dashpot_step,
@@ -19,39 +20,68 @@ from taichi_dem.quality import (
     springs_of,
 )
 from taichi_dem.scene import Scene
+from taichi_dem.step.rates import LIMITED
+from taichi_dem.step_control import StepControl
 from taichi_dem.tetrahedra import all_faces, area_vectors
 from taichi_dem.topology import body_properties, topology_of
 
 #: Elements listed in the printed table.
 _WORST = 10
+#: The methods by what they do with dashpots.
+METHODS = {
+    "full": "Uniform, Multirate",
+    "limited": 'the same with dashpot="limited"',
+    "solved": "ImplicitDashpots",
+}
 
 
 @dataclass(frozen=True, eq=False)
 class StepReport:
-    """Largest stable steps of every body by criterion, and which of them binds.
+    """Largest stable steps of every body by criterion and by method, and which of them binds.
 
     limits: arrays (body_count,) in s by criterion: bond_stiffness, bond_dashpot,
     contact_stiffness and contact_dashpot (every sphere of the worst face in one contact),
     contact_dashpot_single (one sphere in contact, which binds nothing by itself); a criterion
-    whose effect a scene leaves out is missing.
+    whose effect a scene leaves out is missing. warnings: sentences about the scene.
     """
 
     limits: dict
+    warnings: tuple = ()
 
     @property
     def binding(self):
-        """Name of the criterion that binds each body, array (body_count,)."""
+        """Name of the criterion that binds each body's explicit step, array (body_count,)."""
         names = self._names()
         place = np.argmin([self.limits[name] for name in names], axis=0)
         return np.array(names)[place]
 
     @property
     def step_s(self):
-        """Largest stable step of each body [s], (body_count,)."""
+        """Smallest of the limits of each body [s], (body_count,)."""
         return np.min([self.limits[name] for name in self._names()], axis=0)
 
     def _names(self):
         return [name for name in self.limits if not name.endswith("single")]
+
+    def borne(self, dashpots, link="bond"):
+        """Largest stable step of each body under a method [s], (body_count,).
+
+        dashpots: how the method takes them, a key of ``METHODS``: "full", "limited" or "solved".
+        link: "bond", or "contact" for every sphere of the worst face in one contact; a step is
+        stable that is below both. Solved dashpots leave the limit of the springs.
+        Infinite where nothing limits it.
+        """
+        springs = self.limits.get(f"{link}_stiffness")
+        if springs is None:
+            return np.full(len(self.limits["bond_stiffness"]), np.inf)
+        drags = self.limits.get(f"{link}_dashpot", np.full(len(springs), np.inf))
+        if dashpots == "solved":
+            return springs
+        together = stable_together(springs, drags)
+        if dashpots == "full":
+            return together
+        # Of the 2 that an explicit step bears, limited dashpots take LIMITED at most.
+        return np.maximum(together, springs * np.sqrt(1.0 - 0.5 * LIMITED))
 
     def worst(self, count=_WORST):
         """Bodies of the smallest step, the worst first."""
@@ -60,7 +90,7 @@ class StepReport:
     def price(self, count=_WORST):
         """Gain in the step of all without the count worst bodies, a factor of at least 1."""
         steps = np.append(np.sort(self.step_s), np.inf)
-        return float(steps[min(count, len(steps) - 1)] / steps[0])
+        return float(steps[min(count, len(steps) - 1)] / steps[0]) if steps[0] < np.inf else 1.0
 
     def work_share(self, count=_WORST):
         """Share of the body updates, each at its own step, that the count worst bodies take."""
@@ -74,34 +104,80 @@ class StepReport:
         return in_brief(self, bodies, step, "print it for the table")
 
     def __str__(self):
-        """Which criterion binds how many bodies, the worst bodies, and what they cost."""
-        binding, step = self.binding, self.step_s
-        lines = [f"{'step bound by':24s}{'bodies':>8s}{'smallest s':>12s}{'median s':>12s}"]
+        """What each method bears, what binds how many bodies, the worst, and what they cost."""
+        lines = [*self._method_lines(), "", *self._criterion_lines(), *self._worst_lines()]
+        return "\n".join([*lines, *(f"warning: {warning}" for warning in self.warnings)])
+
+    def _method_lines(self):
+        """A line for every way of taking dashpots, then how to read it."""
+        lines = [f"{'largest stable step':32s}{'in bonds s':>12s}{'':10s}{'in contact s':>14s}"]
+        for dashpots, words in METHODS.items():
+            bonds, contact = (self._smallest(dashpots, link) for link in ("bond", "contact"))
+            lines.append(
+                f"{words:32s}{bonds[0]:12.3g} {bonds[1]:9s}{contact[0]:14.3g} {contact[1]}"
+            )
+        lines.append(
+            "in contact: every sphere of the worst face at once; Multirate: of the worst body, "
+            f"each has its own; control=StepControl() keeps to {StepControl().safety:g} of them"
+        )
+        return lines
+
+    def _smallest(self, dashpots, link):
+        """Smallest step that a method bears [s], and whether springs or dashpots limit it."""
+        steps = self.borne(dashpots, link)
+        body = int(np.argmin(steps))
+        if not np.isfinite(steps[body]):
+            return np.inf, ""
+        drags = self.limits.get(f"{link}_dashpot", np.full(len(steps), np.inf))[body]
+        strict = dashpots == "full" and drags < self.limits[f"{link}_stiffness"][body]
+        return steps[body], "dashpots" if strict else "springs"
+
+    def _criterion_lines(self):
+        binding, head = self.binding, "explicit step bound by"
+        lines = [f"{head:24s}{'bodies':>8s}{'smallest s':>12s}{'median s':>12s}"]
         for name, values in self.limits.items():
             bodies = int((binding == name).sum())
             lines.append(f"{name:24s}{bodies:8d}{values.min():12.3g}{np.median(values):12.3g}")
-        lines.append(f"{'worst body':>10s}{'step s':>12s}  bound by")
+        return lines
+
+    def _worst_lines(self):
+        binding, step = self.binding, self.step_s
+        lines = [f"{'worst body':>10s}{'step s':>12s}  bound by"]
         lines += [f"{body:10d}{step[body]:12.3g}  {binding[body]}" for body in self.worst()]
         lines.append(
             f"without the worst {_WORST} the step of all would be {self.price():.3g} times longer; "
             f"with steps of their own they take {100 * self.work_share():.3g} % of the updates"
         )
-        return "\n".join(lines)
+        return lines
+
+
+def stable_together(springs, drags):
+    """Largest explicit step [s] at which springs and dashpots of a body are stable together.
+
+    springs, drags: largest steps of each alone [s], ``quality.spring_step`` and ``dashpot_step``.
+    The leapfrog whose dashpots take the velocity of half a step ago, v += -dt (w^2 x + c v), is
+    stable while c dt + (w dt)^2 / 2 <= 2, which is dt / drags + (dt / springs)^2 <= 1.
+    """
+    with np.errstate(divide="ignore"):
+        rate = 1.0 / np.asarray(drags)
+        return 2.0 / (rate + np.sqrt(rate**2 + (2.0 / np.asarray(springs)) ** 2))
 
 
 def step_report(scene, material=None):
     """Judge a scene, or a mesh and a material with all effects, before a run.
 
     scene: a Scene, or a Mesh if material is given. Limits hold for a pair of equal bodies that
-    move against each other (``quality.dashpot_step``, ``quality.spring_step``).
+    move against each other (``quality.dashpot_step``, ``quality.spring_step``): a mesh bears no
+    less, and at most twice as much.
     Raises InputError for anything else.
     """
     if isinstance(scene, Scene) and material is None:
         effects = {effect.name: effect for effect in scene.effects}
         contact = effects.get("sphere_contact")
         divisions = contact.divisions if contact is not None else None
+        warnings = outer_faces_warnings(scene)
         damped, friction = "bond_damping" in effects, "friction" in effects
-        return _report(scene.mesh, scene.material, damped, friction, divisions)
+        return _report(scene.mesh, scene.material, damped, friction, divisions, warnings)
     if isinstance(scene, Mesh) and isinstance(material, Material):
         return _report(scene, material, True, True, 5)
     raise InputError(
@@ -110,7 +186,7 @@ def step_report(scene, material=None):
     )
 
 
-def _report(mesh, material, damped, friction, divisions):
+def _report(mesh, material, damped, friction, divisions, warnings=()):
     topology = topology_of(mesh)
     rates = bond_rates(mesh, topology, material.density, springs_of(material))
     limits = {"bond_stiffness": spring_step(rates)}
@@ -122,7 +198,7 @@ def _report(mesh, material, damped, friction, divisions):
         limits["contact_stiffness"] = spring_step(material.contact_stiffness * whole)
         limits["contact_dashpot"] = dashpot_step(material.contact_damping * whole)
         limits["contact_dashpot_single"] = dashpot_step(material.contact_damping * one)
-    return StepReport(limits)
+    return StepReport(limits, warnings)
 
 
 def contact_eigenvalues(mesh, density, divisions, friction):

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import taichi as ti
 
+from taichi_dem.outer_faces import REMEDY, OuterFaces
 from taichi_dem.physics.fracture import coulomb_limit
 
 
@@ -13,8 +14,8 @@ class Missed:
     """A need that no listed effect serves.
 
     effect: what to list. what: the finding in words. times: recordings that saw it, of ``looks``.
-    most: the largest number of places in one of them. where: first such bond, place_m: the middle
-    of its face in the mesh [m]. first_s: when first [s].
+    most: the largest number of places in one of them. where: first such bond or body, as unit
+    says; place_m: the middle of its face, or of the body, in the mesh [m]. first_s: when first [s].
     """
 
     effect: str
@@ -25,13 +26,28 @@ class Missed:
     where: int = -1
     place_m: tuple = ()
     first_s: float = 0.0
+    unit: str = "bond"
+
+    def see(self, places, time_s, middle):
+        """Take in what a recording at a time [s] saw.
+
+        places: numbers of the bonds or bodies, one for every sight. middle: function of such a
+        number, its place in the mesh [m].
+        """
+        if not len(places):
+            return
+        if self.times == 0:
+            self.where, self.first_s = int(places[0]), time_s
+            self.place_m = middle(self.where)
+        self.times += 1
+        self.most = max(self.most, len(places))
 
     def __str__(self):
         place = ", ".join(f"{x:.3g}" for x in self.place_m)
         return (
             f"{self.effect} is left out, but {self.what}: up to {self.most} at a time, first at "
-            f"t = {self.first_s:.4g} s (bond {self.where} at {place} m), seen at {self.times} of "
-            f"{self.looks} recordings"
+            f"t = {self.first_s:.4g} s ({self.unit} {self.where} at {place} m), seen at "
+            f"{self.times} of {self.looks} recordings"
         )
 
 
@@ -40,6 +56,7 @@ _NEEDS = (
     ("shear", "ShearSlip", "bonds are sheared past their Coulomb limit"),
     ("contact", "SphereContact", "bodies overlap where a bond has been released"),
 )
+_OVERLAP = "pairs of bodies overlap at outer faces, which carry no contact spheres"
 
 
 def unserved(roles):
@@ -59,6 +76,9 @@ class Watch:
         self.touching = self.looks = 0
         self.last_s = -1.0
         self.missed = unserved({effect.role for effect in model.effects if effect.name})
+        self.outer_faces, self.outer = None, Missed(REMEDY, _OVERLAP, unit="body")
+        if model.has_contact and not model.contact.outer_faces:
+            self.outer_faces = OuterFaces(model, state)
         material = model.material
         self.limits = ti.Vector([material.tensile_strength, material.cohesion, material.friction])
 
@@ -68,35 +88,33 @@ class Watch:
             return
         self.looks, self.last_s = self.looks + 1, time_s
         self._count_touching()
+        if self.outer_faces is not None:
+            later = self.outer_faces.overlaps()
+            pairs = np.repeat(np.arange(len(later)), later)
+            self.outer.see(pairs, time_s, self._centre)
         if not self.missed or self.model.bond_count == 0:
             return
         marks = np.zeros((self.model.bond_count, 3), dtype=np.int32)
         self._mark(marks)
         for column, (role, _, _) in enumerate(_NEEDS):
-            places = np.flatnonzero(marks[:, column])
-            if role in self.missed and len(places):
-                missed = self.missed[role]
-                if missed.times == 0:
-                    missed.where, missed.first_s = int(places[0]), time_s
-                    missed.place_m = self._middle(missed.where)
-                missed.times += 1
-                missed.most = max(missed.most, len(places))
+            if role in self.missed:
+                self.missed[role].see(np.flatnonzero(marks[:, column]), time_s, self._middle)
 
     def saved(self):
         """What a checkpoint holds of it, arrays by name."""
-        rows = [[m.times, m.most, m.where, m.first_s] for m in self.missed.values()]
+        rows = [[m.times, m.most, m.where, m.first_s] for m in self._all()]
         return {
-            "missed": np.array(rows, dtype=np.float64).reshape(-1, 4),
+            "missed": np.array(rows, dtype=np.float64),
             "looks": np.array([self.looks, self.touching, self.last_s]),
         }
 
     def resume(self, saved):
         """Take over what ``saved`` gave."""
-        for missed, row in zip(self.missed.values(), saved["missed"].tolist()):
+        for missed, row in zip(self._all(), saved["missed"].tolist()):
             missed.times, missed.most, missed.where = (int(value) for value in row[:3])
             missed.first_s = row[3]
             if missed.times:
-                missed.place_m = self._middle(missed.where)
+                missed.place_m = self._place(missed)
         looks, touching, self.last_s = saved["looks"].tolist()
         self.looks, self.touching = int(looks), int(touching)
 
@@ -106,13 +124,22 @@ class Watch:
             deepest = contacts.deepest.to_numpy()[: contacts.pair_count[None]]
             self.touching = max(self.touching, int((deepest > 0.0).sum()))
 
+    def _all(self):
+        return (*self.missed.values(), self.outer)
+
+    def _place(self, missed):
+        return (self._centre if missed is self.outer else self._middle)(missed.where)
+
+    def _centre(self, body):
+        return tuple(self.model.centre[body].tolist())
+
     def _middle(self, bond):
         corners = self.model.topology.vertices[bond]
         return tuple(self.model.mesh.points[corners].mean(axis=0).tolist())
 
     def findings(self):
         """A ``Missed`` for each effect that was needed, an empty tuple where none was."""
-        found = [missed for missed in self.missed.values() if missed.times]
+        found = [missed for missed in self._all() if missed.times]
         return tuple(replace(missed, looks=self.looks) for missed in found)
 
     @ti.kernel

@@ -9,6 +9,9 @@ from taichi_dem.effect_use import EffectUse
 
 vec2 = ti.types.vector(2, ti.f64)
 
+#: Why what was not seen may have acted: a blow is shorter than the time between two looks.
+_UNSEEN = "touches between two looks leave no trace"
+
 
 @ti.data_oriented
 class Acted:
@@ -46,17 +49,24 @@ class Acted:
         """An EffectUse for each of the named effects, over all scenes."""
         power, motion = (field.to_numpy().sum(axis=0) for field in (self.power, self.motion))
         touches = int(self.touches.to_numpy().sum())
+        # Spheres keep their spin: where none turns at any look, none has been turned.
         turned = touches if motion[1] > 0.0 else 0
+        unseen = "" if touches else _UNSEEN
         found = {
-            "normal contact": (touches, _share(power, 0), "what contacts took", True),
-            "friction": (touches, _share(power, 1), "what contacts took", False),
-            "rotation": (turned, _share(motion, 1), "the energy of motion", False),
+            "normal contact": (touches, _share(power, 0), "what contacts took", True, unseen),
+            "friction": (touches, _share(power, 1), "what contacts took", False, unseen),
+            "rotation": (
+                *(turned, _share(motion, 1), "the energy of motion", False),
+                unseen if motion[1] > 0.0 else "",
+            ),
         }
         return tuple(_use(name, *found[name]) for name in effects)
 
 
-def _use(name, touches, share, whole, steers):
-    return EffectUse(name, "touches seen", touches, share=share, whole=whole, steers=steers)
+def _use(name, touches, share, whole, steers, kept):
+    return EffectUse(
+        name, "touches seen", touches, share=share, whole=whole, steers=steers, kept=kept
+    )
 
 
 def _share(parts, which):

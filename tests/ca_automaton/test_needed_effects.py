@@ -5,6 +5,8 @@ import json
 import pytest
 
 from ca_damper import Automaton, Batch, InputError, SceneTable, Spheres, needed_effects
+from ca_damper.spheres.acted import Acted
+from taichi_dem.effect_use import Advice
 
 #: Of a cell, and how high above the floor the one particle begins [cells].
 ROW = 10
@@ -50,6 +52,17 @@ def test_shares_of_dashpots_and_friction_are_all_that_contacts_take():
     assert min(normal.share, friction.share) > 0.0
     assert needed_effects(report, friction.share).droppable == ()
     assert needed_effects(report, min(1.0, 1.001 * friction.share)).droppable == ("friction",)
+
+
+@pytest.mark.parametrize("turning", [0.0, 1e-9])
+def test_what_no_look_saw_of_spheres_is_kept(turning):
+    """Looks are 64 steps apart, and a blow takes 5: only a spin, which lasts, would be seen."""
+    acted = Acted(1)
+    acted.motion[0] = [1.0, turning]
+    uses = acted.uses(("normal contact", "friction", "rotation"))
+    advice = Advice(uses, (), 1e-3)
+    assert advice.droppable == (() if turning else ("rotation",))
+    assert "touches between two looks leave no trace" in str(advice)
 
 
 def test_what_is_no_result_is_refused():

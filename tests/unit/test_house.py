@@ -24,8 +24,9 @@ LAYERS = {
         ("plot_style", "checkpoint"),
         ("restart",),
         (
-            *("tetrahedra", "mesh", "mesh_files", "mesh_shapes", "mesh_gmsh", "mesh_order"),
-            *("meshes", "topology", "quality", "contact_spheres", "materials", "partition"),
+            *("tetrahedra", "mesh", "mesh_content", "mesh_files", "mesh_shapes", "mesh_gmsh"),
+            *("mesh_split", "mesh_order", "meshes", "topology", "quality", "contact_spheres"),
+            *("materials", "partition"),
         ),
         ("physics",),
         ("timeline", "step_control"),
@@ -35,7 +36,10 @@ LAYERS = {
         ("state",),
         ("step",),
         ("ledger",),
-        ("health", "watch", "resolution", "report", "step_report", "effects_acted"),
+        (
+            *("outer_faces", "health", "watch", "resolution"),
+            *("report", "step_report", "effects_acted"),
+        ),
         ("simulation",),
         ("monitor", "record", "realised"),
         ("plot",),

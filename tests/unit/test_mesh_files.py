@@ -225,7 +225,9 @@ def test_cut_off_file_is_refused(tmp_path, share):
 def test_file_without_tetrahedra_is_refused_with_what_it_holds(tmp_path):
     path = tmp_path / "flat.vtu"
     meshio.write(path, meshio.Mesh(BAR.points, [("triangle", BAR.groups["top"])]))
-    assert refused(path) == f"mesh file {path} holds no tetrahedra (it holds: triangle)"
+    said = refused(path)
+    assert said.startswith(f"mesh file {path} holds no tetrahedra (it holds: triangle): fill this")
+    assert "save it as surface.stl, echo 'Merge" in said
 
 
 def test_bad_mesh_in_a_file_is_refused_with_its_name(tmp_path):

@@ -1,13 +1,19 @@
 """What a run says of its effects: which acted, which it could do without, which it missed."""
 
 import json
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, InputError, Scene, Uniform, effects, needed_effects, simulate
 from taichi_dem.effect_use import Advice, EffectUse
+from taichi_dem.effects_acted import effects_acted
+from taichi_dem.ledger import TERMS
 from taichi_dem.mesh_shapes import pair
+from taichi_dem.model import Model
+from taichi_dem.state import State
 
 #: Far below the strength of concrete: a block of some 1 kg that falls from rest for 1e-5 s.
 STEP, UNTIL = 1e-7, 1e-5
@@ -39,13 +45,125 @@ def test_effects_that_never_act_are_named(gentle):
     assert "never acted (0 bonds softened)" in lines["softening"]
 
 
-def test_dropping_what_never_acted_changes_no_bit(gentle):
+class Own(effects.BondDamping):
+    """An effect of a user's own, of which the package knows the role alone."""
+
+    name = "own"
+
+
+#: One body is held and the other hangs: the support does no work, and weight gives next to none.
+HUNG = (
+    *(Own, effects.Softening, effects.ShearSlip, effects.SphereContact, effects.Friction),
+    *(effects.Gravity, lambda: effects.Fixed("left")),
+)
+
+
+@pytest.fixture(scope="module")
+def hung():
+    """A pair of which one body is held."""
+    return ran(*(make() for make in HUNG))
+
+
+def test_what_poses_the_question_is_kept_though_it_did_nothing(hung):
+    advice = needed_effects(hung, 1.0)
+    assert set(advice.droppable) == {"softening", "shear_slip", "sphere_contact", "friction"}
+    lines = {line.split()[1]: line for line in str(advice).splitlines()}
+    assert lines["fixed"].startswith("keep       fixed            1 of 2 bodies held, 0 J")
+    assert "a support is part of the question" in lines["fixed"]
+    assert "a load is part of the question" in lines["gravity"]
+    assert "an effect of your own" in lines["own"] and lines["own"].startswith("keep")
+
+
+@pytest.mark.parametrize("scene", ["gentle", "hung"])
+def test_dropping_what_never_acted_changes_no_bit(scene, request):
     """The advice is a promise: without these effects every sample is the same."""
-    kept = [make() for make in GENTLE if make.name not in needed_effects(gentle).never_acted]
+    result, makers = request.getfixturevalue(scene), {"gentle": GENTLE, "hung": HUNG}[scene]
+    dropped = needed_effects(result).droppable
+    kept = [effect for effect in (make() for make in makers) if effect.name not in dropped]
     again = ran(*kept)
-    assert len(kept) < len(GENTLE)
-    for name, column in gentle.history.items():
+    assert len(kept) < len(makers)
+    for name, column in result.history.items():
         np.testing.assert_array_equal(again.history[name], column, err_msg=name)
+
+
+def used(listed, material=CONCRETE, exposed=True, heat=0.0, lacking=0, **account):
+    """What is said of effects whose account holds these terms [J]; every effect by its name.
+
+    exposed: whether faces carry spheres. heat: of each body's contacts, and in each bond [J].
+    lacking: recordings that saw bodies overlap where faces carry none.
+    """
+    model = Model(pair(), material, listed)
+    state = State(model, 1e4)
+    if model.has_contact and exposed:
+        state.expose(model.topology)
+    tables = np.zeros((2, 6)), np.full((1, 5), heat), np.zeros((0, 4))
+    tables[0][:, 3:5] = heat
+    none = SimpleNamespace(state=state, start_energy=0.0)
+    filled = {**dict.fromkeys(TERMS, 0.0), **account}
+    watch = SimpleNamespace(touching=0, outer=SimpleNamespace(times=lacking))
+    return {use.effect: use for use in effects_acted(model, none, tables, filled, watch)}
+
+
+class OwnContact(effects.SphereContact):
+    """A law of a user's own."""
+
+
+class OwnFriction(effects.Friction):
+    """A law of a user's own."""
+
+
+LOSSLESS = replace(CONCRETE, contact_damping=0.0)
+
+
+@pytest.mark.parametrize(
+    ("contact", "material", "exposed", "idle"),
+    [
+        (effects.SphereContact, CONCRETE, True, True),
+        (effects.SphereContact, LOSSLESS, True, False),
+        (effects.SphereContact, LOSSLESS, False, True),
+        (OwnContact, CONCRETE, True, False),
+        (OwnContact, CONCRETE, False, True),
+    ],
+)
+def test_contact_is_idle_only_where_a_touch_would_have_left_a_trace(
+    contact, material, exposed, idle
+):
+    """Heat in dashpots is one; without dashpots, or by a law of one's own, only bare faces are."""
+    use = used([contact(), effects.Friction()], material, exposed)["sphere_contact"]
+    assert use.idle == idle
+    assert bool(use.kept) != idle
+
+
+@pytest.mark.parametrize("exposed", [True, False])
+def test_friction_of_ones_own_is_dropped_only_with_the_contact_it_acts_in(exposed):
+    found = used([effects.SphereContact(), OwnFriction()], exposed=exposed)
+    assert found["friction"].idle != exposed
+    assert found["sphere_contact"].idle
+
+
+def test_contact_is_not_dropped_where_spheres_on_outer_faces_are_missed():
+    found = used([effects.SphereContact(), effects.Friction()], exposed=False, lacking=1)
+    assert not any(use.idle for use in found.values())
+
+
+STEERING = (effects.Softening, effects.ShearSlip, effects.SphereContact, effects.Friction)
+
+
+@pytest.mark.parametrize("make", STEERING)
+def test_what_steers_is_never_negligible(make):
+    """It acted, and took a thousandth of a thousandth of the work put in."""
+    listed = [make()] if make is not effects.Friction else [effects.SphereContact(), make()]
+    use = used(listed, heat=1e-9, load_work=1.0, slip=1e-9, softening=1e-9)[make.name]
+    assert use.acted and not use.negligible(1e-3)
+
+
+@pytest.mark.parametrize("strain, share, negligible", [(0.0, 1.0, False), (1.0, 1e-6, True)])
+def test_dashpots_are_compared_with_what_bonds_hold_not_with_a_fall(strain, share, negligible):
+    """A body that falls far takes work by the joule: its vibration is damped all the same."""
+    account = {"bond_dashpot": 1e-6, "bond_strain": strain, "load_work": 1e6}
+    use = used([effects.BondDamping()], heat=1e-6, **account)["bond_damping"]
+    assert use.share == pytest.approx(share, rel=1e-5)
+    assert use.negligible(1e-3) == negligible
 
 
 def test_weight_of_all_is_all_the_work(gentle):
@@ -87,6 +205,8 @@ USES = (
     EffectUse("friction", "bodies rubbed", 5, 10, 1e-4, 1e-4),
     EffectUse("softening", "bonds softened", 5, 10, 1e-4, 1e-4, steers=True),
     EffectUse("rotation", "touches", 5),
+    EffectUse("dashpot", "bonds damped", 5, 10, 1e-4, 1e-4, kept="it is your own"),
+    EffectUse("fixed", "bodies held", 0, kept="it is part of the question"),
 )
 
 

@@ -17,9 +17,11 @@ from taichi_dem import (
     simulate,
     step_report,
 )
-from taichi_dem.mesh_shapes import bar, pair
-from taichi_dem.quality import bond_rates, dashpot_step, dashpots_of, subset_rates
+from taichi_dem.mesh_shapes import bar, pair, single
+from taichi_dem.quality import bond_rates, dashpot_step, dashpots_of, spring_step, subset_rates
+from taichi_dem.step.rates import LIMITED
 from taichi_dem.step_control import CRITERIA
+from taichi_dem.step_report import StepReport, stable_together
 from taichi_dem.topology import topology_of
 
 
@@ -61,6 +63,67 @@ def test_report_names_the_limit_of_each_element_and_what_the_worst_cost():
     assert bonded.price(10) == pytest.approx(steps[10] / steps[0])
     assert bonded.work_share(10) == pytest.approx((1 / steps[:10]).sum() / (1 / steps).sum())
     assert "bond_dashpot" in str(bonded) and str(bonded.worst()[0]) in str(bonded)
+
+
+def multiplier(dt, stiffness, damping):
+    """Largest growth a step of the leapfrog v += -dt (k x + c v), x += dt v of a unit mass."""
+    step = np.array(
+        [
+            [1.0 - dt * damping, -dt * stiffness],
+            [dt * (1.0 - dt * damping), 1.0 - dt**2 * stiffness],
+        ]
+    )
+    return np.abs(np.linalg.eigvals(step)).max()
+
+
+@pytest.mark.parametrize("ratio", [1e-3, 0.1, 0.7, 1.0, 2.0, 30.0])
+def test_springs_and_dashpots_together_are_stable_up_to_the_step_that_is_told(ratio):
+    """Of a pair of equal bodies, whose rates are twice those of one; ratio: of both steps alone."""
+    rate2 = 3.0
+    springs = float(spring_step(rate2))
+    rate = float(dashpot_step(1.0)) / (ratio * springs)
+    told = stable_together(springs, dashpot_step(rate))
+    assert multiplier(0.999 * told, 2.0 * rate2, 2.0 * rate) <= 1.0 + 1e-12
+    assert multiplier(1.001 * told, 2.0 * rate2, 2.0 * rate) > 1.0
+    assert told < min(springs, float(dashpot_step(rate)))
+
+
+@pytest.mark.parametrize("share", [1e-3, 0.5, 0.8, 0.9, 10.0])
+def test_limited_dashpots_leave_the_springs_what_they_do_not_take(share):
+    """They keep min(1, LIMITED / X) of themselves, X = 2 dt rate; share: of the springs' step."""
+    rate2 = 3.0
+    springs = float(spring_step(rate2))
+    drags = share * springs
+    told = StepReport({"bond_stiffness": np.array([springs]), "bond_dashpot": np.array([drags])})
+    (step,) = told.borne("limited")
+
+    def growth(dt):
+        return multiplier(dt, 2.0 * rate2, min(2.0 / drags, LIMITED / dt))
+
+    assert all(growth(part * step) <= 1.0 + 1e-12 for part in (0.1, 0.5, 0.9, 0.999))
+    assert growth(1.01 * step) > 1.0
+
+
+def test_report_tells_what_each_method_bears():
+    """Solved dashpots leave the springs; without contact bonds limit, without bonds nothing."""
+    mesh = bar(0.4, 0.1, (4, 1, 1))
+    report = step_report(mesh, CONCRETE)
+    for link in ("bond", "contact"):
+        solved, limited, full = (report.borne(way, link) for way in ("solved", "limited", "full"))
+        assert np.array_equal(solved, report.limits[f"{link}_stiffness"])
+        assert np.all(full < report.limits[f"{link}_dashpot"])
+        assert np.all(full < limited) and np.all(limited < solved)
+    lines = {line[:32].strip(): line[32:].split() for line in str(report).splitlines()}
+    assert lines["Uniform, Multirate"][1::2] == ["dashpots", "dashpots"]
+    told = [float(word) for word in lines["ImplicitDashpots"][::2]]
+    smallest = [report.borne("solved", link).min() for link in ("bond", "contact")]
+    assert told == pytest.approx(smallest, rel=5e-3)
+    assert lines["ImplicitDashpots"][1::2] == ["springs", "springs"]
+    undamped = step_report(Scene(mesh, CONCRETE))
+    for way in ("full", "limited", "solved"):
+        assert np.allclose(undamped.borne(way), report.limits["bond_stiffness"], rtol=1e-15)
+        assert np.isinf(undamped.borne(way, "contact")).all()
+    assert "inf" in str(step_report(Scene(single(), CONCRETE, [effects.BondDamping()])))
 
 
 def test_a_body_that_lost_bonds_is_as_slow_as_those_that_hold():

@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 import taichi as ti
 
-from taichi_dem import CONCRETE, Scene, Simulation, StepControl, Uniform, effects
+from taichi_dem import (
+    CONCRETE,
+    ImplicitDashpots,
+    Scene,
+    Simulation,
+    StepControl,
+    Uniform,
+    effects,
+    step_report,
+)
 from taichi_dem.mesh import checked_mesh
 from taichi_dem.mesh_shapes import pair, single
 from taichi_dem.quality import bond_rates, dashpot_step, dashpots_of, spring_step, springs_of
@@ -110,6 +119,33 @@ def test_bond_limits_are_where_motion_begins_to_grow(kind):
     assert found == pytest.approx(exact, rel=0.007), found / exact
     formula = limit(bond_rates(model.mesh, topology_of(model.mesh), CONCRETE.density, of(material)))
     assert formula.max() <= exact * (1 + 1e-9) < 2.0 * formula.min()
+
+
+#: A method for every way of taking dashpots, and how far above what is told motion surely grows:
+#: springs of one body are 1.03 times those of the pair, its dashpots 1.13; limited ones take as
+#: much of a step as they may in the worst case alone.
+WAYS = {
+    "full": (Uniform(1e-9), 1.2),
+    "limited": (Uniform(1e-9, dashpot="limited"), 1.4),
+    "solved": (ImplicitDashpots(1e-9, refresh=1e-9), 1.1),
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_damped_pair_is_calm_below_what_the_report_tells_and_grows_above(way):
+    """Seen at many times: what grew large may come to rest again, far from where it was."""
+    method, above = WAYS[way]
+    rig = Rig(pair(), [effects.BondDamping()], method)
+    told = step_report(rig.simulation.scene).borne(way).min()
+    random = np.random.default_rng(3)
+    velocity, spin = 1e-7 * random.standard_normal((2, 3)), 1e-6 * random.standard_normal((2, 3))
+
+    def largest(step):
+        counts = range(250, STEPS + 1, 250)
+        return max(rig.speeds(step, count, rig.centre, velocity, spin) for count in counts)
+
+    assert largest(0.98 * told) < 1e-6
+    assert largest(above * told) > 1e-4
 
 
 def facing(gap, sides=False):
