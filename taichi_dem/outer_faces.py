@@ -116,7 +116,7 @@ class OuterFaces:
                     for p, q in ti.ndrange(4, 4):
                         apart *= ti.cast(points[i, p] != points[j, q], ti.i32)
                     if apart == 1:
-                        found[i] += self._overlap(i, j)
+                        found[i] = found[i] + self._overlap(i, j)
 
     @ti.func
     def _overlap(self, i, j):
