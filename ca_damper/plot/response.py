@@ -18,12 +18,13 @@ def picture_responses(path, responses, particle_mass):
     columns = 2 if count < 4 else 3
     rows = (count + 2 + columns - 1) // columns
     size = (4.2 * columns, 3.3 * rows)
-    with picture(path, rows, columns, size, squeeze=False) as (_, axes):
+    with picture(path, rows, columns, size, squeeze=False) as (figure, axes):
         panels = axes.ravel()
         for axis, (label, response) in zip(panels, responses.items()):
             _draw_curves(axis, response)
             axis.set_title(styles_of(responses)[label].label)
         _share_height(panels[:count])
+        _legend_of_bands(figure, panels[0])
         _draw_peaks(panels[count], panels[count + 1], responses, particle_mass)
         for axis in panels[count + 2 :]:
             axis.set_axis_off()
@@ -61,7 +62,6 @@ def _draw_curves(axis, response, rows=None):
     bare = STYLES["empty"].label
     axis.plot(fine, 1e3 * empty / np.sqrt(2.0), color=GREY, ls=":", lw=1.0, label=bare)
     axis.set(xlabel="frequency f / f$_0$ [1]", ylabel="RMS displacement [mm]")
-    _legend_of_bands(axis)
 
 
 def _band(axis, x, values, colour, label):
@@ -70,11 +70,12 @@ def _band(axis, x, values, colour, label):
     axis.fill_between(x, values.min(axis=1), values.max(axis=1), color=colour, alpha=0.25, lw=0)
 
 
-def _legend_of_bands(axis):
-    """Legend of an axis with bands: what they are is its last entry."""
+def _legend_of_bands(figure, axis):
+    """Legend above all panels, made from one of them: what bands are is its last entry."""
     handles, _ = axis.get_legend_handles_labels()
     band = area_key("lowest to highest seed", fc=GREY, alpha=0.3)
-    axis.legend(handles=[*handles, band])
+    handles.append(band)
+    figure.legend(handles=handles, loc="outside upper center", ncols=len(handles))
 
 
 def _shade(response, k):
@@ -121,7 +122,8 @@ def picture_measures(path, responses, particle_mass):
     """
     count = len(responses)
     size = (1.0 + 2.6 * count, 5.4)
-    with picture(path, 2, count, size, squeeze=False, sharex=True, sharey="row") as (_, axes):
+    shape = {"squeeze": False, "sharex": True, "sharey": "row"}
+    with picture(path, 2, count, size, **shape) as (figure, axes):
         for column, (label, response) in zip(axes.T, responses.items()):
             for k, particles in enumerate(response.particles):
                 if particles > 0:
@@ -131,7 +133,7 @@ def picture_measures(path, responses, particle_mass):
             column[1].set_xlabel("frequency f / f$_0$ [1]")
         axes[0, 0].set_ylabel("apparent mass /\nmass of the particles [1]")
         axes[1, 0].set_ylabel("loss factor [1]")
-        _legend_of_bands(axes[0, 0])
+        _legend_of_bands(figure, axes[0, 0])
 
 
 def _draw_measures(column, response, k, particle_mass):

@@ -38,7 +38,7 @@ def picture_energy(path, runs):
             if any(made.sentence for made in runs if made.limit == limit):
                 axes.plot([], [], "X", color=BLACK, ms=7, ls="none", label="ended by the program")
             axes.set(title=f"limited by its {limit}", xlabel="time [µs]")
-            axes.legend(loc="lower left", title="step")
+            axes.legend(loc="upper right", title="step")
         panels[0, 0].set_ylabel("unexplained energy / energy put in [1]")
         width = 62 * len(limits)
         words = [f"{made.limit}, {made.share:g} × limit: “{made.sentence}”" for made in said]
