@@ -149,7 +149,7 @@ def picture_hysteresis(path, sweeps):
     count = len(sweeps)
     size = (1.0 + 2.6 * count, 1.0 + 2.3 * len(particles))
     shape = {"squeeze": False, "sharex": True, "sharey": "row"}
-    with picture(path, len(particles), count, size, **shape) as (_, axes):
+    with picture(path, len(particles), count, size, **shape) as (figure, axes):
         for column, (label, sweep) in zip(axes.T, sweeps.items()):
             column[0].set_title(styles_of(sweeps)[label].label)
             for k, axis in enumerate(column):
@@ -157,7 +157,8 @@ def picture_hysteresis(path, sweeps):
             column[-1].set_xlabel("frequency f / f$_0$ [1]")
         for k, axis in enumerate(axes[:, 0]):
             axis.set_ylabel(f"{particles[k]} particles:\nRMS displacement [mm]")
-        axes[0, 0].legend()
+        handles, _ = axes[0, 0].get_legend_handles_labels()
+        figure.legend(handles=handles, loc="outside upper center", ncols=len(handles))
 
 
 def _draw_ways(axis, sweep, k):
