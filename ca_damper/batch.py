@@ -23,13 +23,13 @@ from ca_damper.progress import BatchProgress
 from ca_damper.report import RK45_STAGES, Report
 from ca_damper.table import SceneTable, dealt
 from taichi_dem import runtime
+from taichi_dem.allocation import check_room
 from taichi_dem.checkpoint import version_text
 from taichi_dem.checks import choice, instance, positive, whole
 from taichi_dem.display import in_brief
 from taichi_dem.errors import InputError
-from taichi_dem.fields import check_room
 from taichi_dem.progress import compiling
-from taichi_dem.restart import Keeper, NoKeeper, Saved, opened
+from taichi_dem.restart import CheckpointWriter, NoCheckpointWriter, RunSnapshot, opened
 
 MOUNTS = ("spring", "base")
 
@@ -85,7 +85,7 @@ class Batch:
         self._compiled = self._started = False
         # Of the present run: share done and seconds it took; whether it goes on from a checkpoint.
         self._done, self._seconds, self.going_on = 0.0, 0.0, False
-        self.keeper = NoKeeper()
+        self.keeper = NoCheckpointWriter()
 
     def __repr__(self):
         return in_brief(self, self.filling.label, f"{self.count:,} scenes", f"on the {self.mount}")
@@ -192,21 +192,25 @@ class Batch:
 
         checkpoint: a Checkpoint or None. resume: file to go on from, or None: the run that it was
         saved in is then to be called for again, and goes on. identity: words by name that a file
-        must share; parts: (name, part) of what else goes into it, as in ``restart.Saved``.
+        must share; parts: (name, part) of what else goes into it, as in ``restart.RunSnapshot``.
         Raises InputError.
         """
         self._check_started()
         own = {"version": version_text(), "filling": repr(self.filling)}
         arrays = opened(checkpoint, resume, lambda: {**own, **identity})
         self._compile()
-        saved = Saved({**own, **identity}, self, {"batch": self, **dict(parts)})
+        saved = RunSnapshot({**own, **identity}, self, {"batch": self, **dict(parts)})
         if arrays:
             saved.take(arrays, resume)
-        with Keeper(checkpoint, saved, self._now) if checkpoint else NoKeeper() as self.keeper:
+        with (
+            CheckpointWriter(checkpoint, saved, self._now)
+            if checkpoint
+            else NoCheckpointWriter() as self.keeper
+        ):
             try:
                 yield self.keeper
             finally:
-                self.keeper = NoKeeper()
+                self.keeper = NoCheckpointWriter()
 
     def _now(self):
         """Mean step and time [s] of the scenes."""

@@ -11,7 +11,7 @@ import taichi as ti
 from scipy.optimize import nnls
 
 from taichi_dem import Simulation
-from taichi_dem.fields import fields_first
+from taichi_dem.allocation import batch_allocation
 from taichi_dem.simulate import progress_of
 from taichi_dem.simulation import macro_steps
 from taichi_dem.step.drivers import Once, Resident, Step
@@ -117,7 +117,7 @@ def record(scene, method, until, every, bar):
     The run is stopped between two steps only, so its bits are those of an undisturbed one.
     """
     simulation = Simulation(scene, method, "resident")
-    with fields_first():
+    with batch_allocation():
         counter = Counter(simulation)
     parts = simulation.advance, simulation.schedule, simulation.broad_phase
     simulation.step = CountedStep(counter, *parts)

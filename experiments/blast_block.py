@@ -41,10 +41,10 @@ from _cli import (
 )
 from _deep_block import has_gmsh, made_block, stacked_block
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, plot, quality_report, read_mesh, simulate
-from taichi_dem.fields import field_bytes
+from taichi_dem.allocation import field_bytes
 from taichi_dem.files import output_folder, write_csv
+from taichi_dem.hole_monitor import HoleMonitor
 from taichi_dem.mesh_order import in_space_order
-from taichi_dem.monitor import HoleMonitor
 from taichi_dem.plot.deep import plot_deep_cracks
 from taichi_dem.plot_style import BLACK, BLUE, GREY, picture
 from taichi_dem.progress import time_left

@@ -69,7 +69,7 @@ class Checkpoint:
         return {step for distance in every for step in range(0, last + 1, distance)}
 
 
-class Due:
+class SaveTimer:
     """Whether a checkpoint is due, from what has passed since the last one."""
 
     def __init__(self, checkpoint):

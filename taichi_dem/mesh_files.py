@@ -28,7 +28,7 @@ from taichi_dem.mesh_content import (
     volumes_dropped,
 )
 from taichi_dem.mesh_split import shape_of, tetrahedra_in, triangles_in
-from taichi_dem.time_limit import within
+from taichi_dem.timeout import run_with_timeout
 
 #: Time that a reader may take [s], and what it reads at the slowest [byte/s]: some of meshio's wait
 #: for ever for the rest of a file that was cut off.
@@ -125,7 +125,7 @@ def _read_raw(path):
     sentence = f"its reader found no end in {seconds:.3g} s, as in a file that was cut off"
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-            return within(seconds, lambda: _meshio_read(path), sentence)
+            return run_with_timeout(seconds, lambda: _meshio_read(path), sentence)
     except (Exception, SystemExit) as error:  # meshio raises anything, and exits on some files
         reason = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"mesh file {path} cannot be read: {reason}") from None

@@ -5,10 +5,10 @@ import copy
 import numpy as np
 import taichi as ti
 
+from taichi_dem.allocation import defer_fill
 from taichi_dem.contact_spheres import spheres_of_faces
 from taichi_dem.display import counted, in_brief
 from taichi_dem.effects.base import ABSENT, MANY, ROLES
-from taichi_dem.fields import then
 from taichi_dem.tetrahedra import area_vectors
 from taichi_dem.topology import body_properties, topology_of
 from taichi_dem.types import mat3, real, vec4
@@ -82,7 +82,7 @@ class Model:
         self.inertia_inverse = ti.Matrix.field(3, 3, real, shape=n)
         corners = self.mesh.points[self.mesh.tetrahedra] - self.centre[:, None]
         self.body_radius = np.linalg.norm(corners, axis=-1).max(axis=1)
-        then(
+        defer_fill(
             self._load_bodies,
             self.body_mass,
             self.body_radius,
@@ -115,10 +115,10 @@ class Model:
         self.vertex_slave = ti.Vector.field(3, real, shape=units)
         self.neighbour = ti.field(ti.i32, shape=4 * self.body_count)
         self.face_bond = ti.field(ti.i32, shape=4 * self.body_count)
-        then(self.neighbour.fill, -1)
-        then(self.face_bond.fill, -1)
+        defer_fill(self.neighbour.fill, -1)
+        defer_fill(self.face_bond.fill, -1)
         if self.bond_count:
-            then(self._load_bonds, *self._bond_tables())
+            defer_fill(self._load_bonds, *self._bond_tables())
 
     def _bond_tables(self):
         """Slots, frames, areas and vertices of all bonds as arrays, in the order of the loader."""
@@ -172,9 +172,9 @@ class Model:
         self.sphere = ti.Vector.field(4, real, shape=faces * spheres.per_face)
         self.cluster = ti.Vector.field(4, real, shape=faces)
         ball = np.concatenate([spheres.centre, spheres.radius[..., None]], axis=-1)
-        then(self._load_spheres, ball.reshape(-1, 4), spheres.cluster.reshape(-1, 4))
+        defer_fill(self._load_spheres, ball.reshape(-1, 4), spheres.cluster.reshape(-1, 4))
         self.extent = ti.field(real, shape=self.body_count)
-        then(self.extent.from_numpy, spheres.extent)
+        defer_fill(self.extent.from_numpy, spheres.extent)
 
     @ti.kernel
     def _load_spheres(

@@ -9,13 +9,13 @@ import taichi as ti
 
 from taichi_dem.display import by_fields
 from taichi_dem.files import output_folder, write_csv
+from taichi_dem.hole_monitor import HoleMonitor
 from taichi_dem.mesh_files import write_pvd, write_vtu
-from taichi_dem.monitor import HoleMonitor
 from taichi_dem.state import NEVER
 from taichi_dem.tetrahedra import area_vectors
 from taichi_dem.timeline import MAX_LEVEL
 
-#: Ledger terms that have a column of their own in the time series, in its order.
+#: Energy terms that have a column of their own in the time series, in its order.
 ENERGY_COLUMNS = (
     "kinetic",
     "bond_strain",

@@ -20,8 +20,8 @@ class Report:
     ledger: energy terms [J]; ledger_residual_fraction: residual over the work put in.
     linear_momentum_error, angular_momentum_error: out of nothing, as shares of what was
     exchanged. compile_seconds, run_seconds, run_cpu_seconds: cost. acted: an ``EffectUse`` for each
-    effect. missed: a ``watch.Missed`` for each effect that was left out and needed. unresolved:
-    sentences about bonds and contacts for which the step was too long.
+    effect. missed: a ``missing_effects.MissingEffect`` for each effect that was left out and
+    needed. unresolved: sentences about bonds and contacts for which the step was too long.
     bound_by: bodies at the end by what bounds their step, see ``step_control.CRITERIA``.
     realised_gain: CPU time of one step for all over that of the run, where it was measured.
     """

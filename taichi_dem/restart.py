@@ -5,8 +5,8 @@ import os
 from taichi_dem.checkpoint import (
     Checkpoint,
     CtrlC,
-    Due,
     Interrupted,
+    SaveTimer,
     read_checkpoint,
     write_checkpoint,
 )
@@ -15,7 +15,7 @@ from taichi_dem.field_memory import FieldMemory
 from taichi_dem.files import output_folder
 
 
-class Saved:
+class RunSnapshot:
     """All of a run that changes: the fields on the device and what its parts hold beside them.
 
     identity: what two runs must share for one to go on from the other, words by name. root: of
@@ -55,16 +55,16 @@ def _under(part, arrays):
     return {k[len(part) + 1 :]: array for k, array in arrays.items() if k.startswith(f"{part}/")}
 
 
-class Keeper:
+class CheckpointWriter:
     """Saves a run when its checkpoint asks for it, and on Ctrl-C; its block listens for that.
 
-    checkpoint: a Checkpoint. saved: the ``Saved`` of the run. now: gives its present step and
+    checkpoint: a Checkpoint. saved: the ``RunSnapshot`` of the run. now: gives its present step and
     time [s]. All methods are called between two steps only.
     """
 
     def __init__(self, checkpoint, saved, now):
         self.checkpoint, self.saved, self.now = checkpoint, saved, now
-        self.due, self.ctrl_c, self.kept_s = Due(checkpoint), CtrlC(), None
+        self.due, self.ctrl_c, self.kept_s = SaveTimer(checkpoint), CtrlC(), None
         self.due.saved_at(*now())
 
     def __enter__(self):
@@ -103,7 +103,7 @@ class Keeper:
         return f"; checkpoint {path} holds the run at t = {self.kept_s:.6g} s"
 
 
-class NoKeeper:
+class NoCheckpointWriter:
     """Stands where a run is not to be saved."""
 
     def __enter__(self):

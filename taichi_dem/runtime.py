@@ -27,7 +27,7 @@ from taichi.lang import impl
 
 from taichi_dem.checks import choice, flag, whole
 from taichi_dem.errors import InputError
-from taichi_dem.source_lines import remember
+from taichi_dem.kernel_source_cache import remember
 
 ARCHITECTURES = ("cpu", "cuda")
 

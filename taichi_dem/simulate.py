@@ -10,13 +10,13 @@ from taichi_dem.checkpoint import Checkpoint, digest, version_text
 from taichi_dem.checks import AUTO, instance, progress_option, shown
 from taichi_dem.errors import InputError, SimulationDiverged
 from taichi_dem.files import output_folder
+from taichi_dem.measured_speedup import realised_gain
 from taichi_dem.methods import check_method
 from taichi_dem.outer_faces import outer_faces_warnings
 from taichi_dem.progress import Progress, compiling
 from taichi_dem.progress_bar import reporting
-from taichi_dem.realised import realised_gain
 from taichi_dem.record import Recorder
-from taichi_dem.restart import Keeper, NoKeeper, Saved, opened
+from taichi_dem.restart import CheckpointWriter, NoCheckpointWriter, RunSnapshot, opened
 from taichi_dem.result import Result
 from taichi_dem.scene import Scene
 from taichi_dem.simulation import Simulation, macro_steps
@@ -146,7 +146,7 @@ def _opened(scene, method, checkpoint, resume, last):
 def _keeper(simulation, recorder, checkpoint, resume, arrays):
     """What saves the run, after the run has been put where it was saved."""
     if checkpoint is None and resume is None:
-        return NoKeeper()
+        return NoCheckpointWriter()
     saved = saved_run(simulation, recorder)
     if arrays:
         saved.take(arrays, resume)
@@ -155,11 +155,13 @@ def _keeper(simulation, recorder, checkpoint, resume, arrays):
         """Present largest step, and time [s]."""
         return simulation.state.tick[None] // MACRO_TICKS, simulation.time_s
 
-    return Keeper(checkpoint, saved, now) if checkpoint is not None else NoKeeper()
+    return (
+        CheckpointWriter(checkpoint, saved, now) if checkpoint is not None else NoCheckpointWriter()
+    )
 
 
 def saved_run(simulation, recorder):
-    """All that a checkpoint holds of a started simulation, a ``restart.Saved``."""
+    """All that a checkpoint holds of a started simulation, a ``restart.RunSnapshot``."""
     parts = {
         "simulation": simulation,
         "ledger": simulation.ledger,
@@ -167,7 +169,7 @@ def saved_run(simulation, recorder):
         "resolution": simulation.resolution,
         "recorder": recorder,
     }
-    return Saved(identity_of(simulation.scene, simulation.method), simulation, parts)
+    return RunSnapshot(identity_of(simulation.scene, simulation.method), simulation, parts)
 
 
 def identity_of(scene, method):

@@ -6,32 +6,32 @@ import time
 import numpy as np
 
 from taichi_dem import runtime
+from taichi_dem.allocation import batch_allocation
 from taichi_dem.checks import choice, instance, positive, whole
 from taichi_dem.display import counted, in_brief
-from taichi_dem.effects_acted import effects_acted
+from taichi_dem.divergence import DivergenceCheck
+from taichi_dem.effect_activity import effects_acted
+from taichi_dem.energy_balance import EnergyBalance
 from taichi_dem.errors import InputError, SimulationDiverged
-from taichi_dem.fields import fields_first
-from taichi_dem.health import Health
-from taichi_dem.ledger import Ledger
 from taichi_dem.methods import check_method
+from taichi_dem.missing_effects import MissingEffects
 from taichi_dem.model import Model
 from taichi_dem.progress import compiling
 from taichi_dem.report import Report
-from taichi_dem.resolution import Resolution
 from taichi_dem.scene import Scene
 from taichi_dem.state import NEVER, State
 from taichi_dem.step.advance import Advance
+from taichi_dem.step.auto_driver import AutoDriver
 from taichi_dem.step.broad_phase import BroadPhase
 from taichi_dem.step.contacts import Contacts
 from taichi_dem.step.drivers import DRIVERS, SolvedStep, Step
 from taichi_dem.step.implicit.advance import SolvedAdvance
 from taichi_dem.step.implicit.solver import Solver
-from taichi_dem.step.quicker import Quicker
-from taichi_dem.step.rates import rates_for
 from taichi_dem.step.schedule import Schedule
+from taichi_dem.step.stability_limits import limits_for
 from taichi_dem.step_control import counted_criteria
+from taichi_dem.step_resolution import StepResolution
 from taichi_dem.timeline import MACRO_TICKS
-from taichi_dem.watch import Watch
 
 #: Largest steps of a run, of which the ticks are counted in 64 bits.
 MOST_STEPS = 2**42
@@ -62,7 +62,7 @@ class Simulation:
         compiling("set-up", 0.0)
         self.scene, self.method = scene, method
         self.solves = method.solves
-        with fields_first():
+        with batch_allocation():
             self.model = Model(scene.mesh, scene.material, scene.effects)
             driver = _driver_name(driver, self.model.bond_count)
             self.state = State(self.model, scene.max_speed)
@@ -74,7 +74,7 @@ class Simulation:
                 self.broad_phase = BroadPhase(*parts, brute_force)
         kind = SolvedStep if self.solves else Step
         self.step = kind(self.advance, self.schedule, self.broad_phase)
-        self.driver = {**DRIVERS, _MEASURED: Quicker}[driver](self.step)
+        self.driver = {**DRIVERS, _MEASURED: AutoDriver}[driver](self.step)
         self.ledger = None
         self.compile_seconds = time.perf_counter() - started
         self.run_seconds = self.run_cpu_seconds = 0.0
@@ -91,7 +91,7 @@ class Simulation:
         if model.has_contact:
             self.contacts = Contacts(model, state, method.dt0, method.ahead)
         drifted = method.neighbour == "drifted"
-        rates = rates_for(model, state, self.contacts, method)
+        rates = limits_for(model, state, self.contacts, method)
         self.schedule = Schedule(
             model,
             state,
@@ -133,12 +133,12 @@ class Simulation:
         self.driver.settle()
         self._check_room()
         compiling("energy balance", 0.85)
-        self.ledger = Ledger(self.model, self.state, self.advance, self.contacts)
-        self.health = Health(
+        self.ledger = EnergyBalance(self.model, self.state, self.advance, self.contacts)
+        self.health = DivergenceCheck(
             self.model, self.state, self.schedule, self.contacts, self.ledger, self.solves
         )
-        self.watch = Watch(self.model, self.state, self.advance)
-        self.resolution = Resolution(self.model, self.state, self.advance)
+        self.watch = MissingEffects(self.model, self.state, self.advance)
+        self.resolution = StepResolution(self.model, self.state, self.advance)
         self.look()
         self.health.check()
         self.evaluations_ahead()

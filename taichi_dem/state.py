@@ -3,7 +3,7 @@
 import numpy as np
 import taichi as ti
 
-from taichi_dem.fields import then
+from taichi_dem.allocation import defer_fill
 from taichi_dem.physics.rotation import rotation_matrix, spin_of
 from taichi_dem.types import real, vec3, vec4
 
@@ -52,7 +52,7 @@ class State:
             self.bond_heat = ti.Vector.field(3, real, shape=bonds)
         if model.has_contact:
             self.exposed_tick = ti.field(ti.i64, shape=4 * n)
-            then(self.exposed_tick.fill, NEVER)
+            defer_fill(self.exposed_tick.fill, NEVER)
             self.contact_heat = ti.Vector.field(3, real, shape=n)
             self.injected_tick = ti.field(ti.i64, shape=())
         self.load_work = ti.Vector.field(len(model.loads) + 1, real, shape=n)
@@ -60,10 +60,10 @@ class State:
         self.tick = ti.field(ti.i64, shape=())
         self.bad_body = ti.field(ti.i32, shape=())
         self.max_speed2 = ti.field(real, shape=())
-        then(self.max_speed2.fill, max_speed**2)
-        then(self.broken_tick.fill, NEVER)
-        then(self.bad_body.fill, n)
-        then(self.place, model.centre, np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)))
+        defer_fill(self.max_speed2.fill, max_speed**2)
+        defer_fill(self.broken_tick.fill, NEVER)
+        defer_fill(self.bad_body.fill, n)
+        defer_fill(self.place, model.centre, np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)))
 
     def place(self, position, orientation, velocity=None, spin=None):
         """Set the motion of all bodies.

@@ -6,8 +6,8 @@ from typing import Optional
 import numpy as np
 import taichi as ti
 
+from taichi_dem.allocation import defer_fill
 from taichi_dem.checks import between, choices, whole
-from taichi_dem.fields import then
 from taichi_dem.timeline import MAX_LEVEL
 from taichi_dem.types import real
 
@@ -103,7 +103,7 @@ class Displacement:
     def __init__(self, distance, dt0, power=1):
         steps = dt0 / 2.0 ** np.arange(MAX_LEVEL + 1)
         self.rate2 = ti.field(real, shape=MAX_LEVEL + 2)
-        then(self.rate2.from_numpy, np.append((distance / steps**power) ** 2, np.inf))
+        defer_fill(self.rate2.from_numpy, np.append((distance / steps**power) ** 2, np.inf))
 
     @ti.func
     def finer(self, level, rate2):

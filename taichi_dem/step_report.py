@@ -20,7 +20,7 @@ from taichi_dem.quality import (
     springs_of,
 )
 from taichi_dem.scene import Scene
-from taichi_dem.step.rates import LIMITED
+from taichi_dem.step.stability_limits import LIMITED
 from taichi_dem.step_control import StepControl
 from taichi_dem.tetrahedra import all_faces, area_vectors
 from taichi_dem.topology import body_properties, topology_of
@@ -206,7 +206,7 @@ def contact_eigenvalues(mesh, density, divisions, friction):
 
     The first is for the worst of its spheres in contact, the second for all of the worst face.
     D is the identity with friction, n n^T without; contacts act where a sphere touches its face.
-    The step finds the same from the contacts that are near (``step/near.py``).
+    The step finds the same from the contacts that are near (``step/contact_limits.py``).
     """
     mass, centre, inertia = body_properties(mesh, density)
     spheres = spheres_of_faces(mesh, centre, divisions)

@@ -10,7 +10,7 @@ kept, and the mean force is the weight.
 
 import taichi as ti
 
-from ca_damper.automaton.ledger import EJECTIONS, REST, quanta
+from ca_damper.automaton.impulse_balance import EJECTIONS, REST, quanta
 
 
 @ti.data_oriented
@@ -72,7 +72,7 @@ class Landings:
 
 
 @ti.data_oriented
-class Everything:
+class AllImpulses:
     """All gains of velocity but by gravity act on the container; nothing is remembered."""
 
     asks_for_lattice = True

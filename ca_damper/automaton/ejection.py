@@ -9,7 +9,7 @@ stays in the room has nothing pushed in its way, or it would touch it and be pus
 
 import taichi as ti
 
-from ca_damper.automaton.tally import PUSHES
+from ca_damper.automaton.event_counts import PUSHES
 from ca_damper.lattice import DIRECTIONS, DOWN, HELD, UP
 
 

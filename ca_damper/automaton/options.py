@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from numbers import Integral
 
 from ca_damper.automaton.accumulator import READINGS
-from ca_damper.automaton.bound import BoundAutomaton
-from ca_damper.automaton.rivals import MOST_CELLS
+from ca_damper.automaton.conflict_resolution import MOST_CELLS
+from ca_damper.automaton.device import DeviceAutomaton
 from ca_damper.filling import check_places
 from taichi_dem.checks import choice, flag, fraction, positive, shown, whole
 from taichi_dem.errors import InputError
@@ -160,4 +160,4 @@ class Automaton:
     def bind(self, table):
         """The automaton on the device, for all scenes of a SceneTable."""
         check_places(table.count, (self.columns + 2) * (self.rows + 2))
-        return BoundAutomaton(self, table)
+        return DeviceAutomaton(self, table)

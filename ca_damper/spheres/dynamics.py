@@ -16,9 +16,9 @@ import numpy as np
 import taichi as ti
 
 from ca_damper.filling import Action
-from ca_damper.spheres.acted import Acted
 from ca_damper.spheres.bodies import Bodies, vec2
 from ca_damper.spheres.contact_law import Contact, ContactLaw, pair_numbers, wall_numbers
+from ca_damper.spheres.effect_activity import EffectActivity
 from ca_damper.spheres.rotation import NoRotation, Rotation
 from ca_damper.spheres.search import make_search
 
@@ -43,7 +43,7 @@ _FORGOTTEN = 1.0 / 256.0
 
 
 @ti.data_oriented
-class BoundSpheres:
+class DeviceSpheres:
     """The spheres of all scenes of a table, on the device; see ``ca_damper.filling``.
 
     crushed: whether spheres of a scene lay in each other by a radius when ``health`` looked last.
@@ -58,7 +58,7 @@ class BoundSpheres:
         self.rotation = Rotation() if options.rotation else NoRotation()
         self.search = make_search(options.search, options.radius)
         self.crushed = ti.field(ti.i32, shape=table.count)
-        self.acted = Acted(table.count)
+        self.acted = EffectActivity(table.count)
         self.given = ti.field(ti.f64, shape=table.count)
         self.lost = ti.field(ti.f64, shape=table.count)
         self.held = ti.field(ti.f64, shape=table.count)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ca_damper.filling import check_places
 from ca_damper.spheres.contact_law import POWERS, contact_duration, pair_numbers
-from ca_damper.spheres.dynamics import DIVERGENCES, BoundSpheres
+from ca_damper.spheres.dynamics import DIVERGENCES, DeviceSpheres
 from ca_damper.spheres.search import SEARCHES
 from taichi_dem.checks import choice, finite, flag, fraction, positive, shown, whole
 from taichi_dem.errors import InputError
@@ -143,7 +143,7 @@ class Spheres:
     def bind(self, table):
         """The spheres on the device, for all scenes of a SceneTable."""
         check_places(table.count, self.capacity)
-        return BoundSpheres(self, table)
+        return DeviceSpheres(self, table)
 
     def _check_restitution(self, name):
         value = fraction(name, getattr(self, name))

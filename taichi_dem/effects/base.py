@@ -19,8 +19,8 @@ b is a bond, u one of its three contact units (3 b, 3 b + 1, 3 b + 2), i a body.
 import numpy as np
 import taichi as ti
 
+from taichi_dem.allocation import defer_fill
 from taichi_dem.display import by_arguments
-from taichi_dem.fields import then
 from taichi_dem.types import real, vec3
 
 MANY = ("load", "support")
@@ -50,7 +50,7 @@ class Effect:
 def parameters(**values):
     """Checked parameters in one field, in the order given; floats that kernels read."""
     field = ti.field(real, shape=len(values))
-    then(field.from_numpy, np.array(list(values.values()), dtype=np.float64))
+    defer_fill(field.from_numpy, np.array(list(values.values()), dtype=np.float64))
     return field
 
 

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import taichi as ti
 
+from taichi_dem.allocation import defer_fill
 from taichi_dem.checks import positive, word
 from taichi_dem.effects.base import Effect, parameters
-from taichi_dem.fields import then
 from taichi_dem.physics.rotation import zero3
 from taichi_dem.tetrahedra import area_vectors
 from taichi_dem.topology import face_vertices, faces_of_group
@@ -58,7 +58,7 @@ class GasPressure(Effect):
         self.first = ti.field(ti.i32, shape=body_count + 1)
         self.area = ti.Vector.field(3, ti.f64, shape=len(area))
         self.arm = ti.Vector.field(3, ti.f64, shape=len(area))
-        then(self._load, first.astype(np.int32), area, arm)
+        defer_fill(self._load, first.astype(np.int32), area, arm)
 
     @ti.kernel
     def _load(

@@ -2,9 +2,9 @@
 
 import taichi as ti
 
+from taichi_dem.allocation import defer_fill
 from taichi_dem.checks import direction
 from taichi_dem.effects.base import Effect
-from taichi_dem.fields import then
 from taichi_dem.physics.rotation import zero3
 
 
@@ -22,7 +22,7 @@ class Gravity(Effect):
         """Put the acceleration where kernels read it."""
         self.model = model
         self.acceleration = ti.Vector.field(3, ti.f64, shape=())
-        then(self.acceleration.fill, ti.Vector(self._acceleration))
+        defer_fill(self.acceleration.fill, ti.Vector(self._acceleration))
 
     @ti.func
     def acts_on(self, i):

@@ -2,8 +2,8 @@
 
 import taichi as ti
 
+from taichi_dem.allocation import defer_fill
 from taichi_dem.effects.base import Effect, parameters
-from taichi_dem.fields import then
 from taichi_dem.physics.fracture import coulomb_limit, slip_beyond
 from taichi_dem.types import vec2
 
@@ -24,7 +24,7 @@ class ShearSlip(Effect):
         self.model = model
         self.law = parameters(cohesion=model.material.cohesion, friction=model.material.friction)
         self.slip = ti.Vector.field(2, ti.f64, shape=max(1, 3 * model.bond_count))
-        then(self.slip.fill, vec2(0.0, 0.0))
+        defer_fill(self.slip.fill, vec2(0.0, 0.0))
 
     def state(self):
         """Residual slip of every unit in the face frame [m]."""

@@ -2,8 +2,8 @@
 
 import taichi as ti
 
+from taichi_dem.allocation import defer_fill
 from taichi_dem.effects.base import Effect, parameters
-from taichi_dem.fields import then
 from taichi_dem.physics.fracture import envelope_traction, softening_energy
 from taichi_dem.types import vec2
 
@@ -26,7 +26,7 @@ class Softening(Effect):
         material = model.material
         self.law = parameters(strength=material.tensile_strength, failure=material.failure_opening)
         self.unit = ti.Vector.field(2, ti.f64, shape=max(1, 3 * model.bond_count))
-        then(self._reset)
+        defer_fill(self._reset)
 
     def state(self):
         """Elastic limit [m] and secant stiffness [Pa/m] of every unit."""

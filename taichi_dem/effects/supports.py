@@ -5,10 +5,10 @@ import math
 import numpy as np
 import taichi as ti
 
+from taichi_dem.allocation import defer_fill
 from taichi_dem.checks import direction, positive, shown, word
 from taichi_dem.effects.base import Effect, parameters
 from taichi_dem.errors import InputError
-from taichi_dem.fields import then
 from taichi_dem.physics.rotation import zero3
 from taichi_dem.topology import faces_of_group
 from taichi_dem.types import vec3
@@ -30,7 +30,7 @@ class _Support(Effect):
         marks = np.zeros(model.body_count, dtype=np.int32)
         marks[body] = 1
         self.marked = ti.field(ti.i32, shape=model.body_count)
-        then(self.marked.from_numpy, marks)
+        defer_fill(self.marked.from_numpy, marks)
 
     @ti.func
     def acts_on(self, i):

@@ -5,7 +5,7 @@ import numpy as np
 
 from taichi_dem.plot_style import BLUE, GREEN, PURPLE, RED, picture, seconds, styles_of
 
-#: Ledger terms from the bottom of the stack up: blue is held, red lost in bonds, green in contacts.
+#: Energy terms from the bottom of the stack up: blue is held, red lost in bonds, green in contacts.
 _TERMS = {
     "kinetic_J": ("kinetic", "#08306B"),
     "bond_strain_J": ("bond strain", "#3A87C2"),

@@ -10,13 +10,13 @@ import taichi as ti
 
 from taichi_dem.physics.bond import bond_motion, unit_arm, unit_opening, unit_velocity
 from taichi_dem.physics.rotation import mean_spin, rotation_matrix, spin_of, turned, zero3
-from taichi_dem.step.rates import RELEASE
-from taichi_dem.step.touch import Touch
+from taichi_dem.step.contact_force import ContactForce
+from taichi_dem.step.stability_limits import RELEASE
 from taichi_dem.types import real, vec2, vec3
 
 
 @ti.data_oriented
-class Advance(Touch):
+class Advance(ContactForce):
     """The order in which physics and effects act; see the module."""
 
     def __init__(self, model, state, schedule, contacts, solver=None):

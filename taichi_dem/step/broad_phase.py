@@ -9,11 +9,11 @@ import taichi as ti
 
 from taichi_dem.errors import InputError
 from taichi_dem.step.candidates import Candidates
-from taichi_dem.step.cells import group
-from taichi_dem.step.near_spheres import NearSpheres
-from taichi_dem.step.neighbours import FAR, Neighbours
+from taichi_dem.step.cell_grid import group
+from taichi_dem.step.narrow_phase import NarrowPhase
 from taichi_dem.step.numbering import Numbering
 from taichi_dem.step.old_pairs import OldPairs
+from taichi_dem.step.verlet_list import FAR, VerletList
 
 _ROOM = ("", "pairs_per_body", "spheres_per_body", "neighbours_per_body")
 
@@ -38,9 +38,9 @@ class BroadPhase:
         self.model, self.state = contacts.model, contacts.state
         self.rough = ti.field(ti.i32, shape=n)
         self.rough_count = ti.field(ti.i32, shape=())
-        self.near = Neighbours(contacts, brute_force)
+        self.near = VerletList(contacts, brute_force)
         self.known = self.near.known
-        self.spheres = NearSpheres(contacts, self.known)
+        self.spheres = NarrowPhase(contacts, self.known)
         self.searched = ti.field(ti.i64, shape=())
         self.looked = ti.field(ti.i32, shape=n)
         self.everywhere = ti.field(ti.i32, shape=())

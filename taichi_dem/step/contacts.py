@@ -7,7 +7,7 @@ whoever searched when.
 
 import taichi as ti
 
-from taichi_dem.fields import then
+from taichi_dem.allocation import defer_fill
 from taichi_dem.types import real, vec3
 
 #: Largest steps that a fast body makes before the search looks at it again.
@@ -57,7 +57,7 @@ class Contacts:
         self.travel = ti.field(real, shape=n)
         self.leeway = ti.field(real, shape=n)
         self.skin = ti.field(real, shape=())
-        then(self.skin.fill, effect.skin)
+        defer_fill(self.skin.fill, effect.skin)
         self.search_due = ti.field(ti.i32, shape=())
         self.deepest = ti.field(real, shape=self.capacity)
 

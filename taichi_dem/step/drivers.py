@@ -10,7 +10,7 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem.step.implicit.pairs import COLOURS
-from taichi_dem.step.wake import Wake
+from taichi_dem.step.wake_up import WakeUp
 
 #: The parallel driver is called for about this long [s] between two looks at health, progress and
 #: Ctrl-C.
@@ -84,7 +84,7 @@ class Step:
             return ()
         phases = ((rates, rates.refresh),)
         if self.schedule.retimes:
-            phases += ((rates, Wake(self.advance, self.schedule).rouse),)
+            phases += ((rates, WakeUp(self.advance, self.schedule).rouse),)
         return (*phases, (Once(), self.schedule.settle))
 
     @ti.kernel

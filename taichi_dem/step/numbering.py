@@ -7,7 +7,7 @@ import taichi as ti
 class Numbering:
     """Numbers the pairs of a ``Contacts`` by what the entries of the neighbours say.
 
-    A row of which nothing has changed is numbered from the old list. near: the ``Neighbours``; old:
+    A row of which nothing has changed is numbered from the old list. near: the ``VerletList``; old:
     the ``OldPairs``; candidates: where their spheres lie; full: 1 or 2 when there is no room for
     pairs or for spheres. faces: of a new pair those with new spheres, bit 4 f + g; 0 when it keeps
     those that it had.

@@ -7,10 +7,10 @@ own entries.
 import numpy as np
 import taichi as ti
 
-from taichi_dem.fields import raise_to, then
-from taichi_dem.step.due_list import DueList
+from taichi_dem.allocation import defer_fill, raise_to
+from taichi_dem.step.active_list import ActiveList
+from taichi_dem.step.applied_until import AppliedUntil
 from taichi_dem.step.level_limit import LevelLimit
-from taichi_dem.step.payments import Payments
 from taichi_dem.step_control import DISPLACEMENT, LARGEST, NEIGHBOUR
 from taichi_dem.timeline import MACRO_TICKS, MAX_LEVEL, device_coarsest_due, device_ticks_of
 from taichi_dem.types import real
@@ -24,11 +24,11 @@ class Schedule:
     drifted: bodies next to a due one are brought to its time too, else only due bodies move.
     dt0 [s]: step of level 0. finest: finest level present. low: coarsest level now due.
     changed: bodies whose own level or bonds changed since the lists were put in order.
-    rates: a ``Rates`` that knows stable steps, None where the rule needs none. retimes: whether
-    bodies may be brought to the present between their own times; payments then keeps what bonds and
-    pairs have given ahead. level_limit: how much coarser than its neighbours a body may be.
-    evaluations: substeps, bodies advanced, bonds and pairs evaluated, and the bonds and pairs that
-    one step for all would have evaluated in the same substeps.
+    rates: a ``StabilityLimits`` that knows stable steps, None where the rule needs none. retimes:
+    whether bodies may be brought to the present between their own times; payments then keeps what
+    bonds and pairs have given ahead. level_limit: how much coarser than its neighbours a body may
+    be. evaluations: substeps, bodies advanced, bonds and pairs evaluated, and the bonds and pairs
+    that one step for all would have evaluated in the same substeps.
     """
 
     def __init__(self, model, state, contacts, criterion, dt0, uniform, drifted, rates=None):
@@ -36,7 +36,7 @@ class Schedule:
         self.has_rates = rates is not None
         self.controlled = self.has_rates and rates.control is not None
         self.retimes = self.controlled and rates.wakes != 0
-        self.payments = Payments(model, state, self, rates) if self.retimes else None
+        self.payments = AppliedUntil(model, state, self, rates) if self.retimes else None
         self.spreads = self.controlled and not uniform and rates.jump is not None
         if self.spreads:
             self.level_limit = LevelLimit(model, state, contacts, rates)
@@ -45,10 +45,10 @@ class Schedule:
         self.dt0 = dt0
         self.tick_seconds = dt0 / MACRO_TICKS
         self.step_seconds = ti.field(real, shape=MAX_LEVEL + 1)
-        then(self.step_seconds.from_numpy, dt0 / 2.0 ** np.arange(MAX_LEVEL + 1))
-        self.bodies = DueList(model.body_count)
-        self.bonds = DueList(model.bond_count)
-        self.pairs = DueList(contacts.capacity if contacts else 1)
+        defer_fill(self.step_seconds.from_numpy, dt0 / 2.0 ** np.arange(MAX_LEVEL + 1))
+        self.bodies = ActiveList(model.body_count)
+        self.bonds = ActiveList(model.bond_count)
+        self.pairs = ActiveList(contacts.capacity if contacts else 1)
         self.low = ti.field(ti.i32, shape=())
         self.finest = ti.field(ti.i32, shape=())
         self.wanted = ti.field(ti.i32, shape=())

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ca_damper.automaton import ACCOUNTINGS, Automaton
-from ca_damper.automaton.ledger import ITEMS, QUANTUM
+from ca_damper.automaton.impulse_balance import ITEMS, QUANTUM
 from tests.ca_automaton.shaken import Shaken
 
 MASS, GRAVITY, DT, AMPLITUDE, FREQUENCY = 0.2e-3, 10.0, 1e-4, 18e-3, 6.0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ca_damper import Automaton, Batch, Empty, RigidMass, SceneTable, Spheres
-from ca_damper.automaton.ledger import QUANTUM
+from ca_damper.automaton.impulse_balance import QUANTUM
 
 EPS = np.finfo(float).eps
 PARTICLES = (1, 40)

@@ -5,7 +5,7 @@ import pytest
 
 from taichi_dem import ImplicitDashpots, Simulation, runtime
 from taichi_dem.simulation import PARALLEL_FROM, RESIDENT_BELOW, _driver_name
-from taichi_dem.step.quicker import Quicker
+from taichi_dem.step.auto_driver import AutoDriver
 from tests.bar_blast import UNTIL, squeezed_scene
 
 METHOD = ImplicitDashpots(4e-7, refresh=1e-5)
@@ -45,7 +45,7 @@ def runs():
     straight.advance_to(STEPS)
     simulation = Simulation(squeezed_scene(), METHOD, "resident")
     clock = Slow("resident")
-    simulation.driver = Quicker(simulation.step, clock)
+    simulation.driver = AutoDriver(simulation.step, clock)
     simulation.start()
     clock.watch(simulation.driver)
     names = [simulation.driver.name]
@@ -78,7 +78,7 @@ def test_changing_drivers_changes_no_bit(runs):
 def test_tries_take_their_share(runs):
     """Tries of 2 (1 + 0.01) s are repeated once the driver has gone on for twenty times as long."""
     _, simulation, _ = runs
-    made, clock = Quicker(simulation.step, Slow("parallel")), None
+    made, clock = AutoDriver(simulation.step, Slow("parallel")), None
     clock = made.clock
     for name, driver in made.drivers.items():
         seconds = 1.0 if name == "parallel" else 0.01

@@ -5,7 +5,7 @@ import pytest
 
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects
 from taichi_dem.mesh_shapes import bar
-from taichi_dem.step import neighbours
+from taichi_dem.step import verlet_list
 from taichi_dem.step.contacts import FARTHEST, STEPS
 from tests.again import Again
 
@@ -231,7 +231,7 @@ def test_a_full_row_drops_what_its_body_has_left(monkeypatch):
 
     Whatever is near is in the list all the same, and rooms are seldom allotted anew.
     """
-    monkeypatch.setattr(neighbours, "ROOM", 8)
+    monkeypatch.setattr(verlet_list, "ROOM", 8)
     skin, random = 2e-3, np.random.default_rng(5)
     simulation = scattered(bodies(), skin, 0.05)
     near, motion = simulation.broad_phase.near, simulation.state.motion()

@@ -12,9 +12,9 @@ import pytest
 import taichi as ti
 
 from taichi_dem import Checkpoint, InputError
-from taichi_dem.checkpoint import CtrlC, Due, digest, read_checkpoint, write_checkpoint
+from taichi_dem.checkpoint import CtrlC, SaveTimer, digest, read_checkpoint, write_checkpoint
 from taichi_dem.field_memory import FieldMemory, fields_of, without_end
-from taichi_dem.restart import Keeper
+from taichi_dem.restart import CheckpointWriter
 
 IDENTITY = {"version": "1", "mesh": "a cube"}
 ARRAYS = {"field/a.b": np.arange(12.0).reshape(4, 3), "part/none": np.zeros((0, 2))}
@@ -103,7 +103,7 @@ class FullDisk:
 
 
 class OneArray:
-    """What a ``Saved`` is to a Keeper."""
+    """What a ``RunSnapshot`` is to a CheckpointWriter."""
 
     def write(self, path):
         write_checkpoint(path, IDENTITY, ARRAYS)
@@ -111,7 +111,7 @@ class OneArray:
 
 def test_a_full_disk_leaves_the_last_good_checkpoint_and_says_so(tmp_path, monkeypatch):
     path, opened, room = tmp_path / "run.npz", builtins.open, [10**6]
-    keeper = Keeper(Checkpoint(path), OneArray(), lambda: (3, 1.5))
+    keeper = CheckpointWriter(Checkpoint(path), OneArray(), lambda: (3, 1.5))
 
     def narrow(name, mode="r", *rest, **options):
         file = opened(name, mode, *rest, **options)
@@ -158,7 +158,7 @@ def test_marks_are_whole_steps_no_nearer_than_asked_for():
 def test_a_checkpoint_is_due_by_steps_by_time_and_by_the_wall(monkeypatch):
     wall = [100.0]
     monkeypatch.setattr("time.perf_counter", lambda: wall[0])
-    due = Due(Checkpoint("x", every_steps=10, every_s=1e-6, every_wall_s=60.0))
+    due = SaveTimer(Checkpoint("x", every_steps=10, every_s=1e-6, every_wall_s=60.0))
     due.saved_at(5, 2e-7)
     assert not due.now(14, 1.1e-6)
     assert due.now(15, 1.1e-6)

@@ -17,8 +17,8 @@ from taichi_dem.contact_spheres import spheres_of_faces
 from taichi_dem.display import counted, in_brief, listed
 from taichi_dem.effects.base import Effect
 from taichi_dem.mesh_shapes import bar
+from taichi_dem.missing_effects import MissingEffect
 from taichi_dem.step_control import Displacement, FixedStep
-from taichi_dem.watch import Missed
 
 PACKAGES = (taichi_dem, ca_damper)
 MOST_LETTERS, MOST_LINES = 500, 3
@@ -55,7 +55,10 @@ def of_the_blast():
     yield from (mesh, scene, result, result.model, result.report, result.frames[0])
     yield from (result.model.topology, spheres_of_faces(mesh, result.model.centre, 5))
     yield from (taichi_dem.Simulation(scene, method), result.report.acted[0])
-    yield from (taichi_dem.needed_effects(result), Missed("Softening", "bonds are stretched"))
+    yield from (
+        taichi_dem.needed_effects(result),
+        MissingEffect("Softening", "bonds are stretched"),
+    )
     yield from (taichi_dem.step_report(scene), taichi_dem.quality_report(mesh, CONCRETE))
     yield taichi_dem.Checkpoint("run.npz")
 

@@ -17,7 +17,7 @@ PAST = 20e-6
 _COUNT = """
 import glob, json, os, re, sys
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects, runtime
-from taichi_dem.fields import field_bytes
+from taichi_dem.allocation import field_bytes
 from taichi_dem.mesh_shapes import pair
 from taichi_dem.step.advance import Advance
 import taichi as ti

@@ -16,9 +16,18 @@ ROOT = Path(__file__).resolve().parents[2]
 # row below. A folder counts as one module. A new module needs a place here.
 LAYERS = {
     "taichi_dem": (
-        ("errors", "types", "checks", "display", "source_lines", "runtime", "version", "progress"),
         (
-            *("fields", "field_memory", "files", "effect_use", "time_limit", "listing"),
+            "errors",
+            "types",
+            "checks",
+            "display",
+            "kernel_source_cache",
+            "runtime",
+            "version",
+            "progress",
+        ),
+        (
+            *("allocation", "field_memory", "files", "effect_use", "timeout", "listing"),
             "progress_bar",
         ),
         ("plot_style", "checkpoint"),
@@ -35,13 +44,13 @@ LAYERS = {
         ("model",),
         ("state",),
         ("step",),
-        ("ledger",),
+        ("energy_balance",),
         (
-            *("outer_faces", "health", "watch", "resolution"),
-            *("report", "step_report", "effects_acted"),
+            *("outer_faces", "divergence", "missing_effects", "step_resolution"),
+            *("report", "step_report", "effect_activity"),
         ),
         ("simulation",),
-        ("monitor", "record", "realised"),
+        ("hole_monitor", "record", "measured_speedup"),
         ("plot",),
         ("result",),
         ("simulate", "needed_effects"),
@@ -64,7 +73,7 @@ LAYERS = {
 # What one package may take from another.
 ACROSS = {
     "ca_damper": (
-        *("taichi_dem.runtime", "taichi_dem.errors", "taichi_dem.checks", "taichi_dem.fields"),
+        *("taichi_dem.runtime", "taichi_dem.errors", "taichi_dem.checks", "taichi_dem.allocation"),
         *("taichi_dem.files", "taichi_dem.plot_style", "taichi_dem.effect_use"),
         *("taichi_dem.display",),
         *("taichi_dem.checkpoint", "taichi_dem.restart"),

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, InputError, Scene, Uniform, effects, needed_effects, simulate
+from taichi_dem.effect_activity import effects_acted
 from taichi_dem.effect_use import Advice, EffectUse
-from taichi_dem.effects_acted import effects_acted
-from taichi_dem.ledger import TERMS
+from taichi_dem.energy_balance import TERMS
 from taichi_dem.mesh_shapes import pair
 from taichi_dem.model import Model
 from taichi_dem.state import State

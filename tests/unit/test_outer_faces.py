@@ -9,12 +9,12 @@ import pytest
 
 from taichi_dem import CONCRETE, Scene, Uniform, checked_mesh, effects, simulate
 from taichi_dem.mesh_shapes import bar, pair, single
+from taichi_dem.missing_effects import MissingEffects
 from taichi_dem.model import Model
 from taichi_dem.outer_faces import LEAST_OVERLAP, OuterFaces, outer_faces_warnings
 from taichi_dem.simulation import Simulation
 from taichi_dem.state import State
 from taichi_dem.step_report import step_report
-from taichi_dem.watch import Watch
 
 EDGE = 0.05
 
@@ -178,7 +178,7 @@ def test_finding_names_the_remedy_and_survives_a_checkpoint():
     looked = Looked(TWO)
 
     def watching():
-        return Watch(looked.model, looked.state, SimpleNamespace(contacts=None))
+        return MissingEffects(looked.model, looked.state, SimpleNamespace(contacts=None))
 
     watch = watching()
     watch.look(0.0)
@@ -198,7 +198,7 @@ def test_finding_names_the_remedy_and_survives_a_checkpoint():
 def test_nothing_is_looked_for_where_outer_faces_carry_spheres_or_nothing_does():
     for listed in ([], [effects.SphereContact(outer_faces=True)]):
         model = Model(TWO, CONCRETE, listed)
-        watch = Watch(model, State(model, 1e4), SimpleNamespace(contacts=None))
+        watch = MissingEffects(model, State(model, 1e4), SimpleNamespace(contacts=None))
         assert watch.outer_faces is None
 
 

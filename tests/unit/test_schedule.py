@@ -3,7 +3,7 @@
 import numpy as np
 import taichi as ti
 
-from taichi_dem.step.schedule import DueList
+from taichi_dem.step.schedule import ActiveList
 from taichi_dem.step_control import Displacement
 from taichi_dem.timeline import MAX_LEVEL, coarsest_due
 
@@ -15,7 +15,7 @@ class Sorter:
     def __init__(self, keys):
         self.keys = ti.field(ti.i32, shape=len(keys))
         self.keys.from_numpy(keys)
-        self.list = DueList(len(keys))
+        self.list = ActiveList(len(keys))
         self.fill(len(keys))
 
     @ti.func

@@ -19,7 +19,7 @@ from taichi_dem import (
 )
 from taichi_dem.mesh_shapes import bar, pair, single
 from taichi_dem.quality import bond_rates, dashpot_step, dashpots_of, spring_step, subset_rates
-from taichi_dem.step.rates import LIMITED
+from taichi_dem.step.stability_limits import LIMITED
 from taichi_dem.step_control import CRITERIA
 from taichi_dem.step_report import StepReport, stable_together
 from taichi_dem.topology import topology_of

@@ -17,7 +17,7 @@ from taichi_dem import (
 from taichi_dem.mesh import checked_mesh
 from taichi_dem.mesh_shapes import pair, single
 from taichi_dem.quality import bond_rates, dashpot_step, dashpots_of, spring_step, springs_of
-from taichi_dem.step.rates import LIMITED
+from taichi_dem.step.stability_limits import LIMITED
 from taichi_dem.step_report import contact_eigenvalues
 from taichi_dem.timeline import MACRO_TICKS, MAX_LEVEL
 from taichi_dem.topology import topology_of

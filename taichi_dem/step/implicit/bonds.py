@@ -3,7 +3,7 @@
 import numpy as np
 import taichi as ti
 
-from taichi_dem.fields import then
+from taichi_dem.allocation import defer_fill
 from taichi_dem.physics.wrench import inverse, mobility, plus, point_block, zero_block
 from taichi_dem.step.implicit.colouring import edge_colours
 from taichi_dem.timeline import MACRO_TICKS
@@ -38,13 +38,13 @@ class BondDashpots:
         self.a, self.b, self.c = (ti.Matrix.field(3, 3, real, shape=bonds) for _ in range(3))
         self.start = ti.Vector.field(6, real, shape=bonds)
         self.last = ti.Vector.field(6, real, shape=bonds)
-        then(self.bodies.fill, -1)
+        defer_fill(self.bodies.fill, -1)
         top = model.topology
         colours = edge_colours(np.stack([top.master, top.slave], axis=1), model.body_count)
         self.colours = np.bincount(colours, minlength=1).tolist()
         place = np.empty(bonds, dtype=np.int32)
         place[np.argsort(colours, kind="stable")] = np.arange(len(colours), dtype=np.int32)
-        then(self.place.from_numpy, place)
+        defer_fill(self.place.from_numpy, place)
 
     @ti.func
     def mean(self, b, motion):

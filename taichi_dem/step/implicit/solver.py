@@ -2,10 +2,10 @@
 
 import taichi as ti
 
-from taichi_dem.fields import raise_to
+from taichi_dem.allocation import raise_to
 from taichi_dem.step.implicit.bonds import BondDashpots
-from taichi_dem.step.implicit.motion import Motion
 from taichi_dem.step.implicit.pairs import COLOURS, PairDashpots
+from taichi_dem.step.implicit.velocities import Velocities
 from taichi_dem.types import real
 
 
@@ -24,7 +24,7 @@ class Solver:
     def __init__(self, model, state, schedule, contacts, method):
         self.model, self.state, self.schedule, self.contacts = model, state, schedule, contacts
         self.fewest, self.most = method.sweeps
-        self.motion = Motion(model, state)
+        self.motion = Velocities(model, state)
         self.bonds = None
         self.has_bonds = bool(model.dashpot.name)
         if self.has_bonds:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from taichi_dem import Multirate, Simulation, Uniform
-from taichi_dem.realised import _twin, realised_gain
+from taichi_dem.measured_speedup import _twin, realised_gain
 from taichi_dem.state import NEVER
 from tests.scenes import brisk_scene
 

@@ -1,17 +1,17 @@
 """Which particles meet what in a step, and what comes of it (Komatsuzaki et al., 5.3 and 5.4).
 
 First every touching particle is judged by the state after the flight: does it join the heap, meet
-a wall, or approach another particle? Rivals claim the particles they need, so that no particle has
+a wall, or approach another particle? Events claim the particles they need, so that no particle has
 part in two events of a step. Then the winners act; no two of them touch the same particle.
 """
 
 import taichi as ti
 
-from ca_damper.automaton.laws import deflected, speed_after_pair, speed_after_wall
-from ca_damper.automaton.ledger import PAIRS, quanta
-from ca_damper.automaton.rivals import ahead_of_others, rank
-from ca_damper.automaton.tally import HOLDS, WALLS
-from ca_damper.automaton.tally import PAIRS as PAIRS_MET
+from ca_damper.automaton.collision_laws import deflected, speed_after_pair, speed_after_wall
+from ca_damper.automaton.conflict_resolution import ahead_of_others, rank
+from ca_damper.automaton.event_counts import HOLDS, WALLS
+from ca_damper.automaton.event_counts import PAIRS as PAIRS_MET
+from ca_damper.automaton.impulse_balance import PAIRS, quanta
 from ca_damper.lattice import EMPTY, WALL, mirrored, turned_back
 from ca_damper.random_numbers import DEFLECT, EVENT, bits, unit
 
@@ -20,7 +20,7 @@ _CELL_BITS = 16
 
 
 @ti.data_oriented
-class Encounters:
+class Collisions:
     """Judge and carry out the events of a step.
 
     contacts: cells of touching particles, then cell and event in one number, shape (scenes, cells).

@@ -14,7 +14,7 @@ _UNSEEN = "touches between two looks leave no trace"
 
 
 @ti.data_oriented
-class Acted:
+class EffectActivity:
     """Sums over the looks since the reset, by scene.
 
     touches: of two spheres, or of a sphere and a wall. power: into dashpots and into friction of

@@ -10,7 +10,7 @@ from taichi_dem.physics.fracture import coulomb_limit
 
 
 @dataclass
-class Missed:
+class MissingEffect:
     """A need that no listed effect serves.
 
     effect: what to list. what: the finding in words. times: recordings that saw it, of ``looks``.
@@ -60,12 +60,12 @@ _OVERLAP = "pairs of bodies overlap at outer faces, which carry no contact spher
 
 
 def unserved(roles):
-    """An empty ``Missed`` by role, for every need that no effect of these roles serves."""
-    return {role: Missed(effect, what) for role, effect, what in _NEEDS if role not in roles}
+    """An empty ``MissingEffect`` by role, for every need that no effect of these roles serves."""
+    return {role: MissingEffect(effect, what) for role, effect, what in _NEEDS if role not in roles}
 
 
 @ti.data_oriented
-class Watch:
+class MissingEffects:
     """Counts the places where an absent effect would have acted, at recording times.
 
     touching: most pairs of bodies that one of them saw in contact.
@@ -76,7 +76,7 @@ class Watch:
         self.touching = self.looks = 0
         self.last_s = -1.0
         self.missed = unserved({effect.role for effect in model.effects if effect.name})
-        self.outer_faces, self.outer = None, Missed(REMEDY, _OVERLAP, unit="body")
+        self.outer_faces, self.outer = None, MissingEffect(REMEDY, _OVERLAP, unit="body")
         if model.has_contact and not model.contact.outer_faces:
             self.outer_faces = OuterFaces(model, state)
         material = model.material
@@ -138,7 +138,7 @@ class Watch:
         return tuple(self.model.mesh.points[corners].mean(axis=0).tolist())
 
     def findings(self):
-        """A ``Missed`` for each effect that was needed, an empty tuple where none was."""
+        """A ``MissingEffect`` for each effect that was needed, an empty tuple where none was."""
         found = [missed for missed in self._all() if missed.times]
         return tuple(replace(missed, looks=self.looks) for missed in found)
 

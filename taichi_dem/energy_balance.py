@@ -26,7 +26,7 @@ TERMS = (
 
 
 @ti.data_oriented
-class Ledger:
+class EnergyBalance:
     """Sums what the step has booked; stored energies are computed anew by the step's own laws."""
 
     def __init__(self, model, state, advance, contacts):

@@ -10,7 +10,7 @@ class _Ended(Exception):
     """Raised in a thread that has run for too long."""
 
 
-def within(seconds, call, sentence):
+def run_with_timeout(seconds, call, sentence):
     """What call() returns or raises; InputError with a sentence where it takes longer [s].
 
     It runs in a thread of its own, which is ended then: code that spins in Python ends at once,

@@ -6,8 +6,8 @@ from taichi_dem.types import real
 
 
 @ti.data_oriented
-class Lookout:
-    """What is known of each entry of the ``Neighbours``, so that few are looked into.
+class PairCache:
+    """What is known of each entry of the ``VerletList``, so that few are looked into.
 
     Of an entry, side by side as they are asked for together: faces: which of the two bodies' faces
     are near, bit 4 f + g for faces f and g; broken: which of these are broken too; spheres: how

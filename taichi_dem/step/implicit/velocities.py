@@ -7,7 +7,7 @@ from taichi_dem.types import real
 
 
 @ti.data_oriented
-class Motion:
+class Velocities:
     """Velocity and spin of every body at the end of the step, as far as it is known.
 
     twist: velocity [m/s] and spin [rad/s], world. turn: spin per moment, R I^-1 R^T

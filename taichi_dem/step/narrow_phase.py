@@ -9,10 +9,10 @@ OUTLOOK = 7.0
 
 
 @ti.data_oriented
-class NearSpheres:
+class NarrowPhase:
     """Compares the spheres on the faces of two bodies, where these were last looked at.
 
-    sphere: centre and radius of every sphere there [m]. known: the ``Lookout``, which knows where
+    sphere: centre and radius of every sphere there [m]. known: the ``PairCache``, which knows where
     the balls around those of a face are.
     """
 

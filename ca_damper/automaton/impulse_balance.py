@@ -21,7 +21,7 @@ def quanta(velocity):
 
 
 @ti.data_oriented
-class Ledger:
+class ImpulseBalance:
     """Velocity along x that particles gained uncounted since the reset, by item [quanta]."""
 
     active = True
@@ -42,7 +42,7 @@ class Ledger:
 
 
 @ti.data_oriented
-class NoLedger:
+class NoImpulseBalance:
     """Nothing is written down."""
 
     active = False

@@ -29,7 +29,7 @@ def ahead_of_others(ranked):
 
 
 @ti.data_oriented
-class Rivals:
+class ConflictResolution:
     """Largest rank that ever claimed a cell, shape (scenes, cells + 1)."""
 
     def __init__(self, lattice, scenes):

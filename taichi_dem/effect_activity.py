@@ -22,9 +22,9 @@ _NO_TRACE = "without sphere dashpots a touch between two recordings leaves no tr
 def effects_acted(model, ledger, tables, account, watch):
     """An EffectUse for every listed effect, in the model's order.
 
-    tables, account: what the ledger's methods of that name gave. watch: the ``Watch`` of the run.
-    Judged by role, so that an effect of one's own is judged like those of the package; but it is
-    never called idle where only its own code could tell.
+    tables, account: what the ledger's methods of that name gave. watch: the ``MissingEffects`` of
+    the run. Judged by role, so that an effect of one's own is judged like those of the package; but
+    it is never called idle where only its own code could tell.
     """
     given = abs(account["load_work"]) + abs(account["support_work"]) + ledger.start_energy
     found = [_by_role(model, ledger, tables, watch.touching, effect) for effect in _listed(model)]

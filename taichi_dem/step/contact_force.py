@@ -4,12 +4,12 @@ import taichi as ti
 
 from taichi_dem.physics.rotation import zero3
 from taichi_dem.physics.sphere_pair import meeting
-from taichi_dem.step.rates import HIT
+from taichi_dem.step.stability_limits import HIT
 from taichi_dem.types import vec3
 
 
 @ti.data_oriented
-class Touch:
+class ContactForce:
     """Base of ``Advance``, which owns all that is used here."""
 
     @ti.func

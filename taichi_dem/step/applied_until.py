@@ -6,15 +6,15 @@ from taichi_dem.timeline import device_ticks_of
 
 
 @ti.data_oriented
-class Payments:
+class AppliedUntil:
     """Until when each bond and pair has given its impulse.
 
     A bond gives it for the coming step of the finer body at once. When that body is woken and
     takes a shorter step, the bond is due again while it has still paid: it gives no more until
     the tick that it paid up to. That is a time of the coarser step, so of any finer
     one: nothing is ever paid in part.
-    bond: that tick for every bond; those of the pairs are in ``Near``, which keeps them through a
-    search. schedule: knows their steps.
+    bond: that tick for every bond; those of the pairs are in ``ContactLimits``, which keeps them
+    through a search. schedule: knows their steps.
     """
 
     def __init__(self, model, state, schedule, rates):

@@ -4,20 +4,20 @@ from dataclasses import dataclass
 
 import taichi as ti
 
-from ca_damper.automaton.accounting import Everything, Landings
+from ca_damper.automaton.accounting import AllImpulses, Landings
 from ca_damper.automaton.accumulator import Accumulator
-from ca_damper.automaton.ledger import Ledger, NoLedger
-from ca_damper.automaton.rivals import Rivals
+from ca_damper.automaton.conflict_resolution import ConflictResolution
+from ca_damper.automaton.event_counts import EventCounts
+from ca_damper.automaton.impulse_balance import ImpulseBalance, NoImpulseBalance
 from ca_damper.automaton.state import Cells
 from ca_damper.automaton.static_contact import NoStaticContact, StaticContact
-from ca_damper.automaton.tally import Tally
 from ca_damper.automaton.traversal import ParticleList, Scan
 from ca_damper.lattice import Geometry, Lattice
 
 
 @ti.data_oriented
-class Numbers:
-    """Numbers that kernels read; in fields, so that another value compiles nothing anew.
+class Parameters:
+    """Parameters that kernels read; in fields, so that another value compiles nothing anew.
 
     width of a cell [m], mass of a particle [kg], gravity [m/s^2], restitution of particle and wall;
     threshold of static contact in units of g dt.
@@ -47,18 +47,18 @@ class Numbers:
 
 
 @dataclass(frozen=True, eq=False)
-class Parts:
+class Components:
     """State and choices of an automaton, put together by ``assembled``."""
 
-    numbers: Numbers
+    numbers: Parameters
     lattice: Lattice
     cells: Cells
-    rivals: Rivals
+    rivals: ConflictResolution
     accumulator: Accumulator
     accounting: object
     resting: object
     ledger: object
-    tally: Tally
+    tally: EventCounts
 
 
 def assembled(options, table):
@@ -67,25 +67,25 @@ def assembled(options, table):
     static = options.accounting == "static"
     lattice = Lattice(Geometry(options.columns, options.rows))
     traversal = (Scan if options.traversal == "scan" else ParticleList)(lattice, table)
-    ledger = Ledger(scenes) if options.ledger else NoLedger()
-    accounting = Everything()
+    ledger = ImpulseBalance(scenes) if options.ledger else NoImpulseBalance()
+    accounting = AllImpulses()
     if not static:
         pushes = options.accounting == "landing+ejection"
         accounting = Landings(lattice, scenes, ledger, pushes)
     cells = Cells(lattice, traversal, accounting, scenes)
-    numbers = Numbers(options)
+    numbers = Parameters(options)
     accumulator = Accumulator(options.accumulator, lattice)
     resting = NoStaticContact()
     if static:
         resting = StaticContact(cells, accumulator, numbers)
-    return Parts(
+    return Components(
         numbers=numbers,
         lattice=lattice,
         cells=cells,
-        rivals=Rivals(lattice, scenes),
+        rivals=ConflictResolution(lattice, scenes),
         accumulator=accumulator,
         accounting=accounting,
         resting=resting,
         ledger=ledger,
-        tally=Tally(scenes),
+        tally=EventCounts(scenes),
     )

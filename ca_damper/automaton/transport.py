@@ -2,13 +2,13 @@
 
 import taichi as ti
 
-from ca_damper.automaton.rivals import rank
+from ca_damper.automaton.conflict_resolution import rank
 from ca_damper.lattice import DOWN, EMPTY
 from ca_damper.random_numbers import MOVE
 
 
 @ti.data_oriented
-class Flight:
+class Transport:
     """Gravity, way, and which particles have something ahead or a cell to change.
 
     due: cells of particles that may change their cell, shape (scenes, cells).

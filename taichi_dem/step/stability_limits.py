@@ -7,9 +7,9 @@ listed, and their rates found anew at the start of the next substep.
 import numpy as np
 import taichi as ti
 
-from taichi_dem.fields import then
+from taichi_dem.allocation import defer_fill
 from taichi_dem.quality import dashpots_of, springs_of, subset_rates
-from taichi_dem.step.near import Near
+from taichi_dem.step.contact_limits import ContactLimits
 from taichi_dem.step_control import (
     BOND_C,
     BOND_K,
@@ -41,7 +41,7 @@ STOPS = 1.0
 
 
 @ti.data_oriented
-class Rates:
+class StabilityLimits:
     """Rates of every body, and the list of those whose rates must be found anew.
 
     dashpot_table, spring_table: largest eigenvalue of the bonds' block by the set of intact
@@ -98,11 +98,11 @@ class Rates:
             self.wakes = sum(1 << k for k, event in enumerate(EVENTS) if event in rule.wake)
         self.near = None
         if self.has_contact:
-            self.near = Near(model, state, contacts, rule.ahead * method.dt0)
+            self.near = ContactLimits(model, state, contacts, rule.ahead * method.dt0)
         n = model.body_count
         self.dashpot_table = ti.field(real, shape=(n, 16))
         self.spring_table = ti.field(real, shape=(n, 16))
-        then(self._load_tables)
+        defer_fill(self._load_tables)
         self.bond_damping = ti.field(real, shape=n)
         self.contact_damping = ti.field(real, shape=n)
         self.limit = ti.field(real, shape=n)
@@ -268,7 +268,7 @@ class Rates:
         return ti.min(2.0 * step * self.bond_damping[i], LIMITED - contacts)
 
 
-def rates_for(model, state, contacts, method):
-    """The Rates that a method needs; None where it neither controls steps nor limits dashpots."""
+def limits_for(model, state, contacts, method):
+    """Limits for a method; None where it neither controls steps nor limits dashpots."""
     wanted = getattr(method, "control", None) or getattr(method, "dashpot", "full") == "limited"
-    return Rates(model, state, contacts, method) if wanted else None
+    return StabilityLimits(model, state, contacts, method) if wanted else None

@@ -15,7 +15,7 @@ _TRIES = 2
 _SHARE = 0.05
 
 
-class Quicker:
+class AutoDriver:
     """Tries both drivers from time to time, a few substeps each.
 
     seconds: for a member that was due, the best of the last tries by name of the driver. clock:

@@ -5,9 +5,9 @@ It reaches several skins and takes in every face, broken or not, so one list ser
 
 import taichi as ti
 
-from taichi_dem.fields import then
-from taichi_dem.step.cells import CellGrid
-from taichi_dem.step.lookout import Lookout
+from taichi_dem.allocation import defer_fill
+from taichi_dem.step.cell_grid import CellGrid
+from taichi_dem.step.pair_cache import PairCache
 from taichi_dem.types import real
 
 #: What the list is when it needs to be made anew, and while it is.
@@ -26,15 +26,15 @@ FAR = 0.6
 
 
 @ti.data_oriented
-class Neighbours:
+class VerletList:
     """For each body the bodies of higher index near it, in order.
 
-    first[i] .. last[i]: those of body i, in body, with some room behind; known: what a ``Lookout``
-    knows of them. placed_at, turned_to, listed: where a body was listed, and its clusters [m].
-    reach: how far it may be from there, its leeway included [m], and ball: radius of the ball
-    around it and its reach [m]. gone: bodies that have left their reach since, left: 1 for them;
-    they are listed anew, as a few fragments fly faster than all the rest. stale: STALE when all
-    are. full: 1 when there is no room.
+    first[i] .. last[i]: those of body i, in body, with some room behind; known: what a
+    ``PairCache`` knows of them. placed_at, turned_to, listed: where a body was listed, and its
+    clusters [m]. reach: how far it may be from there, its leeway included [m], and ball: radius of
+    the ball around it and its reach [m]. gone: bodies that have left their reach since, left: 1 for
+    them; they are listed anew, as a few fragments fly faster than all the rest. stale: STALE when
+    all are. full: 1 when there is no room.
     """
 
     def __init__(self, contacts, brute_force=False):
@@ -47,7 +47,7 @@ class Neighbours:
         self.first = ti.field(ti.i32, shape=n + 1)
         self.last = ti.field(ti.i32, shape=n)
         self.body = ti.field(ti.i32, shape=self.capacity)
-        self.known = Lookout(contacts, self.capacity)
+        self.known = PairCache(contacts, self.capacity)
         self.placed_at = ti.Vector.field(3, real, shape=n)
         self.turned_to = ti.Matrix.field(3, 3, real, shape=n)
         self.listed = ti.Vector.field(3, real, shape=4 * n)
@@ -56,7 +56,7 @@ class Neighbours:
         self.left = ti.field(ti.i32, shape=n)
         self.stale = ti.field(ti.i32, shape=())
         self.full = ti.field(ti.i32, shape=())
-        then(self.stale.fill, STALE)
+        defer_fill(self.stale.fill, STALE)
 
     @ti.func
     def notice(self, i):

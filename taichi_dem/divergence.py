@@ -18,7 +18,7 @@ DEEPEST_OVERLAP = 0.95
 SHARE = 0.02
 
 
-class Health:
+class DivergenceCheck:
     """Looks at a run after every resident call; raises SimulationDiverged with the place.
 
     solves: whether the method solves dashpots implicitly, so that only springs limit the step.

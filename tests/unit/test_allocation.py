@@ -3,7 +3,7 @@
 import pytest
 from taichi.lang import impl
 
-from taichi_dem import InputError, Multirate, Simulation, fields
+from taichi_dem import InputError, Multirate, Simulation, allocation
 from tests.scenes import brisk_scene
 
 
@@ -15,21 +15,21 @@ def groups():
 def test_values_wait_until_the_outermost_block_ends():
     """And come in the order in which they were given; without a block they come at once."""
     seen = []
-    fields.then(seen.append, "at once")
-    with fields.fields_first():
-        fields.then(seen.append, "first")
-        with fields.fields_first():
-            fields.then(seen.append, "second")
+    allocation.defer_fill(seen.append, "at once")
+    with allocation.batch_allocation():
+        allocation.defer_fill(seen.append, "first")
+        with allocation.batch_allocation():
+            allocation.defer_fill(seen.append, "second")
         assert seen == ["at once"]
     assert seen == ["at once", "first", "second"]
 
 
 def test_what_an_error_leaves_waiting_is_forgotten():
     seen = []
-    with pytest.raises(ZeroDivisionError), fields.fields_first():
-        fields.then(seen.append, "never")
+    with pytest.raises(ZeroDivisionError), allocation.batch_allocation():
+        allocation.defer_fill(seen.append, "never")
         raise ZeroDivisionError
-    fields.then(seen.append, "at once")
+    allocation.defer_fill(seen.append, "at once")
     assert seen == ["at once"]
 
 
@@ -43,6 +43,6 @@ def test_a_simulation_takes_one_group_of_fields():
 
 def test_a_session_without_room_is_said_in_words(monkeypatch):
     Simulation(brisk_scene(), Multirate(1e-8, 2e-7))
-    monkeypatch.setattr(fields, "MOST_GROUPS", 0)
+    monkeypatch.setattr(allocation, "MOST_GROUPS", 0)
     with pytest.raises(InputError, match=r"must stay below 0, got \d+: call runtime.stop"):
         Simulation(brisk_scene(), Multirate(1e-8, 2e-7))

@@ -19,8 +19,8 @@ _waiting = None
 
 
 @contextlib.contextmanager
-def fields_first():
-    """Hold back what is given to ``then`` until the end of the block, in its order.
+def batch_allocation():
+    """Hold back what is given to ``defer_fill`` until the end of the block, in its order.
 
     Blocks may nest; the outermost counts. Raises InputError when the session has no room left.
     """
@@ -39,8 +39,8 @@ def fields_first():
         load(*arguments)
 
 
-def then(load, *arguments):
-    """Call load(*arguments), which uses fields: now, or at the end of a ``fields_first`` block."""
+def defer_fill(load, *arguments):
+    """Call load(*arguments), which uses fields: now, or at the end of ``batch_allocation``."""
     if _waiting is None:
         load(*arguments)
     else:

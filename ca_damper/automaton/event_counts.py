@@ -15,7 +15,7 @@ _COUNTED = {
 
 
 @ti.data_oriented
-class Tally:
+class EventCounts:
     """Events since the reset, shape (scenes, kinds of event)."""
 
     def __init__(self, scenes):

@@ -6,7 +6,7 @@ from taichi_dem.timeline import MAX_LEVEL
 
 
 @ti.data_oriented
-class DueList:
+class ActiveList:
     """Indices in order of falling key; end[k] counts the members with a key of at least k.
 
     order: the members; place: where in it each one is; key: each one's key, -1 for one that is

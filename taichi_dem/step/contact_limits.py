@@ -3,7 +3,7 @@
 import numpy as np
 import taichi as ti
 
-from taichi_dem.fields import then
+from taichi_dem.allocation import defer_fill
 from taichi_dem.physics.rotation import unit3
 from taichi_dem.physics.wrench import cross_matrix
 from taichi_dem.quality import inverse_root
@@ -30,7 +30,7 @@ def largest_eigenvalue(a, b, c):
 
 
 @ti.data_oriented
-class Near:
+class ContactLimits:
     """Which sphere pairs count as contacts, and the block they form on each body.
 
     A sphere pair counts from the moment at which it could touch within some steps of the finer of
@@ -45,7 +45,7 @@ class Near:
     def __init__(self, model, state, contacts, ahead):
         self.model, self.state, self.contacts = model, state, contacts
         self.ahead = ti.field(real, shape=MAX_LEVEL + 1)
-        then(self.ahead.from_numpy, ahead / 2.0 ** np.arange(MAX_LEVEL + 1))
+        defer_fill(self.ahead.from_numpy, ahead / 2.0 ** np.arange(MAX_LEVEL + 1))
         self.count = ti.field(ti.i32, shape=contacts.capacity)
         self.old_count = ti.field(ti.i32, shape=contacts.capacity)
         self.paid = ti.field(ti.i64, shape=contacts.capacity)
@@ -54,8 +54,8 @@ class Near:
         self.root_mass = ti.field(real, shape=model.body_count)
         self.root_inertia = ti.Matrix.field(3, 3, real, shape=model.body_count)
         root = inverse_root(model.body_mass, model.body_inertia)
-        then(self.root_mass.from_numpy, np.ascontiguousarray(root[:, 0, 0]))
-        then(self.root_inertia.from_numpy, np.ascontiguousarray(root[:, 3:, 3:]))
+        defer_fill(self.root_mass.from_numpy, np.ascontiguousarray(root[:, 0, 0]))
+        defer_fill(self.root_inertia.from_numpy, np.ascontiguousarray(root[:, 3:, 3:]))
 
     @ti.func
     def margin(self, i, j):
@@ -132,4 +132,4 @@ class Near:
         return along * root * root, lever * root, lever @ lever.transpose()
 
 
-__all__ = ["Near", "largest_eigenvalue"]
+__all__ = ["ContactLimits", "largest_eigenvalue"]

@@ -4,8 +4,8 @@ import taichi as ti
 
 
 @ti.data_oriented
-class Wake:
-    """What happens at the start of a substep to the bodies that ``Rates`` has listed.
+class WakeUp:
+    """What happens at the start of a substep to the bodies that ``StabilityLimits`` has listed.
 
     A body waits for its own time with a step chosen before a contact came near, a bond broke or a
     neighbour went to shorter steps. Bonds that paid it their impulse ahead pay no more until then.

@@ -17,7 +17,7 @@ _KEPT = ("share", "pair_share", "taken", "step", "lightest")
 
 
 @ti.data_oriented
-class Resolution:
+class StepResolution:
     """Looks, at recording times, at what steps leave of dashpots; at the end, at how bonds failed.
 
     share: least share of its dashpots that each bond was left with while it held, (bond_count,).
@@ -114,8 +114,8 @@ class Resolution:
         """Largest share that limited sphere dashpots can have had where they acted, (body_count,).
 
         What was seen of them, or that of a single contact, 1 / X with X = 2 c dt / m; see
-        ``step/rates.py``. Where contacts took energy they acted; it is booked to the first body
-        of a pair.
+        ``step/stability_limits.py``. Where contacts took energy they acted; it is booked to the
+        first body of a pair.
         """
         if self.contacts is None or not self.advance.limited:
             return self.pair_share

@@ -3,19 +3,19 @@
 import numpy as np
 import taichi as ti
 
+from ca_damper.automaton.collisions import Collisions
+from ca_damper.automaton.components import assembled
 from ca_damper.automaton.ejection import Ejection
-from ca_damper.automaton.encounters import Encounters
-from ca_damper.automaton.flight import Flight
-from ca_damper.automaton.ledger import GRAVITY, QUANTUM
-from ca_damper.automaton.parts import assembled
+from ca_damper.automaton.impulse_balance import GRAVITY, QUANTUM
 from ca_damper.automaton.placement import DrawnCells, NamedCells
+from ca_damper.automaton.transport import Transport
 from ca_damper.filling import Action
 from ca_damper.lattice import DIRECTIONS, EMPTY, HELD, WALL, unit_vectors
 from ca_damper.random_numbers import stream
 
 
 @ti.data_oriented
-class BoundAutomaton:
+class DeviceAutomaton:
     """Automata of all scenes of a table; the protocol is in ``ca_damper.filling``."""
 
     def __init__(self, options, table):
@@ -23,9 +23,9 @@ class BoundAutomaton:
         self.table, self.numbers, self.lattice = table, parts.numbers, parts.lattice
         self.cells, self.rivals, self.accounting = parts.cells, parts.rivals, parts.accounting
         self.resting, self.ledger, self.tally = parts.resting, parts.ledger, parts.tally
-        self.flight, self.ejection = Flight(parts), Ejection(parts)
+        self.flight, self.ejection = Transport(parts), Ejection(parts)
         both, pairs_first = options.pair_rule == "both", options.priority == "pairs_first"
-        self.encounters = Encounters(parts, both, pairs_first)
+        self.encounters = Collisions(parts, both, pairs_first)
         self.placement = DrawnCells(self.cells, table)
         if options.start is not None:
             self.placement = NamedCells(self.cells, options.start)
