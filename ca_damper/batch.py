@@ -23,7 +23,7 @@ from ca_damper.progress import BatchProgress
 from ca_damper.report import RK45_STAGES, Report
 from ca_damper.table import SceneTable, dealt
 from taichi_dem import runtime
-from taichi_dem.allocation import check_room
+from taichi_dem.allocation import check_capacity
 from taichi_dem.checkpoint import version_text
 from taichi_dem.checks import choice, instance, positive, whole
 from taichi_dem.display import in_brief
@@ -55,7 +55,7 @@ class Batch:
         self.generation = runtime.generation()
         check_filling(filling)
         instance("table", table, SceneTable)
-        check_room()
+        check_capacity()
         choice("mount", mount, MOUNTS)
         self.measured_cycles = whole("measured_cycles", measured_cycles, 0, 100_000)
         check_record_fits(table.count, self.measured_cycles)

@@ -28,7 +28,7 @@ def batch_allocation():
     if _waiting is not None:
         yield
         return
-    check_room()
+    check_capacity()
     _waiting = []
     try:
         yield
@@ -47,7 +47,7 @@ def defer_fill(load, *arguments):
         _waiting.append((load, arguments))
 
 
-def check_room():
+def check_capacity():
     """Raise InputError when the session has no room for more fields."""
     program = impl.get_runtime().prog
     groups = program.get_snode_tree_size() if program is not None else 0

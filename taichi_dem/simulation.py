@@ -131,7 +131,7 @@ class Simulation:
             self.broad_phase.ask(everywhere=True)
         compiling("time step", 0.35)
         self.driver.settle()
-        self._check_room()
+        self._check_capacity()
         compiling("energy balance", 0.85)
         self.ledger = EnergyBalance(self.model, self.state, self.advance, self.contacts)
         self.health = DivergenceCheck(
@@ -166,7 +166,7 @@ class Simulation:
         try:
             while self.state.tick[None] < end:
                 self.driver.run(end)
-                self._check_room()
+                self._check_capacity()
                 self.health.check(hurried=self.state.tick[None] < end)
                 if on_call is not None:
                     on_call()
@@ -174,9 +174,9 @@ class Simulation:
             self.run_seconds, self.run_cpu_seconds = self.running_seconds(), self.cpu_seconds()
             self.started = None
 
-    def _check_room(self):
+    def _check_capacity(self):
         if self.contacts is not None:
-            self.broad_phase.check_room()
+            self.broad_phase.check_capacity()
 
     @property
     def searches(self):

@@ -18,7 +18,7 @@ def ticks_of(level):
     return 1 << (MAX_LEVEL - level)
 
 
-def coarsest_due(tick):
+def coarsest_active(tick):
     """Lowest level that is due at a tick; all finer levels are due too."""
     rest = tick % MACRO_TICKS
     return 0 if rest == 0 else MAX_LEVEL - ((rest & -rest).bit_length() - 1)
@@ -26,7 +26,7 @@ def coarsest_due(tick):
 
 def next_level(wanted, tick):
     """Level a body that is due at a tick may take: what it wants, or the coarsest the grid has."""
-    return max(wanted, coarsest_due(tick))
+    return max(wanted, coarsest_active(tick))
 
 
 @ti.func
@@ -36,8 +36,8 @@ def device_ticks_of(level):
 
 
 @ti.func
-def device_coarsest_due(tick):
-    """``coarsest_due`` for kernels."""
+def device_coarsest_active(tick):
+    """``coarsest_active`` for kernels."""
     rest = ti.cast(tick & (MACRO_TICKS - 1), ti.i32)
     level = 0
     if rest != 0:

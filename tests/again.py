@@ -45,9 +45,9 @@ class Again:
         for field in (contacts.pair_count, contacts.pair_slot, contacts.pair_full):
             field.fill(0)
         contacts.first_of.fill(0)
-        contacts.touch_first.fill(0)
-        contacts.search_due.fill(0)
-        self.simulation.broad_phase.near.stale.fill(1)
+        contacts.second_start.fill(0)
+        contacts.search_requested.fill(0)
+        self.simulation.broad_phase.neighbours.stale.fill(1)
         self.simulation.broad_phase.search()
 
     def _open_account(self):

@@ -7,7 +7,7 @@ from taichi_dem.effects.base import Effect, parameters
 from taichi_dem.physics.sphere_pair import normal_force
 
 #: Entries of a list for each body: a thousand tetrahedra with as many take some GiB.
-_MOST_ROOM = 100_000
+_MOST = 100_000
 
 
 @ti.data_oriented
@@ -37,9 +37,9 @@ class SphereContact(Effect):
         self.divisions = whole("divisions", divisions, 3, 20)
         self.outer_faces = flag("outer_faces", outer_faces)
         self.skin = positive("skin", skin)
-        self.neighbours_per_body = whole("neighbours_per_body", neighbours_per_body, 1, _MOST_ROOM)
-        self.pairs_per_body = whole("pairs_per_body", pairs_per_body, 1, _MOST_ROOM)
-        self.spheres_per_body = whole("spheres_per_body", spheres_per_body, 1, _MOST_ROOM)
+        self.neighbours_per_body = whole("neighbours_per_body", neighbours_per_body, 1, _MOST)
+        self.pairs_per_body = whole("pairs_per_body", pairs_per_body, 1, _MOST)
+        self.spheres_per_body = whole("spheres_per_body", spheres_per_body, 1, _MOST)
 
     def bind(self, model):
         """Take stiffness [N/m] and damping [N s/m] of a contact from the material."""

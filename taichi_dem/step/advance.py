@@ -187,7 +187,7 @@ class Advance(ContactForce):
             if ti.static(self.has_rates):
                 self.rates.notice(slots[side] >> 2, RELEASE)
         if ti.static(self.has_contact):
-            self.contacts.search_due[None] = 1
+            self.contacts.search_requested[None] = 1
 
     @ti.func
     def body(self, i):

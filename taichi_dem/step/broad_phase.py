@@ -1,8 +1,8 @@
 """Search for contact pairs: the broken ones among the neighbouring faces, then their spheres.
 
-The list is renewed when a body may have used up its leeway, or at once when a bond breaks: a search
-looks at the bodies that moved or broke, and keeps what it knows of the others. Impulses that wait
-in the slots of a pair are carried over, so results do not depend on when a search is made.
+The list is renewed when a body may have used up its body skin, or at once when a bond breaks: a
+search looks at the bodies that moved or broke, and keeps what it knows of the others. Impulses that
+wait in the slots of a pair are carried over, so results do not depend on when a search is made.
 """
 
 import taichi as ti
@@ -15,7 +15,7 @@ from taichi_dem.step.numbering import Numbering
 from taichi_dem.step.old_pairs import OldPairs
 from taichi_dem.step.verlet_list import FAR, VerletList
 
-_ROOM = ("", "pairs_per_body", "spheres_per_body", "neighbours_per_body")
+_CAPACITIES = ("", "pairs_per_body", "spheres_per_body", "neighbours_per_body")
 
 
 @ti.data_oriented
@@ -26,21 +26,21 @@ class BroadPhase:
     all bodies with broken faces, for tests. everywhere: 1 when the next search looks at all bodies,
     as is needed once they have been moved by hand. looked: 1 for those at which the last one
     looked; searched: its tick. searches: how many there were. full: which list has no room left,
-    a place in ``_ROOM``.
+    an index into ``_CAPACITIES``.
     """
 
-    scratch_fields = ("rough", "rough_count", "looked")
+    scratch_fields = ("exposed", "exposed_count", "looked")
 
     def __init__(self, contacts, schedule, solver=None, brute_force=False):
         n = contacts.model.body_count
         self.contacts, self.schedule = contacts, schedule
         self.solver, self.solves = solver, solver is not None
         self.model, self.state = contacts.model, contacts.state
-        self.rough = ti.field(ti.i32, shape=n)
-        self.rough_count = ti.field(ti.i32, shape=())
-        self.near = VerletList(contacts, brute_force)
-        self.known = self.near.known
-        self.spheres = NarrowPhase(contacts, self.known)
+        self.exposed = ti.field(ti.i32, shape=n)
+        self.exposed_count = ti.field(ti.i32, shape=())
+        self.neighbours = VerletList(contacts, brute_force)
+        self.pair_cache = self.neighbours.pair_cache
+        self.spheres = NarrowPhase(contacts, self.pair_cache)
         self.searched = ti.field(ti.i64, shape=())
         self.looked = ti.field(ti.i32, shape=n)
         self.everywhere = ti.field(ti.i32, shape=())
@@ -48,48 +48,48 @@ class BroadPhase:
         self.old = OldPairs(contacts)
         self.candidates = Candidates(contacts, solver)
         self.full = ti.field(ti.i32, shape=())
-        self.numbering = Numbering(contacts, self.near, self.old, self.candidates, self.full)
+        self.numbering = Numbering(contacts, self.neighbours, self.old, self.candidates, self.full)
         self.searches = ti.field(ti.i32, shape=())
 
     def ask(self, everywhere=False):
         """Let the driver make a search before its next step."""
         self.everywhere[None] = int(everywhere)
-        self.contacts.search_due[None] = 1
+        self.contacts.search_requested[None] = 1
 
     def renew(self):
         """Renew the lists, a parallel loop a phase, until no search is due."""
-        while self.contacts.search_due[None]:
+        while self.contacts.search_requested[None]:
             self._search()
 
     def search(self, everywhere=True):
-        """Renew the lists now. Raises InputError when they outgrow their room."""
+        """Renew the lists now. Raises InputError when they exceed their capacity."""
         self.ask(everywhere)
         self.renew()
-        self.check_room()
+        self.check_capacity()
 
-    def check_room(self):
-        """Raise InputError when lists have outgrown the room that the scene gave them."""
-        room = _ROOM[self.full[None]]
-        if room:
-            raise InputError(f"contact lists are full: give SphereContact a larger {room}")
+    def check_capacity(self):
+        """Raise InputError when lists exceed the capacity that the scene gave them."""
+        option = _CAPACITIES[self.full[None]]
+        if option:
+            raise InputError(f"contact lists are full: give SphereContact a larger {option}")
 
     @property
     def phases(self):
         """What a search does, as pairs of how often and what, in order."""
         return (
-            (self._once, self._list_rough),
-            (self._rough_bodies, self._choose),
+            (self._once, self._list_exposed),
+            (self._exposed_bodies, self._choose),
             (self._once, self._begin),
-            (self._all_anew, self.near.list_anew),
-            (self.near.making, self._sort),
-            (self._all_anew, self.near.count),
-            (self.near.making, self._allot),
-            (self._all_anew, self.near.fill),
-            (self._all_amended, self.near.amend),
-            (self._rough_bodies, self._place),
+            (self._all_anew, self.neighbours.list_anew),
+            (self.neighbours.making, self._sort),
+            (self._all_anew, self.neighbours.count),
+            (self.neighbours.making, self._allot),
+            (self._all_anew, self.neighbours.fill),
+            (self._all_amended, self.neighbours.amend),
+            (self._exposed_bodies, self._note_places),
             (self._once, self.candidates.pack),
             (self._pairs, self._keep),
-            (self._rough_bodies, self._count_spheres),
+            (self._exposed_bodies, self._count_spheres),
             (self._once, self.numbering.number_pairs),
             (self._pairs, self._fill_pair),
             (self._once, self._end),
@@ -102,9 +102,9 @@ class BroadPhase:
                 item(a)
 
     @ti.func
-    def due(self):
+    def is_requested(self):
         """1 when a search is called for."""
-        return self.contacts.search_due[None]
+        return self.contacts.search_requested[None]
 
     @ti.func
     def overflows(self):
@@ -112,16 +112,16 @@ class BroadPhase:
         return ti.cast(self.full[None] != 0, ti.i32)
 
     @ti.func
-    def _rough_bodies(self):
-        return self.rough_count[None]
+    def _exposed_bodies(self):
+        return self.exposed_count[None]
 
     @ti.func
     def _all_anew(self):
-        return self.near.making() * self.model.body_count
+        return self.neighbours.making() * self.model.body_count
 
     @ti.func
     def _all_amended(self):
-        return self.near.amending() * self.model.body_count
+        return self.neighbours.amending() * self.model.body_count
 
     @ti.func
     def _pairs(self):
@@ -133,32 +133,32 @@ class BroadPhase:
 
     @ti.func
     def _begin(self, one):
-        self.near.begin()
+        self.neighbours.begin()
         self.searched[None] = self.state.tick[None]
 
     @ti.func
     def _sort(self, one):
-        self.near.grid.fill()
+        self.neighbours.grid.fill()
 
     @ti.func
     def _allot(self, one):
-        self.near.allot()
+        self.neighbours.allot()
 
     @ti.func
     def _end(self, one):
-        if self.near.full[None] == 1:
+        if self.neighbours.full[None] == 1:
             self.full[None] = 3
-        self.near.end()
+        self.neighbours.end()
         self._index_second()
         self.schedule.start_pairs()
         self.everywhere[None] = 0
         self.searches[None] = self.searches[None] + 1
         # A row of neighbours without room calls for another search, which makes the list anew.
-        again = self.near.stale[None] != 0 and self.full[None] == 0
-        self.contacts.search_due[None] = ti.cast(again, ti.i32)
+        again = self.neighbours.stale[None] != 0 and self.full[None] == 0
+        self.contacts.search_requested[None] = ti.cast(again, ti.i32)
 
     @ti.func
-    def _list_rough(self, one):
+    def _list_exposed(self, one):
         """List the bodies with spheres on some face, in order of their index."""
         count = 0
         newest = ti.cast(0, ti.i64)
@@ -169,12 +169,12 @@ class BroadPhase:
                 newest = ti.max(newest, since)
                 if since >= 0:
                     exposed |= 1 << f
-            self.contacts.rough[i] = exposed
+            self.contacts.exposed_faces[i] = exposed
             self.looked[i] = 0
             if exposed != 0:
-                self.rough[count] = i
+                self.exposed[count] = i
                 count += 1
-        self.rough_count[None] = count
+        self.exposed_count[None] = count
         self.full[None] = 0
         # A second search at the tick of a break must not book its injection again.
         self.fresh[None] = ti.cast(newest > self.state.injected_tick[None], ti.i32)
@@ -182,32 +182,32 @@ class BroadPhase:
 
     @ti.func
     def _choose(self, a):
-        """Look at a rough body if it used up much of its leeway, or if a break has exposed it."""
-        i = self.rough[a]
-        far = self.contacts.travel[i] > FAR * self.contacts.leeway[i]
+        """Look at an exposed body if it used up much of its skin, or if a break exposed it."""
+        i = self.exposed[a]
+        far = self.contacts.travel[i] > FAR * self.contacts.body_skin[i]
         looked = self.everywhere[None] | ti.cast(far, ti.i32)
         for face in range(4 * i, 4 * i + 4):
             looked |= ti.cast(self.state.exposed_tick[face] > self.searched[None], ti.i32)
         self.looked[i] = looked
         if looked == 1:
-            self.contacts.give_leeway(i)
-            self.near.notice(i)
+            self.contacts.set_body_skin(i)
+            self.neighbours.notice(i)
 
     @ti.func
-    def _place(self, a):
+    def _note_places(self, a):
         """Note where a body is that is looked at.
 
         The others count as lying where they were when they were last looked at: they have used up
-        that much of their leeway since. All are looked at while the list of neighbours is made
+        that much of their body skin since. All are looked at while the list of neighbours is made
         anew.
         """
-        i = self.rough[a]
-        if self.near.making() == 1:
+        i = self.exposed[a]
+        if self.neighbours.making() == 1:
             self.looked[i] = 1
         if self.looked[i] == 1:
-            self.known.place(i, self.contacts.travel[i])
+            self.pair_cache.note_clusters(i, self.contacts.travel[i])
             self.contacts.travel[i] = 0.0
-            self.spheres.place(i)
+            self.spheres.note_spheres(i)
 
     @ti.func
     def _bonded(self, i, j):
@@ -226,14 +226,14 @@ class BroadPhase:
 
     @ti.func
     def _count_spheres(self, a):
-        """Number of sphere pairs of a rough body with each neighbour that this search looks at."""
-        i = self.rough[a]
+        """Number of sphere pairs of an exposed body with each neighbour that is looked at."""
+        i = self.exposed[a]
         looked = self.looked[i]
-        for k in range(self.near.first[i], self.near.last[i]):
-            j = self.near.body[k]
-            if looked | self.looked[j] != 0 and self.contacts.rough[j] != 0:
-                faces = self.known.faces[k] & self._broken_faces(i, j)
-                if self.everywhere[None] == 1 or self.known.may_touch(k, i, j, faces):
+        for k in range(self.neighbours.first[i], self.neighbours.last[i]):
+            j = self.neighbours.body[k]
+            if looked | self.looked[j] != 0 and self.contacts.exposed_faces[j] != 0:
+                faces = self.pair_cache.faces[k] & self._broken_faces(i, j)
+                if self.everywhere[None] == 1 or self.pair_cache.may_touch(k, i, j, faces):
                     self._look_into(k, i, j, faces)
 
     @ti.func
@@ -243,16 +243,16 @@ class BroadPhase:
         if not self._bonded(i, j):
             asked = faces
             if self.everywhere[None] == 0:
-                asked = self.known.to_ask(k, i, j, faces)
+                asked = self.pair_cache.to_ask(k, i, j, faces)
             count, hits, gap = self.spheres.of_pair(i, j, asked, 0, False)
             if asked != faces:
-                gap = ti.min(gap, self.known.gap(k, i, j))
-        self.known.found(k, i, j, faces, count, hits, gap)
+                gap = ti.min(gap, self.pair_cache.gap(k, i, j))
+        self.pair_cache.found(k, i, j, faces, count, hits, gap)
 
     @ti.func
     def _broken_faces(self, i, j):
         """Bit 4 f + g for every broken face f of the one and g of the other."""
-        first, second = self.contacts.rough[i], self.contacts.rough[j]
+        first, second = self.contacts.exposed_faces[i], self.contacts.exposed_faces[j]
         # Bit f of the first goes to bit 4 f, and each such bit then takes a copy of the second.
         spread = (first & 1) | ((first & 2) << 3) | ((first & 4) << 6) | ((first & 8) << 9)
         return spread * second
@@ -308,7 +308,7 @@ class BroadPhase:
     def _index_second(self):
         """List for every body the pairs in which it is second, in order."""
         first, touch, pairs = ti.static(
-            self.contacts.touch_first, self.contacts.touch, self.contacts.pair_count
+            self.contacts.second_start, self.contacts.second_pair, self.contacts.pair_count
         )
         group(first, touch, self.model.body_count, pairs[None], self._second_of)
 

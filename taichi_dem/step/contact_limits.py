@@ -94,9 +94,9 @@ class ContactLimits:
         for p in range(self.contacts.first_of[i], self.contacts.first_of[i + 1]):
             if self.count[p] != 0:
                 a, b, c = self._add_pair(p, 0, a, b, c)
-        for k in range(self.contacts.touch_first[i], self.contacts.touch_first[i + 1]):
-            if self.count[self.contacts.touch[k]] != 0:
-                a, b, c = self._add_pair(self.contacts.touch[k], 1, a, b, c)
+        for k in range(self.contacts.second_start[i], self.contacts.second_start[i + 1]):
+            if self.count[self.contacts.second_pair[k]] != 0:
+                a, b, c = self._add_pair(self.contacts.second_pair[k], 1, a, b, c)
         return largest_eigenvalue(a, b, c)
 
     @ti.func

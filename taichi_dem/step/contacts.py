@@ -1,6 +1,6 @@
 """Pairs of bodies in contact: packed candidate lists and the impulses they exchange.
 
-A pair holds the sphere pairs that were nearer than the leeway of its bodies at the last search.
+A pair holds the sphere pairs that were nearer than the body skin of its bodies at the last search.
 Lists are sorted by (first body, second body), so that sums over a body's pairs have one order,
 whoever searched when.
 """
@@ -26,12 +26,12 @@ class Contacts:
     pair_heat: energy into dashpots, friction, and injected [J], until the first body takes it.
     pair_full[2 p + side]: 1 while something waits there, else its slot is zero; most pairs do not
     touch, and to ask is cheaper than to add zeros. first_of[i]: first pair whose first body is i;
-    touch_first, touch: pairs whose second body is i. rough: bit f for a broken face f.
-    travel: bound of the way any point of a body went since it was last looked at [m]. leeway: how
-    far that may be before it is looked at again [m]; a pair holds the spheres whose gap is below
-    the leeway of both. ahead: steps of a body by which its contacts are counted before they touch.
-    search_due: 1 when the list may miss one of them. deepest: overlap of a pair as a share of the
-    distance at which its spheres touch.
+    second_start, second_pair: pairs whose second body is i. exposed_faces: bit f for a broken face
+    f. travel: bound of the way any point of a body went since it was last looked at [m]. body_skin:
+    how far that may be before it is looked at again [m]; a pair holds the spheres whose gap is
+    below the body skin of both. ahead: steps of a body by which its contacts are counted before
+    they touch. search_requested: 1 when the list may miss one of them. deepest: overlap of a pair
+    as a share of the distance at which its spheres touch.
     """
 
     def __init__(self, model, state, dt0, ahead=0.0):
@@ -51,14 +51,14 @@ class Contacts:
         self.pair_full = ti.field(ti.i32, shape=2 * self.capacity)
         self.pair_heat = ti.Vector.field(3, real, shape=self.capacity)
         self.first_of = ti.field(ti.i32, shape=n + 1)
-        self.touch_first = ti.field(ti.i32, shape=n + 2)
-        self.touch = ti.field(ti.i32, shape=self.capacity)
-        self.rough = ti.field(ti.i32, shape=n)
+        self.second_start = ti.field(ti.i32, shape=n + 2)
+        self.second_pair = ti.field(ti.i32, shape=self.capacity)
+        self.exposed_faces = ti.field(ti.i32, shape=n)
         self.travel = ti.field(real, shape=n)
-        self.leeway = ti.field(real, shape=n)
+        self.body_skin = ti.field(real, shape=n)
         self.skin = ti.field(real, shape=())
         defer_fill(self.skin.fill, effect.skin)
-        self.search_due = ti.field(ti.i32, shape=())
+        self.search_requested = ti.field(ti.i32, shape=())
         self.deepest = ti.field(real, shape=self.capacity)
 
     @ti.func
@@ -115,8 +115,8 @@ class Contacts:
                 linear, angular = self._take(2 * p, linear, angular)
                 self.state.contact_heat[i] = self.state.contact_heat[i] + self.pair_heat[p]
                 self.pair_heat[p] = vec3(0.0)
-        for k in range(self.touch_first[i], self.touch_first[i + 1]):
-            slot = 2 * self.touch[k] + 1
+        for k in range(self.second_start[i], self.second_start[i + 1]):
+            slot = 2 * self.second_pair[k] + 1
             if self.pair_full[slot] == 1:
                 linear, angular = self._take(slot, linear, angular)
         return linear, angular
@@ -134,29 +134,29 @@ class Contacts:
         level = -1
         for p in range(self.first_of[i], self.first_of[i + 1]):
             level = ti.max(level, self.state.level[self.pair_body[p][1]])
-        for k in range(self.touch_first[i], self.touch_first[i + 1]):
-            level = ti.max(level, self.state.level[self.pair_body[self.touch[k]][0]])
+        for k in range(self.second_start[i], self.second_start[i + 1]):
+            level = ti.max(level, self.state.level[self.pair_body[self.second_pair[k]][0]])
         return level
 
     @ti.func
     def moved(self, i, velocity, spin, elapsed):
-        """Add to the way of body i and ask for a search once it may have used up its leeway."""
-        if self.rough[i] != 0:
+        """Add to the way of body i and ask for a search once it may have used up its body skin."""
+        if self.exposed_faces[i] != 0:
             speed = self._speed(i, velocity, spin)
             way = self.travel[i] + speed * elapsed
             self.travel[i] = way
-            if way + self.ahead * elapsed * speed > self.leeway[i]:
-                self.search_due[None] = 1
+            if way + self.ahead * elapsed * speed > self.body_skin[i]:
+                self.search_requested[None] = 1
 
     @ti.func
-    def give_leeway(self, i):
-        """Set the leeway of body i: half the skin, or more where it is fast.
+    def set_body_skin(self, i):
+        """Set the body skin of body i: half the skin, or more where it is fast.
 
         A few fragments fly faster than all others: they would ask for most of the searches.
         """
         speed = self._speed(i, self.state.velocity[i], self.state.spin[i])
         way = ti.min(STEPS * self.dt0 * speed, FARTHEST * self.model.extent[i])
-        self.leeway[i] = ti.max(0.5 * self.skin[None], way)
+        self.body_skin[i] = ti.max(0.5 * self.skin[None], way)
 
     @ti.func
     def _speed(self, i, velocity, spin):
@@ -173,4 +173,4 @@ class Contacts:
     @ti.func
     def margin(self, i, j):
         """Gap below which spheres of two bodies are candidates [m]."""
-        return self.leeway[i] + self.leeway[j]
+        return self.body_skin[i] + self.body_skin[j]

@@ -246,7 +246,7 @@ class Resident:
         ti.loop_config(serialize=True)
         for s in range(substeps + 1):
             if ti.static(self.step.has_contact):
-                while self.step.search.due() == 1:
+                while self.step.search.is_requested() == 1:
                     for count, item in ti.static(self.step.search.phases):
                         for a in range(count()):
                             item(a)
@@ -309,7 +309,7 @@ class Parallel:
         finished = ti.cast(self.step.state.tick[None] >= end_tick, ti.i32)
         finished |= self.step.halted()
         if ti.static(self.step.has_contact):
-            finished |= _SEARCH * self.step.search.due()
+            finished |= _SEARCH * self.step.search.is_requested()
         return finished
 
 

@@ -35,8 +35,8 @@ class LevelLimit:
             for p in range(self.contacts.first_of[i], self.contacts.first_of[i + 1]):
                 if self.rates.near.count[p] > 0:
                     finest = ti.max(finest, self.known[self.contacts.pair_body[p][1]])
-            for k in range(self.contacts.touch_first[i], self.contacts.touch_first[i + 1]):
-                p = self.contacts.touch[k]
+            for k in range(self.contacts.second_start[i], self.contacts.second_start[i + 1]):
+                p = self.contacts.second_pair[k]
                 if self.rates.near.count[p] > 0:
                     finest = ti.max(finest, self.known[self.contacts.pair_body[p][0]])
         return self.least_beside(finest)
@@ -58,8 +58,8 @@ class LevelLimit:
             for p in range(self.contacts.first_of[i], self.contacts.first_of[i + 1]):
                 if self.rates.near.count[p] > 0:
                     self._tell(self.contacts.pair_body[p][1], level)
-            for k in range(self.contacts.touch_first[i], self.contacts.touch_first[i + 1]):
-                p = self.contacts.touch[k]
+            for k in range(self.contacts.second_start[i], self.contacts.second_start[i + 1]):
+                p = self.contacts.second_pair[k]
                 if self.rates.near.count[p] > 0:
                     self._tell(self.contacts.pair_body[p][0], level)
 

@@ -12,18 +12,18 @@ OUTLOOK = 7.0
 class NarrowPhase:
     """Compares the spheres on the faces of two bodies, where these were last looked at.
 
-    sphere: centre and radius of every sphere there [m]. known: the ``PairCache``, which knows where
-    the balls around those of a face are.
+    sphere: centre and radius of every sphere there [m]. pair_cache: the ``PairCache``, which knows
+    where the balls around those of a face are.
     """
 
-    def __init__(self, contacts, known):
+    def __init__(self, contacts, pair_cache):
         self.contacts, self.model, self.state = contacts, contacts.model, contacts.state
-        self.known = known
+        self.pair_cache = pair_cache
         count = 4 * self.model.body_count * self.model.spheres_per_face
         self.sphere = ti.Vector.field(4, real, shape=count)
 
     @ti.func
-    def place(self, i):
+    def note_spheres(self, i):
         """Note where the spheres of body i are; computed once for many that ask."""
         size = ti.static(self.model.spheres_per_face)
         position, rotation = self.state.position[i], self.state.rotation[i]
@@ -49,7 +49,7 @@ class NarrowPhase:
         for fg in range(16):
             if (faces >> fg) & 1 == 1:
                 face_i, face_j = 4 * i + fg // 4, 4 * j + fg % 4
-                if self.known.clusters_near(face_i, face_j, least):
+                if self.pair_cache.clusters_near(face_i, face_j, least):
                     place = start + count
                     more, least = self._of_faces(face_i, face_j, place, margin, least, write)
                     count += more
@@ -64,7 +64,7 @@ class NarrowPhase:
             mine = self.sphere[a]
             whole = mine[3] + self.model.cluster[face_j][3] + least
             # A sphere far from the ball around those of the other face is as far from all of them.
-            if (self.known.cluster[face_j] - mine.xyz).norm_sqr() < whole * whole:
+            if (self.pair_cache.cluster[face_j] - mine.xyz).norm_sqr() < whole * whole:
                 for b in range(size * face_j, size * face_j + size):
                     other = self.sphere[b]
                     reach = mine[3] + other[3]

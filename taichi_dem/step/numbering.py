@@ -7,16 +7,17 @@ import taichi as ti
 class Numbering:
     """Numbers the pairs of a ``Contacts`` by what the entries of the neighbours say.
 
-    A row of which nothing has changed is numbered from the old list. near: the ``VerletList``; old:
-    the ``OldPairs``; candidates: where their spheres lie; full: 1 or 2 when there is no room for
-    pairs or for spheres. faces: of a new pair those with new spheres, bit 4 f + g; 0 when it keeps
-    those that it had.
+    A row of which nothing has changed is numbered from the old list. neighbours: the
+    ``VerletList``; old: the ``OldPairs``; candidates: where their spheres lie; full: 1 or 2 when
+    there is no room for pairs or for spheres. faces: of a new pair those with new spheres, bit 4 f
+    + g; 0 when it keeps those that it had.
     """
 
     scratch_fields = ("faces",)
 
-    def __init__(self, contacts, near, old, candidates, full):
-        self.contacts, self.near, self.known = contacts, near, near.known
+    def __init__(self, contacts, neighbours, old, candidates, full):
+        self.contacts, self.neighbours = contacts, neighbours
+        self.pair_cache = neighbours.pair_cache
         self.old, self.candidates, self.full = old, candidates, full
         self.body_count = contacts.model.body_count
         self.faces = ti.field(ti.i32, shape=contacts.capacity)
@@ -31,14 +32,14 @@ class Numbering:
         for i in range(self.body_count):
             self.contacts.first_of[i] = self.contacts.pair_count[None]
             # A body without spheres is in no pair, now or before.
-            if self.contacts.rough[i] != 0:
+            if self.contacts.exposed_faces[i] != 0:
                 self._row(i)
         self.contacts.first_of[self.body_count] = self.contacts.pair_count[None]
 
     @ti.func
     def _row(self, i):
         """Number the pairs of which body i is the first."""
-        if self.known.take_change(i) == 1:
+        if self.pair_cache.pop_change(i) == 1:
             self._row_anew(i)
         else:
             for old in range(self.old.first_of[i], self.old.first_of[i + 1]):
@@ -50,13 +51,14 @@ class Numbering:
     def _row_anew(self, i):
         """The same from the entries of its neighbours, and what waits in old pairs between."""
         old, last = self.old.first_of[i], self.old.first_of[i + 1]
-        k, left = self.near.first[i], self.known.met[i]
+        k, left = self.neighbours.first[i], self.pair_cache.met[i]
         while left > 0:
-            if self.known.spheres[k] > 0:
-                j = self.near.body[k]
+            if self.pair_cache.spheres[k] > 0:
+                j = self.neighbours.body[k]
                 old = self._waiting(i, old, last, j)
                 former = self.old.place(old, last, j)
-                self._number(i, j, former, self.known.take_news(k), self.known.spheres[k])
+                faces, spheres = self.pair_cache.pop_new_faces(k), self.pair_cache.spheres[k]
+                self._number(i, j, former, faces, spheres)
                 old += ti.cast(former >= 0, ti.i32)
                 left -= 1
             k += 1

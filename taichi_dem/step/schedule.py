@@ -12,7 +12,7 @@ from taichi_dem.step.active_list import ActiveList
 from taichi_dem.step.applied_until import AppliedUntil
 from taichi_dem.step.level_limit import LevelLimit
 from taichi_dem.step_control import DISPLACEMENT, LARGEST, NEIGHBOUR
-from taichi_dem.timeline import MACRO_TICKS, MAX_LEVEL, device_coarsest_due, device_ticks_of
+from taichi_dem.timeline import MACRO_TICKS, MAX_LEVEL, device_coarsest_active, device_ticks_of
 from taichi_dem.types import real
 
 
@@ -89,7 +89,7 @@ class Schedule:
             self.evaluations[3] = self.evaluations[3] + self.pairs.end[self.low[None]]
             self.evaluations[4] = self.evaluations[4] + self.pairs.end[0]
         self.state.tick[None] = self.state.tick[None] + device_ticks_of(self.finest[None])
-        self.low[None] = device_coarsest_due(self.state.tick[None])
+        self.low[None] = device_coarsest_active(self.state.tick[None])
         self.wanted[None] = 0
 
     @ti.func
@@ -167,8 +167,8 @@ class Schedule:
         if ti.static(self.has_contact):
             for p in range(self.contacts.first_of[i], self.contacts.first_of[i + 1]):
                 self._move_pair(p, 1)
-            for k in range(self.contacts.touch_first[i], self.contacts.touch_first[i + 1]):
-                self._move_pair(self.contacts.touch[k], 0)
+            for k in range(self.contacts.second_start[i], self.contacts.second_start[i + 1]):
+                self._move_pair(self.contacts.second_pair[k], 0)
 
     @ti.func
     def _move_pair(self, p, partner: ti.template()):

@@ -13,15 +13,15 @@ from taichi_dem.types import real
 #: What the list is when it needs to be made anew, and while it is.
 STALE, MAKING = 1, 2
 #: Room left behind the neighbours of each body, for fast ones that come.
-ROOM = 16
-#: Reach of the list around a body, in leeways and in skins: a longer list against fewer of them.
-LEEWAYS, SKINS = 2.0, 3.5
+SPARE = 16
+#: Reach of the list around a body, in body skins and in skins: a longer list against fewer of them.
+BODY_SKINS, SKINS = 2.0, 3.5
 #: Largest steps by which a body is listed ahead of where it is, most of those that leave their
 #: reach being adrift, and the share of its reach that this may take.
 AHEAD, SHARE = 256.0, 0.8
 #: Bodies that leave their reach at once, at most, to be listed anew one by one.
-MOST_GONE = 1024
-#: Share of its leeway that a body may use up before a search looks at it.
+MOST_ESCAPED = 1024
+#: Share of its body skin that a body may use up before a search looks at it.
 FAR = 0.6
 
 
@@ -31,10 +31,10 @@ class VerletList:
 
     first[i] .. last[i]: those of body i, in body, with some room behind; known: what a
     ``PairCache`` knows of them. placed_at, turned_to, listed: where a body was listed, and its
-    clusters [m]. reach: how far it may be from there, its leeway included [m], and ball: radius of
-    the ball around it and its reach [m]. gone: bodies that have left their reach since, left: 1 for
-    them; they are listed anew, as a few fragments fly faster than all the rest. stale: STALE when
-    all are. full: 1 when there is no room.
+    clusters [m]. reach: how far it may be from there, its body skin included [m], and ball: radius
+    of the ball around it and its reach [m]. escaped: bodies that have left their reach since, left:
+    1 for them; they are listed anew, as a few fragments fly faster than all the rest. stale: STALE
+    when all are. full: 1 when there is no room.
     """
 
     def __init__(self, contacts, brute_force=False):
@@ -47,12 +47,12 @@ class VerletList:
         self.first = ti.field(ti.i32, shape=n + 1)
         self.last = ti.field(ti.i32, shape=n)
         self.body = ti.field(ti.i32, shape=self.capacity)
-        self.known = PairCache(contacts, self.capacity)
+        self.pair_cache = PairCache(contacts, self.capacity)
         self.placed_at = ti.Vector.field(3, real, shape=n)
         self.turned_to = ti.Matrix.field(3, 3, real, shape=n)
         self.listed = ti.Vector.field(3, real, shape=4 * n)
-        self.gone = ti.field(ti.i32, shape=n)
-        self.gone_count = ti.field(ti.i32, shape=())
+        self.escaped = ti.field(ti.i32, shape=n)
+        self.escaped_count = ti.field(ti.i32, shape=())
         self.left = ti.field(ti.i32, shape=n)
         self.stale = ti.field(ti.i32, shape=())
         self.full = ti.field(ti.i32, shape=())
@@ -64,29 +64,29 @@ class VerletList:
         # No point of the body went further than this: a norm of a matrix bounds what it does.
         way = (self.state.position[i] - self.placed_at[i]).norm()
         way += (self.state.rotation[i] - self.turned_to[i]).norm() * self.model.extent[i]
-        if not way + self.contacts.leeway[i] < self.reach[i]:
+        if not way + self.contacts.body_skin[i] < self.reach[i]:
             self.left[i] = 1
-            self.gone[ti.atomic_add(self.gone_count[None], 1)] = i
+            self.escaped[ti.atomic_add(self.escaped_count[None], 1)] = i
             self._list(i)
 
     @ti.func
     def _list(self, i):
         """Note where body i and its clusters are, or will soon be if it goes on like this."""
-        self.reach[i] = LEEWAYS * self.contacts.leeway[i] + SKINS * self.contacts.skin[None]
+        self.reach[i] = BODY_SKINS * self.contacts.body_skin[i] + SKINS * self.contacts.skin[None]
         self.ball[i] = self.model.extent[i] + self.reach[i]
         ahead = AHEAD * self.contacts.dt0 * self.state.velocity[i]
-        most = SHARE * (self.reach[i] - self.contacts.leeway[i])
+        most = SHARE * (self.reach[i] - self.contacts.body_skin[i])
         ahead *= most / ti.max(ahead.norm(), most)
         self.placed_at[i] = self.state.position[i] + ahead
         self.turned_to[i] = self.state.rotation[i]
         for face in range(4 * i, 4 * i + 4):
-            self.listed[face] = self.known.middle(i, face) + ahead
+            self.listed[face] = self.pair_cache.middle(i, face) + ahead
 
     @ti.func
     def begin(self):
         """See whether so many bodies have left their reach that the list is made anew."""
         self.full[None] = 0
-        if self.gone_count[None] > ti.min(self.model.body_count // 16, MOST_GONE):
+        if self.escaped_count[None] > ti.min(self.model.body_count // 16, MOST_ESCAPED):
             self.stale[None] = STALE
         if self.stale[None] == STALE:
             self.stale[None] = MAKING
@@ -98,19 +98,19 @@ class VerletList:
 
     @ti.func
     def amending(self):
-        """1 while bodies that are gone are listed anew."""
-        return ti.cast(self.stale[None] != MAKING and self.gone_count[None] > 0, ti.i32)
+        """1 while bodies that have escaped are listed anew."""
+        return ti.cast(self.stale[None] != MAKING and self.escaped_count[None] > 0, ti.i32)
 
     @ti.func
     def list_anew(self, i):
         """Note where body i is."""
-        self.contacts.give_leeway(i)
+        self.contacts.set_body_skin(i)
         self._list(i)
 
     @ti.func
     def count(self, i):
         """Count the neighbours of body i."""
-        self.first[i + 1] = self._visit(i, 0, False) + ROOM
+        self.first[i + 1] = self._visit(i, 0, False) + SPARE
 
     @ti.func
     def allot(self):
@@ -128,13 +128,13 @@ class VerletList:
     @ti.func
     def fill(self, i):
         """List the neighbours of body i, when there is room."""
-        self.known.met[i], self.known.changed[i] = 0, 1
+        self.pair_cache.met[i], self.pair_cache.changed[i] = 0, 1
         if self.full[None] == 0:
             self.last[i] = self.first[i] + self._visit(i, self.first[i], True)
 
     @ti.func
     def amend(self, i):
-        """List those that are gone where they are now, among the neighbours of body i.
+        """List those that have escaped where they are now, among the neighbours of body i.
 
         Entries where they were stay while there is room: nothing comes of them but a look. A row
         without room leaves the list stale.
@@ -143,9 +143,9 @@ class VerletList:
             for j in range(i + 1, self.model.body_count):
                 self._add(i, j)
         else:
-            for a in range(self.gone_count[None]):
-                if self.gone[a] > i:
-                    self._add(i, self.gone[a])
+            for a in range(self.escaped_count[None]):
+                if self.escaped[a] > i:
+                    self._add(i, self.escaped[a])
 
     @ti.func
     def _balls_near(self, i, j):
@@ -162,9 +162,9 @@ class VerletList:
         if faces != 0:
             place = self._place_of(i, j)
             if place < self.last[i] and self.body[ti.min(place, self.capacity - 1)] == j:
-                self.known.faces[place] = faces
+                self.pair_cache.faces[place] = faces
             else:
-                self._make_room(i)
+                self._drop_far(i)
                 if self.last[i] < self.first[i + 1]:
                     self._insert(self.first[i], self.last[i], j, faces)
                     self.last[i] = self.last[i] + 1
@@ -172,7 +172,7 @@ class VerletList:
                     self.stale[None] = STALE
 
     @ti.func
-    def _make_room(self, i):
+    def _drop_far(self, i):
         """Drop those that are near body i no more when its row is full."""
         if self.last[i] == self.first[i + 1]:
             place = self.first[i]
@@ -181,7 +181,7 @@ class VerletList:
                     self._move(k, place)
                     place += 1
                 else:
-                    self.known.forget(k, i)
+                    self.pair_cache.forget(k, i)
             self.last[i] = place
 
     @ti.func
@@ -199,9 +199,9 @@ class VerletList:
     @ti.func
     def end(self):
         """The list serves until a body has left its reach."""
-        for a in range(self.gone_count[None]):
-            self.left[self.gone[a]] = 0
-        self.gone_count[None] = 0
+        for a in range(self.escaped_count[None]):
+            self.left[self.escaped[a]] = 0
+        self.escaped_count[None] = 0
         if self.stale[None] == MAKING:
             self.stale[None] = ti.select(self.full[None] == 1, STALE, 0)
 
@@ -231,12 +231,12 @@ class VerletList:
             self._move(place - 1, place)
             place -= 1
         self.body[place] = j
-        self.known.begin(place, faces)
+        self.pair_cache.begin(place, faces)
 
     @ti.func
     def _move(self, k, place):
         self.body[place] = self.body[k]
-        self.known.move(k, place)
+        self.pair_cache.move(k, place)
 
     @ti.func
     def _faces_near(self, i, j):

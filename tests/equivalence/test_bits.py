@@ -81,7 +81,7 @@ def test_skin_changes_no_bit(held):
 def test_skin_changes_no_bit_where_steps_depend_on_what_is_near(monkeypatch):
     """A pair is news when it comes near, not when a search lists it: the same limits, and wakes.
 
-    The thin run gives fast bodies no leeway by their speed either.
+    The thin run gives fast bodies no body skin by their speed either.
     """
     control = StepControl(dashpot_floor=1e-8, level_jump=None)
     method = Multirate(4e-8, 1e-6, control=control, dashpot="limited")

@@ -95,11 +95,11 @@ def test_pairs_stand_in_order_and_are_indexed_from_both_bodies(again):
     bodies = contacts.pair_body.to_numpy()[:count]
     assert np.all(bodies[:, 0] < bodies[:, 1])
     assert bodies.tolist() == sorted(bodies.tolist())
-    first, touch_first = contacts.first_of.to_numpy(), contacts.touch_first.to_numpy()
-    touch = contacts.touch.to_numpy()
+    first, second_start = contacts.first_of.to_numpy(), contacts.second_start.to_numpy()
+    second_pair = contacts.second_pair.to_numpy()
     for i in range(contacts.model.body_count):
         assert list(range(first[i], first[i + 1])) == np.flatnonzero(bodies[:, 0] == i).tolist()
-        seconds = touch[touch_first[i] : touch_first[i + 1]].tolist()
+        seconds = second_pair[second_start[i] : second_start[i + 1]].tolist()
         assert seconds == np.flatnonzero(bodies[:, 1] == i).tolist()
 
 
@@ -162,10 +162,10 @@ def test_a_break_injects_the_energy_of_the_overlaps_that_it_brings_once(again):
         simulation.broad_phase.search()
 
 
-def neighbouring_faces(near):
+def neighbouring_faces(neighbours):
     """Pairs of faces in the list of neighbours."""
-    first, last = near.first.to_numpy()[:-1], near.last.to_numpy()
-    body, faces = near.body.to_numpy(), near.known.faces.to_numpy()
+    first, last = neighbours.first.to_numpy()[:-1], neighbours.last.to_numpy()
+    body, faces = neighbours.body.to_numpy(), neighbours.pair_cache.faces.to_numpy()
     return {
         (4 * i + fg // 4, 4 * int(body[k]) + fg % 4)
         for i in range(len(last))
@@ -205,23 +205,23 @@ def near_balls(simulation, wide):
 def test_one_list_of_neighbours_serves_until_a_body_has_left_its_reach(again, drift, turn):
     """Bodies drift and turn, each its own way, in small steps: whatever is near is in the list.
 
-    It is made anew when a sixteenth of them has gone (LEEWAYS - 1) / 2 + SKINS = 4 skins, here by
-    their fifth step at the earliest, not at every search.
+    It is made anew when a sixteenth of them has escaped (BODY_SKINS - 1) / 2 + SKINS = 4 skins,
+    here by their fifth step at the earliest, not at every search.
     """
     skin, random = 2e-3, np.random.default_rng(7)
     simulation = scattered(again, skin, 0.1)
-    near, motion = simulation.broad_phase.near, simulation.state.motion()
+    neighbours, motion = simulation.broad_phase.neighbours, simulation.state.motion()
     way = random.standard_normal(motion["position"].shape)
     way *= drift * skin / np.linalg.norm(way, axis=1, keepdims=True)
     spin = turn * random.standard_normal(motion["orientation"].shape)
-    listed_at, made = near.turned_to.to_numpy(), 0
+    listed_at, made = neighbours.turned_to.to_numpy(), 0
     for step in range(1, 41):
         turned = motion["orientation"] + step * spin
         turned /= np.linalg.norm(turned, axis=1, keepdims=True)
         simulation.state.place(motion["position"] + step * way, turned)
         simulation.broad_phase.search()
-        assert near_faces(simulation, skin) <= neighbouring_faces(near)
-        before, listed_at = listed_at, near.turned_to.to_numpy()
+        assert near_faces(simulation, skin) <= neighbouring_faces(neighbours)
+        before, listed_at = listed_at, neighbours.turned_to.to_numpy()
         made += (listed_at != before).any(axis=(1, 2)).mean() > 0.5
     assert 3 <= made <= 40 // 5
 
@@ -231,23 +231,23 @@ def test_a_full_row_drops_what_its_body_has_left(monkeypatch):
 
     Whatever is near is in the list all the same, and rooms are seldom allotted anew.
     """
-    monkeypatch.setattr(verlet_list, "ROOM", 8)
+    monkeypatch.setattr(verlet_list, "SPARE", 8)
     skin, random = 2e-3, np.random.default_rng(5)
     simulation = scattered(bodies(), skin, 0.05)
-    near, motion = simulation.broad_phase.near, simulation.state.motion()
-    rough = np.flatnonzero(simulation.contacts.rough.to_numpy())
-    leaping, rest = rough[:: len(rough) // 2], motion["position"].copy()
+    neighbours, motion = simulation.broad_phase.neighbours, simulation.state.motion()
+    exposed = np.flatnonzero(simulation.contacts.exposed_faces.to_numpy())
+    leaping, rest = exposed[:: len(exposed) // 2], motion["position"].copy()
     made, dropped = 0, 0
     for _ in range(30):
         motion["position"][leaping] = random.permutation(rest)[: len(leaping)]
         simulation.state.place(motion["position"], motion["orientation"])
-        rooms, ends = near.first.to_numpy(), near.last.to_numpy()
+        rooms, ends = neighbours.first.to_numpy(), neighbours.last.to_numpy()
         simulation.broad_phase.search()
-        assert near_faces(simulation, skin) <= neighbouring_faces(near)
+        assert near_faces(simulation, skin) <= neighbouring_faces(neighbours)
         assert set(listed(simulation)) == expected(simulation, skin)
-        anew = (near.first.to_numpy() != rooms).any()
+        anew = (neighbours.first.to_numpy() != rooms).any()
         made += anew
-        dropped += not anew and (near.last.to_numpy() < ends).any()
+        dropped += not anew and (neighbours.last.to_numpy() < ends).any()
     assert dropped > 3 * made
 
 
@@ -268,7 +268,7 @@ def test_spheres_that_touch_are_listed_however_seldom_a_pair_is_looked_at(again,
     for step in range(1, 61):
         simulation.state.place(motion["position"] + step * way, motion["orientation"])
         travel = contacts.travel.to_numpy() + np.linalg.norm(way, axis=1)
-        contacts.travel.from_numpy(np.where(contacts.rough.to_numpy() != 0, travel, 0.0))
+        contacts.travel.from_numpy(np.where(contacts.exposed_faces.to_numpy() != 0, travel, 0.0))
         touching = expected(simulation, 0.0)
         assert touching <= set(listed(simulation))
         broad.search(everywhere=False)
@@ -279,8 +279,8 @@ def test_spheres_that_touch_are_listed_however_seldom_a_pair_is_looked_at(again,
 def test_a_fast_body_has_leeway_for_some_steps(again):
     """Each goes STEPS largest steps at its speed, spin included, between half a skin and a cap.
 
-    Spheres are candidates where their gap is below the leeway of both; no search is asked for until
-    one has used up its own.
+    Spheres are candidates where their gap is below the body skin of both; no search is asked for
+    until one has used up its own.
     """
     skin, random = 2e-3, np.random.default_rng(3)
     simulation = scattered(again, skin, 0.03)
@@ -294,13 +294,13 @@ def test_a_fast_body_has_leeway_for_some_steps(again):
     simulation.broad_phase.search()
     speed = np.linalg.norm(velocity, axis=1) + np.linalg.norm(spin, axis=1) * extent
     wanted = np.maximum(0.5 * skin, np.minimum(horizon * speed, FARTHEST * extent))
-    rough = contacts.rough.to_numpy() != 0
-    found = contacts.leeway.to_numpy()
-    assert found[rough] == pytest.approx(wanted[rough], rel=1e-12)
+    exposed = contacts.exposed_faces.to_numpy() != 0
+    found = contacts.body_skin.to_numpy()
+    assert found[exposed] == pytest.approx(wanted[exposed], rel=1e-12)
     for low, high in [(0.0, 0.6 * skin), (0.6 * skin, 0.24 * extent), (0.24 * extent, np.inf)]:
-        assert ((found >= low) & (found < high) & rough).sum() > 10
+        assert ((found >= low) & (found < high) & exposed).sum() > 10
     assert set(listed(simulation)) == expected(simulation, found)
-    assert contacts.search_due[None] == 0
+    assert contacts.search_requested[None] == 0
 
 
 @pytest.mark.parametrize("room", ["neighbours_per_body", "pairs_per_body", "spheres_per_body"])

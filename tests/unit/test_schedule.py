@@ -5,7 +5,7 @@ import taichi as ti
 
 from taichi_dem.step.schedule import ActiveList
 from taichi_dem.step_control import Displacement
-from taichi_dem.timeline import MAX_LEVEL, coarsest_due
+from taichi_dem.timeline import MAX_LEVEL, coarsest_active
 
 
 @ti.data_oriented
@@ -108,7 +108,7 @@ def test_the_paper_rule_takes_the_largest_step_that_is_short_enough_and_on_the_g
     random = np.random.default_rng(5)
     count, dt0, distance = 2000, 1e-8, 1e-8
     speed = 10.0 ** random.uniform(-3, 3.5, count)
-    low = np.array([coarsest_due(int(t)) for t in random.integers(0, 1 << 22, count)])
+    low = np.array([coarsest_active(int(t)) for t in random.integers(0, 1 << 22, count)])
     low = np.minimum(low, 6).astype(np.int32)
     level = np.maximum(low, random.integers(0, 12, count)).astype(np.int32)
     Rule(Displacement(distance, dt0)).ask(level, speed, low)

@@ -18,7 +18,7 @@ def random_ticks(count=20000):
 def test_a_tick_lies_on_the_grid_of_the_coarsest_due_level_and_on_no_coarser():
     """Definition: level k is due where the tick is a multiple of its step."""
     for tick in random_ticks().tolist():
-        low = timeline.coarsest_due(tick)
+        low = timeline.coarsest_active(tick)
         assert tick % timeline.ticks_of(low) == 0
         assert low == 0 or tick % timeline.ticks_of(low - 1) != 0
 
@@ -48,7 +48,7 @@ def _mirror(
     ticks: ti.types.ndarray(dtype=ti.i64, ndim=1), low: ti.types.ndarray(dtype=ti.i64, ndim=2)
 ):
     for k in range(ticks.shape[0]):
-        low[k, 0] = timeline.device_coarsest_due(ticks[k])
+        low[k, 0] = timeline.device_coarsest_active(ticks[k])
         low[k, 1] = timeline.device_ticks_of(ti.cast(low[k, 0], ti.i32))
 
 
@@ -57,6 +57,6 @@ def test_kernels_keep_the_same_time():
     ticks = random_ticks()
     got = np.zeros((len(ticks), 2), dtype=np.int64)
     _mirror(ticks, got)
-    low = [timeline.coarsest_due(tick) for tick in ticks.tolist()]
+    low = [timeline.coarsest_active(tick) for tick in ticks.tolist()]
     assert got[:, 0].tolist() == low
     assert got[:, 1].tolist() == [timeline.ticks_of(level) for level in low]

@@ -117,7 +117,7 @@ def test_a_search_after_a_break_finds_all_that_touches(block):
         looked.append(simulation.broad_phase.looked.to_numpy().sum())
         if len(looked) % 4 == 0:
             touching.append(expected(simulation, 0.0))
-            left = contacts.leeway.to_numpy() - contacts.travel.to_numpy()
+            left = contacts.body_skin.to_numpy() - contacts.travel.to_numpy()
             near = expected(simulation, np.maximum(left, 0.0))
             assert touching[-1] <= near <= set(listed(simulation))
 

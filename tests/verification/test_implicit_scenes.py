@@ -6,7 +6,7 @@ import pytest
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Uniform, effects
 from taichi_dem.mesh import checked_mesh
 from taichi_dem.mesh_shapes import bar, pair, single
-from taichi_dem.step.verlet_list import LEEWAYS, SKINS
+from taichi_dem.step.verlet_list import BODY_SKINS, SKINS
 from taichi_dem.timeline import MACRO_TICKS
 from tests.again import Again
 from tests.unit.test_broad_phase import (
@@ -251,9 +251,9 @@ def test_one_fast_fragment_keeps_the_list_of_neighbours_right(implicit):
     """
     simulation, fragment = implicit.again.simulation, implicit.bodies["fragment"][0]
     implicit.restart(STEP)
-    near, skin = simulation.broad_phase.near, simulation.contacts.skin[None]
-    reach = (LEEWAYS + 2.0 * SKINS) * skin
-    rooms, place, still = near.first.to_numpy(), implicit.place.copy(), implicit.spin * 0.0
+    neighbours, skin = simulation.broad_phase.neighbours, simulation.contacts.skin[None]
+    reach = (BODY_SKINS + 2.0 * SKINS) * skin
+    rooms, place, still = neighbours.first.to_numpy(), implicit.place.copy(), implicit.spin * 0.0
     turn = np.tile([1.0, 0.0, 0.0, 0.0], (len(place), 1))
     counts = []
     for _ in range(25):
@@ -264,15 +264,15 @@ def test_one_fast_fragment_keeps_the_list_of_neighbours_right(implicit):
         # What steps would have noted of its way.
         simulation.contacts.travel[fragment] = 1e-2
         simulation.broad_phase.search(everywhere=False)
-        wanted, found = near_faces(simulation, reach), neighbouring_faces(near)
+        wanted, found = near_faces(simulation, reach), neighbouring_faces(neighbours)
         assert wanted <= found
         besides = found - near_balls(simulation, reach)
         assert all(fragment in (a // 4, b // 4) for a, b in besides)
-        body, last = near.body.to_numpy(), near.last.to_numpy()
-        for start, end in zip(near.first.to_numpy(), last):
+        body, last = neighbours.body.to_numpy(), neighbours.last.to_numpy()
+        for start, end in zip(neighbours.first.to_numpy(), last):
             assert (np.diff(body[start:end]) > 0).all()
         assert set(listed(simulation)) == expected(simulation, skin)
         counts.append(len(listed(simulation)))
         assert simulation.broad_phase.looked.to_numpy().sum() == 1
-    assert np.array_equal(near.first.to_numpy(), rooms)
+    assert np.array_equal(neighbours.first.to_numpy(), rooms)
     assert max(counts) > min(counts) + 20

@@ -59,7 +59,7 @@ class Sleepers:
 
     def search(self):
         """Renew the contact lists where that is due."""
-        if self.simulation.contacts is not None and self.simulation.contacts.search_due[None]:
+        if self.simulation.contacts is not None and self.simulation.contacts.search_requested[None]:
             self.simulation.broad_phase.search()
 
     def release(self):

@@ -19,7 +19,7 @@ class PairDashpots:
     others push: a pair that rocks would stick. So each sphere has its own impulse.
 
     touching: how many spheres of a pair touch, or may within the step; they come first among the
-    pair's candidates. touch: which candidate. normal: from first to second. arm: from the second's
+    pair's candidates. entry: which candidate. normal: from first to second. arm: from the second's
     centre to the contact [m]. push: impulse of the spring, or what the gap still lets through
     [N s]. share: velocity per impulse along the normal, and across at most [1/kg]. impulse: on the
     second, of spring, dashpot and friction, as found [N s]; entries as in
@@ -28,7 +28,7 @@ class PairDashpots:
     """
 
     scratch_fields = (
-        *("touching", "touch", "normal", "arm", "push", "share", "branch"),
+        *("touching", "entry", "normal", "arm", "push", "share", "branch"),
         *("active", "order", "colour", "taken", "colour_first"),
     )
 
@@ -38,7 +38,7 @@ class PairDashpots:
         self.has_friction = bool(model.friction.name)
         pairs, spheres = contacts.capacity, contacts.sphere_capacity
         self.touching = ti.field(ti.i32, shape=pairs)
-        self.touch = ti.field(ti.i32, shape=spheres)
+        self.entry = ti.field(ti.i32, shape=spheres)
         self.normal = ti.Vector.field(3, real, shape=spheres)
         self.arm = ti.Vector.field(3, real, shape=spheres)
         self.push = ti.field(real, shape=spheres)
@@ -122,7 +122,7 @@ class PairDashpots:
             if apart.norm_sqr() < (reach + ahead) * (reach + ahead):
                 met = meeting(first, reach, apart, self.state.rotation[i])
                 overlap, normal, arm = met.overlap, met.normal, met.arm - branch
-                self.touch[end], self.normal[end], self.arm[end] = k, normal, arm
+                self.entry[end], self.normal[end], self.arm[end] = k, normal, arm
                 # Spheres still apart may approach until they touch, at the end of the step.
                 push = dt * self.contacts.law.elastic(ti.max(overlap, 0.0))
                 self.push[end] = push + self.contacts.law.damping() * ti.min(overlap, 0.0)
@@ -175,7 +175,7 @@ class PairDashpots:
 
     @ti.func
     def _visit(self, c, i, j, branch, damping):
-        k, normal, arm, share = self.touch[c], self.normal[c], self.arm[c], self.share[c]
+        k, normal, arm, share = self.entry[c], self.normal[c], self.arm[c], self.share[c]
         linear, angular = self.motion.apart(i, j, branch)
         velocity = linear + angular.cross(arm)
         held = self.impulse[k]
@@ -211,7 +211,7 @@ class PairDashpots:
             dragged, rubbed = 0.0, 0.0
             for c in range(start, start + self.touching[p]):
                 velocity, normal = linear + angular.cross(self.arm[c]), self.normal[c]
-                impulse = self.impulse[self.touch[c]]
+                impulse = self.impulse[self.entry[c]]
                 pressed, rate = impulse.dot(normal), velocity.dot(normal)
                 dragged += (ti.max(self.push[c], 0.0) - pressed) * rate
                 rubbed -= (impulse - pressed * normal).dot(velocity)
