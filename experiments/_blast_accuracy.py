@@ -70,7 +70,7 @@ def blast(mesh, method, until, driver="auto", seed=None, progress=None):
 def _disturb(simulation, seed):
     place = simulation.model.centre
     noise = np.random.default_rng(seed).uniform(-DISTURBANCE, DISTURBANCE, place.shape)
-    simulation.state.place(place + noise, np.tile([1.0, 0.0, 0.0, 0.0], (len(place), 1)))
+    simulation.state.set_motion(place + noise, np.tile([1.0, 0.0, 0.0, 0.0], (len(place), 1)))
 
 
 def _outcome(simulation, failure):

@@ -111,13 +111,13 @@ def _elastic(cls):
     simulation = Simulation(Scene(read_mesh(PAPER_BLOCK), CONCRETE, []), Uniform(step), "resident")
     still = np.tile([1.0, 0.0, 0.0, 0.0], (simulation.model.body_count, 1))
     shaken = np.random.default_rng(1).normal(size=(len(still), 3))
-    simulation.state.place(simulation.model.centre, still, shaken)
+    simulation.state.set_motion(simulation.model.centre, still, shaken)
     simulation.start()
     driver = simulation.driver
     if cls is not None:
         advance = cls(simulation.model, simulation.state, simulation.schedule, None)
         driver = Resident(Step(advance, simulation.schedule, None))
-    driver.settle()
+    driver.prepare()
     return lambda substeps: driver._run(1 << 60, substeps)
 
 

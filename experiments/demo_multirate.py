@@ -109,7 +109,7 @@ def hit(name, scene, until, options):
     flying = model.centre[:, 0] > LENGTH
     velocity = np.outer(flying, (-options.speed, 0.0, 0.0))
     turn = np.tile([1.0, 0.0, 0.0, 0.0], (model.body_count, 1))
-    simulation.state.place(model.centre, turn, velocity)
+    simulation.state.set_motion(model.centre, turn, velocity)
     recorder = Recorder(simulation, None)
     simulation.start()
     last, counts, broken = macro_steps(until, DT0), [], []

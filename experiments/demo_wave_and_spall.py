@@ -161,7 +161,7 @@ def lay_pulse(simulation, ratio, speed):
     moved = peak / speed * np.interp(depth, grid, behind)
     along = np.column_stack([peak * np.interp(depth, grid, shape), still])
     turn = np.tile([1.0, 0.0, 0.0, 0.0], (model.body_count, 1))
-    simulation.state.place(model.centre + np.column_stack([moved, still]), turn, along)
+    simulation.state.set_motion(model.centre + np.column_stack([moved, still]), turn, along)
 
 
 def spalled(made, ratios, speed):

@@ -1,4 +1,4 @@
-"""Fields first, their values after: Taichi bears 512 groups of fields in a session, then crashes.
+"""Taichi crashes beyond 512 field trees a session, so allocation is batched.
 
 A group is what is declared between two uses of any field. A model that wrote each field as soon as
 it was made would take twenty groups, and the thirtieth model of a notebook would end it.

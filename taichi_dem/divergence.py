@@ -1,4 +1,4 @@
-"""Finds runs that have left the range where their numbers mean anything, and says why."""
+"""Detect diverged runs, and describe where and why."""
 
 import time
 
@@ -26,7 +26,7 @@ class DivergenceCheck:
 
     def __init__(self, model, state, schedule, contacts, ledger, solves=False):
         self.model, self.state, self.schedule, self.solves = model, state, schedule, solves
-        self.limited = schedule.has_rates and schedule.rates.limited
+        self.limited = schedule.has_limits and schedule.limits.limited
         self.contacts, self.ledger = contacts, ledger
         self.round_off = self._round_off()
         self.rest_until = 0.0

@@ -1,4 +1,4 @@
-"""What each effect of a run did: read off the energy account at the end, at no cost in the step."""
+"""Activity of each effect in a run, from the energy balance at its end."""
 
 import numpy as np
 

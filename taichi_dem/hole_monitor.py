@@ -1,4 +1,4 @@
-"""The points of a block with a hole that a run watches: bodies at the hole, and one of them."""
+"""Monitoring of a block with a hole: the displacement of the bodies at its wall."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What steps of different length really save: against the same bodies with one step for all.
+"""Measured speed-up of multirate stepping over the same bodies with one step for all.
 
 The gains of a ``Report`` count evaluations. Lists that change, looks at who is due, and lines of
 memory of which a part is used cost time beside them.

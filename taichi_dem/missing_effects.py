@@ -1,4 +1,4 @@
-"""Looks, at recording times, for effects that a scene left out and the run turns out to need."""
+"""Effects that a scene left out and the run needs, found at recording times."""
 
 from dataclasses import dataclass, replace
 

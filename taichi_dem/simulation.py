@@ -91,7 +91,7 @@ class Simulation:
         if model.has_contact:
             self.contacts = Contacts(model, state, method.dt0, method.ahead)
         drifted = method.neighbour == "drifted"
-        rates = limits_for(model, state, self.contacts, method)
+        limits = limits_for(model, state, self.contacts, method)
         self.schedule = Schedule(
             model,
             state,
@@ -100,7 +100,7 @@ class Simulation:
             method.dt0,
             method.uniform,
             drifted,
-            rates,
+            limits,
         )
 
     def _build_advance(self):
@@ -130,7 +130,7 @@ class Simulation:
         if self.contacts is not None:
             self.broad_phase.ask(everywhere=True)
         compiling("time step", 0.35)
-        self.driver.settle()
+        self.driver.prepare()
         self._check_capacity()
         compiling("energy balance", 0.85)
         self.ledger = EnergyBalance(self.model, self.state, self.advance, self.contacts)

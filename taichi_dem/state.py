@@ -63,9 +63,9 @@ class State:
         defer_fill(self.max_speed2.fill, max_speed**2)
         defer_fill(self.broken_tick.fill, NEVER)
         defer_fill(self.bad_body.fill, n)
-        defer_fill(self.place, model.centre, np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)))
+        defer_fill(self.set_motion, model.centre, np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)))
 
-    def place(self, position, orientation, velocity=None, spin=None):
+    def set_motion(self, position, orientation, velocity=None, spin=None):
         """Set the motion of all bodies.
 
         position (n, 3) [m], orientation (n, 4) unit quaternions, velocity (n, 3) [m/s] and spin
@@ -74,10 +74,10 @@ class State:
         still = np.zeros((self.model.body_count, 3))
         arrays = (position, orientation, still if velocity is None else velocity)
         arrays = (*arrays, still if spin is None else spin)
-        self._place(*(np.ascontiguousarray(a, dtype=np.float64) for a in arrays))
+        self._write_motion(*(np.ascontiguousarray(a, dtype=np.float64) for a in arrays))
 
     @ti.kernel
-    def _place(
+    def _write_motion(
         self,
         position: ti.types.ndarray(dtype=ti.f64, ndim=2),
         orientation: ti.types.ndarray(dtype=ti.f64, ndim=2),

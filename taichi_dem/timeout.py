@@ -1,4 +1,4 @@
-"""Calls of other people's code that may never return."""
+"""Run a function with a time limit, for third-party code that may never return."""
 
 import ctypes
 import threading

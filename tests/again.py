@@ -28,7 +28,7 @@ class Again:
         self.simulation.schedule.evaluations.fill(0)
         if position is not None or velocity is not None:
             still = np.tile([1.0, 0.0, 0.0, 0.0], (self.model.body_count, 1))
-            self.state.place(
+            self.state.set_motion(
                 self.model.centre if position is None else position,
                 still if orientation is None else orientation,
                 velocity,

@@ -43,7 +43,9 @@ class BondProbe:
     def move(self, position, orientation=None, velocity=None, spin=None):
         """Place both bodies, arrays (2, ...), and evaluate the bond; see ``evaluate``."""
         still = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
-        self.state.place(position, still if orientation is None else orientation, velocity, spin)
+        self.state.set_motion(
+            position, still if orientation is None else orientation, velocity, spin
+        )
         return self.evaluate()
 
     def open(self, opening, velocity=(0.0, 0.0, 0.0), spin=(0.0, 0.0, 0.0)):
@@ -128,7 +130,9 @@ class ContactProbe:
         spheres: sphere numbers on body 0 and body 1. swap: let body 1 be the first of the pair.
         """
         still = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
-        self.state.place(position, still if orientation is None else orientation, velocity, spin)
+        self.state.set_motion(
+            position, still if orientation is None else orientation, velocity, spin
+        )
         wrench, heat = np.zeros((2, 6)), np.zeros(3)
         self._evaluate(spheres[0], spheres[1], int(swap), wrench, heat)
         return wrench / STEP, heat / STEP

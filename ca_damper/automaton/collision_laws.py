@@ -1,4 +1,4 @@
-"""Laws of one collision as pure functions: values in, values out.
+"""Collision laws as pure functions: values in, values out.
 
 Komatsuzaki et al., 5.3 and 5.4. Speeds are signed along the direction of the particle that hits;
 a result below zero sends that particle back.

@@ -1,4 +1,4 @@
-"""Which particles meet what in a step, and what comes of it (Komatsuzaki et al., 5.3 and 5.4).
+"""Collisions of particles with each other and with walls (Komatsuzaki et al., 5.3 and 5.4).
 
 First every touching particle is judged by the state after the flight: does it join the heap, meet
 a wall, or approach another particle? Events claim the particles they need, so that no particle has

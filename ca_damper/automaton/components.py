@@ -1,4 +1,4 @@
-"""What the rules of an automaton share."""
+"""Components that the rules of an automaton share."""
 
 from dataclasses import dataclass
 

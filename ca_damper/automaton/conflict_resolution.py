@@ -1,4 +1,4 @@
-"""Who comes first where only one can: the largest random rank among all that claim a cell.
+"""Resolve conflicting claims to a cell by random rank.
 
 The largest of several does not depend on the order in which they are asked. Ranks grow with the
 step, so that old claims never need to be cleared.

@@ -1,4 +1,4 @@
-"""Where momentum along x goes that no counted blow carries off.
+"""Balance of the momentum along x that no counted impulse carries.
 
 Six directions cannot hold every momentum: gravity acts on oblique flights by its projection only,
 a random deflection turns momentum out of its line, and an accounting leaves some blows out.

@@ -1,4 +1,4 @@
-"""Free flight and the step into the next cell (Komatsuzaki et al., 5.2)."""
+"""Transport: free flight and the change of cell (Komatsuzaki et al., 5.2)."""
 
 import taichi as ti
 

@@ -1,4 +1,4 @@
-"""What the effects of the spheres did, as seen when the health of a scene was looked at.
+"""Activity of the effects of the spheres, sampled when a scene is checked for divergence.
 
 Those looks are every few steps: to ask in every step would cost a fifth of it.
 """

@@ -247,7 +247,7 @@ def follow(islands, acting, method, until, material=CONCRETE):
         np.vstack([getattr(island, name) for island in islands.values()])
         for name in ("shift", "velocity", "spin")
     )
-    simulation.state.place(centre + shift, np.tile(_STILL, (len(centre), 1)), velocity, spin)
+    simulation.state.set_motion(centre + shift, np.tile(_STILL, (len(centre), 1)), velocity, spin)
     samples = march(simulation, until)
     samples["compile_s"] = simulation.compile_seconds
     return {name: _track(simulation, samples, part) for name, part in slices.items()}

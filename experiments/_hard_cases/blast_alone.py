@@ -222,7 +222,7 @@ def faster_than_the_bound(method, quick):
     """A body beyond the speed at which a scene counts as run away."""
     simulation = Simulation(Scene(single(), CONCRETE, max_speed=100.0), scenes.FREE[method])
     still = [[1.0, 0.0, 0.0, 0.0]]
-    simulation.state.place(simulation.model.centre, still, [[FAST, 0.0, 0.0]])
+    simulation.state.set_motion(simulation.model.centre, still, [[FAST, 0.0, 0.0]])
     scenes.march(simulation, 1e-5)
     return _never()
 

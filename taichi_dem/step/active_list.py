@@ -1,4 +1,4 @@
-"""A list in order of falling level: the members that are due at a tick are its first part."""
+"""List in order of falling level; the members that are active at a tick come first."""
 
 import taichi as ti
 
@@ -9,14 +9,14 @@ from taichi_dem.timeline import MAX_LEVEL
 class ActiveList:
     """Indices in order of falling key; end[k] counts the members with a key of at least k.
 
-    order: the members; place: where in it each one is; key: each one's key, -1 for one that is
+    order: the members; index: where in it each one is; key: each one's key, -1 for one that is
     not listed. The order within a key does not matter: nothing that is computed depends on it.
     """
 
     def __init__(self, capacity):
         room = max(1, capacity)
         self.order = ti.field(ti.i32, shape=room)
-        self.place = ti.field(ti.i32, shape=room)
+        self.index = ti.field(ti.i32, shape=room)
         self.key = ti.field(ti.i32, shape=room)
         self.end = ti.field(ti.i32, shape=MAX_LEVEL + 2)
 
@@ -70,11 +70,11 @@ class ActiveList:
 
     @ti.func
     def _swap(self, m, place):
-        other, old = self.order[place], self.place[m]
+        other, old = self.order[place], self.index[m]
         self._put(other, old)
         self._put(m, place)
 
     @ti.func
     def _put(self, m, place):
         self.order[place] = m
-        self.place[m] = place
+        self.index[m] = place

@@ -27,15 +27,15 @@ class Advance(ContactForce):
         self.has_contact = contacts is not None
         # Without fast_math a product with zero is not folded: what is absent must not be written.
         self.has_dashpot = bool(model.dashpot.name)
-        self.rates, self.retimes = schedule.rates, schedule.retimes
-        self.has_rates = schedule.has_rates
-        self.limited = self.has_rates and schedule.rates.limited
+        self.limits, self.retimes = schedule.limits, schedule.retimes
+        self.has_limits = schedule.has_limits
+        self.limited = self.has_limits and schedule.limits.limited
         self.has_heat = self.has_dashpot or bool(model.shear.name)
 
     @ti.func
     def bond(self, b):
         """Evaluate the three contact units of a bond; release it when one of them fails."""
-        if self._owes(b):
+        if self._is_pending(b):
             slots = self.model.bond_slots[b]
             scale = 1.0
             if ti.static(self.limited):
@@ -92,20 +92,22 @@ class Advance(ContactForce):
                 self.state.bond_heat[b][0] = self.state.bond_heat[b][0] + dragged
 
     @ti.func
-    def _owes(self, b):
+    def _is_pending(self, b):
         """Whether a bond holds, and has not given its impulse for the coming step already."""
-        owes = self.state.broken_tick[b] < 0
+        pending = self.state.broken_tick[b] < 0
         if ti.static(self.retimes):
             slots = self.model.bond_slots[b]
-            owes = owes and self.schedule.payments.owes(b, slots[0] >> 2, slots[1] >> 2)
-        return owes
+            pending = pending and self.schedule.applied_until.is_pending(
+                b, slots[0] >> 2, slots[1] >> 2
+            )
+        return pending
 
     @ti.func
     def _bond_step(self, b, i, j):
         """Seconds for which a bond gives its impulse now."""
         dt = 0.0
         if ti.static(self.retimes):
-            dt = self.schedule.payments.take_bond(b, i, j)
+            dt = self.schedule.applied_until.apply_bond(b, i, j)
         else:
             dt = self.schedule.pair_step(i, j)
         return dt
@@ -114,8 +116,8 @@ class Advance(ContactForce):
     def bond_share(self, b):
         """Share of its coefficient that a bond's limited dashpot keeps: what both bodies bear."""
         i, j = self.model.bond_slots[b][0] >> 2, self.model.bond_slots[b][1] >> 2
-        first = self.rates.bond_share(i, self.schedule.own_step(i))
-        return ti.min(first, self.rates.bond_share(j, self.schedule.own_step(j)))
+        first = self.limits.bond_share(i, self.schedule.own_step(i))
+        return ti.min(first, self.limits.bond_share(j, self.schedule.own_step(j)))
 
     @ti.func
     def _motion(self, b, slots):
@@ -184,8 +186,8 @@ class Advance(ContactForce):
             if ti.static(self.has_contact):
                 self.state.exposed_tick[slots[side]] = tick
             self.schedule.note_change(slots[side] >> 2)
-            if ti.static(self.has_rates):
-                self.rates.notice(slots[side] >> 2, RELEASE)
+            if ti.static(self.has_limits):
+                self.limits.notice(slots[side] >> 2, RELEASE)
         if ti.static(self.has_contact):
             self.contacts.search_requested[None] = 1
 

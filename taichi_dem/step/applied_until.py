@@ -1,4 +1,4 @@
-"""What bonds and pairs have given ahead, where bodies may be woken between their own times."""
+"""Time up to which each bond or pair has applied its impulse."""
 
 import taichi as ti
 
@@ -7,38 +7,38 @@ from taichi_dem.timeline import device_ticks_of
 
 @ti.data_oriented
 class AppliedUntil:
-    """Until when each bond and pair has given its impulse.
+    """Tick up to which each bond and pair has applied its impulse, where bodies may be woken early.
 
-    A bond gives it for the coming step of the finer body at once. When that body is woken and
-    takes a shorter step, the bond is due again while it has still paid: it gives no more until
-    the tick that it paid up to. That is a time of the coarser step, so of any finer
-    one: nothing is ever paid in part.
-    bond: that tick for every bond; those of the pairs are in ``ContactLimits``, which keeps them
+    A bond applies its impulse for the coming step of the finer body at once. When that body is
+    woken and takes a shorter step, the bond is due again although its impulse is still ahead of the
+    clock: it applies no more until the tick up to which it has. That is a time of the coarser
+    step and so of any finer one: no impulse is ever applied in part.
+    bond: that tick for every bond; those of the pairs are in ``ContactLimits``, which carries them
     through a search. schedule: knows their steps.
     """
 
-    def __init__(self, model, state, schedule, rates):
-        self.state, self.schedule, self.near = state, schedule, rates.near
+    def __init__(self, model, state, schedule, limits):
+        self.state, self.schedule, self.contact_limits = state, schedule, limits.contact_limits
         self.bond = ti.field(ti.i64, shape=max(1, model.bond_count))
 
     @ti.func
-    def owes(self, b, i, j):
-        """Whether bond b of two bodies has something left to give for their coming step."""
+    def is_pending(self, b, i, j):
+        """Whether bond b has yet to apply its impulse for the coming step of its two bodies."""
         return self.bond[b] < self._until(i, j)
 
     @ti.func
-    def take_bond(self, b, i, j):
-        """Seconds that bond b, which owes, is to give for now; they count as given."""
+    def apply_bond(self, b, i, j):
+        """Seconds for which a pending bond applies its force now; records them as applied."""
         self.bond[b] = self._until(i, j)
         return self.schedule.pair_step(i, j)
 
     @ti.func
-    def take_pair(self, p, i, j):
-        """The same for a pair in contact; 0 where it has given them."""
+    def apply_pair(self, p, i, j):
+        """The same for a pair in contact; 0 where it has applied its impulse already."""
         dt, until = 0.0, self._until(i, j)
-        if self.near.paid[p] < until:
+        if self.contact_limits.applied_until[p] < until:
             dt = self.schedule.pair_step(i, j)
-            self.near.paid[p] = until
+            self.contact_limits.applied_until[p] = until
         return dt
 
     @ti.func

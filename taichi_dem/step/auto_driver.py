@@ -1,4 +1,4 @@
-"""Goes on with whichever driver proves the quicker: both give the same bits, trying costs but time.
+"""Driver chosen by measurement: continues with the faster one; both give the same bits.
 
 Which one it is depends on how much is due in a step and on how free the cores are: the parallel
 driver pays for every phase with a launch, and much more where other programs hold a core.
@@ -30,7 +30,7 @@ class AutoDriver:
 
     def _begin(self):
         """Try both again."""
-        self.ahead = list(self.drivers) * _TRIES
+        self.pending_tries = list(self.drivers) * _TRIES
         self.seconds, self.spent, self.since = {}, 0.0, 0.0
 
     @property
@@ -38,16 +38,16 @@ class AutoDriver:
         """Name of the driver that goes on, and that this was measured."""
         return f"{self.chosen} (measured)"
 
-    def settle(self):
+    def prepare(self):
         """Make the search that is due, without a step; compiles both drivers."""
         for driver in self.drivers.values():
-            driver.settle()
+            driver.prepare()
 
     def run(self, end_tick):
         """Advance to a tick, to the next halt, for a try, or for about as long as the driver."""
         started = self.clock()
-        if self.ahead:
-            self._try(self.ahead.pop(0), end_tick)
+        if self.pending_tries:
+            self._try(self.pending_tries.pop(0), end_tick)
             self.spent += self.clock() - started
         else:
             self.drivers[self.chosen].run(end_tick)
@@ -61,7 +61,7 @@ class AutoDriver:
         self.drivers[name].few(end_tick, _SUBSTEPS)
         seconds = (self.clock() - started) / max(1, self._visited() - before)
         self.seconds[name] = min(seconds, self.seconds.get(name, seconds))
-        if not self.ahead:
+        if not self.pending_tries:
             self.chosen = min(self.seconds, key=self.seconds.get)
 
     def _visited(self):

@@ -88,7 +88,7 @@ class BroadPhase:
             (self._all_amended, self.neighbours.amend),
             (self._exposed_bodies, self._note_places),
             (self._once, self.candidates.pack),
-            (self._pairs, self._keep),
+            (self._pairs, self._save_pair),
             (self._exposed_bodies, self._count_spheres),
             (self._once, self.numbering.number_pairs),
             (self._pairs, self._fill_pair),
@@ -218,11 +218,11 @@ class BroadPhase:
         return bonded
 
     @ti.func
-    def _keep(self, p):
+    def _save_pair(self, p):
         """Save a pair of the old list with what waits for it."""
         self.old.keep(p)
-        if ti.static(self.schedule.has_rates):
-            self.schedule.rates.near.keep(p)
+        if ti.static(self.schedule.has_limits):
+            self.schedule.limits.contact_limits.save(p)
 
     @ti.func
     def _count_spheres(self, a):
@@ -234,10 +234,10 @@ class BroadPhase:
             if looked | self.looked[j] != 0 and self.contacts.exposed_faces[j] != 0:
                 faces = self.pair_cache.faces[k] & self._broken_faces(i, j)
                 if self.everywhere[None] == 1 or self.pair_cache.may_touch(k, i, j, faces):
-                    self._look_into(k, i, j, faces)
+                    self._count_entry(k, i, j, faces)
 
     @ti.func
-    def _look_into(self, k, i, j, faces):
+    def _count_entry(self, k, i, j, faces):
         """Count the spheres of entry k of the neighbours, and find how far apart the others are."""
         count, hits, gap = 0, 0, 0.0
         if not self._bonded(i, j):
@@ -267,11 +267,11 @@ class BroadPhase:
             self.spheres.of_pair(i, j, faces, self.contacts.pair_first[p], True)
             injected = self._injected(p, i, j)
             if ti.static(self.solves):
-                self.solver.pairs.take(p, self.old)
+                self.solver.pairs.carry_over(p, self.old)
         self.old.hand_over(p, injected)
-        if ti.static(self.schedule.has_rates):
+        if ti.static(self.schedule.has_limits):
             fresh = self._exposed_now(i) | self._exposed_now(j)
-            self.schedule.rates.take_pair(p, self.old.former[p], fresh)
+            self.schedule.limits.carry_over_pair(p, self.old.former[p], fresh)
 
     @ti.func
     def _exposed_now(self, i):

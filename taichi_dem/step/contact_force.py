@@ -1,4 +1,4 @@
-"""What happens to a pair of bodies whose spheres may touch: ``Advance``'s part for contacts."""
+"""Contact forces of a pair of bodies: the part of ``Advance`` for spheres that may touch."""
 
 import taichi as ti
 
@@ -26,14 +26,14 @@ class ContactForce:
         scale, margin, near = 1.0, 0.0, 0
         if ti.static(self.limited):
             scale = self.contact_share(i, j)
-        if ti.static(self.has_rates):
-            margin = self.rates.near.margin(i, j)
+        if ti.static(self.has_limits):
+            margin = self.limits.contact_limits.margin(i, j)
         for k in range(self.contacts.pair_first[p], self.contacts.pair_last[p]):
             a, b = self.contacts.pair_sphere[k][0], self.contacts.pair_sphere[k][1]
             first, second = self.model.sphere[a], self.model.sphere[b]
             apart = turn @ second.xyz + offset - first.xyz
             reach = first[3] + second[3]
-            if ti.static(self.has_rates):
+            if ti.static(self.has_limits):
                 near += ti.cast(apart.norm_sqr() < (reach + margin) * (reach + margin), ti.i32)
             if apart.norm_sqr() < reach * reach:
                 met = meeting(first, reach, apart, self.state.rotation[i])
@@ -58,8 +58,8 @@ class ContactForce:
             heat = dt * vec3(dragged, rubbed, 0.0)
             self.contacts.pair_heat[p] = self.contacts.pair_heat[p] + heat
         self.contacts.deepest[p] = deepest
-        if ti.static(self.has_rates):
-            self.rates.notice_pair(p, near, HIT)
+        if ti.static(self.has_limits):
+            self.limits.notice_pair(p, near, HIT)
 
     @ti.func
     def _limited(self, value, scale):
@@ -73,7 +73,7 @@ class ContactForce:
         """Seconds for which a touching pair gives its impulse now; 0 when it has given it."""
         dt = 0.0
         if ti.static(self.retimes):
-            dt = self.schedule.payments.take_pair(p, i, j)
+            dt = self.schedule.applied_until.apply_pair(p, i, j)
         else:
             dt = self.schedule.pair_step(i, j)
         return dt
@@ -85,5 +85,5 @@ class ContactForce:
     @ti.func
     def contact_share(self, i, j):
         """Share of its coefficient that a limited dashpot of a pair in contact keeps."""
-        first = self.rates.contact_share(i, self.schedule.own_step(i))
-        return ti.min(first, self.rates.contact_share(j, self.schedule.own_step(j)))
+        first = self.limits.contact_share(i, self.schedule.own_step(i))
+        return ti.min(first, self.limits.contact_share(j, self.schedule.own_step(j)))

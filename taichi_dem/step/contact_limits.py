@@ -1,4 +1,4 @@
-"""Contacts that are near: counted before they touch, and what rate they give a body's dashpots."""
+"""Contacts counted before they touch, and the limits they set to a body's step."""
 
 import numpy as np
 import taichi as ti
@@ -35,12 +35,12 @@ class ContactLimits:
 
     A sphere pair counts from the moment at which it could touch within some steps of the finer of
     its bodies: it is evaluated once a step, and the coarser body is woken before the next time.
-    count: how many of the sphere pairs of a body pair count. paid: tick up to which a pair has
-    given its impulse.
+    count: how many of the sphere pairs of a body pair count. applied_until: tick up to which a pair
+    has given its impulse.
     """
 
     constant_fields = ("ahead", "root_mass", "root_inertia")
-    scratch_fields = ("old_count", "old_paid")
+    scratch_fields = ("old_count", "old_applied_until")
 
     def __init__(self, model, state, contacts, ahead):
         self.model, self.state, self.contacts = model, state, contacts
@@ -48,8 +48,8 @@ class ContactLimits:
         defer_fill(self.ahead.from_numpy, ahead / 2.0 ** np.arange(MAX_LEVEL + 1))
         self.count = ti.field(ti.i32, shape=contacts.capacity)
         self.old_count = ti.field(ti.i32, shape=contacts.capacity)
-        self.paid = ti.field(ti.i64, shape=contacts.capacity)
-        self.old_paid = ti.field(ti.i64, shape=contacts.capacity)
+        self.applied_until = ti.field(ti.i64, shape=contacts.capacity)
+        self.old_applied_until = ti.field(ti.i64, shape=contacts.capacity)
         # M^-1/2 as 1 / sqrt(m) and I^-1/2 in the body frame.
         self.root_mass = ti.field(real, shape=model.body_count)
         self.root_inertia = ti.Matrix.field(3, 3, real, shape=model.body_count)
@@ -64,19 +64,19 @@ class ContactLimits:
         return ahead * self.contacts.approach(i, j)
 
     @ti.func
-    def keep(self, p):
+    def save(self, p):
         """Save what is known of a pair before the list is renewed."""
-        self.old_count[p], self.old_paid[p] = self.count[p], self.paid[p]
+        self.old_count[p], self.old_applied_until[p] = self.count[p], self.applied_until[p]
 
     @ti.func
-    def renew(self, p, old):
+    def restore(self, p, old):
         """Take it over for the pair at place p; old: its former place, -1 for none."""
-        self.count[p], self.paid[p] = 0, 0
+        self.count[p], self.applied_until[p] = 0, 0
         if old >= 0:
-            self.paid[p], self.count[p] = self.old_paid[old], self.old_count[old]
+            self.applied_until[p], self.count[p] = self.old_applied_until[old], self.old_count[old]
 
     @ti.func
-    def within(self, p):
+    def count_within_margin(self, p):
         """How many of the sphere pairs of the pair at place p count now."""
         pair = self.contacts.pair_body[p]
         return self.contacts.closer(p, self.margin(pair[0], pair[1]))

@@ -112,17 +112,17 @@ class Contacts:
         linear, angular = vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 0.0)
         for p in range(self.first_of[i], self.first_of[i + 1]):
             if self.pair_full[2 * p] == 1:
-                linear, angular = self._take(2 * p, linear, angular)
+                linear, angular = self._gather_slot(2 * p, linear, angular)
                 self.state.contact_heat[i] = self.state.contact_heat[i] + self.pair_heat[p]
                 self.pair_heat[p] = vec3(0.0)
         for k in range(self.second_start[i], self.second_start[i + 1]):
             slot = 2 * self.second_pair[k] + 1
             if self.pair_full[slot] == 1:
-                linear, angular = self._take(slot, linear, angular)
+                linear, angular = self._gather_slot(slot, linear, angular)
         return linear, angular
 
     @ti.func
-    def _take(self, slot, linear, angular):
+    def _gather_slot(self, slot, linear, angular):
         taken = self.pair_slot[slot]
         self.pair_slot[slot] = 0.0 * taken
         self.pair_full[slot] = 0

@@ -66,9 +66,9 @@ class Step:
             (
                 *self._retimed(),
                 *touching,
-                (Once(), schedule.tick_on),
+                (Once(), schedule.advance_clock),
                 (schedule.bodies, advance.body),
-                (Once(), schedule.put_in_order),
+                (Once(), schedule.reorder),
                 (schedule.bonds, advance.bond),
             ),
         )
@@ -79,13 +79,13 @@ class Step:
 
     def _retimed(self):
         """Phases in which bodies take new rates, and are woken, where the method asks for it."""
-        rates = self.schedule.rates
-        if rates is None:
+        limits = self.schedule.limits
+        if limits is None:
             return ()
-        phases = ((rates, rates.refresh),)
+        phases = ((limits, limits.refresh),)
         if self.schedule.retimes:
-            phases += ((rates, WakeUp(self.advance, self.schedule).rouse),)
-        return (*phases, (Once(), self.schedule.settle))
+            phases += ((limits, WakeUp(self.advance, self.schedule).wake_up),)
+        return (*phases, (Once(), self.schedule.apply_changes))
 
     @ti.kernel
     def prime(self):
@@ -93,9 +93,9 @@ class Step:
         for _ in range(1):
             self.schedule.low[None] = 0
             self.schedule.wanted[None] = 0
-        if ti.static(self.schedule.has_rates):
+        if ti.static(self.schedule.has_limits):
             for i in range(self.advance.model.body_count):
-                self.schedule.rates.refresh(i)
+                self.schedule.limits.refresh(i)
         for i in range(self.advance.model.body_count):
             self.schedule.choose_level(i, self.state.velocity[i].norm_sqr())
         for _ in range(1):
@@ -164,14 +164,14 @@ class SolvedStep(Step):
             booked = ((schedule.pairs, solver.pairs.book),)
         before = (
             *touching,
-            (Once(), schedule.tick_on),
+            (Once(), schedule.advance_clock),
             (Once(), solver.begin),
             (schedule.bodies, advance.predict),
         )
         after = (
             *booked,
             (schedule.bodies, advance.body),
-            (Once(), schedule.put_in_order),
+            (Once(), schedule.reorder),
             (schedule.bonds, advance.bond),
         )
         return (before, self._sweep(solver), after)
@@ -184,7 +184,7 @@ class SolvedStep(Step):
         if self.has_contact:
             pairs = tuple((Colour(solver.pairs, c), solver.pair) for c in range(COLOURS))
             pairs += ((Once(), solver.last_pairs),)
-        return (*bonds, *pairs, (Once(), solver.judge))
+        return (*bonds, *pairs, (Once(), solver.check_convergence))
 
     def repeats(self, part):
         """Whether a part, the sweep, is called for once more."""
@@ -198,7 +198,7 @@ class SolvedStep(Step):
             self.schedule.wanted[None] = 0
         for i in range(self.advance.model.body_count):
             self.schedule.choose_level(i, self.state.velocity[i].norm_sqr())
-            self.advance.solver.motion.place(i, self.advance)
+            self.advance.solver.velocities.update_inertia(i, self.advance)
         for _ in range(1):
             self.schedule.start_all()
         if ti.static(self.advance.solver.has_bonds):
@@ -221,7 +221,7 @@ class Resident:
         self.step = step
         self.substeps = 4
 
-    def settle(self):
+    def prepare(self):
         """Make the search that is due, without a step; compiles the kernel."""
         self._run(0, 0)
 
@@ -253,9 +253,9 @@ class Resident:
             finished = self.step.state.tick[None] >= end_tick or self.step.halted() == 1
             if s == substeps or finished:
                 break
-            for due, item in ti.static(self.step.phases):
-                for a in range(due.count(low[None])):
-                    item(due.pick(a))
+            for active, item in ti.static(self.step.phases):
+                for a in range(active.count(low[None])):
+                    item(active.pick(a))
             done = s + 1
         return done
 
@@ -269,7 +269,7 @@ class Parallel:
     def __init__(self, step):
         self.step = step
 
-    def settle(self):
+    def prepare(self):
         """Make the search that is due, without a step; compiles the kernels."""
         for part in range(len(self.step.parts)):
             self._run(part, 0, 0)
@@ -303,9 +303,9 @@ class Parallel:
     def _run(self, part: ti.template(), end_tick: ti.i64, share: ti.i32) -> ti.i32:
         # With a share of 0 nothing happens: compiled, and that is all.
         low = ti.static(self.step.schedule.low)
-        for due, item in ti.static(self.step.parts[part]):
-            for a in range(share * due.count(low[None])):
-                item(due.pick(a))
+        for active, item in ti.static(self.step.parts[part]):
+            for a in range(share * active.count(low[None])):
+                item(active.pick(a))
         finished = ti.cast(self.step.state.tick[None] >= end_tick, ti.i32)
         finished |= self.step.halted()
         if ti.static(self.step.has_contact):

@@ -9,20 +9,20 @@ from taichi_dem.step.stability_limits import CLOSE
 class LevelLimit:
     """A body takes a level at most jump below the finest of the bodies that it touches.
 
-    It touches those to which it is bonded and those with which contacts are near. known: levels
-    at the last ordering of the lists, so that no result depends on the order of bodies.
+    It touches those to which it is bonded and those with which contacts are near. listed_level:
+    levels at the last ordering of the lists, so that no result depends on the order of bodies.
     """
 
-    def __init__(self, model, state, contacts, rates):
-        self.model, self.state, self.contacts, self.rates = model, state, contacts, rates
-        self.has_contact, self.jump = contacts is not None, rates.jump
-        self.known = ti.field(ti.i32, shape=model.body_count)
+    def __init__(self, model, state, contacts, limits):
+        self.model, self.state, self.contacts, self.limits = model, state, contacts, limits
+        self.has_contact, self.jump = contacts is not None, limits.jump
+        self.listed_level = ti.field(ti.i32, shape=model.body_count)
 
     @ti.func
     def note_all(self):
         """Take the levels of all bodies as known."""
         for i in range(self.model.body_count):
-            self.known[i] = self.state.level[i]
+            self.listed_level[i] = self.state.level[i]
 
     @ti.func
     def least(self, i):
@@ -30,15 +30,15 @@ class LevelLimit:
         finest = -1
         for f in range(4):
             if self._bonded(4 * i + f):
-                finest = ti.max(finest, self.known[self.model.neighbour[4 * i + f]])
+                finest = ti.max(finest, self.listed_level[self.model.neighbour[4 * i + f]])
         if ti.static(self.has_contact):
             for p in range(self.contacts.first_of[i], self.contacts.first_of[i + 1]):
-                if self.rates.near.count[p] > 0:
-                    finest = ti.max(finest, self.known[self.contacts.pair_body[p][1]])
+                if self.limits.contact_limits.count[p] > 0:
+                    finest = ti.max(finest, self.listed_level[self.contacts.pair_body[p][1]])
             for k in range(self.contacts.second_start[i], self.contacts.second_start[i + 1]):
                 p = self.contacts.second_pair[k]
-                if self.rates.near.count[p] > 0:
-                    finest = ti.max(finest, self.known[self.contacts.pair_body[p][0]])
+                if self.limits.contact_limits.count[p] > 0:
+                    finest = ti.max(finest, self.listed_level[self.contacts.pair_body[p][0]])
         return self.least_beside(finest)
 
     @ti.func
@@ -50,18 +50,18 @@ class LevelLimit:
     def spread(self, i):
         """Take the level of body i as known, and list those it touches that are too coarse."""
         level = self.state.level[i]
-        self.known[i] = level
+        self.listed_level[i] = level
         for f in range(4):
             if self._bonded(4 * i + f):
-                self._tell(self.model.neighbour[4 * i + f], level)
+                self._notify(self.model.neighbour[4 * i + f], level)
         if ti.static(self.has_contact):
             for p in range(self.contacts.first_of[i], self.contacts.first_of[i + 1]):
-                if self.rates.near.count[p] > 0:
-                    self._tell(self.contacts.pair_body[p][1], level)
+                if self.limits.contact_limits.count[p] > 0:
+                    self._notify(self.contacts.pair_body[p][1], level)
             for k in range(self.contacts.second_start[i], self.contacts.second_start[i + 1]):
                 p = self.contacts.second_pair[k]
-                if self.rates.near.count[p] > 0:
-                    self._tell(self.contacts.pair_body[p][0], level)
+                if self.limits.contact_limits.count[p] > 0:
+                    self._notify(self.contacts.pair_body[p][0], level)
 
     @ti.func
     def _bonded(self, face):
@@ -71,6 +71,6 @@ class LevelLimit:
         return bonded
 
     @ti.func
-    def _tell(self, j, level):
+    def _notify(self, j, level):
         if self.state.level[j] < level - self.jump:
-            self.rates.notice(j, CLOSE)
+            self.limits.notice(j, CLOSE)

@@ -1,4 +1,4 @@
-"""Spheres of two bodies that are candidates for contact, and how far apart the others are."""
+"""Narrow phase of the contact search: sphere pairs within a margin, and the gap of all others."""
 
 import taichi as ti
 

@@ -1,4 +1,4 @@
-"""When a search has to look into a pair of neighbours, and what it found there."""
+"""Results of earlier searches by pair of neighbours, so that few pairs are searched again."""
 
 import taichi as ti
 
@@ -7,7 +7,7 @@ from taichi_dem.types import real
 
 @ti.data_oriented
 class PairCache:
-    """What is known of each entry of the ``VerletList``, so that few are looked into.
+    """Cached search results of each entry of the ``VerletList``.
 
     Of an entry, side by side as they are asked for together: faces: which of the two bodies' faces
     are near, bit 4 f + g for faces f and g; broken: which of these are broken too; spheres: how
@@ -84,7 +84,7 @@ class PairCache:
 
     @ti.func
     def gap(self, k, i, j):
-        """Least gap that spheres can have now of which entry k knows that they had more [m]."""
+        """Lower bound on the present gap of the pair's unlisted spheres [m]."""
         return self.until[k] - self.travelled[i] - self.travelled[j]
 
     @ti.func

@@ -24,22 +24,22 @@ class Schedule:
     drifted: bodies next to a due one are brought to its time too, else only due bodies move.
     dt0 [s]: step of level 0. finest: finest level present. low: coarsest level now due.
     changed: bodies whose own level or bonds changed since the lists were put in order.
-    rates: a ``StabilityLimits`` that knows stable steps, None where the rule needs none. retimes:
-    whether bodies may be brought to the present between their own times; payments then keeps what
-    bonds and pairs have given ahead. level_limit: how much coarser than its neighbours a body may
-    be. evaluations: substeps, bodies advanced, bonds and pairs evaluated, and the bonds and pairs
-    that one step for all would have evaluated in the same substeps.
+    limits: the ``StabilityLimits`` of the bodies, None where the rule needs none. retimes:
+    whether bodies may be brought to the present between their own times; applied_until then holds
+    the time up to which what bonds and pairs have given ahead. level_limit: how much coarser than
+    its neighbours a body may be. evaluations: substeps, bodies advanced, bonds and pairs evaluated,
+    and the bonds and pairs that one step for all would have evaluated in the same substeps.
     """
 
-    def __init__(self, model, state, contacts, criterion, dt0, uniform, drifted, rates=None):
-        self.model, self.state, self.contacts, self.rates = model, state, contacts, rates
-        self.has_rates = rates is not None
-        self.controlled = self.has_rates and rates.control is not None
-        self.retimes = self.controlled and rates.wakes != 0
-        self.payments = AppliedUntil(model, state, self, rates) if self.retimes else None
-        self.spreads = self.controlled and not uniform and rates.jump is not None
+    def __init__(self, model, state, contacts, criterion, dt0, uniform, drifted, limits=None):
+        self.model, self.state, self.contacts, self.limits = model, state, contacts, limits
+        self.has_limits = limits is not None
+        self.controlled = self.has_limits and limits.control is not None
+        self.retimes = self.controlled and limits.wakes != 0
+        self.applied_until = AppliedUntil(model, state, self, limits) if self.retimes else None
+        self.spreads = self.controlled and not uniform and limits.jump is not None
         if self.spreads:
-            self.level_limit = LevelLimit(model, state, contacts, rates)
+            self.level_limit = LevelLimit(model, state, contacts, limits)
         self.criterion, self.uniform, self.drifted = criterion, uniform, drifted
         self.has_contact = contacts is not None
         self.dt0 = dt0
@@ -83,7 +83,7 @@ class Schedule:
         return ti.cast(tick, real) * self.step_seconds[MAX_LEVEL]
 
     @ti.func
-    def tick_on(self, one):
+    def advance_clock(self, one):
         """Move the clock to the next tick at which a body is due."""
         if ti.static(self.has_contact):
             self.evaluations[3] = self.evaluations[3] + self.pairs.end[self.low[None]]
@@ -114,7 +114,7 @@ class Schedule:
     @ti.func
     def controlled_level(self, i):
         """Level that the rates and the neighbours of body i ask for, and which criterion does."""
-        wanted, bound = self.rates.wanted(i, self.seconds(self.state.tick[None]))
+        wanted, bound = self.limits.wanted(i, self.seconds(self.state.tick[None]))
         if ti.static(self.spreads):
             # Its neighbours, many to visit, step no finer than the finest of all.
             if self.level_limit.least_beside(self.finest[None]) > wanted:
@@ -129,15 +129,15 @@ class Schedule:
         self.changed[ti.atomic_add(self.changed_count[None], 1)] = i
 
     @ti.func
-    def put_in_order(self, one):
+    def reorder(self, one):
         """Move the entries of the bodies that changed, and count what this tick evaluates."""
         self._rearrange()
         self._count()
 
     @ti.func
-    def settle(self, one):
+    def apply_changes(self, one):
         """The same after bodies have been brought to the present; their list is done with."""
-        self.rates.done()
+        self.limits.done()
         if ti.static(self.retimes):
             self._rearrange()
 

@@ -1,4 +1,4 @@
-"""How fast springs and dashpots act on each body, and the step that this allows.
+"""Rates of the springs and dashpots of each body, and the stable step that they allow.
 
 A body's rates change only where a bond breaks or a contact comes near or leaves. Such bodies are
 listed, and their rates found anew at the start of the next substep.
@@ -47,9 +47,9 @@ class StabilityLimits:
     dashpot_table, spring_table: largest eigenvalue of the bonds' block by the set of intact
     bonds, [1/s] and [1/s^2]. bond_damping, contact_damping: rates of a body's dashpots [1/s].
     limit, limit_level, limit_by: longest stable step [s], its level, and the criterion that sets
-    it. way, turn, leap: levels for speed, spin and acceleration. listed, listed_count: bodies to
-    look at; events: why, as bits. woken: how many were brought to the present between their times.
-    control: a StepControl, None for a method that only limits dashpots.
+    it. displacement, turn, leap: levels for speed, spin and acceleration. listed, listed_count:
+    bodies to look at; events: why, as bits. woken: how many were brought to the present between
+    their times. control: a StepControl, None for a method that only limits dashpots.
 
     Limited dashpots share 1.7 by need. With X = 2 dt rate for bonds (b) and contacts (c) of a body
     at its step, bonds keep min(X_b, 1.7 - min(X_c, 0.5)) of X_b and contacts min(X_c, 1, 1.7 -
@@ -88,7 +88,7 @@ class StabilityLimits:
         self.counts = {name: name in rule.criteria for name in CRITERIA}
         self.has_load = self.counts["load"] and self.has_distance and bool(model.loads)
         if self.has_distance:
-            self.way = Displacement(method.distance, method.dt0)
+            self.displacement = Displacement(method.distance, method.dt0)
         if self.has_load:
             self.leap = Displacement(method.distance, method.dt0, power=2)
         if self.counts["rotation"]:
@@ -96,9 +96,9 @@ class StabilityLimits:
         self.wakes = 0
         if self.control is not None:
             self.wakes = sum(1 << k for k, event in enumerate(EVENTS) if event in rule.wake)
-        self.near = None
+        self.contact_limits = None
         if self.has_contact:
-            self.near = ContactLimits(model, state, contacts, rule.ahead * method.dt0)
+            self.contact_limits = ContactLimits(model, state, contacts, rule.ahead * method.dt0)
         n = model.body_count
         self.dashpot_table = ti.field(real, shape=(n, 16))
         self.spring_table = ti.field(real, shape=(n, 16))
@@ -141,23 +141,23 @@ class StabilityLimits:
     @ti.func
     def notice_pair(self, p, count, event: ti.template()):
         """Note how many contacts of a pair are near; list both bodies if that is news."""
-        if count != self.near.count[p]:
-            self.near.count[p] = count
+        if count != self.contact_limits.count[p]:
+            self.contact_limits.count[p] = count
             for side in ti.static(range(2)):
                 self.notice(self.contacts.pair_body[p][side], event)
 
     @ti.func
-    def take_pair(self, p, old, fresh):
+    def carry_over_pair(self, p, old, fresh):
         """Take over what is known of a pair from its former place.
 
-        What is new in the list is no news of itself: a search lists what may come near, and how far
-        it looks must not matter. Spheres that a break has just set free may touch already.
+        Entering the list does not change a body's limits: a search lists what may come near, and
+        how far it looks must not matter. Spheres that a break has just set free may touch already.
         """
-        self.near.renew(p, old)
+        self.contact_limits.restore(p, old)
         if fresh != 0:
-            self.notice_pair(p, self.near.within(p), RELEASE)
+            self.notice_pair(p, self.contact_limits.count_within_margin(p), RELEASE)
         elif old < 0:
-            self.notice_pair(p, self.near.within(p), HIT)
+            self.notice_pair(p, self.contact_limits.count_within_margin(p), HIT)
 
     @ti.func
     def done(self):
@@ -178,7 +178,7 @@ class StabilityLimits:
         dashpot, spring = self.dashpot_table[i, intact], self.spring_table[i, intact]
         contact_c, contact_k = 0.0, 0.0
         if ti.static(self.has_contact):
-            share = self.near.eigenvalue(i)
+            share = self.contact_limits.eigenvalue(i)
             contact_c = self.contacts.law.damping() * share
             contact_k = self.contacts.law.elastic(1.0) * share
         self.bond_damping[i], self.contact_damping[i] = dashpot, contact_c
@@ -223,7 +223,7 @@ class StabilityLimits:
         level, by = self.limit_level[i], self.limit_by[i]
         if ti.static(self.has_distance):
             speed2 = self.state.velocity[i].norm_sqr()
-            level, by = finer(level, by, self.way.finer(level, speed2), DISPLACEMENT)
+            level, by = finer(level, by, self.displacement.finer(level, speed2), DISPLACEMENT)
         if ti.static(self.counts["rotation"]):
             spin2 = self.state.spin[i].norm_sqr()
             level, by = finer(level, by, self.turn.finer(level, spin2), ROTATION)

@@ -160,7 +160,7 @@ class VerletList:
         if self._balls_near(i, j):
             faces = self._faces_near(i, j)
         if faces != 0:
-            place = self._place_of(i, j)
+            place = self._find_row_index(i, j)
             if place < self.last[i] and self.body[ti.min(place, self.capacity - 1)] == j:
                 self.pair_cache.faces[place] = faces
             else:
@@ -185,7 +185,7 @@ class VerletList:
             self.last[i] = place
 
     @ti.func
-    def _place_of(self, i, j):
+    def _find_row_index(self, i, j):
         """First place among the neighbours of body i whose body is not before j."""
         low, high = self.first[i], self.last[i]
         while low < high:

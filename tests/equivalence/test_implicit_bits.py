@@ -109,7 +109,7 @@ def shaken():
     count = simulation.model.body_count
     velocity = np.random.default_rng(4).standard_normal((count, 3))
     turn = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1))
-    simulation.state.place(simulation.model.centre, turn, velocity)
+    simulation.state.set_motion(simulation.model.centre, turn, velocity)
     simulation.advance_to(20)
     return simulation
 

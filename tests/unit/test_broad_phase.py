@@ -31,7 +31,7 @@ def scattered(again, skin, spread):
     turn = random.standard_normal((model.body_count, 4))
     turn /= np.linalg.norm(turn, axis=1, keepdims=True)
     place = model.centre + spread * random.standard_normal((model.body_count, 3))
-    state.place(place, turn)
+    state.set_motion(place, turn)
     broken = random.random(model.bond_count) < 0.5
     state.broken_tick.from_numpy(np.where(broken, 0, -1).astype(np.int64))
     exposed = np.full(4 * model.body_count, -1, dtype=np.int64)
@@ -115,7 +115,7 @@ def test_waiting_impulses_survive_a_search(again):
     before = dict(zip(map(tuple, contacts.pair_body.to_numpy()[:count].tolist()), range(count)))
     motion = simulation.state.motion()
     motion["position"][::3] = np.roll(motion["position"][::3], 1, axis=0)
-    simulation.state.place(motion["position"], motion["orientation"])
+    simulation.state.set_motion(motion["position"], motion["orientation"])
     simulation.broad_phase.search()
     after = contacts.pair_body.to_numpy()[: contacts.pair_count[None]].tolist()
     kept = contacts.pair_slot.to_numpy()
@@ -218,7 +218,7 @@ def test_one_list_of_neighbours_serves_until_a_body_has_left_its_reach(again, dr
     for step in range(1, 41):
         turned = motion["orientation"] + step * spin
         turned /= np.linalg.norm(turned, axis=1, keepdims=True)
-        simulation.state.place(motion["position"] + step * way, turned)
+        simulation.state.set_motion(motion["position"] + step * way, turned)
         simulation.broad_phase.search()
         assert near_faces(simulation, skin) <= neighbouring_faces(neighbours)
         before, listed_at = listed_at, neighbours.turned_to.to_numpy()
@@ -240,7 +240,7 @@ def test_a_full_row_drops_what_its_body_has_left(monkeypatch):
     made, dropped = 0, 0
     for _ in range(30):
         motion["position"][leaping] = random.permutation(rest)[: len(leaping)]
-        simulation.state.place(motion["position"], motion["orientation"])
+        simulation.state.set_motion(motion["position"], motion["orientation"])
         rooms, ends = neighbours.first.to_numpy(), neighbours.last.to_numpy()
         simulation.broad_phase.search()
         assert near_faces(simulation, skin) <= neighbouring_faces(neighbours)
@@ -266,7 +266,7 @@ def test_spheres_that_touch_are_listed_however_seldom_a_pair_is_looked_at(again,
     way *= far * skin * random.random((len(way), 1)) / np.linalg.norm(way, axis=1, keepdims=True)
     found = []
     for step in range(1, 61):
-        simulation.state.place(motion["position"] + step * way, motion["orientation"])
+        simulation.state.set_motion(motion["position"] + step * way, motion["orientation"])
         travel = contacts.travel.to_numpy() + np.linalg.norm(way, axis=1)
         contacts.travel.from_numpy(np.where(contacts.exposed_faces.to_numpy() != 0, travel, 0.0))
         touching = expected(simulation, 0.0)
@@ -290,7 +290,7 @@ def test_a_fast_body_has_leeway_for_some_steps(again):
     velocity, spin = random.standard_normal((2, model.body_count, 3))
     velocity *= 10.0 ** random.uniform(4, 6.5, (model.body_count, 1))
     spin *= 10.0 ** random.uniform(4, 6.5, (model.body_count, 1))
-    simulation.state.place(motion["position"], motion["orientation"], velocity, spin)
+    simulation.state.set_motion(motion["position"], motion["orientation"], velocity, spin)
     simulation.broad_phase.search()
     speed = np.linalg.norm(velocity, axis=1) + np.linalg.norm(spin, axis=1) * extent
     wanted = np.maximum(0.5 * skin, np.minimum(horizon * speed, FARTHEST * extent))

@@ -70,7 +70,9 @@ def test_a_diverged_run_leaves_its_last_good_output(diverged):
 def sentence_of(mesh, velocity, listed=()):
     """What is said of bodies that exceed 100 m/s."""
     simulation = Simulation(Scene(mesh, CONCRETE, list(listed), max_speed=100.0), Uniform(1e-10))
-    simulation.state.place(simulation.model.centre, [[1.0, 0, 0, 0]] * mesh.body_count, velocity)
+    simulation.state.set_motion(
+        simulation.model.centre, [[1.0, 0, 0, 0]] * mesh.body_count, velocity
+    )
     with pytest.raises(SimulationDiverged) as refusal:
         simulation.advance_to(1)
     return str(refusal.value)

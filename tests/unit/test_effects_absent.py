@@ -147,7 +147,7 @@ def needs_after(listed, shift, broken=False):
     frame = simulation.model.bond_frame[0].to_numpy()
     place = simulation.model.centre.copy()
     place[1] += frame.T @ shift
-    simulation.state.place(place, [[1.0, 0, 0, 0]] * 2)
+    simulation.state.set_motion(place, [[1.0, 0, 0, 0]] * 2)
     if broken:
         simulation.state.broken_tick[0] = 0
     simulation.advance_to(1)

@@ -18,7 +18,7 @@ def test_no_body_moves_further_than_the_distance_in_its_first_step(method):
     simulation = Simulation(Scene(pair(), CONCRETE), method)
     velocity = np.array([[1.0, 0.0, 0.0], [0.3, 0.0, 0.0]])
     turn = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
-    simulation.state.place(simulation.model.centre, turn, velocity)
+    simulation.state.set_motion(simulation.model.centre, turn, velocity)
     simulation.start()
     step = DT0 / 2.0 ** simulation.state.level.to_numpy()
     assert np.all(step * velocity[:, 0] <= DISTANCE)

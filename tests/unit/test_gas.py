@@ -70,7 +70,7 @@ def test_pressure_turns_with_the_body(body):
     The first takes the pressure at its beginning, which is zero.
     """
     turn = quaternion([1.0, 2.0, -0.5], 2.0)
-    body.state.place(body.model.centre, [turn])
+    body.state.set_motion(body.model.centre, [turn])
     body.advance_to(2)
     force, torque = (matrix(turn) @ part for part in push_of(body))
     impulse = PEAK * np.cos(0.5 * np.pi * (1.0 / TO_PEAK - 1.0)) ** 2 * STEP

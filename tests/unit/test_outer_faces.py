@@ -40,7 +40,7 @@ class Looked:
     def pairs(self, position, orientation=None):
         """Pairs that are found with the bodies at a position [m], (n, 3)."""
         still = np.tile([1.0, 0.0, 0.0, 0.0], (self.model.body_count, 1))
-        self.state.place(position, still if orientation is None else orientation)
+        self.state.set_motion(position, still if orientation is None else orientation)
         return int(self.outer.overlaps().sum())
 
 
@@ -184,7 +184,7 @@ def test_finding_names_the_remedy_and_survives_a_checkpoint():
     watch.look(0.0)
     assert not [found for found in watch.findings() if "outer" in str(found)]
     first = looked.model.centre[0]
-    looked.state.place(np.array([first, first + 1e-3]), np.tile([1.0, 0, 0, 0], (2, 1)))
+    looked.state.set_motion(np.array([first, first + 1e-3]), np.tile([1.0, 0, 0, 0], (2, 1)))
     watch.look(2e-6)
     (found,) = watch.findings()[-1:]
     assert str(found).startswith("SphereContact(outer_faces=True) is left out, but pairs of bodies")
@@ -210,7 +210,7 @@ def test_two_blocks_that_meet_in_a_run_are_reported():
     scene = Scene(mesh, CONCRETE, [effects.SphereContact(3)])
     simulation = Simulation(scene, Uniform(1e-7))
     still = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
-    simulation.state.place(simulation.model.centre, still, [[0.0] * 3, [-1000.0, 0.0, 0.0]])
+    simulation.state.set_motion(simulation.model.centre, still, [[0.0] * 3, [-1000.0, 0.0, 0.0]])
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         simulation.advance_to(20)

@@ -38,7 +38,7 @@ class Sorter:
     def check(self, keys):
         """end[k] counts the keys >= k, the first end[k] places hold just those members."""
         order, end = self.list.order.to_numpy(), self.list.end.to_numpy()
-        place = self.list.place.to_numpy()
+        place = self.list.index.to_numpy()
         for level in reversed(range(MAX_LEVEL + 1)):
             listed = np.flatnonzero(keys >= level)
             assert end[level] == len(listed)

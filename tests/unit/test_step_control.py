@@ -172,7 +172,7 @@ def test_each_criterion_binds_where_it_is_the_shortest(criterion, options, spin)
     still = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
     velocity = np.tile([0.1, 0.0, 0.0], (2, 1))
     turning = np.tile([spin, 0.0, 0.0], (2, 1))
-    simulation.state.place(simulation.model.centre, still, velocity, turning)
+    simulation.state.set_motion(simulation.model.centre, still, velocity, turning)
     simulation.start()
     assert simulation.report().bound_by == {criterion: 2}
 
@@ -202,10 +202,10 @@ def decay_in_a_step(dt, dashpot):
     )
     still = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
     velocity = np.array([[-1e-3, 0.0, 0.0], [1e-3, 0.0, 0.0]])
-    simulation.state.place(simulation.model.centre, still, velocity)
+    simulation.state.set_motion(simulation.model.centre, still, velocity)
     simulation.advance_to(1)
     rate = 2.0 * 3.0 * simulation.model.unit_area[0] * CONCRETE.normal_damping
-    fastest = simulation.schedule.rates.bond_damping[0] if dashpot == "limited" else 0.0
+    fastest = simulation.schedule.limits.bond_damping[0] if dashpot == "limited" else 0.0
     return simulation.state.velocity[0][0] / -1e-3, rate / simulation.model.body_mass[0], fastest
 
 

@@ -12,7 +12,7 @@ def run(method, steps, *, mesh=None, velocity=None, listed=()):
     """A bonded pair after some steps: the simulation."""
     mesh = mesh or pair()
     simulation = Simulation(Scene(mesh, CONCRETE, [effects.BondDamping(), *listed]), method)
-    simulation.state.place(simulation.model.centre, [[1.0, 0, 0, 0]] * 2, velocity)
+    simulation.state.set_motion(simulation.model.centre, [[1.0, 0, 0, 0]] * 2, velocity)
     simulation.advance_to(steps)
     simulation.look()
     return simulation

@@ -145,7 +145,7 @@ def test_a_triangular_pulse_spalls_where_its_tension_first_suffices(wave_speed):
     still = np.zeros((model.body_count, 2))
     place = model.centre + np.column_stack([moved, still])
     turn = np.tile(STILL, (model.body_count, 1))
-    simulation.state.place(place, turn, np.column_stack([along, still]))
+    simulation.state.set_motion(place, turn, np.column_stack([along, still]))
     broken, end = np.zeros(model.bond_count, dtype=bool), 0.0
     while not broken.any():
         simulation.advance_to(int(simulation.state.tick[None]) // 2**20 + 20)

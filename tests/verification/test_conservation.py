@@ -85,7 +85,7 @@ def test_a_ball_like_body_turns_by_exactly_its_spin():
     simulation = Simulation(Scene(single(), CONCRETE), Uniform(1e-6))
     centre, steps = simulation.model.centre, 2000
     velocity, spin = np.array([[3.0, -2.0, 1.0]]), np.array([[600.0, -700.0, 400.0]])
-    simulation.state.place(centre, [STILL], velocity, spin)
+    simulation.state.set_motion(centre, [STILL], velocity, spin)
     before = simulation.state.motion()
     simulation.advance_to(steps)
     after = simulation.state.motion()
@@ -112,7 +112,7 @@ def precession_error(steps):
     direction = np.array([0.6, 0.8, 0.0])
     spin = momentum * direction / np.array([along, across, across])
     still = np.zeros((1, 3))
-    simulation.state.place(simulation.model.centre, [STILL], still, [spin])
+    simulation.state.set_motion(simulation.model.centre, [STILL], still, [spin])
     simulation.advance_to(steps)
     after = simulation.state.motion()
     axis = after["rotation"][0] @ [1.0, 0.0, 0.0]
@@ -155,7 +155,9 @@ def test_a_rigidly_moved_block_feels_no_force(damped_bar):
     spin = np.array([60.0, -30.0, 40.0])
     velocity = np.cross(spin, place) + np.array([5.0, -3.0, 8.0])
     count = simulation.model.body_count
-    simulation.state.place(place, np.tile(turn, (count, 1)), velocity, np.tile(spin, (count, 1)))
+    simulation.state.set_motion(
+        place, np.tile(turn, (count, 1)), velocity, np.tile(spin, (count, 1))
+    )
     simulation.start()
     area = 3.0 * simulation.model.unit_area.to_numpy().max()
     opening, rate = 8 * EPS * 0.3, 8 * EPS * 30.0
@@ -177,7 +179,7 @@ def test_a_strained_block_in_free_flight_keeps_its_momentum(damped_bar):
     place = simulation.model.centre + 1e-5 * random.standard_normal((count, 3))
     velocity = np.array([7.0, 0.0, -3.0]) + random.standard_normal((count, 3))
     spin = 50.0 * random.standard_normal((count, 3))
-    simulation.state.place(place, np.tile(STILL, (count, 1)), velocity, spin)
+    simulation.state.set_motion(place, np.tile(STILL, (count, 1)), velocity, spin)
     simulation.advance_to(steps)
     report = simulation.report()
     assert report.ledger["slip"] > 0.0 and report.ledger["bond_strain"] > 0.0
@@ -196,7 +198,7 @@ def test_an_uneven_body_keeps_its_angular_momentum_while_it_tumbles():
     mesh = checked_mesh(points, [[0, 1, 2, 3]], {})
     simulation = Simulation(Scene(mesh, CONCRETE), Uniform(1e-6))
     spin = np.array([[400.0, 700.0, -600.0]])
-    simulation.state.place(simulation.model.centre, [STILL], np.zeros((1, 3)), spin)
+    simulation.state.set_motion(simulation.model.centre, [STILL], np.zeros((1, 3)), spin)
     simulation.start()
     first, energy = simulation.state.motion(), simulation.ledger.account()["kinetic"]
     simulation.advance_to(1000)

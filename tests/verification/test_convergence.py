@@ -49,7 +49,7 @@ class MovingBar:
         random = np.random.default_rng(3)
         turn = np.tile([1.0, 0.0, 0.0, 0.0], (model.body_count, 1))
         velocity, spin = random.standard_normal((2, model.body_count, 3))
-        state.place(model.centre, turn, velocity, 10.0 * spin)
+        state.set_motion(model.centre, turn, velocity, 10.0 * spin)
         self.mixed = random.integers(0, 4, model.body_count).astype(np.int32)
         self.fields = state.fields()
         self.first = {name: field.to_numpy() for name, field in self.fields.items()}

@@ -23,7 +23,7 @@ def made(method):
     simulation = Simulation(scene, method)
     still = np.tile([1.0, 0.0, 0.0, 0.0], (len(bodies), 1))
     spin = SPIN / 2.0 ** np.arange(HALVINGS + 1)[:, None]
-    simulation.state.place(simulation.model.centre, still, spin=spin)
+    simulation.state.set_motion(simulation.model.centre, still, spin=spin)
     simulation.start()
     return simulation
 

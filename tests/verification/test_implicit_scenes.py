@@ -260,7 +260,7 @@ def test_one_fast_fragment_keeps_the_list_of_neighbours_right(implicit):
         place[fragment] += [8e-3, 2e-4, -3e-4]
         turn[fragment] += [0.0, 0.03, 0.01, 0.02]
         turn[fragment] /= np.linalg.norm(turn[fragment])
-        implicit.state.place(place, turn, still, still)
+        implicit.state.set_motion(place, turn, still, still)
         # What steps would have noted of its way.
         simulation.contacts.travel[fragment] = 1e-2
         simulation.broad_phase.search(everywhere=False)

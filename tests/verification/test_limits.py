@@ -42,7 +42,7 @@ class Rig:
     def speeds(self, step, steps, position, velocity, spin):
         """Root of the sum of squared speeds after some steps of a length [s]."""
         self.simulation.schedule.step_seconds.from_numpy(step / 2.0 ** np.arange(MAX_LEVEL + 1))
-        self.state.place(position, STILL, velocity, spin)
+        self.state.set_motion(position, STILL, velocity, spin)
         self.state.slot.fill(0.0)
         self.state.tick[None] = 0
         self.state.last_tick.fill(0)
@@ -246,9 +246,9 @@ def test_sphere_dashpots_kick_back_from_their_limit_on(divisions, contacts):
 
 
 @ti.kernel
-def _refresh(rates: ti.template(), count: ti.i32):
+def _refresh(limits: ti.template(), count: ti.i32):
     for i in range(count):
-        rates.refresh(i)
+        limits.refresh(i)
 
 
 @pytest.mark.parametrize("friction", [False, pytest.param(True, marks=pytest.mark.slow)])
@@ -261,18 +261,18 @@ def test_near_contacts_are_counted_before_they_touch_and_limit_as_the_report_say
     control = StepControl(safety=1.0)
     rig = Rig(facing(GAP), listed, Uniform(1e-6, control=control))
     velocity = np.array([[0.5, 0.0, 0.0], [-0.5, 0.0, 0.0]])
-    rig.state.place(rig.centre, STILL, velocity)
+    rig.state.set_motion(rig.centre, STILL, velocity)
     rig.simulation.broad_phase.search()
-    rates = rig.simulation.schedule.rates
-    _refresh(rates, 2)
+    limits = rig.simulation.schedule.limits
+    _refresh(limits, 2)
     # All faces of a regular body are alike, so that the worst is the base that meets.
     _, whole = contact_eigenvalues(rig.simulation.model.mesh, CONCRETE.density, 5, friction)
     exact = dashpot_step(CONCRETE.contact_damping * whole)
     for body in range(2):
-        assert exact[body] / 1.06 < rates.limit[body] < exact[body] * (1 + 1e-6)
-    rig.state.place(rig.centre, STILL, -velocity * 1e-6)
-    _refresh(rates, 2)
-    assert rates.limit[0] == 1e-6
+        assert exact[body] / 1.06 < limits.limit[body] < exact[body] * (1 + 1e-6)
+    rig.state.set_motion(rig.centre, STILL, -velocity * 1e-6)
+    _refresh(limits, 2)
+    assert limits.limit[0] == 1e-6
 
 
 def test_limited_dashpots_never_throw_back_at_any_step():
@@ -287,14 +287,14 @@ def test_limited_dashpots_never_throw_back_at_any_step():
         [effects.SphereContact(3, outer_faces=True)],
         Uniform(1e-9, dashpot="limited"),
     )
-    model, rates = rig.simulation.model, rig.simulation.schedule.rates
+    model, limits = rig.simulation.model, rig.simulation.schedule.limits
     position = rig.centre - np.outer([0.0, 1.0], [GAP + 1e-10, 0.0, 0.0])
     velocity = np.array([[0.5, 0.0, 0.0], [-0.5, 0.0, 0.0]])
     exact = model.body_mass[0] / CONCRETE.contact_damping
     for share in (0.6, 1.0, 3.0, 10.0, 100.0):
         after = rig.speeds(share * exact, 1, position, velocity, np.zeros((2, 3)))
         assert after < 0.06 * np.linalg.norm(velocity)
-        assert rates.contact_damping[0] * exact == pytest.approx(1.0, rel=0.06)
+        assert limits.contact_damping[0] * exact == pytest.approx(1.0, rel=0.06)
 
 
 def test_limited_dashpots_of_a_bond_are_stable_at_any_step():
@@ -307,7 +307,7 @@ def test_limited_dashpots_of_a_bond_are_stable_at_any_step():
     soft = {"normal_stiffness": 450e5, "shear_stiffness": 90e5, "fracture_energy": 1e9}
     material = type(CONCRETE)(**{**vars(CONCRETE), **soft})
     rig = Rig(pair(), [effects.BondDamping()], Uniform(1e-9, dashpot="limited"), material)
-    table = rig.simulation.schedule.rates.dashpot_table
+    table = rig.simulation.schedule.limits.dashpot_table
     known, rate = table.to_numpy(), pair_eigenvalue(rig.simulation.model, dashpots_of(material))
     calm = grown(rig, 3)
 

@@ -20,7 +20,7 @@ def stretched(listed, dt):
     simulation = Simulation(Scene(pair(), CONCRETE, listed), Uniform(dt))
     place = simulation.model.centre.copy()
     place[1, 0] += STRETCH
-    simulation.state.place(place, np.tile([1.0, 0.0, 0.0, 0.0], (2, 1)))
+    simulation.state.set_motion(place, np.tile([1.0, 0.0, 0.0, 0.0], (2, 1)))
     return simulation
 
 

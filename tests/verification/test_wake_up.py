@@ -44,7 +44,7 @@ def shot(control, until, block=None):
     velocity = np.zeros((count, 3))
     velocity[-1, 0] = SPEED
     still = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1))
-    simulation.state.place(simulation.model.centre, still, velocity)
+    simulation.state.set_motion(simulation.model.centre, still, velocity)
     energy = [1.0]
     try:
         for step in range(1, round(until / DT0) + 1):
@@ -61,7 +61,7 @@ def test_energy_never_grows_when_a_fast_fragment_hits_a_sleeping_block():
     """Dashpots and friction only take; round-off of a sum of a dozen terms is left."""
     energy, simulation = shot(StepControl(), 1e-5)
     assert energy[-1] < 0.5 and np.diff(energy).max() < 1e-13
-    assert simulation.schedule.rates.woken[None] > 0
+    assert simulation.schedule.limits.woken[None] > 0
     assert max(simulation.ledger.momentum_errors()) < 1e-13
 
 
@@ -75,7 +75,7 @@ def test_a_hit_wakes_a_boulder_that_is_kicked_away_in_its_sleep():
     asleep, _ = shot(StepControl(wake=(), **options), 3e-6, boulder())
     woken, simulation = shot(StepControl(wake=("hit",), **options), 1e-5, boulder())
     assert asleep.max() > 2.0
-    assert simulation.schedule.rates.woken[None] > 0
+    assert simulation.schedule.limits.woken[None] > 0
     assert np.diff(woken).max() < 1e-13 and woken[-1] < 0.5
 
 
@@ -104,7 +104,7 @@ def test_neighbours_differ_by_no_more_than_the_level_limit(woken):
 
 def test_waking_keeps_momentum_and_the_account(woken):
     report = woken.report()
-    assert report.broken_faces > 30 and woken.schedule.rates.woken[None] > 100
+    assert report.broken_faces > 30 and woken.schedule.limits.woken[None] > 100
     assert max(report.linear_momentum_error, report.angular_momentum_error) < 1e-13
     assert report.ledger_residual_fraction < 0.01
 

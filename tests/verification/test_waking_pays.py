@@ -26,9 +26,9 @@ def pair_and_clock():
 
 
 @ti.kernel
-def _notice(rates: ti.template(), body: ti.i32):
+def _notice(limits: ti.template(), body: ti.i32):
     for _ in range(1):
-        rates.notice(body, 1)
+        limits.notice(body, 1)
 
 
 class Sleepers:
@@ -43,7 +43,7 @@ class Sleepers:
         place[1, 0] += opening
         velocity = np.zeros((3, 3))
         velocity[2, 1] = 0.9 * 4.0 * WAY / DT0
-        self.state.place(place, np.tile([1.0, 0.0, 0.0, 0.0], (3, 1)), velocity)
+        self.state.set_motion(place, np.tile([1.0, 0.0, 0.0, 0.0], (3, 1)), velocity)
         self.simulation.start()
         self.mass = model.body_mass[0]
         self.force_per_opening = 3.0 * model.unit_area[0] * CONCRETE.normal_stiffness
@@ -72,7 +72,7 @@ class Sleepers:
         velocity = self.state.velocity[body]
         velocity[0] += speed
         self.state.velocity[body] = velocity
-        _notice(self.simulation.schedule.rates, body)
+        _notice(self.simulation.schedule.limits, body)
 
 
 def test_a_bond_that_paid_ahead_pays_a_woken_body_nothing_until_then():
@@ -100,7 +100,7 @@ def test_a_bond_that_paid_ahead_pays_a_woken_body_nothing_until_then():
     velocity = made.quarters(5)
     paid = made.force_per_opening * opening * DT0 / 4.0 / made.mass
     assert velocity[0] == pytest.approx(speed + gained + paid, rel=ROUND)
-    assert made.simulation.schedule.rates.woken[None] == 1
+    assert made.simulation.schedule.limits.woken[None] == 1
 
 
 @ti.kernel
@@ -122,7 +122,7 @@ def test_a_release_brings_sleeping_bodies_to_the_present_where_they_now_touch(wa
     made.quarters(2)
     level, last = made.state.level.to_numpy(), made.state.last_tick.to_numpy()
     if wake:
-        assert made.simulation.schedule.rates.woken[None] == 2
+        assert made.simulation.schedule.limits.woken[None] == 2
         assert level[:2].min() > 2 and np.all(last[:2] == made.state.tick[None])
     else:
         assert level[:2].max() == 0 and np.all(last[:2] == 0)
@@ -137,7 +137,7 @@ def test_a_released_bond_pays_sleeping_bodies_nothing_more():
     velocity = made.quarters(8)
     gained = made.force_per_opening * OPENING * DT0 / made.mass
     assert velocity == pytest.approx([gained, -gained], rel=ROUND)
-    assert made.simulation.schedule.rates.woken[None] == 0
+    assert made.simulation.schedule.limits.woken[None] == 0
 
 
 @pytest.mark.parametrize("criteria", [pytest.param((), marks=pytest.mark.slow), ("load",)])

@@ -23,14 +23,14 @@ class SolvedAdvance(Advance):
         elapsed = self.schedule.elapsed(i)
         linear, angular = self._gathered(i)
         linear, angular, _ = self._loaded(i, elapsed, linear, angular)
-        self.solver.motion.predict(i, self, linear, angular)
+        self.solver.velocities.predict(i, self, linear, angular)
         raise_to(self.solver.speed2, self.state.velocity[i].norm_sqr())
 
     @ti.func
     def body(self, i):
         """Bring a body to the present tick with what the sweeps found."""
         elapsed = self.schedule.elapsed(i)
-        velocity, momentum = self.solver.motion.found(i)
+        velocity, momentum = self.solver.velocities.found(i)
         _, _, kick = self._loaded(i, elapsed, zero3(), zero3())
         velocity, momentum = self._supported(i, elapsed, kick, velocity, momentum)
         spin = self.spin(i, momentum)
@@ -38,7 +38,7 @@ class SolvedAdvance(Advance):
         self.state.velocity[i], self.state.angular_momentum[i] = velocity, momentum
         # The next step begins with the spin in the new orientation.
         self.state.spin[i] = self.spin(i, momentum)
-        self.solver.motion.place(i, self)
+        self.solver.velocities.update_inertia(i, self)
         self.schedule.choose_level(i, velocity.norm_sqr())
 
     @ti.func

@@ -19,20 +19,20 @@ class BondDashpots:
     s1 + s0 (1 - theta) / theta carries over from step to step: it is the warm start, and y itself
     need not be stored.
 
-    colours: how many bonds there are of each. place: of a bond in the order. bodies: master and
+    colours: how many bonds there are of each. index: of a bond in the order. bodies: master and
     slave, -1 once released. branch: master's centre to slave's [m]. a, b, c: the block
     (C'^-1 + G)^-1, C' = theta C, G the mobility of the pair. start: s0. last: the s1 that the
     present y satisfies. Velocities in m/s, spins in rad/s, world.
     """
 
-    constant_fields = ("place",)
+    constant_fields = ("index",)
 
-    def __init__(self, model, state, schedule, motion, method):
-        self.model, self.state, self.schedule, self.motion = model, state, schedule, motion
+    def __init__(self, model, state, schedule, velocities, method):
+        self.model, self.state, self.schedule, self.velocities = model, state, schedule, velocities
         self.theta, self.earlier = method.theta, (1.0 - method.theta) / method.theta
         self.refresh_every = max(1, round(method.refresh / method.dt))
         bonds = max(1, model.bond_count)
-        self.place = ti.field(ti.i32, shape=bonds)
+        self.index = ti.field(ti.i32, shape=bonds)
         self.bodies = ti.Vector.field(2, ti.i32, shape=bonds)
         self.branch = ti.Vector.field(3, real, shape=bonds)
         self.a, self.b, self.c = (ti.Matrix.field(3, 3, real, shape=bonds) for _ in range(3))
@@ -44,12 +44,12 @@ class BondDashpots:
         self.colours = np.bincount(colours, minlength=1).tolist()
         place = np.empty(bonds, dtype=np.int32)
         place[np.argsort(colours, kind="stable")] = np.arange(len(colours), dtype=np.int32)
-        defer_fill(self.place.from_numpy, place)
+        defer_fill(self.index.from_numpy, place)
 
     @ti.func
     def mean(self, b, motion):
         """A bond's motion with the twist that its dashpots answered in the step before."""
-        k = self.place[b]
+        k = self.index[b]
         twist = self.theta * (self.last[k] + self.earlier * self.start[k])
         motion.velocity = motion.axes @ twist[0:3]
         motion.spin = motion.axes @ twist[3:6]
@@ -58,7 +58,7 @@ class BondDashpots:
     @ti.func
     def begin(self, b, i, j, branch):
         """Take in the present twist of an intact bond and, now and then, its block."""
-        k = self.place[b]
+        k = self.index[b]
         self.bodies[k], self.branch[k] = [i, j], branch
         now = self._twist(i, j, branch)
         self.last[k] = self.last[k] + self.earlier * (self.start[k] - now)
@@ -69,7 +69,7 @@ class BondDashpots:
     @ti.func
     def first(self, b):
         """Begin a run with a guess: the twist of the first step does not change."""
-        slots, k = self.model.bond_slots[b], self.place[b]
+        slots, k = self.model.bond_slots[b], self.index[b]
         i, j = slots[0] >> 2, slots[1] >> 2
         if self.state.broken_tick[b] < 0:
             branch = self.state.position[j] - self.state.position[i]
@@ -87,7 +87,7 @@ class BondDashpots:
     @ti.func
     def end(self, b):
         """A released bond is visited no more."""
-        self.bodies[self.place[b]] = [-1, -1]
+        self.bodies[self.index[b]] = [-1, -1]
 
     @ti.func
     def visit(self, k):
@@ -96,14 +96,14 @@ class BondDashpots:
         i, j = self.bodies[k][0], self.bodies[k][1]
         if i >= 0:
             branch, last = self.branch[k], self.last[k]
-            linear, angular = self.motion.apart(i, j, branch)
+            linear, angular = self.velocities.apart(i, j, branch)
             linear -= last[0:3]
             angular -= last[3:6]
             change2 = linear.norm_sqr()
             force = self.a[k] @ linear + self.b[k] @ angular
             moment = self.b[k].transpose() @ linear + self.c[k] @ angular
-            self.motion.pull(i, j, branch, force, moment)
-            linear, angular = self.motion.apart(i, j, branch)
+            self.velocities.pull(i, j, branch, force, moment)
+            linear, angular = self.velocities.apart(i, j, branch)
             for q in ti.static(range(3)):
                 self.last[k][q], self.last[k][3 + q] = linear[q], angular[q]
         return change2
@@ -126,10 +126,10 @@ class BondDashpots:
             arm = self.state.rotation[j] @ self.model.vertex_slave[3 * b + q]
             block = plus(block, point_block(arm, law))
         free = mobility(
-            self.motion.slack(i),
-            self.motion.turn[i],
-            self.motion.slack(j),
-            self.motion.turn[j],
+            self.velocities.slack(i),
+            self.velocities.turn[i],
+            self.velocities.slack(j),
+            self.velocities.turn[j],
             self.branch[k],
         )
         solved = inverse(plus(inverse(block), free))

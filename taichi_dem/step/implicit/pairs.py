@@ -32,9 +32,9 @@ class PairDashpots:
         *("active", "order", "colour", "taken", "colour_first"),
     )
 
-    def __init__(self, model, state, schedule, contacts, motion):
+    def __init__(self, model, state, schedule, contacts, velocities):
         self.model, self.state, self.schedule = model, state, schedule
-        self.contacts, self.motion = contacts, motion
+        self.contacts, self.velocities = contacts, velocities
         self.has_friction = bool(model.friction.name)
         pairs, spheres = contacts.capacity, contacts.sphere_capacity
         self.touching = ti.field(ti.i32, shape=pairs)
@@ -54,7 +54,7 @@ class PairDashpots:
         self.colour_first = ti.field(ti.i32, shape=COLOURS + 3)
 
     @ti.func
-    def take(self, p, old):
+    def carry_over(self, p, old):
         """Give the pair at place p, whose spheres are new, the impulses of those it had before.
 
         old: the ``OldPairs``, which know where these lie.
@@ -141,17 +141,19 @@ class PairDashpots:
     def _share(self, i, j, branch, arm, normal):
         """Velocity per impulse along the normal, and the largest across it [1/kg]."""
         other = arm + branch
-        slack = self.motion.slack(i) + self.motion.slack(j)
+        slack = self.velocities.slack(i) + self.velocities.slack(j)
         # trace([r]x^T A [r]x) and n [r]x^T A [r]x n, for both bodies.
         first, second = other.cross(normal), arm.cross(normal)
         along = normal.dot(slack @ normal)
-        along += first.dot(self.motion.turn[i] @ first) + second.dot(self.motion.turn[j] @ second)
+        along += first.dot(self.velocities.turn[i] @ first) + second.dot(
+            self.velocities.turn[j] @ second
+        )
         across = slack.trace()
         for c in ti.static(range(3)):
             axis = unit3()[:, c]
             first, second = other.cross(axis), arm.cross(axis)
-            across += first.dot(self.motion.turn[i] @ first)
-            across += second.dot(self.motion.turn[j] @ second)
+            across += first.dot(self.velocities.turn[i] @ first)
+            across += second.dot(self.velocities.turn[j] @ second)
         return ti.Vector([along, across - along])
 
     @ti.func
@@ -176,7 +178,7 @@ class PairDashpots:
     @ti.func
     def _visit(self, c, i, j, branch, damping):
         k, normal, arm, share = self.entry[c], self.normal[c], self.arm[c], self.share[c]
-        linear, angular = self.motion.apart(i, j, branch)
+        linear, angular = self.velocities.apart(i, j, branch)
         velocity = linear + angular.cross(arm)
         held = self.impulse[k]
         pressed, rate = held.dot(normal), velocity.dot(normal)
@@ -193,7 +195,7 @@ class PairDashpots:
             found += rub
         step = held - found
         self.impulse[k] = found
-        self.motion.pull(i, j, branch, step, arm.cross(step))
+        self.velocities.pull(i, j, branch, step, arm.cross(step))
         return share[0] * share[0] * step.norm_sqr()
 
     @ti.func
@@ -202,7 +204,7 @@ class PairDashpots:
         if self.touching[p] > 0:
             pair = self.contacts.pair_body[p]
             i, j, branch = pair[0], pair[1], self.branch[p]
-            linear, angular = self.motion.apart(i, j, branch)
+            linear, angular = self.velocities.apart(i, j, branch)
             spin = self.state.spin[i]
             before = self.state.velocity[j] - self.state.velocity[i] - spin.cross(branch)
             linear = 0.5 * (linear + before)

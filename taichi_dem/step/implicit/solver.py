@@ -24,15 +24,15 @@ class Solver:
     def __init__(self, model, state, schedule, contacts, method):
         self.model, self.state, self.schedule, self.contacts = model, state, schedule, contacts
         self.fewest, self.most = method.sweeps
-        self.motion = Velocities(model, state)
+        self.velocities = Velocities(model, state)
         self.bonds = None
         self.has_bonds = bool(model.dashpot.name)
         if self.has_bonds:
-            self.bonds = BondDashpots(model, state, schedule, self.motion, method)
+            self.bonds = BondDashpots(model, state, schedule, self.velocities, method)
         self.pairs = None
         self.has_contact = contacts is not None
         if self.has_contact:
-            self.pairs = PairDashpots(model, state, schedule, contacts, self.motion)
+            self.pairs = PairDashpots(model, state, schedule, contacts, self.velocities)
         self.sweeps = ti.field(ti.i32, shape=())
         self.unsolved = ti.field(ti.i32, shape=())
         self.total_sweeps = ti.field(ti.i64, shape=())
@@ -58,7 +58,7 @@ class Solver:
             if ti.static(self.has_contact):
                 for a in range(self.pairs.count[None]):
                     self.pair(self.pairs.order[a])
-            self.judge(0)
+            self.check_convergence(0)
 
     @ti.func
     def bond(self, k):
@@ -78,7 +78,7 @@ class Solver:
             self.pair(self.pairs.order[a])
 
     @ti.func
-    def judge(self, one):
+    def check_convergence(self, one):
         """End a sweep: is another one called for?"""
         self.sweeps[None] = self.sweeps[None] + 1
         self.total_sweeps[None] = self.total_sweeps[None] + 1

@@ -1,4 +1,4 @@
-"""Velocities while a step is being solved, and how the bodies give way to an impulse."""
+"""Velocities while a step is being solved, and their change per impulse."""
 
 import taichi as ti
 
@@ -39,8 +39,8 @@ class Velocities:
         return slack
 
     @ti.func
-    def place(self, i, advance):
-        """Find how body i gives way in its present orientation."""
+    def update_inertia(self, i, advance):
+        """Compute the velocity per impulse of body i in its present orientation."""
         rotation = self.state.rotation[i]
         self.lightness[i] = self.model.mass_inverse[i]
         self.turn[i] = rotation @ self.model.inertia_inverse[i] @ rotation.transpose()
@@ -106,8 +106,8 @@ class Velocities:
         first, second = force, force
         if ti.static(self.has_supports):
             first, second = self.hold[i] @ force, self.hold[j] @ force
-            self._give(i, force, moment + branch.cross(force))
-            self._give(j, -force, -moment)
+            self._add_impulse(i, force, moment + branch.cross(force))
+            self._add_impulse(j, -force, -moment)
         else:
             first, second = self.lightness[i] * force, self.lightness[j] * force
         for k in ti.static(range(3)):
@@ -117,7 +117,7 @@ class Velocities:
             self.twist[j][3 + k] = self.twist[j][3 + k] - back[k]
 
     @ti.func
-    def _give(self, i, impulse, moment):
+    def _add_impulse(self, i, impulse, moment):
         for k in ti.static(range(3)):
             self.given[i][k] = self.given[i][k] + impulse[k]
             self.given[i][3 + k] = self.given[i][3 + k] + moment[k]
