@@ -24,13 +24,15 @@ class MomentumAccount:
     @ti.func
     def begin(self, s, momentum, late):
         """The first step is over; what the filling has now is right."""
-        self.due[s], self.late[s], self.exchanged[s] = momentum + late, late, 0.0
+        self.expected[s], self.late[s], self.exchanged[s] = momentum + late, late, 0.0
 
     @ti.func
     def add(self, s, force, late):
         """Book a step with a mean force [N] on the container."""
         dt = self.table.dt[s]
-        self.due[s] = self.due[s] - (force + self.table.particles[s] * self.weight[None]) * dt
+        self.expected[s] = (
+            self.expected[s] - (force + self.table.particles[s] * self.weight[None]) * dt
+        )
         self.exchanged[s] = self.exchanged[s] + ti.abs(force) * dt
         self.late[s] = late
 
@@ -39,6 +41,6 @@ class MomentumAccount:
 
         momentum: of the fillings, at the start of the last step for what is carried (scenes,).
         """
-        missing = np.abs(momentum + self.late.to_numpy() - self.due.to_numpy())
+        missing = np.abs(momentum + self.late.to_numpy() - self.expected.to_numpy())
         exchanged = self.exchanged.to_numpy()
         return float((missing / np.where(exchanged > 0.0, exchanged, np.inf)).max())

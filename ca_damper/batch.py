@@ -70,10 +70,10 @@ class Batch:
         container = DrivenContainer(table, self.clock)
         if mount == "spring":
             container = SprungContainer(table, self.clock, filling.gravity, rtol, atol)
-        self.bound = filling.bind(table)
+        self.device = filling.bind(table)
         self.account = MomentumAccount(table, filling.particle_mass * filling.gravity)
         self.coupling = Coupling(
-            *(table, self.clock, container, self.bound, self.account),
+            *(table, self.clock, container, self.device, self.account),
             *(filling.gravity, self.measured_cycles),
         )
         self._set_pace(frequency, dt)
@@ -85,7 +85,7 @@ class Batch:
         self._compiled = self._started = False
         # Of the present run: share done and seconds it took; whether it goes on from a checkpoint.
         self._done, self._seconds, self.going_on = 0.0, 0.0, False
-        self.keeper = NoCheckpointWriter()
+        self.writer = NoCheckpointWriter()
 
     def __repr__(self):
         return in_brief(self, self.filling.label, f"{self.count:,} scenes", f"on the {self.mount}")
@@ -102,7 +102,7 @@ class Batch:
         self.coupling.start(np.ascontiguousarray(self._initial(start)))
         self._started = True
         self.time_origin[:] = 0.0
-        self._check_health()
+        self._check_divergence()
 
     def change(self, **numbers):
         """Give the scenes other numbers, as ``SceneTable.change``; then ``start`` begins anew.
@@ -163,7 +163,7 @@ class Batch:
     @property
     def time_s(self):
         """Present time of every scene [s], (scenes,)."""
-        return self.time_origin + self._look()[0] * self.table.column("dt")
+        return self.time_origin + self._read_status()[0] * self.table.column("dt")
 
     def sample(self):
         """The present state: arrays (scenes,) by name.
@@ -180,14 +180,14 @@ class Batch:
     def snapshot(self, s):
         """Positions and velocities of the particles of scene s, as the filling gives them."""
         self._check_started()
-        return self.bound.snapshot(whole("s", s, 0, self.count - 1))
+        return self.device.snapshot(whole("s", s, 0, self.count - 1))
 
     def attempts(self):
         """Steps that RK45 has tried since the start, (scenes,); one a step unless some failed."""
         return self.coupling.attempts.to_numpy()
 
     @contextlib.contextmanager
-    def keep(self, checkpoint, resume, identity, parts=()):
+    def checkpointed(self, checkpoint, resume, identity, parts=()):
         """Let the runs in its block save themselves; gives what saves them.
 
         checkpoint: a Checkpoint or None. resume: file to go on from, or None: the run that it was
@@ -201,20 +201,19 @@ class Batch:
         self._compile()
         saved = RunSnapshot({**own, **identity}, self, {"batch": self, **dict(parts)})
         if arrays:
-            saved.take(arrays, resume)
-        with (
-            CheckpointWriter(checkpoint, saved, self._now)
-            if checkpoint
-            else NoCheckpointWriter() as self.keeper
-        ):
+            saved.restore(arrays, resume)
+        writer = NoCheckpointWriter()
+        if checkpoint:
+            writer = CheckpointWriter(checkpoint, saved, self._now)
+        with writer as self.writer:
             try:
-                yield self.keeper
+                yield self.writer
             finally:
-                self.keeper = NoCheckpointWriter()
+                self.writer = NoCheckpointWriter()
 
     def _now(self):
         """Mean step and time [s] of the scenes."""
-        return int(self._look()[0].mean()), float(self.time_s.mean())
+        return int(self._read_status()[0].mean()), float(self.time_s.mean())
 
     def saved(self):
         """What a checkpoint holds of it beside the fields, arrays by name."""
@@ -243,7 +242,7 @@ class Batch:
             method=self.filling.label,
             mount=self.mount,
             effects=self.filling.effects,
-            acted=self.bound.uses(self.filling.effects),
+            effect_activity=self.device.uses(self.filling.effects),
             scenes=self.count,
             particles=(int(particles.min()), int(particles.max())),
             dt_s=(float(dt.min()), float(dt.max())),
@@ -264,10 +263,10 @@ class Batch:
         if self.generation != runtime.generation():
             raise InputError("this batch belongs to a Taichi session that has been stopped")
 
-    def _look(self):
+    def _read_status(self):
         """Step, position in the cycle, and status of all scenes, (3, scenes)."""
         seen = np.empty((3, self.count), dtype=np.int32)
-        self.coupling.look(seen)
+        self.coupling.read_status(seen)
         return seen
 
     def _check_started(self):
@@ -277,7 +276,7 @@ class Batch:
 
     def _check_cycle_is_full(self):
         self._check_started()
-        position = self._look()[1]
+        position = self._read_status()[1]
         if position.any():
             late = int(position.argmax())
             raise InputError(
@@ -321,7 +320,7 @@ class Batch:
 
     def _aim(self, steps, before_measuring):
         """Say how far every scene is to go."""
-        begin = self._look()[0].astype(np.int64)
+        begin = self._read_status()[0].astype(np.int64)
         if (begin + steps).max() > _MOST_STEPS:
             raise InputError(f"steps since the start must stay below {_MOST_STEPS}: run fewer")
         order = dealt((1 + self.table.column("particles")) * steps, runtime.settings().threads)
@@ -352,7 +351,7 @@ class Batch:
                 self._count(steps)
             if progress is not None:
                 progress(BatchProgress(self._done, self._seconds, round(self._done * total)))
-            self.keeper.look()
+            self.writer.save_if_needed()
             done = self._done
 
     def _count(self, steps):
@@ -370,11 +369,11 @@ class Batch:
         if share < 1.0:
             self._pace *= min(4.0, max(0.25, LAUNCH_SECONDS / seconds))
             self._pace = max(self._pace, float(self.count))
-        self._check_health()
+        self._check_divergence()
         return share
 
-    def _check_health(self):
-        status = self._look()[2]
+    def _check_divergence(self):
+        status = self._read_status()[2]
         if status.any():
             # Scenes stop where they diverge: the first of them in time speaks for all.
             self._report_divergence(int(np.argmin(np.where(status != 0, self.time_s, np.inf))))

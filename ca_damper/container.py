@@ -27,7 +27,7 @@ class SprungContainer:
         self.slope = ti.Vector.field(2, ti.f64, shape=table.count)
         self.impulse = ti.field(ti.f64, shape=table.count)
         self.carried = ti.field(ti.f64, shape=table.count)
-        self.blow = ti.field(ti.f64, shape=table.count)
+        self.impulse_velocity = ti.field(ti.f64, shape=table.count)
         self.gravity = ti.field(ti.f64, shape=())
         self.tolerance = ti.field(ti.f64, shape=2)
         self.gravity[None] = gravity
@@ -37,21 +37,23 @@ class SprungContainer:
     def start(self, s, x, v):
         """Place the container; nothing acts on it but spring, dashpot and base."""
         self.state[s] = ti.Vector([x, v])
-        self.blow[s] = 0.0
-        self._take_up(s, Action(0.0, 0.0))
+        self.impulse_velocity[s] = 0.0
+        self._set_action(s, Action(0.0, 0.0))
 
     @ti.func
     def motion(self, s):
         """Displacement, velocity, and acceleration without the blows of the step before."""
-        return Motion(self.state[s][0], self.state[s][1], self.slope[s][1] - self.blow[s])
+        return Motion(
+            self.state[s][0], self.state[s][1], self.slope[s][1] - self.impulse_velocity[s]
+        )
 
     @ti.func
     def renew(self, s):
         """Note that the base has changed its motion, between two frequencies of a sweep."""
-        self._take_up(s, Action(self.impulse[s], self.carried[s]))
+        self._set_action(s, Action(self.impulse[s], self.carried[s]))
 
     @ti.func
-    def _take_up(self, s, action):
+    def _set_action(self, s, action):
         self.impulse[s], self.carried[s] = action.impulse, action.carried
         self.slope[s] = slope(self._forcing(s, action), 0.0, self.state[s])
 
@@ -78,14 +80,14 @@ class SprungContainer:
     def advance(self, s, action):
         """Take the container over the step; the last slope serves again unless the load changed."""
         if action.impulse != self.impulse[s] or action.carried != self.carried[s]:
-            self._take_up(s, action)
+            self._set_action(s, action)
         forcing = self._forcing(s, action)
         dt, rtol, atol = self.table.dt[s], self.tolerance[0], self.tolerance[1]
         y, change, attempts = rk45.integrate(
             slope, forcing, 0.0, dt, self.state[s], self.slope[s], dt, rtol, atol, _MOST_ATTEMPTS
         )
         self.state[s], self.slope[s] = y, change
-        self.blow[s] = action.impulse / (dt * (self.table.mass[s] + action.carried))
+        self.impulse_velocity[s] = action.impulse / (dt * (self.table.mass[s] + action.carried))
         return attempts
 
 

@@ -13,7 +13,7 @@ from taichi_dem import runtime
 LOST = -1
 # Beyond any motion that means something: squared [m^2] + [m^2/s^2].
 _FAR = 1e12
-_HEALTH_EVERY = 64
+_CHECK_EVERY = 64
 SUM_COUNT = len(measures.SUMS)
 # A parallel loop on a CPU gives each thread at least this many iterations, so there a scene takes
 # that many and uses one. On a GPU every iteration has a thread of its own.
@@ -27,13 +27,13 @@ _F64 = ti.types.ndarray(dtype=ti.f64, ndim=2)
 class Coupling:
     """Filling, container and clock of all scenes, tied together.
 
-    bound: what ``filling.bind`` gave. account: a MomentumAccount. gravity [m/s^2].
+    device: what ``filling.bind`` gave. account: a MomentumAccount. gravity [m/s^2].
     measured_cycles: room in ``record``, whose shape is (scenes, cycles, columns of
     ``measures.COLUMNS``).
     """
 
-    def __init__(self, table, clock, container, bound, account, gravity, measured_cycles):
-        self.table, self.clock, self.container, self.bound = table, clock, container, bound
+    def __init__(self, table, clock, container, device, account, gravity, measured_cycles):
+        self.table, self.clock, self.container, self.device = table, clock, container, device
         self.account = account
         self.count = table.count
         self.padding = _CPU_BLOCK if runtime.settings().arch == "cpu" else 1
@@ -57,8 +57,8 @@ class Coupling:
                 self.step[s], self.attempts[s], self.force[s] = 0, 0, 0.0
                 self.clock.start(s)
                 self.container.start(s, initial[s, 0], initial[s, 1])
-                self.bound.reset(s)
-                self.status[s] = self.bound.health(s)
+                self.device.reset(s)
+                self.status[s] = self.device.divergence_code(s)
 
     @ti.kernel
     def renew(self):
@@ -80,21 +80,21 @@ class Coupling:
         """Take every scene to a share of the way from its begin to its goal."""
         for t in range(self.padding * self.count):
             if t % self.padding == 0:
-                self._take_scene(self.order[t // self.padding], share)
+                self._advance_scene(self.order[t // self.padding], share)
 
     @ti.func
-    def _take_scene(self, s, share):
+    def _advance_scene(self, s, share):
         begin, way = self.begin[s], self.goal[s] - self.begin[s]
         target = begin + ti.cast(ti.floor(share * way), ti.i32)
         while self.step[s] < target and self.status[s] == 0:
-            self._take_step(s)
+            self._advance_step(s)
 
     @ti.func
-    def _take_step(self, s):
-        """The order of a step: filling, container, clock, measures, health."""
+    def _advance_step(self, s):
+        """The order of a step: filling, container, clock, measures, divergence."""
         step, now, middle = self.step[s], self.clock.circle[s], self.clock.middle(s)
         before = self.container.motion(s)
-        action = self.bound.act(s, step, before)
+        action = self.device.advance(s, step, before)
         attempts = self.container.advance(s, action)
         full = self.clock.tick(s)
         after = self.container.motion(s)
@@ -105,16 +105,16 @@ class Coupling:
             if full:
                 self._write_cycle(s)
         self.step[s], self.attempts[s] = step + 1, self.attempts[s] + attempts
-        if step % _HEALTH_EVERY == 0 or full:
-            self.status[s] = self.bound.health(s)
+        if step % _CHECK_EVERY == 0 or full:
+            self.status[s] = self.device.divergence_code(s)
         if attempts < 0 or not after.x * after.x + after.v * after.v < _FAR:
             self.status[s] = LOST
 
     @ti.func
-    def _force(self, s, action, gained):
-        """Mean force [N] of the filling on the container over a step that gained it speed [m/s]."""
+    def _force(self, s, action, speed_gain):
+        """Mean force [N] of the filling on the container over a step with a gain in speed [m/s]."""
         dt = self.table.dt[s]
-        return action.impulse / dt - action.carried * (self.gravity[None] + gained / dt)
+        return action.impulse / dt - action.carried * (self.gravity[None] + speed_gain / dt)
 
     @ti.func
     def _enter(self, s, step, late):
@@ -122,7 +122,7 @@ class Coupling:
         if step > 0:
             self.account.add(s, self.force[s], late)
         else:
-            self.account.begin(s, self.bound.momentum(s), late)
+            self.account.begin(s, self.device.momentum(s), late)
 
     @ti.func
     def _clear(self, s):
@@ -149,7 +149,7 @@ class Coupling:
             self.record[s, c, k] = self.sums[s][k]
         self.record[s, c, SUM_COUNT] = self.extremes[s][0]
         self.record[s, c, SUM_COUNT + 1] = self.extremes[s][1]
-        self.record[s, c, SUM_COUNT + 2] = self.bound.energy(s)
+        self.record[s, c, SUM_COUNT + 2] = self.device.energy(s)
         self.cycle[s] = c + 1
         self._clear(s)
 
@@ -161,10 +161,10 @@ class Coupling:
             y = self.table.base_amplitude[s] * self.clock.circle[s][0]
             values[0, s], values[1, s], values[2, s] = motion.x, motion.v, motion.a
             values[3, s], values[4, s] = y, self.force[s]
-            values[5, s], values[6, s] = self.bound.energy(s), self.bound.momentum(s)
+            values[5, s], values[6, s] = self.device.energy(s), self.device.momentum(s)
 
     @ti.kernel
-    def look(self, seen: _I32):
+    def read_status(self, seen: _I32):
         """Fill seen[:, s] with step, position in the cycle, and status."""
         for s in range(self.count):
             seen[0, s], seen[1, s] = self.step[s], self.clock.position[s]

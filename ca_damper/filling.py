@@ -9,20 +9,20 @@ A filling is a frozen dataclass of a user's options, checked when it is made. It
 ``effects``        what it computes, in words for the report
 ``step_bound``     longest step it allows or advises [s] and why, in words; None where any will do
 ``check(particles, dt)``            raises InputError for what the filling cannot do
-``divergence(code, particles, dt)`` what a code of ``health`` means, in words that follow "it", and
+``divergence(code, particles, dt)`` what a ``divergence_code`` means, in words that follow "it", and
                                     a step that would do [s]
 ``bind(table)``    the filling on the device, for all scenes of a SceneTable
 
 What ``bind`` returns is data oriented and has the ti.funcs
 
 ``reset(s)``               place the particles of scene s anew, from its seed
-``act(s, step, motion)``   take the filling over step number ``step`` (i32, counted from the reset
-                           without a gap), in which the container starts with ``motion``; returns an
+``advance(s, step, motion)`` takes the filling over step number ``step`` (i32, counted from the
+                           reset without a gap), in which the container starts with ``motion``; returns an
                            Action. The container takes the step after this call.
 ``energy(s)``              kinetic and potential energy of the particles [J], heights counted from
                            the container's floor
 ``momentum(s)``            momentum of the particles along x [kg m/s]
-``health(s)``              0, or the code of a divergence, 1 and up; asked every few steps
+``divergence_code(s)``     0, or the code of a divergence, 1 and up; asked every few steps
 
 and in Python ``uses(effects)``, an EffectUse for each of the named effects that can be counted, and
 ``snapshot(s)``, a dict with ``position`` [m] and ``velocity`` [m/s], both (particles, 2) as
@@ -172,7 +172,7 @@ class FixedMass:
         self.velocity[s] = 0.0
 
     @ti.func
-    def act(self, s, step, motion):
+    def advance(self, s, step, motion):
         """No blows; the whole mass is carried."""
         self.velocity[s] = motion.v
         return Action(0.0, self.mass(s))
@@ -188,7 +188,7 @@ class FixedMass:
         return self.mass(s) * self.velocity[s]
 
     @ti.func
-    def health(self, s):
+    def divergence_code(self, s):
         """Always fine."""
         return 0
 

@@ -115,7 +115,7 @@ class Lattice:
             self.cosine[kind, direction] = cosines[kind, direction]
 
     @ti.func
-    def ahead(self, cell, kind):
+    def cell_ahead(self, cell, kind):
         """Cell that a particle of this kind looks at."""
         return ti.cast(self.neighbour[cell, kind], ti.i32)
 

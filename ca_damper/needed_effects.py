@@ -18,4 +18,4 @@ def needed_effects(result, tolerance=1e-3):
     if not isinstance(report, Report):
         kind = type(result).__name__
         raise InputError(f"result must be a Response or the Report of a Batch, got {kind}")
-    return Advice(report.acted, (), fraction("tolerance", tolerance))
+    return Advice(report.effect_activity, (), fraction("tolerance", tolerance))

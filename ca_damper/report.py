@@ -16,8 +16,8 @@ class Report:
     """What a batch did since it was made, and what it cost.
 
     method: label of the filling. mount: "spring" or "base". effects: what the filling was asked to
-    compute. acted: an ``EffectUse`` for each of them that can be counted, since the start.
-    scenes: number; particles, dt_s: fewest and most. simulated_s: longest time of a scene
+    compute. effect_activity: an ``EffectUse`` for each of them that can be counted, since the
+    start. scenes: number; particles, dt_s: fewest and most. simulated_s: longest time of a scene
     since its start. step_bound: longest step [s] that the filling allows or advises, and why; None
     where any does. momentum_error: momentum of the particles out of nothing, as a share of what
     they and the container exchanged, of the worst scene.
@@ -29,7 +29,7 @@ class Report:
     method: str
     mount: str
     effects: tuple
-    acted: tuple
+    effect_activity: tuple
     scenes: int
     particles: tuple
     dt_s: tuple
@@ -55,7 +55,9 @@ class Report:
 
     def as_dict(self):
         """All figures, for a JSON file."""
-        return {**asdict(self), "particle_steps_per_second": self.particle_steps_per_second}
+        figures = asdict(self)
+        figures["acted"] = figures.pop("effect_activity")
+        return {**figures, "particle_steps_per_second": self.particle_steps_per_second}
 
     def write(self, path):
         """Write all figures as JSON. Raises InputError when the file cannot be written."""
@@ -73,7 +75,7 @@ class Report:
         rows = [
             ("method", f"{self.method}, container on the {self.mount}"),
             ("effects", ", ".join(self.effects) or "none"),
-            *(("", f"{use.effect}: {use}") for use in self.acted),
+            *(("", f"{use.effect}: {use}") for use in self.effect_activity),
             ("scenes", f"{self.scenes:,} with {_range(self.particles)} particles"),
             ("simulated", f"{self.simulated_s:.4g} s in steps of {_range(self.dt_s)} s"),
             *self._bound_row(),

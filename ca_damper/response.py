@@ -170,9 +170,9 @@ def frequency_response(
     with reporting(progress, "response") as report_progress:
         batch = grid.batch(grid.ratios, measured_cycles)
         batch.start(start)
-        with batch.keep(checkpoint, resume, {"job": job}) as keeper:
+        with batch.checkpointed(checkpoint, resume, {"job": job}) as writer:
             cycles = batch.run(transient_cycles, measured_cycles, report_progress)
-            keeper.keep()
+            writer.save()
     shape = grid.shape
     steps = batch.steps_per_cycle.reshape(shape)[0, :, 0]
     values = {name: value.reshape(shape) for name, value in grid.measures(cycles).items()}

@@ -59,14 +59,14 @@ def sweep_up_and_down(
         batch = grid.batch(grid.ratios[:1], measured_cycles)
         batch.start(start)
         job = f"sweep, {grid.words()}, {transient_cycles} + {measured_cycles} cycles from {start}"
-        with batch.keep(checkpoint, resume, {"job": job}, way.parts()) as keeper:
+        with batch.checkpointed(checkpoint, resume, {"job": job}, way.parts()) as writer:
             tell = Stages(report_progress, way.ends())
-            for k in way.ahead():
+            for k in way.pending():
                 if not batch.going_on:
                     batch.drive(grid.ratios[k] * grid.oscillator.natural_frequency)
                 cycles = batch.run(transient_cycles, measured_cycles, tell)
-                way.keep(k, batch, cycles)
-            keeper.keep()
+                way.record(k, batch, cycles)
+            writer.save()
     return Sweep(way.up.response(), way.down.response())
 
 
@@ -86,13 +86,13 @@ class _Way:
         ahead = 2 * self.count - self.done
         return (np.arange(ahead) + 1.0) / max(1, ahead)
 
-    def ahead(self):
+    def pending(self):
         """Numbers of the ratios that are not done, in order."""
         return [*range(self.count), *reversed(range(self.count))][self.done :]
 
-    def keep(self, k, batch, cycles):
+    def record(self, k, batch, cycles):
         """Take what was measured at ratio number k."""
-        (self.up if self.done < self.count else self.down).keep(k, batch, cycles)
+        (self.up if self.done < self.count else self.down).record(k, batch, cycles)
         self.done += 1
 
     def saved(self):
@@ -112,7 +112,7 @@ class _Collected:
         self.steps = np.zeros(len(grid.ratios), dtype=np.int32)
         self.values = {name: np.empty(grid.shape) for name in UNITS}
 
-    def keep(self, k, batch, cycles):
+    def record(self, k, batch, cycles):
         """Take what was measured at ratio number k."""
         particles, _, seeds = self.grid.shape
         self.steps[k] = batch.steps_per_cycle[0]

@@ -24,10 +24,11 @@ SPLIT = (
 class Outcome:
     """A run at its end.
 
-    moved: displacements [m], (n, 3) as lists. broken: released bonds. energy: terms of the ledger
-    [J]. evaluations: of bonds and contact pairs. cpu_s, wall_s: of stepping. compile_s: before it.
-    residual: share of the work that the ledger misses. reached_s: time. failure: why the run
-    ended before its time, or nothing; the figures are then those at that time.
+    moved: displacements [m], (n, 3) as lists. broken: released bonds. energy: terms of the energy
+    balance [J]. evaluations: of bonds and contact pairs. cpu_s, wall_s: of stepping. compile_s:
+    before it. residual: share of the work that the energy balance does not explain. reached_s:
+    time. failure: why the run ended before its time, or nothing; the figures are then those at that
+    time.
     """
 
     moved: list
@@ -79,12 +80,12 @@ def _outcome(simulation, failure):
     return Outcome(
         moved=moved.tolist(),
         broken=np.flatnonzero(simulation.state.broken_tick.to_numpy() != NEVER).tolist(),
-        energy=report.ledger,
+        energy=report.energy_balance,
         evaluations=report.contact_evaluations,
         cpu_s=report.run_cpu_seconds,
         wall_s=report.run_seconds,
         compile_s=report.compile_seconds,
-        residual=report.ledger_residual_fraction,
+        residual=report.energy_residual_fraction,
         reached_s=report.until_s,
         failure=failure,
     )

@@ -63,7 +63,7 @@ def blast(names, until, step, ulps):
         "memory_MB": 1e-6 * field_bytes(),
         "hole_mm": float(result.history["hole_radial_displacement_mm"][-1]),
         "broken": report.broken_faces,
-        "shares": {use.effect: use.share for use in report.acted},
+        "shares": {use.effect: use.share for use in report.effect_activity},
         "missed": report.needs,
     }
 
@@ -89,7 +89,7 @@ def damper(filling, options, particles, step, ratios, seeds, cycles):
         "steps": report.scene_steps,
         "memory_MB": 1e-6 * field_bytes(),
         "rms_mm": (1e3 * measured.rms).reshape(len(seeds), len(ratios)).tolist(),
-        "shares": {use.effect: use.share for use in report.acted},
+        "shares": {use.effect: use.share for use in report.effect_activity},
     }
 
 

@@ -197,7 +197,7 @@ def figures_of(result, law, step_ms):
         "seconds_per_simulated_ms": figure(1e-3 * step_ms * 1e-3 / STEP, "s"),
         "memory_MB": figure(memory_mb(), "MB"),
         "fields_MB": figure(1e-6 * field_bytes(), "MB"),
-        "ledger_residual_fraction": figure(report.ledger_residual_fraction, "1"),
+        "ledger_residual_fraction": figure(report.energy_residual_fraction, "1"),
         "linear_momentum_error": figure(report.linear_momentum_error, "1"),
     }
 

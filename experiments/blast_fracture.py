@@ -175,7 +175,7 @@ def figures_of(result):
     return {
         **figures,
         "broken_faces": figure(report.broken_faces, "1"),
-        "ledger_residual_fraction": figure(report.ledger_residual_fraction, "1"),
+        "ledger_residual_fraction": figure(report.energy_residual_fraction, "1"),
         "linear_momentum_error": figure(report.linear_momentum_error, "1"),
         "angular_momentum_error": figure(report.angular_momentum_error, "1"),
         "smallest_step_s": figure(float(history["smallest_step_s"].min()), "s", 4e-11),

@@ -126,7 +126,7 @@ def row_of(name, report, series, wanted, stable, step):
         "displacement_mm": moved,
         "displacement_error": abs(moved / wanted - 1.0),
         "broken_faces": report.broken_faces,
-        "ledger_residual_fraction": report.ledger_residual_fraction,
+        "ledger_residual_fraction": report.energy_residual_fraction,
         "largest_stable_step_s": stable,
         "bound_by": max(report.bound_by, key=report.bound_by.get),
     }

@@ -155,7 +155,7 @@ def table_of(runs):
                     "displacement_mm": float(series["monitor_displacement_mm"][at]),
                     "radial_mm": float(series["hole_radial_displacement_mm"][at]),
                     "broken_faces": report.broken_faces,
-                    "residual_fraction": report.ledger_residual_fraction,
+                    "residual_fraction": report.energy_residual_fraction,
                 }
             )
     for row in rows:

@@ -171,7 +171,7 @@ def compared(blows):
                 ),
                 "broken_faces": int(blow.broken[-1]),
                 "smallest_step_s": DT0 / 2.0 ** int(blow.levels.max()),
-                "residual": report.ledger_residual_fraction,
+                "residual": report.energy_residual_fraction,
                 "cpu_s": report.run_cpu_seconds,
             }
         )

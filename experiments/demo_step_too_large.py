@@ -115,7 +115,7 @@ def strike(limit, share, peak):
             recorder.snapshot()
             speeds.append(corner_speeds(simulation))
             times.append(simulation.time_s)
-            account.append(simulation.ledger.account())
+            account.append(simulation.energy_balance.account())
             shown.at(mark / last)
             if sentence:
                 break

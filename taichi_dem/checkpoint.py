@@ -24,7 +24,7 @@ from taichi_dem.files import renamed_when_done
 from taichi_dem.version import __version__, taichi_version
 
 #: Of the file; another one cannot be read.
-FORMAT = 1
+FORMAT = 2
 _ABOUT = "about"
 _MOST_STEPS = 2**53
 _MOST_MARKS = 1_000_000

@@ -24,10 +24,10 @@ class DivergenceCheck:
     solves: whether the method solves dashpots implicitly, so that only springs limit the step.
     """
 
-    def __init__(self, model, state, schedule, contacts, ledger, solves=False):
+    def __init__(self, model, state, schedule, contacts, energy_balance, solves=False):
         self.model, self.state, self.schedule, self.solves = model, state, schedule, solves
         self.limited = schedule.has_limits and schedule.limits.limited
-        self.contacts, self.ledger = contacts, ledger
+        self.contacts, self.energy_balance = contacts, energy_balance
         self.round_off = self._round_off()
         self.rest_until = 0.0
 
@@ -67,9 +67,13 @@ class DivergenceCheck:
             raise SimulationDiverged(self._sentence(body, self.state.motion(), what))
 
     def _check_energy(self):
-        account = self.ledger.account()
+        account = self.energy_balance.account()
         present = account["kinetic"] + account["bond_strain"] + account["sphere_strain"]
-        given = self.ledger.start_energy + abs(account["load_work"]) + abs(account["support_work"])
+        given = (
+            self.energy_balance.start_energy
+            + abs(account["load_work"])
+            + abs(account["support_work"])
+        )
         bound = ENERGY_FROM_NOWHERE * max(given, self.round_off)
         if -account["residual"] > bound and present > given:
             motion = self.state.motion()

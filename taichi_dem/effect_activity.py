@@ -19,31 +19,36 @@ _UNTOUCHED = "bodies overlap where faces lack the spheres for it"
 _NO_TRACE = "without sphere dashpots a touch between two recordings leaves no trace"
 
 
-def effects_acted(model, ledger, tables, account, watch):
+def effect_activity(model, energy_balance, tables, account, missing_effects):
     """An EffectUse for every listed effect, in the model's order.
 
-    tables, account: what the ledger's methods of that name gave. watch: the ``MissingEffects`` of
-    the run. Judged by role, so that an effect of one's own is judged like those of the package; but
-    it is never called idle where only its own code could tell.
+    tables, account: what the energy balance's methods of that name gave. missing_effects: the
+    ``MissingEffects`` of the run. Judged by role, so that an effect of one's own is judged like
+    those of the package; but it is never called idle where only its own code could tell.
     """
-    given = abs(account["load_work"]) + abs(account["support_work"]) + ledger.start_energy
-    found = [_by_role(model, ledger, tables, watch.touching, effect) for effect in _listed(model)]
-    lacking = watch.outer.times > 0
-    return tuple(_use(account, given, model, ledger.state, lacking, *entry) for entry in found)
+    given = abs(account["load_work"]) + abs(account["support_work"]) + energy_balance.start_energy
+    found = [
+        _by_role(model, energy_balance, tables, missing_effects.touching, effect)
+        for effect in _listed(model)
+    ]
+    lacking = missing_effects.outer.times > 0
+    return tuple(
+        _use(account, given, model, energy_balance.state, lacking, *entry) for entry in found
+    )
 
 
 def _listed(model):
     return [effect for effect in model.effects if effect.name]
 
 
-def _by_role(model, ledger, tables, touching, effect):
+def _by_role(model, energy_balance, tables, touching, effect):
     """(effect, what, events, energy): terms of the account, or a number [J]."""
     body, bond, pair = tables
     if effect.role == "load":
-        work = ledger.load_works(model.loads.index(effect))
+        work = energy_balance.load_works(model.loads.index(effect))
         return effect, "bodies given work", _count(work), np.abs(work).sum()
     if effect.role == "support":
-        work = ledger.support_works(model.supports.index(effect))
+        work = energy_balance.support_works(model.supports.index(effect))
         return effect, "bodies held", int((~np.isnan(work)).sum()), np.nansum(np.abs(work))
     touched = max(touching, _count(body[:, 3]) + _count(pair[:, 1]))
     rubbed = _count(body[:, 4]) + _count(pair[:, 2])

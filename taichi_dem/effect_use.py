@@ -28,18 +28,18 @@ class EffectUse:
     kept: str = ""
 
     @property
-    def acted(self):
+    def is_active(self):
         """Whether any event was counted."""
         return self.events > 0
 
     @property
     def idle(self):
         """Whether it is known to have had no part in the run."""
-        return not self.acted and not self.kept
+        return not self.is_active and not self.kept
 
     def negligible(self, tolerance):
         """Whether it acted, and booked less than a share of the energy."""
-        judged = self.acted and not (self.steers or self.kept) and self.share is not None
+        judged = self.is_active and not (self.steers or self.kept) and self.share is not None
         return judged and self.share < tolerance
 
     def __str__(self):
@@ -56,16 +56,16 @@ class EffectUse:
 class Advice:
     """Which effects a run had need of.
 
-    uses: an EffectUse for each effect. missed: findings about effects that were left out, with how
+    uses: an EffectUse for each effect. missing: findings about effects that were left out, with how
     often and where. tolerance: share of the energy below which an effect counts as negligible.
     """
 
     uses: tuple
-    missed: tuple
+    missing: tuple
     tolerance: float
 
     @property
-    def never_acted(self):
+    def inactive(self):
         """Names of the effects that had no part; without them not a bit would differ."""
         return tuple(use.effect for use in self.uses if use.idle)
 
@@ -77,20 +77,20 @@ class Advice:
     @property
     def droppable(self):
         """Names of the effects that the scene could do without."""
-        return self.never_acted + self.negligible
+        return self.inactive + self.negligible
 
     def __repr__(self):
         lists = {
             "keep": [use.effect for use in self.uses if use.effect not in self.droppable],
             "drop": self.droppable,
-            "missed": [str(getattr(finding, "effect", finding)) for finding in self.missed],
+            "missed": [str(getattr(finding, "effect", finding)) for finding in self.missing],
         }
         return in_brief(self, *(f"{word} {', '.join(of)}" for word, of in lists.items() if of))
 
     def __str__(self):
         """A line for every effect, then what was missed."""
         lines = [self._line(use) for use in self.uses]
-        return "\n".join([*lines, *(f"missed     {finding}" for finding in self.missed)])
+        return "\n".join([*lines, *(f"missed     {finding}" for finding in self.missing)])
 
     def _line(self, use):
         verdict = "drop" if use.idle or use.negligible(self.tolerance) else "keep"

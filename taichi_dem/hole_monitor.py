@@ -10,8 +10,8 @@ class HoleMonitor:
     """Displacement at the wall of a hole.
 
     axis_point (3,) [m] and axis (3,): of the hole. bodies: those with a face on it. outward
-    (n, 3): in-plane unit direction from the axis to each body's first centre. monitor: the body
-    of these that is nearest to the closest free face, at mid depth.
+    (n, 3): in-plane unit direction from the axis to each body's first centre. monitored_body: the
+    one of these that is nearest to the closest free face, at mid depth.
     """
 
     def __init__(self, model, group):
@@ -28,7 +28,7 @@ class HoleMonitor:
         self.first = model.centre[self.bodies]
         away = self._in_plane(self.first - self.axis_point)
         self.outward = away / np.linalg.norm(away, axis=1, keepdims=True)
-        self.monitor = self._nearest_to_free_face(model, body, face)
+        self.monitored_body = self._nearest_to_free_face(model, body, face)
 
     def _in_plane(self, vectors):
         return vectors - np.outer(vectors @ self.axis, self.axis)
@@ -53,7 +53,7 @@ class HoleMonitor:
         moved = position[self.bodies] - self.first
         return float(np.einsum("ij,ij->i", moved, self.outward).mean())
 
-    def monitor_displacement(self, position):
+    def monitored_displacement(self, position):
         """Displacement of the monitored body [m]."""
-        row = int(np.flatnonzero(self.bodies == self.monitor)[0])
-        return float(np.linalg.norm(position[self.monitor] - self.first[row]))
+        row = int(np.flatnonzero(self.bodies == self.monitored_body)[0])
+        return float(np.linalg.norm(position[self.monitored_body] - self.first[row]))

@@ -17,7 +17,7 @@ _ANEW = ("level", "bound", "tick", "last_tick", "injected_tick", "slot", "max_sp
 _ANEW += ("bond_heat", "contact_heat", "load_work", "load_impulse")
 
 
-def realised_gain(simulation, seconds=0.5):
+def measured_speedup(simulation, seconds=0.5):
     """CPU time that one step for all would have taken, over what the run took; 1 where it had one.
 
     How many evaluations that is is counted during the run. What one takes is measured for a number

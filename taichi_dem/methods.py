@@ -27,7 +27,7 @@ def _check_options(method):
         raise InputError(f"dashpot_floor must be 0 unless dashpot is 'limited', got {floor!r}")
 
 
-def _ahead(method):
+def _steps_ahead(method):
     rule = method.control
     if rule is None and method.dashpot == "limited":
         rule = StepControl()
@@ -72,9 +72,9 @@ class Uniform:
         return f"uniform{_suffix(self)}"
 
     @property
-    def ahead(self):
+    def steps_ahead(self):
         """Steps of a body by which its contacts are counted before they touch."""
-        return _ahead(self)
+        return _steps_ahead(self)
 
     def criterion(self):
         """Step rule for the schedule."""
@@ -115,9 +115,9 @@ class Multirate:
         return f"multirate_{self.neighbour}{_suffix(self)}"
 
     @property
-    def ahead(self):
+    def steps_ahead(self):
         """Steps of a body by which its contacts are counted before they touch."""
-        return _ahead(self)
+        return _steps_ahead(self)
 
     def criterion(self):
         """Step rule for the schedule."""
@@ -152,7 +152,7 @@ class ImplicitDashpots:
     distance = None
     solves = True
     # What may touch within the step is solved with it; a little more, as a spin is rounded.
-    ahead = 1.01
+    steps_ahead = 1.01
     name = "implicit"
 
     def __post_init__(self):

@@ -75,14 +75,14 @@ class MissingEffects:
         self.model, self.state, self.advance = model, state, advance
         self.touching = self.looks = 0
         self.last_s = -1.0
-        self.missed = unserved({effect.role for effect in model.effects if effect.name})
+        self.needed = unserved({effect.role for effect in model.effects if effect.name})
         self.outer_faces, self.outer = None, MissingEffect(REMEDY, _OVERLAP, unit="body")
         if model.has_contact and not model.contact.outer_faces:
             self.outer_faces = OuterFaces(model, state)
         material = model.material
         self.limits = ti.Vector([material.tensile_strength, material.cohesion, material.friction])
 
-    def look(self, time_s):
+    def sample(self, time_s):
         """Update the findings at a recording time [s]."""
         if time_s == self.last_s:
             return
@@ -92,29 +92,29 @@ class MissingEffects:
             later = self.outer_faces.overlaps()
             pairs = np.repeat(np.arange(len(later)), later)
             self.outer.see(pairs, time_s, self._centre)
-        if not self.missed or self.model.bond_count == 0:
+        if not self.needed or self.model.bond_count == 0:
             return
         marks = np.zeros((self.model.bond_count, 3), dtype=np.int32)
         self._mark(marks)
         for column, (role, _, _) in enumerate(_NEEDS):
-            if role in self.missed:
-                self.missed[role].see(np.flatnonzero(marks[:, column]), time_s, self._middle)
+            if role in self.needed:
+                self.needed[role].see(np.flatnonzero(marks[:, column]), time_s, self._middle)
 
     def saved(self):
         """What a checkpoint holds of it, arrays by name."""
         rows = [[m.times, m.most, m.where, m.first_s] for m in self._all()]
         return {
-            "missed": np.array(rows, dtype=np.float64),
+            "needed": np.array(rows, dtype=np.float64),
             "looks": np.array([self.looks, self.touching, self.last_s]),
         }
 
     def resume(self, saved):
         """Take over what ``saved`` gave."""
-        for missed, row in zip(self._all(), saved["missed"].tolist()):
+        for missed, row in zip(self._all(), saved["needed"].tolist()):
             missed.times, missed.most, missed.where = (int(value) for value in row[:3])
             missed.first_s = row[3]
             if missed.times:
-                missed.place_m = self._place(missed)
+                missed.place_m = self._position_of(missed)
         looks, touching, self.last_s = saved["looks"].tolist()
         self.looks, self.touching = int(looks), int(touching)
 
@@ -125,9 +125,9 @@ class MissingEffects:
             self.touching = max(self.touching, int((deepest > 0.0).sum()))
 
     def _all(self):
-        return (*self.missed.values(), self.outer)
+        return (*self.needed.values(), self.outer)
 
-    def _place(self, missed):
+    def _position_of(self, missed):
         return (self._centre if missed is self.outer else self._middle)(missed.where)
 
     def _centre(self, body):

@@ -7,7 +7,7 @@ from taichi_dem.report import Report
 
 
 def needed_effects(result, tolerance=1e-3):
-    """Advice about the effects of a run; print it, or ask for its ``droppable`` and ``missed``.
+    """Advice about the effects of a run; print it, or ask for its ``droppable`` and ``missing``.
 
     result: what ``simulate`` gave, or its report. tolerance: share of the energy that passed
     through bonds below which their damping counts as nothing, in [0, 1]. Effects that steer
@@ -20,4 +20,4 @@ def needed_effects(result, tolerance=1e-3):
     if not isinstance(report, Report):
         kind = type(result).__name__
         raise InputError(f"result must be a Result of simulate or its report, got {kind}")
-    return Advice(report.acted, report.missed, fraction("tolerance", tolerance))
+    return Advice(report.effect_activity, report.missing_effects, fraction("tolerance", tolerance))

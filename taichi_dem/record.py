@@ -90,13 +90,13 @@ class Recorder:
         """Add a row to the time series."""
         sim = self.simulation
         motion = self.state.motion()
-        account = sim.ledger.account()
+        account = sim.energy_balance.account()
         account["gas_work"] = sim.gas_work()
         row = {"time_s": sim.time_s}
         if self.hole is not None:
             radial = self.hole.radial_displacement(motion["position"])
             row["hole_radial_displacement_mm"] = 1e3 * radial
-            monitor = self.hole.monitor_displacement(motion["position"])
+            monitor = self.hole.monitored_displacement(motion["position"])
             row["monitor_displacement_mm"] = 1e3 * monitor
         row["broken_faces"] = int((self.state.broken_tick.to_numpy() != NEVER).sum())
         row.update({f"{name}_J": account[name] for name in ENERGY_COLUMNS})

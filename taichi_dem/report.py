@@ -5,6 +5,9 @@ from typing import Optional
 
 from taichi_dem.display import in_brief
 
+#: Keys of the JSON file that differ from the attribute's name.
+_JSON_KEYS = {"effect_activity": "acted", "missing_effects": "missed"}
+
 
 @dataclass(frozen=True)
 class Report:
@@ -17,13 +20,14 @@ class Report:
     substeps over body updates, what the different steps would save if a pair cost nothing;
     boundary_gain: uniform over actual evaluations, what they save with every pair evaluated at
     the finer body's step. searches: rebuilt contact lists.
-    ledger: energy terms [J]; ledger_residual_fraction: residual over the work put in.
+    energy_balance: energy terms [J]; energy_residual_fraction: residual over the work put in.
     linear_momentum_error, angular_momentum_error: out of nothing, as shares of what was
-    exchanged. compile_seconds, run_seconds, run_cpu_seconds: cost. acted: an ``EffectUse`` for each
-    effect. missed: a ``missing_effects.MissingEffect`` for each effect that was left out and
-    needed. unresolved: sentences about bonds and contacts for which the step was too long.
-    bound_by: bodies at the end by what bounds their step, see ``step_control.CRITERIA``.
-    realised_gain: CPU time of one step for all over that of the run, where it was measured.
+    exchanged. compile_seconds, run_seconds, run_cpu_seconds: cost. effect_activity: an
+    ``EffectUse`` for each effect. missing_effects: a ``missing_effects.MissingEffect`` for each
+    effect that was left out and needed. unresolved: sentences about bonds and contacts for which
+    the step was too long. bound_by: bodies at the end by what bounds their step, see
+    ``step_control.CRITERIA``. measured_speedup: CPU time of one step for all over that of the run,
+    where it was measured.
     """
 
     method: str
@@ -41,17 +45,17 @@ class Report:
     sweeps: int
     uniform_evaluations: int
     searches: int
-    ledger: dict
+    energy_balance: dict
     linear_momentum_error: float
     angular_momentum_error: float
     compile_seconds: float
     run_seconds: float
     run_cpu_seconds: float
-    acted: tuple
-    missed: tuple
+    effect_activity: tuple
+    missing_effects: tuple
     unresolved: tuple
     bound_by: dict
-    realised_gain: Optional[float] = None
+    measured_speedup: Optional[float] = None
 
     def __repr__(self):
         took = f"{self.run_seconds:.3g} s run"
@@ -66,7 +70,7 @@ class Report:
     @property
     def needs(self):
         """Sentences about effects that were missed, and about a step that was too long."""
-        return (*(str(missed) for missed in self.missed), *self.unresolved)
+        return (*(str(missing) for missing in self.missing_effects), *self.unresolved)
 
     @property
     def contact_evaluations(self):
@@ -84,23 +88,24 @@ class Report:
         return self.uniform_evaluations / max(1, self.contact_evaluations)
 
     @property
-    def ledger_residual_fraction(self):
+    def energy_residual_fraction(self):
         """Energy that the account cannot explain, over the work put in or the energy held."""
-        given = abs(self.ledger["load_work"]) + abs(self.ledger["support_work"])
-        held = self.ledger["kinetic"] + self.ledger["bond_strain"]
-        return abs(self.ledger["residual"]) / max(given, held, 1e-300)
+        given = abs(self.energy_balance["load_work"]) + abs(self.energy_balance["support_work"])
+        held = self.energy_balance["kinetic"] + self.energy_balance["bond_strain"]
+        return abs(self.energy_balance["residual"]) / max(given, held, 1e-300)
 
     def as_dict(self):
         """All figures, for a JSON file."""
-        derived = ("contact_evaluations", "ideal_gain", "boundary_gain", "ledger_residual_fraction")
+        derived = ("contact_evaluations", "ideal_gain", "boundary_gain", "energy_residual_fraction")
         derived += ("needs",)
-        return {**asdict(self), **{name: getattr(self, name) for name in derived}}
+        figures = {_JSON_KEYS.get(name, name): value for name, value in asdict(self).items()}
+        return {**figures, **{name: getattr(self, name) for name in derived}}
 
     def _effect_rows(self):
         """What each effect did."""
-        if not self.acted:
+        if not self.effect_activity:
             return (("effects", "none"),)
-        rows = [f"{use.effect}: {use}" for use in self.acted]
+        rows = [f"{use.effect}: {use}" for use in self.effect_activity]
         return (("effects", rows[0]), *(("", row) for row in rows[1:]))
 
     def _bound_words(self):
@@ -114,8 +119,8 @@ class Report:
             return ()
         ideal, reached = f"{self.ideal_gain:.2f}", f"{self.boundary_gain:.2f}"
         words = f"{ideal} ideal, {reached} with pairs at the finer step"
-        if self.realised_gain is not None:
-            words += f", {self.realised_gain:.2f} realised"
+        if self.measured_speedup is not None:
+            words += f", {self.measured_speedup:.2f} measured"
         return (("gain over uniform", words),)
 
     def _sweeps_row(self):
@@ -144,8 +149,11 @@ class Report:
             *self._gain_row(),
             *self._sweeps_row(),
             ("contact searches", f"{self.searches:,}"),
-            ("work put in", f"{self.ledger['load_work'] + self.ledger['support_work']:.6g} J"),
-            ("ledger residual", f"{100 * self.ledger_residual_fraction:.3g} % of it"),
+            (
+                "work put in",
+                f"{self.energy_balance['load_work'] + self.energy_balance['support_work']:.6g} J",
+            ),
+            ("energy residual", f"{100 * self.energy_residual_fraction:.3g} % of it"),
             (
                 "momentum error",
                 f"{self.linear_momentum_error:.1e} linear, "

@@ -33,7 +33,7 @@ class RunSnapshot:
             arrays.update({f"{part}/{name}": array for name, array in owner.saved().items()})
         write_checkpoint(path, self.identity, arrays)
 
-    def take(self, arrays, path):
+    def restore(self, arrays, path):
         """Put the run where it was saved, with the arrays that ``opened`` gave for a path.
 
         Raises InputError where the fields are not those of this run.
@@ -58,14 +58,14 @@ def _under(part, arrays):
 class CheckpointWriter:
     """Saves a run when its checkpoint asks for it, and on Ctrl-C; its block listens for that.
 
-    checkpoint: a Checkpoint. saved: the ``RunSnapshot`` of the run. now: gives its present step and
-    time [s]. All methods are called between two steps only.
+    checkpoint: a Checkpoint. snapshot: of the run, a ``RunSnapshot``. now: gives its present step
+    and time [s]. All methods are called between two steps only.
     """
 
-    def __init__(self, checkpoint, saved, now):
-        self.checkpoint, self.saved, self.now = checkpoint, saved, now
-        self.due, self.ctrl_c, self.kept_s = SaveTimer(checkpoint), CtrlC(), None
-        self.due.saved_at(*now())
+    def __init__(self, checkpoint, snapshot, now):
+        self.checkpoint, self.snapshot, self.now = checkpoint, snapshot, now
+        self.timer, self.ctrl_c, self.saved_s = SaveTimer(checkpoint), CtrlC(), None
+        self.timer.saved_at(*now())
 
     def __enter__(self):
         self.ctrl_c.__enter__()
@@ -78,29 +78,29 @@ class CheckpointWriter:
         """Steps of dt [s] up to the last at which to look, a set."""
         return self.checkpoint.marks(last, dt)
 
-    def look(self):
+    def save_if_needed(self):
         """Save the run if that is due. Raises Interrupted after Ctrl-C, InputError."""
         step, time_s = self.now()
-        if self.ctrl_c.asked or self.due.now(step, time_s):
-            self.keep()
+        if self.ctrl_c.asked or self.timer.now(step, time_s):
+            self.save()
         if self.ctrl_c.asked:
             raise Interrupted(time_s, self.checkpoint.path)
 
-    def keep(self):
+    def save(self):
         """Save the run. Raises InputError that tells what the last good checkpoint is."""
         try:
-            self.saved.write(self.checkpoint.path)
+            self.snapshot.write(self.checkpoint.path)
         except InputError as error:
             raise InputError(f"{error}{self.last_good()}") from None
-        step, self.kept_s = self.now()
-        self.due.saved_at(step, self.kept_s)
+        step, self.saved_s = self.now()
+        self.timer.saved_at(step, self.saved_s)
 
     def last_good(self):
         """What is left to go on from, as the end of a sentence."""
-        if self.kept_s is None:
+        if self.saved_s is None:
             return "; this run has saved no checkpoint before"
         path = os.fspath(self.checkpoint.path)
-        return f"; checkpoint {path} holds the run at t = {self.kept_s:.6g} s"
+        return f"; checkpoint {path} holds the run at t = {self.saved_s:.6g} s"
 
 
 class NoCheckpointWriter:
@@ -116,10 +116,10 @@ class NoCheckpointWriter:
         """None."""
         return set()
 
-    def look(self):
+    def save_if_needed(self):
         """Nothing to do."""
 
-    def keep(self):
+    def save(self):
         """Nothing to save."""
 
     def last_good(self):

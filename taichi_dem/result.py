@@ -58,7 +58,7 @@ class Result:
         """The main figures of the run, (name, text) each."""
         report, model, history = self.report, self.model, self.history
         parts = counted(model.body_count, "body"), counted(model.bond_count, "bond")
-        work = report.ledger["load_work"] + report.ledger["support_work"]
+        work = report.energy_balance["load_work"] + report.energy_balance["support_work"]
         rows = [
             ("simulated", f"{report.until_s:.4g} s"),
             ("method", f"{report.method}, {report.driver} driver"),
@@ -68,7 +68,7 @@ class Result:
             ("broken bonds", f"{report.broken_faces:,}"),
             ("largest speed", f"{np.fmax.reduce(self.peak_speed, initial=np.nan):.4g} m/s"),
             ("work put in", f"{work:.4g} J"),
-            ("energy not explained", f"{100.0 * report.ledger_residual_fraction:.3g} % of it"),
+            ("energy not explained", f"{100.0 * report.energy_residual_fraction:.3g} % of it"),
             ("time", f"{report.compile_seconds:.1f} s compiling, {report.run_seconds:.1f} s run"),
         ]
         moved = history.get("hole_radial_displacement_mm", ())

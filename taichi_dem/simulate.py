@@ -10,7 +10,7 @@ from taichi_dem.checkpoint import Checkpoint, digest, version_text
 from taichi_dem.checks import AUTO, instance, progress_option, shown
 from taichi_dem.errors import InputError, SimulationDiverged
 from taichi_dem.files import output_folder
-from taichi_dem.measured_speedup import realised_gain
+from taichi_dem.measured_speedup import measured_speedup
 from taichi_dem.methods import check_method
 from taichi_dem.outer_faces import outer_faces_warnings
 from taichi_dem.progress import Progress, compiling
@@ -30,20 +30,20 @@ _MOST_RECORDS = 1_000_000
 class RunProgress(Progress):
     """How far a run is: time_s of until_s; bonds and pairs evaluated.
 
-    ahead: bonds and pairs to evaluate in a simulated second at the present levels [1/s].
+    evaluation_rate: bonds and pairs to evaluate in a simulated second at the present levels [1/s].
     """
 
     time_s: float
     until_s: float
     evaluations: int
-    ahead: float
+    evaluation_rate: float
 
     @property
     def seconds_left(self):
         """Time expected until the end [s], each level weighted by its steps; infinite at first."""
         if not self.evaluations:
             return math.inf
-        work = max(0.0, self.until_s - self.time_s) * self.ahead
+        work = max(0.0, self.until_s - self.time_s) * self.evaluation_rate
         return work * self.seconds / self.evaluations
 
     @property
@@ -79,7 +79,7 @@ def simulate(
     run diverges. checkpoint: a Checkpoint that says where and when the run saves itself, besides
     at its end and on Ctrl-C. resume: a checkpoint file to go on from, of the same scene and method;
     the bits are those of a run that was never stopped. measure_gain: whether the report says how
-    much time steps of different length saved, which takes some seconds more (``realised_gain``).
+    much time steps of different length saved, which takes some seconds more (``measured_speedup``).
     Raises InputError for bad arguments, SimulationDiverged when the run leaves its bounds,
     Interrupted when Ctrl-C has saved the run. Warns, as a UserWarning before the first step, of
     parts of the mesh that can pass through each other (``outer_faces_warnings``).
@@ -98,19 +98,19 @@ def simulate(
     error = None
     with reporting(progress, "simulating") as report_progress:
         simulation, recorder = _started(scene, method, driver)
-        keeper = _keeper(simulation, recorder, checkpoint, resume, arrays)
+        writer = _checkpoint_writer(simulation, recorder, checkpoint, resume, arrays)
         marks = _marks(last, samples), _marks(last, frames)
         try:
-            with keeper:
-                _run(simulation, recorder, keeper, marks, report_progress)
+            with writer:
+                _run(simulation, recorder, writer, marks, report_progress)
         except SimulationDiverged as diverged:
             error = diverged
         result = _result(scene, method, simulation, recorder, error)
         if measure_gain and error is None:
-            report = replace(result.report, realised_gain=realised_gain(simulation))
+            report = replace(result.report, measured_speedup=measured_speedup(simulation))
             result = replace(result, report=report)
     if output is not None:
-        _write(result, output, keeper)
+        _write(result, output, writer)
     if error is not None:
         error.result = result
         raise error
@@ -143,30 +143,30 @@ def _opened(scene, method, checkpoint, resume, last):
     return arrays
 
 
-def _keeper(simulation, recorder, checkpoint, resume, arrays):
+def _checkpoint_writer(simulation, recorder, checkpoint, resume, arrays):
     """What saves the run, after the run has been put where it was saved."""
     if checkpoint is None and resume is None:
         return NoCheckpointWriter()
     saved = saved_run(simulation, recorder)
     if arrays:
-        saved.take(arrays, resume)
+        saved.restore(arrays, resume)
 
     def now():
         """Present largest step, and time [s]."""
         return simulation.state.tick[None] // MACRO_TICKS, simulation.time_s
 
-    return (
-        CheckpointWriter(checkpoint, saved, now) if checkpoint is not None else NoCheckpointWriter()
-    )
+    if checkpoint is None:
+        return NoCheckpointWriter()
+    return CheckpointWriter(checkpoint, saved, now)
 
 
 def saved_run(simulation, recorder):
     """All that a checkpoint holds of a started simulation, a ``restart.RunSnapshot``."""
     parts = {
         "simulation": simulation,
-        "ledger": simulation.ledger,
-        "watch": simulation.watch,
-        "resolution": simulation.resolution,
+        "energy balance": simulation.energy_balance,
+        "missing effects": simulation.missing_effects,
+        "step resolution": simulation.step_resolution,
         "recorder": recorder,
     }
     return RunSnapshot(identity_of(simulation.scene, simulation.method), simulation, parts)
@@ -190,7 +190,7 @@ def identity_of(scene, method):
     }
 
 
-def _run(simulation, recorder, keeper, marks, report_progress):
+def _run(simulation, recorder, writer, marks, report_progress):
     """Step from mark to mark; every mark is sampled, photographed, or only looked at.
 
     marks: largest steps to sample, and to photograph, two sets. Those up to which a resumed run
@@ -199,39 +199,39 @@ def _run(simulation, recorder, keeper, marks, report_progress):
     sample_steps, frame_steps = marks
     last = max(sample_steps)
     seen = simulation.state.tick[None] if recorder.rows else -1
-    marks = sorted(sample_steps | frame_steps | keeper.marks(last, simulation.method.dt0))
+    marks = sorted(sample_steps | frame_steps | writer.marks(last, simulation.method.dt0))
     for step in (mark for mark in marks if mark * MACRO_TICKS > seen):
 
-        def tell(end=step * MACRO_TICKS):
+        def report_and_save(end=step * MACRO_TICKS):
             """Tell how far the run is, and save it if due; at a mark its rows come first."""
             if report_progress is not None:
                 report_progress(progress_of(simulation, last * simulation.method.dt0))
             if simulation.state.tick[None] < end:
-                keeper.look()
+                writer.save_if_needed()
 
-        simulation.advance_to(step, tell)
+        simulation.advance_to(step, report_and_save)
         if step in sample_steps:
-            simulation.look()
+            simulation.sample()
             recorder.sample()
         if step in frame_steps:
             recorder.snapshot()
-        keeper.look()
-    keeper.keep()
+        writer.save_if_needed()
+    writer.save()
 
 
-def _write(result, folder, keeper):
+def _write(result, folder, writer):
     try:
         result.write(folder)
     except InputError as error:
-        raise InputError(f"{error}{keeper.last_good()}") from None
+        raise InputError(f"{error}{writer.last_good()}") from None
 
 
 def progress_of(simulation, until):
     """RunProgress of a simulation towards a time [s]."""
     done, seconds = simulation.evaluations(), simulation.running_seconds()
-    ahead = simulation.evaluations_ahead()
+    rate = simulation.evaluation_rate()
     time_s = simulation.time_s
-    return RunProgress(min(1.0, time_s / until), seconds, time_s, until, done, ahead)
+    return RunProgress(min(1.0, time_s / until), seconds, time_s, until, done, rate)
 
 
 def _marks(last, count):

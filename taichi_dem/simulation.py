@@ -10,7 +10,7 @@ from taichi_dem.allocation import batch_allocation
 from taichi_dem.checks import choice, instance, positive, whole
 from taichi_dem.display import counted, in_brief
 from taichi_dem.divergence import DivergenceCheck
-from taichi_dem.effect_activity import effects_acted
+from taichi_dem.effect_activity import effect_activity
 from taichi_dem.energy_balance import EnergyBalance
 from taichi_dem.errors import InputError, SimulationDiverged
 from taichi_dem.methods import check_method
@@ -75,7 +75,7 @@ class Simulation:
         kind = SolvedStep if self.solves else Step
         self.step = kind(self.advance, self.schedule, self.broad_phase)
         self.driver = {**DRIVERS, _MEASURED: AutoDriver}[driver](self.step)
-        self.ledger = None
+        self.energy_balance = None
         self.compile_seconds = time.perf_counter() - started
         self.run_seconds = self.run_cpu_seconds = 0.0
         self.started = None
@@ -89,7 +89,7 @@ class Simulation:
         model, state, method = self.model, self.state, self.method
         self.contacts = None
         if model.has_contact:
-            self.contacts = Contacts(model, state, method.dt0, method.ahead)
+            self.contacts = Contacts(model, state, method.dt0, method.steps_ahead)
         drifted = method.neighbour == "drifted"
         limits = limits_for(model, state, self.contacts, method)
         self.schedule = Schedule(
@@ -120,7 +120,7 @@ class Simulation:
 
         Compiles everything, so that stepping afterwards is all that is timed as the run.
         """
-        if self.ledger is not None:
+        if self.energy_balance is not None:
             return
         started = time.perf_counter()
         compiling("first step", 0.2)
@@ -133,24 +133,24 @@ class Simulation:
         self.driver.prepare()
         self._check_capacity()
         compiling("energy balance", 0.85)
-        self.ledger = EnergyBalance(self.model, self.state, self.advance, self.contacts)
-        self.health = DivergenceCheck(
-            self.model, self.state, self.schedule, self.contacts, self.ledger, self.solves
+        self.energy_balance = EnergyBalance(self.model, self.state, self.advance, self.contacts)
+        self.divergence_check = DivergenceCheck(
+            self.model, self.state, self.schedule, self.contacts, self.energy_balance, self.solves
         )
-        self.watch = MissingEffects(self.model, self.state, self.advance)
-        self.resolution = StepResolution(self.model, self.state, self.advance)
-        self.look()
-        self.health.check()
-        self.evaluations_ahead()
+        self.missing_effects = MissingEffects(self.model, self.state, self.advance)
+        self.step_resolution = StepResolution(self.model, self.state, self.advance)
+        self.sample()
+        self.divergence_check.check()
+        self.evaluation_rate()
         self.compile_seconds += time.perf_counter() - started
 
-    def look(self):
+    def sample(self):
         """Look for effects that are missed, and for bonds that the step does not resolve.
 
         Called at recording times, so that the step stays bare.
         """
-        self.watch.look(self.time_s)
-        self.resolution.look()
+        self.missing_effects.sample(self.time_s)
+        self.step_resolution.sample()
 
     def advance_to(self, macro_step, on_call=None):
         """Step until a number of largest steps; on_call() is called about five times a second.
@@ -167,7 +167,7 @@ class Simulation:
             while self.state.tick[None] < end:
                 self.driver.run(end)
                 self._check_capacity()
-                self.health.check(hurried=self.state.tick[None] < end)
+                self.divergence_check.check(hurried=self.state.tick[None] < end)
                 if on_call is not None:
                     on_call()
         finally:
@@ -209,7 +209,7 @@ class Simulation:
         present = time.process_time() - self.started_cpu if self.started is not None else 0.0
         return self.run_cpu_seconds + present
 
-    def evaluations_ahead(self):
+    def evaluation_rate(self):
         """Bonds and pairs to evaluate in a simulated second, if all levels stay as they are."""
         members = self.schedule.members()
         steps = 2.0 ** np.arange(len(members))
@@ -222,15 +222,15 @@ class Simulation:
     def gas_work(self):
         """Work of the gas pressure [J], zero without it."""
         places = [k for k, load in enumerate(self.model.loads) if load.name == "gas_pressure"]
-        return sum(self.ledger.load_work(place) for place in places)
+        return sum(self.energy_balance.load_work(place) for place in places)
 
     def report(self):
         """Report of the run so far."""
         counts = [int(value) for value in self.schedule.evaluations.to_numpy()]
-        linear, angular = self.ledger.momentum_errors()
+        linear, angular = self.energy_balance.momentum_errors()
         levels = self.state.level.to_numpy()
-        tables = self.ledger.tables()
-        account = self.ledger.account(tables)
+        tables = self.energy_balance.tables()
+        account = self.energy_balance.account(tables)
         return Report(
             method=self.method.name,
             driver=self.driver.name,
@@ -247,15 +247,17 @@ class Simulation:
             sweeps=self.sweeps(),
             uniform_evaluations=counts[4],
             searches=self.searches,
-            ledger=account,
+            energy_balance=account,
             linear_momentum_error=float(linear),
             angular_momentum_error=float(angular),
             compile_seconds=self.compile_seconds,
             run_seconds=self.run_seconds,
             run_cpu_seconds=self.run_cpu_seconds,
-            acted=effects_acted(self.model, self.ledger, tables, account, self.watch),
-            missed=self.watch.findings(),
-            unresolved=self.resolution.findings(),
+            effect_activity=effect_activity(
+                self.model, self.energy_balance, tables, account, self.missing_effects
+            ),
+            missing_effects=self.missing_effects.findings(),
+            unresolved=self.step_resolution.findings(),
             bound_by=counted_criteria(self.state.bound.to_numpy()),
         )
 

@@ -43,7 +43,7 @@ class StepResolution:
         for name in _KEPT:
             setattr(self, name, saved[name].copy())
 
-    def look(self):
+    def sample(self):
         """Update the figures at a recording time. Dashpots that are solved need no look."""
         if self.advance.solves:
             return

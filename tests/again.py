@@ -51,12 +51,12 @@ class Again:
         self.simulation.broad_phase.search()
 
     def _open_account(self):
-        ledger = self.simulation.ledger
-        ledger.start_energy = 0.0
-        account = ledger.account()
+        balance = self.simulation.energy_balance
+        balance.start_energy = 0.0
+        account = balance.account()
         strain = account["bond_strain"] + account["sphere_strain"]
-        ledger.start_energy = account["kinetic"] + strain
-        ledger.start_momentum = ledger.momentum()
+        balance.start_energy = account["kinetic"] + strain
+        balance.start_momentum = balance.momentum()
 
     def run(self, steps, look=None):
         """Go on to a number of steps since the start; look() is called after steps with a search.

@@ -2,7 +2,7 @@
 
 The paper gives the container a force only while particles move. Here that is a landing: the first
 blow to a wall after a change of cell. What goes on between a heap and the floor that it lies on is
-left out, as it is there, and goes to the ledger if there is one.
+left out, as it is there, and goes to the impulse balance if there is one.
 With static contact everything acts on the container: every blow, every push, and also what the six
 directions take from the particles, for it is the container that holds the lattice. So momentum is
 kept, and the mean force is the weight.
@@ -21,15 +21,15 @@ class Landings:
     (scenes, cells + 1); meaningless in cells without a particle.
     """
 
-    def __init__(self, lattice, scenes, ledger, pushes):
-        self.lattice, self.ledger, self.pushes = lattice, ledger, pushes
-        self.asks_for_lattice = ledger.active
+    def __init__(self, lattice, scenes, impulse_balance, pushes):
+        self.lattice, self.impulse_balance, self.pushes = lattice, impulse_balance, pushes
+        self.needs_lattice_impulse = impulse_balance.active
         self.arrived = ti.field(ti.i8, shape=(scenes, lattice.cells + 1))
 
     @ti.func
     def clear(self, s):
         """Nobody has moved yet."""
-        self.ledger.clear(s)
+        self.impulse_balance.clear(s)
         for cell in range(self.lattice.cells + 1):
             self.arrived[s, cell] = ti.cast(0, ti.i8)
 
@@ -44,13 +44,13 @@ class Landings:
         self.arrived[s, cell] = ti.cast(1, ti.i8)
 
     @ti.func
-    def blow(self, s, cell, gain):
+    def wall_impulse(self, s, cell, gain):
         """What counts [quanta] of a particle's gain of velocity along x by a blow [m/s]."""
         result = ti.cast(0, ti.i64)
         if self.arrived[s, cell] == 1:
             result = quanta(gain)
         else:
-            self.ledger.add(s, REST, gain)
+            self.impulse_balance.add(s, REST, gain)
         self.arrived[s, cell] = ti.cast(0, ti.i8)
         return result
 
@@ -61,13 +61,13 @@ class Landings:
         if ti.static(self.pushes):
             result = quanta(gain)
         else:
-            self.ledger.add(s, EJECTIONS, gain)
+            self.impulse_balance.add(s, EJECTIONS, gain)
         return result
 
     @ti.func
-    def lattice_gave(self, s, item: ti.template(), gain):
+    def lattice_impulse(self, s, item: ti.template(), gain):
         """What counts of a gain that the lattice is the cause of: nothing."""
-        self.ledger.add(s, item, gain)
+        self.impulse_balance.add(s, item, gain)
         return ti.cast(0, ti.i64)
 
 
@@ -75,7 +75,7 @@ class Landings:
 class AllImpulses:
     """All gains of velocity but by gravity act on the container; nothing is remembered."""
 
-    asks_for_lattice = True
+    needs_lattice_impulse = True
 
     @ti.func
     def clear(self, s):
@@ -90,7 +90,7 @@ class AllImpulses:
         """Nothing to note."""
 
     @ti.func
-    def blow(self, s, cell, gain):
+    def wall_impulse(self, s, cell, gain):
         """What counts [quanta] of a particle's gain of velocity along x by a blow [m/s]."""
         return quanta(gain)
 
@@ -100,6 +100,6 @@ class AllImpulses:
         return quanta(gain)
 
     @ti.func
-    def lattice_gave(self, s, item: ti.template(), gain):
+    def lattice_impulse(self, s, item: ti.template(), gain):
         """What counts of a gain that the lattice is the cause of."""
         return quanta(gain)

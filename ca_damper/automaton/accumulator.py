@@ -48,7 +48,7 @@ class Accumulator:
         return result
 
     @ti.func
-    def ahead_of_wall(self, travelled, kind, way, width):
+    def distance_to_wall(self, travelled, kind, way, width):
         """Way travelled [m] of a particle that flies ahead of a wall that pushes its cell along.
 
         Whoever flies straight (up for way 1, down for -1) keeps its place in the room.

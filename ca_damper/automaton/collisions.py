@@ -8,7 +8,7 @@ part in two events of a step. Then the winners act; no two of them touch the sam
 import taichi as ti
 
 from ca_damper.automaton.collision_laws import deflected, speed_after_pair, speed_after_wall
-from ca_damper.automaton.conflict_resolution import ahead_of_others, rank
+from ca_damper.automaton.conflict_resolution import above_others, rank
 from ca_damper.automaton.event_counts import HOLDS, WALLS
 from ca_damper.automaton.event_counts import PAIRS as PAIRS_MET
 from ca_damper.automaton.impulse_balance import PAIRS, quanta
@@ -29,10 +29,12 @@ class Collisions:
     both: whether both of a pair are updated. pairs_first: whether pairs come before walls.
     """
 
-    def __init__(self, parts, both, pairs_first):
-        self.cells, self.lattice, self.rivals = parts.cells, parts.lattice, parts.rivals
-        self.accumulator, self.resting = parts.accumulator, parts.resting
-        self.accounting, self.numbers, self.tally = parts.accounting, parts.numbers, parts.tally
+    def __init__(self, components, both, pairs_first):
+        self.cells, self.lattice = components.cells, components.lattice
+        self.conflict_resolution = components.conflict_resolution
+        self.accumulator, self.resting = components.accumulator, components.resting
+        self.accounting, self.parameters = components.accounting, components.parameters
+        self.event_counts = components.event_counts
         self.both, self.pairs_first = both, pairs_first
         shape = (self.cells.kind.shape[0], self.lattice.cells)
         self.contacts = ti.field(ti.i32, shape=shape)
@@ -40,44 +42,44 @@ class Collisions:
         self.ranks = ti.field(ti.i64, shape=shape)
 
     @ti.func
-    def happen(self, s, step, shared, count, velocity, pull, pressed):
+    def resolve(self, s, step, shared, count, velocity, pull, pressed):
         """All events of a step; returns velocity along x that counted blows gave [quanta].
 
         velocity: of the container [m/s]. pull: g dt [m/s].
         """
-        events = self.judge_all(s, step, shared, count, velocity, pull, pressed)
-        gained = ti.cast(0, ti.i64)
+        events = self.find_events(s, step, shared, count, velocity, pull, pressed)
+        impulse = ti.cast(0, ti.i64)
         for k in range(events):
             entry = self.contacts[s, k]
             cell, event = entry & ((1 << _CELL_BITS) - 1), entry >> _CELL_BITS
             if self.wins(s, cell, event, self.ranks[s, k]):
-                gained += self.act(s, shared, cell, event, self.other[s, k], velocity, pull)
-        return gained
+                impulse += self.carry_out(s, shared, cell, event, self.other[s, k], velocity, pull)
+        return impulse
 
     @ti.func
-    def judge_all(self, s, step, shared, count, velocity, pull, pressed):
+    def find_events(self, s, step, shared, count, velocity, pull, pressed):
         """Keep those of the contacts in which something happens; returns their number."""
         events = 0
         for k in range(count):
             cell = self.contacts[s, k]
-            event, other = self.judge(s, cell, velocity, pull, pressed)
+            event, other = self.find_event(s, cell, velocity, pull, pressed)
             if event != NOTHING:
                 self.contacts[s, events] = cell | (event << _CELL_BITS)
                 self.other[s, events] = other
                 ranked = rank(step, shared, cell, EVENT)
                 if ti.static(self.pairs_first):
                     if event == PAIR:
-                        ranked = ahead_of_others(ranked)
+                        ranked = above_others(ranked)
                 self.ranks[s, events] = ranked
                 self.claim(s, cell, event, ranked)
                 events += 1
         return events
 
     @ti.func
-    def judge(self, s, cell, velocity, pull, pressed):
+    def find_event(self, s, cell, velocity, pull, pressed):
         """What happens to a particle, and the speed of what it meets."""
         kind = self.cells.at(s, cell)
-        ahead = self.lattice.ahead(cell, kind)
+        ahead = self.lattice.cell_ahead(cell, kind)
         met = self.cells.at(s, ahead)
         event, other = PAIR, self.cells.speed[s, ahead] * self.lattice.cosine[met, kind]
         if met >= WALL:
@@ -96,47 +98,49 @@ class Collisions:
     def claim(self, s, cell, event, ranked):
         """Claim the particles that an event changes."""
         if ti.static(self.both):
-            self.rivals.claim(s, cell, ranked)
+            self.conflict_resolution.claim(s, cell, ranked)
             if event == PAIR:
-                self.rivals.claim(s, self.lattice.ahead(cell, self.cells.at(s, cell)), ranked)
+                self.conflict_resolution.claim(
+                    s, self.lattice.cell_ahead(cell, self.cells.at(s, cell)), ranked
+                )
 
     @ti.func
     def wins(self, s, cell, event, ranked):
         """Whether the event takes place; where each particle updates itself only, it does."""
         result = True
         if ti.static(self.both):
-            result = self.rivals.holds(s, cell, ranked)
+            result = self.conflict_resolution.holds(s, cell, ranked)
             if event == PAIR and result:
-                ahead = self.lattice.ahead(cell, self.cells.at(s, cell))
-                result = self.rivals.holds(s, ahead, ranked)
+                ahead = self.lattice.cell_ahead(cell, self.cells.at(s, cell))
+                result = self.conflict_resolution.holds(s, ahead, ranked)
         return result
 
     @ti.func
-    def act(self, s, shared, cell, event, other, velocity, pull):
+    def carry_out(self, s, shared, cell, event, other, velocity, pull):
         """Carry out an event; returns the counted gain of velocity along x [quanta]."""
         before = self.cells.vertical_speed(s, cell)
-        gained = ti.cast(0, ti.i64)
+        impulse = ti.cast(0, ti.i64)
         if event == PAIR:
-            self.tally.note(s, PAIRS_MET)
+            self.event_counts.note(s, PAIRS_MET)
             gain = self.collide(s, shared, cell, other)
-            gained = self.accounting.lattice_gave(s, PAIRS, gain)
+            impulse = self.accounting.lattice_impulse(s, PAIRS, gain)
         elif event == JOIN:
             # The container carries the particle over this whole step, its weight with it.
-            self.tally.note(s, HOLDS)
-            gained = quanta(velocity - before - pull)
+            self.event_counts.note(s, HOLDS)
+            impulse = quanta(velocity - before - pull)
             self.resting.hold(s, cell)
         else:
-            self.tally.note(s, WALLS)
+            self.event_counts.note(s, WALLS)
             self.rebound(s, cell, event, other)
             gain = self.cells.vertical_speed(s, cell) - before
-            gained = self.accounting.blow(s, cell, gain)
-        return gained
+            impulse = self.accounting.wall_impulse(s, cell, gain)
+        return impulse
 
     @ti.func
     def rebound(self, s, cell, event, wall):
         """Meet a wall or the heap: side walls mirror, all else sends straight back (5.4)."""
         kind = self.cells.at(s, cell)
-        speed = speed_after_wall(self.cells.speed[s, cell], wall, self.numbers.wall[None])
+        speed = speed_after_wall(self.cells.speed[s, cell], wall, self.parameters.wall[None])
         back = turned_back(kind)
         if event == SIDE:
             back = mirrored(kind)
@@ -155,8 +159,8 @@ class Collisions:
         """
         line = self.cells.at(s, cell)
         speed = self.cells.speed[s, cell]
-        restitution = self.numbers.particle[None]
-        ahead = self.lattice.ahead(cell, line)
+        restitution = self.parameters.particle[None]
+        ahead = self.lattice.cell_ahead(cell, line)
         before = self.cells.vertical_speed(s, cell) + self.cells.vertical_speed(s, ahead)
         self.go_on(s, shared, cell, line, speed_after_pair(speed, other, restitution))
         if ti.static(self.both):

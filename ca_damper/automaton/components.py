@@ -48,44 +48,44 @@ class Parameters:
 
 @dataclass(frozen=True, eq=False)
 class Components:
-    """State and choices of an automaton, put together by ``assembled``."""
+    """State and choices of an automaton, put together by ``assemble``."""
 
-    numbers: Parameters
+    parameters: Parameters
     lattice: Lattice
     cells: Cells
-    rivals: ConflictResolution
+    conflict_resolution: ConflictResolution
     accumulator: Accumulator
     accounting: object
     resting: object
-    ledger: object
-    tally: EventCounts
+    impulse_balance: object
+    event_counts: EventCounts
 
 
-def assembled(options, table):
-    """The parts that a user's options ask for; what they leave out is neither stored nor asked."""
+def assemble(options, table):
+    """Components for a user's options; those left out are neither stored nor evaluated."""
     scenes = table.count
     static = options.accounting == "static"
     lattice = Lattice(Geometry(options.columns, options.rows))
     traversal = (Scan if options.traversal == "scan" else ParticleList)(lattice, table)
-    ledger = ImpulseBalance(scenes) if options.ledger else NoImpulseBalance()
+    impulse_balance = ImpulseBalance(scenes) if options.ledger else NoImpulseBalance()
     accounting = AllImpulses()
     if not static:
         pushes = options.accounting == "landing+ejection"
-        accounting = Landings(lattice, scenes, ledger, pushes)
+        accounting = Landings(lattice, scenes, impulse_balance, pushes)
     cells = Cells(lattice, traversal, accounting, scenes)
-    numbers = Parameters(options)
+    parameters = Parameters(options)
     accumulator = Accumulator(options.accumulator, lattice)
     resting = NoStaticContact()
     if static:
-        resting = StaticContact(cells, accumulator, numbers)
+        resting = StaticContact(cells, accumulator, parameters)
     return Components(
-        numbers=numbers,
+        parameters=parameters,
         lattice=lattice,
         cells=cells,
-        rivals=ConflictResolution(lattice, scenes),
+        conflict_resolution=ConflictResolution(lattice, scenes),
         accumulator=accumulator,
         accounting=accounting,
         resting=resting,
-        ledger=ledger,
-        tally=EventCounts(scenes),
+        impulse_balance=impulse_balance,
+        event_counts=EventCounts(scenes),
     )

@@ -23,7 +23,7 @@ def rank(step, shared, cell, purpose: ti.template()):
 
 
 @ti.func
-def ahead_of_others(ranked):
+def above_others(ranked):
     """The rank above all that are drawn in the same step."""
     return ranked | (ti.cast(1, ti.i64) << 31)
 

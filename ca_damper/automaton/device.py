@@ -4,7 +4,7 @@ import numpy as np
 import taichi as ti
 
 from ca_damper.automaton.collisions import Collisions
-from ca_damper.automaton.components import assembled
+from ca_damper.automaton.components import assemble
 from ca_damper.automaton.ejection import Ejection
 from ca_damper.automaton.impulse_balance import GRAVITY, QUANTUM
 from ca_damper.automaton.placement import DrawnCells, NamedCells
@@ -19,50 +19,52 @@ class DeviceAutomaton:
     """Automata of all scenes of a table; the protocol is in ``ca_damper.filling``."""
 
     def __init__(self, options, table):
-        parts = assembled(options, table)
-        self.table, self.numbers, self.lattice = table, parts.numbers, parts.lattice
-        self.cells, self.rivals, self.accounting = parts.cells, parts.rivals, parts.accounting
-        self.resting, self.ledger, self.tally = parts.resting, parts.ledger, parts.tally
-        self.flight, self.ejection = Transport(parts), Ejection(parts)
+        components = assemble(options, table)
+        self.table, self.parameters, self.lattice = table, components.parameters, components.lattice
+        self.cells, self.conflict_resolution = components.cells, components.conflict_resolution
+        self.accounting = components.accounting
+        self.resting, self.impulse_balance = components.resting, components.impulse_balance
+        self.event_counts = components.event_counts
+        self.transport, self.ejection = Transport(components), Ejection(components)
         both, pairs_first = options.pair_rule == "both", options.priority == "pairs_first"
-        self.encounters = Collisions(parts, both, pairs_first)
+        self.collisions = Collisions(components, both, pairs_first)
         self.placement = DrawnCells(self.cells, table)
         if options.start is not None:
             self.placement = NamedCells(self.cells, options.start)
         self.velocity = ti.field(ti.f64, shape=table.count)
-        for loaded in (self.lattice, self.numbers, self.placement):
+        for loaded in (self.lattice, self.parameters, self.placement):
             loaded.load()
 
     @ti.func
     def reset(self, s):
         """Particles at rest in their first cells, headed down."""
         self.cells.clear(s)
-        self.rivals.clear(s)
+        self.conflict_resolution.clear(s)
         self.resting.clear(s)
         self.accounting.clear(s)
-        self.tally.clear(s)
-        self.placement.place(s)
+        self.event_counts.clear(s)
+        self.placement.fill(s)
         self.velocity[s] = 0.0
 
     @ti.func
-    def act(self, s, step, motion):
+    def advance(self, s, step, motion):
         """One step: the walls move, particles fly, meet, and change cells."""
-        pull = self.numbers.gravity[None] * self.table.dt[s]
+        pull = self.parameters.gravity[None] * self.table.dt[s]
         shared = stream(self.table.seed[s], step)
         self.velocity[s] = motion.v
-        pressed = motion.a > -self.numbers.gravity[None]
-        gained = self.ejection.follow(s, step, motion)
+        pressed = motion.a > -self.parameters.gravity[None]
+        impulse = self.ejection.follow(s, step, motion)
         if not pressed:
             self.resting.release(s, motion.v)
-        contacts, due, oblique = self.flight.fly_all(
-            s, self.table.dt[s], pull, self.encounters.contacts
+        contacts, due, oblique = self.transport.fly_all(
+            s, self.table.dt[s], pull, self.collisions.contacts
         )
-        gained += self.encounters.happen(s, step, shared, contacts, motion.v, pull, pressed)
+        impulse += self.collisions.resolve(s, step, shared, contacts, motion.v, pull, pressed)
         # On an oblique flight gravity acts by a quarter: what it lacks, the lattice holds.
-        gained += self.accounting.lattice_gave(s, GRAVITY, 0.75 * pull * oblique)
-        self.flight.move_all(s, step, shared, due)
-        mass = self.numbers.mass[None]
-        return Action(-mass * QUANTUM * ti.cast(gained, ti.f64), mass * self.resting.count(s))
+        impulse += self.accounting.lattice_impulse(s, GRAVITY, 0.75 * pull * oblique)
+        self.transport.move_all(s, step, shared, due)
+        mass = self.parameters.mass[None]
+        return Action(-mass * QUANTUM * ti.cast(impulse, ti.f64), mass * self.resting.count(s))
 
     @ti.func
     def energy(self, s):
@@ -72,10 +74,10 @@ class DeviceAutomaton:
             kind = self.cells.at(s, cell)
             if kind != EMPTY and kind != WALL:
                 speed = self.velocity[s] if kind == HELD else self.cells.speed[s, cell]
-                height = self.lattice.height_of(cell) * self.numbers.width[None]
+                height = self.lattice.height_of(cell) * self.parameters.width[None]
                 height += self.cells.travelled[s, cell] * self.lattice.upward(kind)
-                total += 0.5 * speed * speed + self.numbers.gravity[None] * height
-        return self.numbers.mass[None] * total
+                total += 0.5 * speed * speed + self.parameters.gravity[None] * height
+        return self.parameters.mass[None] * total
 
     @ti.func
     def momentum(self, s):
@@ -83,19 +85,19 @@ class DeviceAutomaton:
         total = self.resting.count(s) * self.velocity[s]
         for cell in range(self.lattice.cells):
             total += self.cells.vertical_speed(s, cell)
-        return self.numbers.mass[None] * total
+        return self.parameters.mass[None] * total
 
     @ti.func
-    def health(self, s):
+    def divergence_code(self, s):
         """1 when a particle needs more than one cell a step, which no rule gives it."""
         fastest = 0.0
         for cell in range(self.lattice.cells):
             fastest = max(fastest, self.cells.speed[s, cell])
-        return 0 if fastest * self.table.dt[s] < self.numbers.width[None] else 1
+        return 0 if fastest * self.table.dt[s] < self.parameters.width[None] else 1
 
     def uses(self, effects):
         """How often each of the named effects acted."""
-        return self.tally.uses(effects)
+        return self.event_counts.uses(effects)
 
     def snapshot(self, s):
         """Positions and velocities of the particles, by cell (see ``ca_damper.filling``)."""
@@ -103,7 +105,7 @@ class DeviceAutomaton:
         flying, present = kind < DIRECTIONS, (kind != EMPTY) & (kind != WALL)
         way = np.zeros((len(kind), 2))
         way[flying] = unit_vectors()[kind[flying]]
-        position = self.lattice.geometry.centres(self.numbers.width[None])
+        position = self.lattice.geometry.centres(self.parameters.width[None])
         position = position + way * self._row(self.cells.travelled, s)[:, None]
         velocity = way * self._row(self.cells.speed, s)[:, None]
         velocity[kind == HELD, 1] = self.velocity[s]

@@ -21,10 +21,11 @@ class Ejection:
     (scenes, cells + 1). border: cells of the cluster still to look around, shape (scenes, cells).
     """
 
-    def __init__(self, parts):
-        self.cells, self.lattice, self.numbers = parts.cells, parts.lattice, parts.numbers
-        self.accumulator, self.accounting = parts.accumulator, parts.accounting
-        self.tally = parts.tally
+    def __init__(self, components):
+        self.cells, self.lattice = components.cells, components.lattice
+        self.parameters = components.parameters
+        self.accumulator, self.accounting = components.accumulator, components.accounting
+        self.event_counts = components.event_counts
         scenes, size = self.cells.kind.shape
         self.pushed = ti.field(ti.i8, shape=(scenes, size))
         self.border = ti.field(ti.i16, shape=(scenes, size))
@@ -32,7 +33,7 @@ class Ejection:
     @ti.func
     def follow(self, s, step, motion):
         """Take the staircase along; returns counted gain of velocity along x [quanta]."""
-        width = self.numbers.width[None]
+        width = self.parameters.width[None]
         stair = ti.cast(ti.floor(motion.x / width + 0.5), ti.i32)
         way = 0
         if step == 0:
@@ -43,23 +44,23 @@ class Ejection:
             way = -1
         self.cells.stair[s] = self.cells.stair[s] + way
         self.cells.offset[s] = motion.x - width * self.cells.stair[s]
-        gained = ti.cast(0, ti.i64)
+        impulse = ti.cast(0, ti.i64)
         if way != 0:
-            gained = self.advance(s, way, motion.v)
-        return gained
+            impulse = self.advance(s, way, motion.v)
+        return impulse
 
     @ti.func
     def advance(self, s, way, velocity):
         """One cell up (way 1) or down (-1); returns counted gain of velocity along x [quanta]."""
         self.mark(s, way)
-        gained = ti.cast(0, ti.i64)
+        impulse = ti.cast(0, ti.i64)
         for k in range(self.cells.traversal.size(s)):
             cell = self.cells.traversal.cell(s, k)
             if self.pushed[s, cell] == 1 and self.cells.at(s, cell) != HELD:
-                gained += self.push(s, cell, way, velocity)
+                impulse += self.push(s, cell, way, velocity)
         self.shift(s, way)
         self.cells.traversal.sort(s, self.cells)
-        return gained
+        return impulse
 
     @ti.func
     def mark(self, s, way):
@@ -74,7 +75,7 @@ class Ejection:
             size -= 1
             cell = ti.cast(self.border[s, size], ti.i32)
             for direction in range(DIRECTIONS):
-                size = self.reach(s, self.lattice.ahead(cell, direction), way, size)
+                size = self.reach(s, self.lattice.cell_ahead(cell, direction), way, size)
 
     @ti.func
     def reach(self, s, cell, way, size):
@@ -97,14 +98,14 @@ class Ejection:
         kind = self.cells.at(s, cell)
         gain = velocity - self.cells.vertical_speed(s, cell)
         if gain * way > 0.0:
-            self.tally.note(s, PUSHES)
+            self.event_counts.note(s, PUSHES)
             kind = UP if velocity > 0.0 else DOWN
             travelled = self.accumulator.at_wall(kind, self.cells.offset[s])
             self.cells.put(s, cell, kind, abs(velocity), travelled)
         else:
             gain = 0.0
-            self.cells.travelled[s, cell] = self.accumulator.ahead_of_wall(
-                self.cells.travelled[s, cell], kind, way, self.numbers.width[None]
+            self.cells.travelled[s, cell] = self.accumulator.distance_to_wall(
+                self.cells.travelled[s, cell], kind, way, self.parameters.width[None]
             )
         return self.accounting.push(s, gain)
 

@@ -27,18 +27,18 @@ class ImpulseBalance:
     active = True
 
     def __init__(self, scenes):
-        self.gained = ti.field(ti.i64, shape=(scenes, _COUNT))
+        self.velocity_gain = ti.field(ti.i64, shape=(scenes, _COUNT))
 
     @ti.func
     def clear(self, s):
         """Start anew."""
         for item in range(_COUNT):
-            self.gained[s, item] = ti.cast(0, ti.i64)
+            self.velocity_gain[s, item] = ti.cast(0, ti.i64)
 
     @ti.func
     def add(self, s, item: ti.template(), velocity):
         """Enter a gain in velocity along x [m/s]."""
-        self.gained[s, item] = self.gained[s, item] + quanta(velocity)
+        self.velocity_gain[s, item] = self.velocity_gain[s, item] + quanta(velocity)
 
 
 @ti.data_oriented

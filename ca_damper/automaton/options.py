@@ -154,7 +154,7 @@ class Automaton:
             )
 
     def divergence(self, code, particles, dt):
-        """What the one code of ``health`` means, and a step that would do [s]."""
+        """What the one code of ``divergence_code`` means, and a step that would do [s]."""
         return "holds a particle faster than one cell a step", 0.2 * dt
 
     def bind(self, table):

@@ -22,7 +22,7 @@ class DrawnCells:
         """Nothing to load."""
 
     @ti.func
-    def place(self, s):
+    def fill(self, s):
         """Put the particles of scene s into its cells, at rest."""
         placed, count = 0, self.table.particles[s]
         left = self.lattice.columns * self.lattice.rows
@@ -56,7 +56,7 @@ class NamedCells:
             self.named[k] = chosen[k]
 
     @ti.func
-    def place(self, s):
+    def fill(self, s):
         """Put the particles of scene s into the cells, at rest."""
         for k in range(self.count):
             self.cells.put(s, self.named[k], DOWN, 0.0, 0.0)

@@ -19,8 +19,8 @@ class StaticContact:
     held: number of them, shape (scenes,).
     """
 
-    def __init__(self, cells, accumulator, numbers):
-        self.cells, self.accumulator, self.numbers = cells, accumulator, numbers
+    def __init__(self, cells, accumulator, parameters):
+        self.cells, self.accumulator, self.parameters = cells, accumulator, parameters
         self.held = ti.field(ti.i32, shape=cells.kind.shape[0])
 
     @ti.func
@@ -50,7 +50,7 @@ class StaticContact:
         result = False
         if pressed and (kind == UP or kind == DOWN):
             relative = self.cells.vertical_speed(s, cell) - velocity
-            if abs(relative) < self.numbers.threshold[None] * pull:
+            if abs(relative) < self.parameters.threshold[None] * pull:
                 result = self.supported(s, cell)
         return result
 

@@ -11,14 +11,15 @@ from ca_damper.random_numbers import MOVE
 class Transport:
     """Gravity, way, and which particles have something ahead or a cell to change.
 
-    due: cells of particles that may change their cell, shape (scenes, cells).
+    crossing: cells of particles that may change their cell, shape (scenes, cells).
     """
 
-    def __init__(self, parts):
-        self.cells, self.lattice, self.rivals = parts.cells, parts.lattice, parts.rivals
-        self.accumulator, self.resting = parts.accumulator, parts.resting
-        self.accounting, self.numbers = parts.accounting, parts.numbers
-        self.due = ti.field(ti.i16, shape=(self.cells.kind.shape[0], self.lattice.cells))
+    def __init__(self, components):
+        self.cells, self.lattice = components.cells, components.lattice
+        self.conflict_resolution = components.conflict_resolution
+        self.accumulator, self.resting = components.accumulator, components.resting
+        self.accounting, self.parameters = components.accounting, components.parameters
+        self.crossing = ti.field(ti.i16, shape=(self.cells.kind.shape[0], self.lattice.cells))
 
     @ti.func
     def fly_all(self, s, dt, pull, contacts: ti.template()):
@@ -26,7 +27,7 @@ class Transport:
 
         Returns how many touch something, how many may move on, and how many fly obliquely.
         """
-        contact_count, due_count, oblique = 0, 0, 0
+        contact_count, crossing_count, oblique = 0, 0, 0
         for k in range(self.cells.traversal.size(s)):
             cell = self.cells.traversal.cell(s, k)
             touches, free, upward = self.fly(s, cell, dt, pull)
@@ -34,12 +35,12 @@ class Transport:
                 contacts[s, contact_count] = cell
                 contact_count += 1
             if free:
-                self.due[s, due_count] = ti.cast(cell, ti.i16)
-                due_count += 1
-            if ti.static(self.accounting.asks_for_lattice):
+                self.crossing[s, crossing_count] = ti.cast(cell, ti.i16)
+                crossing_count += 1
+            if ti.static(self.accounting.needs_lattice_impulse):
                 if upward * upward == 0.25:
                     oblique += 1
-        return contact_count, due_count, oblique
+        return contact_count, crossing_count, oblique
 
     @ti.func
     def fly(self, s, cell, dt, pull):
@@ -61,33 +62,33 @@ class Transport:
             kind = DOWN
             self.cells.kind[s, cell] = ti.cast(DOWN, ti.i8)
         travelled += speed * dt
-        due = travelled >= self.numbers.width[None]
-        blocked = self.cells.at(s, self.lattice.ahead(cell, kind)) != EMPTY
+        due = travelled >= self.parameters.width[None]
+        blocked = self.cells.at(s, self.lattice.cell_ahead(cell, kind)) != EMPTY
         if blocked and due:
             # No particle gets deeper into another than where the next step frees it.
-            travelled = self.numbers.width[None]
+            travelled = self.parameters.width[None]
         self.cells.speed[s, cell] = speed
         self.cells.travelled[s, cell] = travelled
         touches = blocked or self.resting.noticed(s, cell, kind)
         return touches, due and not blocked, upward
 
     @ti.func
-    def move_all(self, s, step, shared, due_count):
+    def move_all(self, s, step, shared, crossing_count):
         """Let the particles that are due change cells, one of the claimants for each cell."""
         claimants = 0
-        for k in range(due_count):
-            cell = ti.cast(self.due[s, k], ti.i32)
+        for k in range(crossing_count):
+            cell = ti.cast(self.crossing[s, k], ti.i32)
             # A collision may have turned it since.
-            if self.cells.travelled[s, cell] >= self.numbers.width[None]:
-                target = self.lattice.ahead(cell, self.cells.at(s, cell))
+            if self.cells.travelled[s, cell] >= self.parameters.width[None]:
+                target = self.lattice.cell_ahead(cell, self.cells.at(s, cell))
                 if self.cells.at(s, target) == EMPTY:
-                    self.rivals.claim(s, target, rank(step, shared, cell, MOVE))
-                    self.due[s, claimants] = ti.cast(cell, ti.i16)
+                    self.conflict_resolution.claim(s, target, rank(step, shared, cell, MOVE))
+                    self.crossing[s, claimants] = ti.cast(cell, ti.i16)
                     claimants += 1
         for k in range(claimants):
-            cell = ti.cast(self.due[s, k], ti.i32)
-            target = self.lattice.ahead(cell, self.cells.at(s, cell))
-            if self.rivals.holds(s, target, rank(step, shared, cell, MOVE)):
-                left = self.cells.travelled[s, cell] - self.numbers.width[None]
+            cell = ti.cast(self.crossing[s, k], ti.i32)
+            target = self.lattice.cell_ahead(cell, self.cells.at(s, cell))
+            if self.conflict_resolution.holds(s, target, rank(step, shared, cell, MOVE)):
+                left = self.cells.travelled[s, cell] - self.parameters.width[None]
                 self.cells.relocate(s, cell, target, left)
                 self.accounting.arrive(s, target)

@@ -1,7 +1,7 @@
 """How a step finds the particles: by scanning all cells, or by a list of those that hold one.
 
-Neither order reaches a result: rules read what no other cell writes, rivals are told apart by
-their random numbers, and impulses are summed as integers.
+Neither order reaches a result: rules read what no other cell writes, rivals are told
+apart by their random numbers, and impulses are summed as integers.
 """
 
 import taichi as ti

@@ -32,8 +32,8 @@ class Bodies:
 
     position [m] and velocity [m/s], (horizontal, vertical), in the frame at rest. Horizontal
     positions count from the middle of the box, so that a mirrored run has the same bits; vertical
-    ones from where the floor is at x = 0. Positions run ``ahead`` [s] of the velocities, half a
-    step in a run. force [N]: of the contacts of this step. floor: where the container's floor is
+    ones from where the floor is at x = 0. Positions run ``lead`` [s] ahead of the velocities, half
+    a step in a run. force [N]: of the contacts of this step. floor: where the container's floor is
     at the time of the velocities [m], as foreseen by the last step.
     """
 
@@ -42,12 +42,12 @@ class Bodies:
         self.lattice = options.lattice
         self.stride = options.capacity
         self.scenes = table.count
-        self.room = self.scenes * self.stride
+        self.capacity = self.scenes * self.stride
         self.body = Body.field(shape=())
-        self.position = ti.Vector.field(2, ti.f64, shape=self.room)
-        self.velocity = ti.Vector.field(2, ti.f64, shape=self.room)
-        self.force = ti.Vector.field(2, ti.f64, shape=self.room)
-        self.ahead = ti.field(ti.f64, shape=self.scenes)
+        self.position = ti.Vector.field(2, ti.f64, shape=self.capacity)
+        self.velocity = ti.Vector.field(2, ti.f64, shape=self.capacity)
+        self.force = ti.Vector.field(2, ti.f64, shape=self.capacity)
+        self.lead = ti.field(ti.f64, shape=self.scenes)
         self.floor = ti.field(ti.f64, shape=self.scenes)
         self.given = options.start is not None
         if self.given:
@@ -72,9 +72,9 @@ class Bodies:
         return s * self.stride + self.table.particles[s]
 
     @ti.func
-    def place(self, s, i):
+    def position_in_box(self, s, i):
         """Centre of a sphere [m] from the container's lower left inner corner."""
-        position = self.position[i] - self.ahead[s] * self.velocity[i]
+        position = self.position[i] - self.lead[s] * self.velocity[i]
         return position + vec2(0.5 * self.body[None].width, -self.floor[s])
 
     @ti.func
@@ -103,21 +103,21 @@ class Bodies:
         self.floor[s] = motion.x
 
     @ti.func
-    def run_ahead(self, s, time):
+    def advance_lead(self, s, time):
         """Let positions run a time [s] ahead of the velocities, as a change of step asks for."""
         for i in range(self.first(s), self.last(s)):
-            self.position[i] = self.position[i] + (time - self.ahead[s]) * self.velocity[i]
-        self.ahead[s] = time
+            self.position[i] = self.position[i] + (time - self.lead[s]) * self.velocity[i]
+        self.lead[s] = time
 
     @ti.func
-    def place_all(self, s):
+    def reset_positions(self, s):
         """Put the spheres where they start: given places at rest, or random ones, hardly moving."""
         if ti.static(self.given):
             for i in range(self.first(s), self.last(s)):
                 self._put(i, self.start[i - self.first(s)], vec2(0.0))
         else:
             self._scatter(s)
-        self.ahead[s], self.floor[s] = 0.0, 0.0
+        self.lead[s], self.floor[s] = 0.0, 0.0
 
     @ti.func
     def _put(self, i, place, velocity):

@@ -22,13 +22,13 @@ from ca_damper.spheres.effect_activity import EffectActivity
 from ca_damper.spheres.rotation import NoRotation, Rotation
 from ca_damper.spheres.search import make_search
 
-# Codes of health; a speed is a runaway's when it crosses more than a radius in a step.
-FINE, NOT_FINITE, RUNAWAY, OVERLAP, GAINED = range(5)
+# Codes of divergence; a speed is a runaway's when it crosses more than a radius in a step.
+FINE, NOT_FINITE, RUNAWAY, OVERLAP, ENERGY_GAINED = range(5)
 DIVERGENCES = {
     NOT_FINITE: "has a sphere whose velocity is not a finite number",
     RUNAWAY: "has a sphere that moves by more than its radius in a step",
     OVERLAP: "has spheres that overlap, or lie outside the container, by more than a radius",
-    GAINED: "has contacts that give back more energy than they took",
+    ENERGY_GAINED: "has contacts that give back more energy than they took",
 }
 
 # Share of their energy that spheres may gain from contacts. Measured over 5 to 20 cycles: 2e-4 at
@@ -36,7 +36,7 @@ DIVERGENCES = {
 MOST_GAIN = 0.03
 # What a single sphere may gain beside: the leapfrog's energy is off by (w dt)^2 / 4 in a contact,
 # half a period of w, that has six steps.
-_BLOW = (math.pi / 6.0) ** 2 / 4.0
+_WALL_IMPULSE_SHARE = (math.pi / 6.0) ** 2 / 4.0
 # Share of a gain that is forgotten from look to look: errors of many blows that go up and down add
 # up to a gain that means nothing, while what makes a run diverge does so within some 100 looks.
 _FORGOTTEN = 1.0 / 256.0
@@ -46,9 +46,10 @@ _FORGOTTEN = 1.0 / 256.0
 class DeviceSpheres:
     """The spheres of all scenes of a table, on the device; see ``ca_damper.filling``.
 
-    crushed: whether spheres of a scene lay in each other by a radius when ``health`` looked last.
-    given: work of the walls on the spheres [J]. lost: most energy that contacts have taken up to
-    a look of late [J], but for a constant. held: energy of the pairs that touch [J], as of a look.
+    crushed: whether spheres of a scene lay in each other by a radius when ``divergence_code``
+    looked last. given: work of the walls on the spheres [J]. lost: most energy that contacts have
+    taken up to a look of late [J], but for a constant. held: energy of the pairs that touch [J], as
+    of a look.
     """
 
     def __init__(self, options, table):
@@ -58,7 +59,7 @@ class DeviceSpheres:
         self.rotation = Rotation() if options.rotation else NoRotation()
         self.search = make_search(options.search, options.radius)
         self.crushed = ti.field(ti.i32, shape=table.count)
-        self.acted = EffectActivity(table.count)
+        self.effect_activity = EffectActivity(table.count)
         self.given = ti.field(ti.f64, shape=table.count)
         self.lost = ti.field(ti.f64, shape=table.count)
         self.held = ti.field(ti.f64, shape=table.count)
@@ -83,22 +84,22 @@ class DeviceSpheres:
     @ti.func
     def reset(self, s):
         """Place the spheres of scene s, at rest; the first step takes them to the container."""
-        self.bodies.place_all(s)
+        self.bodies.reset_positions(s)
         for i in range(self.bodies.first(s), self.bodies.last(s)):
             self.rotation.reset(i)
-        self.acted.clear(s)
+        self.effect_activity.clear(s)
         self.search.forget(s)
         self.given[s], self.lost[s] = 0.0, -ti.math.inf
 
     @ti.func
-    def act(self, s, step, motion):
+    def advance(self, s, step, motion):
         """Take the spheres over a step; returns their blows on the container."""
         dt = self.table.dt[s]
         if step == 0:
             self.bodies.board(s, motion)
             self.lost[s] = -ti.math.inf
-        if self.bodies.ahead[s] != 0.5 * dt:
-            self.bodies.run_ahead(s, 0.5 * dt)
+        if self.bodies.lead[s] != 0.5 * dt:
+            self.bodies.advance_lead(s, 0.5 * dt)
             self.search.forget(s)
         self.search.refresh(s)
         contact = self.law.over_step(self.contact_of_pair[None], dt)
@@ -199,7 +200,7 @@ class DeviceSpheres:
     def _own_energy(self, s, i):
         """Kinetic and potential energy of a sphere and that of its contacts with walls [J]."""
         body = self.bodies.body[None]
-        velocity, place = self.bodies.velocity[i], self.bodies.place(s, i)
+        velocity, place = self.bodies.velocity[i], self.bodies.position_in_box(s, i)
         total = body.mass * (0.5 * velocity.norm_sqr() + body.gravity * place[1])
         total += self.rotation.energy(i)
         room = ti.min(place, vec2(body.width, body.height) - place)
@@ -211,7 +212,7 @@ class DeviceSpheres:
     def _pair_energy(self, s, i, j):
         """Energy of the contact of two spheres [J], none where they do not touch."""
         contact = self.contact_of_pair[None]
-        distance = (self.bodies.place(s, j) - self.bodies.place(s, i)).norm()
+        distance = (self.bodies.position_in_box(s, j) - self.bodies.position_in_box(s, i)).norm()
         return self.law.stored(contact, contact.reach - distance)
 
     @ti.func
@@ -223,17 +224,17 @@ class DeviceSpheres:
         return total
 
     @ti.func
-    def health(self, s):
+    def divergence_code(self, s):
         """0, or a code of DIVERGENCES; "not" lets NaN fail a test."""
         body, dt = self.bodies.body[None], self.table.dt[s]
         self.crushed[s], self.held[s] = self.search.crowded(s), 0.0
         contact = self.law.over_step(self.contact_of_pair[None], dt)
-        self.search.each_pair(s, contact, self._look)
-        code = GAINED if self._gains(s) else FINE
+        self.search.each_pair(s, contact, self._note_pair)
+        code = ENERGY_GAINED if self._gains(s) else FINE
         if self.crushed[s] > 0:
             code = OVERLAP
         for i in range(self.bodies.first(s), self.bodies.last(s)):
-            place, speed = self.bodies.place(s, i), self.bodies.velocity[i].norm()
+            place, speed = self.bodies.position_in_box(s, i), self.bodies.velocity[i].norm()
             if (place < 0.0).any() or (place > vec2(body.width, body.height)).any():
                 code = OVERLAP
             if not (speed * dt < body.radius):
@@ -243,7 +244,7 @@ class DeviceSpheres:
             room = ti.min(place, vec2(body.width, body.height) - place)
             at_wall = ti.cast((room < body.radius).any(), ti.i32)
             going = 0.5 * body.mass * speed * speed
-            self.acted.look(s, at_wall, going, self.rotation.energy(i))
+            self.effect_activity.note_sphere(s, at_wall, going, self.rotation.energy(i))
         return code
 
     @ti.func
@@ -257,12 +258,12 @@ class DeviceSpheres:
             energy += own
             highest = ti.max(highest, own)
         lost = self.given[s] - energy - weight * self.bodies.floor[s]
-        gained = ti.max(0.0, self.lost[s] - lost) * (1.0 - _FORGOTTEN)
-        self.lost[s] = lost + gained
-        return gained > MOST_GAIN * energy + _BLOW * highest
+        gain = ti.max(0.0, self.lost[s] - lost) * (1.0 - _FORGOTTEN)
+        self.lost[s] = lost + gain
+        return gain > MOST_GAIN * energy + _WALL_IMPULSE_SHARE * highest
 
     @ti.func
-    def _look(self, i, j, contact):
+    def _note_pair(self, i, j, contact):
         """Note what spheres hold, those that touch, and those that overlap by half their reach."""
         s = i // self.bodies.stride
         self.held[s] = self.held[s] + self._pair_energy(s, i, j)
@@ -279,17 +280,17 @@ class DeviceSpheres:
                 _, slip, drag = self._rub(i, j, contact, push, normal, relative, 0.5 * distance)
                 rubbed = -drag * slip
             dragged = (push - self.law.elastic(contact, overlap)) * approach
-            self.acted.touch(s, dragged, rubbed)
+            self.effect_activity.note_contact(s, dragged, rubbed)
 
     def uses(self, effects):
         """What each of the named effects did."""
-        return self.acted.uses(effects)
+        return self.effect_activity.uses(effects)
 
     def snapshot(self, s):
         """Places and velocities of the spheres of scene s, and their spins [rad/s] if they turn."""
         count = self.table.particles[s]
         rows = slice(s * self.bodies.stride, s * self.bodies.stride + count)
         velocity = self.bodies.velocity.to_numpy()[rows]
-        position = self.bodies.position.to_numpy()[rows] - self.bodies.ahead[s] * velocity
+        position = self.bodies.position.to_numpy()[rows] - self.bodies.lead[s] * velocity
         shift = np.array([0.5 * self.bodies.body[None].width, -self.bodies.floor[s]])
         return {"position": position + shift, "velocity": velocity, **self.rotation.snapshot(rows)}

@@ -33,14 +33,14 @@ class EffectActivity:
         self.power[s], self.motion[s] = vec2(0.0), vec2(0.0)
 
     @ti.func
-    def touch(self, s, dragged, rubbed):
+    def note_contact(self, s, dragged, rubbed):
         """Note two spheres that touch: power into their dashpot and into friction [W]."""
         # Not "+=", which would be an atomic addition; a scene is one thread.
         self.touches[s] = self.touches[s] + 1
         self.power[s] = self.power[s] + vec2(dragged, rubbed)
 
     @ti.func
-    def look(self, s, at_wall, going, turning):
+    def note_sphere(self, s, at_wall, going, turning):
         """Note a sphere: whether it is at a wall, and the energy of its motion [J]."""
         self.touches[s] = self.touches[s] + at_wall
         self.motion[s] = self.motion[s] + vec2(going, turning)

@@ -125,7 +125,7 @@ class Spheres:
             )
 
     def divergence(self, code, particles, dt):
-        """What a code of ``health`` means, and a step that would do [s]."""
+        """What a code of ``divergence_code`` means, and a step that would do [s]."""
         return DIVERGENCES[code], min(self.safe_step(), 0.5 * dt)
 
     def safe_step(self):

@@ -65,13 +65,13 @@ class CellList:
         size = bodies.options.diameter + self._skin
         self.columns = max(1, int(bodies.options.width / size))
         self.rows = max(1, int(bodies.options.height / size))
-        self.list_room = _PAIRS_PER_SPHERE * bodies.stride
+        self.list_capacity = _PAIRS_PER_SPHERE * bodies.stride
         self.skin = ti.field(ti.f64, shape=())
         # Cells of a scene hold chains of spheres: the first of a cell, then each one's next.
         self.cell_first = ti.field(ti.i32, shape=bodies.scenes * self.columns * self.rows)
-        self.next = ti.field(ti.i32, shape=bodies.room)
-        # The list of a scene fills its room from the end: pair_first[s] .. (s + 1) * list_room.
-        self.pair = ti.Vector.field(2, ti.i32, shape=bodies.scenes * self.list_room)
+        self.next = ti.field(ti.i32, shape=bodies.capacity)
+        # The list of a scene fills its room from the end: pair_first[s] .. (s + 1) * list_capacity.
+        self.pair = ti.Vector.field(2, ti.i32, shape=bodies.scenes * self.list_capacity)
         self.pair_first = ti.field(ti.i32, shape=bodies.scenes)
         self.travel = ti.field(ti.f64, shape=bodies.scenes)
         self.full = ti.field(ti.i32, shape=bodies.scenes)
@@ -84,7 +84,7 @@ class CellList:
     def forget(self, s):
         """Empty the list of scene s; the next refresh searches anew."""
         self.travel[s] = self.skin[None]
-        self.pair_first[s] = (s + 1) * self.list_room
+        self.pair_first[s] = (s + 1) * self.list_capacity
         self.full[s] = 0
 
     @ti.func
@@ -100,7 +100,7 @@ class CellList:
     @ti.func
     def each_pair(self, s, contact, visit: ti.template()):
         """Call visit(i, j, contact) for every pair of scene s that may touch."""
-        for k in range(self.pair_first[s], (s + 1) * self.list_room):
+        for k in range(self.pair_first[s], (s + 1) * self.list_capacity):
             near = self.pair[k]
             visit(near[0], near[1], contact)
 
@@ -118,7 +118,7 @@ class CellList:
         for c in range(s * cells, (s + 1) * cells):
             self.cell_first[c] = -1
         self.full[s] = 0
-        start = (s + 1) * self.list_room
+        start = (s + 1) * self.list_capacity
         first, last = self.bodies.first(s), self.bodies.last(s)
         for back in range(last - first):
             i = last - 1 - back
@@ -157,7 +157,7 @@ class CellList:
     def _insert(self, s, i, j, start, row_end):
         """Put the pair (i, j) in its place between start and row_end; returns the new start."""
         new = start
-        if start == s * self.list_room:
+        if start == s * self.list_capacity:
             self.full[s] = 1
         else:
             new = start - 1

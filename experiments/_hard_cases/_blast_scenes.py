@@ -260,7 +260,7 @@ def march(simulation, until):
     found, times = [simulation.state.motion()], [0.0]
     for k in range(1, SAMPLES + 1):
         simulation.advance_to(max(1, round(last * k / SAMPLES)))
-        simulation.look()
+        simulation.sample()
         found.append(simulation.state.motion())
         times.append(simulation.time_s)
     motion = {name: np.array([one[name] for one in found]) for name in found[0]}
@@ -281,7 +281,7 @@ def _track(simulation, samples, part):
         broken=int((inside & broken[: len(inside)]).sum()),
         dt=simulation.method.dt0,
         compile_s=samples["compile_s"],
-        warnings=simulation.resolution.findings(bodies),
+        warnings=simulation.step_resolution.findings(bodies),
     )
 
 

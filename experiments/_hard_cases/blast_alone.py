@@ -164,7 +164,7 @@ def sudden_pressure_on_sleepers(method, quick):
     limits = (
         Limit("impulse error", abs(impulse[-1] / given - 1.0), late, "(2 dt + rise) / t"),
         Limit("momentum error", report.linear_momentum_error, 1e-12, "rounding"),
-        Limit("energy from nowhere", report.ledger_residual_fraction, 0.05, "the specification"),
+        Limit("energy from nowhere", report.energy_residual_fraction, 0.05, "the specification"),
     )
     shown = Curves("time [µs]", "impulse [N s]", {method: (1e6 * samples["time_s"], impulse)})
     return Measured(limits, shown, simulation.compile_seconds)

@@ -20,7 +20,7 @@ class Again:
         made.start()
         self.memory = FieldMemory(made)
         self.fields = self.memory.read()
-        self.parts = (made, made.ledger, made.watch, made.resolution)
+        self.parts = (made, made.energy_balance, made.missing_effects, made.step_resolution)
         self.begun = [
             {name: np.array(value) for name, value in part.saved().items()} for part in self.parts
         ]

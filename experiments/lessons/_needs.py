@@ -134,7 +134,7 @@ def silenced(made, names):
         shear.law[0] *= _STRONGER
     if friction.name and friction.name not in names:
         friction.law[0] = 0.0
-    made.watch.missed = unserved({EFFECTS[name].role for name in names})
+    made.missing_effects.needed = unserved({EFFECTS[name].role for name in names})
     return made
 
 
@@ -166,18 +166,18 @@ def moved(program, names, speed):
             started = time.thread_time()
             made.advance_to(k * every)
             spent += time.thread_time() - started
-            made.look()
+            made.sample()
             motions.update({name: made.state.motion() for name, at in SHOWN.items() if at == k})
     except SimulationDiverged as diverged:
         sentence = str(diverged)
     report = made.report()
-    listed = tuple(use for use in report.acted if use.effect in names)
+    listed = tuple(use for use in report.effect_activity if use.effect in names)
     return Outcome(
         names=names,
         motions=motions,
         broken=made.state.broken_tick.to_numpy()[: made.model.bond_count] >= 0,
         step_s=spent / max(1, report.substeps),
-        advice=needed_effects(replace(report, acted=listed)),
+        advice=needed_effects(replace(report, effect_activity=listed)),
         sentence=sentence,
         unresolved=report.unresolved,
     )
@@ -206,7 +206,7 @@ def compile_all():
 def verdicts(answer):
     """A row for every effect: (words, whether listed, what it did, what the program advises)."""
     uses = {use.effect: use for use in answer.chosen.advice.uses}
-    missed = {finding.effect: finding for finding in answer.chosen.advice.missed}
+    missed = {finding.effect: finding for finding in answer.chosen.advice.missing}
     return [
         _verdict(name, uses.get(name), missed.get(EFFECTS[name].__name__), answer) for name in ALL
     ]

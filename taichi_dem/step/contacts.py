@@ -29,15 +29,15 @@ class Contacts:
     second_start, second_pair: pairs whose second body is i. exposed_faces: bit f for a broken face
     f. travel: bound of the way any point of a body went since it was last looked at [m]. body_skin:
     how far that may be before it is looked at again [m]; a pair holds the spheres whose gap is
-    below the body skin of both. ahead: steps of a body by which its contacts are counted before
-    they touch. search_requested: 1 when the list may miss one of them. deepest: overlap of a pair
-    as a share of the distance at which its spheres touch.
+    below the body skin of both. steps_ahead: steps of a body by which its contacts are counted
+    before they touch. search_requested: 1 when the list may miss one of them. deepest: overlap of a
+    pair as a share of the distance at which its spheres touch.
     """
 
-    def __init__(self, model, state, dt0, ahead=0.0):
+    def __init__(self, model, state, dt0, steps_ahead=0.0):
         n, effect = model.body_count, model.contact
         self.model, self.state, self.law, self.friction = model, state, effect, model.friction
-        self.dt0, self.ahead = dt0, ahead
+        self.dt0, self.steps_ahead = dt0, steps_ahead
         self.capacity = n * effect.pairs_per_body + 64
         self.sphere_capacity = n * effect.spheres_per_body + 4096
         self.pair_count = ti.field(ti.i32, shape=())
@@ -145,7 +145,7 @@ class Contacts:
             speed = self._speed(i, velocity, spin)
             way = self.travel[i] + speed * elapsed
             self.travel[i] = way
-            if way + self.ahead * elapsed * speed > self.body_skin[i]:
+            if way + self.steps_ahead * elapsed * speed > self.body_skin[i]:
                 self.search_requested[None] = 1
 
     @ti.func

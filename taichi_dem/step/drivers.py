@@ -12,8 +12,8 @@ import taichi as ti
 from taichi_dem.step.implicit.pairs import COLOURS
 from taichi_dem.step.wake_up import WakeUp
 
-#: The parallel driver is called for about this long [s] between two looks at health, progress and
-#: Ctrl-C.
+#: The parallel driver is called for about this long [s] between two checks of divergence, progress
+#: and Ctrl-C.
 CALL_SECONDS = 0.2
 #: The resident one is kept near this long [s]: its kernel cannot be interrupted.
 _KERNEL_SECONDS = 0.1

@@ -60,7 +60,8 @@ class StabilityLimits:
     it in a few steps, and not more than 1, since 1 - X < 0 throws it back.
     One common share min(1, 1.7 / (X_b + X_c)) starves the bonds: +45 % at 1e-8 s, and from 2e-8 s
     on fragments pass through each other.
-    The paper's block, one step for all, hole at 3e-4 s against 13.735 mm, residual of the ledger:
+    The paper's block, one step for all, hole at 3e-4 s against 13.735 mm, residual of the energy
+    balance:
 
         dt     least  most
         1e-8   0.5    1.0    +0.1 %   0.004

@@ -105,7 +105,7 @@ def test_valid_scenes_run_and_stay_finite(name):
         simulation = Simulation(Scene(mesh, material, listed), methods(step)[name])
         with ends_within(120.0):
             simulation.advance_to(20)
-        account = simulation.ledger.account()
+        account = simulation.energy_balance.account()
         assert all(np.isfinite(value) for value in account.values())
         motion = simulation.state.motion()
         assert np.isfinite(motion["position"]).all()

@@ -19,14 +19,14 @@ class Shaken:
         self.table = SceneTable(particles, seed, dt, frequency, amplitude)
         self.trace = ti.Vector.field(4, ti.f64, shape=(max(1, traced), self.table.count))
         self.traced = traced
-        self.bound = filling.bind(self.table)
+        self.device = filling.bind(self.table)
         self.step = 0
         self._reset()
 
     @ti.kernel
     def _reset(self):
         for s in range(self.table.count):
-            self.bound.reset(s)
+            self.device.reset(s)
 
     @ti.func
     def motion(self, s, step):
@@ -41,13 +41,13 @@ class Shaken:
             if t % 512 == 0:
                 s = t // 512
                 for k in range(steps):
-                    action = self.bound.act(s, first + k, self.motion(s, first + k))
+                    action = self.device.advance(s, first + k, self.motion(s, first + k))
                     if ti.static(self.traced > 0):
                         self.trace[first + k, s] = [
                             action.impulse,
                             action.carried,
-                            self.bound.momentum(s),
-                            self.bound.energy(s),
+                            self.device.momentum(s),
+                            self.device.energy(s),
                         ]
 
     def run(self, steps):
@@ -62,5 +62,5 @@ class Shaken:
 
     def state(self):
         """Kind, speed, way and staircase of all scenes, to compare bits."""
-        cells = self.bound.cells
+        cells = self.device.cells
         return [field.to_numpy() for field in (cells.kind, cells.speed, cells.travelled)]

@@ -45,7 +45,7 @@ def test_order_of_the_particles_changes_nothing():
     straight = Shaken(Automaton(), 60, **SHAKEN).run(1200)
     mixed = Shaken(Automaton(), 60, **SHAKEN)
     draw = np.random.default_rng(1)
-    listed = mixed.bound.cells.traversal
+    listed = mixed.device.cells.traversal
     for _ in range(12):
         order = draw.permutation(listed.cells.to_numpy()[0, :60]).astype(np.int32)
         shuffle(listed.cells, listed.number, order)

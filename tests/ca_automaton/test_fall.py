@@ -88,6 +88,6 @@ def test_a_column_falls_to_the_floor_and_stays_a_column(accounting):
     """Ten in a column end in its ten lowest cells, whatever counts."""
     automaton = Automaton(accounting=accounting, start=tuple((4, 6 + k) for k in range(10)))
     box = Shaken(automaton, 10).run(30000)
-    height = box.bound.snapshot(0)["position"][:, 1] / WIDTH
+    height = box.device.snapshot(0)["position"][:, 1] / WIDTH
     assert height.min() == pytest.approx(1.0, abs=0.2)
     assert height.max() < 10.5

@@ -28,8 +28,8 @@ def shaken(steps, **options):
 
 def ledger(box):
     """Velocity along x gained uncounted [m/s], shape (scenes, items)."""
-    entries = getattr(box.bound.accounting, "ledger", None)
-    return entries.gained.to_numpy() * QUANTUM if entries else np.zeros((len(PARTICLES), 1))
+    entries = getattr(box.device.accounting, "impulse_balance", None)
+    return entries.velocity_gain.to_numpy() * QUANTUM if entries else np.zeros((len(PARTICLES), 1))
 
 
 def forces(trace):

@@ -24,8 +24,8 @@ def test_one_particle_meets_the_floor_and_nobody_else(tmp_path):
     report = ran(Automaton(start=((3, ROW),)), 1, 1e-4)
     # Falling 60 mm takes 0.11 s, all bounces with e = 3/4 together (1 + e) / (1 - e) times that,
     # 0.77 s: after 0.5 s it has met the floor at 0.11, 0.27, 0.40 and 0.49 s and still flies.
-    assert needed_effects(report).never_acted == ("pairs", "ejection", "static contact")
-    uses = {use.effect: use.events for use in report.acted}
+    assert needed_effects(report).inactive == ("pairs", "ejection", "static contact")
+    uses = {use.effect: use.events for use in report.effect_activity}
     assert uses["landing"] == 4
     report.write(tmp_path / "report.json")
     written = json.loads((tmp_path / "report.json").read_text())
@@ -41,13 +41,13 @@ def test_shaken_box_calls_for_everything():
 def test_sphere_that_falls_straight_rubs_on_nobody_and_does_not_turn():
     report = ran(Spheres(rotation=True, start=((0.03, 0.05),)), 1, 2e-5)
     advice = needed_effects(report)
-    assert "rotation" in advice.never_acted
+    assert "rotation" in advice.inactive
     assert "normal contact" not in advice.droppable
 
 
 def test_shares_of_dashpots_and_friction_are_all_that_contacts_take():
     report = ran(Spheres(), 40, 2e-5, amplitude=0.02)
-    normal, friction = report.acted
+    normal, friction = report.effect_activity
     assert normal.share + friction.share == pytest.approx(1.0, rel=1e-15)
     assert min(normal.share, friction.share) > 0.0
     assert needed_effects(report, friction.share).droppable == ()

@@ -58,7 +58,7 @@ class BoundKicks:
         self.now[s] = 0
 
     @ti.func
-    def act(self, s, step, motion):
+    def advance(self, s, step, motion):
         impulse = self.strength * ti.sin(1.7 * step + self.table.seed[s])
         if step == self.lost_at and self.table.seed[s] == BAD_SEED:
             impulse = ti.math.nan
@@ -79,7 +79,7 @@ class BoundKicks:
         return -1.0 * self.now[s]
 
     @ti.func
-    def health(self, s):
+    def divergence_code(self, s):
         code = 0
         if self.table.seed[s] == BAD_SEED and 0 <= self.diverges_at <= self.now[s]:
             code = CODE

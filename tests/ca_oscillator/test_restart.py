@@ -77,19 +77,19 @@ def test_an_interrupted_batch_goes_on_to_the_same_bits(shaken, tmp_path):
     batch.start()
     batch._pace = 3.0
     with pytest.raises(Interrupted, match=r"interrupted at t = .* s, saved in .*run.npz"):
-        with batch.keep(checkpoint, None, IDENTITY):
+        with batch.checkpointed(checkpoint, None, IDENTITY):
             shaken.run(CtrlCAt(2))
     done = batch._look()[0]
     assert (done > 0).all()
     assert (done < 2 * batch.steps_per_cycle).all()
     batch.start("rigid")
     batch.advance(7)
-    with batch.keep(None, checkpoint.path, IDENTITY):
+    with batch.checkpointed(None, checkpoint.path, IDENTITY):
         resumed = shaken.run()
     assert [name for name in straight if straight[name].tobytes() != resumed[name].tobytes()] == []
     assert batch.scene_steps == 2 * steps
     with pytest.raises(InputError, match="of another job: a test, not another"):
-        batch.keep(None, checkpoint.path, {"job": "another"}).__enter__()
+        batch.checkpointed(None, checkpoint.path, {"job": "another"}).__enter__()
 
 
 #: Of a container with a rigid mass: little to compile.

@@ -24,13 +24,13 @@ class Rig:
         self.count = self.table.count
         self.done = 0
         self.impulse = ti.field(ti.f64, shape=self.count)
-        self.bound = options.bind(self.table)
+        self.device = options.bind(self.table)
         self._reset()
 
     @ti.kernel
     def _reset(self):
         for s in range(self.count):
-            self.bound.reset(s)
+            self.device.reset(s)
             self.impulse[s] = 0.0
 
     @ti.func
@@ -46,13 +46,17 @@ class Rig:
             if t % _PAD == 0:
                 s = t // _PAD
                 for step in range(start, end):
-                    action = self.bound.act(s, step, self.motion(s, step))
+                    action = self.device.advance(s, step, self.motion(s, step))
                     self.impulse[s] = self.impulse[s] + action.impulse
 
     @ti.kernel
     def _asked(self, s: ti.i32) -> ti.types.vector(3, ti.f64):
         return ti.Vector(
-            [self.bound.energy(s), self.bound.momentum(s), ti.cast(self.bound.health(s), ti.f64)]
+            [
+                self.device.energy(s),
+                self.device.momentum(s),
+                ti.cast(self.device.divergence_code(s), ti.f64),
+            ]
         )
 
     def run(self, steps):
@@ -67,19 +71,19 @@ class Rig:
     def momentum(self, s=0):
         return self._asked(s)[1]
 
-    def health(self, s=0):
+    def divergence_code(self, s=0):
         return int(self._asked(s)[2])
 
     def state(self, s=0):
         """Position and velocity of the spheres of a scene, (particles, 2) each."""
-        shot = self.bound.snapshot(s)
+        shot = self.device.snapshot(s)
         return shot["position"], shot["velocity"]
 
     def states(self):
         """Position and velocity of all spheres there is room for, (scenes, capacity, 2) each."""
-        bodies, shape = self.bound.bodies, (self.count, -1, 2)
+        bodies, shape = self.device.bodies, (self.count, -1, 2)
         velocity = bodies.velocity.to_numpy().reshape(shape)
-        ahead = bodies.ahead.to_numpy()[:, None, None]
+        ahead = bodies.lead.to_numpy()[:, None, None]
         shift = np.zeros((self.count, 1, 2))
         shift[:, 0, 0] = 0.5 * bodies.body[None].width
         shift[:, 0, 1] = -bodies.floor.to_numpy()
@@ -87,20 +91,20 @@ class Rig:
 
     def throw(self, velocity, s=0):
         """Give the spheres of a scene velocities [m/s], (particles, 2)."""
-        bodies = self.bound.bodies
+        bodies = self.device.bodies
         for k, v in enumerate(np.atleast_2d(velocity)):
             bodies.velocity[s * bodies.stride + k] = v
 
     def shift(self, distance, s=0):
         """Move all spheres of a scene by a distance (horizontal, vertical) [m]."""
-        bodies = self.bound.bodies
+        bodies = self.device.bodies
         for k in range(self.table.particles[s]):
             i = s * bodies.stride + k
             bodies.position[i] = bodies.position[i] + ti.Vector(distance)
 
     def mirror(self, s, to):
         """Give scene ``to`` the places and velocities of scene s, left and right exchanged."""
-        bodies = self.bound.bodies
+        bodies = self.device.bodies
         for k in range(self.table.particles[s]):
             source, target = s * bodies.stride + k, to * bodies.stride + k
             for field in (bodies.position, bodies.velocity):

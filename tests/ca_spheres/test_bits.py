@@ -28,7 +28,7 @@ def test_both_searches_give_the_same_bits(particles, rotation):
         for search in ("cells", "all_pairs")
     )
     assert np.array_equal(final(cells), final(pairs))
-    assert cells.health() == 0
+    assert cells.divergence_code() == 0
 
 
 @pytest.mark.parametrize("rotation", [False, True])

@@ -50,7 +50,7 @@ def test_sliding_sphere_ends_rolling_at_five_sevenths_of_its_speed():
     rig.run(3000)
     _, velocity = rig.state()
     assert velocity[0, 0] == pytest.approx(5 / 7 * 0.5, rel=SINKS)
-    spin = rig.bound.snapshot(0)["spin"][0]
+    spin = rig.device.snapshot(0)["spin"][0]
     assert -spin * RADIUS == pytest.approx(velocity[0, 0], rel=SINKS)
 
 
@@ -101,7 +101,7 @@ def angular_momentum(rig):
     place, velocity = rig.state()
     place = place - [0.03, 0.048]
     orbital = MASS * (place[:, 0] * velocity[:, 1] - place[:, 1] * velocity[:, 0]).sum()
-    return orbital + 0.4 * MASS * RADIUS**2 * rig.bound.snapshot(0)["spin"].sum()
+    return orbital + 0.4 * MASS * RADIUS**2 * rig.device.snapshot(0)["spin"].sum()
 
 
 def test_oblique_blow_of_turning_spheres_keeps_momentum_and_angular_momentum():
@@ -110,15 +110,15 @@ def test_oblique_blow_of_turning_spheres_keeps_momentum_and_angular_momentum():
     rig.run(1)
     angular, linear = angular_momentum(rig), rig.state()[1].sum(axis=0)
     rig.run(steps)
-    assert np.abs(rig.bound.snapshot(0)["spin"]).min() > 1.0
+    assert np.abs(rig.device.snapshot(0)["spin"]).min() > 1.0
     assert angular_momentum(rig) == pytest.approx(angular, abs=steps * 1e-16 * MASS * 0.01)
     assert np.abs(rig.state()[1].sum(axis=0) - linear).max() < steps * 1e-16
 
 
 def test_rotation_is_absent_unless_asked_for():
     plain, turning = oblique_pair(rotation=False), oblique_pair(rotation=True)
-    assert "spin" not in plain.bound.snapshot(0)
-    assert not hasattr(plain.bound.rotation, "spin")
+    assert "spin" not in plain.device.snapshot(0)
+    assert not hasattr(plain.device.rotation, "spin")
     # The blow along the normal is the same, that along the contact is not.
     a, b = (rig.run(300).state()[1] for rig in (plain, turning))
     assert not np.array_equal(a, b)
@@ -132,7 +132,7 @@ def test_turning_spheres_keep_their_energy_without_friction():
     before = rig.energy()
     # After a contact the leapfrog is back at its energy but for the onset, d^(3/2): below h^2.
     assert rig.run(6000).energy() == pytest.approx(before, rel=(1e-6 / 4.6e-5) ** 2)
-    assert np.all(rig.bound.snapshot(0)["spin"] == 0.0)
+    assert np.all(rig.device.snapshot(0)["spin"] == 0.0)
 
 
 def test_smooth_spheres_compile_no_friction_and_keep_their_bits(monkeypatch):

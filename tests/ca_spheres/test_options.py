@@ -1,4 +1,4 @@
-"""What users give: refused in words, or taken; starts without overlap; codes of health."""
+"""What users give: refused in words, or taken; starts without overlap; codes of divergence."""
 
 import math
 
@@ -148,15 +148,15 @@ def test_health_finds(search):
     soft = {"young": 1e3, "wall_young": 1e3}
     filling = Spheres(start=[(0.02, 0.05), (0.04, 0.05)], search=search, **soft)
     rig = Rig(filling, [2] * len(UNWELL), DT).run(1)
-    bodies = rig.bound.bodies
+    bodies = rig.device.bodies
     for s, (name, value, _) in enumerate(UNWELL):
-        assert rig.health(s) == 0
+        assert rig.divergence_code(s) == 0
         getattr(bodies, name)[s * bodies.stride] = value
     # Spheres that were put elsewhere are not in the list of pairs; a change of dt makes it anew.
     rig.table.drive(6.0, 0.5 * DT)
     rig.run(1)
     for s, (_, _, word) in enumerate(UNWELL):
-        code = rig.health(s)
+        code = rig.divergence_code(s)
         assert (code != 0) == bool(word)
         if word:
             words, dt = filling.divergence(code, 2, DT)
@@ -166,9 +166,9 @@ def test_health_finds(search):
 
 def test_a_list_that_is_full_counts_as_overlap(monkeypatch):
     # A full box has nearly two pairs a sphere that touch, so a list of one a sphere runs full.
-    assert Rig(Spheres(), 160, DT).run(1).health() == 0
+    assert Rig(Spheres(), 160, DT).run(1).divergence_code() == 0
     monkeypatch.setattr("ca_damper.spheres.search._PAIRS_PER_SPHERE", 1)
-    words, _ = Spheres().divergence(Rig(Spheres(), 160, DT).run(1).health(), 160, DT)
+    words, _ = Spheres().divergence(Rig(Spheres(), 160, DT).run(1).divergence_code(), 160, DT)
     assert "overlap" in words
 
 

@@ -8,7 +8,7 @@ from tests.docs.pages import PAGES, blocks, run_pasted
 #: What the tests below look at, in the program of the one block of a page.
 WANTED = {
     "docs/add_an_effect.md": "dict(moved=moved, mass=result.model.body_mass[0],"
-    " ledger=result.report.ledger)",
+    " energy_balance=result.report.energy_balance)",
     "docs/add_a_contact_law.md": "dict(mass=simulation.model.body_mass[0], speed=speed,"
     " stiffness=stiffness, deepest=deepest, rebound=rebound, account=account,"
     " unexplained=unexplained)",
@@ -62,7 +62,7 @@ def test_the_effect_moves_a_body_as_the_leapfrog_must(left_by):
     # Of the largest kinetic energy on the way, m (2 a / w)^2 / 2, as at the end there is none.
     mass = left["mass"]
     most = 0.5 * mass * (amplitude * period / np.pi) ** 2
-    assert abs(left["ledger"]["residual"]) < 200 * 2.0**-52 * most
+    assert abs(left["energy_balance"]["residual"]) < 200 * 2.0**-52 * most
 
 
 def test_the_contact_law_stores_what_it_takes(left_by):

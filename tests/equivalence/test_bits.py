@@ -54,7 +54,7 @@ def test_parallel_driver_gives_the_bits_of_the_resident_one(held):
     fields, simulation = held
     parallel, other = state_after(Multirate(**COARSE), driver="parallel")
     assert differing(fields, parallel) == []
-    assert simulation.ledger.account() == other.ledger.account()
+    assert simulation.energy_balance.account() == other.energy_balance.account()
 
 
 def test_a_second_run_gives_the_same_bits(held):

@@ -70,7 +70,7 @@ def test_changing_drivers_changes_no_bit(runs):
     assert straight.report().broken_faces > 0 and straight.report().pair_evaluations > 0
     for name, array in straight.state.motion().items():
         assert np.array_equal(array, changing.state.motion()[name]), name
-    assert straight.ledger.account() == changing.ledger.account()
+    assert straight.energy_balance.account() == changing.energy_balance.account()
     assert straight.evaluations() == changing.evaluations()
 
 
@@ -89,8 +89,8 @@ def test_tries_take_their_share(runs):
     calls = 0
     for _ in range(4):
         made.run(0)
-    assert not made.ahead and made.chosen == "resident"
-    while not made.ahead:
+    assert not made.pending_tries and made.chosen == "resident"
+    while not made.pending_tries:
         made.run(0)
         calls += 1
     assert calls == 9  # 20 * 2.02 s in pieces of 5 s

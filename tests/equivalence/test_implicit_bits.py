@@ -39,7 +39,7 @@ def reference(block):
     searches = []
     block.restart(STEP)
     block.run(STEPS, lambda: searches.append(1))
-    return fields_of(block.state), block.simulation.ledger.account(), len(searches)
+    return fields_of(block.state), block.simulation.energy_balance.account(), len(searches)
 
 
 def test_reference_run_breaks_bonds_touches_and_rubs(reference):
@@ -98,7 +98,7 @@ def test_parallel_driver_and_a_search_without_cells_give_the_same_bits(reference
     simulation = Simulation(brisk_scene(), ImplicitDashpots(STEP), "parallel", brute_force=True)
     simulation.advance_to(STEPS)
     assert differing(reference[0], fields_of(simulation.state), MOTION) == []
-    assert simulation.ledger.account() == reference[1]
+    assert simulation.energy_balance.account() == reference[1]
 
 
 def shaken():

@@ -22,7 +22,7 @@ def bits(driver):
     names = [name for name in sorted(fields) if name.split(".")[0] in ("state", "model")]
     report = simulation.report()
     counts = report.substeps, report.broken_faces, report.pair_evaluations
-    account = simulation.ledger.account()
+    account = simulation.energy_balance.account()
     return digest(*(fields[name] for name in names), list(account.values())), counts
 
 

@@ -54,7 +54,7 @@ class Run:
 
     def resume(self, path):
         """Put it where a checkpoint is."""
-        self.saved.take(read_checkpoint(path, self.saved.identity), path)
+        self.saved.restore(read_checkpoint(path, self.saved.identity), path)
 
     def go_odd(self):
         """A few substeps on, to where neither a largest step nor a search ends."""
@@ -66,14 +66,14 @@ class Run:
         """Go on to the end; all that can be compared there."""
         self.recorder.snapshot()
         self.simulation.advance_to(self.last)
-        self.simulation.look()
+        self.simulation.sample()
         self.recorder.sample()
         columns, frame = self.recorder.history(), self.recorder.frames[-1]
         told = {
-            "account": self.simulation.ledger.account(),
-            "momentum": self.simulation.ledger.momentum_errors(),
+            "account": self.simulation.energy_balance.account(),
+            "momentum": self.simulation.energy_balance.momentum_errors(),
             "searches": self.simulation.searches,
-            "needs": self.simulation.watch.findings(),
+            "needs": self.simulation.missing_effects.findings(),
             "frames": len(self.recorder.frames),
         }
         arrays = {**self.saved.memory.read(), **columns, "damage": frame.damage}
@@ -103,7 +103,7 @@ def run(request):
 def foretold(run):
     """Evaluations of a largest step at the start, as expected from the levels and as made."""
     run.simulation.advance_to(2)
-    expected, before = run.simulation.evaluations_ahead(), run.simulation.evaluations()
+    expected, before = run.simulation.evaluation_rate(), run.simulation.evaluations()
     run.simulation.advance_to(3)
     return expected * run.simulation.method.dt0, run.simulation.evaluations() - before
 
@@ -141,7 +141,7 @@ def straight(run, foretold, tmp_path_factory):
     run.saved.write(path)
     broken, ticks = run.simulation.report().broken_faces, run.simulation.state.tick[None]
     lagging = (run.simulation.state.last_tick.to_numpy() < ticks).any()
-    strain = run.simulation.ledger.account()["sphere_strain"]
+    strain = run.simulation.energy_balance.account()["sphere_strain"]
     end = run.finish()
     return path, (broken, ticks, lagging, strain), end, differing(before, constant.read())
 

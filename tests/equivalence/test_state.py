@@ -49,13 +49,13 @@ def test_a_run_continues_from_its_state_with_the_same_bits(runs):
 
 
 def test_a_run_continues_from_its_state_with_the_same_account(runs):
-    """Each term of the ledger, those of the sphere contacts included.
+    """Each term of the energy balance, those of the sphere contacts included.
 
     A checkpoint may sum parts in another order: n terms of one sign are then known to n eps, and
     the residual, a difference, to that of the largest.
     """
     _, straight, restarted = runs
-    first, second = straight.ledger.account(), restarted.ledger.account()
+    first, second = straight.energy_balance.account(), restarted.energy_balance.account()
     assert first["sphere_dashpot"] > 0.0 and first["friction"] > 0.0 and first["injected"] > 0.0
     error = straight.contacts.capacity * np.finfo(float).eps
     off = [

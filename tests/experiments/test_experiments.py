@@ -172,7 +172,7 @@ def test_step_beyond_the_limit_diverges_and_says_so_word_for_word(shown):
     assert figures["dashpots_0.9_diverged"] == 0
     assert figures["dashpots_1.3_diverged"] == 1
     assert figures["dashpots_0.9_unexplained"] < 0.01
-    # Half of the energy given is what the health check lets pass.
+    # Half of the energy given is what the divergence check lets pass.
     assert figures["dashpots_1.3_unexplained"] > 0.5
     sentence = rows_of(folder / "steps.csv")[1]["sentence"]
     assert sentence.startswith("diverged at t = ")

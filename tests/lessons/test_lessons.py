@@ -35,7 +35,7 @@ def fresh_far_end(method, rise, macro_steps):
     scene = Scene(bar.mesh, CONCRETE, [blow, effects.BondDamping()])
     simulation = Simulation(scene, method)
     simulation.advance_to(macro_steps)
-    return simulation.state.motion(), simulation.ledger.account()
+    return simulation.state.motion(), simulation.energy_balance.account()
 
 
 @pytest.mark.parametrize("name", ["explicit", pytest.param("solved", marks=pytest.mark.slow)])
@@ -49,7 +49,7 @@ def test_another_step_and_blow_give_the_bits_of_a_simulation_made_for_them(engin
         _time_step.strike(name, 2.56e-6, 1e-5)
         made = _time_step.ready(name, step, rise)
         made.advance_to(count)
-        return made.state.motion(), made.ledger.account()
+        return made.state.motion(), made.energy_balance.account()
 
     method = solved if name == "solved" else Uniform(step)
     motion, account = engine.ask(again)
@@ -156,7 +156,7 @@ def test_effects_that_are_silenced_give_the_bits_of_a_program_without_them(engin
         for key, values in own.motions[name].items():
             assert values.tobytes() == silent.motions[name][key].tobytes(), (name, key)
     assert [str(use) for use in silent.advice.uses] == [str(use) for use in own.advice.uses]
-    assert silent.advice.missed == own.advice.missed != ()
+    assert silent.advice.missing == own.advice.missing != ()
     assert math.isnan(silent.step_s) and own.step_s > 0.0
 
 

@@ -47,7 +47,7 @@ def test_another_format_is_refused(path):
         arrays = dict(file)
     arrays["about"] = np.array(json.dumps({"format": 99, "identity": IDENTITY}))
     np.savez(path, **arrays)
-    with pytest.raises(InputError, match="must have format 1, got 99"):
+    with pytest.raises(InputError, match="must have format 2, got 99"):
         read_checkpoint(path, IDENTITY)
 
 
@@ -111,7 +111,7 @@ class OneArray:
 
 def test_a_full_disk_leaves_the_last_good_checkpoint_and_says_so(tmp_path, monkeypatch):
     path, opened, room = tmp_path / "run.npz", builtins.open, [10**6]
-    keeper = CheckpointWriter(Checkpoint(path), OneArray(), lambda: (3, 1.5))
+    writer = CheckpointWriter(Checkpoint(path), OneArray(), lambda: (3, 1.5))
 
     def narrow(name, mode="r", *rest, **options):
         file = opened(name, mode, *rest, **options)
@@ -120,13 +120,13 @@ def test_a_full_disk_leaves_the_last_good_checkpoint_and_says_so(tmp_path, monke
     monkeypatch.setattr(builtins, "open", narrow)
     room[0] = 0
     with pytest.raises(InputError, match=r"No space left.*has saved no checkpoint before"):
-        keeper.keep()
+        writer.save()
     room[0] = 10**6
-    keeper.keep()
+    writer.save()
     good = path.read_bytes()
     for room[0] in (0, 300, len(good) - 1):
         with pytest.raises(InputError, match=r"No space left.*run.npz holds the run at t = 1.5 s"):
-            keeper.keep()
+            writer.save()
         assert path.read_bytes() == good
         assert os.listdir(tmp_path) == ["run.npz"]
 

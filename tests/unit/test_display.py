@@ -54,7 +54,7 @@ def of_the_blast():
     result = taichi_dem.simulate(scene, method=method, until=4e-8, frames=3, samples=4)
     yield from (mesh, scene, result, result.model, result.report, result.frames[0])
     yield from (result.model.topology, spheres_of_faces(mesh, result.model.centre, 5))
-    yield from (taichi_dem.Simulation(scene, method), result.report.acted[0])
+    yield from (taichi_dem.Simulation(scene, method), result.report.effect_activity[0])
     yield from (
         taichi_dem.needed_effects(result),
         MissingEffect("Softening", "bonds are stretched"),

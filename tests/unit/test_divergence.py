@@ -52,9 +52,9 @@ def test_the_step_it_advises_is_stable(diverged):
     report = run(advised).report
     assert report.until_s >= UNTIL * (1.0 - 1e-9)
     # First order in step times fastest rate, which the advice keeps at 1.
-    assert report.ledger_residual_fraction < 1.0
-    assert np.isfinite(report.ledger["kinetic"])
-    assert report.ledger["kinetic"] <= report.ledger["load_work"]
+    assert report.energy_residual_fraction < 1.0
+    assert np.isfinite(report.energy_balance["kinetic"])
+    assert report.energy_balance["kinetic"] <= report.energy_balance["load_work"]
 
 
 def test_a_diverged_run_leaves_its_last_good_output(diverged):

@@ -151,7 +151,7 @@ def needs_after(listed, shift, broken=False):
     if broken:
         simulation.state.broken_tick[0] = 0
     simulation.advance_to(1)
-    simulation.watch.look(simulation.time_s)
+    simulation.missing_effects.sample(simulation.time_s)
     return simulation.report().needs
 
 

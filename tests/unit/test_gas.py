@@ -59,7 +59,7 @@ def test_a_free_body_takes_the_impulse_of_the_pulse(body):
     momentum = body.model.body_mass[0] * body.state.motion()["velocity"][0]
     error = 1.1 * quadrature + TO_END * EPS * exact
     assert np.abs(momentum - push * exact).max() < error * np.linalg.norm(push)
-    account = body.ledger.account()
+    account = body.energy_balance.account()
     assert account["load_work"] == pytest.approx(account["kinetic"], rel=TO_END * EPS)
     assert body.gas_work() == account["load_work"]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from taichi_dem import Multirate, Simulation, Uniform
-from taichi_dem.measured_speedup import _twin, realised_gain
+from taichi_dem.measured_speedup import _twin, measured_speedup
 from taichi_dem.state import NEVER
 from tests.scenes import brisk_scene
 
@@ -35,7 +35,7 @@ def test_a_twin_stands_where_the_run_does_and_takes_its_smallest_step(broken):
 def test_gain_is_time_over_time_and_is_said_in_the_report(broken):
     """Uniform evaluations over the run's, times what one takes; nothing of the run changes."""
     before, report = broken.state.position.to_numpy(), broken.report()
-    gain = realised_gain(broken, seconds=0.05)
+    gain = measured_speedup(broken, seconds=0.05)
     assert math.isfinite(gain) and gain > 0.0
     assert np.array_equal(broken.state.position.to_numpy(), before)
     assert broken.report() == report
@@ -43,4 +43,4 @@ def test_gain_is_time_over_time_and_is_said_in_the_report(broken):
 
 def test_one_step_for_all_gains_nothing():
     simulation = Simulation(brisk_scene(), Uniform(1e-8))
-    assert realised_gain(simulation) == 1.0
+    assert measured_speedup(simulation) == 1.0

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, InputError, Scene, Uniform, effects, needed_effects, simulate
-from taichi_dem.effect_activity import effects_acted
+from taichi_dem.effect_activity import effect_activity
 from taichi_dem.effect_use import Advice, EffectUse
 from taichi_dem.energy_balance import TERMS
 from taichi_dem.mesh_shapes import pair
@@ -37,9 +37,9 @@ def gentle():
 def test_effects_that_never_act_are_named(gentle):
     advice = needed_effects(gentle)
     idle = {"softening", "shear_slip", "sphere_contact", "friction"}
-    assert idle <= set(advice.never_acted)
+    assert idle <= set(advice.inactive)
     assert "gravity" not in advice.droppable
-    assert advice.missed == ()
+    assert advice.missing == ()
     lines = {line.split()[1]: line for line in str(advice).splitlines()}
     assert lines["softening"].startswith("drop")
     assert "never acted (0 bonds softened)" in lines["softening"]
@@ -101,7 +101,7 @@ def used(listed, material=CONCRETE, exposed=True, heat=0.0, lacking=0, **account
     none = SimpleNamespace(state=state, start_energy=0.0)
     filled = {**dict.fromkeys(TERMS, 0.0), **account}
     watch = SimpleNamespace(touching=0, outer=SimpleNamespace(times=lacking))
-    return {use.effect: use for use in effects_acted(model, none, tables, filled, watch)}
+    return {use.effect: use for use in effect_activity(model, none, tables, filled, watch)}
 
 
 class OwnContact(effects.SphereContact):
@@ -154,7 +154,7 @@ def test_what_steers_is_never_negligible(make):
     """It acted, and took a thousandth of a thousandth of the work put in."""
     listed = [make()] if make is not effects.Friction else [effects.SphereContact(), make()]
     use = used(listed, heat=1e-9, load_work=1.0, slip=1e-9, softening=1e-9)[make.name]
-    assert use.acted and not use.negligible(1e-3)
+    assert use.is_active and not use.negligible(1e-3)
 
 
 @pytest.mark.parametrize("strain, share, negligible", [(0.0, 1.0, False), (1.0, 1e-6, True)])
@@ -172,7 +172,7 @@ def test_weight_of_all_is_all_the_work(gentle):
     Kicks at the beginning of a step of dt give v = g t at its end; with the mean velocity of each
     kick the work is exactly m (g t)^2 / 2.
     """
-    use = next(use for use in gentle.report.acted if use.effect == "gravity")
+    use = next(use for use in gentle.report.effect_activity if use.effect == "gravity")
     mass = gentle.model.body_mass.sum()
     assert use.events == use.of == 2
     assert use.share == pytest.approx(1.0, rel=1e-12)
@@ -185,7 +185,7 @@ def test_missed_effect_is_told_how_often_and_where():
     runs_away = effects.PrescribedMotion(next(iter(mesh.groups)), (-50.0, 0.0, 0.0))
     # In tension the limit of slip falls to nothing: with slip listed, only the strength is missed.
     result = ran(runs_away, effects.ShearSlip())
-    missed = needed_effects(result).missed
+    missed = needed_effects(result).missing
     assert {finding.effect for finding in missed} == {"Softening"}
     (finding,) = missed
     middle = mesh.points[result.model.topology.vertices[0]].mean(axis=0)

@@ -181,11 +181,11 @@ def test_finding_names_the_remedy_and_survives_a_checkpoint():
         return MissingEffects(looked.model, looked.state, SimpleNamespace(contacts=None))
 
     watch = watching()
-    watch.look(0.0)
+    watch.sample(0.0)
     assert not [found for found in watch.findings() if "outer" in str(found)]
     first = looked.model.centre[0]
     looked.state.set_motion(np.array([first, first + 1e-3]), np.tile([1.0, 0, 0, 0], (2, 1)))
-    watch.look(2e-6)
+    watch.sample(2e-6)
     (found,) = watch.findings()[-1:]
     assert str(found).startswith("SphereContact(outer_faces=True) is left out, but pairs of bodies")
     assert "up to 1 at a time, first at t = 2e-06 s (body 1 at " in str(found)
@@ -214,6 +214,6 @@ def test_two_blocks_that_meet_in_a_run_are_reported():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         simulation.advance_to(20)
-        simulation.look()
+        simulation.sample()
     (need,) = simulation.report().needs
     assert "SphereContact(outer_faces=True) is left out" in need and "seen at 1 of 2" in need

@@ -77,7 +77,9 @@ def test_breaks_are_drawn(broken):
 def nothing_but_nan(result):
     history = {name: np.full(len(column), NAN) for name, column in result.history.items()}
     report = dataclasses.replace(
-        result.report, ledger=dict.fromkeys(result.report.ledger, NAN), run_seconds=NAN
+        result.report,
+        energy_balance=dict.fromkeys(result.report.energy_balance, NAN),
+        run_seconds=NAN,
     )
     frame = dataclasses.replace(
         result.frames[-1], displacement=NAN * result.frames[-1].displacement

@@ -14,7 +14,7 @@ def run(method, steps, *, mesh=None, velocity=None, listed=()):
     simulation = Simulation(Scene(mesh, CONCRETE, [effects.BondDamping(), *listed]), method)
     simulation.state.set_motion(simulation.model.centre, [[1.0, 0, 0, 0]] * 2, velocity)
     simulation.advance_to(steps)
-    simulation.look()
+    simulation.sample()
     return simulation
 
 
@@ -24,7 +24,7 @@ def test_limited_dashpots_are_named_with_the_share_that_their_step_leaves():
     step = 10.0 * quality_report(mesh, CONCRETE).dashpot_step_s[0]
     simulation = run(Uniform(step, dashpot="limited"), 3, mesh=mesh)
     share = 1.7 / 20.0
-    assert simulation.resolution.share[0] == pytest.approx(share, rel=1e-12)
+    assert simulation.step_resolution.share[0] == pytest.approx(share, rel=1e-12)
     (said,) = simulation.report().needs
     assert f"bond 0 to {100 * share:.2g} %" in said
 
@@ -43,4 +43,4 @@ def test_a_bond_that_failed_a_step_late_is_named(step, named):
     if named:
         widest = simulation.model.tension.unit.to_numpy()[:3, 0].max()
         assert f"{widest / CONCRETE.failure_opening:.2g} times its failure opening" in found[0]
-    assert not simulation.resolution.findings(np.array([False, False]))
+    assert not simulation.step_resolution.findings(np.array([False, False]))

@@ -206,13 +206,16 @@ def test_supports_hold_what_they_say(held):
 
 
 def test_work_and_impulse_of_supports_are_booked(held):
-    """The ledger closes at first order, momentum to sqrt(updates) eps."""
+    """The energy balance closes at first order, momentum to sqrt(updates) eps."""
     coarse, fine = (simulation.report() for simulation in held)
-    assert abs(coarse.ledger["support_work"]) > 0.0 and coarse.ledger["load_work"] == 0.0
-    ratio = fine.ledger["residual"] / coarse.ledger["residual"]
+    assert (
+        abs(coarse.energy_balance["support_work"]) > 0.0
+        and coarse.energy_balance["load_work"] == 0.0
+    )
+    ratio = fine.energy_balance["residual"] / coarse.energy_balance["residual"]
     # w dt of the driving and of the fastest dashpot, 0.04: second order is that share of it.
     assert ratio == pytest.approx(0.5, abs=0.02)
-    assert coarse.ledger_residual_fraction < 0.05
+    assert coarse.energy_residual_fraction < 0.05
     bound = EPS * np.sqrt(fine.substeps)
     assert fine.linear_momentum_error < bound
     assert fine.angular_momentum_error < bound
@@ -229,7 +232,7 @@ def test_free_fall_is_late_by_exactly_half_a_step():
     exact = gravity * time * (time + step) / 2.0
     assert np.abs(fallen - exact).max() < steps * EPS * np.abs(exact).max()
     assert np.abs(motion["velocity"][0] - gravity * time).max() < steps * EPS * 9.81 * time
-    account = simulation.ledger.account()
+    account = simulation.energy_balance.account()
     assert account["load_work"] == pytest.approx(account["kinetic"], rel=steps * EPS)
 
 
@@ -244,4 +247,4 @@ def test_what_is_held_still_takes_no_work(method):
     held = faces_of_group(simulation.model.mesh, simulation.model.topology, "right")[0]
     assert np.abs(simulation.state.load_impulse.to_numpy()[held]).max() > 0.0
     assert np.array_equal(works[held], np.zeros_like(works[held]))
-    assert report.ledger["support_work"] == 0.0 < report.ledger["load_work"]
+    assert report.energy_balance["support_work"] == 0.0 < report.energy_balance["load_work"]

@@ -61,14 +61,14 @@ def test_ledger_residual_halves_with_step_and_distance(reports, name):
     """
     coarse, fine = reports(name, 1.0), reports(name, 0.5)
     assert fine.smallest_step_s < coarse.smallest_step_s
-    ratio = fine.ledger["residual"] / coarse.ledger["residual"]
+    ratio = fine.energy_balance["residual"] / coarse.energy_balance["residual"]
     assert ratio == pytest.approx(0.5, abs=0.05)
-    assert coarse.ledger_residual_fraction < 1e-3
+    assert coarse.energy_residual_fraction < 1e-3
 
 
 def test_every_term_of_the_ledger_is_in_use(reports):
     """Without any one of them the residual would not have closed above."""
-    account = reports("held", 0.5).ledger
+    account = reports("held", 0.5).energy_balance
     residual = abs(account["residual"])
     idle = [name for name, value in account.items() if name != "support_work" and value == 0.0]
     assert idle == []
@@ -182,7 +182,7 @@ def test_a_strained_block_in_free_flight_keeps_its_momentum(damped_bar):
     simulation.state.set_motion(place, np.tile(STILL, (count, 1)), velocity, spin)
     simulation.advance_to(steps)
     report = simulation.report()
-    assert report.ledger["slip"] > 0.0 and report.ledger["bond_strain"] > 0.0
+    assert report.energy_balance["slip"] > 0.0 and report.energy_balance["bond_strain"] > 0.0
     bound = EPS * np.sqrt(steps)
     assert report.linear_momentum_error < bound
     assert report.angular_momentum_error < bound
@@ -200,9 +200,9 @@ def test_an_uneven_body_keeps_its_angular_momentum_while_it_tumbles():
     spin = np.array([[400.0, 700.0, -600.0]])
     simulation.state.set_motion(simulation.model.centre, [STILL], np.zeros((1, 3)), spin)
     simulation.start()
-    first, energy = simulation.state.motion(), simulation.ledger.account()["kinetic"]
+    first, energy = simulation.state.motion(), simulation.energy_balance.account()["kinetic"]
     simulation.advance_to(1000)
     last = simulation.state.motion()
     assert np.array_equal(first["angular_momentum"], last["angular_momentum"])
     assert np.abs(last["spin"] - spin).max() > 100.0
-    assert simulation.ledger.account()["kinetic"] == pytest.approx(energy, rel=1e-3)
+    assert simulation.energy_balance.account()["kinetic"] == pytest.approx(energy, rel=1e-3)

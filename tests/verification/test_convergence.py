@@ -26,7 +26,7 @@ class Unchanged:
 class FixedLevels:
     """Multirate without a rule: the order of a scheme shows where its steps do not jump."""
 
-    name, uniform, solves, ahead = "fixed_levels", False, False, 0.0
+    name, uniform, solves, steps_ahead = "fixed_levels", False, False, 0.0
 
     def __init__(self, neighbour):
         self.neighbour, self.dt0 = neighbour, UNTIL / STEPS[0]

@@ -52,9 +52,9 @@ def test_ledger_residual_halves_with_the_step(reports):
     First order through fracture and contact. The mean power is the work of the gas over the time;
     it grows, and a few times the mean bounds what it is in the end.
     """
-    coarse, fine = (report.ledger["residual"] for report in reports)
+    coarse, fine = (report.energy_balance["residual"] for report in reports)
     assert fine / coarse == pytest.approx(0.5, abs=0.02)
-    assert reports[0].ledger_residual_fraction < 4.0 * 0.5 * STEP / UNTIL
+    assert reports[0].energy_residual_fraction < 4.0 * 0.5 * STEP / UNTIL
 
 
 @pytest.mark.parametrize("until, bound", [(8e-6, 0.002), (1.44e-5, 0.02)])

@@ -58,7 +58,7 @@ def test_motion_turns_shifts_and_mirrors_with_the_mesh(straight, change, shift):
     """
     displacement, velocity, reference = straight
     found, rate, simulation = moved(change, shift)
-    assert reference.report().ledger["slip"] > 0.0
+    assert reference.report().energy_balance["slip"] > 0.0
     error = STEPS * EPS
     assert np.abs(displacement).max() > 1e8 * error
     assert np.abs(found - displacement).max() < error

@@ -49,9 +49,9 @@ def shot(control, until, block=None):
     try:
         for step in range(1, round(until / DT0) + 1):
             simulation.advance_to(step)
-            account = simulation.ledger.account()
+            account = simulation.energy_balance.account()
             stored = account["kinetic"] + account["bond_strain"] + account["sphere_strain"]
-            energy.append(stored / simulation.ledger.start_energy)
+            energy.append(stored / simulation.energy_balance.start_energy)
     except SimulationDiverged:
         energy.append(np.inf)
     return np.array(energy), simulation
@@ -62,7 +62,7 @@ def test_energy_never_grows_when_a_fast_fragment_hits_a_sleeping_block():
     energy, simulation = shot(StepControl(), 1e-5)
     assert energy[-1] < 0.5 and np.diff(energy).max() < 1e-13
     assert simulation.schedule.limits.woken[None] > 0
-    assert max(simulation.ledger.momentum_errors()) < 1e-13
+    assert max(simulation.energy_balance.momentum_errors()) < 1e-13
 
 
 def test_a_hit_wakes_a_boulder_that_is_kicked_away_in_its_sleep():
@@ -106,7 +106,7 @@ def test_waking_keeps_momentum_and_the_account(woken):
     report = woken.report()
     assert report.broken_faces > 30 and woken.schedule.limits.woken[None] > 100
     assert max(report.linear_momentum_error, report.angular_momentum_error) < 1e-13
-    assert report.ledger_residual_fraction < 0.01
+    assert report.energy_residual_fraction < 0.01
 
 
 @pytest.mark.slow

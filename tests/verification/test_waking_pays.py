@@ -126,7 +126,7 @@ def test_a_release_brings_sleeping_bodies_to_the_present_where_they_now_touch(wa
         assert level[:2].min() > 2 and np.all(last[:2] == made.state.tick[None])
     else:
         assert level[:2].max() == 0 and np.all(last[:2] == 0)
-    assert max(made.simulation.ledger.momentum_errors()) < 1e-13
+    assert max(made.simulation.energy_balance.momentum_errors()) < 1e-13
 
 
 def test_a_released_bond_pays_sleeping_bodies_nothing_more():
