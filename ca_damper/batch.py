@@ -187,19 +187,19 @@ class Batch:
         return self.coupling.attempts.to_numpy()
 
     @contextlib.contextmanager
-    def checkpointed(self, checkpoint, resume, identity, parts=()):
+    def checkpointed(self, checkpoint, resume, identity, owners=()):
         """Let the runs in its block save themselves; gives what saves them.
 
         checkpoint: a Checkpoint or None. resume: file to go on from, or None: the run that it was
         saved in is then to be called for again, and goes on. identity: words by name that a file
-        must share; parts: (name, part) of what else goes into it, as in ``restart.RunSnapshot``.
+        must share; owners: (name, object) of what else goes into it, as in ``restart.RunSnapshot``.
         Raises InputError.
         """
         self._check_started()
         own = {"version": version_text(), "filling": repr(self.filling)}
         arrays = opened(checkpoint, resume, lambda: {**own, **identity})
         self._compile()
-        saved = RunSnapshot({**own, **identity}, self, {"batch": self, **dict(parts)})
+        saved = RunSnapshot({**own, **identity}, self, {"batch": self, **dict(owners)})
         if arrays:
             saved.restore(arrays, resume)
         writer = NoCheckpointWriter()

@@ -17,8 +17,8 @@ What ``bind`` returns is data oriented and has the ti.funcs
 
 ``reset(s)``               place the particles of scene s anew, from its seed
 ``advance(s, step, motion)`` takes the filling over step number ``step`` (i32, counted from the
-                           reset without a gap), in which the container starts with ``motion``; returns an
-                           Action. The container takes the step after this call.
+                           reset without a gap), in which the container starts with ``motion``;
+                           returns an Action. The container takes the step after this call.
 ``energy(s)``              kinetic and potential energy of the particles [J], heights counted from
                            the container's floor
 ``momentum(s)``            momentum of the particles along x [kg m/s]

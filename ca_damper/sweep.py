@@ -59,7 +59,9 @@ def sweep_up_and_down(
         batch = grid.batch(grid.ratios[:1], measured_cycles)
         batch.start(start)
         job = f"sweep, {grid.words()}, {transient_cycles} + {measured_cycles} cycles from {start}"
-        with batch.checkpointed(checkpoint, resume, {"job": job}, way.parts()) as writer:
+        with batch.checkpointed(
+            checkpoint, resume, {"job": job}, way.checkpoint_owners()
+        ) as writer:
             tell = Stages(report_progress, way.ends())
             for k in way.pending():
                 if not batch.going_on:
@@ -77,7 +79,7 @@ class _Way:
         self.up, self.down, self.done = _Collected(grid), _Collected(grid), 0
         self.count = len(grid.ratios)
 
-    def parts(self):
+    def checkpoint_owners(self):
         """What a checkpoint holds of it."""
         return ("way", self), ("up", self.up), ("down", self.down)
 

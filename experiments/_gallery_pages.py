@@ -248,9 +248,9 @@ PAGES = (
         "hard_cases",
         PRICE,
         "Which scenes at the edge does each method bear, by what margin, and which does it "
-        "decline?",
+        "refuse?",
         "A row a case, a mark a method: right of the line it stays within what physics allows, "
-        "left it declines in words; numbers in the place of a refusal would count as failed. The "
+        "left it refuses in words; one that returns numbers where it should refuse has failed. The "
         "sheets show what each case did.",
         "10 min on one",
         ("hard_cases.png", "hard_cases_blast.png", "hard_cases_damper.png"),

@@ -26,7 +26,7 @@ from _demo import conclude, placed_together
 from taichi_dem import CONCRETE, InputError, Multirate, Scene, Simulation, Uniform, effects
 from taichi_dem.files import output_folder, write_csv
 from taichi_dem.mesh_shapes import bar
-from taichi_dem.plot.blow import film_blow, picture_blow
+from taichi_dem.plot.impact import film_impact, picture_impact
 from taichi_dem.progress_bar import ProgressBar
 from taichi_dem.record import Recorder
 from taichi_dem.simulate import progress_of
@@ -52,7 +52,7 @@ SAMPLES, FRAMES = 80, 40
 
 
 @dataclass(frozen=True, eq=False)
-class Blow:
+class Impact:
     """A run; all but name and Simulation has an entry a frame.
 
     struck, far: mean way of the bar's ends away from the fragment [m]. evaluations, broken: so far.
@@ -102,7 +102,7 @@ def built_scene():
 
 
 def hit(name, scene, until, options):
-    """One blow with a method; returns Blow."""
+    """Run one impact with a method; returns Impact."""
     method = METHODS[name](DT0, DISTANCE)
     simulation = Simulation(scene, method, options.driver)
     model = simulation.model
@@ -122,7 +122,7 @@ def hit(name, scene, until, options):
             broken.append(int((ticks[: model.bond_count] >= 0).sum()))
     frames = tuple(recorder.frames)
     ends = [end_moved(scene, model, frames, group) for group in ("bar_right", "bar_left")]
-    return Blow(name, simulation, frames, *ends, np.array(counts), np.array(broken))
+    return Impact(name, simulation, frames, *ends, np.array(counts), np.array(broken))
 
 
 def end_moved(scene, model, frames, group):
@@ -136,12 +136,12 @@ def run(options):
     settings = QUICK if options.quick else FULL
     check_speed(options.speed, settings["until"])
     output_folder(options.out)
-    blows = [hit(name, built_scene(), settings["until"], options) for name in settings["methods"]]
-    rows = compared(blows)
+    impacts = [hit(name, built_scene(), settings["until"], options) for name in settings["methods"]]
+    rows = compared(impacts)
     print_rows(rows)
-    picture(blows, options)
-    simulations = [blow.simulation for blow in blows]
-    conclude(options, NAME, figures_of(rows), caption(rows, blows[1]), simulations)
+    picture(impacts, options)
+    simulations = [impact.simulation for impact in impacts]
+    conclude(options, NAME, figures_of(rows), caption(rows, impacts[1]), simulations)
 
 
 def check_speed(speed, until):
@@ -154,23 +154,23 @@ def check_speed(speed, until):
         )
 
 
-def compared(blows):
+def compared(impacts):
     """A row for every method; differences are the largest over time, of the largest way."""
-    base = blows[0]
+    base = impacts[0]
     rows = []
-    for blow in blows:
-        report = blow.simulation.report()
+    for impact in impacts:
+        report = impact.simulation.report()
         rows.append(
             {
-                "method": blow.name,
-                "evaluations": int(blow.evaluations[-1]),
-                "saved": float(base.evaluations[-1] / blow.evaluations[-1]),
-                "struck_um": 1e6 * float(blow.struck[-1]),
+                "method": impact.name,
+                "evaluations": int(impact.evaluations[-1]),
+                "saved": float(base.evaluations[-1] / impact.evaluations[-1]),
+                "struck_um": 1e6 * float(impact.struck[-1]),
                 "difference": float(
-                    np.abs(blow.struck - base.struck).max() / np.abs(base.struck).max()
+                    np.abs(impact.struck - base.struck).max() / np.abs(base.struck).max()
                 ),
-                "broken_faces": int(blow.broken[-1]),
-                "smallest_step_s": DT0 / 2.0 ** int(blow.levels.max()),
+                "broken_faces": int(impact.broken[-1]),
+                "smallest_step_s": DT0 / 2.0 ** int(impact.levels.max()),
                 "residual": report.energy_residual_fraction,
                 "cpu_s": report.run_cpu_seconds,
             }
@@ -178,12 +178,12 @@ def compared(blows):
     return rows
 
 
-def caption(rows, blow):
-    """What to see; blow: of the second row, in which every body has its own step."""
+def caption(rows, impact):
+    """What to see; impact: of the second row, in which every body has its own step."""
     base, other = rows[:2]
     return (
         "A fragment (right of the blue line) hits a bar. Above one step for all bodies, below a "
-        f"step for each, by colour: {short_steps(blow)}. The struck end moves alike, within "
+        f"step for each, by colour: {short_steps(impact)}. The struck end moves alike, within "
         f"{100 * other['difference']:.2g} %, with {1e-6 * other['evaluations']:.1f} instead of "
         f"{1e-6 * base['evaluations']:.1f} million bonds and contacts evaluated (a ratio of "
         f"{other['saved']:.2f}). The account of {other['method']} neighbours is off by "
@@ -192,11 +192,11 @@ def caption(rows, blow):
     )
 
 
-def short_steps(blow):
+def short_steps(impact):
     """How far short steps came into the bar, and how many have grown again, in words."""
-    place = blow.simulation.model.centre[:, 0]
+    place = impact.simulation.model.centre[:, 0]
     in_bar = place < LENGTH
-    place, levels = place[in_bar], blow.levels[:, in_bar]
+    place, levels = place[in_bar], impact.levels[:, in_bar]
     finest = levels.max(axis=0)
     reached = finest > 0
     if not reached.any():
@@ -244,24 +244,24 @@ def figures_of(rows):
     return figures
 
 
-def picture(blows, options):
+def picture(impacts, options):
     """Write the picture, its tables and the film."""
 
     def at(name):
         return os.path.join(options.out, name)
 
-    columns = {"time_s": blows[0].time}
-    for blow in blows:
-        columns[f"struck_{blow.name}_m"] = blow.struck
-        columns[f"far_{blow.name}_m"] = blow.far
-        columns[f"evaluations_{blow.name}"] = blow.evaluations
-        top = int(blow.levels.max()) + 1
-        shares = np.array([np.bincount(row, minlength=top) / len(row) for row in blow.levels])
+    columns = {"time_s": impacts[0].time}
+    for impact in impacts:
+        columns[f"struck_{impact.name}_m"] = impact.struck
+        columns[f"far_{impact.name}_m"] = impact.far
+        columns[f"evaluations_{impact.name}"] = impact.evaluations
+        top = int(impact.levels.max()) + 1
+        shares = np.array([np.bincount(row, minlength=top) / len(row) for row in impact.levels])
         levels = {f"level_{k}": shares[:, k] for k in range(top)}
-        write_csv(at(f"levels_{blow.name}.csv"), {"time_s": blow.time, **levels})
+        write_csv(at(f"levels_{impact.name}.csv"), {"time_s": impact.time, **levels})
     write_csv(at("blow.csv"), columns)
-    picture_blow(at("blow.png"), blows, DT0)
-    film_blow(at("blow.gif"), blows[0], blows[1], DT0, FRAMES)
+    picture_impact(at("blow.png"), impacts, DT0)
+    film_impact(at("blow.gif"), impacts[0], impacts[1], DT0, FRAMES)
 
 
 if __name__ == "__main__":

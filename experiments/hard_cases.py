@@ -1,4 +1,4 @@
-"""Which hard cases each method bears, which it declines in words, and by what margin.
+"""Which hard cases each method bears, which it refuses in words, and by what margin.
 
     python experiments/hard_cases.py                      # about ten minutes on one core
     python experiments/hard_cases.py --only full_box,still_heap
@@ -6,7 +6,7 @@
 
 A case is a scene at the edge of what can be computed, with figures that physics bounds: the formula
 stands in the table. A method that claims the case passes with all figures within their bounds; the
-margin is bound over figure, of the worst of them. A method that cannot handle it has to decline in
+margin is bound over figure, of the worst of them. A method that cannot handle it has to refuse in
 words: numbers in their place count as a failure.
 """
 
@@ -197,7 +197,7 @@ def draw_curves(axis, shown, look):
 
 
 def figures_of(cases, results):
-    """How many cases, and how many askings ended in which way."""
+    """How many cases, and how many runs ended in which way."""
     counts = {word: sum(r.status == word for r in results) for word in (PASSED, REFUSED, FAILED)}
     margins = [result.margin for result in results if result.limit]
     figures = {"cases": figure(len(cases), "1"), "askings": figure(len(results), "1")}

@@ -32,17 +32,17 @@ class RememberingWrapper(textwrap.TextWrapper):
 
 def remembering(find):
     """A function's source lines and where they begin, as find gives them, each looked for once."""
-    known = {}
+    cached = {}
 
     def lines(function):
         """Source lines of a function and the number of the first."""
         # Equal code of two files may differ in what is no code: annotations.
         key = (function.__code__.co_filename, function.__code__)
-        if key not in known:
-            known[key] = find(function)
-        return known[key]
+        if key not in cached:
+            cached[key] = find(function)
+        return cached[key]
 
-    lines.known = known
+    lines.cached = cached
     return lines
 
 
@@ -51,5 +51,5 @@ def remember():
     if hasattr(ast_transformer_utils, "TextWrapper"):
         ast_transformer_utils.TextWrapper = RememberingWrapper
     find = getattr(kernel_impl, "getsourcelines", None)
-    if find is not None and not hasattr(find, "known"):
+    if find is not None and not hasattr(find, "cached"):
         kernel_impl.getsourcelines = remembering(find)

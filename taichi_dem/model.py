@@ -43,13 +43,13 @@ class Model:
         self.body_mass, self.centre, self.body_inertia = body_properties(mesh, material.density)
         self._allocate_bodies()
         self._allocate_bonds()
-        self._take_in(effects)
+        self._bind_effects(effects)
 
     def __repr__(self):
         bodies, bonds = counted(self.body_count, "body"), counted(self.bond_count, "bond")
         return in_brief(self, bodies, bonds, *(effect.name for effect in self.effects))
 
-    def _take_in(self, effects):
+    def _bind_effects(self, effects):
         """Sort the effects by role, put null objects where none is listed, and bind them.
 
         Each is copied first: a bound effect belongs to one model, and a scene may serve many. Its

@@ -112,7 +112,7 @@ class _Notebook:
     """A bar below the cell of a Jupyter notebook that is running."""
 
     def __init__(self, title, display):
-        self._title, self._due = title, 0.0
+        self._title, self._next_update = title, 0.0
         self._handle = display(self._drawn(0.0, ""), raw=True, display_id=True)
 
     def _drawn(self, share, words):
@@ -122,8 +122,8 @@ class _Notebook:
 
     def show(self, progress):
         """Draw how far the job is, and what it says of itself."""
-        if progress.phase == "compiling" or time.perf_counter() >= self._due:
-            self._due = time.perf_counter() + _NOTEBOOK_SECONDS
+        if progress.phase == "compiling" or time.perf_counter() >= self._next_update:
+            self._next_update = time.perf_counter() + _NOTEBOOK_SECONDS
             self._handle.update(self._drawn(progress.share, str(progress)), raw=True)
 
     def close(self):

@@ -16,20 +16,20 @@ from taichi_dem.files import output_folder
 
 
 class RunSnapshot:
-    """All of a run that changes: the fields on the device and what its parts hold beside them.
+    """All of a run that changes: the fields on the device and what its owners hold beside them.
 
     identity: what two runs must share for one to go on from the other, words by name. root: of
-    which all fields are taken. parts: by name, objects with ``saved()``, which gives arrays by
+    which all fields are taken. owners: by name, objects with ``saved()``, which gives arrays by
     name, and ``resume(arrays)``, which takes them over.
     """
 
-    def __init__(self, identity, root, parts):
-        self.identity, self.memory, self.parts = identity, FieldMemory(root), parts
+    def __init__(self, identity, root, owners):
+        self.identity, self.memory, self.owners = identity, FieldMemory(root), owners
 
     def write(self, path):
         """Save the run as it is, between two steps. Raises InputError."""
         arrays = {f"field/{name}": array for name, array in self.memory.read().items()}
-        for part, owner in self.parts.items():
+        for part, owner in self.owners.items():
             arrays.update({f"{part}/{name}": array for name, array in owner.saved().items()})
         write_checkpoint(path, self.identity, arrays)
 
@@ -42,7 +42,7 @@ class RunSnapshot:
         if missing:
             raise InputError(f"checkpoint {path} is of another version: field {missing} differs")
         self.memory.write(_under("field", arrays))
-        for part, owner in self.parts.items():
+        for part, owner in self.owners.items():
             try:
                 owner.resume(_under(part, arrays))
             except (KeyError, IndexError, ValueError, TypeError):

@@ -69,6 +69,6 @@ def _use(name, touches, share, whole, steers, kept):
     )
 
 
-def _share(parts, which):
+def _share(sums, which):
     """None for no part at all: spheres may rub on walls alone, which is not seen."""
-    return float(parts[which] / parts.sum()) if parts[which] > 0.0 else None
+    return float(sums[which] / sums.sum()) if sums[which] > 0.0 else None

@@ -75,12 +75,12 @@ def bond_area(mesh):
     return 0.5 * np.linalg.norm(np.cross(corners[1] - corners[0], corners[2] - corners[0]))
 
 
-def blast_case(run, methods, declines=None):
+def blast_case(run, methods, refused=None):
     """A Case of the blast by its function."""
     name = run.__name__
-    return Case(name, "blast", run.__doc__.split("\n")[0], tuple(methods), run, declines or {})
+    return Case(name, "blast", run.__doc__.split("\n")[0], tuple(methods), run, refused or {})
 
 
-def decline(methods, words):
+def refuse(methods, words):
     """Words that are due, for several methods."""
     return dict.fromkeys(methods, words)

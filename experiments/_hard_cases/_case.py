@@ -63,7 +63,7 @@ class Case:
     """A scene at the edge of what a method bears.
 
     question: what is hard, in a sentence. methods: that claim to handle it, by name. run(method,
-    quick) gives a Measured; quick: the same on a smaller job. declines: methods that cannot handle
+    quick) gives a Measured; quick: the same on a smaller job. refused: methods that cannot handle
     it, and a word that stands in the sentence with which they have to say so. package: whose case.
     """
 
@@ -72,19 +72,19 @@ class Case:
     question: str
     methods: tuple
     run: Callable
-    declines: dict = field(default_factory=dict)
+    refused: dict = field(default_factory=dict)
 
     @property
     def asked(self):
         """All methods to be asked."""
-        return (*self.methods, *self.declines)
+        return (*self.methods, *self.refused)
 
 
 @dataclass(frozen=True)
 class Result:
     """How a method fared; see ``Measured``.
 
-    words: the worst figure, or the sentence with which the method declined. limit: the worst, None
+    words: the worst figure, or the sentence with which the method refused. limit: the worst, None
     where there was none. seconds: in all, with compiling.
     """
 
@@ -117,12 +117,12 @@ def judge(case, method, quick):
         measured = case.run(method, quick)
     except (InputError, SimulationDiverged) as error:
         words = " ".join(str(error).split())
-        due = case.declines.get(method)
+        due = case.refused.get(method)
         status = REFUSED if due is not None and due in words else FAILED
         return _result(case, method, status, words, started)
-    if method in case.declines:
-        said = [words for words in measured.warnings if case.declines[method] in words]
-        words = said[0] if said else "returned numbers where it should have declined"
+    if method in case.refused:
+        said = [words for words in measured.warnings if case.refused[method] in words]
+        words = said[0] if said else "returned numbers where it should have refused"
         rest = (None, measured.shown, measured.compile_s)
         return _result(case, method, REFUSED if said else FAILED, words, started, *rest)
     worst = min(measured.limits, key=_closeness)

@@ -8,7 +8,7 @@ from taichi_dem.plot_style import BLACK, GREY, picture, power, styles_of
 
 #: A uniform step of a hard case is fixed: the paper's rule does not shorten it.
 _MEANT = {"uniform": "fixed"}
-#: Margins from which on more means nothing; where those stand that decline, and those that fail.
+#: Margins from which on more means nothing; where those stand that refuse, and those that fail.
 _MOST, _REFUSED, _FAILS = 1e4, 0.05, 0.4
 
 

@@ -1,4 +1,4 @@
-"""Hard cases of the granular damper: what its methods claim to bear, and what they decline."""
+"""Hard cases of the granular damper: what its methods claim to bear, and what they refuse."""
 
 import numpy as np
 
@@ -294,9 +294,9 @@ def infinite_numbers(method, quick):
     return Measured((Limit("runs", np.nan, 0.0, "there is no such cycle"),))
 
 
-def _case(run, methods, declines=None):
+def _case(run, methods, refused=None):
     name = run.__name__
-    return Case(name, "damper", run.__doc__.split("\n")[0], tuple(methods), run, declines or {})
+    return Case(name, "damper", run.__doc__.split("\n")[0], tuple(methods), run, refused or {})
 
 
 _ALL = (*AUTOMATA, *SPHERES)

@@ -22,7 +22,7 @@ def plot_deep_cracks(path, mesh, topology, broken_time, time_s, hole):
     broken = broken[np.argsort(-broken_time[broken], kind="stable")]
     triangles, time_ms = mesh.points[topology.vertices[broken]], 1e3 * broken_time[broken]
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
-    look = _look(1e3 * time_s)
+    look = _colours_by_time(1e3 * time_s)
     with picture(path, 0, size=(14.0, 5.2)) as (figure, _):
         grid = figure.add_gridspec(1, 3, width_ratios=(1.25, 1.0, 0.8), wspace=0.1)
         whole = figure.add_subplot(grid[0], projection="3d")
@@ -35,7 +35,7 @@ def plot_deep_cracks(path, mesh, topology, broken_time, time_s, hole):
         figure.colorbar(lines, ax=panels, label="time of breaking [ms]", shrink=0.8, aspect=25)
 
 
-def _look(end_ms):
+def _colours_by_time(end_ms):
     """Colours by time, dark first; as in the pictures of flat blocks."""
     shades = matplotlib.colormaps["plasma"](np.linspace(0.0, 0.88, 256))
     return {"cmap": ListedColormap(shades), "norm": matplotlib.colors.Normalize(0.0, end_ms)}

@@ -233,7 +233,7 @@ class BroadPhase:
             j = self.neighbours.body[k]
             if looked | self.looked[j] != 0 and self.contacts.exposed_faces[j] != 0:
                 faces = self.pair_cache.faces[k] & self._broken_faces(i, j)
-                if self.everywhere[None] == 1 or self.pair_cache.may_touch(k, i, j, faces):
+                if self.everywhere[None] == 1 or self.pair_cache.may_gain_spheres(k, i, j, faces):
                     self._count_entry(k, i, j, faces)
 
     @ti.func

@@ -63,7 +63,7 @@ class PairCache:
         return self.state.position[i] + self.state.rotation[i] @ self.model.cluster[face].xyz
 
     @ti.func
-    def may_touch(self, k, i, j, faces):
+    def may_gain_spheres(self, k, i, j, faces):
         """Whether entry k, bodies i and j, may have more spheres than it had; faces: broken now."""
         return self.broken[k] != faces or (faces != 0 and self._may_be_closer(k, i, j))
 

@@ -1,8 +1,8 @@
-"""The hard cases of the blast at quick size: what is claimed holds, what is not is declined.
+"""The hard cases of the blast at quick size: what is claimed holds, what is not is refused.
 
 Compiling is what they cost. The experiment asks all methods; here those of a case that shares its
 run with others are the two that share least code, and a case with a run of its own is asked of the
-first method that claims it and the first that declines it, among the slow tests.
+first method that claims it and the first that refuses it, among the slow tests.
 """
 
 import pytest
@@ -16,7 +16,7 @@ SHARED = ("multirate_drifted", "implicit")
 def methods_of(case):
     if case in blast.CASES:
         return [method for method in case.asked if method in SHARED]
-    return [*case.methods[:1], *list(case.declines)[:1]]
+    return [*case.methods[:1], *list(case.refused)[:1]]
 
 
 ASKED = [
@@ -34,7 +34,7 @@ ASKED = [
 @pytest.mark.parametrize(("case", "method"), ASKED)
 def test_method_bears_the_case_or_declines_it_in_words(case, method):
     result = judge(case, method, quick=True)
-    wanted = "refused" if method in case.declines else "passed"
+    wanted = "refused" if method in case.refused else "passed"
     assert result.status == wanted, result.words
     shown = result.shown
     assert shown is None or all(map(UNIT.search, (shown.xlabel, shown.ylabel)))

@@ -1,4 +1,4 @@
-"""The hard cases of the damper at quick size: what is claimed holds, what is not is declined."""
+"""The hard cases of the damper at quick size: what is claimed holds, what is not is refused."""
 
 import pytest
 
@@ -23,7 +23,7 @@ ASKED = [
 @pytest.mark.parametrize(("case", "method"), ASKED)
 def test_method_bears_the_case_or_declines_it_in_words(case, method):
     result = judge(case, method, quick=True)
-    wanted = "refused" if method in case.declines else "passed"
+    wanted = "refused" if method in case.refused else "passed"
     assert result.status == wanted, result.words
     shown = result.shown
     assert shown is None or all(map(UNIT.search, (shown.xlabel, shown.ylabel)))

@@ -39,23 +39,23 @@ def test_method_that_claims_a_case_and_refuses_it_fails():
 def test_method_that_declines_in_the_words_that_are_due_is_refused():
     unable = {"unable": "dt must"}
     assert (
-        judge(case(raises=InputError("dt must"), declines=unable), "unable", True).status == REFUSED
+        judge(case(raises=InputError("dt must"), refused=unable), "unable", True).status == REFUSED
     )
-    assert judge(case(raises=InputError("no"), declines=unable), "unable", True).status == FAILED
+    assert judge(case(raises=InputError("no"), refused=unable), "unable", True).status == FAILED
 
 
 def test_numbers_where_a_method_should_decline_are_a_failure():
-    result = judge(case(declines={"unable": "dt must"}), "unable", True)
+    result = judge(case(refused={"unable": "dt must"}), "unable", True)
     assert result.status == FAILED
-    assert "should have declined" in result.words
+    assert "should have refused" in result.words
 
 
 def test_numbers_with_the_warning_that_is_due_are_refused():
     unable = {"unable": "too long"}
-    said = case(warnings=("first", "the step is too long"), declines=unable)
+    said = case(warnings=("first", "the step is too long"), refused=unable)
     result = judge(said, "unable", True)
     assert (result.status, result.words) == (REFUSED, "the step is too long")
-    assert judge(case(warnings=("first",), declines=unable), "unable", True).status == FAILED
+    assert judge(case(warnings=("first",), refused=unable), "unable", True).status == FAILED
 
 
 def test_names_of_cases_are_unique_and_unknown_ones_refused():
@@ -71,4 +71,4 @@ def test_every_case_says_what_is_hard_and_asks_somebody():
     for one in registry():
         assert one.question.endswith(".")
         assert one.asked
-        assert not set(one.methods) & set(one.declines)
+        assert not set(one.methods) & set(one.refused)

@@ -57,7 +57,7 @@ def test_taichi_reads_kernels_that_way():
     assert twice_doubled(3) == 12
     after = broken.cache_info()
     assert after.hits > before.hits
-    found = [code.co_name for _, code in kernel_impl.getsourcelines.known]
+    found = [code.co_name for _, code in kernel_impl.getsourcelines.cached]
     assert found.count("doubled") == 1
 
 

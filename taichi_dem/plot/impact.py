@@ -1,7 +1,7 @@
 """A fragment hits a bar: bodies by their step, motion of the ends, evaluations of each method.
 
-A blow has: name (of its method), simulation, frames, time [s], struck and far [m] (displacements of
-the bar's ends), levels
+An impact has: name (of its method), simulation, frames, time [s], struck and far [m] (displacements
+of the bar's ends), levels
 (frames, bodies), evaluations and broken; one entry a frame.
 """
 
@@ -19,42 +19,42 @@ from taichi_dem.plot_style import BLACK, GREY, picture, seconds, styles_of
 _MAGNIFY = 40.0
 
 
-def picture_blow(path, blows, dt0):
+def picture_impact(path, impacts, dt0):
     """Motion of the ends, evaluations, and share of bodies on each level of the second method."""
-    styles = styles_of([blow.name for blow in blows])
+    styles = styles_of([impact.name for impact in impacts])
     with picture(path, 1, 3, size=(12.0, 3.6)) as (figure, (way, work, share)):
-        for blow, style in zip(blows, styles.values()):
+        for impact, style in zip(impacts, styles.values()):
             look = {"color": style.colour, "linestyle": style.line}
-            time = 1e6 * blow.time
-            way.plot(time, 1e6 * blow.struck, label=style.label, **look)
-            way.plot(time, 1e6 * blow.far, linewidth=0.8, **look)
-            work.plot(time, 1e-6 * blow.evaluations, label=style.label, **look)
+            time = 1e6 * impact.time
+            way.plot(time, 1e6 * impact.struck, label=style.label, **look)
+            way.plot(time, 1e6 * impact.far, linewidth=0.8, **look)
+            work.plot(time, 1e-6 * impact.evaluations, label=style.label, **look)
         way.set(xlabel="time [µs]", ylabel="displacement [µm]", title="the answer")
         work.set(xlabel="time [µs]", ylabel="evaluations of bonds and pairs [10⁶]")
         work.set(title="the price")
         handles, labels = work.get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower left", ncols=len(blows))
+        figure.legend(handles, labels, loc="outside lower left", ncols=len(impacts))
         ends = [way.plot([], [], color=GREY, lw=width)[0] for width in (1.5, 0.8)]
         way.legend(ends, ["struck end (thick)", "far end (thin)"], loc="upper left")
-        levels = blows[1].levels
+        levels = impacts[1].levels
         top = int(levels.max()) + 1
         shares = np.array([np.bincount(row, minlength=top) / len(row) for row in levels])
-        areas = share.stackplot(1e6 * blows[1].time, 100.0 * shares.T, colors=_shades(top))
+        areas = share.stackplot(1e6 * impacts[1].time, 100.0 * shares.T, colors=_shades(top))
         share.set(xlabel="time [µs]", ylabel="share of bodies [%]", ylim=(0.0, 100.0))
         share.set(
-            title=f"steps: {styles[blows[1].name].label}", xlim=(0.0, 1e6 * blows[1].time[-1])
+            title=f"steps: {styles[impacts[1].name].label}", xlim=(0.0, 1e6 * impacts[1].time[-1])
         )
         names = [seconds(dt0 / 2.0**level) for level in range(top)]
         figure.legend(areas[::-1], names[::-1], title="step", loc="outside right center")
 
 
-def film_blow(path, base, other, dt0, count):
+def film_impact(path, base, other, dt0, count):
     """Both bars by their bodies' steps, and how far the struck end moves. count: of frames."""
     styles = styles_of([base.name, other.name])
     top = int(max(base.levels.max(), other.levels.max())) + 1
     with moving_picture(path, (4.0, 3.8), 120) as (figure, shoot):
         panels = figure.subplots(3, 1, height_ratios=(1.0, 1.0, 1.25))
-        blocks = [_Block(axes, blow, top) for axes, blow in zip(panels, (base, other))]
+        blocks = [_Block(axes, impact, top) for axes, impact in zip(panels, (base, other))]
         both = panels[:2].tolist()
         words = f"step of a body; displacement × {_MAGNIFY:g}; thick line: mean of the struck end"
         look = {"location": "bottom", "aspect": 40, "label": words}
@@ -71,9 +71,9 @@ def film_blow(path, base, other, dt0, count):
         way.set(xlabel="time [µs]", ylabel="displacement of\nthe struck end [µm]")
         way.legend(loc="lower right")
         for row in np.linspace(0, len(base.time) - 1, count).round().astype(int):
-            for block, blow, line in zip(blocks, (base, other), lines):
+            for block, impact, line in zip(blocks, (base, other), lines):
                 block.show(row)
-                line.set_data(1e6 * blow.time[: row + 1], 1e6 * blow.struck[: row + 1])
+                line.set_data(1e6 * impact.time[: row + 1], 1e6 * impact.struck[: row + 1])
             shoot()
 
 
@@ -84,8 +84,8 @@ def _shades(count):
 class _Block:
     """Bar and fragment from the side, coloured by level, displacement magnified."""
 
-    def __init__(self, axes, blow, top):
-        self.blow, self.model, self.view = blow, blow.simulation.model, View()
+    def __init__(self, axes, impact, top):
+        self.impact, self.model, self.view = impact, impact.simulation.model, View()
         flat = self.view.project(self.model.mesh.points)
         low, high = flat.min(axis=0), flat.max(axis=0)
         axes.set(xlim=(low[0] - 0.08, high[0] + 0.02), ylim=(low[1] - 0.03, high[1] + 0.03))
@@ -98,19 +98,19 @@ class _Block:
         shades = ListedColormap(_shades(top)[:top])
         self.drawn = PolyCollection([], cmap=shades, norm=norm, linewidth=0.25, edgecolor=GREY)
         axes.add_collection(self.drawn)
-        self.axes, self.name = axes, styles_of([blow.name])[blow.name].label
-        self.broken_tick = blow.simulation.state.broken_tick.to_numpy()[: self.model.bond_count]
-        self.tick = blow.simulation.schedule.tick_seconds
+        self.axes, self.name = axes, styles_of([impact.name])[impact.name].label
+        self.broken_tick = impact.simulation.state.broken_tick.to_numpy()[: self.model.bond_count]
+        self.tick = impact.simulation.schedule.tick_seconds
 
     def show(self, row):
         """Show a frame by its number."""
-        frame, blow = self.blow.frames[row], self.blow
+        frame, impact = self.impact.frames[row], self.impact
         broken = (self.broken_tick >= 0) & (self.broken_tick * self.tick <= frame.time_s)
         corners = displaced(self.model, frame, _MAGNIFY)
         polygons, body, _ = surface(self.model.topology, self.view, corners, broken)
         self.drawn.set_verts(polygons)
         self.drawn.set_array(frame.level[body].astype(float))
-        self.edge.set_data([self.end - _MAGNIFY * blow.struck[row]] * 2, self.height)
-        count = f"{1e-6 * blow.evaluations[row]:.1f} million evaluations"
+        self.edge.set_data([self.end - _MAGNIFY * impact.struck[row]] * 2, self.height)
+        count = f"{1e-6 * impact.evaluations[row]:.1f} million evaluations"
         text = f"{self.name}:\n{count} after {1e6 * frame.time_s:.0f} µs"
         self.axes.set_title(text)
