@@ -247,8 +247,7 @@ PAGES = (
     Page(
         "hard_cases",
         PRICE,
-        "Which scenes at the edge does each method bear, by what margin, and which does it "
-        "refuse?",
+        "Which scenes at the edge does each method bear, by what margin, and which does it refuse?",
         "A row a case, a mark a method: right of the line it stays within what physics allows, "
         "left it refuses in words; one that returns numbers where it should refuse has failed. The "
         "sheets show what each case did.",

@@ -110,11 +110,11 @@ class MissingEffects:
 
     def resume(self, saved):
         """Take over what ``saved`` gave."""
-        for missed, row in zip(self._all(), saved["needed"].tolist()):
-            missed.times, missed.most, missed.where = (int(value) for value in row[:3])
-            missed.first_s = row[3]
-            if missed.times:
-                missed.place_m = self._position_of(missed)
+        for finding, row in zip(self._all(), saved["needed"].tolist()):
+            finding.times, finding.most, finding.where = (int(value) for value in row[:3])
+            finding.first_s = row[3]
+            if finding.times:
+                finding.place_m = self._position_of(finding)
         looks, touching, self.last_s = saved["looks"].tolist()
         self.looks, self.touching = int(looks), int(touching)
 
@@ -127,8 +127,8 @@ class MissingEffects:
     def _all(self):
         return (*self.needed.values(), self.outer)
 
-    def _position_of(self, missed):
-        return (self._centre if missed is self.outer else self._middle)(missed.where)
+    def _position_of(self, finding):
+        return (self._centre if finding is self.outer else self._middle)(finding.where)
 
     def _centre(self, body):
         return tuple(self.model.centre[body].tolist())
@@ -139,8 +139,8 @@ class MissingEffects:
 
     def findings(self):
         """A ``MissingEffect`` for each effect that was needed, an empty tuple where none was."""
-        found = [missed for missed in self._all() if missed.times]
-        return tuple(replace(missed, looks=self.looks) for missed in found)
+        found = [finding for finding in self._all() if finding.times]
+        return tuple(replace(finding, looks=self.looks) for finding in found)
 
     @ti.kernel
     def _mark(self, marks: ti.types.ndarray(dtype=ti.i32, ndim=2)):
