@@ -10,15 +10,15 @@ class MomentumAccount:
 
     Counted from the end of the first step, when all that is carried moves along.
 
-    weight: of a particle [N]. due: momentum that a filling should have [kg m/s]. late: part of it
-    that what is carried takes over at its next step [kg m/s]. exchanged: sum of the magnitudes of
-    what was given [N s].
+    weight: of a particle [N]. expected: momentum that a filling should have [kg m/s]. late: part of
+    it that what is carried takes over at its next step [kg m/s]. exchanged: sum of the magnitudes
+    of what was given [N s].
     """
 
     def __init__(self, table, weight):
         self.table, self.weight = table, ti.field(ti.f64, shape=())
         self.weight[None] = weight
-        for name in ("due", "late", "exchanged"):
+        for name in ("expected", "late", "exchanged"):
             setattr(self, name, ti.field(ti.f64, shape=table.count))
 
     @ti.func
