@@ -56,7 +56,7 @@ def film_impact(path, base, other, dt0, count):
         panels = figure.subplots(3, 1, height_ratios=(1.0, 1.0, 1.25))
         blocks = [_Block(axes, impact, top) for axes, impact in zip(panels, (base, other))]
         both = panels[:2].tolist()
-        words = f"step of a body; displacement × {_MAGNIFY:g}; thick line: mean of the struck end"
+        words = f"step of a body; displacement × {_MAGNIFY:g}\nthick line: mean of the struck end"
         look = {"location": "bottom", "aspect": 40, "label": words}
         bar = figure.colorbar(blocks[0].drawn, ax=both, **look)
         bar.ax.set_xticks(np.arange(top), [seconds(dt0 / 2.0**k) for k in range(top)])
