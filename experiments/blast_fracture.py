@@ -54,7 +54,8 @@ from taichi_dem.files import write_csv
 from taichi_dem.progress_bar import ProgressBar
 
 NAME = "blast_fracture"
-#: Method by name: how it is made of the largest step and the way l; its largest step [s], l [m].
+#: Method by name: how it is made of the largest step and the displacement limit l; its largest step
+#: [s], l [m].
 METHODS = {
     "implicit": (lambda dt0, distance: ImplicitDashpots(dt0), 4e-7, None),
     "limited": (lambda dt0, distance: explicit_limited(dt0), 2.5e-8, None),

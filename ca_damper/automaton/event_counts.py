@@ -1,4 +1,4 @@
-"""How often each rule of the automaton acted."""
+"""Counts of events by rule of the automaton."""
 
 import taichi as ti
 

@@ -39,7 +39,7 @@ class Once:
 
 @ti.data_oriented
 class Step:
-    """The phases of a substep, as (due list, what happens to one member) pairs.
+    """The phases of a substep, as (active list, what happens to one member) pairs.
 
     A substep begins with the contacts of the present tick, whose bonds are evaluated already, and
     ends with the bonds of the next: between substeps the contact lists can be renewed.

@@ -18,7 +18,7 @@ from taichi_dem.types import real
 
 @ti.data_oriented
 class Schedule:
-    """Clock and due lists of a run.
+    """Clock and active lists of a run.
 
     criterion: rule from ``step_control``. uniform: all bodies share the finest level wanted.
     drifted: bodies next to a due one are brought to its time too, else only due bodies move.

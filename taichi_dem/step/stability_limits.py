@@ -141,7 +141,7 @@ class StabilityLimits:
 
     @ti.func
     def notice_pair(self, p, count, event: ti.template()):
-        """Note how many contacts of a pair are near; list both bodies if that is news."""
+        """Note how many contacts of a pair are near; list both bodies if the number changed."""
         if count != self.contact_limits.count[p]:
             self.contact_limits.count[p] = count
             for side in ti.static(range(2)):
@@ -238,7 +238,7 @@ class StabilityLimits:
         """Square of the acceleration that the loads alone give body i [m^2/s^4].
 
         The larger one of now and a largest step ahead: a body does not leap into a load that sets
-        in while it sleeps.
+        in before its next update.
         """
         push2 = 0.0
         for e in ti.static(range(len(self.model.loads))):

@@ -40,7 +40,7 @@ def test_bad_options_are_refused_by_name(name, value, allowed):
     assert "\n" not in str(refused.value)
 
 
-def test_priority_without_rivals_is_refused():
+def test_priority_without_conflicts_is_refused():
     """With one-sided pairs no events compete: the option would do nothing."""
     with pytest.raises(InputError, match="priority must be 'random'"):
         Automaton(pair_rule="one_sided", priority="pairs_first")

@@ -79,7 +79,7 @@ def test_an_interrupted_batch_goes_on_to_the_same_bits(shaken, tmp_path):
     with pytest.raises(Interrupted, match=r"interrupted at t = .* s, saved in .*run.npz"):
         with batch.checkpointed(checkpoint, None, IDENTITY):
             shaken.run(CtrlCAt(2))
-    done = batch._look()[0]
+    done = batch._read_status()[0]
     assert (done > 0).all()
     assert (done < 2 * batch.steps_per_cycle).all()
     batch.start("rigid")

@@ -142,7 +142,7 @@ UNWELL = (
 
 
 @pytest.mark.parametrize("search", ["cells", "all_pairs"])
-def test_health_finds(search):
+def test_divergence_code_finds(search):
     # One change a scene, to the first of two spheres so soft that they stay where they are put;
     # the second is at (0.01, 0.05) from the middle of the floor.
     soft = {"young": 1e3, "wall_young": 1e3}

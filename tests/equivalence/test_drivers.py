@@ -1,4 +1,4 @@
-"""Whichever driver proves the quicker goes on, and no bit depends on which."""
+"""Whichever driver proves faster continues, and no bit depends on which."""
 
 import numpy as np
 import pytest
@@ -16,14 +16,14 @@ class Slow:
     """A clock on which one driver takes a hundred times as long as the other, whatever they do."""
 
     def __init__(self, slow):
-        self.slow, self.now, self.quicker = slow, 0.0, None
+        self.slow, self.now, self.auto = slow, 0.0, None
 
     def __call__(self):
         return self.now
 
-    def watch(self, quicker):
+    def time_calls(self, auto):
         """Let the clock go on with every call of a driver."""
-        for name, driver in quicker.drivers.items():
+        for name, driver in auto.drivers.items():
             for call in ("few", "run"):
                 setattr(driver, call, self._timed(getattr(driver, call), name))
 
@@ -47,7 +47,7 @@ def runs():
     clock = Slow("resident")
     simulation.driver = AutoDriver(simulation.step, clock)
     simulation.start()
-    clock.watch(simulation.driver)
+    clock.time_calls(simulation.driver)
     names = [simulation.driver.name]
     simulation.advance_to(STEPS // 3)
     names.append(simulation.driver.name)
@@ -59,7 +59,7 @@ def runs():
 
 
 @pytest.mark.slow
-def test_the_quicker_driver_is_chosen_again_and_again(runs):
+def test_the_faster_driver_is_chosen_again_and_again(runs):
     assert runs[2] == ["resident (measured)", "parallel (measured)", "resident (measured)"]
     assert runs[1].report().driver == "resident (measured)"
 

@@ -21,7 +21,7 @@ ASKED = [
 
 
 @pytest.mark.parametrize(("case", "method"), ASKED)
-def test_method_bears_the_case_or_declines_it_in_words(case, method):
+def test_method_bears_the_case_or_refuses_it_in_words(case, method):
     result = judge(case, method, quick=True)
     wanted = "refused" if method in case.refused else "passed"
     assert result.status == wanted, result.words

@@ -36,7 +36,7 @@ def test_method_that_claims_a_case_and_refuses_it_fails():
     assert judge(case(raises=InputError("dt must be short")), "able", True).status == FAILED
 
 
-def test_method_that_declines_in_the_words_that_are_due_is_refused():
+def test_method_that_refuses_in_the_words_that_are_due_is_refused():
     unable = {"unable": "dt must"}
     assert (
         judge(case(raises=InputError("dt must"), refused=unable), "unable", True).status == REFUSED

@@ -41,7 +41,7 @@ def test_a_simulation_takes_one_group_of_fields():
     assert groups() == before + 1
 
 
-def test_a_session_without_room_is_said_in_words(monkeypatch):
+def test_a_session_at_its_limit_is_said_in_words(monkeypatch):
     Simulation(brisk_scene(), Multirate(1e-8, 2e-7))
     monkeypatch.setattr(allocation, "MOST_GROUPS", 0)
     with pytest.raises(InputError, match=r"must stay below 0, got \d+: call runtime.stop"):

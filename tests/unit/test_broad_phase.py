@@ -276,7 +276,7 @@ def test_spheres_that_touch_are_listed_however_seldom_a_pair_is_looked_at(again,
     assert max(found) > min(found) + 20
 
 
-def test_a_fast_body_has_leeway_for_some_steps(again):
+def test_a_fast_body_has_a_skin_for_some_steps(again):
     """Each goes STEPS largest steps at its speed, spin included, between half a skin and a cap.
 
     Spheres are candidates where their gap is below the body skin of both; no search is asked for
@@ -303,12 +303,12 @@ def test_a_fast_body_has_leeway_for_some_steps(again):
     assert contacts.search_requested[None] == 0
 
 
-@pytest.mark.parametrize("room", ["neighbours_per_body", "pairs_per_body", "spheres_per_body"])
-def test_too_little_room_is_said_in_words(room):
+@pytest.mark.parametrize("option", ["neighbours_per_body", "pairs_per_body", "spheres_per_body"])
+def test_too_little_capacity_is_said_in_words(option):
     """The lists have some room for small scenes whatever the options; the mesh has to exceed it."""
-    rooms = {"neighbours_per_body": 1000, room: 1}
-    contact = effects.SphereContact(outer_faces=True, skin=0.05, **rooms)
+    capacities = {"neighbours_per_body": 1000, option: 1}
+    contact = effects.SphereContact(outer_faces=True, skin=0.05, **capacities)
     scene = Scene(bar(0.6, 0.2, (12, 4, 4)), CONCRETE, [contact])
     simulation = Simulation(scene, Uniform(1e-9))
-    with pytest.raises(ValueError, match=f"larger {room}"):
+    with pytest.raises(ValueError, match=f"larger {option}"):
         simulation.start()

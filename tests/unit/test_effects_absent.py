@@ -66,7 +66,7 @@ model += [(4 * n, 1, whole), (4 * n, 1, whole)]
 state = [(n, 3), (n, 4), (n, 9), (n, 3), (n, 3), (n, 3), (n, 1, whole), (n, 1, whole)]
 state += [(n, 1, wide), (4 * n, 6), (b, 1, wide), (n, 1), (n, 6)]
 state += [(1, 1, wide), (1, 1, whole), (1, 1)]
-# Of three due lists that of contacts has but one place.
+# Of three active lists that of contacts has but one place.
 due = [(k, 1, whole) for size in (n, b, 1) for k in (size, size, size, 22)]
 clock = [(21, 1), *due, *[(1, 1, whole)] * 3, (2 * n + 2 * b, 1, whole), (1, 1, whole)]
 clock += [(5, 1, wide)]

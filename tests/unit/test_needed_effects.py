@@ -75,7 +75,7 @@ def test_what_poses_the_question_is_kept_though_it_did_nothing(hung):
 
 
 @pytest.mark.parametrize("scene", ["gentle", "hung"])
-def test_dropping_what_never_acted_changes_no_bit(scene, request):
+def test_dropping_inactive_effects_changes_no_bit(scene, request):
     """The advice is a promise: without these effects every sample is the same."""
     result, makers = request.getfixturevalue(scene), {"gentle": GENTLE, "hung": HUNG}[scene]
     dropped = needed_effects(result).droppable
@@ -141,7 +141,7 @@ def test_friction_of_ones_own_is_dropped_only_with_the_contact_it_acts_in(expose
     assert found["sphere_contact"].idle
 
 
-def test_contact_is_not_dropped_where_spheres_on_outer_faces_are_missed():
+def test_contact_is_not_dropped_where_spheres_on_outer_faces_are_missing():
     found = used([effects.SphereContact(), effects.Friction()], exposed=False, lacking=1)
     assert not any(use.idle for use in found.values())
 
@@ -179,7 +179,7 @@ def test_weight_of_all_is_all_the_work(gentle):
     assert use.energy_J == pytest.approx(0.5 * mass * (9.81 * UNTIL) ** 2, rel=1e-9)
 
 
-def test_missed_effect_is_told_how_often_and_where():
+def test_missing_effect_is_told_how_often_and_where():
     """A hundred g pull nothing apart; a support that runs away does, past the strength."""
     mesh = pair()
     runs_away = effects.PrescribedMotion(next(iter(mesh.groups)), (-50.0, 0.0, 0.0))

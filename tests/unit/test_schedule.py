@@ -1,4 +1,4 @@
-"""Due lists and the step rule, on made-up keys and speeds."""
+"""Active lists and the step rule, on made-up keys and speeds."""
 
 import numpy as np
 import taichi as ti
@@ -10,7 +10,7 @@ from taichi_dem.timeline import MAX_LEVEL, coarsest_active
 
 @ti.data_oriented
 class Sorter:
-    """A due list over keys that a test sets."""
+    """An active list over keys that a test sets."""
 
     def __init__(self, keys):
         self.keys = ti.field(ti.i32, shape=len(keys))

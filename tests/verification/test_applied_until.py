@@ -75,7 +75,7 @@ class Sleepers:
         _notice(self.simulation.schedule.limits, body)
 
 
-def test_a_bond_that_paid_ahead_pays_a_woken_body_nothing_until_then():
+def test_a_bond_applies_no_impulse_to_a_woken_body_twice():
     """F dt0 at t = 0 is all until dt0, then F dt0 / 4 with the opening of then; both bodies alike.
 
     By hand: impulses at t = 0 of F0 dt0. Body 0 is kicked and woken at dt0 / 4, moves at its new
