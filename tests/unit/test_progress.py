@@ -73,11 +73,15 @@ def test_time_left_is_that_of_what_is_not_done():
 
 def test_time_left_of_a_scene_without_bonds_is_told_by_its_share():
     run = {"seconds": 3.0, "time_s": 0.25, "until_s": 1.0}
-    assert RunProgress(share=0.25, evaluations=0, ahead=0.0, **run).seconds_left == 9.0
+    assert RunProgress(share=0.25, evaluations=0, evaluation_rate=0.0, **run).seconds_left == 9.0
     # 100 evaluations in 3 s, and three quarters of a second at 400 a second ahead.
-    assert RunProgress(share=0.25, evaluations=100, ahead=400.0, **run).seconds_left == 9.0
+    assert (
+        RunProgress(share=0.25, evaluations=100, evaluation_rate=400.0, **run).seconds_left == 9.0
+    )
     # A first call says nothing of how fast the rest goes.
-    assert RunProgress(share=0.001, evaluations=1, ahead=1.0, **run).seconds_left == math.inf
+    assert (
+        RunProgress(share=0.001, evaluations=1, evaluation_rate=1.0, **run).seconds_left == math.inf
+    )
 
 
 def test_speeds_have_units_a_reader_knows():
