@@ -25,7 +25,15 @@ LAYERS = {
         ("restart",),
         (
             *("tetrahedra", "mesh", "mesh_content", "mesh_files", "mesh_shapes", "mesh_gmsh"),
-            *("mesh_split", "mesh_order", "meshes", "topology", "quality", "contact_spheres"),
+            *(
+                "mesh_split",
+                "mesh_order",
+                "mesh_parts",
+                "meshes",
+                "topology",
+                "quality",
+                "contact_spheres",
+            ),
             *("materials", "partition"),
         ),
         ("physics",),
