@@ -28,7 +28,7 @@ class Health:
         self.model, self.state, self.schedule, self.solves = model, state, schedule, solves
         self.limited = schedule.has_rates and schedule.rates.limited
         self.contacts, self.ledger = contacts, ledger
-        self.round_off = self._round_off()
+        self.rounded_once = self._rounded_once()
         self.rest_until = 0.0
 
     def check(self, hurried=False):
@@ -70,14 +70,18 @@ class Health:
         account = self.ledger.account()
         present = account["kinetic"] + account["bond_strain"] + account["sphere_strain"]
         given = self.ledger.start_energy + abs(account["load_work"]) + abs(account["support_work"])
-        bound = ENERGY_FROM_NOWHERE * max(given, self.round_off)
+        bound = ENERGY_FROM_NOWHERE * max(given, self.round_off())
         if -account["residual"] > bound and present > given:
             motion = self.state.motion()
             body = int(np.linalg.norm(motion["velocity"], axis=1).argmax())
             what = f"is the fastest while {-account['residual']:.3g} J came from nowhere"
             raise SimulationDiverged(self._sentence(body, motion, what))
 
-    def _round_off(self):
+    def round_off(self):
+        """Energy [J] that rounded positions may have given the bonds so far, once a substep."""
+        return max(1, int(self.schedule.evaluations[0])) * self.rounded_once
+
+    def _rounded_once(self):
         """Energy [J] of springs whose ends are known to a few units in the last place."""
         count = self.model.bond_count
         area = 3.0 * self.model.unit_area.to_numpy()[:count]

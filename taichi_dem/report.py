@@ -23,6 +23,7 @@ class Report:
     effect. missed: a ``watch.Missed`` for each effect that was left out and needed. unresolved:
     sentences about bonds and contacts for which the step was too long.
     bound_by: bodies at the end by what bounds their step, see ``step_control.CRITERIA``.
+    round_off_J: energies below this may be round-off (``Health.round_off``).
     realised_gain: CPU time of one step for all over that of the run, where it was measured.
     """
 
@@ -51,6 +52,7 @@ class Report:
     missed: tuple
     unresolved: tuple
     bound_by: dict
+    round_off_J: float = 0.0
     realised_gain: Optional[float] = None
 
     def __repr__(self):
@@ -86,9 +88,21 @@ class Report:
     @property
     def ledger_residual_fraction(self):
         """Energy that the account cannot explain, over the work put in or the energy held."""
+        return abs(self.ledger["residual"]) / max(*self._given_and_held(), 1e-300)
+
+    def _given_and_held(self):
+        """Work put in, and energy held at the end [J]."""
         given = abs(self.ledger["load_work"]) + abs(self.ledger["support_work"])
-        held = self.ledger["kinetic"] + self.ledger["bond_strain"]
-        return abs(self.ledger["residual"]) / max(given, held, 1e-300)
+        return given, self.ledger["kinetic"] + self.ledger["bond_strain"]
+
+    @property
+    def unexplained(self):
+        """The residual in words: a share of the work put in, unless all energies are round-off."""
+        given, held = self._given_and_held()
+        if max(given, held) <= self.round_off_J:
+            return f"{abs(self.ledger['residual']):.2g} J; all energies are round-off"
+        whole = "the energy held" if held > given else "it"
+        return f"{100.0 * self.ledger_residual_fraction:.3g} % of {whole}"
 
     def as_dict(self):
         """All figures, for a JSON file."""
@@ -145,7 +159,7 @@ class Report:
             *self._sweeps_row(),
             ("contact searches", f"{self.searches:,}"),
             ("work put in", f"{self.ledger['load_work'] + self.ledger['support_work']:.6g} J"),
-            ("ledger residual", f"{100 * self.ledger_residual_fraction:.3g} % of it"),
+            ("ledger residual", self.unexplained),
             (
                 "momentum error",
                 f"{self.linear_momentum_error:.1e} linear, "

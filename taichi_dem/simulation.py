@@ -257,6 +257,7 @@ class Simulation:
             missed=self.watch.findings(),
             unresolved=self.resolution.findings(),
             bound_by=counted_criteria(self.state.bound.to_numpy()),
+            round_off_J=self.health.round_off(),
         )
 
 
