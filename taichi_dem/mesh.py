@@ -11,19 +11,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichi_dem import tetrahedra as geometry
-from taichi_dem.checks import finite, shown, word
+from taichi_dem.checks import shown, word
 from taichi_dem.display import counted, in_brief
 from taichi_dem.errors import InputError
 from taichi_dem.mesh_parts import parts_of
+from taichi_dem.mesh_weld import COINCIDENT, weld_labels
 
 #: Below this share of (longest edge)^3 a volume counts as zero: what round-off leaves of it.
 FLAT = 1e-12
 
 #: The extent of a mesh lies between these [m]: a moment of inertia is its fifth power.
 _LEAST_EXTENT, _MOST_EXTENT = 1e-30, 1e30
-
-#: Points nearer than this share of the mesh's extent count as one and the same place.
-COINCIDENT = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,8 +47,8 @@ class Mesh:
         groups = f"groups {', '.join(self.groups)}" if self.groups else "no groups"
         bodies, points = counted(self.body_count, "body"), counted(self.point_count, "point")
         parts = [note for note in self.notes if note.startswith("the mesh has")]
-        notes = f"{counted(len(self.notes), 'note')} (print its notes)" if self.notes else ""
-        return in_brief(self, bodies, points, groups, self.source, *parts, notes)
+        notes = f"{counted(len(self.notes), 'note')} (.notes)" if self.notes else ""
+        return in_brief(self, bodies, points, *parts, notes, groups, self.source)
 
     @property
     def body_count(self) -> int:
@@ -117,10 +115,7 @@ def welded_numbers(points, tetrahedra, tolerance, notes):
     """
     points = _checked_points(points)
     tetrahedra = _checked_indices("tetrahedra", tetrahedra, 4, len(points))
-    label = np.arange(len(points))
-    if _checked_tolerance(tolerance, points, tetrahedra) > 0.0:
-        label = geometry.components(len(points), geometry.close_pairs(points, tolerance))
-        _refuse_joined_ends(points, tetrahedra, label, tolerance)
+    label = weld_labels(points, tetrahedra, tolerance)
     count = int(np.sum(label != np.arange(len(points))))
     if count:
         notes.append(f"welded {count} points closer than {tolerance:g} m to another")
@@ -176,30 +171,6 @@ def _checked_indices(what, indices, width, point_count):
             f"{indices[bad[0]].tolist()}"
         )
     return indices.astype(np.int32)
-
-
-def _checked_tolerance(tolerance, points, tetrahedra):
-    """Refuse a tolerance that would weld the ends of an edge."""
-    lengths = geometry.edge_lengths(points, tetrahedra)
-    shortest = lengths[lengths > COINCIDENT * np.ptp(points, axis=0).max()].min(initial=np.inf)
-    if not (finite(tolerance) and 0.0 <= tolerance < shortest):
-        raise InputError(
-            f"weld_tolerance must lie in [0, {shortest:.6g}) m, the shortest edge, "
-            f"got {shown(tolerance)}"
-        )
-    return tolerance
-
-
-def _refuse_joined_ends(points, tetrahedra, label, tolerance):
-    """Refuse a tolerance that welds the ends of an edge through points between them."""
-    ends = label[tetrahedra[:, geometry.LOCAL_EDGES]]
-    lengths = geometry.edge_lengths(points, tetrahedra)
-    joined = (ends[..., 0] == ends[..., 1]) & (lengths > tolerance)
-    if joined.any():
-        raise InputError(
-            f"weld_tolerance must be smaller than {tolerance:g} m: it joins the ends of an edge "
-            f"of {lengths[joined].min():.6g} m through points between them"
-        )
 
 
 def _without_loose_points(points, tetrahedra, groups, notes):

@@ -12,6 +12,7 @@ from taichi_dem.mesh_split import shape_of
 #: Gmsh's groups by their dimension.
 _KINDS = {0: "points", 1: "lines", 3: "volumes"}
 _SPLIT = "split them into tetrahedra, for example by ParaView's filter Tetrahedralize"
+_UNKNOWN = "holds cells of a type that meshio does not know, such as voxels"
 #: What Gmsh's remedy below calls a file whose name a shell or Gmsh would take for more than a name.
 _PLAIN = "surface.stl"
 #: Kind of an Abaqus surface among the unread groups.
@@ -32,8 +33,13 @@ _IN_A_GROUP = (
 )
 
 
-def refuse_without_tetrahedra(raw, path):
-    """Raise InputError for a file that has no tetrahedra, with what to do about it."""
+def refuse_without_tetrahedra(raw, path, printed=""):
+    """Raise InputError for a file that has no tetrahedra, with what to do about it.
+
+    printed: what the reader wrote to the terminal.
+    """
+    if cells_dropped(printed):
+        raise InputError(f"mesh file {path} {_UNKNOWN}, which cannot be read: {_SPLIT}")
     kinds = ", ".join(_held(raw)) or "no cells"
     remedy = _remedy(raw, path)
     raise InputError(f"mesh file {path} holds no tetrahedra (it holds: {kinds}){remedy}")
@@ -67,6 +73,13 @@ def cells_counted(count, kind):
     return f"{count} {plurals[kind]}"
 
 
+def cells_dropped(printed):
+    """A sentence about cells that meshio passes over, or ""; printed: what it wrote to say so."""
+    if "cells that meshio cannot handle" not in " ".join(printed.split()):
+        return ""
+    return f"it {_UNKNOWN}, and these are not read: {_SPLIT}"
+
+
 def reason_of(error, printed):
     """Why a reader failed, in words: an exception may hold a number only.
 
@@ -75,8 +88,8 @@ def reason_of(error, printed):
     text = " ".join(str(error).split())
     if isinstance(error, SystemExit):
         text = " ".join(printed.replace("Error: ", "").split())
-    if "cells that meshio cannot handle" in text:
-        return f"it holds cells, such as voxels, that cannot be cut: {_SPLIT}"
+    if cells_dropped(text):
+        return f"it {_UNKNOWN}: {_SPLIT}"
     named = text if re.search(r"[^\W\d]", text) else f"{type(error).__name__} {text}"
     return named.strip()
 

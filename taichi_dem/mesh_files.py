@@ -19,6 +19,7 @@ from taichi_dem.files import renamed_when_done, write_text
 from taichi_dem.mesh import Mesh, checked_mesh, welded_numbers
 from taichi_dem.mesh_content import (
     cells_counted,
+    cells_dropped,
     is_quadrangle,
     is_solid,
     is_tetrahedron,
@@ -51,23 +52,25 @@ def read_mesh(path, *, scale=1.0, weld_tolerance=0.0) -> Mesh:
     Elements of higher order are read as linear ones; hexahedra, prisms and pyramids are cut into
     tetrahedra after welding; groups of points, lines and volumes are not read: the mesh's notes
     say so. A UserWarning tells of what may change results: parts of other materials, Abaqus sets
-    and surfaces that are not read, and cells that meet but share no face.
+    and surfaces that are not read, cells of types that meshio does not know, and cells that meet
+    but share no face.
 
     Raises InputError, in one sentence, for a file that is missing, cannot be read, holds no solid
     cells or such as cannot be cut, or whose mesh ``checked_mesh`` refuses.
     """
     scale, path = positive("scale", scale), path_name("path", path)
-    raw = _read_raw(path)
+    raw, printed = _read_raw(path)
     refuse_uncut(raw, path)
     if not any(is_solid(block.type) and len(block.data) for block in raw.cells):
-        refuse_without_tetrahedra(raw, path)
+        refuse_without_tetrahedra(raw, path, printed)
     unread = (*unread_groups(raw), *surfaces_of_abaqus(path))
     try:
         mesh = _mesh(raw, scale, weld_tolerance)
     except InputError as error:
         cells = _cell_at_fault(raw) if "tetrahedra " in str(error) else ""
         raise InputError(f"mesh file {path}: {error}{cells}") from None
-    told = [*parts_dropped(raw, unread), unbonded_places(mesh.points, mesh.tetrahedra)]
+    told = [cells_dropped(printed), *parts_dropped(raw, unread)]
+    told.append(unbonded_places(mesh.points, mesh.tetrahedra))
     told = [sentence for sentence in told if sentence]
     for sentence in told:
         warnings.warn(f"mesh file {path}: {sentence}", stacklevel=2)
@@ -118,7 +121,10 @@ def write_pvd(path, times_s, file_names) -> None:
 
 
 def _read_raw(path):
-    """The file as meshio sees it; whatever goes wrong inside becomes one InputError."""
+    """The file as meshio sees it, and what meshio printed.
+
+    Whatever goes wrong inside becomes one InputError.
+    """
     if not os.path.isfile(path):
         problem = "is no file" if os.path.lexists(path) else "does not exist"
         problem = "is a folder" if os.path.isdir(path) else problem
@@ -128,7 +134,7 @@ def _read_raw(path):
     sentence = f"its reader found no end in {seconds:.3g} s, as in a file that was cut off"
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-            return within(seconds, lambda: _meshio_read(path), sentence)
+            return within(seconds, lambda: _meshio_read(path), sentence), said.getvalue()
     except (Exception, SystemExit) as error:  # meshio raises anything, and exits on some files
         reason = reason_of(error, said.getvalue())
         raise InputError(f"mesh file {path} cannot be read: {reason}") from None

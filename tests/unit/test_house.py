@@ -29,6 +29,7 @@ LAYERS = {
                 "mesh_split",
                 "mesh_order",
                 "mesh_parts",
+                "mesh_weld",
                 "meshes",
                 "topology",
                 "quality",

@@ -1,6 +1,7 @@
 """What mesh files hold beside tetrahedra: cells that are cut, and what is told or refused."""
 
 import os
+import re
 import shlex
 import subprocess
 
@@ -179,7 +180,27 @@ CELL_TYPES 1
 def test_voxels_are_refused_in_words(tmp_path):
     (tmp_path / "mesh.vtk").write_text(VOXELS)
     said = refused(tmp_path / "mesh.vtk")
-    assert "holds cells, such as voxels, that cannot be cut: split them" in said
+    assert "holds cells of a type that meshio does not know, such as voxels: split them" in said
+
+
+@pytest.mark.parametrize("beside", [False, True])
+def test_voxels_that_meshio_passes_over_are_told(tmp_path, beside):
+    """In a VTU it drops them without an error; beside others they would leave holes."""
+    points, cells = boxes((1, 1, 1))
+    kinds = [("hexahedron", cells), ("hexahedron", cells)]
+    content = meshio.Mesh(np.vstack([points, points + 9.0]), kinds[: 1 + beside])
+    content.cells[-1].data = content.cells[-1].data + 8
+    meshio.write(tmp_path / "mesh.vtu", content, binary=False)
+    text = (tmp_path / "mesh.vtu").read_text()
+    types = re.search(r'(Name="types"[^>]*>)\s*((?:12\s*)+)<', text)
+    voxels = "12\n11\n" if beside else "11\n"
+    (tmp_path / "mesh.vtu").write_text(text.replace(types[0], f"{types[1]}{voxels}<"))
+    if not beside:
+        assert "such as voxels, which cannot be read: split" in refused(tmp_path / "mesh.vtu")
+        return
+    with pytest.warns(UserWarning, match="such as voxels, and these are not read"):
+        mesh = read_mesh(tmp_path / "mesh.vtu")
+    assert mesh.body_count == 6 and any("voxels" in note for note in mesh.notes)
 
 
 @pytest.mark.parametrize("error", [KeyError(1), IndexError(), ValueError(" 7 ")])
