@@ -4,6 +4,7 @@ import math
 import time
 from dataclasses import dataclass
 
+from taichi_dem.display import prefixed
 from taichi_dem.progress import Progress
 
 #: Calls of a progress callback keep this distance [s] when stages are short.
@@ -19,7 +20,7 @@ class BatchProgress(Progress):
     @property
     def speed(self):
         """Scene-steps a second."""
-        return f"{1e-6 * self.steps / max(self.seconds, 1e-9):.3g} M scene steps/s"
+        return prefixed(self.steps / max(self.seconds, 1e-9), "scene steps/s")
 
 
 class Stages:

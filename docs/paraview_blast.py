@@ -66,9 +66,11 @@ def show(source, name, words, decades):
     if decades:
         scale.CustomLabels = [most * 10.0**-k for k in range(decades + 1)]
     else:
-        most = colours.RGBPoints[-4]
-        even = [0.0, 0.5 * most, most] if most <= 1.0 else [float(k) for k in range(int(most) + 1)]
-        scale.CustomLabels = even
+        # A level that all bodies share would leave the scale no width.
+        most = max(1.0, math.ceil(colours.RGBPoints[-4]))
+        colours.RescaleTransferFunction(0.0, most)
+        whole = [float(k) for k in range(int(most) + 1)]
+        scale.CustomLabels = [0.0, 0.5, 1.0] if name == "damage" else whole
     text = simple.Show(simple.Text(Text=words), view)
     text.Color, text.WindowLocation = INK, "Upper Center"
     view.ResetCamera()

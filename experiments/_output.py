@@ -35,10 +35,15 @@ class _LastingOutput:
     def write(self, text):
         """Write text, or drop it."""
         try:
-            self._stream.write(text)
+            self._stream.write(self._encodable(text))
         except OSError as error:
             self._drop(error)
         return len(text)
+
+    def _encodable(self, text):
+        """The text, with a question mark for what the encoding of the stream lacks."""
+        encoding = self._stream.encoding or "utf-8"
+        return text.encode(encoding, "replace").decode(encoding)
 
     def flush(self):
         """Send what waits in the buffer, or drop it."""

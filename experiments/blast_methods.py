@@ -73,12 +73,12 @@ def options_parser():
 
 def follow(scene, method, options, title):
     """Report and time series of one run."""
-    simulation = Simulation(scene, method, options.driver)
-    recorder = Recorder(simulation, "hole")
-    simulation.start()
     last = macro_steps(options.until, method.dt0)
     seconds, evaluations = [], []
     with ProgressBar(title) as bar:
+        simulation = Simulation(scene, method, options.driver)
+        recorder = Recorder(simulation, "hole")
+        simulation.start()
         for step in sorted({round(last * k / options.samples) for k in range(options.samples + 1)}):
             simulation.advance_to(step, lambda: bar(progress_of(simulation, options.until)))
             recorder.sample()
@@ -107,10 +107,12 @@ def serves(scene, method, exact, options):
 
 def largest_stable_step(scene, make, step, exact, options):
     """Largest step [s], a power of two from the one in use, with which a method serves."""
-    for _ in range(options.doublings):
-        if not serves(scene, make(2.0 * step), exact, options):
-            return step
-        step *= 2.0
+    with ProgressBar("largest stable step") as bar:
+        for tried in range(options.doublings):
+            bar.count(tried, options.doublings)
+            if not serves(scene, make(2.0 * step), exact, options):
+                return step
+            step *= 2.0
     return step
 
 

@@ -41,6 +41,7 @@ from taichi_dem import (
     plot,
 )
 from taichi_dem.files import output_folder, write_csv
+from taichi_dem.plot_style import styles_of
 from taichi_dem.progress_bar import ProgressBar
 from taichi_dem.record import Recorder
 from taichi_dem.simulate import progress_of
@@ -78,15 +79,15 @@ def options_parser():
 def follow(name, options, scene):
     """One run of a method: (report at the early instant, report at the end, series, seconds)."""
     method = METHODS[name](options.dt0, options.l)
-    simulation = Simulation(scene, method, options.driver)
-    recorder = Recorder(simulation, "hole")
-    simulation.start()
     last = macro_steps(options.until, method.dt0)
     early = min(last, macro_steps(options.early, method.dt0))
     marks = {round(last * k / options.samples) for k in range(options.samples + 1)}
     reports, costs = {}, {"cpu_s": [], "evaluations": [], "level": []}
-    try:
-        with ProgressBar(name) as bar:
+    with ProgressBar(styles_of([name])[name].label) as bar:
+        simulation = Simulation(scene, method, options.driver)
+        recorder = Recorder(simulation, "hole")
+        simulation.start()
+        try:
             for step in sorted(marks | {early}):
                 simulation.advance_to(step, lambda: bar(progress_of(simulation, options.until)))
                 reports[step] = simulation.report()
@@ -94,9 +95,9 @@ def follow(name, options, scene):
                 costs["cpu_s"].append(simulation.run_cpu_seconds)
                 costs["evaluations"].append(reports[step].contact_evaluations)
                 costs["level"].append(simulation.state.level.to_numpy())
-    finally:
-        # Also what a run that diverged, or was interrupted, had reached.
-        write_csv(os.path.join(options.out, f"history_{name}.csv"), recorder.history())
+        finally:
+            # Also what a run that diverged, or was interrupted, had reached.
+            write_csv(os.path.join(options.out, f"history_{name}.csv"), recorder.history())
     series = {**recorder.history(), **costs}
     series["row_early"] = sorted(marks | {early}).index(early)
     return reports[early], reports[last], series

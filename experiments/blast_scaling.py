@@ -146,10 +146,12 @@ def run(options):
     workers = Workers(recorded)
     shared = simulated(workers, QUICK_COUNTS if options.quick else COUNTS)
     cells, *often = (QUICK_CELLS, 1, 2) if options.quick else (CELLS, ROUNDS, options.repeats)
-    gains = [
-        thread_gain("", cells, "paper_multirate", 10, *often),
-        thread_gain(options.mesh, None, "paper_multirate", 400, *often),
-    ]
+    blocks = ("", cells, "paper_multirate", 10), (options.mesh, None, "paper_multirate", 400)
+    gains = []
+    with ProgressBar("two threads") as bar:
+        for block in blocks:
+            bar.count(len(gains), len(blocks))
+            gains.append(thread_gain(*block, *often))
     figures = figures_of(workers, shared, gains)
     write_tables(options.out, workers, shared)
     path = os.path.join(options.out, "scaling.png")

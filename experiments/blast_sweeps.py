@@ -108,11 +108,11 @@ def run(options):
     """Go from time to time, solve in every way, compare."""
     scene = paper_scene(options.mesh)
     output_folder(options.out)
-    simulation = Simulation(scene, ImplicitDashpots(refresh=4e-7))
-    simulation.start()
     found = {}
     times = QUICK_TIMES if options.quick else TIMES
     with ProgressBar("blast") as bar:
+        simulation = Simulation(scene, ImplicitDashpots(refresh=4e-7))
+        simulation.start()
         for time_s in times:
             last = macro_steps(time_s, simulation.method.dt0)
             simulation.advance_to(last, lambda: bar(progress_of(simulation, times[-1])))

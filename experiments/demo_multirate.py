@@ -27,6 +27,7 @@ from taichi_dem import CONCRETE, InputError, Multirate, Scene, Simulation, Unifo
 from taichi_dem.files import output_folder, write_csv
 from taichi_dem.mesh_shapes import bar
 from taichi_dem.plot.blow import film_blow, picture_blow
+from taichi_dem.plot_style import styles_of
 from taichi_dem.progress_bar import ProgressBar
 from taichi_dem.record import Recorder
 from taichi_dem.simulate import progress_of
@@ -104,16 +105,16 @@ def built_scene():
 def hit(name, scene, until, options):
     """One blow with a method; returns Blow."""
     method = METHODS[name](DT0, DISTANCE)
-    simulation = Simulation(scene, method, options.driver)
-    model = simulation.model
-    flying = model.centre[:, 0] > LENGTH
-    velocity = np.outer(flying, (-options.speed, 0.0, 0.0))
-    turn = np.tile([1.0, 0.0, 0.0, 0.0], (model.body_count, 1))
-    simulation.state.place(model.centre, turn, velocity)
-    recorder = Recorder(simulation, None)
-    simulation.start()
     last, counts, broken = macro_steps(until, DT0), [], []
-    with ProgressBar(name) as shown:
+    with ProgressBar(styles_of([name])[name].label) as shown:
+        simulation = Simulation(scene, method, options.driver)
+        model = simulation.model
+        flying = model.centre[:, 0] > LENGTH
+        velocity = np.outer(flying, (-options.speed, 0.0, 0.0))
+        turn = np.tile([1.0, 0.0, 0.0, 0.0], (model.body_count, 1))
+        simulation.state.place(model.centre, turn, velocity)
+        recorder = Recorder(simulation, None)
+        simulation.start()
         for step in sorted({round(last * k / SAMPLES) for k in range(SAMPLES + 1)}):
             simulation.advance_to(step, lambda: shown(progress_of(simulation, until)))
             recorder.snapshot()

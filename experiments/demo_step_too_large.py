@@ -102,11 +102,11 @@ def strike(limit, share, peak):
     """Run the bar with a share of the limit as its step, to its end or as far as it goes."""
     scene = struck_bar(limit, peak)
     step = share * limits(scene.mesh)[limit]
-    simulation = Simulation(scene, Uniform(step))
-    recorder, speeds, times, account = Recorder(simulation, None), [], [], []
-    simulation.start()
     last, sentence = macro_steps(UNTIL[limit], step), ""
     with ProgressBar(f"{share:g} x the limit of {limit}") as shown:
+        simulation = Simulation(scene, Uniform(step))
+        recorder, speeds, times, account = Recorder(simulation, None), [], [], []
+        simulation.start()
         for mark in marks(last):
             try:
                 simulation.advance_to(mark)

@@ -5,6 +5,7 @@ Nothing here reads a field: an object may be shown after its Taichi session has 
 
 import base64
 import html
+import math
 from dataclasses import fields
 from inspect import signature
 
@@ -62,6 +63,14 @@ def counted(count, what):
     """A number with its noun: "1 frame", "2,898 bodies"."""
     plural = f"{what[:-1]}ies" if what.endswith("y") else f"{what}s"
     return f"{count:,} {what if count == 1 else plural}"
+
+
+def prefixed(value, unit):
+    """A number with its unit, from nano to giga: "20 ms", "3.2 M evaluations/s"."""
+    power = min(3, max(-3, math.floor(math.log10(value) / 3.0 + 1e-9))) if value > 0.0 else 0
+    prefix = ("n", "µ", "m", "", "k", "M", "G")[power + 3]
+    gap = " " if prefix and len(unit) > 3 else ""
+    return f"{value / 1e3**power:.3g} {prefix}{gap}{unit}"
 
 
 def listed(values):

@@ -6,6 +6,9 @@ import time
 from dataclasses import dataclass
 from typing import ClassVar
 
+#: Share of a job below which its first calls, which take longer than later ones, rule its speed.
+LEAST_SHARE = 0.01
+
 
 @dataclass(frozen=True)
 class Progress:
@@ -20,8 +23,8 @@ class Progress:
 
     @property
     def seconds_left(self):
-        """Time expected until the end [s]; infinite while nothing is known of it."""
-        if self.share <= 0.0:
+        """Time expected until the end [s]; infinite while too little is known of it."""
+        if self.share < LEAST_SHARE:
             return math.inf
         return max(0.0, self.seconds * (1.0 / self.share - 1.0))
 
@@ -76,6 +79,21 @@ def time_left(seconds):
     if seconds < 5400.0:
         return f"{seconds / 60.0:.0f} min left"
     return f"{seconds / 3600.0:.1f} h left"
+
+
+class Pace:
+    """Says when it is time to report again: after some seconds [s]."""
+
+    def __init__(self, seconds):
+        self.seconds, self._last = seconds, -math.inf
+
+    def due(self, at_any_rate=False):
+        """Whether to report now; the next time is counted from then on."""
+        now = time.perf_counter()
+        due = at_any_rate or now - self._last >= self.seconds
+        if due:
+            self._last = now
+        return due
 
 
 #: Who is told of compiling, the innermost last, and since when each listens [s].

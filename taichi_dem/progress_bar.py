@@ -2,15 +2,19 @@
 
 import contextlib
 import html
+import os
 import sys
 import time
 
-from taichi_dem.checks import AUTO, progress_option, shown
+from taichi_dem.checks import AUTO, instance, progress_option, shown
 from taichi_dem.display import in_brief
+from taichi_dem.errors import InputError
 from taichi_dem.progress import Counted, Progress, listening
 
 #: Least time between two updates of a cell in Jupyter [s].
 _NOTEBOOK_SECONDS = 0.2
+#: Columns of a terminal below which there is no room for the bar beside its words.
+_NARROW = 70
 #: Bars that are shown now; a second one below the first would garble both.
 _open_bars = []
 
@@ -24,17 +28,20 @@ class ProgressBar:
     """
 
     def __init__(self, title):
-        self.title, self._display = title, None
-        self._listening = listening(self)
+        self.title = instance("title", title, str)
+        self._opened = contextlib.ExitStack()
+        self._started, self._display = time.perf_counter(), _Nothing()
 
     def __repr__(self):
         return in_brief(self, self.title)
 
     def __enter__(self):
+        if self in _open_bars:
+            raise InputError(f"the progress bar {self.title!r} is shown already")
         self._started = time.perf_counter()
         self._display = _Nothing() if _open_bars else _display_for(self.title)
         _open_bars.append(self)
-        self._listening.__enter__()
+        self._opened.enter_context(listening(self))
         return self
 
     def __call__(self, progress):
@@ -49,12 +56,13 @@ class ProgressBar:
 
     def count(self, done, total):
         """Show how many runs are done of a job that consists of several."""
-        self(Counted(done / total, time.perf_counter() - self._started, done, total))
+        self(Counted(done / max(1, total), time.perf_counter() - self._started, done, total))
 
     def __exit__(self, *error):
-        self._listening.__exit__(*error)
+        self._opened.close()
         _open_bars.remove(self)
         self._display.close()
+        self._display = _Nothing()
 
 
 @contextlib.contextmanager
@@ -90,22 +98,55 @@ class _Terminal:
         from rich.console import Console
         from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
 
-        texts = TextColumn("{task.description}"), TextColumn("{task.fields[words]}")
-        columns = SpinnerColumn(), texts[0], BarColumn(None), texts[1]
-        # The bar takes what the words leave of a line.
-        self._bar = Progress(*columns, console=Console(stderr=True), transient=True, expand=True)
-        self._bar.start()
+        console = Console(stderr=True)
+        # A title is no markup; dots of Braille are not in every encoding.
+        texts = [
+            TextColumn(f"{{task.{field}}}", markup=False)
+            for field in ("description", "fields[words]")
+        ]
+        spinner = SpinnerColumn("dots" if console.encoding.startswith("utf") else "line")
+        self._narrow = console.width < _NARROW
+        bars = () if self._narrow else (BarColumn(None),)
+        # The bar takes what the words leave of a line. Prints go where they would go without it.
+        self._bar = Progress(
+            *(spinner, texts[0], *bars, texts[1]),
+            console=console,
+            transient=True,
+            expand=not self._narrow,
+            redirect_stdout=sys.stdout is not None and sys.stdout.isatty(),
+        )
         self._task = self._bar.add_task(title, total=1.0, words="")
+        self._bar.start()
 
     def show(self, progress):
         """Draw how far the job is, and what it says of itself."""
         # Rich's own thread redraws ten times a second, but not while Taichi compiles a kernel.
         at_once = progress.phase == "compiling"
-        self._bar.update(self._task, completed=progress.share, words=str(progress), refresh=at_once)
+        words = str(progress).split(", ")
+        words = ", ".join(words[:2] if self._narrow else words)
+        self._bar.update(self._task, completed=progress.share, words=words, refresh=at_once)
 
     def close(self):
         """Remove the bar."""
         self._bar.stop()
+
+
+class _PlainTerminal:
+    """Lines on a terminal that cannot move its cursor: parts of compiling, tenths of the run."""
+
+    def __init__(self, title):
+        self._title, self._said = title, None
+
+    def show(self, progress):
+        """Write a line where there is something new."""
+        steps = 100 if progress.phase == "compiling" else 10
+        now = progress.phase, int(steps * progress.share)
+        if now != self._said:
+            self._said = now
+            print(f"{self._title}: {progress}", file=sys.stderr, flush=True)
+
+    def close(self):
+        """Leave what was written."""
 
 
 class _Notebook:
@@ -135,9 +176,9 @@ def _display_for(title):
     shell = _notebook_shell()
     if shell is not None:
         return _Notebook(title, sys.modules["IPython"].display.display)
-    if sys.stderr is not None and sys.stderr.isatty():
-        return _Terminal(title)
-    return _Nothing()
+    if sys.stderr is None or not sys.stderr.isatty():
+        return _Nothing()
+    return _PlainTerminal(title) if os.environ.get("TERM") == "dumb" else _Terminal(title)
 
 
 def _notebook_shell():

@@ -15,13 +15,13 @@ from pathlib import Path
 
 os.environ.setdefault("TI_SKIP_VERSION_CHECK", "ON")
 os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
-# In Jupyter Taichi would say when it is imported that it found a graphical shell.
-os.environ.setdefault("TI_LOG_LEVEL", "error")
 # TI_ARCH would overrule the architecture that the caller asks for without a word.
 os.environ.pop("TI_ARCH", None)
 if not os.environ.get("HOME"):
     os.environ["HOME"] = tempfile.mkdtemp(prefix="taichi-home-")
 
+# In Jupyter Taichi would say when it is imported that it found a graphical shell.
+os.environ.setdefault("TI_LOG_LEVEL", "error")
 import taichi as ti
 from taichi.lang import impl
 
@@ -110,6 +110,8 @@ def _initialise(wanted):
         raise InputError("arch 'cuda' was asked for, but no CUDA device answers here: use 'cpu'")
     _remove_stale_lock()
     remember()
+    # ti.init would warn that its argument overrules this switch, which only its import needed.
+    os.environ.pop("TI_LOG_LEVEL", None)
     with contextlib.redirect_stdout(io.StringIO()):
         ti.init(
             arch=ti.cuda if wanted.arch == "cuda" else ti.cpu,

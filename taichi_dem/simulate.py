@@ -1,6 +1,5 @@
 """The loop a user calls: step, sample, keep frames, and hand everything back as one result."""
 
-import math
 import warnings
 from dataclasses import dataclass, replace
 
@@ -8,11 +7,12 @@ import numpy as np
 
 from taichi_dem.checkpoint import Checkpoint, digest, version_text
 from taichi_dem.checks import AUTO, instance, progress_option, shown
+from taichi_dem.display import prefixed
 from taichi_dem.errors import InputError, SimulationDiverged
 from taichi_dem.files import output_folder
 from taichi_dem.methods import check_method
 from taichi_dem.outer_faces import outer_faces_warnings
-from taichi_dem.progress import Progress, compiling
+from taichi_dem.progress import LEAST_SHARE, Pace, Progress, compiling
 from taichi_dem.progress_bar import reporting
 from taichi_dem.realised import realised_gain
 from taichi_dem.record import Recorder
@@ -22,6 +22,8 @@ from taichi_dem.scene import Scene
 from taichi_dem.simulation import Simulation, macro_steps
 from taichi_dem.timeline import MACRO_TICKS
 
+#: Progress is reported this often [s].
+_REPORT_SECONDS = 0.2
 #: Samples or frames of a run: each costs a look at all bodies.
 _MOST_RECORDS = 1_000_000
 
@@ -40,9 +42,12 @@ class RunProgress(Progress):
 
     @property
     def seconds_left(self):
-        """Time expected until the end [s], each level weighted by its steps; infinite at first."""
-        if not self.evaluations:
-            return math.inf
+        """Time expected until the end [s], each level weighted by its steps; infinite at first.
+
+        Without bonds and pairs to evaluate, as the share of the way tells.
+        """
+        if self.share < LEAST_SHARE or not self.ahead or not self.evaluations:
+            return super().seconds_left
         work = max(0.0, self.until_s - self.time_s) * self.ahead
         return work * self.seconds / self.evaluations
 
@@ -50,8 +55,8 @@ class RunProgress(Progress):
     def speed(self):
         """Simulated time and evaluations a second."""
         seconds = max(self.seconds, 1e-9)
-        rate = 1e-6 * self.evaluations / seconds
-        return f"{1e6 * self.time_s / seconds:.3g} us/s, {rate:.3g} M evaluations/s"
+        passed = prefixed(self.time_s / seconds, "s/s")
+        return f"{passed}, {prefixed(self.evaluations / seconds, 'evaluations/s')}"
 
 
 def simulate(
@@ -95,16 +100,11 @@ def simulate(
         output_folder(output)
     for sentence in outer_faces_warnings(scene):
         warnings.warn(sentence, stacklevel=2)
-    error = None
     with reporting(progress, "simulating") as report_progress:
         simulation, recorder = _started(scene, method, driver)
         keeper = _keeper(simulation, recorder, checkpoint, resume, arrays)
         marks = _marks(last, samples), _marks(last, frames)
-        try:
-            with keeper:
-                _run(simulation, recorder, keeper, marks, report_progress)
-        except SimulationDiverged as diverged:
-            error = diverged
+        error = _run_kept(simulation, recorder, keeper, marks, report_progress)
         result = _result(scene, method, simulation, recorder, error)
         if measure_gain and error is None:
             report = replace(result.report, realised_gain=realised_gain(simulation))
@@ -188,6 +188,16 @@ def identity_of(scene, method):
     }
 
 
+def _run_kept(simulation, recorder, keeper, marks, report_progress):
+    """Run to the end, or as far as the run stays within its bounds: then the SimulationDiverged."""
+    try:
+        with keeper:
+            _run(simulation, recorder, keeper, marks, report_progress)
+    except SimulationDiverged as error:
+        return error
+    return None
+
+
 def _run(simulation, recorder, keeper, marks, report_progress):
     """Step from mark to mark; every mark is sampled, photographed, or only looked at.
 
@@ -195,6 +205,7 @@ def _run(simulation, recorder, keeper, marks, report_progress):
     has come have been seen to.
     """
     sample_steps, frame_steps = marks
+    pace = Pace(_REPORT_SECONDS)
     last = max(sample_steps)
     seen = simulation.state.tick[None] if recorder.rows else -1
     marks = sorted(sample_steps | frame_steps | keeper.marks(last, simulation.method.dt0))
@@ -202,7 +213,8 @@ def _run(simulation, recorder, keeper, marks, report_progress):
 
         def tell(end=step * MACRO_TICKS):
             """Tell how far the run is, and save it if due; at a mark its rows come first."""
-            if report_progress is not None:
+            end_of_run = simulation.state.tick[None] >= last * MACRO_TICKS
+            if report_progress is not None and pace.due(end_of_run):
                 report_progress(progress_of(simulation, last * simulation.method.dt0))
             if simulation.state.tick[None] < end:
                 keeper.look()

@@ -9,6 +9,8 @@ import subprocess
 import termios
 from typing import NamedTuple
 
+from tests.processes import users_environment
+
 #: What a terminal obeys instead of showing: colours, moves of the cursor, lines erased.
 _ORDERS = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 
@@ -24,13 +26,16 @@ class Seen(NamedTuple):
         return _ORDERS.sub("", self.raw).replace("\r\n", "\n").replace("\r", "\n")
 
 
-def run_in_terminal(command, columns=100, **options):
-    """Run a command with all three standard streams on a terminal of its own; returns a Seen."""
+def run_in_terminal(command, columns=100, term="xterm-256color", **options):
+    """Run a command with all three standard streams on a terminal of its own; returns a Seen.
+
+    term: kind of terminal. options: of ``subprocess.Popen``, such as another stdout.
+    """
     ours, theirs = pty.openpty()
     fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 40, columns, 0, 0))
-    environment = {**os.environ, "TERM": "xterm-256color"}
-    streams = {"stdin": theirs, "stdout": theirs, "stderr": theirs}
-    process = subprocess.Popen(command, env=environment, **streams, **options)
+    environment = users_environment(TERM=term)
+    streams = {"stdin": theirs, "stdout": theirs, "stderr": theirs, **options}
+    process = subprocess.Popen(command, env=environment, **streams)
     os.close(theirs)
     sent = b"".join(iter(lambda: _read(ours), b""))
     os.close(ours)

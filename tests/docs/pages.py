@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from markdown_it import MarkdownIt
 
+from tests.processes import users_environment
 from tests.scenes import ROOT
 
 FOLDER = Path(ROOT)
@@ -75,6 +76,7 @@ def run_pasted(text, folder, wanted="None"):
     """
     (folder / "pasted.py").write_text(text, encoding="utf-8")
     line = [sys.executable, "-c", _RUNNER, wanted]
-    done = subprocess.run(line, cwd=folder, capture_output=True, text=True, timeout=600)
+    options = {"capture_output": True, "text": True, "timeout": 600}
+    done = subprocess.run(line, cwd=folder, env=users_environment(), **options)
     assert done.returncode == 0 and done.stderr == "", done.stderr
     return Program(folder, done.stdout, pickle.loads((folder / "left.pickle").read_bytes()))

@@ -15,6 +15,7 @@ import pytest
 from PIL import Image
 
 from tests import arch
+from tests.processes import users_environment
 
 FOLDER = Path(__file__).resolve().parents[2] / "experiments"
 READER = Path(__file__).resolve().parents[1] / "figures.py"
@@ -34,7 +35,8 @@ def start(name, *arguments, report=None):
     everywhere = ["--threads", "2", "--arch", arch.chosen()]
     reader = [] if report is None else [str(READER), str(report)]
     line = [sys.executable, *reader, str(FOLDER / f"{name}.py"), *everywhere, *map(str, arguments)]
-    return subprocess.run(line, capture_output=True, text=True, timeout=1800)
+    options = {"capture_output": True, "text": True, "timeout": 1800}
+    return subprocess.run(line, env=users_environment(), **options)
 
 
 def figure_report(folder):

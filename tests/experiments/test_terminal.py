@@ -1,5 +1,6 @@
 """Experiments as a user runs them: on a terminal, and into a pipe whose reader leaves."""
 
+import io
 import os
 import subprocess
 import sys
@@ -8,6 +9,7 @@ import pytest
 
 from tests import arch
 from tests.experiments.contract import FOLDER, NAMES
+from tests.processes import users_environment
 from tests.terminal import run_in_terminal
 
 #: Those whose quick run takes a few seconds, one for each way of telling how far it is.
@@ -29,9 +31,11 @@ def test_an_experiment_ends_well_on_a_terminal(name, tmp_path):
     seen = run_in_terminal(command(name, tmp_path / name))
     assert seen.returncode == 0, seen.text
     assert "Traceback" not in seen.text
-    # Compiling is told of where a bar is shown; the last line stands below all that was erased.
+    # The bar told of compiling or of the run, was erased, and the cursor is shown again.
+    assert "compiling" in seen.text or " runs" in seen.text
+    assert seen.raw.count("\x1b[?25l") == seen.raw.count("\x1b[?25h") > 0
     _, _, left = seen.raw.rpartition("\x1b[2K")
-    assert "\x1b[" not in left[:-1].replace("\x1b[?25h", "")
+    assert "\x1b[" not in left
     assert len(left.splitlines()) > 1
     assert str(tmp_path / name) in left
     assert (tmp_path / name / "summary.json").is_file()
@@ -48,7 +52,8 @@ MORE_READERS = ("| true", ">&-", "2>&-", ">/dev/null 2>&1")
 def test_a_reader_that_leaves_costs_nothing(reader, tmp_path):
     line = [*command(SMALLEST, tmp_path / "out")]
     script = f'"$@" {reader}; exit "${{PIPESTATUS[0]}}"'
-    done = subprocess.run(["bash", "-c", script, "bash", *line], capture_output=True, text=True)
+    options = {"capture_output": True, "text": True, "env": users_environment()}
+    done = subprocess.run(["bash", "-c", script, "bash", *line], **options)
     assert (done.returncode, done.stderr) == (0, "")
     assert (tmp_path / "out" / "summary.json").is_file()
     assert (tmp_path / "out" / "energy.png").stat().st_size > 1000
@@ -57,9 +62,22 @@ def test_a_reader_that_leaves_costs_nothing(reader, tmp_path):
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="only Linux has a disk that is full")
 def test_output_that_cannot_be_written_is_one_sentence(tmp_path):
     with open("/dev/full", "w") as full:
-        done = subprocess.run(
-            command(SMALLEST, tmp_path / "out"), stdout=full, stderr=subprocess.PIPE, text=True
-        )
+        options = {"stdout": full, "stderr": subprocess.PIPE, "text": True}
+        # Its letter is not in the output's encoding.
+        line, environment = command(SMALLEST, tmp_path / "o\u0436"), {"PYTHONIOENCODING": "ascii"}
+        done = subprocess.run(line, env=users_environment(**environment), **options)
     assert done.returncode == 0
     assert done.stderr == "standard output cannot be written to: No space left on device\n"
-    assert (tmp_path / "out" / "summary.json").is_file()
+    assert (tmp_path / "o\u0436" / "summary.json").is_file()
+
+
+def test_letters_that_the_output_lacks_are_replaced(script, monkeypatch):
+    script("gallery")
+    from _output import lasting_output
+
+    written = io.BytesIO()
+    stream = io.TextIOWrapper(written, encoding="ascii")
+    monkeypatch.setattr(sys, "stdout", stream)
+    with lasting_output():
+        print("20 µs in \u0436")
+    assert written.getvalue() == b"20 ?s in ?\n"

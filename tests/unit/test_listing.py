@@ -144,3 +144,12 @@ def test_what_it_does_not_know_is_refused_in_words():
     done = started("ca_damper", "--all", capture_output=True)
     assert done.returncode == 2 and "unrecognized arguments: --all" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="only Linux has a disk that is full")
+@pytest.mark.parametrize("package", PACKAGES)
+def test_output_that_cannot_be_written_is_one_sentence(package):
+    with open("/dev/full", "w") as full:
+        done = started(package.__name__, stdout=full, stderr=subprocess.PIPE)
+    assert done.returncode == 0
+    assert done.stderr == "standard output cannot be written to: No space left on device\n"

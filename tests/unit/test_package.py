@@ -2,7 +2,6 @@
 
 import email
 import importlib.metadata
-import os
 import shutil
 import subprocess
 import sys
@@ -16,6 +15,7 @@ import taichi_dem
 from taichi_dem import PAPER_BLOCK
 from taichi_dem.checkpoint import version_text
 from tests.docs.pages import FOLDER
+from tests.processes import users_environment
 
 SOURCES = ("taichi_dem", "ca_damper", "pyproject.toml", "README.md", "LICENSE")
 
@@ -56,7 +56,7 @@ def said(folder, tmp_path, *arguments):
     done = subprocess.run(
         [sys.executable, *arguments],
         cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(folder)},
+        env=users_environment(PYTHONPATH=str(folder)),
         capture_output=True,
         text=True,
         timeout=60,

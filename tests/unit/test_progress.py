@@ -4,21 +4,33 @@ import dataclasses
 import math
 import subprocess
 import sys
+import time
 import types
 from pathlib import Path
 
 import pytest
 
 from ca_damper import Spheres, frequency_response
-from taichi_dem import CONCRETE, Scene, Uniform, effects, mesh_shapes, progress_bar, simulate
+from taichi_dem import (
+    CONCRETE,
+    InputError,
+    Scene,
+    Uniform,
+    effects,
+    mesh_shapes,
+    progress_bar,
+    simulate,
+)
 from taichi_dem.progress import Compiling, Counted, Progress, compiling, listening
 from taichi_dem.progress_bar import ProgressBar, reporting
+from taichi_dem.simulate import RunProgress
+from tests.processes import users_environment
 from tests.terminal import run_in_terminal
 
 ROOT = Path(__file__).resolve().parents[2]
 #: A run of well under a second, to be typed into a file by a user.
 JOB = """
-from taichi_dem import CONCRETE, Scene, Uniform, effects, mesh_shapes, runtime, simulate
+from taichi_dem import CONCRETE, InputError, Scene, Uniform, effects, mesh_shapes, runtime, simulate
 
 runtime.start(threads=1)
 scene = Scene(mesh_shapes.bar(0.4, 0.1, (4, 1, 1)), CONCRETE, [effects.Gravity((0, 0, -9.81))])
@@ -57,6 +69,29 @@ def test_time_left_is_that_of_what_is_not_done():
     assert Progress(1.0, 3.0).seconds_left == 0.0
     assert "9 s left" in str(Progress(0.25, 3.0))
     assert str(Counted(0.25, 3.0, 1, 4)).endswith("1 of 4 runs")
+
+
+def test_time_left_of_a_scene_without_bonds_is_told_by_its_share():
+    run = {"seconds": 3.0, "time_s": 0.25, "until_s": 1.0}
+    assert RunProgress(share=0.25, evaluations=0, ahead=0.0, **run).seconds_left == 9.0
+    # 100 evaluations in 3 s, and three quarters of a second at 400 a second ahead.
+    assert RunProgress(share=0.25, evaluations=100, ahead=400.0, **run).seconds_left == 9.0
+    # A first call says nothing of how fast the rest goes.
+    assert RunProgress(share=0.001, evaluations=1, ahead=1.0, **run).seconds_left == math.inf
+
+
+def test_speeds_have_units_a_reader_knows():
+    progress = RunProgress(0.5, 2.0, 0.04, 0.08, 6_400_000, 1.0)
+    assert progress.speed == "20 ms/s, 3.2 M evaluations/s"
+
+
+def test_a_callback_is_called_five_times_a_second_and_at_the_end():
+    told = []
+    started = time.perf_counter()
+    blast(told.append)
+    running = [progress for progress in told if progress.phase == "running"]
+    assert len(running) <= 2 + (time.perf_counter() - started) / 0.2
+    assert running[-1].share == 1.0
 
 
 @pytest.mark.parametrize("nothing", [0.5, None, "half", object()])
@@ -140,13 +175,41 @@ def test_a_terminal_shows_compiling_and_is_left_clean(job, tmp_path):
     assert seen.raw[seen.raw.rindex("\x1b[2K") :] == "\x1b[2Kbroken faces: 0\r\n"
 
 
+@pytest.mark.parametrize("stays", ["[/b] [red]x", "plain"])
+def test_prints_stay_where_they_go_and_titles_are_no_markup(stays, tmp_path):
+    work = f"with ProgressBar({stays!r}) as bar:\n    bar.at(0.5)\n    print('row')\n"
+    (tmp_path / "job.py").write_text(f"from taichi_dem import ProgressBar\n{work}print('end')\n")
+    with open(tmp_path / "out.txt", "w") as out:
+        seen = run_in_terminal([sys.executable, "job.py"], cwd=tmp_path, stdout=out)
+    assert seen.returncode == 0, seen.text
+    assert stays in seen.text
+    assert seen.raw.count("\x1b[?25l") == seen.raw.count("\x1b[?25h")
+    assert (tmp_path / "out.txt").read_text() == "row\nend\n"
+
+
+def test_a_narrow_terminal_keeps_what_matters(job, tmp_path):
+    seen = run_in_terminal(job(), columns=50, cwd=tmp_path)
+    assert seen.returncode == 0, seen.text
+    assert "simulating  35 %, compiling time step kernels" in seen.text
+
+
+def test_a_terminal_without_a_cursor_gets_lines(job, tmp_path):
+    seen = run_in_terminal(job(), term="dumb", cwd=tmp_path)
+    assert seen.returncode == 0, seen.text
+    assert "simulating:  35 %, compiling time step kernels, the next start is faster" in seen.text
+    assert seen.text.endswith("\nbroken faces: 0\n")
+    assert "\x1b" not in seen.raw and "\n\n" not in seen.text
+
+
 def test_no_progress_on_a_terminal_where_none_is_wanted(job, tmp_path):
     seen = run_in_terminal(job(", progress=None"), cwd=tmp_path)
     assert seen == (0, "broken faces: 0\r\n")
 
 
 def test_nothing_but_the_result_in_a_pipe(job, tmp_path):
-    done = subprocess.run(job(), capture_output=True, text=True, cwd=tmp_path)
+    done = subprocess.run(
+        job(), capture_output=True, text=True, cwd=tmp_path, env=users_environment()
+    )
     assert (done.returncode, done.stdout, done.stderr) == (0, "broken faces: 0\n", "")
 
 
@@ -204,6 +267,18 @@ def test_a_bar_is_closed_by_an_error_and_by_ctrl_c(notebook):
             raise error
         assert notebook[-1]["text/plain"] == ""
     assert progress_bar._open_bars == []
+
+
+def test_a_bar_may_be_used_again_but_not_twice_at_once(notebook):
+    bar = ProgressBar("work")
+    bar.at(0.5)
+    for _ in range(2):
+        with bar, pytest.raises(InputError, match="'work' is shown already"), bar:
+            pass
+    bar.count(0, 0)
+    assert [bundle["text/plain"] for bundle in notebook] == ["work: ", "", "work: ", ""]
+    with pytest.raises(InputError, match="title must be a str, got 3"):
+        ProgressBar(3)
 
 
 def test_a_bar_without_standard_error_is_silent(monkeypatch):
