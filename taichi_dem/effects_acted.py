@@ -39,9 +39,14 @@ def effects_acted(model, ledger, tables, account, watch, substeps):
         _by_role(model, ledger, tables, watch.touching, rounding, effect)
         for effect in _listed(model)
     ]
-    lacking = _UNTOUCHED if watch.outer.times > 0 else _APART * bool(outer_faces_warnings(model))
+    lacking = _UNTOUCHED if watch.outer.times > 0 else _unseen(model)
     parts = account, given, model, ledger.state, lacking, rounding
     return tuple(_use(*parts, *entry) for entry in found)
+
+
+def _unseen(model):
+    """Why a run with contact may miss that bodies meet, in words; "" where it would see it."""
+    return _APART if model.has_contact and outer_faces_warnings(model) else ""
 
 
 class _Rounding(NamedTuple):
