@@ -253,7 +253,7 @@ class Simulation:
             compile_seconds=self.compile_seconds,
             run_seconds=self.run_seconds,
             run_cpu_seconds=self.run_cpu_seconds,
-            acted=effects_acted(self.model, self.ledger, tables, account, self.watch),
+            acted=effects_acted(self.model, self.ledger, tables, account, self.watch, counts[0]),
             missed=self.watch.findings(),
             unresolved=self.resolution.findings(),
             bound_by=counted_criteria(self.state.bound.to_numpy()),
