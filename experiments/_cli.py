@@ -117,7 +117,12 @@ def parser(name, description, drivers=()):
         allow_abbrev=False,
     )
     made.add_argument("--quick", action="store_true", help="a smaller job of under a minute")
-    made.add_argument("--out", default=os.path.join("results", name), help="folder for the output")
+    made.add_argument(
+        "--out",
+        type=os.path.expanduser,
+        default=os.path.join("results", name),
+        help="folder for the output",
+    )
     made.add_argument("--arch", default="cpu", choices=runtime.ARCHITECTURES)
     if drivers:
         made.add_argument("--driver", default=drivers[0], choices=drivers)

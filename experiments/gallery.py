@@ -40,7 +40,9 @@ def options_parser():
         allow_abbrev=False,
     )
     made.add_argument("--quick", action="store_true", help="run smaller jobs of under a minute")
-    made.add_argument("--out", default="results", help="folder for page and results")
+    made.add_argument(
+        "--out", type=os.path.expanduser, default="results", help="folder for page and results"
+    )
     made.add_argument("--only", type=several(str), default=None, help="names, by comma")
     made.add_argument("--reuse", action="store_true", help="run only what has no result yet")
     made.add_argument("--readme", action="store_true", help="renew README.md, run nothing")

@@ -45,7 +45,7 @@ class Checkpoint:
     every_wall_s: Optional[float] = None
 
     def __post_init__(self):
-        path_name("path", self.path)
+        object.__setattr__(self, "path", path_name("path", self.path))
         if self.every_steps is not None:
             whole("every_steps", self.every_steps, 1, _MOST_STEPS)
         for name in ("every_s", "every_wall_s"):

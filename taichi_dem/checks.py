@@ -126,11 +126,14 @@ def progress_option(name, value):
 
 
 def path_name(name, value):
-    """The value as text; InputError unless it can be the name of a file or folder."""
+    """The value as text, a leading "~" as the user's home.
+
+    InputError unless it can be the name of a file or folder.
+    """
     text = os.fspath(value) if isinstance(value, (str, os.PathLike)) else ""
     if not isinstance(text, str) or not text or "\0" in text:
         raise InputError(f"{name} must be the name of a file, got {shown(value)}")
-    return text
+    return os.path.expanduser(text)
 
 
 def several(name, values, check):

@@ -28,7 +28,7 @@ class DivergenceCheck:
         self.model, self.state, self.schedule, self.solves = model, state, schedule, solves
         self.limited = schedule.has_limits and schedule.limits.limited
         self.contacts, self.energy_balance = contacts, energy_balance
-        self.round_off = self._round_off()
+        self.rounded_once = self._rounded_once()
         self.rest_until = 0.0
 
     def check(self, hurried=False):
@@ -74,14 +74,18 @@ class DivergenceCheck:
             + abs(account["load_work"])
             + abs(account["support_work"])
         )
-        bound = ENERGY_FROM_NOWHERE * max(given, self.round_off)
+        bound = ENERGY_FROM_NOWHERE * max(given, self.round_off())
         if -account["residual"] > bound and present > given:
             motion = self.state.motion()
             body = int(np.linalg.norm(motion["velocity"], axis=1).argmax())
             what = f"is the fastest while {-account['residual']:.3g} J came from nowhere"
             raise SimulationDiverged(self._sentence(body, motion, what))
 
-    def _round_off(self):
+    def round_off(self):
+        """Energy [J] that rounded positions may have given the bonds so far, once a substep."""
+        return max(1, int(self.schedule.evaluations[0])) * self.rounded_once
+
+    def _rounded_once(self):
         """Energy [J] of springs whose ends are known to a few units in the last place."""
         count = self.model.bond_count
         area = 3.0 * self.model.unit_area.to_numpy()[:count]

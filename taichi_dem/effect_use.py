@@ -14,7 +14,8 @@ class EffectUse:
     is no most). energy_J: taken or given, None where it is not booked. share: of ``whole``, in
     words; None where there is nothing to compare with. steers: whether it directs the rest even
     where it takes little, as a crack does: then only one that never acted can be left out. kept:
-    why it cannot be left out whatever was counted, in words, or "".
+    why it cannot be left out whatever was counted, in words, or "". rounding: whether all that was
+    booked is no more than the rounding of numbers may leave; then no event is counted.
     """
 
     effect: str
@@ -26,6 +27,7 @@ class EffectUse:
     whole: str = "the energy put in"
     steers: bool = False
     kept: str = ""
+    rounding: bool = False
 
     @property
     def is_active(self):
@@ -34,11 +36,13 @@ class EffectUse:
 
     @property
     def idle(self):
-        """Whether it is known to have had no part in the run."""
-        return not self.is_active and not self.kept
+        """Whether it is known to have had no part in the run, not even in its rounding."""
+        return not (self.is_active or self.kept or self.rounding)
 
     def negligible(self, tolerance):
-        """Whether it acted, and booked less than a share of the energy."""
+        """Whether it acted, and booked less than a share of the energy, or round-off alone."""
+        if self.rounding:
+            return not self.kept
         judged = self.is_active and not (self.steers or self.kept) and self.share is not None
         return judged and self.share < tolerance
 
@@ -46,6 +50,8 @@ class EffectUse:
         """One line without the name."""
         if self.idle:
             return f"never acted (0 {self.what})"
+        if self.rounding:
+            return f"never acted beyond round-off (0 {self.what}, {self.energy_J:.3g} J)"
         most = f" of {self.of:,}" if self.of else ""
         energy = f", {self.energy_J:.3g} J" if self.energy_J is not None else ""
         share = f", {100 * self.share:.3g} % of {self.whole}" if self.share is not None else ""
@@ -71,7 +77,7 @@ class Advice:
 
     @property
     def negligible(self):
-        """Names of the effects that acted, and booked less than the tolerance."""
+        """Names of the effects that booked less than the tolerance, or no more than round-off."""
         return tuple(use.effect for use in self.uses if use.negligible(self.tolerance))
 
     @property

@@ -3,6 +3,7 @@
 import contextlib
 import csv
 import os
+import re
 
 import numpy as np
 
@@ -11,13 +12,14 @@ from taichi_dem.errors import InputError
 
 
 def output_folder(path):
-    """Make a folder for output and return its path.
+    """Make a folder for output and return its path, with a leading "~" as the user's home.
 
     Raises InputError when it cannot be made or written to.
     """
     name = os.fspath(path) if isinstance(path, (str, os.PathLike)) else ""
     if not isinstance(name, str) or not name or "\0" in name:
         raise InputError(f"output folder must be the name of a folder, got {shown(path)}")
+    path = os.path.expanduser(name)
     try:
         os.makedirs(path, exist_ok=True)
         probe = os.path.join(path, ".write-test")
@@ -27,7 +29,7 @@ def output_folder(path):
     except OSError as error:
         reason = error.strerror or error
         raise InputError(f"output folder {path} must be writable: {reason}") from None
-    return os.fspath(path)
+    return path
 
 
 @contextlib.contextmanager
@@ -47,6 +49,23 @@ def renamed_when_done(path):
     finally:
         if os.path.exists(temporary):
             os.remove(temporary)
+
+
+def remove_files(folder, pattern):
+    """Remove the files of a folder, if there is one, whose whole names match a regular expression.
+
+    Raises InputError when one of them cannot be removed.
+    """
+    if not os.path.isdir(folder):
+        return
+    for name in os.listdir(folder):
+        path = os.path.join(folder, name)
+        if re.fullmatch(pattern, name) and os.path.isfile(path):
+            try:
+                os.remove(path)
+            except OSError as error:
+                reason = error.strerror or error
+                raise InputError(f"cannot remove {path} of an earlier run: {reason}") from None
 
 
 def write_whole(path, write):

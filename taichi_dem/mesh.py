@@ -11,18 +11,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichi_dem import tetrahedra as geometry
-from taichi_dem.checks import finite, shown, word
+from taichi_dem.checks import shown, word
 from taichi_dem.display import counted, in_brief
 from taichi_dem.errors import InputError
+from taichi_dem.mesh_parts import parts_of
+from taichi_dem.mesh_weld import COINCIDENT, weld_labels
 
 #: Below this share of (longest edge)^3 a volume counts as zero: what round-off leaves of it.
 FLAT = 1e-12
 
 #: The extent of a mesh lies between these [m]: a moment of inertia is its fifth power.
 _LEAST_EXTENT, _MOST_EXTENT = 1e-30, 1e30
-
-#: Points nearer than this share of the mesh's extent count as one and the same place.
-COINCIDENT = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +46,9 @@ class Mesh:
     def __repr__(self):
         groups = f"groups {', '.join(self.groups)}" if self.groups else "no groups"
         bodies, points = counted(self.body_count, "body"), counted(self.point_count, "point")
-        return in_brief(self, bodies, points, groups, self.source)
+        parts = [note for note in self.notes if note.startswith("the mesh has")]
+        notes = f"{counted(len(self.notes), 'note')} (.notes)" if self.notes else ""
+        return in_brief(self, bodies, points, *parts, notes, groups, self.source)
 
     @property
     def body_count(self) -> int:
@@ -94,8 +95,8 @@ def checked_mesh(points, tetrahedra, groups, source="", weld_tolerance=0.0) -> M
     tetrahedra = _checked_indices("tetrahedra", tetrahedra, 4, len(points))
     groups = _checked_groups(groups, len(points))
     notes = []
-    if _checked_tolerance(weld_tolerance, points, tetrahedra) > 0.0:
-        tetrahedra, groups = _welded(points, tetrahedra, groups, weld_tolerance, notes)
+    label = welded_numbers(points, tetrahedra, weld_tolerance, notes)
+    tetrahedra, groups = label[tetrahedra], {name: label[groups[name]] for name in groups}
     points, tetrahedra, groups = _without_loose_points(points, tetrahedra, groups, notes)
     _refuse_extent(points)
     _refuse_coincident(points)
@@ -104,6 +105,21 @@ def checked_mesh(points, tetrahedra, groups, source="", weld_tolerance=0.0) -> M
     groups = _outer_groups(tetrahedra, groups, notes)
     _note_parts(tetrahedra, notes)
     return Mesh(points, tetrahedra, groups, tuple(notes), str(source))
+
+
+def welded_numbers(points, tetrahedra, tolerance, notes):
+    """For every point the first of those that become one with it, (n,) int32.
+
+    points, tetrahedra, tolerance: as for ``checked_mesh``, with the same errors. notes: a list to
+    which a sentence is added where points become one.
+    """
+    points = _checked_points(points)
+    tetrahedra = _checked_indices("tetrahedra", tetrahedra, 4, len(points))
+    label = weld_labels(points, tetrahedra, tolerance)
+    count = int(np.sum(label != np.arange(len(points))))
+    if count:
+        notes.append(f"welded {count} points closer than {tolerance:g} m to another")
+    return label.astype(np.int32)
 
 
 def _checked_points(points):
@@ -155,28 +171,6 @@ def _checked_indices(what, indices, width, point_count):
             f"{indices[bad[0]].tolist()}"
         )
     return indices.astype(np.int32)
-
-
-def _checked_tolerance(tolerance, points, tetrahedra):
-    """Refuse a tolerance that would weld the ends of an edge."""
-    lengths = geometry.edge_lengths(points, tetrahedra)
-    shortest = lengths[lengths > COINCIDENT * np.ptp(points, axis=0).max()].min(initial=np.inf)
-    if not (finite(tolerance) and 0.0 <= tolerance < shortest):
-        raise InputError(
-            f"weld_tolerance must lie in [0, {shortest:.6g}) m, the shortest edge, "
-            f"got {shown(tolerance)}"
-        )
-    return tolerance
-
-
-def _welded(points, tetrahedra, groups, tolerance, notes):
-    """Replace every point by the first of those within ``tolerance`` [m] of each other."""
-    label = geometry.components(len(points), geometry.close_pairs(points, tolerance))
-    count = int(np.sum(label != np.arange(len(points))))
-    if count:
-        notes.append(f"welded {count} points closer than {tolerance:g} m to another")
-    label = label.astype(np.int32)
-    return label[tetrahedra], {name: label[faces] for name, faces in groups.items()}
 
 
 def _without_loose_points(points, tetrahedra, groups, notes):
@@ -290,8 +284,7 @@ def _checked_rows(name, rows, notes):
 
 def _note_parts(tetrahedra, notes):
     """Say when the bodies are not all joined through shared faces."""
-    pairs = geometry.shared_faces(tetrahedra) // 4
-    parts = len(np.unique(geometry.components(len(tetrahedra), pairs)))
+    parts = len(np.unique(parts_of(tetrahedra)))
     if parts > 1:
         notes.append(f"the mesh has {parts} parts that share no face with each other")
 

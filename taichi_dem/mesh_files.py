@@ -16,18 +16,24 @@ import numpy as np
 from taichi_dem.checks import path_name, positive
 from taichi_dem.errors import InputError
 from taichi_dem.files import renamed_when_done, write_text
-from taichi_dem.mesh import Mesh, checked_mesh
+from taichi_dem.mesh import Mesh, checked_mesh, welded_numbers
 from taichi_dem.mesh_content import (
+    cells_counted,
+    cells_dropped,
     is_quadrangle,
+    is_solid,
     is_tetrahedron,
     is_triangle,
     others_dropped,
+    parts_dropped,
+    reason_of,
     refuse_uncut,
     refuse_without_tetrahedra,
+    surfaces_of_abaqus,
     unread_groups,
-    volumes_dropped,
 )
-from taichi_dem.mesh_split import shape_of, tetrahedra_in, triangles_in
+from taichi_dem.mesh_parts import unbonded_places
+from taichi_dem.mesh_split import folded_or_flat, shape_of, tetrahedra_in, triangles_in
 from taichi_dem.timeout import run_with_timeout
 
 #: Time that a reader may take [s], and what it reads at the slowest [byte/s]: some of meshio's wait
@@ -44,32 +50,32 @@ def read_mesh(path, *, scale=1.0, weld_tolerance=0.0) -> Mesh:
     Groups come from Gmsh's physical surfaces ("physical_TAG" where they have no name); in other
     formats from integer data on triangles, as "data name_value".
     Elements of higher order are read as linear ones; hexahedra, prisms and pyramids are cut into
-    tetrahedra; groups of points, lines and volumes are not read: the mesh's notes say so, and a
-    UserWarning if there are several groups of volumes.
+    tetrahedra after welding; groups of points, lines and volumes are not read: the mesh's notes
+    say so. A UserWarning tells of what may change results: parts of other materials, Abaqus sets
+    and surfaces that are not read, cells of types that meshio does not know, and cells that meet
+    but share no face.
 
     Raises InputError, in one sentence, for a file that is missing, cannot be read, holds no solid
     cells or such as cannot be cut, or whose mesh ``checked_mesh`` refuses.
     """
     scale, path = positive("scale", scale), path_name("path", path)
-    raw = _read_raw(path)
-    notes = []
+    raw, printed = _read_raw(path)
     refuse_uncut(raw, path)
-    tetrahedra = _tetrahedra(raw, notes)
-    if len(tetrahedra) == 0:
-        refuse_without_tetrahedra(raw, path)
-    unread = unread_groups(raw)
-    notes += others_dropped(raw, unread)
-    volumes = volumes_dropped(unread)
-    if volumes:
-        notes.append(volumes)
-        warnings.warn(f"mesh file {path}: {volumes}", stacklevel=2)
+    if not any(is_solid(block.type) and len(block.data) for block in raw.cells):
+        refuse_without_tetrahedra(raw, path, printed)
+    unread = (*unread_groups(raw), *surfaces_of_abaqus(path))
     try:
-        with np.errstate(over="ignore"):  # checked_mesh refuses what is no finite number
-            points = scale * np.asarray(raw.points, dtype=np.float64)
-        mesh = checked_mesh(points, tetrahedra, _groups(raw), path, weld_tolerance)
+        mesh = _mesh(raw, scale, weld_tolerance)
     except InputError as error:
-        raise InputError(f"mesh file {path}: {error}") from None
-    return replace(mesh, notes=(*notes, *mesh.notes), source=path, unread=unread)
+        cells = _cell_at_fault(raw) if "tetrahedra " in str(error) else ""
+        raise InputError(f"mesh file {path}: {error}{cells}") from None
+    told = [cells_dropped(printed), *parts_dropped(raw, unread)]
+    told.append(unbonded_places(mesh.points, mesh.tetrahedra))
+    told = [sentence for sentence in told if sentence]
+    for sentence in told:
+        warnings.warn(f"mesh file {path}: {sentence}", stacklevel=2)
+    notes = (*others_dropped(raw, unread), *told, *mesh.notes)
+    return replace(mesh, notes=notes, source=path, unread=unread)
 
 
 def write_mesh(path, mesh) -> None:
@@ -115,7 +121,10 @@ def write_pvd(path, times_s, file_names) -> None:
 
 
 def _read_raw(path):
-    """The file as meshio sees it; whatever goes wrong inside becomes one InputError."""
+    """The file as meshio sees it, and what meshio printed.
+
+    Whatever goes wrong inside becomes one InputError.
+    """
     if not os.path.isfile(path):
         problem = "is no file" if os.path.lexists(path) else "does not exist"
         problem = "is a folder" if os.path.isdir(path) else problem
@@ -125,15 +134,54 @@ def _read_raw(path):
     sentence = f"its reader found no end in {seconds:.3g} s, as in a file that was cut off"
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-            return run_with_timeout(seconds, lambda: _meshio_read(path), sentence)
+            return run_with_timeout(seconds, lambda: _meshio_read(path), sentence), said.getvalue()
     except (Exception, SystemExit) as error:  # meshio raises anything, and exits on some files
-        reason = " ".join(str(error).split()) or type(error).__name__
+        reason = reason_of(error, said.getvalue())
         raise InputError(f"mesh file {path} cannot be read: {reason}") from None
 
 
 def _meshio_read(path):
     with np.errstate(over="ignore"):  # an STL's text, tried as if it were binary
         return meshio.read(path)
+
+
+def _mesh(raw, scale, weld_tolerance):
+    """The mesh of a file's cells, cut once their points are welded; raw gets the welded numbers."""
+    notes, welding = [], []
+    with np.errstate(over="ignore"):  # checked_mesh refuses what is no finite number
+        points = scale * np.asarray(raw.points, dtype=np.float64)
+    tetrahedra = _tetrahedra(raw, notes)
+    label = welded_numbers(points, tetrahedra, weld_tolerance, welding)
+    if welding:
+        _renumber(raw, label)
+        notes.clear()
+        tetrahedra = _tetrahedra(raw, notes)
+    mesh = checked_mesh(points, tetrahedra, _groups(raw))
+    return replace(mesh, notes=(*notes, *welding, *mesh.notes))
+
+
+def _renumber(raw, label):
+    """Give the solid cells and faces other point numbers, label (n,) by the old ones.
+
+    Numbers of no point stay, to be refused later.
+    """
+    for block in raw.cells:
+        if len(block.data) and (is_solid(block.type) or _is_face(block.type)):
+            data = np.asarray(block.data)
+            known = (data >= 0) & (data < len(label))
+            block.data = np.where(known, label[np.where(known, data, 0)], data)
+
+
+def _cell_at_fault(raw):
+    """What an error means for the file's cells, where some have been cut; else ""."""
+    cut = [block for block in raw.cells if len(block.data) and shape_of(block.type)]
+    finite = np.isfinite(raw.points).all() and np.shape(raw.points)[1:] == (3,)
+    for block in cut if finite else ():
+        if (block.data >= 0).all() and (block.data < len(raw.points)).all():
+            sentence = folded_or_flat(raw.points, block.type, block.data)
+            if sentence:
+                return f"; these are tetrahedra that cells were cut into: {sentence}"
+    return "; tetrahedra are numbered after cells have been cut" if cut else ""
 
 
 def _tetrahedra(raw, notes):
@@ -149,7 +197,8 @@ def _tetrahedra(raw, notes):
                 )
         elif shape_of(block.type):
             cut.append(tetrahedra_in(raw.points, block.type, block.data))
-            notes.append(f"cut {len(block.data)} {block.type} into {len(cut[-1])} tetrahedra")
+            cells = cells_counted(len(block.data), block.type)
+            notes.append(f"cut {cells} into {len(cut[-1])} tetrahedra")
     return np.vstack([*found, *cut])
 
 

@@ -6,6 +6,8 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem.outer_faces import REMEDY, OuterFaces
+from taichi_dem.part_overlaps import PartOverlaps
+from taichi_dem.parts import parts_of
 from taichi_dem.physics.fracture import coulomb_limit
 
 
@@ -59,6 +61,18 @@ _NEEDS = (
 _OVERLAP = "pairs of bodies overlap at outer faces, which carry no contact spheres"
 
 
+def _outer_faces(model, state):
+    """What finds bodies that overlap at outer faces without spheres; None where none can.
+
+    Without contact a solid in one piece has nothing to meet but what broke off it: that is found
+    at its released bonds.
+    """
+    if model.has_contact:
+        return None if model.contact.outer_faces else OuterFaces(model, state)
+    part = parts_of(model.mesh)
+    return PartOverlaps(model, state, part) if part.any() else None
+
+
 def unserved(roles):
     """An empty ``MissingEffect`` by role, for every need that no effect of these roles serves."""
     return {role: MissingEffect(effect, what) for role, effect, what in _NEEDS if role not in roles}
@@ -76,9 +90,8 @@ class MissingEffects:
         self.touching = self.looks = 0
         self.last_s = -1.0
         self.needed = unserved({effect.role for effect in model.effects if effect.name})
-        self.outer_faces, self.outer = None, MissingEffect(REMEDY, _OVERLAP, unit="body")
-        if model.has_contact and not model.contact.outer_faces:
-            self.outer_faces = OuterFaces(model, state)
+        self.outer_faces = _outer_faces(model, state)
+        self.outer = MissingEffect(REMEDY, _OVERLAP, unit="body")
         material = model.material
         self.limits = ti.Vector([material.tensile_strength, material.cohesion, material.friction])
 

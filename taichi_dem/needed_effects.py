@@ -13,7 +13,8 @@ def needed_effects(result, tolerance=1e-3):
     through bonds below which their damping counts as nothing, in [0, 1]. Effects that steer
     (fracture, slip, contact, friction) take little and decide much: they are dropped only where
     they never acted. Loads and supports pose the question and are always kept; so is an effect of
-    one's own unless it cannot have acted, as the account need not show what it does.
+    one's own unless it cannot have acted, as the account need not show what it does. Dashpots that
+    took no more than rounding leaves can be dropped: only last digits differ without them.
     Raises InputError for a result that is none, or a tolerance out of range.
     """
     report = getattr(result, "report", result)

@@ -7,8 +7,9 @@ Bodies that meet elsewhere pass through each other.
 import numpy as np
 import taichi as ti
 
+from taichi_dem.parts import may_meet, parts_of
 from taichi_dem.state import NEVER
-from taichi_dem.tetrahedra import components, shared_faces
+from taichi_dem.tetrahedra import components
 from taichi_dem.types import vec3
 
 #: Overlap of two spheres, as a share of the distance at which they touch, below which they count
@@ -21,18 +22,22 @@ def outer_faces_warnings(scene):
     """Sentences about parts of a scene that may meet where they carry no spheres; before a run.
 
     A solid in one piece has nothing else to meet until it breaks, and what then happens is seen in
-    the run. Nothing is said of a scene without contact.
+    the run. Who lists contact expects bodies to meet: then all that has several parts is told. Who
+    lists none may have put independent solids into one scene: then nothing is said where they
+    stay at rest, fall alike, or are too far from each other (``parts.may_meet``).
+    scene: a Scene, or a Model, which has the same mesh and effects.
     """
     contact = [effect for effect in scene.effects if effect.role == "contact"]
-    if not contact or contact[0].outer_faces:
+    if contact and contact[0].outer_faces:
         return ()
-    bonded = shared_faces(scene.mesh.tetrahedra) // 4
-    parts = len(np.unique(components(scene.mesh.body_count, bonded)))
-    if parts == 1:
+    part = parts_of(scene.mesh)
+    count = part.max() + 1
+    if count == 1 or not (contact or may_meet(scene, part)):
         return ()
+    lack = "their outer faces carry no contact spheres" if contact else "no contact is listed"
     return (
-        f"the mesh has {parts} parts that no bond joins, and their outer faces carry no contact "
-        f"spheres: where these parts meet they pass through each other; {REMEDY} lets them touch",
+        f"the mesh has {count} parts that no bond joins, and {lack}: "
+        f"where these parts meet they pass through each other; {REMEDY} lets them touch",
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem.display import by_fields
-from taichi_dem.files import output_folder, write_csv
+from taichi_dem.files import output_folder, remove_files, write_csv
 from taichi_dem.hole_monitor import HoleMonitor
 from taichi_dem.mesh_files import write_pvd, write_vtu
 from taichi_dem.state import NEVER
@@ -210,15 +210,22 @@ def series_name(folder):
     return re.sub(r"[^\w.-]+", "_", name)[:_LONGEST_NAME].strip("._-") or "run"
 
 
+def remove_series(folder, name):
+    """Remove a ParaView series of a name, and nothing else, from a folder that may not be there."""
+    remove_files(folder, re.escape(name) + r"(\.pvd|_\d{4,}\.vtu)")
+
+
 def write_paraview(folder, model, frames, name=None):
     """Write frames as a ParaView series: folder/name.pvd and a VTU file a frame.
 
     name: of the files, that of the folder if None (``series_name``).
     Cells carry body_id, level, speed_m_s, displacement_m, damage and step_bound_by, the place
-    in ``step_control.CRITERIA`` of what bounds a body's step.
+    in ``step_control.CRITERIA`` of what bounds a body's step. An earlier series of that name in
+    the folder is removed first.
     """
-    output_folder(folder)
+    folder = output_folder(folder)
     name = series_name(folder) if name is None else name
+    remove_series(folder, name)
     cells = np.arange(4 * model.body_count, dtype=np.int32).reshape(-1, 4)
     names = []
     for number, frame in enumerate(frames):

@@ -26,8 +26,9 @@ class Report:
     ``EffectUse`` for each effect. missing_effects: a ``missing_effects.MissingEffect`` for each
     effect that was left out and needed. unresolved: sentences about bonds and contacts for which
     the step was too long. bound_by: bodies at the end by what bounds their step, see
-    ``step_control.CRITERIA``. measured_speedup: CPU time of one step for all over that of the run,
-    where it was measured.
+    ``step_control.CRITERIA``. round_off_J: energies below this may be round-off
+    (``DivergenceCheck.round_off``). measured_speedup: CPU time of one step for all over that of the
+    run, where it was measured.
     """
 
     method: str
@@ -55,6 +56,7 @@ class Report:
     missing_effects: tuple
     unresolved: tuple
     bound_by: dict
+    round_off_J: float = 0.0
     measured_speedup: Optional[float] = None
 
     def __repr__(self):
@@ -90,9 +92,21 @@ class Report:
     @property
     def energy_residual_fraction(self):
         """Energy that the account cannot explain, over the work put in or the energy held."""
+        return abs(self.energy_balance["residual"]) / max(*self._given_and_held(), 1e-300)
+
+    def _given_and_held(self):
+        """Work put in, and energy held at the end [J]."""
         given = abs(self.energy_balance["load_work"]) + abs(self.energy_balance["support_work"])
-        held = self.energy_balance["kinetic"] + self.energy_balance["bond_strain"]
-        return abs(self.energy_balance["residual"]) / max(given, held, 1e-300)
+        return given, self.energy_balance["kinetic"] + self.energy_balance["bond_strain"]
+
+    @property
+    def unexplained(self):
+        """The residual in words: a share of the work put in, unless all energies are round-off."""
+        given, held = self._given_and_held()
+        if max(given, held) <= self.round_off_J:
+            return f"{abs(self.energy_balance['residual']):.2g} J; all energies are round-off"
+        whole = "the energy held" if held > given else "it"
+        return f"{100.0 * self.energy_residual_fraction:.3g} % of {whole}"
 
     def as_dict(self):
         """All figures, for a JSON file."""
@@ -153,7 +167,7 @@ class Report:
                 "work put in",
                 f"{self.energy_balance['load_work'] + self.energy_balance['support_work']:.6g} J",
             ),
-            ("energy residual", f"{100 * self.energy_residual_fraction:.3g} % of it"),
+            ("energy residual", self.unexplained),
             (
                 "momentum error",
                 f"{self.linear_momentum_error:.1e} linear, "

@@ -9,7 +9,7 @@ import numpy as np
 from taichi_dem.display import counted, embedded, in_brief, table, titled, unfolded
 from taichi_dem.files import output_folder, write_csv, write_text
 from taichi_dem.mesh_files import write_mesh
-from taichi_dem.record import series_name, write_bonds, write_paraview
+from taichi_dem.record import remove_series, series_name, write_bonds, write_paraview
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +68,7 @@ class Result:
             ("broken bonds", f"{report.broken_faces:,}"),
             ("largest speed", f"{np.fmax.reduce(self.peak_speed, initial=np.nan):.4g} m/s"),
             ("work put in", f"{work:.4g} J"),
-            ("energy not explained", f"{100.0 * report.energy_residual_fraction:.3g} % of it"),
+            ("energy not explained", report.unexplained),
             ("time", f"{report.compile_seconds:.1f} s compiling, {report.run_seconds:.1f} s run"),
         ]
         moved = history.get("hole_radial_displacement_mm", ())
@@ -79,15 +79,17 @@ class Result:
     def write(self, folder):
         """Write history.csv, bonds.csv, mesh.msh, report.json and a ParaView series to a folder.
 
-        The series, in paraview/ of that folder, has the folder's name.
-        Raises InputError when the folder cannot be written to.
+        The series, in paraview/ of that folder, has the folder's name. These files of an earlier
+        run in the same folder are replaced, its series removed even where this run has no frames.
+        A leading "~" is the user's home. Raises InputError when the folder cannot be written to.
         """
-        output_folder(folder)
+        folder = output_folder(folder)
+        place, name = os.path.join(folder, "paraview"), series_name(folder)
+        remove_series(place, name)
         write_csv(os.path.join(folder, "history.csv"), self.history)
         write_bonds(os.path.join(folder, "bonds.csv"), self.model, self.broken_time)
         write_mesh(os.path.join(folder, "mesh.msh"), self.scene.mesh)
         text = json.dumps({**self.report.as_dict(), "diverged": self.diverged}, indent=1)
         write_text(os.path.join(folder, "report.json"), text)
         if self.frames:
-            place = os.path.join(folder, "paraview")
-            write_paraview(place, self.model, self.frames, series_name(folder))
+            write_paraview(place, self.model, self.frames, name)

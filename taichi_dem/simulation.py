@@ -254,11 +254,12 @@ class Simulation:
             run_seconds=self.run_seconds,
             run_cpu_seconds=self.run_cpu_seconds,
             effect_activity=effect_activity(
-                self.model, self.energy_balance, tables, account, self.missing_effects
+                self.model, self.energy_balance, tables, account, self.missing_effects, counts[0]
             ),
             missing_effects=self.missing_effects.findings(),
             unresolved=self.step_resolution.findings(),
             bound_by=counted_criteria(self.state.bound.to_numpy()),
+            round_off_J=self.divergence_check.round_off(),
         )
 
 

@@ -27,6 +27,8 @@ from taichi_dem.topology import body_properties, topology_of
 
 #: Elements listed in the printed table.
 _WORST = 10
+#: What binds a body without bonds and contacts.
+NOTHING = "nothing"
 #: The methods by what they do with dashpots.
 METHODS = {
     "full": "Uniform, Multirate",
@@ -50,10 +52,13 @@ class StepReport:
 
     @property
     def binding(self):
-        """Name of the criterion that binds each body's explicit step, array (body_count,)."""
+        """Name of the criterion that binds each body's explicit step, array (body_count,).
+
+        "nothing" for a body whose step nothing limits.
+        """
         names = self._names()
         place = np.argmin([self.limits[name] for name in names], axis=0)
-        return np.array(names)[place]
+        return np.where(np.isfinite(self.step_s), np.array(names)[place], NOTHING)
 
     @property
     def step_s(self):
@@ -88,7 +93,10 @@ class StepReport:
         return np.argsort(self.step_s, kind="stable")[:count]
 
     def price(self, count=_WORST):
-        """Gain in the step of all without the count worst bodies, a factor of at least 1."""
+        """Gain in the step of all without the count worst bodies, a factor of at least 1.
+
+        Infinite where nothing limits the step of the others, or there are none.
+        """
         steps = np.append(np.sort(self.step_s), np.inf)
         return float(steps[min(count, len(steps) - 1)] / steps[0]) if steps[0] < np.inf else 1.0
 
@@ -100,13 +108,22 @@ class StepReport:
     def __repr__(self):
         worst = self.worst(1)[0]
         step = f"smallest step {self.step_s[worst]:.3g} s by {self.binding[worst]}"
+        if self._free:
+            step = "nothing limits the step"
         bodies = counted(len(self.step_s), "body")
         return in_brief(self, bodies, step, "print it for the table")
 
     def __str__(self):
         """What each method bears, what binds how many bodies, the worst, and what they cost."""
         lines = [*self._method_lines(), "", *self._criterion_lines(), *self._worst_lines()]
+        if self._free:
+            lines = ["nothing limits the step: no body has a bond, and no contact is listed"]
         return "\n".join([*lines, *(f"warning: {warning}" for warning in self.warnings)])
+
+    @property
+    def _free(self):
+        """Whether nothing limits the step of any body."""
+        return not np.isfinite(self.step_s).any()
 
     def _method_lines(self):
         """A line for every way of taking dashpots, then how to read it."""
@@ -114,7 +131,8 @@ class StepReport:
         for dashpots, words in METHODS.items():
             bonds, contact = (self._smallest(dashpots, link) for link in ("bond", "contact"))
             lines.append(
-                f"{words:32s}{bonds[0]:12.3g} {bonds[1]:9s}{contact[0]:14.3g} {contact[1]}"
+                f"{words:32s}{_seconds(bonds[0]):>12s} {bonds[1]:9s}"
+                f"{_seconds(contact[0]):>14s} {contact[1]}"
             )
         lines.append(
             "in contact: every sphere of the worst face at once; Multirate: of the worst body, "
@@ -137,18 +155,33 @@ class StepReport:
         lines = [f"{head:24s}{'bodies':>8s}{'smallest s':>12s}{'median s':>12s}"]
         for name, values in self.limits.items():
             bodies = int((binding == name).sum())
-            lines.append(f"{name:24s}{bodies:8d}{values.min():12.3g}{np.median(values):12.3g}")
+            smallest, median = (_seconds(value) for value in (values.min(), np.median(values)))
+            lines.append(f"{name:24s}{bodies:8d}{smallest:>12s}{median:>12s}")
         return lines
 
     def _worst_lines(self):
+        """The bodies of the smallest steps, as far as something limits them, and their cost."""
         binding, step = self.binding, self.step_s
+        worst = [body for body in self.worst() if np.isfinite(step[body])]
         lines = [f"{'worst body':>10s}{'step s':>12s}  bound by"]
-        lines += [f"{body:10d}{step[body]:12.3g}  {binding[body]}" for body in self.worst()]
-        lines.append(
-            f"without the worst {_WORST} the step of all would be {self.price():.3g} times longer; "
-            f"with steps of their own they take {100 * self.work_share():.3g} % of the updates"
-        )
-        return lines
+        lines += [f"{body:10d}{step[body]:12.3g}  {binding[body]}" for body in worst]
+        return [*lines, *self._price_lines()]
+
+    def _price_lines(self):
+        """What the worst bodies cost, where others are left whose step is limited too."""
+        price = self.price()
+        if not np.isfinite(price):
+            return []
+        share = f"with steps of their own they take {100 * self.work_share():.3g} % of the updates"
+        if f"{price:.3g}" == "1":
+            return [f"without the worst {_WORST} the step of all would be no longer; {share}"]
+        longer = f"would be {price:.3g} times longer"
+        return [f"without the worst {_WORST} the step of all {longer}; {share}"]
+
+
+def _seconds(step):
+    """A step [s] for a table."""
+    return f"{step:.3g}" if np.isfinite(step) else "unlimited"
 
 
 def stable_together(springs, drags):

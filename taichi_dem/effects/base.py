@@ -46,6 +46,20 @@ class Effect:
         """Fields that change in a run, by name; a checkpoint holds them."""
         return {}
 
+    def travel(self):
+        """How far it may carry bodies along x, y and z [m]: lowest and highest, two rows.
+
+        Asked of loads and supports, whether parts of a mesh may meet: without bounds unless an
+        effect knows better.
+        """
+        return (-np.inf,) * 3, (np.inf,) * 3
+
+
+def along(direction):
+    """Travel without end in a direction, for ``Effect.travel``."""
+    low = tuple(-np.inf if x < 0.0 else 0.0 for x in direction)
+    return low, tuple(np.inf if x > 0.0 else 0.0 for x in direction)
+
 
 def parameters(**values):
     """Checked parameters in one field, in the order given; floats that kernels read."""
@@ -142,4 +156,4 @@ ABSENT = {
     "friction": NoFriction,
 }
 
-__all__ = ["ABSENT", "MANY", "ROLES", "Effect", "parameters"]
+__all__ = ["ABSENT", "MANY", "ROLES", "Effect", "along", "parameters"]

@@ -4,7 +4,7 @@ import taichi as ti
 
 from taichi_dem.allocation import defer_fill
 from taichi_dem.checks import direction
-from taichi_dem.effects.base import Effect
+from taichi_dem.effects.base import Effect, along
 from taichi_dem.physics.rotation import zero3
 
 
@@ -23,6 +23,10 @@ class Gravity(Effect):
         self.model = model
         self.acceleration = ti.Vector.field(3, ti.f64, shape=())
         defer_fill(self.acceleration.fill, ti.Vector(self._acceleration))
+
+    def travel(self):
+        """Without end along the acceleration."""
+        return along(self._acceleration)
 
     @ti.func
     def acts_on(self, i):

@@ -7,7 +7,7 @@ import taichi as ti
 
 from taichi_dem.allocation import defer_fill
 from taichi_dem.checks import direction, positive, shown, word
-from taichi_dem.effects.base import Effect, parameters
+from taichi_dem.effects.base import Effect, along, parameters
 from taichi_dem.errors import InputError
 from taichi_dem.physics.rotation import zero3
 from taichi_dem.topology import faces_of_group
@@ -22,6 +22,10 @@ class _Support(Effect):
 
     def __init__(self, group):
         self.group = word("group", group)
+
+    def travel(self):
+        """None: it holds what it acts on."""
+        return (0.0,) * 3, (0.0,) * 3
 
     def bind(self, model):
         """Mark the supported bodies; InputError when the mesh has no such group."""
@@ -101,6 +105,13 @@ class PrescribedMotion(_Support):
         _Support.bind(self, model)
         x, y, z = self._velocity
         self.motion = parameters(x=x, y=y, z=z, rate=2.0 * math.pi * self._frequency)
+
+    def travel(self):
+        """As far as it swings, or without end along a constant velocity."""
+        if not self._frequency:
+            return along(self._velocity)
+        swing = [abs(x) / (2.0 * math.pi * self._frequency) for x in self._velocity]
+        return tuple(-x for x in swing), tuple(swing)
 
     @ti.func
     def held(self, i, t, rotation, velocity, angular_momentum):

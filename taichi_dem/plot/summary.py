@@ -4,6 +4,7 @@ import math
 
 import matplotlib
 import numpy as np
+from matplotlib.ticker import MaxNLocator
 
 from taichi_dem.plot.block import draw_breaks, frame_block
 from taichi_dem.plot.bodies import draw_bodies
@@ -145,6 +146,8 @@ def _draw_curves(panels, history):
     style = "steps-post" if label == _BROKEN else "default"
     _line(panels["events"], factor * time_s, values, color=BLUE, drawstyle=style)
     panels["events"].set(ylabel=label)
+    if label == _BROKEN:
+        panels["events"].yaxis.set_major_locator(MaxNLocator(integer=True))
     for name in ("energy", "events"):
         panels[name].set(xlabel=f"time [{unit}]")
         panels[name].locator_params(axis="x", nbins=6)

@@ -7,6 +7,7 @@ import pytest
 
 from taichi_dem import (
     CONCRETE,
+    Multirate,
     Scene,
     Simulation,
     SimulationDiverged,
@@ -55,6 +56,14 @@ def test_the_step_it_advises_is_stable(diverged):
     assert report.energy_residual_fraction < 1.0
     assert np.isfinite(report.energy_balance["kinetic"])
     assert report.energy_balance["kinetic"] <= report.energy_balance["load_work"]
+
+
+def test_an_idle_scene_does_not_diverge_however_long_it_rests():
+    """The energy that rounding gives it grows with the steps, and stays round-off."""
+    scene = Scene(bar(0.4, 0.1, (4, 1, 1)), CONCRETE, [effects.Fixed("left")])
+    report = simulate(scene, method=Multirate(), until=1e-3, samples=4, progress=None).report
+    assert 0.0 < report.energy_balance["kinetic"] < report.round_off_J
+    assert "round-off" in report.unexplained
 
 
 def test_a_diverged_run_leaves_its_last_good_output(diverged):

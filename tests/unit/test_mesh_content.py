@@ -1,5 +1,10 @@
 """What mesh files hold beside tetrahedra: cells that are cut, and what is told or refused."""
 
+import os
+import re
+import shlex
+import subprocess
+
 import meshio
 import numpy as np
 import pytest
@@ -75,7 +80,9 @@ def test_solid_cells_are_cut_into_tetrahedra_that_fit_together(tmp_path, name):
     meshio.write(tmp_path / "mesh.vtu", meshio.Mesh(points, [(kind, cells)]))
     mesh = read_mesh(tmp_path / "mesh.vtu")
     assert mesh.body_count == each * len(cells)
-    assert f"cut {len(cells)} {kind} into {mesh.body_count} tetrahedra" in mesh.notes
+    named = "hexahedra" if kind == "hexahedron" else f"{kind}s"
+    named = "hexahedron20 cells" if kind == "hexahedron20" else named
+    assert f"cut {len(cells)} {named} into {mesh.body_count} tetrahedra" in mesh.notes
     assert not any("negative volume" in note for note in mesh.notes)
     # 3 x 2 x 2 boxes have 32 outer squares.
     top = topology_of(mesh)
@@ -137,6 +144,73 @@ def test_stl_is_refused_with_the_lines_that_fill_it(tmp_path):
     if gmsh is not None:
         filled = filled_by_gmsh(tmp_path, f"{lines}\n")
         assert volumes(filled).sum() == pytest.approx(volumes(BAR).sum())
+
+
+@pytest.mark.skipif(os.name == "nt", reason="the lines are for a POSIX shell")
+@pytest.mark.parametrize(
+    "name", ["my part.stl", "it's.stl", 'a"b.stl', "$HOME.stl", "a;b`c`.STL", "-x.stl", "é.stl"]
+)
+def test_the_lines_that_fill_an_stl_hold_for_any_name(tmp_path, name):
+    """The script names a file that is there, and copying touches no other."""
+    meshio.write(tmp_path / "a.stl", meshio.Mesh(BAR.points, [("triangle", BAR.groups["top"])]))
+    os.rename(tmp_path / "a.stl", tmp_path / name)
+    said = refused(str(tmp_path / name))
+    line = said.split("pip install gmsh): ")[1].split(" && gmsh")[0]
+    subprocess.run(["sh", "-c", line], cwd=tmp_path, check=True)
+    script = (tmp_path / "fill.geo").read_text()
+    merged = script.split('Merge "')[1].split('"; ')[0]
+    assert (tmp_path / merged).read_bytes() == (tmp_path / name).read_bytes()
+    assert {path.name for path in tmp_path.iterdir()} == {name, merged, "fill.geo"}
+    assert shlex.quote(merged) == merged or merged == "é.stl"
+
+
+VOXELS = """# vtk DataFile Version 3.0
+one voxel
+ASCII
+DATASET UNSTRUCTURED_GRID
+POINTS 8 float
+0 0 0 1 0 0 0 1 0 1 1 0 0 0 1 1 0 1 0 1 1 1 1 1
+CELLS 1 9
+8 0 1 2 3 4 5 6 7
+CELL_TYPES 1
+11
+"""
+
+
+def test_voxels_are_refused_in_words(tmp_path):
+    (tmp_path / "mesh.vtk").write_text(VOXELS)
+    said = refused(tmp_path / "mesh.vtk")
+    assert "holds cells of a type that meshio does not know, such as voxels: split them" in said
+
+
+@pytest.mark.parametrize("beside", [False, True])
+def test_voxels_that_meshio_passes_over_are_told(tmp_path, beside):
+    """In a VTU it drops them without an error; beside others they would leave holes."""
+    points, cells = boxes((1, 1, 1))
+    kinds = [("hexahedron", cells), ("hexahedron", cells)]
+    content = meshio.Mesh(np.vstack([points, points + 9.0]), kinds[: 1 + beside])
+    content.cells[-1].data = content.cells[-1].data + 8
+    meshio.write(tmp_path / "mesh.vtu", content, binary=False)
+    text = (tmp_path / "mesh.vtu").read_text()
+    types = re.search(r'(Name="types"[^>]*>)\s*((?:12\s*)+)<', text)
+    voxels = "12\n11\n" if beside else "11\n"
+    (tmp_path / "mesh.vtu").write_text(text.replace(types[0], f"{types[1]}{voxels}<"))
+    if not beside:
+        assert "such as voxels, which cannot be read: split" in refused(tmp_path / "mesh.vtu")
+        return
+    with pytest.warns(UserWarning, match="such as voxels, and these are not read"):
+        mesh = read_mesh(tmp_path / "mesh.vtu")
+    assert mesh.body_count == 6 and any("voxels" in note for note in mesh.notes)
+
+
+@pytest.mark.parametrize("error", [KeyError(1), IndexError(), ValueError(" 7 ")])
+def test_a_reader_that_fails_with_a_number_is_named(tmp_path, monkeypatch, error):
+    def fail(path):
+        raise error
+
+    monkeypatch.setattr(meshio, "read", fail)
+    (tmp_path / "mesh.vtk").write_text(VOXELS)
+    assert f"cannot be read: {type(error).__name__}" in refused(tmp_path / "mesh.vtk")
 
 
 def filled_by_gmsh(folder, lines):
@@ -203,10 +277,49 @@ def test_sets_and_numbers_of_other_formats_are_told(tmp_path):
     content = meshio.Mesh(BAR.points, cells, cell_sets={"part": [np.arange(5)]})
     content.point_sets = {"held": np.arange(3)}
     meshio.write(tmp_path / "mesh.inp", content)
-    (note,) = read_mesh(tmp_path / "mesh.inp").notes
-    assert note == "only groups of faces are read, not part (of elements), held (of points)"
-    for values, told in ((np.arange(BAR.body_count) % 2, 1), (np.ones(BAR.body_count, int), 0)):
-        content = meshio.Mesh(BAR.points, cells, cell_data={"rock": [values]})
-        meshio.write(tmp_path / "mesh.vtu", content)
-        notes = read_mesh(tmp_path / "mesh.vtu").notes
-        assert notes == ("numbers on tetrahedra are not read: rock",) * told
+    with pytest.warns(UserWarning, match="need groups of faces") as warned:
+        (note,) = read_mesh(tmp_path / "mesh.inp").notes
+    assert note.startswith("the sets part (of elements), held (of points) are not read: one mat")
+    assert len(warned) == 1 and note in str(warned[0].message)
+    content = meshio.Mesh(BAR.points, cells, cell_data={"rock": [np.arange(BAR.body_count) % 2]})
+    meshio.write(tmp_path / "mesh.vtu", content)
+    with pytest.warns(UserWarning, match="numbers on tetrahedra are not read: rock; one material"):
+        mesh = read_mesh(tmp_path / "mesh.vtu")
+    assert len(mesh.notes) == 1 and "1 note" in repr(mesh)
+
+
+@pytest.mark.parametrize("number", [np.ones, np.arange, np.zeros])
+def test_one_number_for_all_or_a_number_for_each_is_no_news(tmp_path, number):
+    cells, data = [("tetra", BAR.tetrahedra)], {"id": [number(BAR.body_count).astype(int)]}
+    meshio.write(tmp_path / "mesh.vtu", meshio.Mesh(BAR.points, cells, cell_data=data))
+    assert read_mesh(tmp_path / "mesh.vtu").notes == ()
+
+
+def abaqus_file(path, lines, **sets):
+    content = meshio.Mesh(BAR.points, [("tetra", BAR.tetrahedra)], **sets)
+    meshio.write(path, content)
+    path.write_text(path.read_text() + lines)
+    return path
+
+
+def test_abaqus_sets_of_everything_are_noted_without_a_warning(tmp_path):
+    sets = {"cell_sets": {"all": [np.arange(BAR.body_count)]}}
+    path = abaqus_file(
+        tmp_path / "mesh.inp", "", point_sets={"n": np.arange(BAR.point_count)}, **sets
+    )
+    assert read_mesh(path).notes == (
+        "only groups of faces are read, not all (of elements), n (of points)",
+    )
+
+
+@pytest.mark.parametrize(
+    "head", ["*Surface, type=ELEMENT, name=Load", "*SURFACE,NAME=Load", '*surface, name="Load"']
+)
+def test_abaqus_surfaces_are_told(tmp_path, head):
+    path = abaqus_file(tmp_path / "mesh.inp", f"{head}\n1, S1\n")
+    with pytest.warns(UserWarning, match=r"Load \(of element sides\) are not read"):
+        mesh = read_mesh(path)
+    with pytest.raises(InputError, match="Load is a group of element sides"):
+        mesh.group_faces("Load")
+    path = abaqus_file(tmp_path / "mesh.inp", "*Surface Interaction, name=Load\n** *Surface\n")
+    assert read_mesh(path).notes == ()

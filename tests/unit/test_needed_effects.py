@@ -7,13 +7,23 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE, InputError, Scene, Uniform, effects, needed_effects, simulate
+from taichi_dem import (
+    CONCRETE,
+    InputError,
+    Scene,
+    Uniform,
+    checked_mesh,
+    effects,
+    needed_effects,
+    simulate,
+)
 from taichi_dem.effect_activity import effect_activity
 from taichi_dem.effect_use import Advice, EffectUse
 from taichi_dem.energy_balance import TERMS
-from taichi_dem.mesh_shapes import pair
+from taichi_dem.mesh_shapes import bar, pair
 from taichi_dem.model import Model
 from taichi_dem.state import State
+from tests.unit.test_outer_faces import beside
 
 #: Far below the strength of concrete: a block of some 1 kg that falls from rest for 1e-5 s.
 STEP, UNTIL = 1e-7, 1e-5
@@ -78,7 +88,7 @@ def test_what_poses_the_question_is_kept_though_it_did_nothing(hung):
 def test_dropping_inactive_effects_changes_no_bit(scene, request):
     """The advice is a promise: without these effects every sample is the same."""
     result, makers = request.getfixturevalue(scene), {"gentle": GENTLE, "hung": HUNG}[scene]
-    dropped = needed_effects(result).droppable
+    dropped = needed_effects(result).inactive
     kept = [effect for effect in (make() for make in makers) if effect.name not in dropped]
     again = ran(*kept)
     assert len(kept) < len(makers)
@@ -86,22 +96,25 @@ def test_dropping_inactive_effects_changes_no_bit(scene, request):
         np.testing.assert_array_equal(again.history[name], column, err_msg=name)
 
 
-def used(listed, material=CONCRETE, exposed=True, heat=0.0, lacking=0, **account):
+def used(
+    listed, material=CONCRETE, exposed=True, heat=0.0, lacking=0, mesh=None, works=None, **account
+):
     """What is said of effects whose account holds these terms [J]; every effect by its name.
 
     exposed: whether faces carry spheres. heat: of each body's contacts, and in each bond [J].
     lacking: recordings that saw bodies overlap where faces carry none.
     """
-    model = Model(pair(), material, listed)
+    model = Model(mesh or pair(), material, listed)
     state = State(model, 1e4)
     if model.has_contact and exposed:
         state.expose(model.topology)
-    tables = np.zeros((2, 6)), np.full((1, 5), heat), np.zeros((0, 4))
+    bonds = max(1, model.bond_count)
+    tables = np.zeros((model.body_count, 6)), np.full((bonds, 5), heat), np.zeros((0, 4))
     tables[0][:, 3:5] = heat
-    none = SimpleNamespace(state=state, start_energy=0.0)
+    none = SimpleNamespace(state=state, start_energy=0.0, support_works=lambda index: works)
     filled = {**dict.fromkeys(TERMS, 0.0), **account}
     watch = SimpleNamespace(touching=0, outer=SimpleNamespace(times=lacking))
-    return {use.effect: use for use in effect_activity(model, none, tables, filled, watch)}
+    return {use.effect: use for use in effect_activity(model, none, tables, filled, watch, 100)}
 
 
 class OwnContact(effects.SphereContact):
@@ -219,6 +232,80 @@ def test_small_share_is_negligible_unless_the_effect_steers(tolerance, names):
 def test_tolerance_out_of_range_is_refused(gentle, bad):
     with pytest.raises(InputError, match=r"tolerance must lie in \[0, 1\]"):
         needed_effects(gentle, bad)
+
+
+def test_contact_is_kept_where_parts_may_pass_through_each_other_between_recordings():
+    """No recording saw them within each other; that they never touched tells nothing."""
+    mesh = beside(pair(), pair(), [0.5, 0.0, 0.0])
+    for outer_faces in (False, True):
+        listed = [effects.SphereContact(outer_faces=outer_faces), effects.Friction()]
+        found = used(listed, mesh=mesh)
+        assert [found[name].idle for name in ("sphere_contact", "friction")] == [outer_faces] * 2
+        assert all(
+            ("may pass through each other" in use.kept) != use.idle for use in found.values()
+        )
+
+
+SHAKER = (
+    *(effects.BondDamping, effects.Gravity, lambda: effects.PrescribedMotion("left", (1.0, 0, 0))),
+    lambda: effects.Fixed("right"),
+)
+
+
+def test_support_that_drives_is_not_said_to_hold_without_work(hung):
+    """One body is pushed at 1 m/s, the other held: work is done by one support alone."""
+    lines = {
+        line.split()[1]: line
+        for line in str(needed_effects(ran(*(m() for m in SHAKER)))).splitlines()
+    }
+    assert "1 of 2 bodies driven, " in lines["prescribed_motion"]
+    assert lines["prescribed_motion"].endswith("; a support is part of the question")
+    assert "1 of 2 bodies held, " in lines["fixed"]
+    for line in (lines["fixed"], str(needed_effects(hung))):
+        assert "a support is part of the question, and holds without doing work" in line
+
+
+@pytest.mark.parametrize(
+    ("make", "work", "told"),
+    [
+        (effects.Fixed, 0.0, "held, and holds without doing work"),
+        (effects.Fixed, -1.0, "held"),  # of bodies that were placed in motion
+        (lambda group: effects.PrescribedMotion(group, (1.0, 0, 0)), 1.0, "driven"),
+        (lambda group: effects.PrescribedMotion(group, (0, 0, 0)), 1e-17, "held, and holds"),
+        (lambda group: effects.Roller(group, (1.0, 0, 0)), 1e-17, "held, and holds"),
+    ],
+)
+def test_supports_hold_without_work_where_their_work_is_round_off(make, work, told):
+    """Of 1 J that a load gave, 100 steps may round off 2e-14 J."""
+    (use,) = used([make("left")], works=np.array([work, np.nan]), load_work=1.0).values()
+    words = use.what.split()[1] + use.kept.replace("a support is part of the question", "")
+    assert words.startswith(told) and ("without" in words) == ("holds" in told)
+
+
+@pytest.mark.parametrize("listed", [(), (effects.Gravity,)])
+@pytest.mark.parametrize("away", [0.0, 100.0])
+def test_round_off_in_bonds_is_no_damping(listed, away):
+    """A bar at rest, or in free fall, wherever it lies: its bonds shake by last digits only."""
+    mesh = bar(0.5, 0.1, (5, 1, 1))
+    mesh = checked_mesh(mesh.points + away, mesh.tetrahedra, {})
+    scene = Scene(mesh, CONCRETE, (effects.BondDamping(), *(make() for make in listed)))
+    advice = needed_effects(simulate(scene, method=Uniform(STEP), until=1e-4, samples=1), 0.0)
+    use = advice.uses[0]
+    assert use.energy_J > 0.0
+    assert str(use) == f"never acted beyond round-off (0 bonds damped, {use.energy_J:.3g} J)"
+    assert advice.droppable == ("bond_damping",) and advice.inactive == ()
+
+
+def test_a_vibration_of_a_nanometre_is_damped_and_one_below_the_last_digits_is_not():
+    """Energy of a bond that is opened by u: A k u^2 / 2. Own dashpots are kept all the same."""
+    model = Model(pair(), CONCRETE, [])
+    spring = 1.5 * float(model.unit_area[0]) * model.bond_stiffness[0][0]
+    (seen,) = used([effects.BondDamping()], heat=spring * 1e-9**2).values()
+    assert seen.is_active and not seen.rounding
+    for make, dropped in ((effects.BondDamping, True), (Own, False)):
+        (hidden,) = used([make()], heat=spring * 1e-18**2, bond_dashpot=1e-30).values()
+        assert hidden.rounding and not hidden.is_active and not hidden.idle
+        assert hidden.negligible(0.0) == dropped
 
 
 def test_what_is_no_result_is_refused():

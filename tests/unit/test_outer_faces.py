@@ -23,7 +23,11 @@ def beside(mesh, other, shift):
     """Two meshes in one, the second moved by a shift [m]."""
     points = np.vstack([mesh.points, other.points + shift])
     bodies = np.vstack([mesh.tetrahedra, other.tetrahedra + mesh.point_count])
-    return checked_mesh(points, bodies, {})
+    groups = {f"first {name}": faces for name, faces in mesh.groups.items()}
+    groups.update({f"second {name}": f + mesh.point_count for name, f in other.groups.items()})
+    for name in set(mesh.groups) & set(other.groups):
+        groups[name] = np.vstack([groups[f"first {name}"], groups[f"second {name}"]])
+    return checked_mesh(points, bodies, groups)
 
 
 TWO = beside(single(EDGE), single(EDGE), [1.0, 0.0, 0.0])
@@ -55,6 +59,7 @@ def two():
     [
         (TWO, [effects.SphereContact()], True),
         (TWO, [effects.SphereContact(outer_faces=True)], False),
+        (TWO, [effects.BondDamping(), effects.GasPressure("sides")], True),
         (TWO, [effects.BondDamping()], False),
         (pair(EDGE), [effects.SphereContact()], False),
         (bar(0.2, 0.1, (2, 1, 1)), [effects.SphereContact()], False),
@@ -65,6 +70,8 @@ def test_parts_that_may_pass_through_each_other_are_told_before_a_run(mesh, list
     sentences = outer_faces_warnings(scene)
     assert len(sentences) == told
     assert all("SphereContact(outer_faces=True)" in sentence for sentence in sentences)
+    spheres = any(effect.role == "contact" for effect in listed)
+    assert all(("no contact is listed" in sentence) != spheres for sentence in sentences)
     assert str(step_report(scene)).count("warning: the mesh has 2 parts") == told
 
 
@@ -195,11 +202,18 @@ def test_finding_names_the_remedy_and_survives_a_checkpoint():
     assert again.findings() == watch.findings()
 
 
-def test_nothing_is_looked_for_where_outer_faces_carry_spheres_or_nothing_does():
-    for listed in ([], [effects.SphereContact(outer_faces=True)]):
-        model = Model(TWO, CONCRETE, listed)
-        watch = MissingEffects(model, State(model, 1e4), SimpleNamespace(contacts=None))
-        assert watch.outer_faces is None
+@pytest.mark.parametrize(
+    ("mesh", "listed"),
+    [
+        (TWO, [effects.SphereContact(outer_faces=True)]),
+        (pair(EDGE), []),
+        (bar(0.2, 0.1, (2, 1, 1)), []),
+    ],
+)
+def test_nothing_is_looked_for_where_outer_faces_carry_spheres_or_the_solid_is_one(mesh, listed):
+    model = Model(mesh, CONCRETE, listed)
+    watch = MissingEffects(model, State(model, 1e4), SimpleNamespace(contacts=None))
+    assert watch.outer_faces is None
 
 
 def test_two_blocks_that_meet_in_a_run_are_reported():

@@ -8,15 +8,28 @@ import re
 from xml.etree import ElementTree
 
 import matplotlib
+import matplotlib.pyplot as plt
 import meshio
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from taichi_dem import CONCRETE, ImplicitDashpots, InputError, Scene, effects, runtime, simulate
+from taichi_dem import (
+    CONCRETE,
+    Checkpoint,
+    ImplicitDashpots,
+    InputError,
+    Scene,
+    effects,
+    read_mesh,
+    runtime,
+    simulate,
+)
+from taichi_dem.files import write_text
+from taichi_dem.mesh_files import write_mesh
 from taichi_dem.mesh_shapes import bar, single
-from taichi_dem.plot.summary import scale, viewed_along
+from taichi_dem.plot.summary import _draw_curves, scale, viewed_along
 from taichi_dem.plot.view import View
 from taichi_dem.record import series_name, write_paraview
 from tests.bad_input.refusals import steady
@@ -281,3 +294,84 @@ def test_the_root_is_no_name():
 def test_a_folder_that_is_none_is_refused(beam, folder):
     with pytest.raises(InputError, match="output folder must be"):
         beam.write(folder)
+
+
+def files_in(folder):
+    return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.mark.parametrize("frames", [0, 1, 2])
+def test_a_folder_used_before_keeps_nothing_of_the_earlier_series(beam, tmp_path, frames):
+    """And all that is not of this series, however alike its name."""
+    place, name = tmp_path / "run", "paraview/run"
+    dataclasses.replace(beam, frames=beam.frames * 4).write(place)
+    others = {f"{name}.txt", f"{name}_1.vtu", f"{name}2_0001.vtu", f"{name}_0001_0001.vtu"}
+    others |= {"run_0001.vtu", "mine.txt", "paraview/other.pvd", "paraview/xrun.pvd"}
+    for other in others:
+        (place / other).write_text("mine")
+    (place / name).with_name("run_0099.vtu").mkdir()
+    dataclasses.replace(beam, frames=beam.frames[:frames]).write(place)
+    tables = {"history.csv", "bonds.csv", "mesh.msh", "report.json"}
+    series = {f"{name}_{k:04d}.vtu" for k in range(frames)} | ({f"{name}.pvd"} if frames else set())
+    assert files_in(place) == tables | series | others
+
+
+def test_a_shorter_series_of_a_given_name_replaces_its_own(beam, tmp_path):
+    write_paraview(tmp_path, beam.model, beam.frames, "a+b")
+    write_paraview(tmp_path, beam.model, beam.frames, "c")
+    write_paraview(tmp_path, beam.model, beam.frames[:1], "a+b")
+    count = len(beam.frames)
+    kept = {"c.pvd", *(f"c_{k:04d}.vtu" for k in range(count))}
+    assert files_in(tmp_path) == kept | {"a+b.pvd", "a+b_0000.vtu"}
+
+
+def test_a_tilde_is_the_users_home(beam, tmp_path, monkeypatch):
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    for name in ("HOME", "USERPROFILE"):
+        monkeypatch.setenv(name, str(tmp_path / "home"))
+    beam.write("~/run")
+    assert names_in(tmp_path / "home" / "run" / "paraview") == "run"
+    write_paraview("~/frames", beam.model, beam.frames)
+    assert names_in(tmp_path / "home" / "frames") == "frames"
+    write_text("~/a.txt", "x")
+    write_mesh("~/a.msh", beam.scene.mesh)
+    assert read_mesh("~/a.msh").source == str(tmp_path / "home" / "a.msh")
+    assert Checkpoint("~/a.npz").path == str(tmp_path / "home" / "a.npz")
+    assert list((tmp_path / "here").iterdir()) == []
+
+
+def figures(result):
+    return dict(result._figures())
+
+
+def test_energy_not_explained_is_a_share_only_where_there_is_some(results):
+    """Without work and motion all energies are round-off, and a share of them says nothing."""
+    beam, alone = results
+    assert beam.report.round_off_J > 0.0
+    share = beam.report.energy_residual_fraction
+    assert figures(beam)["energy not explained"].startswith(f"{100.0 * share:.3g} % of ")
+    for size, words in ((1e-3, "round-off"), (1e3, "% of the energy held")):
+        ledger = dict.fromkeys(beam.report.energy_balance, 0.0)
+        ledger.update(
+            kinetic=size * beam.report.round_off_J, residual=0.3 * beam.report.round_off_J
+        )
+        idle = dataclasses.replace(
+            beam, report=dataclasses.replace(beam.report, energy_balance=ledger)
+        )
+        assert words in figures(idle)["energy not explained"] and words in str(idle.report)
+    assert "%" not in figures(alone)["energy not explained"]
+    ledger = {**beam.report.energy_balance, "load_work": 2.0, "residual": 0.01}
+    pushed = dataclasses.replace(beam.report, energy_balance=ledger)
+    assert pushed.unexplained == "0.5 % of it"
+
+
+def test_broken_bonds_are_counted_in_whole_numbers():
+    """Whatever their number."""
+    for count in range(1, 12):
+        _, panels = plt.subplots(1, 2)
+        history = {"time_s": np.arange(2.0), "broken_faces": np.array([0, count])}
+        _draw_curves(dict(zip(("energy", "events"), panels)), history)
+        ticks = panels[1].get_yticks()
+        plt.close("all")
+        assert np.array_equal(ticks, np.round(ticks))

@@ -1,5 +1,7 @@
 """What limits a step: options, the report before a run, what a run records, limited dashpots."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -12,6 +14,7 @@ from taichi_dem import (
     Simulation,
     StepControl,
     Uniform,
+    checked_mesh,
     effects,
     read_mesh,
     simulate,
@@ -123,7 +126,44 @@ def test_report_tells_what_each_method_bears():
     for way in ("full", "limited", "solved"):
         assert np.allclose(undamped.borne(way), report.limits["bond_stiffness"], rtol=1e-15)
         assert np.isinf(undamped.borne(way, "contact")).all()
-    assert "inf" in str(step_report(Scene(single(), CONCRETE, [effects.BondDamping()])))
+
+
+def loose_and_bonded(*meshes):
+    """Meshes side by side in one, 1 m apart."""
+    starts = np.cumsum([0] + [mesh.point_count for mesh in meshes])
+    points = [np.add(mesh.points, [0.0, 0.0, place]) for place, mesh in enumerate(meshes)]
+    bodies = [mesh.tetrahedra + start for mesh, start in zip(meshes, starts)]
+    return checked_mesh(np.vstack(points), np.vstack(bodies), {})
+
+
+@pytest.mark.parametrize("count", [1, 3, 12])
+@pytest.mark.parametrize("listed", [[], [effects.BondDamping()], [effects.Gravity()]])
+def test_bodies_without_bonds_are_told_that_nothing_limits_their_step(count, listed):
+    """No figure is said of them: there is no step, no share and no gain to tell."""
+    scene = Scene(loose_and_bonded(*[single()] * count), CONCRETE, listed)
+    report = step_report(scene)
+    assert set(report.binding) == {"nothing"}
+    first = str(report).splitlines()[0]
+    assert first == "nothing limits the step: no body has a bond, and no contact is listed"
+    assert not re.search(r"\binf\b|nan|%|times|bond_", str(report) + repr(report))
+    assert "nothing limits the step" in repr(report)
+
+
+@pytest.mark.parametrize("loose", [0, 1, 20])
+def test_bodies_that_nothing_limits_are_not_among_the_worst(loose):
+    """Two bonded bodies limit the step of all; without them nothing is left to compare with."""
+    mesh = loose_and_bonded(*[single()] * loose, pair())
+    report = step_report(Scene(mesh, CONCRETE, [effects.BondDamping()]))
+    assert list(report.binding) == ["nothing"] * loose + ["bond_dashpot"] * 2
+    told = str(report)
+    assert told.count("  bond_dashpot\n") + told.endswith("  bond_dashpot") == 2
+    assert not re.search(r"\binf\b|nan|times longer|  nothing", told)
+    assert ("unlimited" in told) and ("s by bond_dashpot" in repr(report))
+
+
+def test_equal_worst_bodies_do_not_promise_a_step_one_time_longer():
+    report = step_report(Scene(loose_and_bonded(*[pair()] * 6), CONCRETE, [effects.BondDamping()]))
+    assert "the step of all would be no longer; with steps of their own" in str(report)
 
 
 def test_a_body_that_lost_bonds_is_as_slow_as_those_that_hold():
