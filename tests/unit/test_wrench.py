@@ -106,7 +106,8 @@ def random(request):
 
 def test_cross_matrix_is_the_vector_product(random):
     r, w = random.standard_normal((2, 3))
-    assert np.array_equal(found(_cross, r)[:3, :3] @ w, cross(r) @ w)
+    # The matrices, not their products: a library rounds a product as its operands lie in memory.
+    assert np.array_equal(found(_cross, r)[:3, :3], cross(r))
     assert np.allclose(cross(r) @ w, np.cross(r, w), rtol=0, atol=4 * EPS * norm(r) * norm(w))
 
 
