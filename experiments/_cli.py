@@ -12,14 +12,13 @@ import sys
 
 import numpy as np
 
-from _output import lasting_output
-
 # The experiments take the mesh from here, as they do all that they share.
 from taichi_dem import PAPER_BLOCK as PAPER_BLOCK
 from taichi_dem import Checkpoint, InputError, SimulationDiverged, runtime
 from taichi_dem.checkpoint import Interrupted
 from taichi_dem.checks import shown
 from taichi_dem.files import write_text
+from taichi_dem.lasting_output import lasting_output
 from taichi_dem.version import __version__, taichi_version
 
 HERE = os.path.dirname(os.path.abspath(__file__))

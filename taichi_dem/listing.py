@@ -7,12 +7,11 @@
 import argparse
 import ast
 import inspect
-import os
 import pkgutil
-import sys
 from importlib import import_module
 from pathlib import Path
 
+from taichi_dem.lasting_output import lasting_output
 from taichi_dem.version import __version__
 
 _ROOT = Path(__file__).resolve().parents[1]
@@ -130,11 +129,5 @@ def _section(section):
 
 def _show(text):
     """Print, and end in silence when nobody reads on, as in ``| head``."""
-    encoding = getattr(sys.stdout, "encoding", None) or "utf-8"
-    try:
-        print(text.encode(encoding, "replace").decode(encoding), flush=True)
-    except OSError as error:
-        if not isinstance(error, BrokenPipeError):
-            print(f"standard output cannot be written to: {error.strerror}", file=sys.stderr)
-        # Python flushes again when it ends, and would complain then.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    with lasting_output():
+        print(text)

@@ -7,6 +7,7 @@ import sys
 
 import pytest
 
+from taichi_dem.lasting_output import lasting_output
 from tests import arch
 from tests.experiments.contract import FOLDER, NAMES
 from tests.processes import users_environment
@@ -71,10 +72,7 @@ def test_output_that_cannot_be_written_is_one_sentence(tmp_path):
     assert (tmp_path / "o\u0436" / "summary.json").is_file()
 
 
-def test_letters_that_the_output_lacks_are_replaced(script, monkeypatch):
-    script("gallery")
-    from _output import lasting_output
-
+def test_letters_that_the_output_lacks_are_replaced(monkeypatch):
     written = io.BytesIO()
     stream = io.TextIOWrapper(written, encoding="ascii")
     monkeypatch.setattr(sys, "stdout", stream)

@@ -21,6 +21,7 @@ LAYERS = {
             "types",
             "checks",
             "display",
+            "lasting_output",
             "kernel_source_cache",
             "runtime",
             "version",
