@@ -1,11 +1,9 @@
 """How far a batch is, and runs in several stages told as one."""
 
-import math
-import time
 from dataclasses import dataclass
 
 from taichi_dem.display import prefixed
-from taichi_dem.progress import Progress
+from taichi_dem.progress import Pace, Progress
 
 #: Calls of a progress callback keep this distance [s] when stages are short.
 _LEAST_SECONDS = 0.1
@@ -33,7 +31,7 @@ class Stages:
     def __init__(self, progress, ends):
         self.progress, self.ends, self.stage = progress, ends, 0
         self.before = BatchProgress(0.0, 0.0, 0)
-        self.told = -math.inf
+        self.pace = Pace(_LEAST_SECONDS)
 
     def __call__(self, progress):
         """Take note of the present stage's progress; the stage ends with a share of 1.
@@ -49,9 +47,7 @@ class Stages:
         whole = BatchProgress(float(share), seconds, steps)
         if progress.share == 1.0:
             self.stage, self.before = self.stage + 1, whole
-        late = time.perf_counter() - self.told > _LEAST_SECONDS
-        if late or self.stage == len(self.ends):
-            self.told = time.perf_counter()
+        if self.pace.should_report(self.stage == len(self.ends)):
             self._pass_on(whole)
 
     def _pass_on(self, progress):

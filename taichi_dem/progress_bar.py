@@ -9,7 +9,7 @@ import time
 from taichi_dem.checks import AUTO, instance, progress_option, shown
 from taichi_dem.display import in_brief
 from taichi_dem.errors import InputError
-from taichi_dem.progress import Counted, Progress, listening
+from taichi_dem.progress import Counted, Pace, Progress, listening
 
 #: Least time between two updates of a cell in Jupyter [s].
 _NOTEBOOK_SECONDS = 0.2
@@ -153,7 +153,7 @@ class _Notebook:
     """A bar below the cell of a Jupyter notebook that is running."""
 
     def __init__(self, title, display):
-        self._title, self._next_update = title, 0.0
+        self._title, self._pace = title, Pace(_NOTEBOOK_SECONDS)
         self._handle = display(self._drawn(0.0, ""), raw=True, display_id=True)
 
     def _drawn(self, share, words):
@@ -163,8 +163,7 @@ class _Notebook:
 
     def show(self, progress):
         """Draw how far the job is, and what it says of itself."""
-        if progress.phase == "compiling" or time.perf_counter() >= self._next_update:
-            self._next_update = time.perf_counter() + _NOTEBOOK_SECONDS
+        if self._pace.should_report(progress.phase == "compiling"):
             self._handle.update(self._drawn(progress.share, str(progress)), raw=True)
 
     def close(self):

@@ -239,7 +239,7 @@ def test_time_left_and_stages():
     told = []
     stages = Stages(told.append, [0.5, 1.0])
     for share in (0.5, 1.0, 0.5, 1.0):
-        stages.told = -math.inf
+        stages.pace.seconds = 0.0
         stages(BatchProgress(share, 2.0 * share, round(10 * share)))
     assert [progress.share for progress in told] == [0.25, 0.5, 0.75, 1.0]
     assert [progress.seconds for progress in told] == [1.0, 2.0, 3.0, 4.0]
