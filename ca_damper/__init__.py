@@ -1,7 +1,7 @@
 """The granular damper: a container of grains on a spring, by automaton or by spheres."""
 
 # First, out of order: it prepares the environment for ``import taichi``.
-from taichi_dem import runtime  # isort: skip
+from taichi_dem.kit import runtime  # isort: skip
 
 from ca_damper.automaton import Automaton
 from ca_damper.batch import Batch
@@ -15,9 +15,9 @@ from ca_damper.response import Response, frequency_response
 from ca_damper.spheres import Spheres
 from ca_damper.sweep import Sweep, sweep_up_and_down
 from ca_damper.table import SceneTable
-from taichi_dem.progress import Progress
-from taichi_dem.progress_bar import ProgressBar
-from taichi_dem.version import __version__
+from taichi_dem.kit.progress.progress import Progress
+from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.version import __version__
 
 __all__ = [
     "Automaton",

@@ -1,7 +1,7 @@
 """``python -m ca_damper``: fillings of the damper, what runs them, and experiments there are."""
 
 import ca_damper
-from taichi_dem import listing
+from taichi_dem.kit import listing
 
 
 def sections():

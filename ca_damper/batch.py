@@ -22,14 +22,14 @@ from ca_damper.oscillator import Oscillator
 from ca_damper.progress import BatchProgress
 from ca_damper.report import RK45_STAGES, Report
 from ca_damper.table import SceneTable, dealt
-from taichi_dem import runtime
-from taichi_dem.allocation import check_capacity
-from taichi_dem.checkpoint import version_text
-from taichi_dem.checks import choice, instance, positive, whole
-from taichi_dem.display import in_brief
-from taichi_dem.errors import InputError
-from taichi_dem.progress import compiling
-from taichi_dem.restart import CheckpointWriter, NoCheckpointWriter, RunSnapshot, opened
+from taichi_dem.kit import runtime
+from taichi_dem.kit.allocation import check_capacity
+from taichi_dem.kit.checkpoint import version_text
+from taichi_dem.kit.display import in_brief
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.progress.progress import compiling
+from taichi_dem.kit.restart import CheckpointWriter, NoCheckpointWriter, RunSnapshot, opened
+from taichi_dem.kit.validation import choice, instance, positive, whole
 
 MOUNTS = ("spring", "base")
 

@@ -3,8 +3,8 @@
 import numpy as np
 
 from ca_damper import measures
-from taichi_dem.checks import choice, progress_option, shown, whole
-from taichi_dem.errors import InputError
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import choice, progress_option, shown, whole
 
 #: Motion of the container at the beginning of a run.
 STARTS = ("rest", "empty", "rigid")

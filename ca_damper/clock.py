@@ -5,8 +5,8 @@ import math
 import numpy as np
 import taichi as ti
 
-from taichi_dem.checks import positive
-from taichi_dem.errors import InputError
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import positive
 
 #: Fewer would leave first harmonics, and the series of ``oscillator``, to chance.
 LEAST_STEPS_PER_CYCLE = 40

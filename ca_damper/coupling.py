@@ -7,7 +7,7 @@ launches, so that neither their number nor what else is in the batch changes a b
 import taichi as ti
 
 from ca_damper import measures
-from taichi_dem import runtime
+from taichi_dem.kit import runtime
 
 #: Status of a scene whose container has no finite motion any more; fillings use codes above zero.
 LOST = -1

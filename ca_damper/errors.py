@@ -1,7 +1,7 @@
 """Exceptions that a user of the package may meet; scripts end with 2 and 3 on them."""
 
-from taichi_dem.errors import InputError
-from taichi_dem.errors import SimulationDiverged as _SimulationDiverged
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.errors import SimulationDiverged as _SimulationDiverged
 
 
 class SimulationDiverged(_SimulationDiverged):

@@ -36,8 +36,8 @@ from typing import ClassVar
 import numpy as np
 import taichi as ti
 
-from taichi_dem.checks import positive, shown, whole
-from taichi_dem.errors import InputError
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import positive, shown, whole
 
 
 @ti.dataclass

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from taichi_dem.display import by_fields
+from taichi_dem.kit.display import by_fields
 
 #: Summed over the steps of a cycle; _cos and _sin: times cos(w t) and sin(w t).
 SUMS = ("x", "x_squared", "x_cos", "x_sin", "v_cos", "v_sin", "f", "f_cos", "f_sin")

@@ -1,9 +1,9 @@
 """Which effects of a filling a run had need of."""
 
 from ca_damper.report import Report
-from taichi_dem.checks import fraction
-from taichi_dem.effect_use import Advice
-from taichi_dem.errors import InputError
+from taichi_dem.kit.effect_usage import Advice
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import fraction
 
 
 def needed_effects(result, tolerance=1e-3):

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import taichi as ti
 
-from taichi_dem.checks import positive
+from taichi_dem.kit.validation import positive
 
 
 @dataclass(frozen=True)

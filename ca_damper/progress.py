@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from taichi_dem.display import prefixed
-from taichi_dem.progress import Pace, Progress
+from taichi_dem.kit.display import prefixed
+from taichi_dem.kit.progress.progress import Pace, Progress
 
 #: Calls of a progress callback keep this distance [s] when stages are short.
 _LEAST_SECONDS = 0.1

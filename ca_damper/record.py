@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ca_damper.progress import Stages
-from taichi_dem.checks import AUTO, shown, whole
-from taichi_dem.display import by_fields, counted, in_brief
-from taichi_dem.errors import InputError
-from taichi_dem.progress_bar import reporting
+from taichi_dem.kit.display import by_fields, counted, in_brief
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.progress.progress_bar import reporting
+from taichi_dem.kit.validation import AUTO, shown, whole
 
 _MOST_STEPS = 2**31 - 1
 _MOST_MARKS = 1_000_000

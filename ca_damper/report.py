@@ -4,8 +4,8 @@ import json
 from dataclasses import asdict, dataclass
 from typing import Optional
 
-from taichi_dem.display import counted, in_brief
-from taichi_dem.files import write_text
+from taichi_dem.kit.display import counted, in_brief
+from taichi_dem.kit.files import write_text
 
 #: Evaluations of the right-hand side in an attempt of RK45; the first slope is the last one's.
 RK45_STAGES = 6

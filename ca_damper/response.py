@@ -14,11 +14,11 @@ from ca_damper.measures import peak
 from ca_damper.oscillator import Oscillator
 from ca_damper.report import Report
 from ca_damper.table import SceneTable
-from taichi_dem.checks import AUTO, instance, positive, several, whole
-from taichi_dem.display import counted, embedded, in_brief, listed, table, titled, unfolded
-from taichi_dem.errors import InputError
-from taichi_dem.files import write_csv
-from taichi_dem.progress_bar import reporting
+from taichi_dem.kit.display import counted, embedded, in_brief, listed, table, titled, unfolded
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.files import write_csv
+from taichi_dem.kit.progress.progress_bar import reporting
+from taichi_dem.kit.validation import AUTO, instance, positive, several, whole
 
 #: Measures of a response and the unit that a CSV file says behind their names.
 UNITS = {

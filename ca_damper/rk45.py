@@ -15,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 import taichi as ti
 
-from taichi_dem.checks import finite, positive, shown, whole
-from taichi_dem.display import by_fields
-from taichi_dem.errors import InputError
+from taichi_dem.kit.display import by_fields
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import finite, positive, shown, whole
 
 #: Attempts after which an integration counts as stuck, unless the caller says otherwise.
 MOST_ATTEMPTS = 1_000_000

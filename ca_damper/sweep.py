@@ -11,9 +11,9 @@ import numpy as np
 from ca_damper.checks import check_run
 from ca_damper.progress import Stages
 from ca_damper.response import UNITS, Grid, Response
-from taichi_dem.checks import AUTO
-from taichi_dem.display import in_brief
-from taichi_dem.progress_bar import reporting
+from taichi_dem.kit.display import in_brief
+from taichi_dem.kit.progress.progress_bar import reporting
+from taichi_dem.kit.validation import AUTO
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,9 +3,9 @@
 import numpy as np
 import taichi as ti
 
-from taichi_dem.checks import choice, shown
-from taichi_dem.display import counted, in_brief
-from taichi_dem.errors import InputError
+from taichi_dem.kit.display import counted, in_brief
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import choice, shown
 
 #: Scenes of a table, and the largest seed.
 _MOST_SCENES, _MOST_SEED = 2**24, 2**31 - 1

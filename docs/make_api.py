@@ -25,7 +25,7 @@ def modules(package):
     """Names of a package and of all modules in it; pdoc by itself stops at ``__all__``."""
     path = importlib.import_module(package).__path__
     inside = (found.name for found in pkgutil.walk_packages(path, f"{package}."))
-    return [package, *(name for name in inside if name != "taichi_dem.mesh_gmsh")]
+    return [package, *(name for name in inside if name != "taichi_dem.mesh.gmsh")]
 
 
 if __name__ == "__main__":

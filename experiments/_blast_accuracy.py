@@ -9,7 +9,7 @@ from _hard_cases._case import renew_session
 from taichi_dem import CONCRETE, Scene, Simulation, SimulationDiverged
 from taichi_dem.simulate import progress_of
 from taichi_dem.simulation import macro_steps
-from taichi_dem.state import NEVER
+from taichi_dem.timeline import NEVER
 
 #: How far bodies are displaced at the start of a run that differs by round-off only [m].
 DISTURBANCE = 1e-12

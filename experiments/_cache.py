@@ -4,8 +4,8 @@ import hashlib
 import json
 from pathlib import Path
 
-from taichi_dem.errors import InputError
-from taichi_dem.files import output_folder, write_text
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.files import output_folder, write_text
 
 _ROOT = Path(__file__).resolve().parents[1]
 

@@ -15,11 +15,11 @@ import numpy as np
 # The experiments take the mesh from here, as they do all that they share.
 from taichi_dem import PAPER_BLOCK as PAPER_BLOCK
 from taichi_dem import Checkpoint, InputError, SimulationDiverged, runtime
-from taichi_dem.checkpoint import Interrupted
-from taichi_dem.checks import shown
-from taichi_dem.files import write_text
-from taichi_dem.lasting_output import lasting_output
-from taichi_dem.version import __version__, taichi_version
+from taichi_dem.kit.checkpoint import Interrupted
+from taichi_dem.kit.files import write_text
+from taichi_dem.kit.progress.lasting_output import lasting_output
+from taichi_dem.kit.validation import shown
+from taichi_dem.kit.version import __version__, taichi_version
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 _INTERVALS = {

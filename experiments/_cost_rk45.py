@@ -6,7 +6,7 @@ from _damper_response import OSCILLATOR
 from _timing import measure
 from _work_precision import Point
 from ca_damper import Batch, Empty, SceneTable, rk45
-from taichi_dem.plot_style import power
+from taichi_dem.kit.plot_style import power
 
 WAYS = ("rk45_tolerance", "rk45_step", "rk45_python")
 TOLERANCES = (1e-6, 1e-8, 1e-10, 1e-12)

@@ -7,9 +7,9 @@ import numpy as np
 
 from _cli import PAPER_BLOCK
 from taichi_dem import read_mesh
-from taichi_dem.mesh import checked_mesh
-from taichi_dem.mesh_gmsh import block_with_hole
-from taichi_dem.mesh_order import in_space_order
+from taichi_dem.mesh.gmsh import block_with_hole
+from taichi_dem.mesh.mesh import checked_mesh
+from taichi_dem.mesh.reorder import in_space_order
 
 DEPTH = 3.0
 #: Sizes of elements at the hole and far from it [m] at a scale of one, the paper's at the hole.

@@ -7,7 +7,7 @@ import numpy as np
 
 from _cli import print_figures, write_summary
 from taichi_dem import checked_mesh
-from taichi_dem.files import write_text
+from taichi_dem.kit.files import write_text
 
 
 def placed_together(parts):

@@ -1,6 +1,6 @@
 """The picture of ``cost_of_effects.py``: what an effect costs beside what it is good for."""
 
-from taichi_dem.plot_style import BLACK, BLUE, GREY, RED, area_key, line_key, picture
+from taichi_dem.kit.plot_style import BLACK, BLUE, GREY, RED, area_key, line_key, picture
 
 #: Changes are drawn from the first on [%].
 _TICKS = (0.01, 0.1, 1.0, 10.0, 100.0)

@@ -26,8 +26,8 @@ from taichi_dem import (
     runtime,
     simulate,
 )
-from taichi_dem.allocation import field_bytes
-from taichi_dem.errors import SimulationDiverged
+from taichi_dem.kit.allocation import field_bytes
+from taichi_dem.kit.errors import SimulationDiverged
 from taichi_dem.step.drivers import Resident, Step
 
 EFFECTS = {

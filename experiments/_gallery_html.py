@@ -11,7 +11,7 @@ from urllib.parse import quote
 from jinja2 import Environment, FileSystemLoader
 
 from _cli import value_in_words
-from taichi_dem.files import write_text
+from taichi_dem.kit.files import write_text
 
 HERE = Path(__file__).resolve().parent
 #: What ``gallery.py`` notes of a run beside what the experiment wrote.

@@ -3,8 +3,8 @@
 import numpy as np
 
 from _scaling_simulate import WAYS, acceleration
-from taichi_dem.partition import imbalance
-from taichi_dem.plot_style import BLACK, BLUE, GREEN, GREY, PURPLE, RED, picture
+from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, PURPLE, RED, picture
+from taichi_dem.mesh.partition import imbalance
 
 _LOOK = {
     "static": (RED, "-"),

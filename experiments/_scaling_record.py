@@ -11,7 +11,7 @@ import taichi as ti
 from scipy.optimize import nnls
 
 from taichi_dem import Simulation
-from taichi_dem.allocation import batch_allocation
+from taichi_dem.kit.allocation import batch_allocation
 from taichi_dem.simulate import progress_of
 from taichi_dem.simulation import macro_steps
 from taichi_dem.step.drivers import Once, Resident, Step

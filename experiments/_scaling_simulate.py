@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from taichi_dem.partition import even_cuts, recut, share_costs
+from taichi_dem.mesh.partition import even_cuts, recut, share_costs
 
 #: Way of sharing -> words. Those with cuts give every worker a run of bodies.
 WAYS = {

@@ -17,10 +17,10 @@ import taichi as ti
 
 from _blast import METHODS, paper_effects
 from taichi_dem import CONCRETE, Scene, Simulation, effects, read_mesh, runtime
-from taichi_dem.checkpoint import digest
-from taichi_dem.field_memory import FieldMemory
-from taichi_dem.mesh_order import in_space_order
-from taichi_dem.mesh_shapes import bar
+from taichi_dem.kit.checkpoint import digest
+from taichi_dem.kit.field_memory import FieldMemory
+from taichi_dem.mesh.reorder import in_space_order
+from taichi_dem.mesh.shapes import bar
 
 #: Length and width of the bar that stands for a block [m].
 BAR = (2.0, 1.0)

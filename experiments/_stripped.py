@@ -2,10 +2,10 @@
 
 import taichi as ti
 
+from taichi_dem.kit.types import vec3
 from taichi_dem.physics.bond import unit_arm, unit_opening
 from taichi_dem.physics.rotation import mean_spin, rotation_matrix, spin_of, turned, zero3
 from taichi_dem.step.advance import Advance
-from taichi_dem.types import vec3
 
 
 @ti.data_oriented

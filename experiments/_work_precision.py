@@ -13,8 +13,8 @@ from typing import Optional
 from _cli import processor, versions
 from _timing import Timing
 from taichi_dem import runtime
-from taichi_dem.files import write_csv
-from taichi_dem.plot_style import GREY, picture, styles_of
+from taichi_dem.kit.files import write_csv
+from taichi_dem.kit.plot_style import GREY, picture, styles_of
 
 _SMALL = 6.5
 #: Where a label's centre may stand: right and up in widths and heights of the label, and a gap.

@@ -19,7 +19,7 @@ import _bench_block
 import _bench_damper
 from _cli import main, parser, print_table, processor, versions
 from taichi_dem import runtime
-from taichi_dem.files import output_folder, write_text
+from taichi_dem.kit.files import output_folder, write_text
 
 NAME = "bench"
 

@@ -41,14 +41,14 @@ from _cli import (
 )
 from _deep_block import has_gmsh, made_block, stacked_block
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, plot, quality_report, read_mesh, simulate
-from taichi_dem.allocation import field_bytes
-from taichi_dem.files import output_folder, write_csv
-from taichi_dem.hole_monitor import HoleMonitor
-from taichi_dem.mesh_order import in_space_order
+from taichi_dem.kit.allocation import field_bytes
+from taichi_dem.kit.files import output_folder, write_csv
+from taichi_dem.kit.plot_style import BLACK, BLUE, GREY, picture
+from taichi_dem.kit.progress.progress import time_left
+from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.mesh.reorder import in_space_order
+from taichi_dem.output.hole_monitor import HoleMonitor
 from taichi_dem.plot.deep import plot_deep_cracks
-from taichi_dem.plot_style import BLACK, BLUE, GREY, picture
-from taichi_dem.progress import time_left
-from taichi_dem.progress_bar import ProgressBar
 
 NAME = "blast_block"
 QUICK = {"until": 1e-4, "samples": 20, "frames": 1}

@@ -50,8 +50,8 @@ from taichi_dem import (
     read_mesh,
     simulate,
 )
-from taichi_dem.files import write_csv
-from taichi_dem.progress_bar import ProgressBar
+from taichi_dem.kit.files import write_csv
+from taichi_dem.kit.progress.progress_bar import ProgressBar
 
 NAME = "blast_fracture"
 #: Method by name: how it is made of the largest step and the displacement limit l; its largest step

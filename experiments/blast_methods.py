@@ -36,9 +36,9 @@ from _cli import (
     write_summary,
 )
 from taichi_dem import ImplicitDashpots, InputError, Simulation, SimulationDiverged, plot
-from taichi_dem.files import output_folder, write_csv
-from taichi_dem.progress_bar import ProgressBar
-from taichi_dem.record import Recorder
+from taichi_dem.kit.files import output_folder, write_csv
+from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.output.record import Recorder
 from taichi_dem.simulate import progress_of
 from taichi_dem.simulation import macro_steps
 

@@ -43,9 +43,9 @@ from _scaling_record import record
 from _scaling_simulate import WAYS, Workers, acceleration
 from _scaling_threads import ROUNDS, thread_gain
 from taichi_dem import Multirate
-from taichi_dem.files import output_folder, write_csv
-from taichi_dem.partition import imbalance
-from taichi_dem.progress_bar import ProgressBar
+from taichi_dem.kit.files import output_folder, write_csv
+from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.mesh.partition import imbalance
 
 NAME = "blast_scaling"
 QUICK = {"until": 1e-4, "l": 1e-7}

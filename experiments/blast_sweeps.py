@@ -32,9 +32,9 @@ from _cli import (
 )
 from _dashpot_system import DashpotSystem
 from taichi_dem import ImplicitDashpots, Simulation
-from taichi_dem.files import output_folder, write_csv
-from taichi_dem.plot_style import BROWN, GREY, STYLES, VIOLET, picture
-from taichi_dem.progress_bar import ProgressBar
+from taichi_dem.kit.files import output_folder, write_csv
+from taichi_dem.kit.plot_style import BROWN, GREY, STYLES, VIOLET, picture
+from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.simulate import progress_of
 from taichi_dem.simulation import macro_steps
 

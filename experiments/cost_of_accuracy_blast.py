@@ -53,10 +53,10 @@ from _work_precision import (
     write_points,
 )
 from taichi_dem import ImplicitDashpots, Multirate, StepControl, Uniform, read_mesh
-from taichi_dem.files import output_folder, write_csv
-from taichi_dem.plot_style import power, styles_of
-from taichi_dem.plot_style import seconds as seconds_in_words
-from taichi_dem.progress_bar import ProgressBar
+from taichi_dem.kit.files import output_folder, write_csv
+from taichi_dem.kit.plot_style import power, styles_of
+from taichi_dem.kit.plot_style import seconds as seconds_in_words
+from taichi_dem.kit.progress.progress_bar import ProgressBar
 
 NAME = "cost_of_accuracy_blast"
 PAPER_DT0 = 1e-8

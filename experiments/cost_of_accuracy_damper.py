@@ -43,10 +43,10 @@ from _work_precision import (
 from ca_damper import Automaton, SimulationDiverged, Spheres
 from ca_damper.plot.cost import picture_curves
 from taichi_dem import InputError
-from taichi_dem.files import output_folder, write_csv
-from taichi_dem.plot_style import STYLES, styles_of
-from taichi_dem.plot_style import seconds as seconds_in_words
-from taichi_dem.progress_bar import ProgressBar
+from taichi_dem.kit.files import output_folder, write_csv
+from taichi_dem.kit.plot_style import STYLES, styles_of
+from taichi_dem.kit.plot_style import seconds as seconds_in_words
+from taichi_dem.kit.progress.progress_bar import ProgressBar
 
 NAME = "cost_of_accuracy_damper"
 SPHERES = "dem_tsuji"

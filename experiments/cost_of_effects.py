@@ -32,8 +32,8 @@ from _cli import (
 from _damper_response import distance
 from _effects_jobs import Job, run_all
 from _effects_picture import picture_effects
-from taichi_dem.files import output_folder, write_csv
-from taichi_dem.progress_bar import ProgressBar
+from taichi_dem.kit.files import output_folder, write_csv
+from taichi_dem.kit.progress.progress_bar import ProgressBar
 
 NAME = "cost_of_effects"
 #: Effects in the order in which they are added; the load is always there.

@@ -27,8 +27,8 @@ from _timing import Timing
 from ca_damper import Automaton, Batch, SceneTable, SimulationDiverged, Spheres
 from ca_damper.plot.cost import picture_cost, picture_steps
 from taichi_dem import InputError
-from taichi_dem.files import output_folder, write_csv
-from taichi_dem.progress_bar import ProgressBar
+from taichi_dem.kit.files import output_folder, write_csv
+from taichi_dem.kit.progress.progress_bar import ProgressBar
 
 NAME = "damper_cost"
 FREQUENCY = 6.0

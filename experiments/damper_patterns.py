@@ -23,9 +23,9 @@ from _cli import figure, main, number, parser, print_table, whole, write_summary
 from ca_damper import Automaton, Batch, SceneTable, Spheres, film, plot
 from ca_damper.automaton import ACCOUNTINGS
 from ca_damper.progress import Stages
-from taichi_dem.files import output_folder, write_csv
-from taichi_dem.plot_style import STYLES
-from taichi_dem.progress_bar import ProgressBar
+from taichi_dem.kit.files import output_folder, write_csv
+from taichi_dem.kit.plot_style import STYLES
+from taichi_dem.kit.progress.progress_bar import ProgressBar
 
 NAME = "damper_patterns"
 QUICK = {"transient": 5, "cycles": 1, "seeds": 2}

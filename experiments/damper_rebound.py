@@ -25,8 +25,8 @@ from ca_damper import Batch, SceneTable, film, plot
 from ca_damper.automaton import Automaton
 from ca_damper.automaton.accumulator import READINGS
 from ca_damper.spheres import Spheres
-from taichi_dem.files import output_folder, write_csv
-from taichi_dem.progress_bar import ProgressBar
+from taichi_dem.kit.files import output_folder, write_csv
+from taichi_dem.kit.progress.progress_bar import ProgressBar
 
 NAME = "damper_rebound"
 QUICK = {"impacts": 4, "every_s": 1e-3}

@@ -39,8 +39,8 @@ from ca_damper import Automaton, Response, Spheres, Sweep, frequency_response, s
 from ca_damper.plot.response import picture_hysteresis, picture_measures, picture_responses
 from ca_damper.response import Grid
 from taichi_dem import InputError
-from taichi_dem.files import output_folder, write_csv
-from taichi_dem.progress_bar import ProgressBar
+from taichi_dem.kit.files import output_folder, write_csv
+from taichi_dem.kit.progress.progress_bar import ProgressBar
 
 NAME = "damper_response"
 #: 33 ratios f/f0, every 0.005 where the peaks of 0 to 50 particles lie.

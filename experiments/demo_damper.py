@@ -21,8 +21,8 @@ import numpy as np
 from _cli import figure, main, number, parser, whole, write_summary
 from ca_damper import Automaton, Batch, Empty, Oscillator, SceneTable, Spheres, film, plot
 from ca_damper.progress import Stages
-from taichi_dem.files import output_folder, write_csv, write_text
-from taichi_dem.progress_bar import ProgressBar
+from taichi_dem.kit.files import output_folder, write_csv, write_text
+from taichi_dem.kit.progress.progress_bar import ProgressBar
 
 NAME = "demo_damper"
 QUICK = {"begin": 10, "measured": 5}

@@ -22,11 +22,11 @@ import numpy as np
 from _cli import figure, main, parser, print_table, whole
 from _demo import conclude, placed_together
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects
-from taichi_dem.files import output_folder, write_csv
-from taichi_dem.mesh import group_area
-from taichi_dem.mesh_shapes import pair, single
+from taichi_dem.kit.files import output_folder, write_csv
+from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.mesh.mesh import group_area
+from taichi_dem.mesh.shapes import pair, single
 from taichi_dem.plot.law import film_law, picture_law
-from taichi_dem.progress_bar import ProgressBar
 
 NAME = "demo_fracture_law"
 QUICK, FULL = {"steps": 1000}, {"steps": 5000}

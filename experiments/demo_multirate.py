@@ -24,15 +24,15 @@ import numpy as np
 from _cli import BLAST_DRIVERS, figure, main, number, parser, print_table
 from _demo import conclude, placed_together
 from taichi_dem import CONCRETE, InputError, Multirate, Scene, Simulation, Uniform, effects
-from taichi_dem.files import output_folder, write_csv
-from taichi_dem.mesh_shapes import bar
+from taichi_dem.kit.files import output_folder, write_csv
+from taichi_dem.kit.plot_style import styles_of
+from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.mesh.shapes import bar
+from taichi_dem.mesh.topology import faces_of_group
+from taichi_dem.output.record import Recorder
 from taichi_dem.plot.impact import film_impact, picture_impact
-from taichi_dem.plot_style import styles_of
-from taichi_dem.progress_bar import ProgressBar
-from taichi_dem.record import Recorder
 from taichi_dem.simulate import progress_of
 from taichi_dem.simulation import macro_steps
-from taichi_dem.topology import faces_of_group
 
 NAME = "demo_multirate"
 #: All methods, made in one place; the first is what the others are compared with.

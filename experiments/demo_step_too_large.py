@@ -30,11 +30,11 @@ from taichi_dem import (
     effects,
     quality_report,
 )
-from taichi_dem.files import output_folder, write_csv
-from taichi_dem.mesh_shapes import bar
+from taichi_dem.kit.files import output_folder, write_csv
+from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.mesh.shapes import bar
+from taichi_dem.output.record import Recorder
 from taichi_dem.plot.shaken import film_shaken, picture_energy
-from taichi_dem.progress_bar import ProgressBar
-from taichi_dem.record import Recorder
 from taichi_dem.simulation import macro_steps
 
 NAME = "demo_step_too_large"

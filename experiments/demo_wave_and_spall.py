@@ -24,10 +24,10 @@ import numpy as np
 from _cli import figure, main, parser, print_table, whole
 from _demo import conclude, placed_together
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects
-from taichi_dem.files import output_folder, write_csv
-from taichi_dem.mesh_shapes import bar
+from taichi_dem.kit.files import output_folder, write_csv
+from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.mesh.shapes import bar
 from taichi_dem.plot.wave import film_spall, picture_spall, picture_wave
-from taichi_dem.progress_bar import ProgressBar
 
 NAME = "demo_wave_and_spall"
 LENGTH, WIDTH = 4.0, 0.1

@@ -24,7 +24,7 @@ from _cli import Parser, exit_code, several
 from _gallery_html import CAPTION, RUN, THUMBNAILS, shown, write_page
 from _gallery_pages import SMALL_PICTURES, TOOLS, pages, readme_table
 from taichi_dem import InputError
-from taichi_dem.files import output_folder, write_text, write_whole
+from taichi_dem.kit.files import output_folder, write_text, write_whole
 
 HERE = Path(__file__).resolve().parent
 #: Small pictures for the repository and for the page's list: widest side [pixels] and colours.

@@ -29,9 +29,9 @@ from _cli import (
 from _hard_cases import judge, named, registry
 from _hard_cases._case import FAILED, PASSED, REFUSED
 from _hard_cases._margins import case_title, method_styles, picture_margins, with_powers
-from taichi_dem.files import output_folder, write_csv
-from taichi_dem.plot_style import GREY, RED, picture, power
-from taichi_dem.progress_bar import ProgressBar
+from taichi_dem.kit.files import output_folder, write_csv
+from taichi_dem.kit.plot_style import GREY, RED, picture, power
+from taichi_dem.kit.progress.progress_bar import ProgressBar
 
 NAME = "hard_cases"
 #: Cases of a quick run, one of each kind; the tests ask all, at quick size.

@@ -15,8 +15,8 @@ import sys
 
 from _cli import Parser, exit_code
 from taichi_dem import CONCRETE, PAPER_BLOCK, quality_report, read_mesh
-from taichi_dem.files import output_folder
-from taichi_dem.mesh_gmsh import block_with_hole
+from taichi_dem.kit.files import output_folder
+from taichi_dem.mesh.gmsh import block_with_hole
 
 MESHES = os.path.dirname(PAPER_BLOCK)
 

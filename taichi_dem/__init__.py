@@ -15,28 +15,28 @@ A scene is a mesh, a material and the effects that act; ``simulate`` runs it::
 """
 
 # First, out of order: it prepares the environment for ``import taichi``.
-from taichi_dem import runtime  # isort: skip
+from taichi_dem.kit import runtime  # isort: skip
 
 from taichi_dem import effects, methods
-from taichi_dem.checkpoint import Checkpoint
-from taichi_dem.errors import InputError, SimulationDiverged
+from taichi_dem.kit.checkpoint import Checkpoint
+from taichi_dem.kit.errors import InputError, SimulationDiverged
+from taichi_dem.kit.progress.progress import Progress
+from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.version import __version__
 from taichi_dem.materials import CONCRETE, Material
-from taichi_dem.mesh import Mesh, checked_mesh
-from taichi_dem.mesh_files import read_mesh
-from taichi_dem.mesh_order import in_space_order
+from taichi_dem.mesh.files import read_mesh
+from taichi_dem.mesh.mesh import Mesh, checked_mesh
+from taichi_dem.mesh.reorder import in_space_order
 from taichi_dem.meshes import PAPER_BLOCK
 from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
 from taichi_dem.needed_effects import needed_effects
-from taichi_dem.progress import Progress
-from taichi_dem.progress_bar import ProgressBar
-from taichi_dem.quality import quality_report
-from taichi_dem.record import write_paraview
+from taichi_dem.output.record import write_paraview
 from taichi_dem.scene import Scene
 from taichi_dem.simulate import simulate
 from taichi_dem.simulation import Simulation
-from taichi_dem.step_control import StepControl
-from taichi_dem.step_report import step_report
-from taichi_dem.version import __version__
+from taichi_dem.stability.quality import quality_report
+from taichi_dem.stability.step_control import StepControl
+from taichi_dem.stability.step_report import step_report
 
 __all__ = [
     "CONCRETE",

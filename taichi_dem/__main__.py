@@ -3,7 +3,14 @@
 import inspect
 
 import taichi_dem
-from taichi_dem import effects, listing, materials, meshes, methods
+from taichi_dem import effects, materials, mesh, meshes, methods
+from taichi_dem.kit import listing
+
+#: Modules of meshes whose functions a user may call.
+_MESH_MODULES = tuple(
+    f"mesh.{name}"
+    for name in ("mesh", "files", "shapes", "gmsh", "reorder", "content", "split", "weld")
+)
 
 
 def sections():
@@ -22,7 +29,7 @@ def sections():
 
 def _mesh_functions():
     """Functions that make, read, write, check or reorder meshes, by module."""
-    found = listing.modules(taichi_dem, "mesh")
+    found = [m for m in listing.modules(mesh) if m.__name__.endswith(_MESH_MODULES)]
     return [(module, listing.own(module, inspect.isfunction)) for module in found]
 
 

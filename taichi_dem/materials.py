@@ -5,8 +5,8 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 
-from taichi_dem.checks import LARGEST, SMALLEST, finite, shown
-from taichi_dem.errors import InputError
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import LARGEST, SMALLEST, finite, shown
 
 _MAY_BE_ZERO = frozenset(
     {"normal_damping", "shear_damping", "cohesion", "friction", "contact_damping"}

@@ -8,7 +8,7 @@ import numpy as np
 
 from taichi_dem.methods import Uniform
 from taichi_dem.simulation import Simulation
-from taichi_dem.state import NEVER
+from taichi_dem.timeline import NEVER
 
 #: Substeps to begin with.
 _FIRST = 64

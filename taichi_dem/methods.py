@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from typing import Optional
 
-from taichi_dem.checks import between, choice, positive, shown
-from taichi_dem.errors import InputError
-from taichi_dem.step_control import Displacement, FixedStep, StepControl
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import between, choice, positive, shown
+from taichi_dem.stability.step_control import Displacement, FixedStep, StepControl
 
 NEIGHBOURS = ("held", "drifted")
 DASHPOTS = ("full", "limited")

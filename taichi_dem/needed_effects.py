@@ -1,9 +1,9 @@
 """Which effects a run had need of: those to keep, those to drop, those that were missed."""
 
-from taichi_dem.checks import fraction
-from taichi_dem.effect_use import Advice
-from taichi_dem.errors import InputError
-from taichi_dem.report import Report
+from taichi_dem.diagnostics.report import Report
+from taichi_dem.kit.effect_usage import Advice
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import fraction
 
 
 def needed_effects(result, tolerance=1e-3):

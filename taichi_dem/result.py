@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from taichi_dem.display import counted, embedded, in_brief, table, titled, unfolded
-from taichi_dem.files import output_folder, write_csv, write_text
-from taichi_dem.mesh_files import write_mesh
-from taichi_dem.record import remove_series, series_name, write_bonds, write_paraview
+from taichi_dem.kit.display import counted, embedded, in_brief, table, titled, unfolded
+from taichi_dem.kit.files import output_folder, write_csv, write_text
+from taichi_dem.mesh.files import write_mesh
+from taichi_dem.output.record import remove_series, series_name, write_bonds, write_paraview
 
 
 @dataclass(frozen=True, eq=False)

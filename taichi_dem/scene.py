@@ -2,12 +2,16 @@
 
 from dataclasses import dataclass
 
-from taichi_dem.checks import positive, shown
-from taichi_dem.display import counted, in_brief
 from taichi_dem.effects.base import MANY, Effect
-from taichi_dem.errors import InputError
+from taichi_dem.kit.display import counted, in_brief
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import positive, shown
 from taichi_dem.materials import Material
-from taichi_dem.mesh import Mesh
+from taichi_dem.mesh.mesh import Mesh
+from taichi_dem.mesh.parts import may_meet, parts_of
+
+#: What lets bodies touch at outer faces.
+REMEDY = "SphereContact(outer_faces=True)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,3 +73,26 @@ def _check_roles(effects):
     roles = {effect.role for effect in single}
     if "friction" in roles and "contact" not in roles:
         raise InputError("effect friction acts in sphere contacts: list SphereContact too")
+
+
+def outer_faces_warnings(scene):
+    """Sentences about parts of a scene that may meet where they carry no spheres; before a run.
+
+    A solid in one piece has nothing else to meet until it breaks, and what then happens is seen in
+    the run. Who lists contact expects bodies to meet: then all that has several parts is told. Who
+    lists none may have put independent solids into one scene: then nothing is said where they
+    stay at rest, fall alike, or are too far from each other (``parts.may_meet``).
+    scene: a Scene, or a Model, which has the same mesh and effects.
+    """
+    contact = [effect for effect in scene.effects if effect.role == "contact"]
+    if contact and contact[0].outer_faces:
+        return ()
+    part = parts_of(scene.mesh)
+    count = part.max() + 1
+    if count == 1 or not (contact or may_meet(scene, part)):
+        return ()
+    lack = "their outer faces carry no contact spheres" if contact else "no contact is listed"
+    return (
+        f"the mesh has {count} parts that no bond joins, and {lack}: "
+        f"where these parts meet they pass through each other; {REMEDY} lets them touch",
+    )

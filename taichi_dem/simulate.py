@@ -5,20 +5,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from taichi_dem.checkpoint import Checkpoint, digest, version_text
-from taichi_dem.checks import AUTO, instance, progress_option, shown
-from taichi_dem.display import prefixed
-from taichi_dem.errors import InputError, SimulationDiverged
-from taichi_dem.files import output_folder
+from taichi_dem.kit.checkpoint import Checkpoint, digest, version_text
+from taichi_dem.kit.display import prefixed
+from taichi_dem.kit.errors import InputError, SimulationDiverged
+from taichi_dem.kit.files import output_folder
+from taichi_dem.kit.progress.progress import LEAST_SHARE, Pace, Progress, compiling
+from taichi_dem.kit.progress.progress_bar import reporting
+from taichi_dem.kit.restart import CheckpointWriter, NoCheckpointWriter, RunSnapshot, opened
+from taichi_dem.kit.validation import AUTO, instance, progress_option, shown
 from taichi_dem.measured_speedup import measured_speedup
 from taichi_dem.methods import check_method
-from taichi_dem.outer_faces import outer_faces_warnings
-from taichi_dem.progress import LEAST_SHARE, Pace, Progress, compiling
-from taichi_dem.progress_bar import reporting
-from taichi_dem.record import Recorder
-from taichi_dem.restart import CheckpointWriter, NoCheckpointWriter, RunSnapshot, opened
+from taichi_dem.output.record import Recorder
 from taichi_dem.result import Result
-from taichi_dem.scene import Scene
+from taichi_dem.scene import Scene, outer_faces_warnings
 from taichi_dem.simulation import Simulation, macro_steps
 from taichi_dem.timeline import MACRO_TICKS
 

@@ -5,33 +5,33 @@ import time
 
 import numpy as np
 
-from taichi_dem import runtime
-from taichi_dem.allocation import batch_allocation
-from taichi_dem.checks import choice, instance, positive, whole
-from taichi_dem.display import counted, in_brief
-from taichi_dem.divergence import DivergenceCheck
-from taichi_dem.effect_activity import effect_activity
-from taichi_dem.energy_balance import EnergyBalance
-from taichi_dem.errors import InputError, SimulationDiverged
+from taichi_dem.contact_search.contacts import Contacts
+from taichi_dem.contact_search.search import BroadPhase
+from taichi_dem.diagnostics.divergence import DivergenceCheck
+from taichi_dem.diagnostics.effect_activity import effect_activity
+from taichi_dem.diagnostics.energy_balance import EnergyBalance
+from taichi_dem.diagnostics.missing_effects import MissingEffects
+from taichi_dem.diagnostics.report import Report
+from taichi_dem.diagnostics.step_resolution import StepResolution
+from taichi_dem.engine.model import Model
+from taichi_dem.engine.state import State
+from taichi_dem.kit import runtime
+from taichi_dem.kit.allocation import batch_allocation
+from taichi_dem.kit.display import counted, in_brief
+from taichi_dem.kit.errors import InputError, SimulationDiverged
+from taichi_dem.kit.progress.progress import compiling
+from taichi_dem.kit.validation import choice, instance, positive, whole
 from taichi_dem.methods import check_method
-from taichi_dem.missing_effects import MissingEffects
-from taichi_dem.model import Model
-from taichi_dem.progress import compiling
-from taichi_dem.report import Report
 from taichi_dem.scene import Scene
-from taichi_dem.state import NEVER, State
+from taichi_dem.stability.body_limits import limits_for
+from taichi_dem.stability.step_control import counted_criteria
 from taichi_dem.step.advance import Advance
 from taichi_dem.step.auto_driver import AutoDriver
-from taichi_dem.step.broad_phase import BroadPhase
-from taichi_dem.step.contacts import Contacts
 from taichi_dem.step.drivers import DRIVERS, SolvedStep, Step
 from taichi_dem.step.implicit.advance import SolvedAdvance
 from taichi_dem.step.implicit.solver import Solver
 from taichi_dem.step.schedule import Schedule
-from taichi_dem.step.stability_limits import limits_for
-from taichi_dem.step_control import counted_criteria
-from taichi_dem.step_resolution import StepResolution
-from taichi_dem.timeline import MACRO_TICKS
+from taichi_dem.timeline import MACRO_TICKS, NEVER
 
 #: Largest steps of a run, of which the ticks are counted in 64 bits.
 MOST_STEPS = 2**42

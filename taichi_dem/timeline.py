@@ -11,6 +11,8 @@ import taichi as ti
 MAX_LEVEL = 20
 #: Ticks in the largest step.
 MACRO_TICKS = 1 << MAX_LEVEL
+#: Value of a tick field for "not yet".
+NEVER = -1
 
 
 def ticks_of(level):

@@ -1,7 +1,7 @@
 """A small bar that is blown at one end: 16 bonds break, and what they held touches, in 5.5e-5 s."""
 
 from taichi_dem import CONCRETE, ImplicitDashpots, Multirate, Scene, StepControl, Uniform, effects
-from taichi_dem.mesh_shapes import bar
+from taichi_dem.mesh.shapes import bar
 from tests.scenes import paper_effects
 
 METHODS = {

@@ -20,7 +20,7 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
-from taichi_dem.plot_style import STYLES
+from taichi_dem.kit.plot_style import STYLES
 
 CODE_NAME = re.compile(r"[A-Za-z0-9]_[A-Za-z0-9]")
 PROGRAM_NUMBER = re.compile(r"\d[eE][-+]?\d+(?![0-9a-zA-Z])")

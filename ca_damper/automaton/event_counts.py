@@ -2,7 +2,7 @@
 
 import taichi as ti
 
-from taichi_dem.effect_use import EffectUse
+from taichi_dem.kit.effect_usage import EffectUse
 
 PAIRS, WALLS, PUSHES, HOLDS = range(4)
 #: What is counted, by the effect that it belongs to.

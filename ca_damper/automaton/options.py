@@ -7,8 +7,8 @@ from ca_damper.automaton.accumulator import READINGS
 from ca_damper.automaton.conflict_resolution import MOST_CELLS
 from ca_damper.automaton.device import DeviceAutomaton
 from ca_damper.filling import check_places
-from taichi_dem.checks import choice, flag, fraction, positive, shown, whole
-from taichi_dem.errors import InputError
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import choice, flag, fraction, positive, shown, whole
 
 ACCOUNTINGS = {"landing": "ca_landing", "landing+ejection": "ca_ejection", "static": "ca_static"}
 

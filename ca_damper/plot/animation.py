@@ -3,7 +3,7 @@
 import contextlib
 
 from ca_damper.plot.box import DrawnBox, frame_panel
-from taichi_dem.plot_style import STYLE, filming, write_gif
+from taichi_dem.kit.plot_style import STYLE, filming, write_gif
 
 _DPI = 100
 _SMALL = {**STYLE, "font.size": 7.5, "axes.titlesize": 7.5, "xtick.labelsize": 6.5}

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.collections import EllipseCollection
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 
-from taichi_dem.plot_style import BLACK, BLUE, RED
+from taichi_dem.kit.plot_style import BLACK, BLUE, RED
 
 #: Vertical speed of particles: falling, at rest, rising.
 SPEEDS = LinearSegmentedColormap.from_list("speeds", [RED, "#F2EFE6", BLUE])

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from taichi_dem.plot_style import BLACK, GREY, STYLES, picture, styles_of
+from taichi_dem.kit.plot_style import BLACK, GREY, STYLES, picture, styles_of
 
 #: Filling, search or traversal with the step, marker and line of each variant; the paper's way is
 #: dashed, markers tell the automaton's steps apart.

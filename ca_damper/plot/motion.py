@@ -4,7 +4,7 @@ import numpy as np
 
 from ca_damper.plot.animation import moving_picture
 from ca_damper.plot.box import Box, DrawnBox
-from taichi_dem.plot_style import BLACK, GREY, STYLES, picture, styles_of
+from taichi_dem.kit.plot_style import BLACK, GREY, STYLES, picture, styles_of
 
 #: The spring hangs from the base, this far over a box in its middle [mm]; its coils and half width.
 _HANGS, _COILS, _HALF = 75.0, 9, 7.0

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ca_damper.plot.box import DrawnBox, frame_panel
-from taichi_dem.plot_style import BLACK, GREY, area_key, line_key, picture, styles_of
+from taichi_dem.kit.plot_style import BLACK, GREY, area_key, line_key, picture, styles_of
 
 #: A container slower than this share of its fastest gets no arrow.
 _SLOW = 0.1

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from taichi_dem.plot_style import BLACK, VIOLET, picture, styles_of
+from taichi_dem.kit.plot_style import BLACK, VIOLET, picture, styles_of
 
 #: Errors below this [ms] would lengthen a logarithmic axis for nothing.
 _SHORTEST = 5e-3

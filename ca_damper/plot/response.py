@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib import colormaps
 
-from taichi_dem.plot_style import GREY, STYLES, area_key, picture, png_of, styled, styles_of
+from taichi_dem.kit.plot_style import GREY, STYLES, area_key, picture, png_of, styled, styles_of
 
 _SHADES = colormaps["viridis"]
 _FINE = 400

@@ -5,7 +5,7 @@ Those looks are every few steps: to ask in every step would cost a fifth of it.
 
 import taichi as ti
 
-from taichi_dem.effect_use import EffectUse
+from taichi_dem.kit.effect_usage import EffectUse
 
 vec2 = ti.types.vector(2, ti.f64)
 

@@ -10,8 +10,8 @@ from ca_damper.filling import check_places
 from ca_damper.spheres.contact_law import POWERS, contact_duration, pair_numbers
 from ca_damper.spheres.dynamics import DIVERGENCES, DeviceSpheres
 from ca_damper.spheres.search import SEARCHES
-from taichi_dem.checks import choice, finite, flag, fraction, positive, shown, whole
-from taichi_dem.errors import InputError
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import choice, finite, flag, fraction, positive, shown, whole
 
 # Spheres part ever more slowly the stronger the dashpot, but none keeps them from parting.
 _LEAST_RESTITUTION = 0.01

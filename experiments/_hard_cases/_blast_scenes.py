@@ -19,11 +19,11 @@ from taichi_dem import (
     Uniform,
     effects,
 )
-from taichi_dem.contact_spheres import spheres_of_faces
-from taichi_dem.mesh import checked_mesh
-from taichi_dem.mesh_shapes import bar, pair, single
+from taichi_dem.mesh.contact_spheres import spheres_of_faces
+from taichi_dem.mesh.mesh import checked_mesh
+from taichi_dem.mesh.shapes import bar, pair, single
+from taichi_dem.mesh.topology import body_properties
 from taichi_dem.simulation import macro_steps
-from taichi_dem.topology import body_properties
 
 EPS = np.finfo(float).eps
 #: Distance of islands [m].

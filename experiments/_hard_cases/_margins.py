@@ -4,7 +4,7 @@ import math
 import re
 
 from _hard_cases._case import FAILED, REFUSED
-from taichi_dem.plot_style import BLACK, GREY, picture, power, styles_of
+from taichi_dem.kit.plot_style import BLACK, GREY, picture, power, styles_of
 
 #: A uniform step of a hard case is fixed: the paper's rule does not shorten it.
 _MEANT = {"uniform": "fixed"}

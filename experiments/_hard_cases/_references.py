@@ -4,7 +4,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.linalg import block_diag, expm
 
-from taichi_dem.topology import body_properties, topology_of
+from taichi_dem.mesh.topology import body_properties, topology_of
 
 
 def damped_opening(mass, stiffness, damping, opening, speed, time_s):

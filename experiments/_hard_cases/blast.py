@@ -21,7 +21,7 @@ from _hard_cases._blast_scenes import EPS, OPENING, SPIN, TEARING
 from _hard_cases._case import Limit
 from _hard_cases._references import damped_opening, speed_torn
 from taichi_dem import CONCRETE
-from taichi_dem.mesh_shapes import pair
+from taichi_dem.mesh.shapes import pair
 
 FREE = tuple(scenes.FREE)
 

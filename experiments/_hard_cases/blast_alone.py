@@ -28,9 +28,9 @@ from taichi_dem import (
     Uniform,
     effects,
 )
-from taichi_dem.mesh import checked_mesh
-from taichi_dem.mesh_shapes import bar, pair, single
-from taichi_dem.topology import body_properties, faces_of_group
+from taichi_dem.mesh.mesh import checked_mesh
+from taichi_dem.mesh.shapes import bar, pair, single
+from taichi_dem.mesh.topology import body_properties, faces_of_group
 
 JUMPING = {
     "controlled": Multirate(8e-8, 5e-9, control=StepControl(level_jump=None)),

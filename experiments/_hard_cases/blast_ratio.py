@@ -6,8 +6,8 @@ from _hard_cases import _blast_scenes as scenes
 from _hard_cases._blast_limits import blast_case, refuse
 from _hard_cases._case import Curves, Limit, Measured
 from taichi_dem import CONCRETE, Multirate, StepControl
-from taichi_dem.mesh import checked_mesh
-from taichi_dem.mesh_shapes import single
+from taichi_dem.mesh.mesh import checked_mesh
+from taichi_dem.mesh.shapes import single
 
 #: Edges of the scan [m]: frequency times largest step runs through a factor of four.
 SCAN = tuple(np.geomspace(0.02, 0.32, 16))

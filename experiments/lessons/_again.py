@@ -3,7 +3,7 @@
 import numpy as np
 
 from taichi_dem import Simulation
-from taichi_dem.field_memory import FieldMemory
+from taichi_dem.kit.field_memory import FieldMemory
 from taichi_dem.timeline import MACRO_TICKS, MAX_LEVEL
 
 

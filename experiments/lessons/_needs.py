@@ -16,8 +16,8 @@ import numpy as np
 from _again import Again
 from _engine import engine
 from taichi_dem import CONCRETE, Scene, SimulationDiverged, Uniform, effects, needed_effects
-from taichi_dem.mesh_shapes import bar
-from taichi_dem.missing_effects import unserved
+from taichi_dem.diagnostics.missing_effects import unserved
+from taichi_dem.mesh.shapes import bar
 
 LENGTH, WIDTH, CELLS = 0.3, 0.1, (3, 2, 2)
 STEP, UNTIL, LOOKS = 2e-8, 9e-4, 20

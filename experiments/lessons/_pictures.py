@@ -10,8 +10,18 @@ from _needs import SHOWN as INSTANTS
 from _time_step import METHODS, SHOWN, STEPS, WORDS
 from ca_damper.plot import Box
 from ca_damper.plot.box import DrawnBox, frame_panel
+from taichi_dem.kit.plot_style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    RED,
+    STYLES,
+    seconds,
+    styled,
+    styles_of,
+)
 from taichi_dem.plot.bodies import draw_bodies
-from taichi_dem.plot_style import BLACK, BLUE, GREEN, GREY, RED, STYLES, seconds, styled, styles_of
 
 _LOOKS = {name: (style.colour, style.marker) for name, style in styles_of(METHODS).items()}
 _FILLING = STYLES["ca_static"].colour

@@ -21,8 +21,8 @@ from taichi_dem import (
     effects,
     quality_report,
 )
-from taichi_dem.mesh_shapes import bar
-from taichi_dem.plot_style import styles_of
+from taichi_dem.kit.plot_style import styles_of
+from taichi_dem.mesh.shapes import bar
 
 LENGTH, WIDTH, CELLS = 0.4, 0.05, (12, 1, 1)
 #: Steps to choose from [s], and that of the truth.

@@ -19,7 +19,7 @@ def _():
     import _time_step as lesson
     from _engine import engine
     from _pictures import percent, picture_time_step
-    from taichi_dem.plot_style import seconds
+    from taichi_dem.kit.plot_style import seconds
 
     served = mo.app_meta().mode in ("run", "edit")
     return engine, lesson, mo, percent, picture_time_step, seconds, served

@@ -19,9 +19,9 @@ b is a bond, u one of its three contact units (3 b, 3 b + 1, 3 b + 2), i a body.
 import numpy as np
 import taichi as ti
 
-from taichi_dem.allocation import defer_fill
-from taichi_dem.display import by_arguments
-from taichi_dem.types import real, vec3
+from taichi_dem.kit.allocation import defer_fill
+from taichi_dem.kit.display import by_arguments
+from taichi_dem.kit.types import real, vec3
 
 MANY = ("load", "support")
 ROLES = ("tension", "shear", "dashpot", "contact", "friction", *MANY)

@@ -3,7 +3,7 @@
 import taichi as ti
 
 from taichi_dem.effects.base import Effect, parameters
-from taichi_dem.types import vec3
+from taichi_dem.kit.types import vec3
 
 
 @ti.data_oriented

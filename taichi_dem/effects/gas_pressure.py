@@ -5,13 +5,13 @@ import math
 import numpy as np
 import taichi as ti
 
-from taichi_dem.allocation import defer_fill
-from taichi_dem.checks import positive, word
 from taichi_dem.effects.base import Effect, parameters
+from taichi_dem.kit.allocation import defer_fill
+from taichi_dem.kit.types import vec3
+from taichi_dem.kit.validation import positive, word
+from taichi_dem.mesh.tetrahedra import area_vectors
+from taichi_dem.mesh.topology import face_vertices, faces_of_group
 from taichi_dem.physics.rotation import zero3
-from taichi_dem.tetrahedra import area_vectors
-from taichi_dem.topology import face_vertices, faces_of_group
-from taichi_dem.types import vec3
 
 
 @ti.func

@@ -2,9 +2,9 @@
 
 import taichi as ti
 
-from taichi_dem.allocation import defer_fill
-from taichi_dem.checks import direction
 from taichi_dem.effects.base import Effect, along
+from taichi_dem.kit.allocation import defer_fill
+from taichi_dem.kit.validation import direction
 from taichi_dem.physics.rotation import zero3
 
 

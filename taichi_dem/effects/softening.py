@@ -2,10 +2,10 @@
 
 import taichi as ti
 
-from taichi_dem.allocation import defer_fill
 from taichi_dem.effects.base import Effect, parameters
+from taichi_dem.kit.allocation import defer_fill
+from taichi_dem.kit.types import vec2
 from taichi_dem.physics.fracture import envelope_traction, softening_energy
-from taichi_dem.types import vec2
 
 
 @ti.data_oriented

@@ -2,8 +2,8 @@
 
 import taichi as ti
 
-from taichi_dem.checks import flag, positive, whole
 from taichi_dem.effects.base import Effect, parameters
+from taichi_dem.kit.validation import flag, positive, whole
 from taichi_dem.physics.sphere_pair import normal_force
 
 #: Entries of a list for each body: a thousand tetrahedra with as many take some GiB.

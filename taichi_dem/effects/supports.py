@@ -5,13 +5,13 @@ import math
 import numpy as np
 import taichi as ti
 
-from taichi_dem.allocation import defer_fill
-from taichi_dem.checks import direction, positive, shown, word
 from taichi_dem.effects.base import Effect, along, parameters
-from taichi_dem.errors import InputError
+from taichi_dem.kit.allocation import defer_fill
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.types import vec3
+from taichi_dem.kit.validation import direction, positive, shown, word
+from taichi_dem.mesh.topology import faces_of_group
 from taichi_dem.physics.rotation import zero3
-from taichi_dem.topology import faces_of_group
-from taichi_dem.types import vec3
 
 
 @ti.data_oriented

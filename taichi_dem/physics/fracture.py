@@ -6,7 +6,7 @@ unit is an opening that starts at the onset u_E = f_t / k_n and follows the larg
 
 import taichi as ti
 
-from taichi_dem.types import vec2
+from taichi_dem.kit.types import vec2
 
 
 @ti.func

@@ -2,7 +2,7 @@
 
 import taichi as ti
 
-from taichi_dem.types import mat3, vec3, vec4
+from taichi_dem.kit.types import mat3, vec3, vec4
 
 # A chain of divisions would take as long as all else that turns a body.
 _6TH, _12TH, _20TH, _30TH, _42TH = (1.0 / n for n in (6, 12, 20, 30, 42))

@@ -6,7 +6,7 @@ A twist is (velocity, spin), a wrench (force, moment), both at one point. Blocks
 
 import taichi as ti
 
-from taichi_dem.types import mat3
+from taichi_dem.kit.types import mat3
 
 
 @ti.dataclass

@@ -7,9 +7,9 @@ import numpy as np
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap
 
+from taichi_dem.kit.plot_style import STYLE, filming, write_gif
 from taichi_dem.plot.block import break_times, displaced, frame_block
 from taichi_dem.plot.view import View, surface, traces
-from taichi_dem.plot_style import STYLE, filming, write_gif
 
 #: Half decades of speed that are told apart; what is slower has one colour.
 _STEPS = 7

@@ -5,9 +5,9 @@ import numpy as np
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap
 
+from taichi_dem.kit.plot_style import area_key, picture, seconds
+from taichi_dem.output.record import body_corners
 from taichi_dem.plot.view import View, surface, traces
-from taichi_dem.plot_style import area_key, picture, seconds
-from taichi_dem.record import body_corners
 
 _STONE, _JOINT, _INSIDE = "#E4E0D6", "#C9C3B5", "#B5AD9C"
 

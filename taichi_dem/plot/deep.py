@@ -6,7 +6,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import ListedColormap
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
-from taichi_dem.plot_style import GREY, picture
+from taichi_dem.kit.plot_style import GREY, picture
 
 _AXES = "xyz"
 

@@ -5,8 +5,8 @@ import os
 import shutil
 import subprocess
 
-from taichi_dem.files import renamed_when_done
-from taichi_dem.plot_style import STYLE, filming, write_gif
+from taichi_dem.kit.files import renamed_when_done
+from taichi_dem.kit.plot_style import STYLE, filming, write_gif
 
 #: Pixels an inch of the MP4; the GIF has half as many each way.
 _DPI = 200

@@ -10,10 +10,10 @@ import numpy as np
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap
 
+from taichi_dem.kit.plot_style import BLACK, GREY, picture, seconds, styles_of
 from taichi_dem.plot.block import displaced
 from taichi_dem.plot.film import moving_picture
 from taichi_dem.plot.view import View, surface
-from taichi_dem.plot_style import BLACK, GREY, picture, seconds, styles_of
 
 #: Of the displacement in the film.
 _MAGNIFY = 40.0

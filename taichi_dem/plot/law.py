@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, RED, picture
 from taichi_dem.plot.film import moving_picture
-from taichi_dem.plot_style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, RED, picture
 
 _COLOURS = (RED, BLUE, GREEN, ORANGE, PURPLE)
 #: How much larger than true the film shows openings and slidings.

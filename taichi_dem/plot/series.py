@@ -3,7 +3,7 @@
 import matplotlib
 import numpy as np
 
-from taichi_dem.plot_style import BLUE, GREEN, PURPLE, RED, picture, seconds, styles_of
+from taichi_dem.kit.plot_style import BLUE, GREEN, PURPLE, RED, picture, seconds, styles_of
 
 #: Energy terms from the bottom of the stack up: blue is held, red lost in bonds, green in contacts.
 _TERMS = {

@@ -10,10 +10,10 @@ import textwrap
 import numpy as np
 from matplotlib.collections import PolyCollection
 
+from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, ORANGE, RED, picture, seconds
 from taichi_dem.plot.block import displaced
 from taichi_dem.plot.film import moving_picture
 from taichi_dem.plot.view import View, surface
-from taichi_dem.plot_style import BLACK, BLUE, GREEN, GREY, ORANGE, RED, picture, seconds
 
 #: Of the displacement in the film.
 _MAGNIFY = 6000.0

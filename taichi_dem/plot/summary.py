@@ -6,10 +6,10 @@ import matplotlib
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
+from taichi_dem.kit.plot_style import BLACK, BLUE, png_of, styled
 from taichi_dem.plot.block import draw_breaks, frame_block
 from taichi_dem.plot.bodies import draw_bodies
 from taichi_dem.plot.view import View
-from taichi_dem.plot_style import BLACK, BLUE, png_of, styled
 
 #: From this ratio of its sides on, a block lies above the curves and not beside them.
 _LONG = 2.2

@@ -5,7 +5,7 @@ NumPy only. Corners are world positions (body_count, 4, 3) [m], as ``record.body
 
 import numpy as np
 
-from taichi_dem.tetrahedra import LOCAL_FACES
+from taichi_dem.mesh.tetrahedra import LOCAL_FACES
 
 #: Faces that lean away from the viewer by less than this sine count as seen edge on.
 _EDGE_ON = 1e-6

@@ -7,8 +7,8 @@ bars, cells - 1) that are broken. Stress (rows, bars, cells - 1) [Pa] is positiv
 import matplotlib
 import numpy as np
 
+from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, ORANGE, RED, picture
 from taichi_dem.plot.film import moving_picture
-from taichi_dem.plot_style import BLACK, BLUE, GREEN, GREY, ORANGE, RED, picture
 
 #: Stress: pressed, at rest, pulled.
 _COLOURS = "RdBu_r"

@@ -8,11 +8,11 @@ v += S / m, L += T, then x += dt v and q = exp(dt w) q, with the spin w in the m
 
 import taichi as ti
 
+from taichi_dem.kit.types import real, vec2, vec3
 from taichi_dem.physics.bond import bond_motion, unit_arm, unit_opening, unit_velocity
 from taichi_dem.physics.rotation import mean_spin, rotation_matrix, spin_of, turned, zero3
+from taichi_dem.stability.body_limits import RELEASE
 from taichi_dem.step.contact_force import ContactForce
-from taichi_dem.step.stability_limits import RELEASE
-from taichi_dem.types import real, vec2, vec3
 
 
 @ti.data_oriented

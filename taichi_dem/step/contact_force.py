@@ -2,10 +2,10 @@
 
 import taichi as ti
 
+from taichi_dem.kit.types import vec3
 from taichi_dem.physics.rotation import zero3
 from taichi_dem.physics.sphere_pair import meeting
-from taichi_dem.step.stability_limits import HIT
-from taichi_dem.types import vec3
+from taichi_dem.stability.body_limits import HIT
 
 
 @ti.data_oriented

@@ -2,7 +2,7 @@
 
 import taichi as ti
 
-from taichi_dem.step.stability_limits import CLOSE
+from taichi_dem.stability.body_limits import CLOSE
 
 
 @ti.data_oriented

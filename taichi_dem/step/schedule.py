@@ -7,13 +7,13 @@ own entries.
 import numpy as np
 import taichi as ti
 
-from taichi_dem.allocation import defer_fill, raise_to
+from taichi_dem.kit.allocation import defer_fill, raise_to
+from taichi_dem.kit.types import real
+from taichi_dem.stability.step_control import DISPLACEMENT, LARGEST, NEIGHBOUR
 from taichi_dem.step.active_list import ActiveList
 from taichi_dem.step.applied_until import AppliedUntil
 from taichi_dem.step.level_limit import LevelLimit
-from taichi_dem.step_control import DISPLACEMENT, LARGEST, NEIGHBOUR
 from taichi_dem.timeline import MACRO_TICKS, MAX_LEVEL, device_coarsest_active, device_ticks_of
-from taichi_dem.types import real
 
 
 @ti.data_oriented

@@ -15,11 +15,11 @@ from taichi_dem import (
     StepControl,
     Uniform,
     effects,
-    mesh_shapes,
     read_mesh,
     runtime,
 )
-from taichi_dem.mesh_gmsh import block_with_hole
+from taichi_dem.mesh import shapes as mesh_shapes
+from taichi_dem.mesh.gmsh import block_with_hole
 
 
 class Option(NamedTuple):

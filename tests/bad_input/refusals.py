@@ -10,7 +10,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 
 from taichi_dem import InputError
-from taichi_dem.checks import shown
+from taichi_dem.kit.validation import shown
 
 #: The same examples at every run, none of them kept in a folder.
 steady = settings(derandomize=True, database=None, deadline=None, max_examples=6)

@@ -9,8 +9,8 @@ import taichi as ti
 
 from ca_damper import Automaton, Batch, RigidMass, SceneTable, Spheres
 from taichi_dem import CONCRETE, Multirate, Scene, Simulation, Uniform, effects, runtime
-from taichi_dem.mesh_shapes import bar, single
-from taichi_dem.record import Recorder
+from taichi_dem.mesh.shapes import bar, single
+from taichi_dem.output.record import Recorder
 from taichi_dem.timeline import MACRO_TICKS
 from tests.bar_blast import METHODS
 from tests.scenes import paper_effects

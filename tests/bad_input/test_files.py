@@ -12,12 +12,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import taichi_dem.mesh_files as mesh_files
+import taichi_dem.mesh.files as mesh_files
 from taichi_dem import PAPER_BLOCK, InputError, read_mesh
-from taichi_dem.checkpoint import read_checkpoint, write_checkpoint
-from taichi_dem.files import output_folder, write_csv, write_text
-from taichi_dem.mesh_files import write_mesh, write_vtu
-from taichi_dem.mesh_shapes import bar
+from taichi_dem.kit.checkpoint import read_checkpoint, write_checkpoint
+from taichi_dem.kit.files import output_folder, write_csv, write_text
+from taichi_dem.mesh.files import write_mesh, write_vtu
+from taichi_dem.mesh.shapes import bar
 from tests.bad_input.refusals import Endless, assert_refused, ends_within, steady
 from tests.scenes import ROOT
 

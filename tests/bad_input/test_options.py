@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from taichi_dem.checks import shown
+from taichi_dem.kit.validation import shown
 from tests.bad_input.options import BLAST, DAMPER
 from tests.bad_input.refusals import DRAWN, WRONG, assert_names, steady
 

@@ -6,7 +6,7 @@ import pytest
 
 from ca_damper import Automaton, Batch, InputError, SceneTable, Spheres, needed_effects
 from ca_damper.spheres.effect_activity import EffectActivity
-from taichi_dem.effect_use import Advice
+from taichi_dem.kit.effect_usage import Advice
 
 #: Of a cell, and how high above the floor the one particle begins [cells].
 ROW = 10

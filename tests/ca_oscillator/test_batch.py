@@ -25,7 +25,7 @@ from ca_damper import batch as batch_module
 from ca_damper.clock import steps_per_cycle
 from ca_damper.progress import BatchProgress, Stages
 from ca_damper.table import dealt
-from taichi_dem.progress import Compiling
+from taichi_dem.kit.progress.progress import Compiling
 from tests.ca_oscillator.kicks import BAD_SEED, CODE, Kicks
 from tests.scenes import ROOT
 

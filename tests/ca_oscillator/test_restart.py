@@ -17,8 +17,8 @@ from ca_damper import (
     sweep_up_and_down,
 )
 from taichi_dem import Checkpoint
-from taichi_dem.checkpoint import Interrupted
-from taichi_dem.field_memory import FieldMemory
+from taichi_dem.kit.checkpoint import Interrupted
+from taichi_dem.kit.field_memory import FieldMemory
 from tests.equivalence.test_restart import every_field
 
 IDENTITY = {"job": "a test"}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from taichi_dem import Multirate, Simulation, StepControl, Uniform
-from taichi_dem.step import contacts
+from taichi_dem.contact_search import contacts
 from tests.scenes import ROOT, brisk_scene
 
 ENVIRONMENT = {**os.environ, "PYTHONPATH": ROOT}

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, effects
-from taichi_dem.mesh_shapes import bar
-from taichi_dem.step import candidates
+from taichi_dem.contact_search import candidates
+from taichi_dem.mesh.shapes import bar
 from taichi_dem.step.implicit.colouring import edge_colours
 from tests.again import Again
 from tests.equivalence.test_bits import ENVIRONMENT, MOTION, differing

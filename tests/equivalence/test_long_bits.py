@@ -6,8 +6,8 @@ import pytest
 import taichi as ti
 
 from taichi_dem import Simulation, runtime
-from taichi_dem.checkpoint import digest
-from taichi_dem.field_memory import FieldMemory
+from taichi_dem.kit.checkpoint import digest
+from taichi_dem.kit.field_memory import FieldMemory
 from tests.bar_blast import METHODS, bar_scene
 
 #: Largest steps; they have a hundred thousand substeps.

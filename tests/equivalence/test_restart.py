@@ -13,10 +13,10 @@ import pytest
 import taichi as ti
 
 from taichi_dem import CONCRETE, Checkpoint, InputError, Scene, Simulation, effects, simulate
-from taichi_dem.checkpoint import read_checkpoint
-from taichi_dem.field_memory import FieldMemory, fields_of
-from taichi_dem.mesh_shapes import bar
-from taichi_dem.record import Recorder
+from taichi_dem.kit.checkpoint import read_checkpoint
+from taichi_dem.kit.field_memory import FieldMemory, fields_of
+from taichi_dem.mesh.shapes import bar
+from taichi_dem.output.record import Recorder
 from taichi_dem.simulate import saved_run
 from taichi_dem.timeline import MACRO_TICKS
 from tests.bar_blast import METHODS, UNTIL, squeezed_scene

@@ -12,10 +12,10 @@ from taichi_dem import (
     read_mesh,
     simulate,
 )
-from taichi_dem.mesh import group_area, volumes
-from taichi_dem.mesh_shapes import bar
+from taichi_dem.mesh.mesh import group_area, volumes
+from taichi_dem.mesh.shapes import bar
+from taichi_dem.mesh.topology import topology_of
 from taichi_dem.plot.deep import crossings
-from taichi_dem.topology import topology_of
 
 
 @pytest.fixture(scope="module")

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from taichi_dem import PAPER_BLOCK, mesh_shapes
-from taichi_dem.mesh_files import read_mesh, write_mesh
+from taichi_dem import PAPER_BLOCK
+from taichi_dem.mesh import shapes as mesh_shapes
+from taichi_dem.mesh.files import read_mesh, write_mesh
 from taichi_dem.plot.film import write_mp4
 from tests.experiments.contract import (
     NAMES,

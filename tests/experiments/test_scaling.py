@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, Multirate, Scene, effects
-from taichi_dem.mesh_shapes import bar
+from taichi_dem.mesh.shapes import bar
 
 # Two classes of ticks: all are due at the first, the last quarter also at three ticks between.
 BODIES, INTERVALS, TICKS = 40, 5, (10, 30)

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from taichi_dem.lasting_output import lasting_output
+from taichi_dem.kit.progress.lasting_output import lasting_output
 from tests import arch
 from tests.experiments.contract import FOLDER, NAMES
 from tests.processes import users_environment

@@ -3,7 +3,8 @@
 import pytest
 from taichi.lang import impl
 
-from taichi_dem import InputError, Multirate, Simulation, allocation
+from taichi_dem import InputError, Multirate, Simulation
+from taichi_dem.kit import allocation
 from tests.scenes import brisk_scene
 
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects
-from taichi_dem.mesh_shapes import bar
-from taichi_dem.step import verlet_list
-from taichi_dem.step.contacts import FARTHEST, STEPS
+from taichi_dem.contact_search import verlet_list
+from taichi_dem.contact_search.contacts import FARTHEST, STEPS
+from taichi_dem.mesh.shapes import bar
 from tests.again import Again
 
 DT = 1e-9

@@ -12,9 +12,9 @@ import pytest
 import taichi as ti
 
 from taichi_dem import Checkpoint, InputError
-from taichi_dem.checkpoint import CtrlC, SaveTimer, digest, read_checkpoint, write_checkpoint
-from taichi_dem.field_memory import FieldMemory, fields_of, without_end
-from taichi_dem.restart import CheckpointWriter
+from taichi_dem.kit.checkpoint import CtrlC, SaveTimer, digest, read_checkpoint, write_checkpoint
+from taichi_dem.kit.field_memory import FieldMemory, fields_of, without_end
+from taichi_dem.kit.restart import CheckpointWriter
 
 IDENTITY = {"version": "1", "mesh": "a cube"}
 ARRAYS = {"field/a.b": np.arange(12.0).reshape(4, 3), "part/none": np.zeros((0, 2))}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from taichi_dem import PAPER_BLOCK, read_mesh
-from taichi_dem.contact_spheres import interior_crossings, spheres_of_faces
+from taichi_dem.mesh.contact_spheres import interior_crossings, spheres_of_faces
 
 EPS = np.finfo(float).eps
 

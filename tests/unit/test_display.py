@@ -13,12 +13,12 @@ import ca_damper
 import taichi_dem
 from ca_damper import measures, rk45
 from taichi_dem import CONCRETE, effects, methods, runtime
-from taichi_dem.contact_spheres import spheres_of_faces
-from taichi_dem.display import counted, in_brief, listed
+from taichi_dem.diagnostics.missing_effects import MissingEffect
 from taichi_dem.effects.base import Effect
-from taichi_dem.mesh_shapes import bar
-from taichi_dem.missing_effects import MissingEffect
-from taichi_dem.step_control import Displacement, FixedStep
+from taichi_dem.kit.display import counted, in_brief, listed
+from taichi_dem.mesh.contact_spheres import spheres_of_faces
+from taichi_dem.mesh.shapes import bar
+from taichi_dem.stability.step_control import Displacement, FixedStep
 
 PACKAGES = (taichi_dem, ca_damper)
 MOST_LETTERS, MOST_LINES = 500, 3
@@ -59,7 +59,7 @@ def of_the_blast():
         taichi_dem.needed_effects(result),
         MissingEffect("Softening", "bonds are stretched"),
     )
-    yield from (taichi_dem.step_report(scene), taichi_dem.quality_report(mesh, CONCRETE))
+    yield from (taichi_dem.stability.step_report(scene), taichi_dem.quality_report(mesh, CONCRETE))
     yield taichi_dem.Checkpoint("run.npz")
 
 

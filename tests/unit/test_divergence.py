@@ -16,8 +16,8 @@ from taichi_dem import (
     quality_report,
     simulate,
 )
-from taichi_dem.mesh import checked_mesh
-from taichi_dem.mesh_shapes import bar, pair, single
+from taichi_dem.mesh.mesh import checked_mesh
+from taichi_dem.mesh.shapes import bar, pair, single
 
 STEP, UNTIL = 1e-6, 2e-4
 

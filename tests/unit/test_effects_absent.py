@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects
-from taichi_dem.mesh_shapes import pair
+from taichi_dem.mesh.shapes import pair
 from tests.scenes import ROOT
 
 #: Opening beyond the tensile strength [m].
@@ -17,8 +17,8 @@ PAST = 20e-6
 _COUNT = """
 import glob, json, os, re, sys
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects, runtime
-from taichi_dem.allocation import field_bytes
-from taichi_dem.mesh_shapes import pair
+from taichi_dem.kit.allocation import field_bytes
+from taichi_dem.mesh.shapes import pair
 from taichi_dem.step.advance import Advance
 import taichi as ti
 sys.path.insert(0, os.environ["EXPERIMENTS"])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, Multirate, Scene, Simulation, Uniform
-from taichi_dem.mesh_shapes import pair
+from taichi_dem.mesh.shapes import pair
 
 DT0, DISTANCE = 1e-6, 1e-8
 

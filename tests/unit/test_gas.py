@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects
-from taichi_dem.mesh import checked_mesh
+from taichi_dem.mesh.mesh import checked_mesh
 from tests.turns import matrix, quaternion
 
 EPS = np.finfo(float).eps

@@ -7,7 +7,7 @@ import pytest
 import taichi as ti
 from taichi.lang import kernel_impl
 
-from taichi_dem.kernel_source_cache import RememberingWrapper, broken, remembering
+from taichi_dem.kit.kernel_source_cache import RememberingWrapper, broken, remembering
 
 LINES = ("", " ", "    a = b", "    " + "^" * 9, "x" * 200, "    word " * 30, "\ta\n b")
 

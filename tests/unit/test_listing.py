@@ -11,8 +11,10 @@ import pytest
 
 import ca_damper
 import taichi_dem
-from taichi_dem import effects, listing, mesh_shapes, methods
+from taichi_dem import effects, methods
 from taichi_dem.effects.base import Effect
+from taichi_dem.kit import listing
+from taichi_dem.mesh import shapes as mesh_shapes
 from tests.docs.pages import FOLDER, PAGES, headings
 
 PACKAGES = (taichi_dem, ca_damper)
@@ -95,7 +97,7 @@ def test_what_is_added_is_listed(monkeypatch):
     monkeypatch.setattr(mesh_shapes, "ring", ring, raising=False)
     made = sections(taichi_dem)
     assert made["Effects"]["taichi_dem.effects.Wind"] == "Drag of the air."
-    assert made["Meshes"]["taichi_dem.mesh_shapes.ring"] == "A ring of tetrahedra."
+    assert made["Meshes"]["taichi_dem.mesh.shapes.ring"] == "A ring of tetrahedra."
 
 
 def test_a_constant_has_the_comment_above_it():

@@ -7,7 +7,7 @@ import pytest
 
 from taichi_dem import Multirate, Simulation, Uniform
 from taichi_dem.measured_speedup import _twin, measured_speedup
-from taichi_dem.state import NEVER
+from taichi_dem.timeline import NEVER
 from tests.scenes import brisk_scene
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from taichi_dem import PAPER_BLOCK, InputError, checked_mesh, read_mesh
-from taichi_dem import tetrahedra as geometry
-from taichi_dem.mesh import group_area, volumes
-from taichi_dem.mesh_shapes import bar, pair, single
+from taichi_dem.mesh import tetrahedra as geometry
+from taichi_dem.mesh.mesh import group_area, volumes
+from taichi_dem.mesh.shapes import bar, pair, single
 
 # Two tetrahedra on both sides of the triangle 0 1 2, apexes 3 (z > 0) and 4 (z < 0).
 POINTS = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.2, 0.2, 1], [0.2, 0.2, -1]]

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from taichi_dem import InputError, read_mesh
-from taichi_dem.mesh import volumes
-from taichi_dem.mesh_order import in_space_order
-from taichi_dem.mesh_shapes import bar
-from taichi_dem.mesh_split import triangles_in
-from taichi_dem.tetrahedra import all_faces, area_vectors
-from taichi_dem.topology import topology_of
+from taichi_dem.mesh.mesh import volumes
+from taichi_dem.mesh.reorder import in_space_order
+from taichi_dem.mesh.shapes import bar
+from taichi_dem.mesh.split import triangles_in
+from taichi_dem.mesh.tetrahedra import all_faces, area_vectors
+from taichi_dem.mesh.topology import topology_of
 
 BAR = bar(1.0, 0.3, (3, 1, 2))
 

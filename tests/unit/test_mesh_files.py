@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from taichi_dem import PAPER_BLOCK, InputError, checked_mesh, read_mesh
-from taichi_dem.mesh_files import write_mesh, write_pvd, write_vtu
-from taichi_dem.mesh_gmsh import block_with_hole
-from taichi_dem.mesh_shapes import bar, single
+from taichi_dem.mesh.files import write_mesh, write_pvd, write_vtu
+from taichi_dem.mesh.gmsh import block_with_hole
+from taichi_dem.mesh.shapes import bar, single
 
 BAR = bar(1.0, 0.3, (3, 1, 2))
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from taichi_dem.mesh import Mesh, group_area, volumes
-from taichi_dem.mesh_order import in_space_order
-from taichi_dem.mesh_shapes import bar
-from taichi_dem.topology import topology_of
+from taichi_dem.mesh.mesh import Mesh, group_area, volumes
+from taichi_dem.mesh.reorder import in_space_order
+from taichi_dem.mesh.shapes import bar
+from taichi_dem.mesh.topology import topology_of
 
 
 @pytest.fixture

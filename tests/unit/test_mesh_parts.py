@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from taichi_dem import InputError, checked_mesh, read_mesh
-from taichi_dem.mesh import volumes
-from taichi_dem.mesh_parts import parts_of, unbonded_places
-from taichi_dem.mesh_shapes import bar
-from taichi_dem.topology import topology_of
+from taichi_dem.mesh.mesh import volumes
+from taichi_dem.mesh.parts_in_files import parts_of, unbonded_places
+from taichi_dem.mesh.shapes import bar
+from taichi_dem.mesh.topology import topology_of
 
 CUBE = np.array(
     [*((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)), *((0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))],

@@ -17,12 +17,12 @@ from taichi_dem import (
     needed_effects,
     simulate,
 )
-from taichi_dem.effect_activity import effect_activity
-from taichi_dem.effect_use import Advice, EffectUse
-from taichi_dem.energy_balance import TERMS
-from taichi_dem.mesh_shapes import bar, pair
-from taichi_dem.model import Model
-from taichi_dem.state import State
+from taichi_dem.diagnostics.effect_activity import effect_activity
+from taichi_dem.diagnostics.energy_balance import TERMS
+from taichi_dem.engine.model import Model
+from taichi_dem.engine.state import State
+from taichi_dem.kit.effect_usage import Advice, EffectUse
+from taichi_dem.mesh.shapes import bar, pair
 from tests.unit.test_outer_faces import beside
 
 #: Far below the strength of concrete: a block of some 1 kg that falls from rest for 1e-5 s.

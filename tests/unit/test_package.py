@@ -13,7 +13,7 @@ import _cli
 import ca_damper
 import taichi_dem
 from taichi_dem import PAPER_BLOCK
-from taichi_dem.checkpoint import version_text
+from taichi_dem.kit.checkpoint import version_text
 from tests.docs.pages import FOLDER
 from tests.processes import users_environment
 

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from taichi_dem.errors import InputError
-from taichi_dem.partition import even_cuts, imbalance, recut, share_costs
+from taichi_dem.kit.errors import InputError
+from taichi_dem.mesh.partition import even_cuts, imbalance, recut, share_costs
 
 # Whole numbers: their sums have no rounding, so bounds hold to the last bit.
 COSTS = arrays(float, st.integers(1, 60), elements=st.integers(0, 1000).map(float))

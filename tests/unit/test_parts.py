@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, Scene, checked_mesh, effects
+from taichi_dem.diagnostics.part_overlaps import PartOverlaps
 from taichi_dem.effects.base import Effect
-from taichi_dem.mesh_shapes import bar, single
-from taichi_dem.model import Model
-from taichi_dem.outer_faces import outer_faces_warnings
-from taichi_dem.part_overlaps import PartOverlaps
-from taichi_dem.parts import any_overlap, part_boxes, parts_of
-from taichi_dem.state import State
+from taichi_dem.engine.model import Model
+from taichi_dem.engine.state import State
+from taichi_dem.mesh.parts import any_overlap, part_boxes, parts_of
+from taichi_dem.mesh.shapes import bar, single
+from taichi_dem.scene import outer_faces_warnings
 from tests.unit.test_outer_faces import beside, quaternions
 
 BAR = bar(0.2, 0.05, (4, 1, 1))

@@ -17,12 +17,12 @@ from taichi_dem import (
     Scene,
     Uniform,
     effects,
-    mesh_shapes,
-    progress_bar,
     simulate,
 )
-from taichi_dem.progress import Compiling, Counted, Progress, compiling, listening
-from taichi_dem.progress_bar import ProgressBar, reporting
+from taichi_dem.kit.progress import progress_bar
+from taichi_dem.kit.progress.progress import Compiling, Counted, Progress, compiling, listening
+from taichi_dem.kit.progress.progress_bar import ProgressBar, reporting
+from taichi_dem.mesh import shapes as mesh_shapes
 from taichi_dem.simulate import RunProgress
 from tests.processes import users_environment
 from tests.terminal import run_in_terminal
@@ -30,7 +30,8 @@ from tests.terminal import run_in_terminal
 ROOT = Path(__file__).resolve().parents[2]
 #: A run of well under a second, to be typed into a file by a user.
 JOB = """
-from taichi_dem import CONCRETE, InputError, Scene, Uniform, effects, mesh_shapes, runtime, simulate
+from taichi_dem import CONCRETE, InputError, Scene, Uniform, effects, runtime, simulate
+from taichi_dem.mesh import shapes as mesh_shapes
 
 runtime.start(threads=1)
 scene = Scene(mesh_shapes.bar(0.4, 0.1, (4, 1, 1)), CONCRETE, [effects.Gravity((0, 0, -9.81))])

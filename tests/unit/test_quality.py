@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, PAPER_BLOCK, quality_report, read_mesh
-from taichi_dem.mesh_shapes import bar, pair, single
-from taichi_dem.quality import bond_rates, dashpots_of, smallest_altitudes, springs_of
-from taichi_dem.topology import body_properties, topology_of
+from taichi_dem.mesh.shapes import bar, pair, single
+from taichi_dem.mesh.topology import body_properties, topology_of
+from taichi_dem.stability.mesh_limits import bond_rates, dashpots_of, springs_of
+from taichi_dem.stability.quality import smallest_altitudes
 
 EDGE = 0.05
 

@@ -26,12 +26,12 @@ from taichi_dem import (
     runtime,
     simulate,
 )
-from taichi_dem.files import write_text
-from taichi_dem.mesh_files import write_mesh
-from taichi_dem.mesh_shapes import bar, single
+from taichi_dem.kit.files import write_text
+from taichi_dem.mesh.files import write_mesh
+from taichi_dem.mesh.shapes import bar, single
+from taichi_dem.output.record import series_name, write_paraview
 from taichi_dem.plot.summary import _draw_curves, scale, viewed_along
 from taichi_dem.plot.view import View
-from taichi_dem.record import series_name, write_paraview
 from tests.bad_input.refusals import steady
 from tests.notebook import shown
 

@@ -13,7 +13,7 @@ from tests.scenes import ROOT
 _SCRIPT = """
 import json
 from taichi_dem import CONCRETE, InputError, Scene, Simulation, Uniform, runtime
-from taichi_dem.mesh_shapes import pair
+from taichi_dem.mesh.shapes import pair
 
 said = {}
 
@@ -81,7 +81,7 @@ def test_sessions_start_once_and_say_why_they_refuse(tmp_path):
 _SILENT_START = """
 import json
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, runtime
-from taichi_dem.mesh_shapes import pair
+from taichi_dem.mesh.shapes import pair
 
 runtime.start(threads=1)
 Simulation(Scene(pair(), CONCRETE), Uniform()).advance_to(1)

@@ -14,7 +14,7 @@ from taichi_dem import (
     effects,
     simulate,
 )
-from taichi_dem.mesh_shapes import pair, single
+from taichi_dem.mesh.shapes import pair, single
 
 NAN = float("nan")
 MESH = single()

@@ -3,8 +3,8 @@
 import numpy as np
 import taichi as ti
 
+from taichi_dem.stability.step_control import Displacement
 from taichi_dem.step.schedule import ActiveList
-from taichi_dem.step_control import Displacement
 from taichi_dem.timeline import MAX_LEVEL, coarsest_active
 
 

@@ -18,14 +18,20 @@ from taichi_dem import (
     effects,
     read_mesh,
     simulate,
-    step_report,
 )
-from taichi_dem.mesh_shapes import bar, pair, single
-from taichi_dem.quality import bond_rates, dashpot_step, dashpots_of, spring_step, subset_rates
-from taichi_dem.step.stability_limits import LIMITED
-from taichi_dem.step_control import CRITERIA
-from taichi_dem.step_report import StepReport, stable_together
-from taichi_dem.topology import topology_of
+from taichi_dem.mesh.shapes import bar, pair, single
+from taichi_dem.mesh.topology import topology_of
+from taichi_dem.stability import step_report
+from taichi_dem.stability.body_limits import LIMITED
+from taichi_dem.stability.mesh_limits import (
+    bond_rates,
+    dashpot_step,
+    dashpots_of,
+    spring_step,
+    subset_rates,
+)
+from taichi_dem.stability.step_control import CRITERIA
+from taichi_dem.stability.step_report import StepReport, stable_together
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, Uniform, effects
-from taichi_dem.mesh_shapes import pair
-from taichi_dem.quality import quality_report
+from taichi_dem.mesh.shapes import pair
+from taichi_dem.stability.quality import quality_report
 
 
 def run(method, steps, *, mesh=None, velocity=None, listed=()):

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from taichi_dem import PAPER_BLOCK, InputError, checked_mesh, read_mesh
-from taichi_dem import tetrahedra as geometry
-from taichi_dem.mesh_shapes import bar, pair, single
-from taichi_dem.topology import body_properties, face_vertices, faces_of_group, topology_of
+from taichi_dem.mesh import tetrahedra as geometry
+from taichi_dem.mesh.shapes import bar, pair, single
+from taichi_dem.mesh.topology import body_properties, face_vertices, faces_of_group, topology_of
 
 MESHES = {
     "single": single(),

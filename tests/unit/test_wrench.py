@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import taichi as ti
 
+from taichi_dem.kit.types import mat3, vec3
 from taichi_dem.physics.wrench import (
     Block,
     cross_matrix,
@@ -13,7 +14,6 @@ from taichi_dem.physics.wrench import (
     point_block,
     zero_block,
 )
-from taichi_dem.types import mat3, vec3
 
 EPS = np.finfo(float).eps
 norm = np.linalg.norm

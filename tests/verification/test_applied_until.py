@@ -5,8 +5,8 @@ import pytest
 import taichi as ti
 
 from taichi_dem import CONCRETE, Multirate, Scene, Simulation, StepControl, effects
-from taichi_dem.mesh import checked_mesh
-from taichi_dem.mesh_shapes import pair, single
+from taichi_dem.mesh.mesh import checked_mesh
+from taichi_dem.mesh.shapes import pair, single
 from taichi_dem.timeline import MACRO_TICKS
 
 #: Step of the sleeping pair [s], a power of two; a body far away steps four times as often.

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, Uniform, effects
-from taichi_dem.mesh_shapes import bar, single
-from taichi_dem.topology import faces_of_group
+from taichi_dem.mesh.shapes import bar, single
+from taichi_dem.mesh.topology import faces_of_group
 
 EPS = np.finfo(float).eps
 LENGTH, WIDTH, CELLS = 4.0, 0.1, 40

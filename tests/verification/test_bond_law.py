@@ -7,7 +7,8 @@ so it is known to OPENING_ERROR; tractions are then known to stiffness times tha
 import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE, effects, mesh_shapes
+from taichi_dem import CONCRETE, effects
+from taichi_dem.mesh import shapes as mesh_shapes
 from tests.probe import BondProbe
 from tests.turns import matrix, product, quaternion
 

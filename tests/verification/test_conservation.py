@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, Multirate, Scene, Simulation, Uniform, effects
-from taichi_dem.mesh import checked_mesh
-from taichi_dem.mesh_shapes import bar, single
+from taichi_dem.mesh.mesh import checked_mesh
+from taichi_dem.mesh.shapes import bar, single
 from tests.scenes import brisk_scene
 from tests.turns import matrix, quaternion
 

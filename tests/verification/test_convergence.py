@@ -5,7 +5,7 @@ import pytest
 import taichi as ti
 
 from taichi_dem import CONCRETE, Scene, Simulation, effects, quality_report
-from taichi_dem.mesh_shapes import bar
+from taichi_dem.mesh.shapes import bar
 from taichi_dem.timeline import MACRO_TICKS, MAX_LEVEL
 
 UNTIL = 1e-5

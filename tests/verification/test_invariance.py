@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects
-from taichi_dem.mesh import checked_mesh
-from taichi_dem.mesh_shapes import bar
+from taichi_dem.mesh.mesh import checked_mesh
+from taichi_dem.mesh.shapes import bar
 from tests.turns import matrix, quaternion
 
 EPS = np.finfo(float).eps

@@ -12,15 +12,21 @@ from taichi_dem import (
     StepControl,
     Uniform,
     effects,
-    step_report,
 )
-from taichi_dem.mesh import checked_mesh
-from taichi_dem.mesh_shapes import pair, single
-from taichi_dem.quality import bond_rates, dashpot_step, dashpots_of, spring_step, springs_of
-from taichi_dem.step.stability_limits import LIMITED
-from taichi_dem.step_report import contact_eigenvalues
+from taichi_dem.mesh.mesh import checked_mesh
+from taichi_dem.mesh.shapes import pair, single
+from taichi_dem.mesh.topology import topology_of
+from taichi_dem.stability import step_report
+from taichi_dem.stability.body_limits import LIMITED
+from taichi_dem.stability.mesh_limits import (
+    bond_rates,
+    dashpot_step,
+    dashpots_of,
+    spring_step,
+    springs_of,
+)
+from taichi_dem.stability.step_report import contact_eigenvalues
 from taichi_dem.timeline import MACRO_TICKS, MAX_LEVEL
-from taichi_dem.topology import topology_of
 
 STILL = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
 #: Steps of a run that must grow: at 1.004 of a limit a mode grows by 1.008 a step, 1e10 in all.

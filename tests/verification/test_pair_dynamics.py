@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects
-from taichi_dem.mesh import checked_mesh
-from taichi_dem.mesh_shapes import pair
+from taichi_dem.mesh.mesh import checked_mesh
+from taichi_dem.mesh.shapes import pair
 from tests.probe import ContactProbe
 
 EPS = np.finfo(float).eps

@@ -12,8 +12,8 @@ from taichi_dem import (
     StepControl,
     effects,
 )
-from taichi_dem.mesh import checked_mesh
-from taichi_dem.mesh_shapes import bar, single
+from taichi_dem.mesh.mesh import checked_mesh
+from taichi_dem.mesh.shapes import bar, single
 from tests.scenes import brisk_scene
 
 DT0, SPEED, EDGE, GAP = 1e-6, 20.0, 0.03, 3e-5

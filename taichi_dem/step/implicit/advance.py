@@ -2,7 +2,7 @@
 
 import taichi as ti
 
-from taichi_dem.allocation import raise_to
+from taichi_dem.kit.allocation import raise_to
 from taichi_dem.physics.rotation import zero3
 from taichi_dem.step.advance import Advance
 

@@ -3,11 +3,11 @@
 import numpy as np
 import taichi as ti
 
-from taichi_dem.allocation import defer_fill
+from taichi_dem.kit.allocation import defer_fill
+from taichi_dem.kit.types import real, vec3, vec6
 from taichi_dem.physics.wrench import inverse, mobility, plus, point_block, zero_block
 from taichi_dem.step.implicit.colouring import edge_colours
 from taichi_dem.timeline import MACRO_TICKS
-from taichi_dem.types import real, vec3, vec6
 
 
 @ti.data_oriented

@@ -2,10 +2,10 @@
 
 import taichi as ti
 
+from taichi_dem.contact_search.cell_grid import group
+from taichi_dem.kit.types import real, vec3
 from taichi_dem.physics.rotation import unit3, zero3
 from taichi_dem.physics.sphere_pair import meeting
-from taichi_dem.step.cell_grid import group
-from taichi_dem.types import real, vec3
 
 #: Colours of pairs that share no body; what finds no free one is visited last, in turn.
 COLOURS = 16

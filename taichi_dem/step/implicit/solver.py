@@ -2,11 +2,11 @@
 
 import taichi as ti
 
-from taichi_dem.allocation import raise_to
+from taichi_dem.kit.allocation import raise_to
+from taichi_dem.kit.types import real
 from taichi_dem.step.implicit.bonds import BondDashpots
 from taichi_dem.step.implicit.pairs import COLOURS, PairDashpots
 from taichi_dem.step.implicit.velocities import Velocities
-from taichi_dem.types import real
 
 
 @ti.data_oriented

@@ -2,8 +2,8 @@
 
 import taichi as ti
 
+from taichi_dem.kit.types import real
 from taichi_dem.physics.rotation import unit3
-from taichi_dem.types import real
 
 
 @ti.data_oriented

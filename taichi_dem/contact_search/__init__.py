@@ -1,0 +1,1 @@
+"""Search for contact pairs, and the pairs themselves."""

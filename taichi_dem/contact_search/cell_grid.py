@@ -1,0 +1,105 @@
+"""Cell grid over the centres of bodies, and the counting sort that fills it."""
+
+import taichi as ti
+
+from taichi_dem.kit.types import real
+
+
+@ti.data_oriented
+class CellGrid:
+    """Sorts all bodies by cell, so that a body asks only the cells that others near it may be in.
+
+    ball: radius of the ball around a body within which others are near whose balls it meets [m].
+    member: bodies, cell by cell. brute_force: a single cell.
+    """
+
+    scratch_fields = ("first", "member", "cell", "counts", "corner", "edge", "largest")
+
+    def __init__(self, model, state, ball, brute_force=False):
+        n = model.body_count
+        self.model, self.state, self.ball, self.brute_force = model, state, ball, brute_force
+        self.capacity = 4 * n + 64
+        self.first = ti.field(ti.i32, shape=self.capacity + 2)
+        self.member = ti.field(ti.i32, shape=n)
+        self.cell = ti.field(ti.i32, shape=n)
+        self.counts = ti.Vector.field(3, ti.i32, shape=())
+        self.corner = ti.Vector.field(3, real, shape=())
+        self.edge = ti.field(real, shape=())
+        self.largest = ti.field(real, shape=())
+
+    @ti.func
+    def fill(self):
+        """Sort the bodies into cells about as wide as one of their balls."""
+        self._size()
+        counts = self.counts[None]
+        for i in range(self.model.body_count):
+            cell = self._cell_of(self.state.position[i])
+            self.cell[i] = (cell[2] * counts[1] + cell[1]) * counts[0] + cell[0]
+        total = counts[0] * counts[1] * counts[2]
+        group(self.first, self.member, total, self.model.body_count, self._cell_of_member)
+
+    @ti.func
+    def around(self, i):
+        """Cells with the centres of all whose balls meet that of body i: lowest, past highest."""
+        position = self.state.position[i]
+        reach = self.ball[i] + self.largest[None]
+        low = ti.max(self._cell_of(position - reach), 0)
+        high = ti.min(self._cell_of(position + reach) + 1, self.counts[None])
+        return low, high
+
+    @ti.func
+    def row(self, z, y, low, high):
+        """First place, and one past the last, of the members of the cells low .. high - 1 of a row.
+
+        The cells of a row follow one another, and so do their members.
+        """
+        cell = (z * self.counts[None][1] + y) * self.counts[None][0]
+        return self.first[cell + low], self.first[cell + high]
+
+    @ti.func
+    def _size(self):
+        low, high, mean = self.state.position[0], self.state.position[0], 0.0
+        self.largest[None] = 0.0
+        for i in range(self.model.body_count):
+            low, high = ti.min(low, self.state.position[i]), ti.max(high, self.state.position[i])
+            mean += self.ball[i] / self.model.body_count
+            self.largest[None] = ti.max(self.largest[None], self.ball[i])
+        edge = 2.0 * mean
+        if ti.static(self.brute_force):
+            edge += (high - low).max()
+        while _product(ti.floor((high - low) / edge) + 1.0) > self.capacity:
+            edge *= 1.25
+        self.edge[None], self.corner[None] = edge, low
+        self.counts[None] = ti.cast((high - low) / edge, ti.i32) + 1
+
+    @ti.func
+    def _cell_of(self, position):
+        return ti.cast(ti.floor((position - self.corner[None]) / self.edge[None]), ti.i32)
+
+    @ti.func
+    def _cell_of_member(self, i):
+        return self.cell[i]
+
+
+@ti.func
+def _product(counts):
+    return counts[0] * counts[1] * counts[2]
+
+
+@ti.func
+def group(first: ti.template(), order: ti.template(), keys, count, key_of: ti.template()):
+    """List 0 .. count - 1 by key: those of key c, in order, at order[first[c]] .. first[c + 1].
+
+    first has room for keys + 2 entries.
+    """
+    for c in range(keys + 2):
+        first[c] = 0
+    for a in range(count):
+        key = key_of(a)
+        first[key + 2] = first[key + 2] + 1
+    for c in range(keys):
+        first[c + 2] = first[c + 2] + first[c + 1]
+    for a in range(count):
+        place = first[key_of(a) + 1]
+        order[place] = a
+        first[key_of(a) + 1] = place + 1

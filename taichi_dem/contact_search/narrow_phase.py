@@ -1,0 +1,78 @@
+"""Narrow phase of the contact search: sphere pairs within a margin, and the gap of all others."""
+
+import taichi as ti
+
+from taichi_dem.kit.types import real, vec4
+
+#: Skins beyond their margin within which the gap of two spheres is found; others count as farther.
+OUTLOOK = 7.0
+
+
+@ti.data_oriented
+class NarrowPhase:
+    """Compares the spheres on the faces of two bodies, where these were last looked at.
+
+    sphere: centre and radius of every sphere there [m]. pair_cache: the ``PairCache``, which knows
+    where the balls around those of a face are.
+    """
+
+    def __init__(self, contacts, pair_cache):
+        self.contacts, self.model, self.state = contacts, contacts.model, contacts.state
+        self.pair_cache = pair_cache
+        count = 4 * self.model.body_count * self.model.spheres_per_face
+        self.sphere = ti.Vector.field(4, real, shape=count)
+
+    @ti.func
+    def note_spheres(self, i):
+        """Note where the spheres of body i are; computed once for many that ask."""
+        size = ti.static(self.model.spheres_per_face)
+        position, rotation = self.state.position[i], self.state.rotation[i]
+        for face in range(4 * i, 4 * i + 4):
+            if self.state.exposed_tick[face] >= 0:
+                for s in range(size * face, size * face + size):
+                    sphere = self.model.sphere[s]
+                    place = position + rotation @ sphere.xyz
+                    self.sphere[s] = vec4(place[0], place[1], place[2], sphere[3])
+
+    @ti.func
+    def of_pair(self, i, j, faces, start, write):
+        """Sphere pairs of two bodies within their margin: how many, and on which faces.
+
+        Besides the smallest gap of others [m], no more than OUTLOOK skins beyond the margin. faces:
+        bit 4 f + g for faces f and g to compare. write: enter the pairs among the candidates, from
+        start on; then other gaps are of no interest.
+        """
+        margin = self.contacts.margin(i, j)
+        count, hits, least = 0, 0, margin
+        if not write:
+            least += OUTLOOK * self.contacts.skin[None]
+        for fg in range(16):
+            if (faces >> fg) & 1 == 1:
+                face_i, face_j = 4 * i + fg // 4, 4 * j + fg % 4
+                if self.pair_cache.clusters_near(face_i, face_j, least):
+                    place = start + count
+                    more, least = self._of_faces(face_i, face_j, place, margin, least, write)
+                    count += more
+                    hits |= ti.cast(more > 0, ti.i32) << fg
+        return count, hits, least
+
+    @ti.func
+    def _of_faces(self, face_i, face_j, start, margin, least, write):
+        count = 0
+        size = ti.static(self.model.spheres_per_face)
+        for a in range(size * face_i, size * face_i + size):
+            mine = self.sphere[a]
+            whole = mine[3] + self.model.cluster[face_j][3] + least
+            # A sphere far from the ball around those of the other face is as far from all of them.
+            if (self.pair_cache.cluster[face_j] - mine.xyz).norm_sqr() < whole * whole:
+                for b in range(size * face_j, size * face_j + size):
+                    other = self.sphere[b]
+                    reach = mine[3] + other[3]
+                    apart2 = (other.xyz - mine.xyz).norm_sqr()
+                    if apart2 < (reach + margin) * (reach + margin):
+                        if write:
+                            self.contacts.pair_sphere[start + count] = [a, b]
+                        count += 1
+                    elif apart2 < (reach + least) * (reach + least):
+                        least = ti.sqrt(apart2) - reach
+        return count, least

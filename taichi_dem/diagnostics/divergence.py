@@ -1,0 +1,176 @@
+"""Detect diverged runs, and describe where and why."""
+
+import time
+
+import numpy as np
+
+from taichi_dem.kit.errors import SimulationDiverged
+from taichi_dem.stability.mesh_limits import dashpot_step, spring_step
+from taichi_dem.stability.quality import quality_report
+from taichi_dem.step.drivers import CALL_SECONDS
+
+#: Energy that may appear from nowhere before a run counts as diverged, as a share of what is there.
+ENERGY_FROM_NOWHERE = 0.5
+#: Overlap of two contact spheres that no contact recovers from, as a share of the distance at which
+#: they touch: their centres are about to pass each other. A small one may be inside a large one.
+DEEPEST_OVERLAP = 0.95
+#: Share of the time that a hurried check may take: it reads every bond, a tenth of a call of the
+#: driver at 100,000 bodies.
+SHARE = 0.02
+
+
+class DivergenceCheck:
+    """Looks at a run after every resident call; raises SimulationDiverged with the place.
+
+    solves: whether the method solves dashpots implicitly, so that only springs limit the step.
+    """
+
+    def __init__(self, model, state, schedule, contacts, energy_balance, solves=False):
+        self.model, self.state, self.schedule, self.solves = model, state, schedule, solves
+        self.limited = schedule.has_limits and schedule.limits.limited
+        self.contacts, self.energy_balance = contacts, energy_balance
+        self.rounded_once = self._rounded_once()
+        self.rest_until = 0.0
+
+    def check(self, hurried=False):
+        """Raise SimulationDiverged when a body ran away, spheres swallowed, or energy appeared.
+
+        hurried: look for runaways alone while all the rest would take more than SHARE of the time.
+        """
+        self._check_speed()
+        started = time.process_time()
+        if hurried and started < self.rest_until:
+            return
+        self._check_overlap()
+        self._check_energy()
+        now = time.process_time()
+        if hurried:
+            # The first check, which is not, compiles: that says nothing of what one takes. What
+            # takes no more than its share of a call does not rest, so small scenes never do.
+            self.rest_until = now + (now - started) / SHARE - CALL_SECONDS
+
+    def _check_speed(self):
+        body = self.state.bad_body[None]
+        if body < self.model.body_count:
+            motion = self.state.motion()
+            speed = np.linalg.norm(motion["velocity"][body])
+            raise SimulationDiverged(self._sentence(body, motion, f"moves at {speed:.3g} m/s"))
+
+    def _check_overlap(self):
+        if self.contacts is None or not self.contacts.pair_count[None]:
+            return
+        deepest = self.contacts.deepest.to_numpy()[: self.contacts.pair_count[None]]
+        pair = int(deepest.argmax())
+        if deepest[pair] > DEEPEST_OVERLAP:
+            body, other = (int(k) for k in self.contacts.pair_body[pair])
+            share = f"{100 * deepest[pair]:.0f} % of their radii"
+            what = f"has a contact sphere inside one of body {other} ({share})"
+            raise SimulationDiverged(self._sentence(body, self.state.motion(), what))
+
+    def _check_energy(self):
+        account = self.energy_balance.account()
+        present = account["kinetic"] + account["bond_strain"] + account["sphere_strain"]
+        given = (
+            self.energy_balance.start_energy
+            + abs(account["load_work"])
+            + abs(account["support_work"])
+        )
+        bound = ENERGY_FROM_NOWHERE * max(given, self.round_off())
+        if -account["residual"] > bound and present > given:
+            motion = self.state.motion()
+            body = int(np.linalg.norm(motion["velocity"], axis=1).argmax())
+            what = f"is the fastest while {-account['residual']:.3g} J came from nowhere"
+            raise SimulationDiverged(self._sentence(body, motion, what))
+
+    def round_off(self):
+        """Energy [J] that rounded positions may have given the bonds so far, once a substep."""
+        return max(1, int(self.schedule.evaluations[0])) * self.rounded_once
+
+    def _rounded_once(self):
+        """Energy [J] of springs whose ends are known to a few units in the last place."""
+        count = self.model.bond_count
+        area = 3.0 * self.model.unit_area.to_numpy()[:count]
+        stiffness = self.model.bond_stiffness.to_numpy()[:count].max(axis=1, initial=0.0)
+        place = 4.0 * np.finfo(float).eps * np.abs(self.model.mesh.points).max()
+        return max(0.5 * float(np.sum(area * stiffness)) * place**2, 1e-300)
+
+    def _sentence(self, body, motion, what):
+        level = int(motion["level"][body])
+        time_s = self.state.tick[None] * self.schedule.tick_seconds
+        step = self.schedule.dt0 / 2.0**level
+        links = self._links(body)
+        return (
+            f"diverged at t = {time_s:.6g} s: body {body} {what}; "
+            f"{_partner(body, motion, links)}; its step was {step:.3g} s (level {level}), "
+            f"{self._advice(body, links)}"
+        )
+
+    def _links(self, body):
+        """Bodies that a body is tied to or near, and how, as pairs."""
+        top = self.model.topology
+        intact = self.state.broken_tick.to_numpy() < 0
+        links = [
+            (int(top.master[b] + top.slave[b] - body), f"bond {b} to body")
+            for b in top.body_bond[body]
+            if b >= 0 and intact[b]
+        ]
+        for first, second in self._pairs():
+            if body in (first, second):
+                links.append((int(first + second - body), "contact with body"))
+        return links
+
+    def _pairs(self):
+        if self.contacts is None:
+            return np.zeros((0, 2), dtype=int)
+        return self.contacts.pair_body.to_numpy()[: self.contacts.pair_count[None]]
+
+    def _advice(self, body, links):
+        """What limits the step around a body, and a step that would do.
+
+        What runs away is often thrown by a neighbour of a shorter step: the tightest one counts.
+        """
+        limits = self._limits()
+        near = [body, *(other for other, _ in links)]
+        limit, cause, tight = min((limits[name][k], name, k) for name in limits for k in near)
+        if not np.isfinite(limit):
+            return "which nothing near it limits"
+        whose = f"its {cause}" if tight == body else f"the {cause} of body {tight} beside it"
+        return f"{whose} allow {limit:.3g} s: try a step of {0.5 * limit:.2g} s"
+
+    def _limits(self):
+        """Largest stable explicit steps by what sets them [s], arrays (body_count,).
+
+        Dashpots that are solved or limited set none.
+        """
+        steps = quality_report(self.model.mesh, self.model.material)
+        limits = {"bond springs": steps.spring_step_s}
+        tame = self.solves or self.limited
+        if self.model.dashpot.name and not tame:
+            limits["bond dashpots"] = steps.dashpot_step_s
+        if self.contacts is not None:
+            rates = self._contact_rates()
+            limits["contact springs"] = spring_step(self.model.material.contact_stiffness * rates)
+            if not tame:
+                limits["sphere dashpots"] = dashpot_step(
+                    self.model.material.contact_damping * rates
+                )
+        return limits
+
+    def _contact_rates(self):
+        """Sphere pairs near every body over its mass [1/kg], (body_count,)."""
+        counts = self.contacts.pair_last.to_numpy() - self.contacts.pair_first.to_numpy()
+        rates = np.zeros(self.model.body_count)
+        for pair, bodies in enumerate(self._pairs()):
+            count = max(1, counts[pair])
+            rates[bodies] = np.maximum(rates[bodies], count / self.model.body_mass[bodies])
+        return rates
+
+
+def _partner(body, motion, links):
+    """The neighbour that moves fastest against a body, and how they are tied."""
+    if not links:
+        return "it touches nothing"
+    velocity = motion["velocity"]
+    apart = [np.linalg.norm(velocity[other] - velocity[body]) for other, _ in links]
+    other, tie = links[int(np.nanargmax(np.nan_to_num(apart, nan=np.inf)))]
+    return f"the fastest against it is {tie} {other}"

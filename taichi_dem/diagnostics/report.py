@@ -1,0 +1,183 @@
+"""The short report at the end of a run."""
+
+from dataclasses import asdict, dataclass
+from typing import Optional
+
+from taichi_dem.kit.display import in_brief
+
+#: Keys of the JSON file that differ from the attribute's name.
+_JSON_KEYS = {"effect_activity": "acted", "missing_effects": "missed"}
+
+
+@dataclass(frozen=True)
+class Report:
+    """What a run did and what it cost.
+
+    method, driver, effects: what was run. until_s: simulated time. substeps: ticks at which
+    something was due. body_updates, bond_evaluations, pair_evaluations: work done.
+    uniform_evaluations: bonds and pairs that one step for all would have evaluated in the same
+    substeps. sweeps: over all dashpots where they are solved, else 0. ideal_gain: bodies times
+    substeps over body updates, what the different steps would save if a pair cost nothing;
+    boundary_gain: uniform over actual evaluations, what they save with every pair evaluated at
+    the finer body's step. searches: rebuilt contact lists.
+    energy_balance: energy terms [J]; energy_residual_fraction: residual over the work put in.
+    linear_momentum_error, angular_momentum_error: out of nothing, as shares of what was
+    exchanged. compile_seconds, run_seconds, run_cpu_seconds: cost. effect_activity: an
+    ``EffectUse`` for each effect. missing_effects: a ``missing_effects.MissingEffect`` for each
+    effect that was left out and needed. unresolved: sentences about bonds and contacts for which
+    the step was too long. bound_by: bodies at the end by what bounds their step, see
+    ``step_control.CRITERIA``. round_off_J: energies below this may be round-off
+    (``DivergenceCheck.round_off``). measured_speedup: CPU time of one step for all over that of the
+    run, where it was measured.
+    """
+
+    method: str
+    driver: str
+    effects: tuple
+    until_s: float
+    body_count: int
+    bond_count: int
+    broken_faces: int
+    smallest_step_s: float
+    substeps: int
+    body_updates: int
+    bond_evaluations: int
+    pair_evaluations: int
+    sweeps: int
+    uniform_evaluations: int
+    searches: int
+    energy_balance: dict
+    linear_momentum_error: float
+    angular_momentum_error: float
+    compile_seconds: float
+    run_seconds: float
+    run_cpu_seconds: float
+    effect_activity: tuple
+    missing_effects: tuple
+    unresolved: tuple
+    bound_by: dict
+    round_off_J: float = 0.0
+    measured_speedup: Optional[float] = None
+
+    def __repr__(self):
+        took = f"{self.run_seconds:.3g} s run"
+        return in_brief(self, self.outcome, took, "print it for all figures")
+
+    @property
+    def outcome(self):
+        """Method, simulated time and broken bonds in words."""
+        broken = f"{self.broken_faces:,} of {self.bond_count:,} bonds broken"
+        return f"{self.method}, {self.until_s:.4g} s simulated, {broken}"
+
+    @property
+    def needs(self):
+        """Sentences about effects that were missed, and about a step that was too long."""
+        return (*(str(missing) for missing in self.missing_effects), *self.unresolved)
+
+    @property
+    def contact_evaluations(self):
+        """Bonds and contact pairs evaluated."""
+        return self.bond_evaluations + self.pair_evaluations
+
+    @property
+    def ideal_gain(self):
+        """Bodies times substeps over body updates."""
+        return self.body_count * self.substeps / max(1, self.body_updates)
+
+    @property
+    def boundary_gain(self):
+        """Evaluations of one step for all over those made."""
+        return self.uniform_evaluations / max(1, self.contact_evaluations)
+
+    @property
+    def energy_residual_fraction(self):
+        """Energy that the account cannot explain, over the work put in or the energy held."""
+        return abs(self.energy_balance["residual"]) / max(*self._given_and_held(), 1e-300)
+
+    def _given_and_held(self):
+        """Work put in, and energy held at the end [J]."""
+        given = abs(self.energy_balance["load_work"]) + abs(self.energy_balance["support_work"])
+        return given, self.energy_balance["kinetic"] + self.energy_balance["bond_strain"]
+
+    @property
+    def unexplained(self):
+        """The residual in words: a share of the work put in, unless all energies are round-off."""
+        given, held = self._given_and_held()
+        if max(given, held) <= self.round_off_J:
+            return f"{abs(self.energy_balance['residual']):.2g} J; all energies are round-off"
+        whole = "the energy held" if held > given else "it"
+        return f"{100.0 * self.energy_residual_fraction:.3g} % of {whole}"
+
+    def as_dict(self):
+        """All figures, for a JSON file."""
+        derived = ("contact_evaluations", "ideal_gain", "boundary_gain", "energy_residual_fraction")
+        derived += ("needs",)
+        figures = {_JSON_KEYS.get(name, name): value for name, value in asdict(self).items()}
+        return {**figures, **{name: getattr(self, name) for name in derived}}
+
+    def _effect_rows(self):
+        """What each effect did."""
+        if not self.effect_activity:
+            return (("effects", "none"),)
+        rows = [f"{use.effect}: {use}" for use in self.effect_activity]
+        return (("effects", rows[0]), *(("", row) for row in rows[1:]))
+
+    def _bound_words(self):
+        """What bounds the steps of how many bodies."""
+        words = ((name.replace("_", " "), n) for name, n in self.bound_by.items())
+        return ", ".join(f"{name} ({n} bodies)" for name, n in words)
+
+    def _gain_row(self):
+        """What steps of different length save, where there are some."""
+        if self.body_updates == self.body_count * self.substeps:
+            return ()
+        ideal, reached = f"{self.ideal_gain:.2f}", f"{self.boundary_gain:.2f}"
+        words = f"{ideal} ideal, {reached} with pairs at the finer step"
+        if self.measured_speedup is not None:
+            words += f", {self.measured_speedup:.2f} measured"
+        return (("gain over uniform", words),)
+
+    def _sweeps_row(self):
+        """What solving all dashpots took, for the methods that do."""
+        if not self.sweeps:
+            return ()
+        return (("sweeps", f"{self.sweeps:,}, {self.sweeps / self.substeps:.2f} a substep"),)
+
+    def __str__(self):
+        """A table of some twenty lines, then one line for every effect that was missed."""
+        rows = [
+            ("method", f"{self.method}, {self.driver} driver"),
+            *self._effect_rows(),
+            (
+                "simulated",
+                f"{self.until_s:.4g} s, {self.broken_faces} of {self.bond_count} bonds broken",
+            ),
+            ("smallest step", f"{self.smallest_step_s:.3g} s"),
+            ("steps bound by", self._bound_words()),
+            ("substeps", f"{self.substeps:,}"),
+            (
+                "evaluations",
+                f"{self.bond_evaluations:,} bonds, {self.pair_evaluations:,} pairs, "
+                f"{self.body_updates:,} bodies",
+            ),
+            *self._gain_row(),
+            *self._sweeps_row(),
+            ("contact searches", f"{self.searches:,}"),
+            (
+                "work put in",
+                f"{self.energy_balance['load_work'] + self.energy_balance['support_work']:.6g} J",
+            ),
+            ("energy residual", self.unexplained),
+            (
+                "momentum error",
+                f"{self.linear_momentum_error:.1e} linear, "
+                f"{self.angular_momentum_error:.1e} angular",
+            ),
+            (
+                "time",
+                f"{self.compile_seconds:.1f} s before the first step, "
+                f"{self.run_seconds:.1f} s run ({self.run_cpu_seconds:.1f} s of CPU)",
+            ),
+        ]
+        lines = [f"{name:18s} {text}" for name, text in rows]
+        return "\n".join([*lines, *(f"warning: {need}" for need in self.needs)])

@@ -1,0 +1,157 @@
+"""Bonds and contacts for which the step of a run was too long: stable, but not accurate."""
+
+import numpy as np
+import taichi as ti
+
+from taichi_dem.timeline import NEVER
+
+#: A limited dashpot below this share of its coefficient is another material's.
+LEAST_SHARE = 0.5
+#: A bond that is open by this many failure openings when it fails has failed too late: up to then
+#: its dashpots, far the stronger part of it, have pulled for as much too long.
+MOST_OPENING = 1.25
+#: Sphere dashpots of a pair take c n dt / m of the speed at which the bodies part or meet; above 1
+#: they turn it round, and what the springs should ease apart is thrown apart.
+MOST_TAKEN = 1.0
+_KEPT = ("share", "pair_share", "taken", "step", "lightest")
+
+
+@ti.data_oriented
+class StepResolution:
+    """Looks, at recording times, at what steps leave of dashpots; at the end, at how bonds failed.
+
+    share: least share of its dashpots that each bond was left with while it held, (bond_count,).
+    step: shortest step of each body [s]; lightest: mass of the lightest it came near [kg];
+    pair_share: least share that its contacts were seen with; taken: largest part of a speed that
+    they take in a step; all (body_count,).
+    """
+
+    def __init__(self, model, state, advance):
+        self.model, self.state, self.advance = model, state, advance
+        self.contacts = advance.contacts
+        self.share = np.ones(model.bond_count)
+        self.pair_share, self.taken = np.ones(model.body_count), np.zeros(model.body_count)
+        self.step = np.full(model.body_count, np.inf)
+        self.lightest = model.body_mass.copy()
+
+    def saved(self):
+        """What a checkpoint holds of it, arrays by name."""
+        return {name: getattr(self, name) for name in _KEPT}
+
+    def resume(self, saved):
+        """Take over what ``saved`` gave."""
+        for name in _KEPT:
+            setattr(self, name, saved[name].copy())
+
+    def sample(self):
+        """Update the figures at a recording time. Dashpots that are solved need no look."""
+        if self.advance.solves:
+            return
+        if self.advance.limited and self.advance.has_dashpot and self.model.bond_count:
+            self._read_bonds(self.share)
+        if self.contacts is not None and self.contacts.pair_count[None]:
+            if self.advance.limited:
+                self._note_partners()
+            self._read_pairs(self.pair_share, self.taken)
+
+    def _note_partners(self):
+        """Remember steps and light partners: few contacts last until a recording."""
+        schedule, mass = self.advance.schedule, self.model.body_mass
+        self.step = np.minimum(self.step, schedule.dt0 / 2.0 ** self.state.level.to_numpy())
+        pairs = self.contacts.pair_body.to_numpy()[: self.contacts.pair_count[None]]
+        for one, other in (pairs.T, pairs.T[::-1]):
+            np.minimum.at(self.lightest, one, mass[other])
+
+    def findings(self, bodies=None):
+        """Sentences about what the step did not resolve, an empty tuple where it did all.
+
+        bodies: which to judge, booleans (body_count,), all by default.
+        """
+        bodies = np.ones(self.model.body_count, dtype=bool) if bodies is None else bodies
+        return (*self._bonds(bodies[self.model.topology.master]), *self._pairs(bodies))
+
+    def _bonds(self, inside):
+        share = np.where(inside, self.share, 1.0)
+        found = []
+        if (share < LEAST_SHARE).any():
+            worst = int(np.argmin(share))
+            found.append(
+                f"the step is too long for the dashpots of {(share < LEAST_SHARE).sum()} bonds, "
+                f"and limits them to less than half, bond {worst} to {100 * share[worst]:.2g} %: "
+                f"these bonds give way too fast"
+            )
+        late = np.where(inside, self._openings_at_failure(), 0.0)
+        if (late > MOST_OPENING).any():
+            worst = int(np.argmax(late))
+            found.append(
+                f"the step is too long for {(late > MOST_OPENING).sum()} bonds that failed late, "
+                f"bond {worst} at {late[worst]:.2g} times its failure opening: their dashpots took "
+                f"energy for too long"
+            )
+        return found
+
+    def _pairs(self, bodies):
+        share = np.where(bodies, self._contact_shares(), 1.0)
+        taken = np.where(bodies, self.taken, 0.0)
+        found = []
+        if (share < LEAST_SHARE).any():
+            worst = int(np.argmin(share))
+            found.append(
+                f"the step is too long for the sphere dashpots of {(share < LEAST_SHARE).sum()} "
+                f"bodies, and limits them to less than half, those of body {worst} to "
+                f"{100 * share[worst]:.2g} %: what is pressed together parts too fast"
+            )
+        if (taken > MOST_TAKEN).any():
+            worst = int(np.argmax(taken))
+            found.append(
+                f"the step is too long for the sphere dashpots of {(taken > MOST_TAKEN).sum()} "
+                f"bodies: those of body {worst} take {taken[worst]:.2g} of a speed in one step, "
+                f"and throw bodies apart that they should stop"
+            )
+        return found
+
+    def _contact_shares(self):
+        """Largest share that limited sphere dashpots can have had where they acted, (body_count,).
+
+        What was seen of them, or that of a single contact, 1 / X with X = 2 c dt / m; see
+        ``step/stability_limits.py``. Where contacts took energy they acted; it is booked to the
+        first body of a pair.
+        """
+        if self.contacts is None or not self.advance.limited:
+            return self.pair_share
+        acted = self.state.contact_heat.to_numpy()[:, :2].sum(axis=1) > 0.0
+        x = 2.0 * self.model.material.contact_damping * self.step / self.lightest
+        return np.minimum(self.pair_share, np.where(acted, 1.0 / np.maximum(1.0, x), 1.0))
+
+    def _openings_at_failure(self):
+        """Largest opening of the units of every bond that failed over the failure opening, (b,)."""
+        bonds = self.model.bond_count
+        units = self.model.tension.state().get("softening_unit")
+        if units is None:
+            return np.zeros(bonds)
+        widest = units.to_numpy()[: 3 * bonds, 0].reshape(bonds, 3).max(axis=1)
+        failed = self.state.broken_tick.to_numpy()[:bonds] != NEVER
+        return np.where(failed, widest / self.model.material.failure_opening, 0.0)
+
+    @ti.kernel
+    def _read_bonds(self, share: ti.types.ndarray(dtype=ti.f64, ndim=1)):
+        for b in range(self.model.bond_count):
+            if self.state.broken_tick[b] < 0:
+                share[b] = ti.min(share[b], self.advance.bond_share(b))
+
+    @ti.kernel
+    def _read_pairs(
+        self,
+        share: ti.types.ndarray(dtype=ti.f64, ndim=1),
+        taken: ti.types.ndarray(dtype=ti.f64, ndim=1),
+    ):
+        for p in range(self.contacts.pair_count[None]):
+            count = self.contacts.touching(p)
+            if count > 0:
+                i, j = self.contacts.pair_body[p][0], self.contacts.pair_body[p][1]
+                if ti.static(self.advance.limited):
+                    ti.atomic_min(share[i], self.advance.contact_share(i, j))
+                else:
+                    rate = count * self.contacts.law.damping()
+                    rate *= 1.0 / self.model.mass[i] + 1.0 / self.model.mass[j]
+                    ti.atomic_max(taken[i], rate * self.advance.schedule.pair_step(i, j))

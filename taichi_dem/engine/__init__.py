@@ -1,0 +1,1 @@
+"""Tables and state of a scene on the device."""

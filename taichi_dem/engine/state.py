@@ -1,0 +1,144 @@
+"""Everything that changes in a run; with the effects' own state this is what a checkpoint holds."""
+
+import numpy as np
+import taichi as ti
+
+from taichi_dem.kit.allocation import defer_fill
+from taichi_dem.kit.types import real, vec3, vec4
+from taichi_dem.physics.rotation import rotation_matrix, spin_of
+from taichi_dem.timeline import NEVER
+
+
+@ti.data_oriented
+class State:
+    """Motion of the bodies, pending impulses, fracture and the energy account.
+
+    position [m], velocity [m/s], orientation (unit quaternion, scalar first), angular_momentum
+    [kg m^2/s] in world axes; rotation (matrix) and spin [rad/s] follow from them and are kept so
+    that neighbours need not compute them. A body's motion is that of its own last tick.
+    level: step dt0 / 2^level. bound: what asked for it, a place in ``step_control.CRITERIA``.
+    last_tick: when the body was last advanced.
+    slot: impulse [N s] and its moment about the body's centre [N m s] that face f of body i has
+    gathered since then, entry 4 i + f.
+    broken_tick: when a bond was released, NEVER while it holds. exposed_tick: since when a face
+    carries contact spheres; with contact only.
+    bond_heat: energy that dashpots, slip and release have taken from each bond [J]; not for bonds
+    that are merely elastic.
+    contact_heat: energy that sphere dashpots and friction have taken, and energy that releases
+    have injected [J], booked to the first body of a pair; with contact only.
+    injected_tick: last tick whose releases have been booked there.
+    load_work: work [J], one component a load and a last one for supports; load_impulse: what all
+    of them gave a body (linear, and angular about the origin). tick: present time. bad_body:
+    lowest body out of bounds, body_count if none.
+    """
+
+    def __init__(self, model, max_speed):
+        n, bonds = model.body_count, max(1, model.bond_count)
+        self.model = model
+        self.position = ti.Vector.field(3, real, shape=n)
+        self.orientation = ti.Vector.field(4, real, shape=n)
+        self.rotation = ti.Matrix.field(3, 3, real, shape=n)
+        self.velocity = ti.Vector.field(3, real, shape=n)
+        self.spin = ti.Vector.field(3, real, shape=n)
+        self.angular_momentum = ti.Vector.field(3, real, shape=n)
+        self.level = ti.field(ti.i32, shape=n)
+        self.bound = ti.field(ti.i32, shape=n)
+        self.last_tick = ti.field(ti.i64, shape=n)
+        self.slot = ti.Vector.field(6, real, shape=4 * n)
+        self.broken_tick = ti.field(ti.i64, shape=bonds)
+        if model.has_bond_heat:
+            self.bond_heat = ti.Vector.field(3, real, shape=bonds)
+        if model.has_contact:
+            self.exposed_tick = ti.field(ti.i64, shape=4 * n)
+            defer_fill(self.exposed_tick.fill, NEVER)
+            self.contact_heat = ti.Vector.field(3, real, shape=n)
+            self.injected_tick = ti.field(ti.i64, shape=())
+        self.load_work = ti.Vector.field(len(model.loads) + 1, real, shape=n)
+        self.load_impulse = ti.Vector.field(6, real, shape=n)
+        self.tick = ti.field(ti.i64, shape=())
+        self.bad_body = ti.field(ti.i32, shape=())
+        self.max_speed2 = ti.field(real, shape=())
+        defer_fill(self.max_speed2.fill, max_speed**2)
+        defer_fill(self.broken_tick.fill, NEVER)
+        defer_fill(self.bad_body.fill, n)
+        defer_fill(self.set_motion, model.centre, np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)))
+
+    def set_motion(self, position, orientation, velocity=None, spin=None):
+        """Set the motion of all bodies.
+
+        position (n, 3) [m], orientation (n, 4) unit quaternions, velocity (n, 3) [m/s] and spin
+        (n, 3) [rad/s] in world axes, zero by default.
+        """
+        still = np.zeros((self.model.body_count, 3))
+        arrays = (position, orientation, still if velocity is None else velocity)
+        arrays = (*arrays, still if spin is None else spin)
+        self._write_motion(*(np.ascontiguousarray(a, dtype=np.float64) for a in arrays))
+
+    @ti.kernel
+    def _write_motion(
+        self,
+        position: ti.types.ndarray(dtype=ti.f64, ndim=2),
+        orientation: ti.types.ndarray(dtype=ti.f64, ndim=2),
+        velocity: ti.types.ndarray(dtype=ti.f64, ndim=2),
+        spin: ti.types.ndarray(dtype=ti.f64, ndim=2),
+    ):
+        for i in range(self.model.body_count):
+            self.position[i] = vec3(position[i, 0], position[i, 1], position[i, 2])
+            turn = vec4(0.0)
+            for k in ti.static(range(4)):
+                turn[k] = orientation[i, k]
+            self.orientation[i] = turn
+            rotation = rotation_matrix(turn)
+            self.rotation[i] = rotation
+            self.velocity[i] = vec3(velocity[i, 0], velocity[i, 1], velocity[i, 2])
+            w = vec3(spin[i, 0], spin[i, 1], spin[i, 2])
+            self.spin[i] = w
+            self.angular_momentum[i] = rotation @ (
+                self.model.inertia[i] @ (rotation.transpose() @ w)
+            )
+
+    def expose(self, topology):
+        """Let all outer faces carry contact spheres from the start, beside those that do."""
+        marks = self.exposed_tick.to_numpy()
+        marks[4 * topology.outer_body + topology.outer_face] = 0
+        self.exposed_tick.from_numpy(marks)
+
+    def motion(self):
+        """Arrays of the bodies' motion by name.
+
+        position, velocity, spin, angular_momentum (n, 3), orientation (n, 4), rotation (n, 3, 3)
+        and level (n,).
+        """
+        table = np.zeros((self.model.body_count, 26))
+        self._read_motion(table)
+        widths = (("position", 3), ("orientation", 4), ("velocity", 3), ("spin", 3))
+        parts, start = {}, 0
+        for name, width in (*widths, ("angular_momentum", 3), ("rotation", 9), ("level", 1)):
+            parts[name] = table[:, start : start + width].copy()
+            start += width
+        parts["rotation"] = parts["rotation"].reshape(-1, 3, 3)
+        parts["level"] = parts["level"][:, 0].astype(np.int32)
+        return parts
+
+    @ti.kernel
+    def _read_motion(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
+        for i in range(self.model.body_count):
+            rotation = self.rotation[i]
+            spin = spin_of(rotation, self.model.inertia_inverse[i], self.angular_momentum[i])
+            for k in ti.static(range(3)):
+                table[i, k] = self.position[i][k]
+                table[i, 7 + k] = self.velocity[i][k]
+                table[i, 10 + k] = spin[k]
+                table[i, 13 + k] = self.angular_momentum[i][k]
+            for k in ti.static(range(4)):
+                table[i, 3 + k] = self.orientation[i][k]
+            for r, c in ti.static(ti.ndrange(3, 3)):
+                table[i, 16 + 3 * r + c] = rotation[r, c]
+            table[i, 25] = ti.cast(self.level[i], ti.f64)
+
+    def fields(self):
+        """Every field that changes, by name, the bound effects' state included."""
+        own = {k: v for k, v in vars(self).items() if isinstance(v, (ti.Field,))}
+        for effect in self.model.effects:
+            own.update(effect.state())
+        return own

@@ -1,0 +1,1 @@
+"""Tools without physics, shared with ca_damper: session, checks, files, checkpoints, progress."""

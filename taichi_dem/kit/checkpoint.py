@@ -1,0 +1,193 @@
+"""Runs that are saved on their way and gone on with: when, into what file, and for whom it is.
+
+A file holds arrays by name and an identity: what a run has to share with it to go on from it.
+Nothing here knows what is simulated.
+"""
+
+import hashlib
+import json
+import math
+import os
+import signal
+import threading
+import time
+import zipfile
+import zlib
+from dataclasses import dataclass
+from typing import Optional
+
+import numpy as np
+
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.files import renamed_when_done
+from taichi_dem.kit.validation import path_name, positive, whole
+from taichi_dem.kit.version import __version__, taichi_version
+
+#: Of the file; another one cannot be read.
+FORMAT = 2
+_ABOUT = "about"
+_MOST_STEPS = 2**53
+_MOST_MARKS = 1_000_000
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """Where a run saves itself, and when besides at its end and on Ctrl-C.
+
+    path: file, replaced whole. every_steps: largest steps between two of them (steps of a scene
+    in a batch). every_s: simulated time [s]. every_wall_s: time on the wall [s].
+    Raises InputError for a value out of its range.
+    """
+
+    path: str
+    every_steps: Optional[int] = None
+    every_s: Optional[float] = None
+    every_wall_s: Optional[float] = None
+
+    def __post_init__(self):
+        object.__setattr__(self, "path", path_name("path", self.path))
+        if self.every_steps is not None:
+            whole("every_steps", self.every_steps, 1, _MOST_STEPS)
+        for name in ("every_s", "every_wall_s"):
+            if getattr(self, name) is not None:
+                positive(name, getattr(self, name))
+
+    def marks(self, last, dt):
+        """Steps of dt [s] from 0 to last at which it asks to be saved, a set.
+
+        Raises InputError where they are more than a million.
+        """
+        every = [self.every_steps] if self.every_steps else []
+        if self.every_s is not None:
+            every.append(max(1, math.ceil(self.every_s / dt - 1e-9)))
+        if every and last > _MOST_MARKS * min(every):
+            least = math.ceil(last / _MOST_MARKS)
+            raise InputError(
+                f"every_steps must be at least {least} and every_s {least * dt:.3g} s in a run of "
+                f"{last} steps, got {self.every_steps} and {self.every_s}"
+            )
+        return {step for distance in every for step in range(0, last + 1, distance)}
+
+
+class SaveTimer:
+    """Whether a checkpoint is due, from what has passed since the last one."""
+
+    def __init__(self, checkpoint):
+        self.every = (checkpoint.every_steps, checkpoint.every_s, checkpoint.every_wall_s)
+        self.saved_at(0, 0.0)
+
+    def saved_at(self, step, time_s):
+        """Count from a step and a time [s] on."""
+        self.last = (step, time_s, time.perf_counter())
+
+    def now(self, step, time_s):
+        """Whether the run, at a step and a time [s], should be saved."""
+        passed = zip(self.every, (step, time_s, time.perf_counter()), self.last)
+        return any(
+            every is not None and present - last >= every * (1.0 - 1e-9)
+            for every, present, last in passed
+        )
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C, after the run has been saved. path: of the checkpoint."""
+
+    def __init__(self, time_s, path):
+        super().__init__(f"interrupted at t = {time_s:.6g} s, saved in {path}")
+        self.path = os.fspath(path)
+
+
+class CtrlC:
+    """In its block the first Ctrl-C is only noted, in ``asked``; the second one interrupts.
+
+    Python lets the main thread alone listen: in others Ctrl-C is what it was.
+    """
+
+    def __init__(self):
+        self.asked = False
+
+    def __enter__(self):
+        self.listens = threading.current_thread() is threading.main_thread()
+        if self.listens:
+            self.before = signal.signal(signal.SIGINT, self._note)
+        return self
+
+    def __exit__(self, kind, *_):
+        if self.listens:
+            signal.signal(signal.SIGINT, self.before)
+        if self.asked and kind is None:
+            raise KeyboardInterrupt
+
+    def _note(self, number, frame):
+        if self.asked:
+            raise KeyboardInterrupt
+        self.asked = True
+
+
+def digest(*arrays):
+    """Twelve letters that change with any bit, type or shape of the arrays."""
+    made = hashlib.sha256()
+    for array in map(np.ascontiguousarray, arrays):
+        made.update(f"{array.dtype} {array.shape}".encode())
+        made.update(array.tobytes())
+    return made.hexdigest()[:12]
+
+
+def version_text():
+    """Versions that a checkpoint is bound to."""
+    return f"{__version__} on taichi {taichi_version()}"
+
+
+def write_checkpoint(path, identity, arrays):
+    """Write arrays by name under an identity, a dict of words; on the disk before it appears.
+
+    Raises InputError when the file cannot be written; one that was there stays as it was.
+    """
+    about = json.dumps({"format": FORMAT, "identity": identity})
+    with renamed_when_done(path) as temporary:
+        with open(temporary, "wb") as file:
+            np.savez(file, **{_ABOUT: np.array(about)}, **arrays)
+            file.flush()
+            os.fsync(file.fileno())
+
+
+def read_checkpoint(path, identity):
+    """Arrays by name from a checkpoint of the same identity.
+
+    Raises InputError for a file that is absent, damaged or none of ours, and for one of another
+    identity, naming what differs.
+    """
+    about, arrays = _read(path)
+    if about["format"] != FORMAT:
+        raise InputError(
+            f"checkpoint {path} must have format {FORMAT}, got {about['format']!r}: "
+            "it is of another version"
+        )
+    for name, mine in identity.items():
+        theirs = about["identity"].get(name, "nothing")
+        if theirs != mine:
+            raise InputError(f"checkpoint {path} is of another {name}: {theirs}, not {mine}")
+    return arrays
+
+
+def _read(path):
+    """What the file says of itself, and its arrays; every part is checked against its sum."""
+    path = path_name("checkpoint", path)
+    if os.path.exists(path) and not os.path.isfile(path):
+        what = "it is a folder" if os.path.isdir(path) else "it is no file"
+        raise InputError(f"cannot read checkpoint {path}: {what}")
+    try:
+        with zipfile.ZipFile(path) as file:
+            if file.testzip() is not None:
+                raise ValueError("a sum does not fit")
+        with np.load(path, allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+        about = json.loads(str(arrays.pop(_ABOUT)))
+        if not isinstance(about, dict) or not isinstance(about["identity"], dict):
+            raise ValueError("it says nothing of itself")
+        about["format"]
+    except OSError as error:
+        raise InputError(f"cannot read checkpoint {path}: {error.strerror or error}") from None
+    except (ValueError, KeyError, EOFError, NotImplementedError, zipfile.BadZipFile, zlib.error):
+        raise InputError(f"{path} must be a whole checkpoint: it is damaged or none") from None
+    return about, arrays

@@ -1,0 +1,112 @@
+"""How objects show themselves: a line or two at a prompt, HTML in a notebook.
+
+Nothing here reads a field: an object may be shown after its Taichi session has ended.
+"""
+
+import base64
+import html
+import math
+from dataclasses import fields
+from inspect import signature
+
+import numpy as np
+
+from taichi_dem.kit.validation import shown
+
+#: Letters of a representation at a prompt.
+_LONGEST = 400
+#: Numbers of a sequence that are listed; longer ones are given by their ends.
+_LISTED = 6
+_CELL = "text-align:left;padding:2px 12px 2px 0"
+_PICTURE = "max-width:100%"
+
+
+def in_brief(thing, *parts):
+    """``<Class: part, part>``, the representation of an object; empty parts are left out."""
+    text = ", ".join(part for part in parts if part)
+    if len(text) > _LONGEST:
+        text = f"{text[: _LONGEST - 3]}..."
+    return f"<{type(thing).__name__}: {text}>"
+
+
+def by_fields(thing):
+    """Representation of a dataclass that names its fields, arrays by their shape."""
+    values = (f"{field.name}={_short(getattr(thing, field.name))}" for field in fields(thing))
+    return f"{type(thing).__name__}({', '.join(values)})"
+
+
+def _short(value):
+    if isinstance(value, np.ndarray):
+        return f"array {value.shape}"
+    if isinstance(value, (dict, list, tuple)) and len(value):
+        return f"{type(value).__name__} of {len(value)}"
+    return f"{value:.6g}" if isinstance(value, float) else shown(value)
+
+
+def by_arguments(thing):
+    """Representation of an object that keeps what its class was called with, as such a call."""
+    names = signature(type(thing)).parameters
+    kept = {name: vars(thing).get(f"_{name}", vars(thing).get(name)) for name in names}
+    texts = {name: _argument(value) for name, value in kept.items()}
+    arguments = ", ".join(f"{name}={text}" for name, text in texts.items() if text)
+    return f"{type(thing).__name__}({arguments})"
+
+
+def _argument(value):
+    """A plain value or a short vector as text; "" for what is none, such as a field."""
+    if isinstance(value, np.ndarray):
+        value = tuple(value.tolist())
+    return shown(value) if isinstance(value, (str, bool, int, float, tuple)) else ""
+
+
+def counted(count, what):
+    """A number with its noun: "1 frame", "2,898 bodies"."""
+    plural = f"{what[:-1]}ies" if what.endswith("y") else f"{what}s"
+    return f"{count:,} {what if count == 1 else plural}"
+
+
+def prefixed(value, unit):
+    """A number with its unit, from nano to giga: "20 ms", "3.2 M evaluations/s"."""
+    power = min(3, max(-3, math.floor(math.log10(value) / 3.0 + 1e-9))) if value > 0.0 else 0
+    prefix = ("n", "µ", "m", "", "k", "M", "G")[power + 3]
+    gap = " " if prefix and len(unit) > 3 else ""
+    return f"{value / 1e3**power:.3g} {prefix}{gap}{unit}"
+
+
+def listed(values):
+    """Numbers in words: "10, 20, 30", or "10 to 400 (40 values)" where they are many."""
+    if len(values) <= _LISTED:
+        return ", ".join(f"{value:g}" for value in values)
+    return f"{min(values):g} to {max(values):g} ({len(values)} values)"
+
+
+def table(rows, head=()):
+    """HTML table of rows of text, escaped; head: names of the columns."""
+    lines = [_row("th", head)] if head else []
+    return f"<table>{''.join([*lines, *(_row('td', row) for row in rows)])}</table>"
+
+
+def _row(tag, cells):
+    made = (f'<{tag} style="{_CELL}">{html.escape(str(cell))}</{tag}>' for cell in cells)
+    return f"<tr>{''.join(made)}</tr>"
+
+
+def embedded(png, alt):
+    """HTML of a PNG image, bytes, that brings its data along; alt: what it shows in words."""
+    data = base64.b64encode(png).decode("ascii")
+    source = f"data:image/png;base64,{data}"
+    return f'<img style="{_PICTURE}" alt="{html.escape(alt)}" src="{source}">'
+
+
+def titled(title, *sections, warning=""):
+    """HTML of a title, a warning in red where there is one, and sections of HTML below them."""
+    lines = [f"<p><b>{html.escape(title)}</b></p>"]
+    if warning:
+        lines.append(f'<p style="color:#B00020">{html.escape(warning)}</p>')
+    return f"<div>{''.join([*lines, *sections])}</div>"
+
+
+def unfolded(title, text):
+    """HTML of text that appears, as it stands, when its title is clicked on."""
+    words, lines = html.escape(title), html.escape(text)
+    return f"<details><summary>{words}</summary><pre>{lines}</pre></details>"

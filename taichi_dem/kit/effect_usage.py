@@ -1,0 +1,104 @@
+"""What an effect did in a run, and which of them a user may leave out; plain data, no physics."""
+
+from dataclasses import dataclass
+from typing import Optional
+
+from taichi_dem.kit.display import in_brief
+
+
+@dataclass(frozen=True)
+class EffectUse:
+    """What one effect did.
+
+    effect: its name. what: the events in words. events: how many, of at most ``of`` (0 where there
+    is no most). energy_J: taken or given, None where it is not booked. share: of ``whole``, in
+    words; None where there is nothing to compare with. steers: whether it directs the rest even
+    where it takes little, as a crack does: then only one that never acted can be left out. kept:
+    why it cannot be left out whatever was counted, in words, or "". rounding: whether all that was
+    booked is no more than the rounding of numbers may leave; then no event is counted.
+    """
+
+    effect: str
+    what: str
+    events: int
+    of: int = 0
+    energy_J: Optional[float] = None
+    share: Optional[float] = None
+    whole: str = "the energy put in"
+    steers: bool = False
+    kept: str = ""
+    rounding: bool = False
+
+    @property
+    def is_active(self):
+        """Whether any event was counted."""
+        return self.events > 0
+
+    @property
+    def idle(self):
+        """Whether it is known to have had no part in the run, not even in its rounding."""
+        return not (self.is_active or self.kept or self.rounding)
+
+    def negligible(self, tolerance):
+        """Whether it acted, and booked less than a share of the energy, or round-off alone."""
+        if self.rounding:
+            return not self.kept
+        judged = self.is_active and not (self.steers or self.kept) and self.share is not None
+        return judged and self.share < tolerance
+
+    def __str__(self):
+        """One line without the name."""
+        if self.idle:
+            return f"never acted (0 {self.what})"
+        if self.rounding:
+            return f"never acted beyond round-off (0 {self.what}, {self.energy_J:.3g} J)"
+        most = f" of {self.of:,}" if self.of else ""
+        energy = f", {self.energy_J:.3g} J" if self.energy_J is not None else ""
+        share = f", {100 * self.share:.3g} % of {self.whole}" if self.share is not None else ""
+        return f"{self.events:,}{most} {self.what}{energy}{share}"
+
+
+@dataclass(frozen=True)
+class Advice:
+    """Which effects a run had need of.
+
+    uses: an EffectUse for each effect. missing: findings about effects that were left out, with how
+    often and where. tolerance: share of the energy below which an effect counts as negligible.
+    """
+
+    uses: tuple
+    missing: tuple
+    tolerance: float
+
+    @property
+    def inactive(self):
+        """Names of the effects that had no part; without them not a bit would differ."""
+        return tuple(use.effect for use in self.uses if use.idle)
+
+    @property
+    def negligible(self):
+        """Names of the effects that booked less than the tolerance, or no more than round-off."""
+        return tuple(use.effect for use in self.uses if use.negligible(self.tolerance))
+
+    @property
+    def droppable(self):
+        """Names of the effects that the scene could do without."""
+        return self.inactive + self.negligible
+
+    def __repr__(self):
+        lists = {
+            "keep": [use.effect for use in self.uses if use.effect not in self.droppable],
+            "drop": self.droppable,
+            "missed": [str(getattr(finding, "effect", finding)) for finding in self.missing],
+        }
+        return in_brief(self, *(f"{word} {', '.join(of)}" for word, of in lists.items() if of))
+
+    def __str__(self):
+        """A line for every effect, then what was missed."""
+        lines = [self._line(use) for use in self.uses]
+        return "\n".join([*lines, *(f"missed     {finding}" for finding in self.missing)])
+
+    def _line(self, use):
+        verdict = "drop" if use.idle or use.negligible(self.tolerance) else "keep"
+        reason = f"; {use.kept}" if use.kept else ""
+        return f"{verdict:10s} {use.effect:16s} {use}{reason}"

@@ -1,0 +1,133 @@
+"""Lists of what a package offers, made from its modules and their docstrings.
+
+``python -m taichi_dem`` and ``python -m ca_damper`` print them. A section is a title and rows
+(name, line); names are dotted, as ``import`` and ``python -m pydoc`` take them.
+"""
+
+import argparse
+import ast
+import inspect
+import pkgutil
+from importlib import import_module
+from pathlib import Path
+
+from taichi_dem.kit.progress.lasting_output import lasting_output
+from taichi_dem.kit.version import __version__
+
+_ROOT = Path(__file__).resolve().parents[2]
+_PACKAGES = ("taichi_dem", "ca_damper")
+
+
+def run(package, sections, arguments=None):
+    """Print the sections of a package, its experiments and where its documentation is."""
+    parser = argparse.ArgumentParser(
+        prog=f"python -m {package.__name__}",
+        description=f"List what {package.__name__} offers, with the first line of each docstring.",
+    )
+    parser.add_argument("--version", action="version", version=f"taichi-dem {__version__}")
+    parser.parse_args(arguments)
+    head = [f"{package.__name__} {__version__}: {first_line(package.__doc__)}"]
+    where = f", in {_ROOT}" if _is_checkout(_ROOT) else ""
+    tail = [
+        (f"Experiments{where}", experiments(_ROOT)),
+        (f"Documentation{where}", [*_other_lists(package), *documentation(_ROOT)]),
+    ]
+    _show("\n".join([*head, *map(_section, [*sections, *tail])]))
+
+
+def first_line(docstring):
+    """First line of a docstring, "" where there is none."""
+    return inspect.cleandoc(docstring or "").partition("\n")[0]
+
+
+def described(prefix, owner, names):
+    """Rows of the members of a module that bear these names, called prefix.name."""
+    return [(f"{prefix}.{name}", _line(owner, name)) for name in names]
+
+
+def own(module, kind):
+    """Names of what a module itself defines in public, in order; kind: such as inspect.isclass."""
+    return [
+        name
+        for name, thing in vars(module).items()
+        if not name.startswith("_") and kind(thing) and thing.__module__ == module.__name__
+    ]
+
+
+def instances(module, kind):
+    """Names of the public constants of a class that a module holds."""
+    return [
+        name
+        for name, thing in vars(module).items()
+        if not name.startswith("_") and isinstance(thing, kind)
+    ]
+
+
+def modules(package):
+    """Modules of a package, in order of their names."""
+    names = [found.name for found in pkgutil.iter_modules(package.__path__)]
+    return [import_module(f"{package.__name__}.{name}") for name in names]
+
+
+def experiments(root):
+    """Rows of the scripts of a checkout, none elsewhere; they are read, not run."""
+    if not _is_checkout(root):
+        return []
+    paths = sorted((root / "experiments").glob("[a-z]*.py"))
+    return [(f"python experiments/{path.name}", first_line(_docstring(path))) for path in paths]
+
+
+def documentation(root):
+    """Rows of pages by their first headings: of a checkout, or what an installation has of them."""
+    rows = [("python -m pydoc NAME", "all that a name above does: arguments, units, errors")]
+    if not _is_checkout(root):
+        pages = root.glob("taichi_dem-*.dist-info/METADATA")
+        return rows + [(str(page), "README, below the lines on the package") for page in pages]
+    pages = [*sorted(root.glob("*.md")), *sorted((root / "docs").glob("*.md"))]
+    rows += [(page.relative_to(root).as_posix(), _heading(page)) for page in pages]
+    return [*rows, ("make api", "pages of all modules from their docstrings")]
+
+
+def _other_lists(package):
+    others = [name for name in _PACKAGES if name != package.__name__]
+    return [(f"python -m {name}", "the same list for that package") for name in others]
+
+
+def _is_checkout(root):
+    return (root / "pyproject.toml").is_file() and (root / "experiments" / "_cli.py").is_file()
+
+
+def _line(owner, name):
+    """First line on a member: of its docstring, or of the comment ``#:`` above a constant."""
+    thing = getattr(owner, name)
+    if inspect.ismodule(thing) or inspect.isclass(thing) or inspect.isroutine(thing):
+        return first_line(inspect.getdoc(thing))
+    before = inspect.getsource(owner).partition(f"\n{name} = ")[0]
+    return before.rpartition("\n")[2].partition("#: ")[2]
+
+
+def _docstring(path):
+    """Docstring of a script; "" for one that Python cannot read, such as a draft."""
+    try:
+        return ast.get_docstring(ast.parse(path.read_bytes()))
+    except (SyntaxError, ValueError):
+        return ""
+
+
+def _heading(page):
+    lines = page.read_text(encoding="utf-8", errors="replace").splitlines()
+    return next((line[2:] for line in lines if line.startswith("# ")), "")
+
+
+def _section(section):
+    """A section as text, "" where it has no rows."""
+    title, rows = section
+    width = max((len(name) for name, _ in rows), default=0)
+    lines = [f"  {name:{width}}  {line}".rstrip() for name, line in rows]
+    return "\n".join(["", title, *lines]) if rows else ""
+
+
+def _show(text):
+    """Print, and end in silence when nobody reads on, as in ``| head``."""
+    with lasting_output():
+        print(text)

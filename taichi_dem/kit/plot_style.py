@@ -1,0 +1,212 @@
+"""One look for all pictures of both packages."""
+
+import contextlib
+import io
+from dataclasses import dataclass
+
+import matplotlib
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import LogFormatterSciNotation
+from PIL import Image
+
+from taichi_dem.kit.files import write_whole
+
+STYLE = {
+    "savefig.dpi": 150,
+    "font.size": 9.5,
+    "axes.titlesize": 10,
+    "axes.titlelocation": "left",
+    "axes.labelsize": 9.5,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.alpha": 0.25,
+    "grid.linewidth": 0.6,
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "lines.linewidth": 1.5,
+    "xtick.labelsize": 8.5,
+    "ytick.labelsize": 8.5,
+}
+
+#: Okabe and Ito's colours, told apart by colour-blind readers too.
+BLUE, RED, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
+ORANGE, SKY, BLACK, GREY = "#E69F00", "#56B4E9", "#222222", "#8A8A8A"
+BROWN, VIOLET = "#8C6D31", "#6A51A3"
+
+
+@dataclass(frozen=True)
+class MethodStyle:
+    """How a method or a filling looks in every picture: legend entry, colour, marker, line."""
+
+    label: str
+    colour: str
+    marker: str
+    line: str = "-"
+
+
+#: Styles by name; what the same picture shows has colours of its own.
+STYLES = {
+    "uniform": MethodStyle("paper's rule, one step for all", RED, "o"),
+    "multirate_held": MethodStyle("paper's rule, multirate", BLUE, "s", "--"),
+    "multirate_drifted": MethodStyle(
+        "paper's rule, multirate, neighbours drifted", GREEN, "D", ":"
+    ),
+    "controlled": MethodStyle("multirate, step control", ORANGE, "^", "-."),
+    "limited": MethodStyle("one fixed step, limited dashpots", PURPLE, "v"),
+    "implicit": MethodStyle("one fixed step, solved dashpots", SKY, "P", "--"),
+    "fixed": MethodStyle("one fixed step, full dashpots", BLACK, "X"),
+    "reference": MethodStyle("reference", GREY, "."),
+    "ca_static": MethodStyle("automaton, static contact", BLUE, "o"),
+    "ca_ejection": MethodStyle("automaton, landing + ejection", GREEN, "s"),
+    "ca_landing": MethodStyle("automaton, landing", ORANGE, "D"),
+    "dem": MethodStyle("spheres", RED, "^"),
+    "dem_printed": MethodStyle("spheres, damping as printed", PURPLE, "v"),
+    "dem_soft": MethodStyle("spheres, modulus / 100", SKY, "P"),
+    "empty": MethodStyle("empty container", GREY, "X", ":"),
+    "rk45_tolerance": MethodStyle("RK45 in the kernel, tolerance swept", BROWN, "o"),
+    "rk45_step": MethodStyle("RK45 in the kernel, longest step swept", VIOLET, "s"),
+    "rk45_python": MethodStyle("RK45 in Python, tolerance swept", BLACK, "D"),
+}
+#: Other names of the same.
+_SAME = {
+    **{"paper_uniform": "uniform", "paper_multirate": "multirate_held", "held": "multirate_held"},
+    **{"drifted": "multirate_drifted", "multirate_controlled": "controlled"},
+    **{"explicit_limited": "limited", "solved": "implicit", "explicit": "fixed"},
+    **{"automaton": "ca_static", "automaton_ejection": "ca_ejection", "spheres": "dem"},
+    **{"automaton_landing": "ca_landing", "spheres_printed": "dem_printed", "dem_tsuji": "dem"},
+}
+_SPARE = (BLUE, RED, GREEN, PURPLE, ORANGE, SKY, BROWN, VIOLET)
+
+
+def styles_of(names):
+    """MethodStyle of each name: that of ``STYLES``, or else the name itself and a spare colour."""
+    known = {name: STYLES.get(_SAME.get(name, name)) for name in names}
+    taken = {style.colour for style in known.values() if style}
+    spare = [colour for colour in _SPARE if colour not in taken] or list(_SPARE)
+    others = [name for name, style in known.items() if style is None]
+    for k, name in enumerate(others):
+        known[name] = MethodStyle(name, spare[k % len(spare)], "osD^vPX"[k % 7], ("-", "--")[k % 2])
+    return known
+
+
+def line_key(label, **look):
+    """A line or marker for a legend alone; look: as of ``Axes.plot``."""
+    return Line2D([], [], label=label, **look)
+
+
+def area_key(label, **look):
+    """A coloured area for a legend alone; look: facecolor, edgecolor, alpha."""
+    return Patch(label=label, **look)
+
+
+@contextlib.contextmanager
+def styled(rows=1, columns=1, size=(6.4, 4.2), **options):
+    """A figure and its axes in the common style, which holds to the end of the block.
+
+    size: in inches. rows: 0 for no axes, which the block then makes. options: of
+    ``Figure.subplots``. The Agg canvas needs no display.
+    """
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=size, layout="constrained")
+        FigureCanvasAgg(figure)
+        yield figure, figure.subplots(rows, columns, **options) if rows else None
+
+
+@contextlib.contextmanager
+def picture(path, *shape, **options):
+    """A figure and its axes, as of ``styled``, written as PNG when the block ends well.
+
+    Raises InputError when the file cannot be written.
+    """
+    with styled(*shape, **options) as (figure, axes):
+        yield figure, axes
+        _write_plain_numbers(figure)
+        write_whole(path, lambda name: figure.savefig(name, format="png"))
+
+
+class _PlainLogFormatter(LogFormatterSciNotation):
+    """0.01, 0.1, 1 instead of powers of ten on axes that lie between 0.001 and 10000."""
+
+    def __call__(self, x, pos=None):
+        text = super().__call__(x, pos)
+        low, high = sorted(self.axis.get_view_interval())
+        return f"{x:g}" if text and low > 5e-4 and high < 2e4 else text
+
+
+def _write_plain_numbers(figure):
+    """Give logarithmic axes that have matplotlib's own formatters plain numbers."""
+    for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
+        for level, give in (
+            ("major", axis.set_major_formatter),
+            ("minor", axis.set_minor_formatter),
+        ):
+            if type(getattr(axis, f"get_{level}_formatter")()) is LogFormatterSciNotation:
+                give(_PlainLogFormatter())
+
+
+def png_of(figure, dpi=110):
+    """A figure as PNG, in bytes; within the block of ``styled``."""
+    content = io.BytesIO()
+    figure.savefig(content, format="png", dpi=dpi)
+    return content.getvalue()
+
+
+@contextlib.contextmanager
+def filming(size, dpi, style):
+    """A figure, a function that takes it as the next image, and the RGB images taken so far.
+
+    size: in inches, at dpi pixels each. style: of matplotlib. The layout stays that of the first
+    image, so that nothing jumps.
+    """
+    with matplotlib.rc_context(style):
+        figure = Figure(figsize=size, dpi=dpi, layout="constrained")
+        canvas, images = FigureCanvasAgg(figure), []
+
+        def shoot():
+            """Take the figure as the next image."""
+            if not images:
+                _write_plain_numbers(figure)
+            canvas.draw()
+            images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())[:, :, :3].copy()))
+            figure.set_layout_engine("none")
+
+        yield figure, shoot, images
+
+
+def seconds(value):
+    """A time in words, with a unit that keeps the number readable: 3.125e-10 -> 0.313 ns."""
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
+        if value >= size:
+            return f"{value / size:.3g} {unit}"
+    return f"{value / 1e-9:.3g} ns"
+
+
+def power(value):
+    """A number with two figures and a power of ten: 3.1e-07 -> 3.1 × 10⁻⁷, 1e-06 -> 10⁻⁶."""
+    factor, exponent = f"{value:.1e}".split("e")
+    raised = str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    factor = factor.replace(".0", "")
+    return f"10{raised}" if factor == "1" else f"{factor} × 10{raised}"
+
+
+def write_gif(path, images, milliseconds, colours=64, samples=8):
+    """Write RGB images as a GIF with one palette, made from some of them, evenly over the whole.
+
+    milliseconds: a frame. Raises InputError when the file cannot be written.
+    """
+    width, height = images[0].size
+    picked = np.linspace(0, len(images) - 1, samples).round().astype(int)
+    sheet = Image.new("RGB", (width, samples * height))
+    for row, index in enumerate(picked):
+        sheet.paste(images[index], (0, row * height))
+    # Median cut counts pixels, and nearly all are white: the octree keeps rare colours.
+    palette = sheet.quantize(colours, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+    reduced = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
+    options = {"append_images": reduced[1:], "duration": milliseconds, "loop": 0}
+    write_whole(path, lambda name: reduced[0].save(name, format="GIF", save_all=True, **options))

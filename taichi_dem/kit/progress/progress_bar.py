@@ -1,0 +1,187 @@
+"""A progress bar where somebody watches: on a terminal and in Jupyter; silent elsewhere."""
+
+import contextlib
+import html
+import os
+import sys
+import time
+
+from taichi_dem.kit.display import in_brief
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.progress.progress import Counted, Pace, Progress, listening
+from taichi_dem.kit.validation import AUTO, instance, progress_option, shown
+
+#: Least time between two updates of a cell in Jupyter [s].
+_NOTEBOOK_SECONDS = 0.2
+#: Columns of a terminal below which there is no room for the bar beside its words.
+_NARROW = 70
+#: Bars that are shown now; a second one below the first would garble both.
+_open_bars = []
+
+
+class ProgressBar:
+    """A bar with percent, time left and speed, from entering to leaving its block.
+
+    It is drawn on stderr where that is a terminal, and in the cell of a Jupyter notebook; it leaves
+    nothing behind. Call it with a Progress; while kernels are compiled in its block it says so by
+    itself. title: what is being done.
+    """
+
+    def __init__(self, title):
+        self.title = instance("title", title, str)
+        self._opened = contextlib.ExitStack()
+        self._started, self._display = time.perf_counter(), _Nothing()
+
+    def __repr__(self):
+        return in_brief(self, self.title)
+
+    def __enter__(self):
+        if self in _open_bars:
+            raise InputError(f"the progress bar {self.title!r} is shown already")
+        self._started = time.perf_counter()
+        self._display = _Nothing() if _open_bars else _display_for(self.title)
+        _open_bars.append(self)
+        self._opened.enter_context(listening(self))
+        return self
+
+    def __call__(self, progress):
+        """Show a Progress. Raises TypeError for anything else, watched or not."""
+        if not isinstance(progress, Progress):
+            raise TypeError(f"a progress bar takes a Progress, got {shown(progress)}")
+        self._display.show(progress)
+
+    def at(self, share):
+        """Show a share in [0, 1] of a job that knows no more of itself."""
+        self(Progress(share, time.perf_counter() - self._started))
+
+    def count(self, done, total):
+        """Show how many runs are done of a job that consists of several."""
+        self(Counted(done / max(1, total), time.perf_counter() - self._started, done, total))
+
+    def __exit__(self, *error):
+        self._opened.close()
+        _open_bars.remove(self)
+        self._display.close()
+        self._display = _Nothing()
+
+
+@contextlib.contextmanager
+def reporting(progress, title):
+    """What a job is to report its Progress to, given its argument ``progress``; None for nobody.
+
+    "auto" gives a bar where somebody watches. A function is also told of compiling.
+    """
+    if progress_option("progress", progress) is None:
+        yield None
+    elif progress == AUTO:
+        with ProgressBar(title) as bar:
+            yield bar
+    else:
+        with listening(progress):
+            yield progress
+
+
+class _Nothing:
+    """Nobody watches."""
+
+    def show(self, progress):
+        """Do nothing."""
+
+    def close(self):
+        """Do nothing."""
+
+
+class _Terminal:
+    """A bar on a terminal, by rich."""
+
+    def __init__(self, title):
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn
+
+        console = Console(stderr=True)
+        # A title is no markup; dots of Braille are not in every encoding.
+        texts = [
+            TextColumn(f"{{task.{field}}}", markup=False)
+            for field in ("description", "fields[words]")
+        ]
+        spinner = SpinnerColumn("dots" if console.encoding.startswith("utf") else "line")
+        self._narrow = console.width < _NARROW
+        bars = () if self._narrow else (BarColumn(None),)
+        # The bar takes what the words leave of a line. Prints go where they would go without it.
+        self._bar = Progress(
+            *(spinner, texts[0], *bars, texts[1]),
+            console=console,
+            transient=True,
+            expand=not self._narrow,
+            redirect_stdout=sys.stdout is not None and sys.stdout.isatty(),
+        )
+        self._task = self._bar.add_task(title, total=1.0, words="")
+        self._bar.start()
+
+    def show(self, progress):
+        """Draw how far the job is, and what it says of itself."""
+        # Rich's own thread redraws ten times a second, but not while Taichi compiles a kernel.
+        at_once = progress.phase == "compiling"
+        words = str(progress).split(", ")
+        words = ", ".join(words[:2] if self._narrow else words)
+        self._bar.update(self._task, completed=progress.share, words=words, refresh=at_once)
+
+    def close(self):
+        """Remove the bar."""
+        self._bar.stop()
+
+
+class _PlainTerminal:
+    """Lines on a terminal that cannot move its cursor: parts of compiling, tenths of the run."""
+
+    def __init__(self, title):
+        self._title, self._said = title, None
+
+    def show(self, progress):
+        """Write a line where there is something new."""
+        steps = 100 if progress.phase == "compiling" else 10
+        now = progress.phase, int(steps * progress.share)
+        if now != self._said:
+            self._said = now
+            print(f"{self._title}: {progress}", file=sys.stderr, flush=True)
+
+    def close(self):
+        """Leave what was written."""
+
+
+class _Notebook:
+    """A bar below the cell of a Jupyter notebook that is running."""
+
+    def __init__(self, title, display):
+        self._title, self._pace = title, Pace(_NOTEBOOK_SECONDS)
+        self._handle = display(self._drawn(0.0, ""), raw=True, display_id=True)
+
+    def _drawn(self, share, words):
+        bar = f'<progress value="{share:.3f}" max="1"></progress>'
+        marked = f"{html.escape(self._title)} {bar} {html.escape(words)}"
+        return {"text/plain": f"{self._title}: {words}", "text/html": marked}
+
+    def show(self, progress):
+        """Draw how far the job is, and what it says of itself."""
+        if self._pace.should_report(progress.phase == "compiling"):
+            self._handle.update(self._drawn(progress.share, str(progress)), raw=True)
+
+    def close(self):
+        """Empty the place of the bar."""
+        self._handle.update({"text/plain": "", "text/html": ""}, raw=True)
+
+
+def _display_for(title):
+    shell = _notebook_shell()
+    if shell is not None:
+        return _Notebook(title, sys.modules["IPython"].display.display)
+    if sys.stderr is None or not sys.stderr.isatty():
+        return _Nothing()
+    return _PlainTerminal(title) if os.environ.get("TERM") == "dumb" else _Terminal(title)
+
+
+def _notebook_shell():
+    """The shell of a Jupyter kernel that this process is, or None."""
+    python = sys.modules.get("IPython")
+    shell = python.get_ipython() if python is not None else None
+    return shell if shell is not None and hasattr(shell, "kernel") else None

@@ -1,0 +1,141 @@
+"""Runs that save themselves: what a run consists of, when it is saved, how one goes on from it."""
+
+import os
+
+from taichi_dem.kit.checkpoint import (
+    Checkpoint,
+    CtrlC,
+    Interrupted,
+    SaveTimer,
+    read_checkpoint,
+    write_checkpoint,
+)
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.field_memory import FieldMemory
+from taichi_dem.kit.files import output_folder
+
+
+class RunSnapshot:
+    """All of a run that changes: the fields on the device and what its owners hold beside them.
+
+    identity: what two runs must share for one to go on from the other, words by name. root: of
+    which all fields are taken. owners: by name, objects with ``saved()``, which gives arrays by
+    name, and ``resume(arrays)``, which takes them over.
+    """
+
+    def __init__(self, identity, root, owners):
+        self.identity, self.memory, self.owners = identity, FieldMemory(root), owners
+
+    def write(self, path):
+        """Save the run as it is, between two steps. Raises InputError."""
+        arrays = {f"field/{name}": array for name, array in self.memory.read().items()}
+        for part, owner in self.owners.items():
+            arrays.update({f"{part}/{name}": array for name, array in owner.saved().items()})
+        write_checkpoint(path, self.identity, arrays)
+
+    def restore(self, arrays, path):
+        """Put the run where it was saved, with the arrays that ``opened`` gave for a path.
+
+        Raises InputError where the fields are not those of this run.
+        """
+        missing = self.memory.misfit(_under("field", arrays))
+        if missing:
+            raise InputError(f"checkpoint {path} is of another version: field {missing} differs")
+        self.memory.write(_under("field", arrays))
+        for part, owner in self.owners.items():
+            try:
+                owner.resume(_under(part, arrays))
+            except (KeyError, IndexError, ValueError, TypeError):
+                raise InputError(
+                    f"checkpoint {path} is of another version: what it holds of the {part} differs"
+                ) from None
+
+
+def _under(part, arrays):
+    return {k[len(part) + 1 :]: array for k, array in arrays.items() if k.startswith(f"{part}/")}
+
+
+class CheckpointWriter:
+    """Saves a run when its checkpoint asks for it, and on Ctrl-C; its block listens for that.
+
+    checkpoint: a Checkpoint. snapshot: of the run, a ``RunSnapshot``. now: gives its present step
+    and time [s]. All methods are called between two steps only.
+    """
+
+    def __init__(self, checkpoint, snapshot, now):
+        self.checkpoint, self.snapshot, self.now = checkpoint, snapshot, now
+        self.timer, self.ctrl_c, self.saved_s = SaveTimer(checkpoint), CtrlC(), None
+        self.timer.saved_at(*now())
+
+    def __enter__(self):
+        self.ctrl_c.__enter__()
+        return self
+
+    def __exit__(self, *error):
+        self.ctrl_c.__exit__(*error)
+
+    def marks(self, last, dt):
+        """Steps of dt [s] up to the last at which to look, a set."""
+        return self.checkpoint.marks(last, dt)
+
+    def save_if_needed(self):
+        """Save the run if that is due. Raises Interrupted after Ctrl-C, InputError."""
+        step, time_s = self.now()
+        if self.ctrl_c.asked or self.timer.now(step, time_s):
+            self.save()
+        if self.ctrl_c.asked:
+            raise Interrupted(time_s, self.checkpoint.path)
+
+    def save(self):
+        """Save the run. Raises InputError that tells what the last good checkpoint is."""
+        try:
+            self.snapshot.write(self.checkpoint.path)
+        except InputError as error:
+            raise InputError(f"{error}{self.last_good()}") from None
+        step, self.saved_s = self.now()
+        self.timer.saved_at(step, self.saved_s)
+
+    def last_good(self):
+        """What is left to go on from, as the end of a sentence."""
+        if self.saved_s is None:
+            return "; this run has saved no checkpoint before"
+        path = os.fspath(self.checkpoint.path)
+        return f"; checkpoint {path} holds the run at t = {self.saved_s:.6g} s"
+
+
+class NoCheckpointWriter:
+    """Stands where a run is not to be saved."""
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        """Nothing to end."""
+
+    def marks(self, last, dt):
+        """None."""
+        return set()
+
+    def save_if_needed(self):
+        """Nothing to do."""
+
+    def save(self):
+        """Nothing to save."""
+
+    def last_good(self):
+        """No words."""
+        return ""
+
+
+def opened(checkpoint, resume, identity):
+    """Look, before anything dear is done, whether a run can be saved and gone on with.
+
+    checkpoint: a Checkpoint or None. resume: file to go on from, or None. identity: gives that of
+    the run. Returns the arrays of the file, None without. Raises InputError.
+    """
+    if checkpoint is not None and not isinstance(checkpoint, Checkpoint):
+        raise InputError(f"checkpoint must be a Checkpoint or None, got {checkpoint!r}")
+    arrays = None if resume is None else read_checkpoint(resume, identity())
+    if checkpoint is not None:
+        output_folder(os.path.dirname(os.path.abspath(checkpoint.path)))
+    return arrays

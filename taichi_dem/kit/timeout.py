@@ -1,0 +1,38 @@
+"""Run a function with a time limit, for third-party code that may never return."""
+
+import ctypes
+import threading
+
+from taichi_dem.kit.errors import InputError
+
+
+class _Ended(Exception):
+    """Raised in a thread that has run for too long."""
+
+
+def run_with_timeout(seconds, call, sentence):
+    """What call() returns or raises; InputError with a sentence where it takes longer [s].
+
+    It runs in a thread of its own, which is ended then: code that spins in Python ends at once,
+    other code when it comes back to Python.
+    """
+    outcome = {}
+
+    def work():
+        """Keep what comes out; SystemExit too, as some readers end a program."""
+        try:
+            outcome["value"] = call()
+        except (Exception, SystemExit) as error:
+            outcome["error"] = error
+
+    thread = threading.Thread(target=work, daemon=True)
+    thread.start()
+    thread.join(seconds)
+    if thread.is_alive():
+        ctypes.pythonapi.PyThreadState_SetAsyncExc(
+            ctypes.c_ulong(thread.ident), ctypes.py_object(_Ended)
+        )
+        raise InputError(sentence)
+    if "error" in outcome:
+        raise outcome["error"]
+    return outcome["value"]

@@ -1,0 +1,163 @@
+"""Checks of what a user gives: the value comes back, or InputError names it and what is allowed."""
+
+import math
+import numbers
+import os
+
+from taichi_dem.kit.errors import InputError
+
+#: Positive numbers lie between these, so that products of a few of them stay finite: beyond, one
+#: overflows to infinity or falls to zero, and a run ends in NaN without a reason. In SI units
+#: nothing that there is comes near.
+SMALLEST, LARGEST = 1e-60, 1e60
+#: Value of an argument ``progress`` that asks for a bar where somebody watches.
+AUTO = "auto"
+#: Letters of a value that a sentence quotes.
+_QUOTED = 80
+
+
+def shown(value):
+    """A value as a sentence quotes it: on one line, and cut where it is long."""
+    try:
+        text = " ".join(repr(value).split())
+    except ValueError:
+        # Python prints no whole number of more than 4300 digits.
+        text = f"a whole number of {value.bit_length()} bits"
+    return text if len(text) <= _QUOTED else f"{text[: _QUOTED - 3]}..."
+
+
+def finite(value):
+    """Whether a value is a real number, no truth value, and finite as a float."""
+    if not isinstance(value, numbers.Real) or isinstance(value, bool):
+        return False
+    try:
+        return math.isfinite(float(value))
+    except OverflowError:
+        return False
+
+
+def positive(name, value, zero_allowed=False):
+    """The value as a float; InputError unless it is a finite number above (or at) zero.
+
+    It must lie between SMALLEST and LARGEST, where products of a few numbers stay finite.
+    """
+    if not finite(value) or value < 0.0 or (value == 0.0 and not zero_allowed):
+        limit = "zero or a positive" if zero_allowed else "a positive"
+        raise InputError(f"{name} must be {limit} finite number, got {shown(value)}")
+    if value != 0.0 and not SMALLEST <= value <= LARGEST:
+        zero = "zero or " if zero_allowed else ""
+        raise InputError(
+            f"{name} must be {zero}a number from {SMALLEST:g} to {LARGEST:g}, got {shown(value)}"
+        )
+    return float(value)
+
+
+def between(name, value, least, most):
+    """The value as a float; InputError unless it is a number from least to most."""
+    if not finite(value) or not least <= value <= most:
+        raise InputError(f"{name} must be a number from {least:g} to {most:g}, got {shown(value)}")
+    return float(value)
+
+
+def fraction(name, value):
+    """The value as a float; InputError unless it lies in [0, 1]."""
+    if not finite(value) or not 0.0 <= value <= 1.0:
+        raise InputError(f"{name} must lie in [0, 1], got {shown(value)}")
+    return float(value)
+
+
+def whole(name, value, least, most):
+    """The value as an int; InputError unless it is a whole number from least to most."""
+    integral = isinstance(value, numbers.Integral) and not isinstance(value, bool)
+    if not integral or not least <= value <= most:
+        raise InputError(
+            f"{name} must be a whole number from {least} to {most}, got {shown(value)}"
+        )
+    return int(value)
+
+
+def flag(name, value):
+    """The value; InputError unless it is True or False."""
+    if not isinstance(value, bool):
+        raise InputError(f"{name} must be True or False, got {shown(value)}")
+    return value
+
+
+def choice(name, value, allowed):
+    """The value; InputError unless it is one of the words allowed."""
+    if not isinstance(value, str) or value not in tuple(allowed):
+        raise InputError(f"{name} must be one of {', '.join(allowed)}, got {shown(value)}")
+    return value
+
+
+def choices(name, values, allowed):
+    """Words as a tuple; InputError unless they are a list or tuple of words allowed."""
+    several = isinstance(values, (list, tuple))
+    if not several or not all(isinstance(v, str) and v in tuple(allowed) for v in values):
+        raise InputError(f"{name} must be a tuple out of {', '.join(allowed)}, got {shown(values)}")
+    return tuple(values)
+
+
+def word(name, value):
+    """The value; InputError unless it is text that a mesh file can hold as a name."""
+    if not isinstance(value, str) or not value or not value.isprintable() or '"' in value:
+        raise InputError(
+            f'{name} must be text on one line, without ", of one letter at least, '
+            f"got {shown(value)}"
+        )
+    return value
+
+
+def instance(name, value, kind):
+    """The value; InputError unless it is an object of a class, or of one of several."""
+    kinds = kind if isinstance(kind, tuple) else (kind,)
+    if not isinstance(value, kinds):
+        names = " or ".join(one.__name__ for one in kinds)
+        article = "an" if names[0] in "AEIOU" else "a"
+        raise InputError(f"{name} must be {article} {names}, got {shown(value)}")
+    return value
+
+
+def progress_option(name, value):
+    """The value; InputError unless it is a function, "auto" (a bar where watched) or None."""
+    if value is None or callable(value) or (isinstance(value, str) and value == AUTO):
+        return value
+    raise InputError(f'{name} must be a function, "{AUTO}" or None, got {shown(value)}')
+
+
+def path_name(name, value):
+    """The value as text, a leading "~" as the user's home.
+
+    InputError unless it can be the name of a file or folder.
+    """
+    text = os.fspath(value) if isinstance(value, (str, os.PathLike)) else ""
+    if not isinstance(text, str) or not text or "\0" in text:
+        raise InputError(f"{name} must be the name of a file, got {shown(value)}")
+    return os.path.expanduser(text)
+
+
+def several(name, values, check):
+    """One value or a sequence as a tuple, each of them passed through check(name, value).
+
+    InputError for an empty sequence, or for what check refuses.
+    """
+    one = isinstance(values, (str, bytes, dict)) or not hasattr(values, "__iter__")
+    if one or getattr(values, "ndim", 1) == 0:
+        values = (values,)
+    checked = tuple(check(name, value) for value in values)
+    if not checked:
+        raise InputError(f"{name} must hold at least one value, got none")
+    return checked
+
+
+def direction(name, value):
+    """Three finite numbers as a tuple of floats; InputError otherwise."""
+    try:
+        three = tuple(value)
+    except TypeError:
+        three = ()
+    if len(three) != 3 or not all(finite(x) and abs(x) <= LARGEST for x in three):
+        raise InputError(
+            f"{name} must be three finite numbers, none above {LARGEST:g}, got {shown(value)}"
+        )
+    return tuple(float(x) for x in three)

@@ -1,0 +1,92 @@
+"""Where the contact spheres of a face sit and how large they are (NumPy only).
+
+Konno et al., section 2.2 and Fig. 5: the lines that divide the edges of a face into n equal parts
+cross inside it; a sphere touches the face from inside at each crossing.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from taichi_dem.kit.display import by_fields
+from taichi_dem.mesh.tetrahedra import all_faces, area_vectors
+
+#: Steps towards the centre of a small ball around spheres, and what stands for no distance [m].
+_CENTRINGS, _SMALL = 10, 1e-300
+
+
+@dataclass(frozen=True, eq=False)
+class ContactSpheres:
+    """Spheres of every face of every body, in body frames (world axes, origin at the centre).
+
+    centre: (body_count, 4, sphere_count, 3) [m]. radius: (body_count, 4, sphere_count) [m].
+    cluster: (body_count, 4, 4): centre and radius of a ball around the spheres of a face [m].
+    extent: (body_count,), radius of the ball around all spheres of a body [m]; little more than
+    half that of its corners, where a sphere has no room.
+    """
+
+    centre: np.ndarray
+    radius: np.ndarray
+    cluster: np.ndarray
+    extent: np.ndarray
+
+    def __repr__(self):
+        return by_fields(self)
+
+    @property
+    def per_face(self):
+        """Number of spheres on a face."""
+        return self.radius.shape[2]
+
+
+def interior_crossings(divisions):
+    """Barycentric coordinates (k, 3) of the interior crossings for edges cut in n equal parts."""
+    n = divisions
+    rows = [(a, b, n - a - b) for a in range(1, n) for b in range(1, n - a)]
+    return np.array(rows, dtype=float) / n
+
+
+def spheres_of_faces(mesh, centre, divisions=5):
+    """Spheres tangent to their own face and as large as the other three faces allow.
+
+    centre: centres of the bodies (body_count, 3) [m]. The radius is the smallest of
+    d_g / (1 - m_f . m_g) over the other faces g, with d_g the distance of the touching point from
+    face g and m the inward unit normals (spec, section 2).
+    """
+    faces = all_faces(mesh.tetrahedra).reshape(-1, 4, 3)
+    corners = mesh.points[faces] - centre[:, None, None, :]
+    inward = -area_vectors(mesh.points, faces.reshape(-1, 3)).reshape(-1, 4, 3)
+    inward /= np.linalg.norm(inward, axis=-1, keepdims=True)
+    touch = np.einsum("ka,nfax->nfkx", interior_crossings(divisions), corners)
+    height = np.einsum("nfkx,ngx->nfkg", touch, inward)
+    height -= np.einsum("ngx,ngx->ng", corners[:, :, 0], inward)[:, None, None, :]
+    slope = 1.0 - np.einsum("nfx,ngx->nfg", inward, inward)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        allowed = height / slope[:, :, None, :]
+    allowed[:, np.arange(4), :, np.arange(4)] = np.inf
+    radius = allowed.min(axis=-1)
+    middle = touch + radius[..., None] * inward[:, :, None, :]
+    extent = (np.linalg.norm(middle, axis=-1) + radius).max(axis=(1, 2))
+    return ContactSpheres(middle, radius, _clusters(middle, radius), extent)
+
+
+def _clusters(middle, radius):
+    """Small balls around the spheres of each face: centre and radius, (body_count, 4, 4).
+
+    A centre goes towards the farthest point of its spheres, by ever smaller shares of the way: ten
+    times take off 7 % of the radius on average, a thousand 9 % (Badoiu and Clarkson 2003).
+    """
+    centre = middle.mean(axis=2)
+    for k in range(_CENTRINGS):
+        away, reach = _reach(middle, radius, centre)
+        far = reach.argmax(axis=2)[..., None]
+        towards = np.take_along_axis(away, far[..., None], axis=2)[:, :, 0]
+        towards /= np.maximum(np.linalg.norm(towards, axis=-1, keepdims=True), _SMALL)
+        centre = centre + towards * reach.max(axis=2)[..., None] / (k + 2)
+    reach = _reach(middle, radius, centre)[1].max(axis=2)
+    return np.concatenate([centre, reach[..., None]], axis=-1)
+
+
+def _reach(middle, radius, centre):
+    away = middle - centre[:, :, None]
+    return away, np.linalg.norm(away, axis=-1) + radius

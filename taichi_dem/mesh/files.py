@@ -1,0 +1,247 @@
+"""Mesh files: read all that meshio can, write Gmsh, VTU and PVD; the only importer of meshio."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import warnings
+from collections import defaultdict
+from dataclasses import replace
+from xml.sax.saxutils import quoteattr
+
+import meshio
+import numpy as np
+
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.files import renamed_when_done, write_text
+from taichi_dem.kit.timeout import run_with_timeout
+from taichi_dem.kit.validation import path_name, positive
+from taichi_dem.mesh.content import (
+    cells_counted,
+    cells_dropped,
+    is_quadrangle,
+    is_solid,
+    is_tetrahedron,
+    is_triangle,
+    others_dropped,
+    parts_dropped,
+    reason_of,
+    refuse_uncut,
+    refuse_without_tetrahedra,
+    surfaces_of_abaqus,
+    unread_groups,
+)
+from taichi_dem.mesh.mesh import Mesh, checked_mesh, welded_numbers
+from taichi_dem.mesh.parts_in_files import unbonded_places
+from taichi_dem.mesh.split import folded_or_flat, shape_of, tetrahedra_in, triangles_in
+
+#: Time that a reader may take [s], and what it reads at the slowest [byte/s]: some of meshio's wait
+#: for ever for the rest of a file that was cut off.
+_PATIENCE_S = 20.0
+_SLOWEST_BYTES_PER_S = 1e5
+
+
+def read_mesh(path, *, scale=1.0, weld_tolerance=0.0) -> Mesh:
+    """Read solid cells and named face groups from a file (Gmsh 2.2 or 4.1, VTK, VTU, ...).
+
+    scale: length of one unit of the file [m], e.g. 0.001 for a drawing in mm.
+    weld_tolerance: points not farther apart [m] become one; 0 welds nothing.
+    Groups come from Gmsh's physical surfaces ("physical_TAG" where they have no name); in other
+    formats from integer data on triangles, as "data name_value".
+    Elements of higher order are read as linear ones; hexahedra, prisms and pyramids are cut into
+    tetrahedra after welding; groups of points, lines and volumes are not read: the mesh's notes
+    say so. A UserWarning tells of what may change results: parts of other materials, Abaqus sets
+    and surfaces that are not read, cells of types that meshio does not know, and cells that meet
+    but share no face.
+
+    Raises InputError, in one sentence, for a file that is missing, cannot be read, holds no solid
+    cells or such as cannot be cut, or whose mesh ``checked_mesh`` refuses.
+    """
+    scale, path = positive("scale", scale), path_name("path", path)
+    raw, printed = _read_raw(path)
+    refuse_uncut(raw, path)
+    if not any(is_solid(block.type) and len(block.data) for block in raw.cells):
+        refuse_without_tetrahedra(raw, path, printed)
+    unread = (*unread_groups(raw), *surfaces_of_abaqus(path))
+    try:
+        mesh = _mesh(raw, scale, weld_tolerance)
+    except InputError as error:
+        cells = _cell_at_fault(raw) if "tetrahedra " in str(error) else ""
+        raise InputError(f"mesh file {path}: {error}{cells}") from None
+    told = [cells_dropped(printed), *parts_dropped(raw, unread)]
+    told.append(unbonded_places(mesh.points, mesh.tetrahedra))
+    told = [sentence for sentence in told if sentence]
+    for sentence in told:
+        warnings.warn(f"mesh file {path}: {sentence}", stacklevel=2)
+    notes = (*others_dropped(raw, unread), *told, *mesh.notes)
+    return replace(mesh, notes=notes, source=path, unread=unread)
+
+
+def write_mesh(path, mesh) -> None:
+    """Write a mesh with its named groups as a Gmsh 2.2 text file (exact: 17 digits)."""
+    names = list(mesh.groups)
+    lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$PhysicalNames", str(len(names) + 1)]
+    lines += [f'2 {tag} "{name}"' for tag, name in enumerate(names, start=1)]
+    lines += [f'3 {len(names) + 1} "bodies"', "$EndPhysicalNames", "$Nodes", str(len(mesh.points))]
+    lines += [f"{k} {x:.17g} {y:.17g} {z:.17g}" for k, (x, y, z) in enumerate(mesh.points, 1)]
+    elements = [(2, tag, face) for tag, name in enumerate(names, 1) for face in mesh.groups[name]]
+    elements += [(4, len(names) + 1, corners) for corners in mesh.tetrahedra]
+    lines += ["$EndNodes", "$Elements", str(len(elements))]
+    for number, (kind, tag, corners) in enumerate(elements, start=1):
+        lines.append(f"{number} {kind} 2 {tag} {tag} " + " ".join(str(c + 1) for c in corners))
+    write_text(path, "\n".join([*lines, "$EndElements", ""]))
+
+
+def write_vtu(path, points, tetrahedra, point_data=None, cell_data=None) -> None:
+    """Write tetrahedra with data as a compressed VTU file, for ParaView.
+
+    point_data: name -> (point_count, ...).  cell_data: name -> (body_count, ...).
+    """
+    cell_data = {name: [np.asarray(values)] for name, values in (cell_data or {}).items()}
+    content = meshio.Mesh(points, [("tetra", tetrahedra)], point_data or {}, cell_data)
+    with renamed_when_done(path) as temporary:
+        meshio.write(temporary, content, file_format="vtu", compression="zlib")
+
+
+def write_pvd(path, times_s, file_names) -> None:
+    """Write the list of VTU files of a time series, which ParaView opens as one.
+
+    times_s: time of each file [s].  file_names: relative to the folder of ``path``.
+    """
+    if len(times_s) != len(file_names):
+        raise InputError(f"{path}: {len(times_s)} times, but {len(file_names)} file names")
+    sets = [
+        f'    <DataSet timestep="{time!r}" part="0" file={quoteattr(str(name))}/>'
+        for time, name in zip(map(float, times_s), file_names)
+    ]
+    head = '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">'
+    lines = ['<?xml version="1.0"?>', head, "  <Collection>", *sets, "  </Collection>"]
+    write_text(path, "\n".join([*lines, "</VTKFile>", ""]))
+
+
+def _read_raw(path):
+    """The file as meshio sees it, and what meshio printed.
+
+    Whatever goes wrong inside becomes one InputError.
+    """
+    if not os.path.isfile(path):
+        problem = "is no file" if os.path.lexists(path) else "does not exist"
+        problem = "is a folder" if os.path.isdir(path) else problem
+        raise InputError(f"mesh file {path} {problem}")
+    said = io.StringIO()
+    seconds = _PATIENCE_S + os.path.getsize(path) / _SLOWEST_BYTES_PER_S
+    sentence = f"its reader found no end in {seconds:.3g} s, as in a file that was cut off"
+    try:
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+            return run_with_timeout(seconds, lambda: _meshio_read(path), sentence), said.getvalue()
+    except (Exception, SystemExit) as error:  # meshio raises anything, and exits on some files
+        reason = reason_of(error, said.getvalue())
+        raise InputError(f"mesh file {path} cannot be read: {reason}") from None
+
+
+def _meshio_read(path):
+    with np.errstate(over="ignore"):  # an STL's text, tried as if it were binary
+        return meshio.read(path)
+
+
+def _mesh(raw, scale, weld_tolerance):
+    """The mesh of a file's cells, cut once their points are welded; raw gets the welded numbers."""
+    notes, welding = [], []
+    with np.errstate(over="ignore"):  # checked_mesh refuses what is no finite number
+        points = scale * np.asarray(raw.points, dtype=np.float64)
+    tetrahedra = _tetrahedra(raw, notes)
+    label = welded_numbers(points, tetrahedra, weld_tolerance, welding)
+    if welding:
+        _renumber(raw, label)
+        notes.clear()
+        tetrahedra = _tetrahedra(raw, notes)
+    mesh = checked_mesh(points, tetrahedra, _groups(raw))
+    return replace(mesh, notes=(*notes, *welding, *mesh.notes))
+
+
+def _renumber(raw, label):
+    """Give the solid cells and faces other point numbers, label (n,) by the old ones.
+
+    Numbers of no point stay, to be refused later.
+    """
+    for block in raw.cells:
+        if len(block.data) and (is_solid(block.type) or _is_face(block.type)):
+            data = np.asarray(block.data)
+            known = (data >= 0) & (data < len(label))
+            block.data = np.where(known, label[np.where(known, data, 0)], data)
+
+
+def _cell_at_fault(raw):
+    """What an error means for the file's cells, where some have been cut; else ""."""
+    cut = [block for block in raw.cells if len(block.data) and shape_of(block.type)]
+    finite = np.isfinite(raw.points).all() and np.shape(raw.points)[1:] == (3,)
+    for block in cut if finite else ():
+        if (block.data >= 0).all() and (block.data < len(raw.points)).all():
+            sentence = folded_or_flat(raw.points, block.type, block.data)
+            if sentence:
+                return f"; these are tetrahedra that cells were cut into: {sentence}"
+    return "; tetrahedra are numbered after cells have been cut" if cut else ""
+
+
+def _tetrahedra(raw, notes):
+    """Corner points of all tetrahedra, (n, 4), those that other cells are cut into last."""
+    found, cut = [np.empty((0, 4), dtype=np.int64)], []
+    for block in (block for block in raw.cells if len(block.data)):
+        if is_tetrahedron(block.type):
+            found.append(block.data[:, :4])
+            if block.data.shape[1] > 4:
+                order = "second" if block.data.shape[1] == 10 else "higher"
+                notes.append(
+                    f"read {len(block.data)} {order}-order elements as linear {block.type}"
+                )
+        elif shape_of(block.type):
+            cut.append(tetrahedra_in(raw.points, block.type, block.data))
+            cells = cells_counted(len(block.data), block.type)
+            notes.append(f"cut {cells} into {len(cut[-1])} tetrahedra")
+    return np.vstack([*found, *cut])
+
+
+def _groups(raw):
+    """Named groups of triangles, name -> (n, 3)."""
+    found = defaultdict(list)
+    if "gmsh:physical" in raw.cell_data:
+        names = {tag: name for name, (tag, dim) in raw.field_data.items() if dim == 2}
+        for faces, value in _labelled(raw, raw.cell_data["gmsh:physical"]):
+            if value > 0:  # 0: in no physical group
+                found[names.get(value, f"physical_{value}")].append(faces)
+        # A surface in two groups: Gmsh 4.1 keeps one number a face, but the sets know of both.
+        found.update(_sets(raw, names.values()))
+    else:
+        for key in raw.cell_data:
+            if not key.startswith("gmsh:"):  # numbers of drawn entities, no choice of the user
+                for faces, value in _labelled(raw, raw.cell_data[key]):
+                    found[f"{key}_{value}"].append(faces)
+    return {name: np.vstack(faces) for name, faces in found.items()}
+
+
+def _labelled(raw, data):
+    """Triangles that carry one integer value, as (faces (n, 3), value), for every value."""
+    for block, values in zip(raw.cells, map(np.asarray, data)):
+        if _is_face(block.type) and values.ndim == 1 and values.dtype.kind in "iu":
+            for value in np.unique(values):
+                yield _corners(block, values == value), value
+
+
+def _sets(raw, names):
+    """Triangles of meshio's cell sets of the given names, name -> list of (n, 3)."""
+    found = defaultdict(list)
+    for name in names:
+        for block, members in zip(raw.cells, raw.cell_sets.get(name, ())):
+            if _is_face(block.type) and members is not None and len(members):
+                found[name].append(_corners(block, members))
+    return found
+
+
+def _is_face(kind):
+    return is_triangle(kind) or is_quadrangle(kind)
+
+
+def _corners(block, members):
+    """Triangles of some faces of a block, (n, 3); quadrangles as ``tetrahedra_in`` cuts them."""
+    return triangles_in(block.data[members, : 3 if is_triangle(block.type) else 4])

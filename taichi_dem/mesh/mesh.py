@@ -1,0 +1,295 @@
+"""Mesh of tetrahedra with named groups of outer faces, checked once at the border.
+
+x points to the right, y up, z towards the viewer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from taichi_dem.kit.display import counted, in_brief
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import shown, word
+from taichi_dem.mesh import tetrahedra as geometry
+from taichi_dem.mesh.parts_in_files import parts_of
+from taichi_dem.mesh.weld import COINCIDENT, weld_labels
+
+#: Below this share of (longest edge)^3 a volume counts as zero: what round-off leaves of it.
+FLAT = 1e-12
+
+#: The extent of a mesh lies between these [m]: a moment of inertia is its fifth power.
+_LEAST_EXTENT, _MOST_EXTENT = 1e-30, 1e30
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Tetrahedra and named groups of outer faces; build it with ``checked_mesh``.
+
+    points: (point_count, 3) float64 [m].
+    tetrahedra: (body_count, 4) int32 point indices, all of positive volume.
+    groups: name -> (n, 3) int32 point indices of outer faces, normals outward.
+    notes: sentences about what the checks mended or found remarkable.
+    source: name of the file, "" for a mesh built in memory.
+    unread: groups of the file that are not of faces, pairs of name and what they are of.
+    """
+
+    points: np.ndarray
+    tetrahedra: np.ndarray
+    groups: dict
+    notes: tuple = ()
+    source: str = ""
+    unread: tuple = ()
+
+    def __repr__(self):
+        groups = f"groups {', '.join(self.groups)}" if self.groups else "no groups"
+        bodies, points = counted(self.body_count, "body"), counted(self.point_count, "point")
+        parts = [note for note in self.notes if note.startswith("the mesh has")]
+        notes = f"{counted(len(self.notes), 'note')} (.notes)" if self.notes else ""
+        return in_brief(self, bodies, points, *parts, notes, groups, self.source)
+
+    @property
+    def body_count(self) -> int:
+        """Number of tetrahedra."""
+        return len(self.tetrahedra)
+
+    @property
+    def point_count(self) -> int:
+        """Number of points."""
+        return len(self.points)
+
+    def group_faces(self, name) -> np.ndarray:
+        """Outer faces of the group ``name``, shape (n, 3); InputError when there is none."""
+        if not isinstance(name, str) or name not in self.groups:
+            known = ", ".join(sorted(self.groups)) or "none"
+            kinds = [kind for other, kind in self.unread if other == name]
+            why = f" ({name} is a group of {kinds[0]}: make one of faces)" if kinds else ""
+            raise InputError(f"mesh has no face group {shown(name)}{why}; its groups are: {known}")
+        return self.groups[name]
+
+
+def volumes(mesh) -> np.ndarray:
+    """Volumes of the bodies [m3], shape (body_count,)."""
+    return geometry.signed_volumes(mesh.points, mesh.tetrahedra)
+
+
+def group_area(mesh, name) -> float:
+    """Area of the faces of a group [m2]."""
+    vectors = geometry.area_vectors(mesh.points, mesh.group_faces(name))
+    return float(np.linalg.norm(vectors, axis=1).sum())
+
+
+def checked_mesh(points, tetrahedra, groups, source="", weld_tolerance=0.0) -> Mesh:
+    """Build a Mesh from arrays, mend what can be mended (and say so), refuse the rest.
+
+    points: (n, 3) [m].  tetrahedra: (m, 4) point indices, either orientation.
+    groups: name -> (k, 3) point indices of outer faces, either orientation.
+    weld_tolerance: points not farther apart [m] become one; 0 welds nothing.
+
+    Mended: negative volumes, points without a tetrahedron, faces twice in a group.
+    Raises InputError, with the numbers (counted from 0) of what is wrong.
+    """
+    points = _checked_points(points)
+    tetrahedra = _checked_indices("tetrahedra", tetrahedra, 4, len(points))
+    groups = _checked_groups(groups, len(points))
+    notes = []
+    label = welded_numbers(points, tetrahedra, weld_tolerance, notes)
+    tetrahedra, groups = label[tetrahedra], {name: label[groups[name]] for name in groups}
+    points, tetrahedra, groups = _without_loose_points(points, tetrahedra, groups, notes)
+    _refuse_extent(points)
+    _refuse_coincident(points)
+    tetrahedra = _positive(points, tetrahedra, notes)
+    _refuse_bad_sharing(tetrahedra)
+    groups = _outer_groups(tetrahedra, groups, notes)
+    _note_parts(tetrahedra, notes)
+    return Mesh(points, tetrahedra, groups, tuple(notes), str(source))
+
+
+def welded_numbers(points, tetrahedra, tolerance, notes):
+    """For every point the first of those that become one with it, (n,) int32.
+
+    points, tetrahedra, tolerance: as for ``checked_mesh``, with the same errors. notes: a list to
+    which a sentence is added where points become one.
+    """
+    points = _checked_points(points)
+    tetrahedra = _checked_indices("tetrahedra", tetrahedra, 4, len(points))
+    label = weld_labels(points, tetrahedra, tolerance)
+    count = int(np.sum(label != np.arange(len(points))))
+    if count:
+        notes.append(f"welded {count} points closer than {tolerance:g} m to another")
+    return label.astype(np.int32)
+
+
+def _checked_points(points):
+    """Copy as (n, 3) float64, or InputError."""
+    try:
+        points = np.array(points)
+        points = points.astype(np.float64) if points.dtype.kind in "iuf" else None
+    except (TypeError, ValueError, OverflowError):
+        points = None
+    if points is None:
+        raise InputError("points must be an array of numbers, shape (n, 3)")
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise InputError(f"points must have shape (n, 3), got {points.shape}")
+    bad = np.flatnonzero(~(np.abs(points) <= _MOST_EXTENT).all(axis=1))
+    if len(bad):
+        raise InputError(
+            f"points must be finite, within {_MOST_EXTENT:g} m, but {len(bad)} are not, the first "
+            f"is number {bad[0]}: {points[bad[0]].tolist()}"
+        )
+    return points
+
+
+def _checked_groups(groups, point_count):
+    """Groups as a dict of name to (n, 3) int32, or InputError."""
+    if not isinstance(groups, Mapping):
+        raise InputError(f"groups must be a dict of name to faces, got {shown(groups)}")
+    return {
+        word("name of a group", name): _checked_indices(f"group {name!r}", faces, 3, point_count)
+        for name, faces in groups.items()
+    }
+
+
+def _checked_indices(what, indices, width, point_count):
+    """Copy as (n, width) int32 with all values in range, or InputError."""
+    try:
+        indices = np.asarray(indices)
+    except ValueError:
+        raise InputError(f"{what} must be rows of {width} point numbers each") from None
+    if indices.size == 0:
+        raise InputError(f"{what} must not be empty")
+    if indices.ndim != 2 or indices.shape[1] != width:
+        raise InputError(f"{what} must have shape (n, {width}), got {indices.shape}")
+    if indices.dtype.kind not in "iu":
+        raise InputError(f"{what} must hold integer point numbers, got {indices.dtype}")
+    bad = np.flatnonzero(((indices < 0) | (indices >= point_count)).any(axis=1))
+    if len(bad):
+        raise InputError(
+            f"{what}: point numbers must lie in [0, {point_count - 1}], but row {bad[0]} is "
+            f"{indices[bad[0]].tolist()}"
+        )
+    return indices.astype(np.int32)
+
+
+def _without_loose_points(points, tetrahedra, groups, notes):
+    """Drop the points that no tetrahedron uses; a group's face that uses one gets -1 there."""
+    used = np.unique(tetrahedra)
+    if len(used) < len(points):
+        notes.append(f"dropped {len(points) - len(used)} points that belong to no tetrahedron")
+    new = np.full(len(points), -1, dtype=np.int32)
+    new[used] = np.arange(len(used), dtype=np.int32)
+    return points[used], new[tetrahedra], {name: new[faces] for name, faces in groups.items()}
+
+
+def _refuse_extent(points):
+    """Refuse a mesh so small that its inertia falls to zero."""
+    extent = np.ptp(points, axis=0).max()
+    if extent < _LEAST_EXTENT:
+        raise InputError(f"points must span at least {_LEAST_EXTENT:g} m, got {extent:.3g} m")
+
+
+def _refuse_coincident(points):
+    """Refuse points at one place: bodies that look joined there would not be bonded."""
+    distance = COINCIDENT * np.ptp(points, axis=0).max()
+    pairs = geometry.close_pairs(points, distance) if distance > 0.0 else np.empty((0, 2))
+    if len(pairs):
+        first = points[pairs[0, 0]]
+        raise InputError(
+            f"{len(np.unique(pairs[:, 1]))} points coincide with another, the first at "
+            f"({first[0]:g}, {first[1]:g}, {first[2]:g}) m; pass "
+            f"weld_tolerance={2.0 * distance:.1e} to join them"
+        )
+
+
+def _positive(points, tetrahedra, notes):
+    """Turn negative volumes, refuse flat ones."""
+    volume = geometry.signed_volumes(points, tetrahedra)
+    longest = geometry.edge_lengths(points, tetrahedra).max(axis=1)
+    flat = np.flatnonzero(np.abs(volume) <= FLAT * longest**3)
+    if len(flat):
+        raise InputError(
+            f"{len(flat)} tetrahedra have no volume, the first is number {flat[0]} with "
+            f"{volume[flat[0]]:.3g} m3 (at least {FLAT:g} of its longest edge cubed is needed)"
+        )
+    negative = volume < 0.0
+    if negative.any():
+        notes.append(f"turned {int(negative.sum())} tetrahedra of negative volume")
+        tetrahedra = np.where(negative[:, None], tetrahedra[:, [0, 1, 3, 2]], tetrahedra)
+    return np.ascontiguousarray(tetrahedra, dtype=np.int32)
+
+
+def _refuse_bad_sharing(tetrahedra):
+    """Refuse repeated bodies, faces of three bodies and bodies that lie in each other."""
+    _, number, count = np.unique(
+        np.sort(tetrahedra, axis=1), axis=0, return_inverse=True, return_counts=True
+    )
+    repeated = np.flatnonzero(count[number.reshape(-1)] > 1)
+    if len(repeated):
+        twins = np.flatnonzero(number.reshape(-1) == number.reshape(-1)[repeated[0]])
+        raise InputError(f"tetrahedra {_listed(twins)} have the same four points")
+    face = geometry.face_numbers(geometry.all_faces(tetrahedra))
+    crowded = np.flatnonzero(np.bincount(face) > 2)
+    if len(crowded):
+        owners = np.flatnonzero(face == crowded[0]) // 4
+        raise InputError(
+            f"tetrahedra {_listed(owners)} share one face; at most two may "
+            f"({len(crowded)} such faces)"
+        )
+    _refuse_overlap(tetrahedra)
+
+
+def _refuse_overlap(tetrahedra):
+    """Refuse two bodies on the same side of their shared face."""
+    rows = geometry.shared_faces(tetrahedra)
+    first, second = (geometry.all_faces(tetrahedra)[rows[:, side]] for side in (0, 1))
+    start = np.argmax(second == first[:, :1], axis=1)
+    following = np.take_along_axis(second, ((start + 1) % 3)[:, None], axis=1)[:, 0]
+    bad = np.flatnonzero(following == first[:, 1])
+    if len(bad):
+        raise InputError(
+            f"tetrahedra {_listed(rows[bad[0]] // 4)} lie on the same side of the face they share"
+        )
+
+
+def _outer_groups(tetrahedra, groups, notes):
+    """Groups with their faces in outward order; refuse faces that are no outer face."""
+    faces = geometry.all_faces(tetrahedra)
+    names = list(groups)
+    number = geometry.face_numbers(np.vstack([faces, *(groups[name] for name in names)]))
+    row_of = np.full(number.max() + 1, -1)
+    row_of[number[: len(faces)]] = np.arange(len(faces))
+    row_of[np.bincount(number[: len(faces)], minlength=len(row_of)) != 1] = -1
+    result, start = {}, len(faces)
+    for name in names:
+        rows = row_of[number[start : start + len(groups[name])]]
+        start += len(rows)
+        result[name] = faces[_checked_rows(name, rows, notes)]
+    return result
+
+
+def _checked_rows(name, rows, notes):
+    """Outer faces of one group, each once, in the order of the bodies."""
+    inner = int(np.sum(rows < 0))
+    if inner:
+        raise InputError(
+            f"group {name!r}: {inner} of its {len(rows)} faces are not outer faces of the mesh"
+        )
+    once = np.unique(rows)
+    if len(once) < len(rows):
+        notes.append(f"dropped {len(rows) - len(once)} repeated faces of group {name!r}")
+    return once
+
+
+def _note_parts(tetrahedra, notes):
+    """Say when the bodies are not all joined through shared faces."""
+    parts = len(np.unique(parts_of(tetrahedra)))
+    if parts > 1:
+        notes.append(f"the mesh has {parts} parts that share no face with each other")
+
+
+def _listed(numbers):
+    """Numbers as "3, 5 and 9"."""
+    words = [str(int(k)) for k in numbers]
+    return " and ".join([", ".join(words[:-1]), words[-1]])

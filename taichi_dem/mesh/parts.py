@@ -1,0 +1,85 @@
+"""Parts of a mesh that no bond joins: their bodies, where they are, and whether they may meet.
+
+NumPy only: it is asked before a run, and at recording times.
+"""
+
+import numpy as np
+
+from taichi_dem.mesh.tetrahedra import components, shared_faces
+from taichi_dem.mesh.topology import faces_of_group, topology_of
+
+#: How far a part may come by deforming and breaking, as a share of its longest side. Nobody can
+#: know before the run; so parts count as near each other up to the length of one of them.
+NEARNESS = 0.5
+
+
+def parts_of(mesh):
+    """Number of the part of each body, from 0, (body_count,)."""
+    bonded = shared_faces(mesh.tetrahedra) // 4
+    return np.unique(components(mesh.body_count, bonded), return_inverse=True)[1].reshape(-1)
+
+
+def part_boxes(corners, part):
+    """Boxes around parts: lowest and highest coordinates [m], two arrays (part_count, 3).
+
+    corners: of every body [m], (body_count, 4, 3). part: what ``parts_of`` gave.
+    """
+    order = np.argsort(part, kind="stable")
+    first = np.searchsorted(part[order], np.arange(part.max() + 1))
+    low = np.minimum.reduceat(corners.min(axis=1)[order], first)
+    return low, np.maximum.reduceat(corners.max(axis=1)[order], first)
+
+
+def any_overlap(low, high):
+    """Whether two boxes overlap; touching is not enough.
+
+    Sorted by where they begin along an axis, a box that begins behind the end of another is
+    followed by none that overlaps it; the axis is the one with the fewest candidates.
+    """
+    begun = [np.searchsorted(np.sort(low[:, axis]), high[:, axis]).sum() for axis in range(3)]
+    axis = int(np.argmin(begun))
+    order = np.argsort(low[:, axis], kind="stable")
+    low, high = low[order], high[order]
+    for k in range(1, len(low)):
+        first, later = slice(None, -k), slice(k, None)
+        if not (low[later, axis] < high[first, axis]).any():
+            return False
+        meet = (low[later] < high[first]) & (low[first] < high[later])
+        if meet.all(axis=1).any():
+            return True
+    return False
+
+
+def may_meet(scene, part):
+    """Whether parts of a scene at rest may come to meet, as far as can be known before a run.
+
+    Not where nothing moves them, and not where uniform acceleration is all that does. Else every
+    part may come as far from its box as ``NEARNESS`` says and as its loads and supports may carry
+    it (``Effect.travel``); what all parts have in common carries them side by side, unless it may
+    go anywhere, as gas. part: what ``parts_of`` gave.
+    """
+    drives = [effect for effect in scene.effects if effect.role in ("load", "support")]
+    travels = np.array([effect.travel() for effect in drives]).reshape(-1, 2, 3)
+    anywhere = np.isinf(travels).all(axis=(1, 2))
+    weight_only = not any(hasattr(effect, "group") for effect in drives) and not anywhere.any()
+    if weight_only or not travels.any():
+        return False
+    low, high = part_boxes(scene.mesh.points[scene.mesh.tetrahedra], part)
+    reach = NEARNESS * (high - low).max(axis=1, keepdims=True)
+    low, high = low - reach, high + reach
+    acts = np.array([_parts_under(scene.mesh, effect, part) for effect in drives])
+    alike = (acts == acts[:, :1]).all()
+    for travel, on in zip(travels[anywhere] if alike else travels, acts[anywhere | ~alike]):
+        low[on] += travel[0]
+        high[on] += travel[1]
+    return any_overlap(low, high)
+
+
+def _parts_under(mesh, effect, part):
+    """Whether a load or support acts on each part, (part_count,)."""
+    marks = np.zeros(part.max() + 1, dtype=bool)
+    body = slice(None)
+    if hasattr(effect, "group"):
+        body, _ = faces_of_group(mesh, topology_of(mesh), effect.group)
+    marks[part[body]] = True
+    return marks

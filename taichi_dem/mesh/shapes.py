@@ -1,0 +1,125 @@
+"""Small meshes of known shape, built without a mesh generator: for tests, demos, wave bars."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import positive, shown
+from taichi_dem.mesh.mesh import Mesh, checked_mesh
+
+#: Groups of a bar: name -> (axis, 0 low or 1 high end).
+_SIDES = {
+    "left": (0, 0),
+    "right": (0, 1),
+    "bottom": (1, 0),
+    "top": (1, 1),
+    "back": (2, 0),
+    "front": (2, 1),
+}
+
+#: Boxes of a bar: ten million tetrahedra take some ten GiB to check.
+_MOST_BOXES = 1_666_666
+
+#: Orders in which a path may step along the axes; every second one winds the other way round.
+_EVEN_ORDERS = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
+
+
+def single(edge=0.05, height=None) -> Mesh:
+    """One tetrahedron: equilateral base of ``edge`` [m] in the plane x = 0, apex at x = -height.
+
+    height: [m]; None makes the tetrahedron regular.  Groups: base, sides.
+    """
+    base, height = _base(edge, height)
+    points = np.vstack([[-height, 0.0, 0.0], base])
+    groups = {"base": [[1, 2, 3]], "sides": [[0, 1, 2], [0, 2, 3], [0, 3, 1]]}
+    return checked_mesh(points, [[0, 1, 2, 3]], groups)
+
+
+def pair(edge=0.05, height=None) -> Mesh:
+    """Two equal tetrahedra that share the face in x = 0; body 0 lies at x < 0, body 1 at x > 0.
+
+    edge, height: as in ``single``.  Groups: left and right, the free faces of either body.
+    """
+    base, height = _base(edge, height)
+    points = np.vstack([base, [-height, 0.0, 0.0], [height, 0.0, 0.0]])
+    around = [(0, 1), (1, 2), (2, 0)]
+    groups = {
+        "left": [[3, a, b] for a, b in around],
+        "right": [[4, a, b] for a, b in around],
+    }
+    return checked_mesh(points, [[3, 0, 1, 2], [4, 0, 2, 1]], groups)
+
+
+def bar(length, width, cells) -> Mesh:
+    """Square bar along x from the origin, regular boxes cut into six tetrahedra each.
+
+    length, width: [m].  cells: boxes along x, y and z.
+    Groups: left, right (ends), bottom, top, back, front (z = width).
+    The cut is Kuhn's: all six share the box's diagonal, and neighbours match without turning.
+    Body number = 6 * box + path; boxes run fastest along z.
+    """
+    cells = _checked_cells(length, width, cells)
+    index = np.arange(np.prod(cells + 1)).reshape(cells + 1)
+    grid = np.stack(np.meshgrid(*(np.arange(n + 1) for n in cells), indexing="ij"), axis=-1)
+    points = grid.reshape(-1, 3) / cells * np.array([length, width, width], dtype=float)
+    tetrahedra = _kuhn(index)
+    return checked_mesh(points, tetrahedra, _sides(grid.reshape(-1, 3), cells, tetrahedra))
+
+
+def _base(edge, height):
+    """Equilateral triangle in x = 0 about the origin, normal +x, and the apex height [m]."""
+    edge = positive("edge", edge)
+    height = positive("height", edge * np.sqrt(2.0 / 3.0) if height is None else height)
+    angle = 2.0 * np.pi / 3.0 * np.arange(3)
+    radius = edge / np.sqrt(3.0)
+    triangle = np.column_stack([np.zeros(3), radius * np.cos(angle), radius * np.sin(angle)])
+    return triangle, height
+
+
+def _checked_cells(length, width, cells):
+    """Numbers of boxes as an array (3,)."""
+    for name, value in (("length", length), ("width", width)):
+        positive(name, value)
+    try:
+        numbers = np.asarray(cells)
+    except ValueError:
+        numbers = np.zeros(0)
+    if numbers.shape != (3,) or numbers.dtype.kind not in "iu" or numbers.min() < 1:
+        raise InputError(f"cells must be three integers of at least 1, got {shown(cells)}")
+    if np.prod(numbers.astype(float)) > _MOST_BOXES:
+        raise InputError(f"cells must make at most {_MOST_BOXES} boxes, got {shown(cells)}")
+    return numbers
+
+
+def _kuhn(index):
+    """Six tetrahedra a box: one for every path of axis steps from its low to its high corner."""
+    paths = []
+    for order in itertools.permutations(range(3)):
+        corner = np.zeros(3, dtype=int)
+        path = [corner.copy()]
+        for axis in order:
+            corner[axis] += 1
+            path.append(corner.copy())
+        if order not in _EVEN_ORDERS:
+            path[2:] = path[:1:-1]
+        paths.append(np.stack([_corner(index, step) for step in path], axis=-1))
+    return np.stack(paths, axis=1).reshape(-1, 4)
+
+
+def _corner(index, step):
+    """Point numbers of one corner of all boxes, shape (boxes,)."""
+    box = tuple(slice(s, n - 1 + s) for s, n in zip(step, index.shape))
+    return index[box].ravel()
+
+
+def _sides(grid, cells, tetrahedra):
+    """Faces of the tetrahedra in the six outer planes: a face with all its points in the plane."""
+    faces = tetrahedra[:, list(itertools.combinations(range(4), 3))].reshape(-1, 3)
+    groups = {}
+    for name, (axis, end) in _SIDES.items():
+        inside = grid[faces, axis] == end * cells[axis]
+        groups[name] = faces[inside.all(axis=1)]
+    return groups

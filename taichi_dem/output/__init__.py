@@ -1,0 +1,1 @@
+"""What a run leaves behind: series, frames, files and the result."""

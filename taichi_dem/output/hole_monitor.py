@@ -1,0 +1,59 @@
+"""Monitoring of a block with a hole: the displacement of the bodies at its wall."""
+
+import numpy as np
+
+from taichi_dem.mesh.tetrahedra import area_vectors
+from taichi_dem.mesh.topology import face_vertices, faces_of_group
+
+
+class HoleMonitor:
+    """Displacement at the wall of a hole.
+
+    axis_point (3,) [m] and axis (3,): of the hole. bodies: those with a face on it. outward
+    (n, 3): in-plane unit direction from the axis to each body's first centre. monitored_body: the
+    one of these that is nearest to the closest free face, at mid depth.
+    """
+
+    def __init__(self, model, group):
+        mesh, topology = model.mesh, model.topology
+        body, face = faces_of_group(mesh, topology, group)
+        corners = face_vertices(mesh, body, face)
+        area = area_vectors(mesh.points, corners)
+        middle = mesh.points[corners].mean(axis=1)
+        weight = np.linalg.norm(area, axis=1)
+        # No wall face looks along the axis: it is the weakest direction among the normals.
+        self.axis = np.linalg.eigh(area.T @ (area / weight[:, None]))[1][:, 0]
+        self.axis_point = weight @ middle / weight.sum()
+        self.bodies = np.unique(body)
+        self.first = model.centre[self.bodies]
+        away = self._in_plane(self.first - self.axis_point)
+        self.outward = away / np.linalg.norm(away, axis=1, keepdims=True)
+        self.monitored_body = self._nearest_to_free_face(model, body, face)
+
+    def _in_plane(self, vectors):
+        return vectors - np.outer(vectors @ self.axis, self.axis)
+
+    def _nearest_to_free_face(self, model, hole_body, hole_face):
+        mesh, topology = model.mesh, model.topology
+        on_hole = set(zip(hole_body.tolist(), hole_face.tolist()))
+        pairs = zip(topology.outer_body.tolist(), topology.outer_face.tolist())
+        free = np.array([pair for pair in pairs if pair not in on_hole], dtype=np.int32)
+        corners = face_vertices(mesh, free[:, 0], free[:, 1])
+        normal = area_vectors(mesh.points, corners)
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        distance = np.einsum("ij,ij->i", mesh.points[corners[:, 0]] - self.axis_point, normal)
+        distance[np.abs(normal @ self.axis) > 0.5] = np.inf
+        toward = normal[distance.argmin()]
+        depth = np.abs((self.first - self.axis_point) @ self.axis)
+        score = (self.first - self.axis_point) @ toward - depth
+        return int(self.bodies[score.argmax()])
+
+    def radial_displacement(self, position):
+        """Mean displacement of the hole's bodies away from its axis [m]; position (n, 3)."""
+        moved = position[self.bodies] - self.first
+        return float(np.einsum("ij,ij->i", moved, self.outward).mean())
+
+    def monitored_displacement(self, position):
+        """Displacement of the monitored body [m]."""
+        row = int(np.flatnonzero(self.bodies == self.monitored_body)[0])
+        return float(np.linalg.norm(position[self.monitored_body] - self.first[row]))

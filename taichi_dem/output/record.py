@@ -1,0 +1,242 @@
+"""What a run leaves behind: time series, snapshots, ParaView files; written whole or not at all."""
+
+import os
+import re
+from dataclasses import dataclass, fields
+
+import numpy as np
+import taichi as ti
+
+from taichi_dem.kit.display import by_fields
+from taichi_dem.kit.files import output_folder, remove_files, write_csv
+from taichi_dem.mesh.files import write_pvd, write_vtu
+from taichi_dem.mesh.tetrahedra import area_vectors
+from taichi_dem.output.hole_monitor import HoleMonitor
+from taichi_dem.timeline import MAX_LEVEL, NEVER
+
+#: Energy terms that have a column of their own in the time series, in its order.
+ENERGY_COLUMNS = (
+    "kinetic",
+    "bond_strain",
+    "sphere_strain",
+    "gas_work",
+    "bond_dashpot",
+    "softening",
+    "release",
+    "slip",
+    "sphere_dashpot",
+    "friction",
+    "injected",
+    "residual",
+)
+
+
+#: Letters of a series' name.
+_LONGEST_NAME = 50
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """The block at one time.
+
+    time_s; position, displacement, velocity (n, 3) in m and m/s; rotation (n, 3, 3), body to
+    world; level (n,); damage (n,) in [0, 1], the mean over a body's bonds; bound (n,): what
+    asked for the level, a place in ``step_control.CRITERIA``.
+    """
+
+    time_s: float
+    position: np.ndarray
+    rotation: np.ndarray
+    displacement: np.ndarray
+    velocity: np.ndarray
+    level: np.ndarray
+    damage: np.ndarray
+    bound: np.ndarray
+
+    def __repr__(self):
+        return by_fields(self)
+
+    @property
+    def speed(self):
+        """Speed of every body [m/s], (n,)."""
+        return np.linalg.norm(self.velocity, axis=1)
+
+
+@ti.data_oriented
+class Recorder:
+    """Collects samples and frames of a simulation.
+
+    group: face group of the hole whose displacement is followed, None for none. peak_speed: the
+    largest of each body at all samples so far [m/s], (body_count,).
+    """
+
+    def __init__(self, simulation, group):
+        self.simulation = simulation
+        self.model, self.state = simulation.model, simulation.state
+        self.hole = HoleMonitor(self.model, group) if group else None
+        self.rows = []
+        self.frames = []
+        self.peak_speed = np.zeros(self.model.body_count)
+
+    def compile(self):
+        """Compile all that recording needs, so that nothing later keeps Ctrl-C waiting."""
+        self.sample()
+        self.snapshot()
+        self.rows, self.frames = [], []
+        self.peak_speed = np.zeros(self.model.body_count)
+
+    def sample(self):
+        """Add a row to the time series."""
+        sim = self.simulation
+        motion = self.state.motion()
+        account = sim.energy_balance.account()
+        account["gas_work"] = sim.gas_work()
+        row = {"time_s": sim.time_s}
+        if self.hole is not None:
+            radial = self.hole.radial_displacement(motion["position"])
+            row["hole_radial_displacement_mm"] = 1e3 * radial
+            monitor = self.hole.monitored_displacement(motion["position"])
+            row["monitor_displacement_mm"] = 1e3 * monitor
+        row["broken_faces"] = int((self.state.broken_tick.to_numpy() != NEVER).sum())
+        row.update({f"{name}_J": account[name] for name in ENERGY_COLUMNS})
+        row["smallest_step_s"] = sim.method.dt0 / 2.0 ** int(motion["level"].max())
+        row["load_work_J"], row["support_work_J"] = account["load_work"], account["support_work"]
+        speed = np.linalg.norm(motion["velocity"], axis=1)
+        row["largest_speed_m_s"] = float(speed.max())
+        self.peak_speed = np.maximum(self.peak_speed, speed)
+        self.rows.append(row)
+
+    def snapshot(self):
+        """Keep the block as it is now."""
+        motion = self.state.motion()
+        damage = np.zeros(max(1, self.model.bond_count))
+        self._read_damage(damage)
+        self.frames.append(
+            Frame(
+                time_s=self.simulation.time_s,
+                position=motion["position"],
+                rotation=motion["rotation"],
+                displacement=motion["position"] - self.model.centre,
+                velocity=motion["velocity"],
+                level=motion["level"],
+                damage=self._body_damage(damage),
+                bound=self.state.bound.to_numpy(),
+            )
+        )
+
+    def saved(self):
+        """What a checkpoint holds of it, arrays by name: columns of rows, stacks of frames."""
+        rows = {f"row.{name}": column for name, column in self.history().items()}
+        stacks = {
+            f"frame.{field.name}": np.array([getattr(frame, field.name) for frame in self.frames])
+            for field in fields(Frame)
+            if self.frames
+        }
+        return {**rows, **stacks, "peak_speed": self.peak_speed}
+
+    def resume(self, saved):
+        """Take over what ``saved`` gave."""
+        self.peak_speed = saved.get("peak_speed", self.peak_speed)
+        rows = {k[4:]: column.tolist() for k, column in saved.items() if k.startswith("row.")}
+        self.rows = [dict(zip(rows, values)) for values in zip(*rows.values())]
+        stacks = {k[6:]: stack for k, stack in saved.items() if k.startswith("frame.")}
+        times = stacks.pop("time_s", np.zeros(0)).tolist()
+        self.frames = [
+            Frame(time_s, **dict(zip(stacks, arrays)))
+            for time_s, *arrays in zip(times, *stacks.values())
+        ]
+
+    @ti.kernel
+    def _read_damage(self, damage: ti.types.ndarray(dtype=ti.f64, ndim=1)):
+        for b in range(self.model.bond_count):
+            damage[b] = 1.0
+            if self.state.broken_tick[b] < 0:
+                damage[b] = 0.0
+                for q in range(3):
+                    damage[b] = damage[b] + self.model.tension.damage(b, 3 * b + q) / 3.0
+
+    def _body_damage(self, damage):
+        bond = self.model.topology.body_bond
+        own = np.where(bond >= 0, damage[np.maximum(bond, 0)], 0.0)
+        return own.sum(axis=1) / np.maximum(1, (bond >= 0).sum(axis=1))
+
+    def history(self):
+        """Time series as arrays by column name."""
+        names = self.rows[0].keys() if self.rows else ()
+        return {name: np.array([row[name] for row in self.rows]) for name in names}
+
+    def broken_time(self):
+        """When each bond was released [s], (bond_count,); NaN while it holds."""
+        tick = self.state.broken_tick.to_numpy()[: self.model.bond_count]
+        seconds = tick * (self.simulation.method.dt0 / 2.0**MAX_LEVEL)
+        return np.where(tick == NEVER, np.nan, seconds)
+
+
+def body_corners(model, frame):
+    """World positions of the corners of all bodies in a frame [m], (n, 4, 3)."""
+    arms = model.mesh.points[model.mesh.tetrahedra] - model.centre[:, None]
+    return frame.position[:, None] + np.einsum("nij,nkj->nki", frame.rotation, arms)
+
+
+def write_bonds(path, model, broken_time):
+    """Write a CSV row a bond: its bodies, centre and area of its face, and when it broke.
+
+    broken_time: (bond_count,) [s], NaN while a bond holds; its cell is then empty.
+    Raises InputError when the file cannot be written.
+    """
+    top, points = model.topology, model.mesh.points
+    centre = points[top.vertices].mean(axis=1)
+    times = np.array(broken_time, dtype=object)
+    times[np.isnan(broken_time)] = ""
+    columns = {
+        "bond": np.arange(top.bond_count),
+        "master": top.master,
+        "slave": top.slave,
+        **{f"{axis}_m": centre[:, k] for k, axis in enumerate("xyz")},
+        "area_m2": np.linalg.norm(area_vectors(points, top.vertices), axis=1),
+        "broken_time_s": times,
+    }
+    write_csv(path, columns)
+
+
+def series_name(folder):
+    """Name of a series after its folder, fit for files everywhere; "run" where nothing is left.
+
+    Letters and digits of any script, "-", "_" and "." stay; all else becomes "_". At most
+    50 letters, so that numbers and endings find room in a file name.
+    """
+    name = os.path.basename(os.path.abspath(folder))
+    return re.sub(r"[^\w.-]+", "_", name)[:_LONGEST_NAME].strip("._-") or "run"
+
+
+def remove_series(folder, name):
+    """Remove a ParaView series of a name, and nothing else, from a folder that may not be there."""
+    remove_files(folder, re.escape(name) + r"(\.pvd|_\d{4,}\.vtu)")
+
+
+def write_paraview(folder, model, frames, name=None):
+    """Write frames as a ParaView series: folder/name.pvd and a VTU file a frame.
+
+    name: of the files, that of the folder if None (``series_name``).
+    Cells carry body_id, level, speed_m_s, displacement_m, damage and step_bound_by, the place
+    in ``step_control.CRITERIA`` of what bounds a body's step. An earlier series of that name in
+    the folder is removed first.
+    """
+    folder = output_folder(folder)
+    name = series_name(folder) if name is None else name
+    remove_series(folder, name)
+    cells = np.arange(4 * model.body_count, dtype=np.int32).reshape(-1, 4)
+    names = []
+    for number, frame in enumerate(frames):
+        names.append(f"{name}_{number:04d}.vtu")
+        data = {
+            "body_id": np.arange(model.body_count, dtype=np.int32),
+            "level": frame.level,
+            "speed_m_s": frame.speed,
+            "displacement_m": frame.displacement,
+            "damage": frame.damage,
+            "step_bound_by": frame.bound,
+        }
+        points = body_corners(model, frame).reshape(-1, 3)
+        write_vtu(os.path.join(folder, names[-1]), points, cells, {}, data)
+    write_pvd(os.path.join(folder, f"{name}.pvd"), [frame.time_s for frame in frames], names)

@@ -1,0 +1,1 @@
+"""Every calculation of a stable step."""

@@ -1,0 +1,275 @@
+"""Rates of the springs and dashpots of each body, and the stable step that they allow.
+
+A body's rates change only where a bond breaks or a contact comes near or leaves. Such bodies are
+listed, and their rates found anew at the start of the next substep.
+"""
+
+import numpy as np
+import taichi as ti
+
+from taichi_dem.kit.allocation import defer_fill
+from taichi_dem.kit.types import real
+from taichi_dem.stability.contact_limits import ContactLimits
+from taichi_dem.stability.mesh_limits import dashpots_of, springs_of, subset_rates
+from taichi_dem.stability.step_control import (
+    BOND_C,
+    BOND_K,
+    CONTACT_C,
+    CONTACT_K,
+    CRITERIA,
+    DISPLACEMENT,
+    EVENTS,
+    LARGEST,
+    LOAD,
+    ROTATION,
+    Displacement,
+    StepControl,
+    dashpot_limit,
+    finer,
+    level_of,
+    shorter,
+    spring_limit,
+)
+
+HIT, RELEASE, CLOSE = (1 << k for k in range(len(EVENTS)))
+#: With c min(1, LIMITED / X) no dashpot takes more than this in a step (X = 2 is unstable).
+LIMITED = 1.7
+#: Part of it that near contacts get at least, if they need it: a meeting is over in a few steps.
+FOR_CONTACTS = 0.5
+#: Part of it that they get at most: 1 stops bodies that meet in a step, more throws them back.
+STOPS = 1.0
+
+
+@ti.data_oriented
+class StabilityLimits:
+    """Rates of every body, and the list of those whose rates must be found anew.
+
+    dashpot_table, spring_table: largest eigenvalue of the bonds' block by the set of intact
+    bonds, [1/s] and [1/s^2]. bond_damping, contact_damping: rates of a body's dashpots [1/s].
+    limit, limit_level, limit_by: longest stable step [s], its level, and the criterion that sets
+    it. displacement, turn, leap: levels for speed, spin and acceleration. listed, listed_count:
+    bodies to look at; events: why, as bits. woken: how many were brought to the present between
+    their times. control: a StepControl, None for a method that only limits dashpots.
+
+    Limited dashpots share 1.7 by need. With X = 2 dt rate for bonds (b) and contacts (c) of a body
+    at its step, bonds keep min(X_b, 1.7 - min(X_c, 0.5)) of X_b and contacts min(X_c, 1, 1.7 -
+    what the bonds keep) of X_c, and a pair the smaller share of its two. A body's rates never
+    add up to more than 1.7 / (2 dt), as the eigenvalue of a sum is no larger than the sum of
+    both: no step makes them unstable. Bonds come first, as their dashpots are most of the physics
+    here; contacts need little, for X_c is ten to a hundred and any c stops what meets, if it stops
+    it in a few steps, and not more than 1, since 1 - X < 0 throws it back.
+    One common share min(1, 1.7 / (X_b + X_c)) starves the bonds: +45 % at 1e-8 s, and from 2e-8 s
+    on fragments pass through each other.
+    The paper's block, one step for all, hole at 3e-4 s against 13.735 mm, residual of the energy
+    balance:
+
+        dt     least  most
+        1e-8   0.5    1.0    +0.1 %   0.004
+        2e-8   0.5    1.0    +0.3 %   0.004
+        4e-8   0.1    1.0    +1.1 %   0.004
+        4e-8   0.5    1.0    +1.1 %   0.004
+        4e-8   1.0    1.0    +2.1 %   0.005
+        4e-8   0.5    1.7    +1.0 %   0.007
+        6e-8   0.5    1.0    +1.6 %   0.005
+        2e-7   0.5    1.0     +39 %   0.004
+    """
+
+    constant_fields = ("dashpot_table", "spring_table")
+
+    def __init__(self, model, state, contacts, method):
+        self.model, self.state, self.contacts = model, state, contacts
+        self.control = method.control
+        self.controlled = method.control is not None
+        self.has_contact = contacts is not None
+        self.has_distance = method.distance is not None
+        rule = self.control or StepControl()
+        self.dt0, self.safety = method.dt0, rule.safety
+        self.limited = method.dashpot == "limited"
+        self.jump, self.floor = rule.level_jump, rule.dashpot_floor
+        self.counts = {name: name in rule.criteria for name in CRITERIA}
+        self.has_load = self.counts["load"] and self.has_distance and bool(model.loads)
+        if self.has_distance:
+            self.displacement = Displacement(method.distance, method.dt0)
+        if self.has_load:
+            self.leap = Displacement(method.distance, method.dt0, power=2)
+        if self.counts["rotation"]:
+            self.turn = Displacement(rule.angle, method.dt0)
+        self.wakes = 0
+        if self.control is not None:
+            self.wakes = sum(1 << k for k, event in enumerate(EVENTS) if event in rule.wake)
+        self.contact_limits = None
+        if self.has_contact:
+            self.contact_limits = ContactLimits(model, state, contacts, rule.ahead * method.dt0)
+        n = model.body_count
+        self.dashpot_table = ti.field(real, shape=(n, 16))
+        self.spring_table = ti.field(real, shape=(n, 16))
+        defer_fill(self._load_tables)
+        self.bond_damping = ti.field(real, shape=n)
+        self.contact_damping = ti.field(real, shape=n)
+        self.limit = ti.field(real, shape=n)
+        self.limit_by = ti.field(ti.i32, shape=n)
+        self.limit_level = ti.field(ti.i32, shape=n)
+        self.events = ti.field(ti.i32, shape=n)
+        self.listed = ti.field(ti.i32, shape=n)
+        self.listed_count = ti.field(ti.i32, shape=())
+        self.woken = ti.field(ti.i32, shape=())
+
+    def _load_tables(self):
+        model, material = self.model, self.model.material
+        shape = model.mesh, model.topology, material.density
+        if model.dashpot.name:
+            self.dashpot_table.from_numpy(subset_rates(*shape, dashpots_of(material)))
+        self.spring_table.from_numpy(
+            np.ascontiguousarray(subset_rates(*shape, springs_of(material)))
+        )
+
+    @ti.func
+    def count(self, low):
+        """Bodies whose rates must be found anew."""
+        return self.listed_count[None]
+
+    @ti.func
+    def pick(self, a):
+        """One of them."""
+        return self.listed[a]
+
+    @ti.func
+    def notice(self, i, event):
+        """List body i, once, and remember what happened to it."""
+        if ti.atomic_or(self.events[i], event) == 0:
+            self.listed[ti.atomic_add(self.listed_count[None], 1)] = i
+
+    @ti.func
+    def notice_pair(self, p, count, event: ti.template()):
+        """Note how many contacts of a pair are near; list both bodies if the number changed."""
+        if count != self.contact_limits.count[p]:
+            self.contact_limits.count[p] = count
+            for side in ti.static(range(2)):
+                self.notice(self.contacts.pair_body[p][side], event)
+
+    @ti.func
+    def carry_over_pair(self, p, old, fresh):
+        """Take over what is known of a pair from its former place.
+
+        Entering the list does not change a body's limits: a search lists what may come near, and
+        how far it looks must not matter. Spheres that a break has just set free may touch already.
+        """
+        self.contact_limits.restore(p, old)
+        if fresh != 0:
+            self.notice_pair(p, self.contact_limits.count_within_margin(p), RELEASE)
+        elif old < 0:
+            self.notice_pair(p, self.contact_limits.count_within_margin(p), HIT)
+
+    @ti.func
+    def done(self):
+        """Empty the list."""
+        for a in range(self.listed_count[None]):
+            self.events[self.listed[a]] = 0
+        self.listed_count[None] = 0
+
+    @ti.func
+    def refresh(self, i):
+        """Find the rates of body i, and the longest stable step."""
+        intact = 0
+        for f in range(4):
+            b = self.model.face_bond[4 * i + f]
+            if b >= 0:
+                if self.state.broken_tick[b] < 0:
+                    intact |= 1 << f
+        dashpot, spring = self.dashpot_table[i, intact], self.spring_table[i, intact]
+        contact_c, contact_k = 0.0, 0.0
+        if ti.static(self.has_contact):
+            share = self.contact_limits.eigenvalue(i)
+            contact_c = self.contacts.law.damping() * share
+            contact_k = self.contacts.law.elastic(1.0) * share
+        self.bond_damping[i], self.contact_damping[i] = dashpot, contact_c
+        if ti.static(self.controlled):
+            self._limit(i, dashpot, contact_c, spring, contact_k)
+
+    @ti.func
+    def _limit(self, i, bond_c, contact_c, bond_k, contact_k):
+        """Rates of bonds and contacts add up; the larger one of the two counts as the cause.
+
+        A criterion that the user left out does not add.
+        """
+        step, by = self.dt0, LARGEST
+        if ti.static(not self.counts["bond_dashpot"]):
+            bond_c = 0.0
+        if ti.static(not self.counts["contact_dashpot"]):
+            contact_c = 0.0
+        if ti.static(not self.counts["bond_stiffness"]):
+            bond_k = 0.0
+        if ti.static(not self.counts["contact_stiffness"]):
+            contact_k = 0.0
+        cause = BOND_K
+        if contact_k > bond_k:
+            cause = CONTACT_K
+        step, by = shorter(step, by, self.safety * spring_limit(bond_k + contact_k), cause)
+        cause = BOND_C
+        if contact_c > bond_c:
+            cause = CONTACT_C
+        borne = self.safety * dashpot_limit(bond_c + contact_c)
+        if ti.static(self.limited):
+            borne = ti.max(borne, self.floor)
+        step, by = shorter(step, by, borne, cause)
+        self.limit[i], self.limit_by[i] = step, by
+        self.limit_level[i] = level_of(step, self.dt0)
+
+    @ti.func
+    def wanted(self, i, now):
+        """Level that body i wants at a time [s], and the criterion that asks for it.
+
+        A body asks at every step: squares and tables spare it roots and quotients.
+        """
+        level, by = self.limit_level[i], self.limit_by[i]
+        if ti.static(self.has_distance):
+            speed2 = self.state.velocity[i].norm_sqr()
+            level, by = finer(level, by, self.displacement.finer(level, speed2), DISPLACEMENT)
+        if ti.static(self.counts["rotation"]):
+            spin2 = self.state.spin[i].norm_sqr()
+            level, by = finer(level, by, self.turn.finer(level, spin2), ROTATION)
+        if ti.static(self.has_load):
+            push2 = self._push2(i, now)
+            level, by = finer(level, by, self.leap.finer(level, push2), LOAD)
+        return level, by
+
+    @ti.func
+    def _push2(self, i, now):
+        """Square of the acceleration that the loads alone give body i [m^2/s^4].
+
+        The larger one of now and a largest step ahead: a body does not leap into a load that sets
+        in before its next update.
+        """
+        push2 = 0.0
+        for e in ti.static(range(len(self.model.loads))):
+            if self.model.loads[e].acts_on(i):
+                for ahead in ti.static(range(2)):
+                    force, _ = self.model.loads[e].wrench(
+                        i, now + ahead * self.dt0, self.state.rotation[i]
+                    )
+                    push2 = ti.max(push2, force.norm_sqr())
+        return push2 * self.model.mass_inverse[i] ** 2
+
+    @ti.func
+    def bond_share(self, i, step):
+        """Share of its bonds' dashpots that a step [s] of body i bears."""
+        return self._bonds_get(i, step) / ti.max(2.0 * step * self.bond_damping[i], 1e-200)
+
+    @ti.func
+    def contact_share(self, i, step):
+        """Share of its contacts' dashpots that a step [s] of body i bears, beside its bonds."""
+        x = 2.0 * step * self.contact_damping[i]
+        left = ti.min(STOPS, LIMITED - self._bonds_get(i, step))
+        return ti.min(1.0, left / ti.max(x, 1e-200))
+
+    @ti.func
+    def _bonds_get(self, i, step):
+        """What the bonds take of LIMITED."""
+        contacts = ti.min(FOR_CONTACTS, 2.0 * step * self.contact_damping[i])
+        return ti.min(2.0 * step * self.bond_damping[i], LIMITED - contacts)
+
+
+def limits_for(model, state, contacts, method):
+    """Limits for a method; None where it neither controls steps nor limits dashpots."""
+    wanted = getattr(method, "control", None) or getattr(method, "dashpot", "full") == "limited"
+    return StabilityLimits(model, state, contacts, method) if wanted else None

@@ -1,0 +1,135 @@
+"""Contacts counted before they touch, and the limits they set to a body's step."""
+
+import numpy as np
+import taichi as ti
+
+from taichi_dem.kit.allocation import defer_fill
+from taichi_dem.kit.types import mat3, real
+from taichi_dem.physics.rotation import unit3
+from taichi_dem.physics.wrench import cross_matrix
+from taichi_dem.stability.mesh_limits import inverse_root
+from taichi_dem.timeline import MAX_LEVEL
+
+#: Squarings of the block of near contacts: tr(A^32)^(1/32) exceeds its largest eigenvalue by at
+#: most 6^(1/32), 6 %, and is never below it.
+SQUARINGS = 5
+
+
+@ti.func
+def largest_eigenvalue(a, b, c):
+    """Bound from above, by 6 % at most, of the symmetric 6x6 matrix [[a, b^T], [b, c]] >= 0."""
+    scale = a.trace() + c.trace()
+    bound = 0.0
+    if scale > 0.0:
+        a, b, c = a / scale, b / scale, c / scale
+        for _ in range(SQUARINGS):
+            across = b.transpose()
+            a, b, c = a @ a + across @ b, b @ a + c @ b, b @ across + c @ c
+        bound = scale * ti.pow(a.trace() + c.trace(), 0.5**SQUARINGS)
+    return bound
+
+
+@ti.data_oriented
+class ContactLimits:
+    """Which sphere pairs count as contacts, and the block they form on each body.
+
+    A sphere pair counts from the moment at which it could touch within some steps of the finer of
+    its bodies: it is evaluated once a step, and the coarser body is woken before the next time.
+    count: how many of the sphere pairs of a body pair count. applied_until: tick up to which a pair
+    has given its impulse.
+    """
+
+    constant_fields = ("ahead", "root_mass", "root_inertia")
+    scratch_fields = ("old_count", "old_applied_until")
+
+    def __init__(self, model, state, contacts, ahead):
+        self.model, self.state, self.contacts = model, state, contacts
+        self.ahead = ti.field(real, shape=MAX_LEVEL + 1)
+        defer_fill(self.ahead.from_numpy, ahead / 2.0 ** np.arange(MAX_LEVEL + 1))
+        self.count = ti.field(ti.i32, shape=contacts.capacity)
+        self.old_count = ti.field(ti.i32, shape=contacts.capacity)
+        self.applied_until = ti.field(ti.i64, shape=contacts.capacity)
+        self.old_applied_until = ti.field(ti.i64, shape=contacts.capacity)
+        # M^-1/2 as 1 / sqrt(m) and I^-1/2 in the body frame.
+        self.root_mass = ti.field(real, shape=model.body_count)
+        self.root_inertia = ti.Matrix.field(3, 3, real, shape=model.body_count)
+        root = inverse_root(model.body_mass, model.body_inertia)
+        defer_fill(self.root_mass.from_numpy, np.ascontiguousarray(root[:, 0, 0]))
+        defer_fill(self.root_inertia.from_numpy, np.ascontiguousarray(root[:, 3:, 3:]))
+
+    @ti.func
+    def margin(self, i, j):
+        """Gap [m] that two bodies can close in the time that is looked ahead."""
+        ahead = self.ahead[ti.max(self.state.level[i], self.state.level[j])]
+        return ahead * self.contacts.approach(i, j)
+
+    @ti.func
+    def save(self, p):
+        """Save what is known of a pair before the list is renewed."""
+        self.old_count[p], self.old_applied_until[p] = self.count[p], self.applied_until[p]
+
+    @ti.func
+    def restore(self, p, old):
+        """Take it over for the pair at place p; old: its former place, -1 for none."""
+        self.count[p], self.applied_until[p] = 0, 0
+        if old >= 0:
+            self.applied_until[p], self.count[p] = self.old_applied_until[old], self.old_count[old]
+
+    @ti.func
+    def count_within_margin(self, p):
+        """How many of the sphere pairs of the pair at place p count now."""
+        pair = self.contacts.pair_body[p]
+        return self.contacts.closer(p, self.margin(pair[0], pair[1]))
+
+    @ti.func
+    def eigenvalue(self, i):
+        """Largest eigenvalue of M^-1/2 (sum of J^T D J) M^-1/2 over near contacts of body i [1/kg].
+
+        J maps velocity and spin to the velocity at the contact; D is the identity with friction,
+        whose dashpot acts along all three axes, and n n^T without. Times a coefficient [N s/m] it
+        is the rate of the contacts' dashpots [1/s], times a stiffness [N/m] bounds that of their
+        springs [1/s^2]. Partners stand still, as in ``quality.bond_rates``.
+        """
+        a, b, c = mat3(0.0), mat3(0.0), mat3(0.0)
+        for p in range(self.contacts.first_of[i], self.contacts.first_of[i + 1]):
+            if self.count[p] != 0:
+                a, b, c = self._add_pair(p, 0, a, b, c)
+        for k in range(self.contacts.second_start[i], self.contacts.second_start[i + 1]):
+            if self.count[self.contacts.second_pair[k]] != 0:
+                a, b, c = self._add_pair(self.contacts.second_pair[k], 1, a, b, c)
+        return largest_eigenvalue(a, b, c)
+
+    @ti.func
+    def _add_pair(self, p, side, a, b, c):
+        """Add the near contacts of a pair to the block of its first (0) or second (1) body."""
+        i, j = self.contacts.pair_body[p][0], self.contacts.pair_body[p][1]
+        if side == 1:
+            i, j = j, i
+        back, margin = self.state.rotation[i].transpose(), self.margin(i, j)
+        turn = back @ self.state.rotation[j]
+        offset = back @ (self.state.position[j] - self.state.position[i])
+        for k in range(self.contacts.pair_first[p], self.contacts.pair_last[p]):
+            spheres = self.contacts.pair_sphere[k]
+            mine, other = self.model.sphere[spheres[0]], self.model.sphere[spheres[1]]
+            if side == 1:
+                mine, other = other, mine
+            apart = turn @ other.xyz + offset - mine.xyz
+            reach = mine[3] + other[3] + margin
+            if apart.norm_sqr() < reach * reach:
+                normal = apart / ti.max(apart.norm(), 1e-30)
+                da, db, dc = self._contact(i, mine.xyz + mine[3] * normal, normal)
+                a, b, c = a + da, b + db, c + dc
+        return a, b, c
+
+    @ti.func
+    def _contact(self, i, arm, normal):
+        """Blocks of one contact at an arm from the centre of body i, in its frame."""
+        along = normal.outer_product(normal)
+        if ti.static(bool(self.model.friction.name)):
+            along = unit3()
+        root = self.root_mass[i]
+        lever = self.root_inertia[i] @ cross_matrix(arm) @ along
+        return along * root * root, lever * root, lever @ lever.transpose()
+
+
+__all__ = ["ContactLimits", "largest_eigenvalue"]

@@ -1,0 +1,111 @@
+"""Explicit step limits of the bonds of a mesh: rates of each body, and the steps they allow."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from taichi_dem.mesh import tetrahedra as geometry
+from taichi_dem.mesh.topology import body_properties, face_vertices
+
+
+def dashpot_step(rate):
+    """Largest step [s] at which dashpots are stable that slow a body at a rate [1/s].
+
+    A pair of equal bodies moves against each other at twice the rate of one, and forward Euler
+    is stable to 2 / (2 rate). Infinite where the rate is zero.
+    """
+    with np.errstate(divide="ignore"):
+        return 1.0 / np.asarray(rate)
+
+
+def spring_step(rate2):
+    """Largest step [s] at which springs are stable that hold a body at a squared rate [1/s2].
+
+    As for dashpots a pair has twice that of one, and symplectic Euler is stable to
+    2 / sqrt(2 omega^2). Infinite where it is zero.
+    """
+    with np.errstate(divide="ignore"):
+        return 2.0 / np.sqrt(2.0 * np.asarray(rate2))
+
+
+def dashpots_of(material):
+    """Normal and tangential damping per area of a bond [Pa s/m]."""
+    return material.normal_damping, material.shear_damping
+
+
+def springs_of(material):
+    """Normal and tangential stiffness per area of a bond [Pa/m]."""
+    return material.normal_stiffness, material.shear_stiffness
+
+
+def bond_rates(mesh, topology, density, coefficients) -> np.ndarray:
+    """Largest eigenvalue of M^-1/2 G M^-1/2 of every body, shape (body_count,).
+
+    G is the 6x6 block with which the bonds of a body resist its velocity and spin when the
+    neighbours stand still: the sum of (A / 3) J^T diag(normal, tangential) J over the three
+    contact units of each bonded face, J the map from (velocity, spin) to the velocity at the
+    vertex (Konno et al., section 2.1, units at the vertices).  M holds mass and inertia.
+    coefficients: normal and tangential coefficient per area; [Pa s/m] gives rates [1/s],
+    [Pa/m] gives squared angular frequencies [1/s2].
+    """
+    return subset_rates(mesh, topology, density, coefficients, subsets=(15,))[:, 0]
+
+
+def subset_rates(mesh, topology, density, coefficients, subsets=range(16)) -> np.ndarray:
+    """``bond_rates`` with only some of a body's bonds intact, shape (body_count, len(subsets)).
+
+    subsets: bit f of each stands for the bond at local face f; the default is all sixteen.
+    """
+    mass, centre, inertia = body_properties(mesh, density)
+    body, face = np.nonzero(topology.body_bond >= 0)
+    blocks = _face_blocks(mesh, body, face, centre[body], coefficients)
+    root = inverse_root(mass, inertia)
+    rates = np.zeros((mesh.body_count, len(subsets)))
+    for column, subset in enumerate(subsets):
+        total = np.zeros((mesh.body_count, 6, 6))
+        kept = (subset >> face) & 1 == 1
+        np.add.at(total, body[kept], blocks[kept])
+        rates[:, column] = np.linalg.eigvalsh(root @ total @ root)[:, -1]
+    return np.maximum(rates, 0.0)
+
+
+def _face_blocks(mesh, body, face, centre, coefficients):
+    """The block G of single faces, shape (n, 6, 6)."""
+    vertices = face_vertices(mesh, body, face)
+    vector = geometry.area_vectors(mesh.points, vertices)
+    area = np.linalg.norm(vector, axis=1)
+    normal = vector / area[:, None]
+    law = coefficients[1] * np.eye(3) + (coefficients[0] - coefficients[1]) * (
+        normal[:, :, None] * normal[:, None, :]
+    )
+    arms = mesh.points[vertices] - centre[:, None]
+    return area[:, None, None] / 3.0 * point_blocks(arms, law)
+
+
+def point_blocks(arms, law):
+    """Sum over points of J^T law J, J the map from (velocity, spin) to the point's velocity.
+
+    arms: points from the centre [m], shape (n, points, 3). law: what resists their velocity,
+    shape (n, 3, 3). Returns (n, 6, 6).
+    """
+    lever = np.zeros((*arms.shape[:2], 3, 6))
+    lever[..., :3] = np.eye(3)
+    lever[..., 3:] = -_cross_matrix(arms)  # w x r = -[r]x w
+    return np.einsum("nuai,nab,nubj->nij", lever, law, lever)
+
+
+def _cross_matrix(vectors):
+    """Matrices [r]x with [r]x w = r x w, shape (..., 3, 3)."""
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    zero = np.zeros_like(x)
+    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def inverse_root(mass, inertia):
+    """M^-1/2 of M = diag(mass, mass, mass, inertia), shape (n, 6, 6)."""
+    moments, axes = np.linalg.eigh(inertia)
+    root = np.zeros((len(mass), 6, 6))
+    root[:, :3, :3] = np.eye(3) / np.sqrt(mass)[:, None, None]
+    root[:, 3:, 3:] = np.einsum("nia,na,nja->nij", axes, moments**-0.5, axes)
+    return root

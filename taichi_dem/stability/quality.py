@@ -1,0 +1,146 @@
+"""How good the elements of a mesh are, and what the bad ones cost in time step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from taichi_dem.kit.display import counted, in_brief
+from taichi_dem.kit.validation import instance
+from taichi_dem.materials import Material
+from taichi_dem.mesh import tetrahedra as geometry
+from taichi_dem.mesh.mesh import Mesh
+from taichi_dem.mesh.topology import body_properties, topology_of
+from taichi_dem.stability.mesh_limits import (
+    bond_rates,
+    dashpot_step,
+    dashpots_of,
+    spring_step,
+    springs_of,
+)
+
+#: Elements listed in the printed table.
+_WORST = 10
+
+
+@dataclass(frozen=True, eq=False)
+class QualityReport:
+    """Per-body figures, each of shape (body_count,), and what the explicit step pays for them.
+
+    volume_m3; mass_kg; aspect_ratio, longest edge / smallest altitude (1.22 when regular);
+    smallest_altitude_m; dashpot_step_s and spring_step_s, the largest explicit step at which a
+    pair of two such bodies is stable under its bond dashpots and bond springs.
+    point_count, bond_count, outer_count: of the mesh.
+    """
+
+    volume_m3: np.ndarray
+    mass_kg: np.ndarray
+    aspect_ratio: np.ndarray
+    smallest_altitude_m: np.ndarray
+    dashpot_step_s: np.ndarray
+    spring_step_s: np.ndarray
+    point_count: int
+    bond_count: int
+    outer_count: int
+
+    @property
+    def body_count(self) -> int:
+        """Number of bodies."""
+        return len(self.volume_m3)
+
+    @property
+    def critical_step_s(self) -> np.ndarray:
+        """The smaller of both limits of every body [s], shape (body_count,)."""
+        return np.minimum(self.dashpot_step_s, self.spring_step_s)
+
+    def worst(self, count=_WORST) -> np.ndarray:
+        """The bodies of the smallest critical step, the worst first, shape (count,)."""
+        return np.argsort(self.critical_step_s, kind="stable")[:count]
+
+    def price(self, count=_WORST) -> np.ndarray:
+        """Gain in the step of the whole mesh without the k + 1 worst bodies, k < count.
+
+        Factors of at least 1, as many as there are bodies to leave out; infinite where nothing
+        is left that limits the step, 1 where nothing limited it before.
+        """
+        steps = np.append(np.sort(self.critical_step_s), np.inf)
+        gained = steps[1 : count + 1]
+        return gained / steps[0] if np.isfinite(steps[0]) else np.ones_like(gained)
+
+    def __repr__(self) -> str:
+        bodies, bonds = counted(self.body_count, "body"), counted(self.bond_count, "bond")
+        step = f"critical step {self.critical_step_s.min(initial=np.inf):.3g} s"
+        return in_brief(self, bodies, bonds, step, "print it for the table")
+
+    def __str__(self) -> str:
+        """Counts, ranges and the worst bodies as a table."""
+        return "\n".join([*self._summary(), "", *self._worst_lines()])
+
+    def _summary(self):
+        """Counts, ranges and limits."""
+        ranges = (
+            ("smallest altitude", self.smallest_altitude_m, "m"),
+            ("mass", self.mass_kg, "kg"),
+            ("aspect ratio", self.aspect_ratio, ""),
+            ("bond dashpot step", self.dashpot_step_s, "s"),
+            ("bond spring step", self.spring_step_s, "s"),
+        )
+        lines = [
+            f"{self.body_count} bodies, {self.point_count} points, {self.bond_count} bonds, "
+            f"{self.outer_count} outer faces, volume {self.volume_m3.sum():.6g} m3",
+            f"{'':20s}{'smallest':>12s}{'median':>12s}{'largest':>12s}",
+        ]
+        for name, values, unit in ranges:
+            figures = (values.min(), np.median(values), values.max())
+            cells = "".join(f"{figure:12.3g}" for figure in figures)
+            lines.append(f"{name:20s}{cells} {unit}".rstrip())
+        return lines
+
+    def _worst_lines(self):
+        """The worst bodies and what the step would gain without them."""
+        lines = [
+            "worst bodies; the last column is how much larger the step of the whole mesh would be",
+            "without this body and those above it",
+            f"{'body':>8s}{'altitude m':>12s}{'aspect':>8s}{'dashpot s':>12s}{'spring s':>12s}"
+            f"{'price':>8s}",
+        ]
+        for body, price in zip(self.worst(), self.price()):
+            lines.append(
+                f"{body:8d}{self.smallest_altitude_m[body]:12.3g}{self.aspect_ratio[body]:8.3g}"
+                f"{self.dashpot_step_s[body]:12.3g}{self.spring_step_s[body]:12.3g}{price:8.3f}"
+            )
+        return lines
+
+
+def quality_report(mesh, material) -> QualityReport:
+    """Shape and explicit step limits of every body of a mesh; infinite for one without bonds.
+
+    Raises InputError for what is no mesh or material.
+    """
+    instance("mesh", mesh, Mesh)
+    instance("material", material, Material)
+    topology = topology_of(mesh)
+    mass, _, _ = body_properties(mesh, material.density)
+    altitude = smallest_altitudes(mesh)
+    longest = geometry.edge_lengths(mesh.points, mesh.tetrahedra).max(axis=1)
+    damping = bond_rates(mesh, topology, material.density, dashpots_of(material))
+    springs = bond_rates(mesh, topology, material.density, springs_of(material))
+    return QualityReport(
+        volume_m3=geometry.signed_volumes(mesh.points, mesh.tetrahedra),
+        mass_kg=mass,
+        aspect_ratio=longest / altitude,
+        smallest_altitude_m=altitude,
+        dashpot_step_s=dashpot_step(damping),
+        spring_step_s=spring_step(springs),
+        point_count=mesh.point_count,
+        bond_count=topology.bond_count,
+        outer_count=topology.outer_count,
+    )
+
+
+def smallest_altitudes(mesh) -> np.ndarray:
+    """Smallest distance of a vertex from the opposite face, 3 V / A [m], shape (body_count,)."""
+    vectors = geometry.area_vectors(mesh.points, geometry.all_faces(mesh.tetrahedra))
+    area = np.linalg.norm(vectors, axis=1).reshape(-1, 4).max(axis=1)
+    return 3.0 * geometry.signed_volumes(mesh.points, mesh.tetrahedra) / area
