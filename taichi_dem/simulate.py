@@ -7,6 +7,7 @@ import numpy as np
 
 from taichi_dem.kit.checkpoint import Checkpoint, digest, version_text
 from taichi_dem.kit.display import prefixed
+from taichi_dem.kit.engine_pool import LoanMemory
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.progress.progress import LEAST_SHARE, Pace, Progress, compiling
@@ -168,7 +169,9 @@ def saved_run(simulation, recorder):
         "step resolution": simulation.step_resolution,
         "recorder": recorder,
     }
-    return RunSnapshot(identity_of(simulation.scene, simulation.method), simulation, parts)
+    return RunSnapshot(
+        identity_of(simulation.scene, simulation.method), LoanMemory(simulation.loan), parts
+    )
 
 
 def identity_of(scene, method):

@@ -1,6 +1,6 @@
 """Field trees: fields declared in one block, allocated together, read and written in place.
 
-Taichi crashes beyond 512 field trees a session and never frees one of them by itself. So each engine
+Taichi crashes beyond 512 field trees a session and never frees one by itself. So each engine
 declares all of its fields in the block of one ``FieldTree``, which owns their memory.
 On a CPU an array lies where each field does (``array_of``): reading or writing compiles nothing.
 """
@@ -35,6 +35,8 @@ class FieldTree:
     all fields. Raises InputError, before anything is allocated, where the machine lacks the memory
     or the session has no room for another tree.
     """
+
+    scratch_fields = ("_anchor",)
 
     def __init__(self, advice="take a smaller one"):
         self.advice, self.bytes, self._tree = advice, 0, None
@@ -80,6 +82,11 @@ class FieldTree:
 _bases: dict = {}
 
 
+def in_tree(field) -> bool:
+    """Whether a field lies in a ``FieldTree``, on a CPU."""
+    return _first_scalar(field).snode.ptr.get_snode_tree_id() in _bases
+
+
 def array_of(field) -> np.ndarray:
     """Array that lies where a field of a ``FieldTree`` does; on a CPU only.
 
@@ -102,7 +109,7 @@ def array_of(field) -> np.ndarray:
 
 def values(field) -> np.ndarray:
     """Copy of all entries of a field."""
-    if impl.current_cfg().arch == ti.cuda:
+    if impl.current_cfg().arch == ti.cuda or not in_tree(field):
         return field.to_numpy()
     ti.sync()
     return array_of(field).copy()
@@ -115,7 +122,7 @@ def assign(field, array):
     """
     if np.ndim(array) == 0 and field.shape:
         array = np.full(values(field).shape, array)
-    if impl.current_cfg().arch == ti.cuda:
+    if impl.current_cfg().arch == ti.cuda or not in_tree(field):
         whole = field.to_numpy()
         whole[slice(len(array)) if whole.ndim else ()] = array
         field.from_numpy(whole)
