@@ -33,8 +33,8 @@ class Contacts:
     how far that may be before it is looked at again [m]; a pair holds the spheres whose gap is
     below the body skin of both. pace: largest step [s], and steps of a body by which its contacts
     are counted before they touch. pair_limit, sphere_limit: entries that the scene allows to the
-    lists of pairs and of their spheres. search_requested: 1 when the list may miss one of them. deepest: overlap of a
-    pair as a share of the distance at which its spheres touch.
+    lists of pairs and of their spheres. search_requested: 1 when the list may miss one of them.
+    deepest: overlap of a pair as a share of the distance at which its spheres touch.
     """
 
     def __init__(self, tables, state):

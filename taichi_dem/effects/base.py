@@ -9,7 +9,8 @@ tension   ``traction(stiffness, u, opening)`` [Pa], ``failed(u)``, ``stored(b, u
 shear     ``traction(stiffness, u, sliding, pressure)`` -> (traction [Pa], energy slipped away
           [J/m^2]), ``stored(b, u, sliding)``
 dashpot   ``traction(velocity)`` [Pa] of a contact unit
-load      ``acts_on(i)``, ``wrench(i, t, rotation)`` -> (force [N], torque about the centre [N m])
+load      ``acts_on(i)``, ``wrench(i, motion)`` -> (force [N], torque about the centre [N m]), from a
+          ``body_motion.BodyMotion``
 support   ``acts_on(i)``, ``held(i, t, rotation, velocity, angular_momentum)`` -> both, corrected
 contact   sphere contacts between broken faces      friction  their sliding
 

@@ -68,15 +68,15 @@ class GasPressure(Effect):
         return self.first[i + 1] - self.first[i]
 
     @ti.func
-    def wrench(self, i, t, rotation):
-        """Force [N] and torque about the centre [N m] on body i at time t [s]."""
-        pressure = pulse(self.law[0], self.law[1], self.law[2], t)
+    def wrench(self, i, motion):
+        """Force [N] and torque about the centre [N m] on body i in a motion."""
+        pressure = pulse(self.law[0], self.law[1], self.law[2], motion.time)
         force, torque = zero3(), zero3()
         for k in range(self.first[i], self.first[i + 1]):
             push = -pressure * self.area[k]
             force += push
             torque += self.arm[k].cross(push)
-        return rotation @ force, rotation @ torque
+        return motion.rotation @ force, motion.rotation @ torque
 
     def pressure_at(self, times):
         """Pressure [Pa] at an array of times [s], for pictures."""

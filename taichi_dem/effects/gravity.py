@@ -32,6 +32,6 @@ class Gravity(Effect):
         return 1
 
     @ti.func
-    def wrench(self, i, t, rotation):
+    def wrench(self, i, motion):
         """Force [N] and torque about the centre [N m] on body i."""
         return self.tables.mass[i] * vec3(self.law[0], self.law[1], self.law[2]), zero3()

@@ -244,13 +244,18 @@ def defer_fill(load, *arguments):
 
 def check_capacity():
     """Raise InputError when the session has no room for more fields."""
-    program = impl.get_runtime().prog
-    trees = program.get_snode_tree_size() if program is not None else 0
+    trees = tree_count()
     if trees > MOST_TREES:
         raise InputError(
             f"groups of fields in a Taichi session must stay below {MOST_TREES}, got {trees}: "
-            "call runtime.stop() and runtime.start() after some hundred simulations"
+            "call runtime.clear() after some hundred kinds of scenes"
         )
+
+
+def tree_count() -> int:
+    """Field trees of the session."""
+    program = impl.get_runtime().prog
+    return program.get_snode_tree_size() if program is not None else 0
 
 
 def field_bytes():

@@ -18,8 +18,8 @@ class RunSnapshot:
     """All of a run that changes: the fields on the device and what its owners hold beside them.
 
     identity: what two runs must share for one to go on from the other, words by name. memory: of
-    the fields, as ``FieldMemory`` or ``engine_pool.LoanMemory``. owners: by name, objects with ``saved()``, which gives arrays by
-    name, and ``resume(arrays)``, which takes them over.
+    the fields, as ``FieldMemory`` or ``engine_pool.LoanMemory``. owners: by name, objects with
+    ``saved()``, which gives arrays by name, and ``resume(arrays)``, which takes them over.
     """
 
     def __init__(self, identity, memory, owners):

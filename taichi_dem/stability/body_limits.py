@@ -7,6 +7,7 @@ listed, and their rates found anew at the start of the next substep.
 import numpy as np
 import taichi as ti
 
+from taichi_dem.effects.body_motion import BodyMotion
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.types import real
 from taichi_dem.stability.contact_limits import ContactLimits
@@ -250,13 +251,19 @@ class StabilityLimits:
         The larger one of now and a largest step ahead: a body does not leap into a load that sets
         in before its next update.
         """
-        push2 = 0.0
-        for e in ti.static(range(len(self.tables.loads))):
-            if self.tables.loads[e].acts_on(i):
-                for ahead in ti.static(range(2)):
-                    force, _ = self.tables.loads[e].wrench(
-                        i, now + ahead * self.rule[0], self.state.rotation[i]
-                    )
+        push2, step = 0.0, self.rule[0]
+        for ahead in ti.static(range(2)):
+            motion = BodyMotion(
+                position=self.state.position[i],
+                rotation=self.state.rotation[i],
+                velocity=self.state.velocity[i],
+                spin=self.state.spin[i],
+                time=now + ahead * step,
+                step=step,
+            )
+            for e in ti.static(range(len(self.tables.loads))):
+                if self.tables.loads[e].acts_on(i):
+                    force, _ = self.tables.loads[e].wrench(i, motion)
                     push2 = ti.max(push2, force.norm_sqr())
         return push2 * self.tables.mass_inverse[i] ** 2
 

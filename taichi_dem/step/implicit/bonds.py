@@ -23,10 +23,11 @@ class BondDashpots:
     need not be stored.
 
     theta: where in the step dashpots take their velocity, and (1 - theta) / theta. refresh_every:
-    steps between two renewals of the blocks. colour_first: first place of each colour. index: of a bond in the order. bodies: master and
-    slave, -1 once released. branch: master's centre to slave's [m]. a, b, c: the block
-    (C'^-1 + G)^-1, C' = theta C, G the mobility of the pair. start: s0. last: the s1 that the
-    present y satisfies. Velocities in m/s, spins in rad/s, world.
+    steps between two renewals of the blocks. colour_first: first place of each colour. index: of a
+    bond in the order. bodies: master and slave, -1 once released. branch: from the master's centre
+    to the slave's [m].
+    a, b, c: the block (C'^-1 + G)^-1, C' = theta C, G the mobility of the pair. start: s0. last:
+    the s1 that the present y satisfies. Velocities in m/s, spins in rad/s, world.
     """
 
     constant_fields = ("theta", "refresh_every", "index", "colour_first")
