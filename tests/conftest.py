@@ -6,6 +6,7 @@
 import pytest
 
 from taichi_dem import InputError, runtime
+from taichi_dem.engine.engine import ENGINES
 from taichi_dem.kit.allocation import field_bytes, tree_count
 from taichi_dem.simulation import CPU_ONLY
 from tests import arch
@@ -46,11 +47,9 @@ def _is_full():
 
 
 @pytest.fixture
-def compiled_anew():
+def compiled_anew(monkeypatch):
     """Engines of this test alone: for constants of kernels that a test changes."""
-    runtime.clear()
-    yield
-    runtime.clear()
+    monkeypatch.setattr(ENGINES, "_engines", {})
 
 
 def _skipping():

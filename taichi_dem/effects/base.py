@@ -9,8 +9,8 @@ tension   ``traction(stiffness, u, opening)`` [Pa], ``failed(u)``, ``stored(b, u
 shear     ``traction(stiffness, u, sliding, pressure)`` -> (traction [Pa], energy slipped away
           [J/m^2]), ``stored(b, u, sliding)``
 dashpot   ``traction(velocity)`` [Pa] of a contact unit
-load      ``acts_on(i)``, ``wrench(i, motion)`` -> (force [N], torque about the centre [N m]), from a
-          ``body_motion.BodyMotion``
+load      ``acts_on(i)``, ``wrench(i, motion)`` -> (force [N], torque about the centre [N m]);
+          motion: a ``body_motion.BodyMotion``
 support   ``acts_on(i)``, ``held(i, t, rotation, velocity, angular_momentum)`` -> both, corrected
 contact   sphere contacts between broken faces      friction  their sliding
 
@@ -75,7 +75,7 @@ class Effect:
         if given is not None:
             self.__dict__["_given"] = vars(given)
 
-    def take(self, model):
+    def load_scene(self, model):
         """Load the numbers of the effect that this bound one stands for."""
         if self._count:
             assign(self.law, np.array(self.numbers(model.material), dtype=np.float64))

@@ -94,9 +94,16 @@ class BlastEngine(Engine):
             self.advance.solver.load(model, method)
         for driver in self.drivers.values():
             driver.load()
-        n, bonds = model.body_count, model.bond_count
-        room = Capacity(*self.capacity)
-        self.lengths = {room.bodies: n, room.faces: 4 * n, room.bonds: bonds, room.units: 3 * bonds}
+        self.lengths = self._lengths(model)
+
+    def _lengths(self, model):
+        """Entries that a scene uses by those that a field has."""
+        room, n = Capacity(*self.capacity), model.body_count
+        lengths = {room.bodies: n, room.faces: 4 * n}
+        lengths.update({room.bonds: model.bond_count, room.units: 3 * model.bond_count})
+        if model.has_contact:
+            lengths[room.spheres] = 4 * n * model.spheres.per_face
+        return lengths
 
     def accepts(self, model):
         """Whether no kernel has read a number of an effect that the scene gives another value."""

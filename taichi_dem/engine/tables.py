@@ -93,7 +93,7 @@ class Tables:
             self._load_spheres(model.spheres)
         for effect, given in self.matched(model):
             effect.stand_for(given)
-            effect.take(model)
+            effect.load_scene(model)
 
     def matched(self, model):
         """Pairs of an effect bound here and the one of a model that it stands for.

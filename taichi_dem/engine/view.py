@@ -5,6 +5,7 @@ from taichi.lang import impl
 from taichi.lang.matrix import MatrixField
 
 from taichi_dem.kit.allocation import array_of, assign, values
+from taichi_dem.kit.display import in_brief
 
 _OWN = ("taichi_dem", "ca_damper")
 
@@ -44,11 +45,19 @@ class PartView:
         return {name: FieldView(self._loan, (field,)) for name, field in found.items()}
 
     def __repr__(self):
-        return repr(self._part())
+        return in_brief(self._part(), f"part of a {self._loan.what}")
+
+    @property
+    def name(self) -> str:
+        """Name of the part; asked for also after its session has ended."""
+        return self._part().name
 
 
 class FieldView:
-    """A field of an engine on behalf of a simulation: entries of its scene, no room behind them."""
+    """A field of an engine on behalf of a simulation: entries of its scene, no room behind them.
+
+    As a NumPy array by ``to_numpy()``; single entries by index, as those of a field.
+    """
 
     def __init__(self, loan, path):
         self._loan, self._path = loan, path
@@ -86,6 +95,9 @@ class FieldView:
             whole = values(self.field)
             whole[: shape[0]] = value
             assign(self.field, whole)
+
+    def __repr__(self):
+        return in_brief(self, ".".join(map(str, self._path)), f"field of a {self._loan.what}")
 
     def __getitem__(self, index):
         field = self.field

@@ -59,12 +59,14 @@ class FieldTree:
         impl.get_runtime().initialize_fields_builder(self._builder)
         self._tree = self._builder.finalize(raise_warning=False)
         if impl.current_cfg().arch != ti.cuda:
-            _bases[self._tree.id] = _address(self._anchor) - _offset(self._anchor.snode.ptr)
+            address = _address(self._anchor) - _offset(self._anchor.snode.ptr)[1]
+            _base(self._builder.root.ptr)
+            _bases[self._builder.root.ptr.id] = address
 
     def memory(self) -> np.ndarray:
         """Array of all bytes of the tree, in place; on a CPU only."""
         size = self._builder.root.ptr.cell_size_bytes
-        return _array_at(_bases[self._tree.id], np.uint8, (size,))
+        return _array_at(_base(self._builder.root.ptr), np.uint8, (size,))
 
     def clear(self):
         """Set all fields to zero."""
@@ -73,18 +75,28 @@ class FieldTree:
 
     def destroy(self):
         """Give the memory back; the fields must not be used any more."""
-        _bases.pop(self._tree.id, None)
+        _bases.pop(self._builder.root.ptr.id, None)
         self._tree.destroy()
         self._tree = None
 
 
-#: Addresses of the trees of the session by their numbers.
+#: Addresses of the trees of the session by their roots, and the session's program.
 _bases: dict = {}
+_bases_of = None
+
+
+def _base(root) -> int:
+    """Address of a tree of the present session by its root; 0 for one that is no ``FieldTree``."""
+    global _bases_of
+    if _bases_of is not impl.get_runtime().prog:
+        _bases_of = impl.get_runtime().prog
+        _bases.clear()
+    return _bases.get(root.id, 0)
 
 
 def in_tree(field) -> bool:
     """Whether a field lies in a ``FieldTree``, on a CPU."""
-    return _first_scalar(field).snode.ptr.get_snode_tree_id() in _bases
+    return _base(_offset(_first_scalar(field).snode.ptr)[0]) != 0
 
 
 def array_of(field) -> np.ndarray:
@@ -103,8 +115,8 @@ def array_of(field) -> np.ndarray:
         entry = (field.n,) if field.ndim == 1 else (field.n, field.m)
         steps = (kind.itemsize,) if field.ndim == 1 else (field.m * kind.itemsize, kind.itemsize)
         shape, strides = shape + entry, strides + steps
-    base = _bases[first.get_snode_tree_id()]
-    return _array_at(base + _offset(first), kind, shape, strides)
+    root, offset = _offset(first)
+    return _array_at(_base(root) + offset, kind, shape, strides)
 
 
 def values(field) -> np.ndarray:
@@ -181,13 +193,13 @@ def _first_scalar(field):
     return field.get_scalar_field(*((0,) if field.ndim == 1 else (0, 0)))
 
 
-def _offset(node) -> int:
-    """Bytes from the beginning of its tree to a node."""
+def _offset(node) -> tuple:
+    """Root of the tree of a node, and bytes from the tree's beginning to the node."""
     offset = 0
     while node.parent is not None:
         offset += node.offset_bytes_in_parent_cell
         node = node.parent
-    return offset
+    return node, offset
 
 
 def _address(field) -> int:

@@ -51,7 +51,7 @@ def instructions(kernel):
 def counts(cls, *listed):
     before = field_bytes()
     sim = Simulation(Scene(pair(), CONCRETE, listed), Uniform())
-    kernel = Kernel(cls(sim.model, sim.state, sim.schedule, None))
+    kernel = Kernel(cls(sim.tables, sim.state, sim.schedule, None))
     return {
         "bytes": field_bytes() - before,
         "bond": instructions(kernel.bond),

@@ -137,7 +137,7 @@ class Parts:
         away = self.again.run(round(UNTIL / step)) - self.place
         simulation = self.again.simulation
         bonds = np.zeros((self.model.bond_count, 5))
-        simulation.energy_balance._read_bonds(bonds)
+        simulation.readings.bonds(bonds)
         return {
             "moved": {name: away[of] for name, of in self.bodies.items()},
             "broken_s": self.state.broken_tick.to_numpy() / MACRO_TICKS * step,
