@@ -1,13 +1,8 @@
-"""What the demonstrations of the blast share: several solids in one scene, and their caption."""
-
-import os
-import textwrap
+"""What the demonstrations of the blast share: several solids in one scene, and their motion."""
 
 import numpy as np
 
-from _cli import print_figures, write_summary
 from taichi_dem import checked_mesh
-from taichi_dem.kit.files import write_text
 
 
 def placed_together(parts):
@@ -28,16 +23,8 @@ def placed_together(parts):
     return checked_mesh(np.vstack(points), np.vstack(tetrahedra), joined)
 
 
-def conclude(options, name, figures, caption, simulations):
-    """Write summary.json and caption.txt; print the figures and the caption."""
-    write_summary(
-        options.out,
-        name,
-        figures,
-        compile_seconds=sum(made.compile_seconds for made in simulations),
-        run_seconds=sum(made.run_seconds for made in simulations),
-    )
-    write_text(os.path.join(options.out, "caption.txt"), caption + "\n")
-    print_figures(figures)
-    print("\n" + textwrap.fill(caption, 100))
-    print(f"\nPictures and tables are in {options.out}")
+def set_moving(simulation, velocity, moved=0.0):
+    """Begin with a velocity (n, 3) [m/s] and displacements (n, 3) [m] of all bodies, unturned."""
+    centre = simulation.model.centre
+    turn = np.tile([1.0, 0.0, 0.0, 0.0], (len(centre), 1))
+    simulation.state.set_motion(centre + moved, turn, velocity)

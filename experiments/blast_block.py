@@ -26,21 +26,11 @@ import time
 
 import numpy as np
 
-from _blast import paper_effects
-from _cli import (
-    BLAST_DRIVERS,
-    add_checkpoints,
-    checkpoint_of,
-    figure,
-    main,
-    number,
-    parser,
-    print_figures,
-    whole,
-    write_summary,
-)
+from _blast import blast_parser, paper_effects, print_quality
+from _cli import add_checkpoints, checkpoint_of, figure, main, number, whole
 from _deep_block import has_gmsh, made_block, stacked_block
-from taichi_dem import CONCRETE, ImplicitDashpots, Scene, plot, quality_report, read_mesh, simulate
+from _report import finish, take_defaults
+from taichi_dem import CONCRETE, ImplicitDashpots, Scene, plot, read_mesh, simulate
 from taichi_dem.kit.allocation import field_bytes
 from taichi_dem.kit.files import output_folder, write_csv
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREY, picture
@@ -65,9 +55,10 @@ LINES = 10
 
 def options_parser():
     """Options of this experiment."""
-    made = parser(NAME, __doc__, BLAST_DRIVERS)
+    made = blast_parser(NAME, __doc__)
+    # Without it, Gmsh makes one.
+    made.set_defaults(mesh=None)
     made.add_argument("--tetrahedra", type=whole(2000, 2000000), help="about how many, 20000")
-    made.add_argument("--mesh", help="a mesh of one's own, with a face group hole along z")
     made.add_argument("--until", type=number(0, 1), help="simulated time [s], 1e-3")
     made.add_argument("--samples", type=whole(1, 1000000), help="rows of the time series, 200")
     made.add_argument("--frames", type=whole(1, 10000), help="snapshots, 10")
@@ -106,25 +97,17 @@ class Lines:
 
     def _say(self, progress, now):
         (time_s, seconds), (time_before, before) = now, self.last
-        step_ms = 1e3 * (seconds - before) * STEP / (time_s - time_before)
-        left = time_left(seconds_left(step_ms, progress))
-        print(f"t = {1e3 * time_s:.3f} ms, {step_ms:.3g} ms a step, {left}, {memory()}", flush=True)
-
-
-def seconds_left(step_ms, progress):
-    """Seconds until the end at the present time per step."""
-    return 1e-3 * step_ms * (progress.until_s - progress.time_s) / STEP
+        step_s = (seconds - before) * STEP / (time_s - time_before)
+        left = time_left(step_s * (progress.until_s - time_s) / STEP)
+        words = f"t = {1e3 * time_s:.3f} ms, {1e3 * step_s:.3g} ms a step, {left}"
+        fields = f"{1e-6 * field_bytes():.0f} MB of fields"
+        print(f"{words}, {fields}, {memory_mb():.0f} MB in all", flush=True)
 
 
 def memory_mb():
     """Most memory that the process has taken so far [MB]."""
     size = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return size / (1e6 if sys.platform == "darwin" else 1e3)
-
-
-def memory():
-    """Memory in words: fields of the simulation, and the whole process."""
-    return f"{1e-6 * field_bytes():.0f} MB of fields, {memory_mb():.0f} MB in all"
 
 
 def peaks(result):
@@ -156,25 +139,17 @@ def picture_peaks(path, distance, speed, inner, law):
     """Peak speed of every body over its distance from the hole, and the power law."""
     slope, level = law
     with picture(path, size=(6.6, 4.6)) as (_, axes):
-        for chosen, colour, words in (
-            (~inner, GREY, "bodies nearer to a free side"),
-            (inner, BLUE, "bodies nearer to the hole"),
-        ):
-            size = {"s": 4, "alpha": 0.4, "linewidths": 0, "color": colour}
-            axes.scatter(distance[chosen], speed[chosen], label=words, **size)
+        look = {"s": 4, "alpha": 0.4, "linewidths": 0}
+        for chosen, colour, side in ((~inner, GREY, "a free side"), (inner, BLUE, "the hole")):
+            words = f"bodies nearer to {side}"
+            axes.scatter(distance[chosen], speed[chosen], color=colour, label=words, **look)
         ends = np.array([FROM_RADII, distance[inner].max()])
-        axes.plot(ends, level * ends**slope, color=BLACK, label=f"power {slope:.2f} (fitted)")
-        start = level * ends[0] ** slope
-        axes.plot(
-            ends,
-            start * (ends / ends[0]) ** -0.5,
-            ":",
-            color=BLACK,
-            label="power -0.5 (cylindrical wave)",
-        )
-        axes.set(
-            xscale="log", yscale="log", xlabel="distance from the axis / radius of the hole [1]"
-        )
+        fit, wave = level * ends**slope, (ends / ends[0]) ** -0.5
+        axes.plot(ends, fit, color=BLACK, label=f"power {slope:.2f} (fitted)")
+        words = "power -0.5 (cylindrical wave)"
+        axes.plot(ends, fit[0] * wave, ":", color=BLACK, label=words)
+        axes.set(xscale="log", yscale="log")
+        axes.set(xlabel="distance from the axis / radius of the hole [1]")
         axes.set(ylabel="peak particle velocity [m/s]")
         positive = speed[speed > 0.0]
         axes.set_ylim(0.5 * np.percentile(positive, 0.1), 2.0 * positive.max())
@@ -204,11 +179,9 @@ def figures_of(result, law, step_ms):
 
 def run(options):
     """Run, picture, print."""
-    for name, value in (QUICK if options.quick else FULL).items():
-        if getattr(options, name) is None:
-            setattr(options, name, value)
+    take_defaults(options, FULL, QUICK)
     scene = Scene(mesh_of(options), CONCRETE, paper_effects())
-    print("\n".join(str(quality_report(scene.mesh, scene.material)).splitlines()[:7]))
+    print_quality(scene)
     with ProgressBar("blasting") as bar:
         result = simulate(
             scene,
@@ -228,11 +201,8 @@ def run(options):
     report = result.report
     figures = figures_of(result, law, 1e3 * report.run_cpu_seconds / report.substeps)
     figures["picture_seconds"] = figure(time.perf_counter() - started, "s")
-    seconds = {"compile_seconds": report.compile_seconds, "run_seconds": report.run_seconds}
-    write_summary(options.out, NAME, figures, **seconds)
     print(f"\n{report}\n")
-    print_figures(figures)
-    print(f"\nPictures, tables and the ParaView series are in {options.out}: see cracks.png first")
+    finish(options, NAME, figures, [report], see="cracks.png")
 
 
 def show(result, folder, distance, speed, inner, law):

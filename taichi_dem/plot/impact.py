@@ -1,8 +1,7 @@
 """A fragment hits a bar: bodies by their step, motion of the ends, evaluations of each method.
 
-An impact has: name (of its method), simulation, frames, time [s], struck and far [m] (displacements
-of the bar's ends), levels
-(frames, bodies), evaluations and broken; one entry a frame.
+An impact has: name (of its method), result, model, frames, time [s], struck and far [m]
+(displacements of the bar's ends), levels (frames, bodies) and evaluations; one entry a frame.
 """
 
 import matplotlib
@@ -85,7 +84,7 @@ class _Block:
     """Bar and fragment from the side, coloured by level, displacement magnified."""
 
     def __init__(self, axes, impact, top):
-        self.impact, self.model, self.view = impact, impact.simulation.model, View()
+        self.impact, self.model, self.view = impact, impact.model, View()
         flat = self.view.project(self.model.mesh.points)
         low, high = flat.min(axis=0), flat.max(axis=0)
         axes.set(xlim=(low[0] - 0.08, high[0] + 0.02), ylim=(low[1] - 0.03, high[1] + 0.03))
@@ -99,13 +98,11 @@ class _Block:
         self.drawn = PolyCollection([], cmap=shades, norm=norm, linewidth=0.25, edgecolor=GREY)
         axes.add_collection(self.drawn)
         self.axes, self.name = axes, styles_of([impact.name])[impact.name].label
-        self.broken_tick = impact.simulation.state.broken_tick.to_numpy()[: self.model.bond_count]
-        self.tick = impact.simulation.schedule.tick_seconds
 
     def show(self, row):
         """Show a frame by its number."""
         frame, impact = self.impact.frames[row], self.impact
-        broken = (self.broken_tick >= 0) & (self.broken_tick * self.tick <= frame.time_s)
+        broken = impact.result.broken_time <= frame.time_s
         corners = displaced(self.model, frame, _MAGNIFY)
         polygons, body, _ = surface(self.model.topology, self.view, corners, broken)
         self.drawn.set_verts(polygons)

@@ -1,7 +1,7 @@
 """Runs with steps that are too large: energy from nowhere, and what a block looks like then.
 
 A run has: limit (what sets it), share (of the limit), step [s], time [s] and residual (over the
-energy put in by then), simulation, frames, speeds (of the bodies' corners [m/s], (frames,
+energy put in by then), model, frames, speeds (of the bodies' corners [m/s], (frames,
 bodies)), sentence (of its end; "" when it ended well).
 """
 
@@ -105,7 +105,7 @@ class _Block:
 
     def __init__(self, figure, place, below, made, fastest):
         axes, speeds = figure.add_subplot(place), figure.add_subplot(below)
-        self.made, self.model, self.view = made, made.simulation.model, View(_AXIS)
+        self.made, self.model, self.view = made, made.model, View(_AXIS)
         self.whole = np.zeros(self.model.bond_count, dtype=bool)
         flat = self.view.project(self.model.mesh.points)
         low, high = flat.min(axis=0), flat.max(axis=0)

@@ -28,7 +28,7 @@ LAYERS = {
         ("diagnostics",),
         ("engine",),
         ("simulation",),
-        ("output", "measured_speedup"),
+        ("output", "measured_speedup", "observers"),
         ("plot",),
         ("result",),
         ("simulate", "needed_effects"),
