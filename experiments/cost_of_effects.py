@@ -19,20 +19,12 @@ import sys
 
 import numpy as np
 
-from _cli import (
-    figure,
-    main,
-    number,
-    parser,
-    print_figures,
-    print_table,
-    whole,
-    write_summary,
-)
+from _cli import figure, main, number, parser, whole
 from _damper_response import distance
 from _effects_jobs import Job, run_all
 from _effects_picture import picture_effects
-from taichi_dem.kit.files import output_folder, write_csv
+from _report import finish, show_rows, take_defaults, write_rows
+from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 
 NAME = "cost_of_effects"
@@ -81,6 +73,7 @@ COSTS = (
     *("spared_percent", "spared_least_percent", "spared_most_percent"),
     *("memory_MB", "before_first_step_s", "compiled_kB"),
 )
+HIDDEN = ("group", "failed", "run_s", "spared_least_percent", "spared_most_percent")
 
 
 def options_parser():
@@ -93,35 +86,27 @@ def options_parser():
 
 def run(options):
     """Measure, then write and print."""
-    for name, value in (QUICK if options.quick else FULL).items():
-        if getattr(options, name, None) is None:
-            setattr(options, name, value)
+    take_defaults(options, FULL, QUICK)
     output_folder(options.out)
     jobs = [*blast_jobs(options), *damper_jobs(options), absent_job(options)]
     workers = options.threads or min(2, os.cpu_count() or 1)
     with ProgressBar("measuring") as bar:
         seconds = run_all(jobs, options.repeats, workers, options.arch, bar)
     blast, damper = blast_rows(jobs), damper_rows(jobs)
-    figures = figures_of(jobs, blast, damper)
-    write_rows(os.path.join(options.out, "blast.csv"), blast)
-    write_rows(os.path.join(options.out, "damper.csv"), damper)
+    write_rows(options.out, "blast.csv", blast)
+    write_rows(options.out, "damper.csv", damper)
     picture(blast, damper, os.path.join(options.out, "effects.png"))
-    compiling = sum(job.first.get("compile_s", 0.0) for job in jobs)
-    write_summary(options.out, NAME, figures, compile_seconds=compiling, run_seconds=seconds)
     show(blast, "The blast: hole's displacement [mm] and broken faces")
     show(damper, "The damper: peak of the response [mm]; first rows: what two seeds may differ by")
-    print()
-    print_figures(figures)
-    print(f"\nThe picture and the tables are in {options.out}")
+    compiling = sum(job.first.get("compile_s", 0.0) for job in jobs)
+    finish(options, NAME, figures_of(jobs, blast, damper), [], seconds=(compiling, seconds))
 
 
 def picture(blast, damper, path):
     """Bars: what an effect costs, and what changes without it."""
-    parts = [
-        ("Blast of the paper's block", verdicts(blast, ("blast",)), _chance(blast) or 0.0),
-        ("Damper, spheres", verdicts(damper, ("spheres",)), _floor(damper, "spheres")),
-        ("Damper, automaton", verdicts(damper, ("automaton",)), _floor(damper, "automaton")),
-    ]
+    parts = [("Blast of the paper's block", verdicts(blast, "blast"), _chance(blast) or 0.0)]
+    for group in ("spheres", "automaton"):
+        parts.append((f"Damper, {group}", verdicts(damper, group), _floor(damper, group)))
     picture_effects(path, parts)
 
 
@@ -246,13 +231,13 @@ def _cost_row(job, complete):
     }
 
 
-def verdicts(rows, groups):
-    """(name, cost [%] with its least and most, change [%]) for each effect of some groups."""
+def verdicts(rows, group):
+    """(name, cost [%] with its least and most, change [%]) for each effect of a group."""
     found = []
     for row in rows:
         name = row["scene"].replace("without ", "")
         alone = row["scene"].startswith("without ") or name in VARIANTS
-        if row["group"] in groups and alone and not row["failed"]:
+        if row["group"] == group and alone and not row["failed"]:
             costs = [row[f"spared_{key}percent"] for key in ("", "least_", "most_")]
             if name in ADDED:
                 name, costs = f"{name} (added)", [-costs[0], -costs[2], -costs[1]]
@@ -295,27 +280,19 @@ def _add(figures, name, row, complete):
     figures[f"{name}_{what}_change_percent"] = figure(row["change_percent"], "%")
 
 
-def write_rows(path, rows):
-    """CSV with a column for every key."""
-    write_csv(path, {key: [row[key] for row in rows] for key in rows[0]})
-
-
 def show(rows, title):
     """Print the rows that did not fail, and why the others did."""
-    hidden = ("group", "failed", "run_s", "spared_least_percent", "spared_most_percent")
-    names = [name for name in rows[0] if name not in hidden]
-    cells = [[_cell(row[name]) for name in names] for row in rows]
     print(f"\n{title}")
-    print_table(cells, names)
+    names = [name for name in rows[0] if name not in HIDDEN]
+    cells = [{name: _cell(row[name]) for name in names} for row in rows]
+    show_rows(cells, {name: (name, "") for name in names})
     for row in rows:
         if row["failed"]:
             print(f"{row['scene']}: {row['failed']}")
 
 
 def _cell(value):
-    if value is None:
-        return "-"
-    return value if isinstance(value, (str, int)) else f"{value:.3g}"
+    return value if isinstance(value, (str, int, type(None))) else f"{value:.3g}"
 
 
 if __name__ == "__main__":
