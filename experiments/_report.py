@@ -48,18 +48,16 @@ def figures_from(row, units, name="{}"):
     return {name.format(key): figure(row[key], unit) for key, unit in units.items()}
 
 
-def finish(options, name, figures, reports, caption="", wall_s=None, see="", seconds=None):
+def finish(options, name, figures, reports, caption="", see="", seconds=None):
     """Write summary.json, and caption.txt where there is a caption; print both.
 
-    reports: of all runs, or their simulations. wall_s: of the whole job, instead of stepping.
-    see: the picture to look at first. seconds: of compiling and of running, instead of theirs.
+    reports: of all runs. see: the picture to look at first. seconds: of compiling and of running,
+    instead of those of the reports.
     """
     compiling, running = seconds or (
         sum(one.compile_seconds for one in reports),
         sum(one.run_seconds for one in reports),
     )
-    if wall_s is not None:
-        running = wall_s - compiling
     write_summary(options.out, name, figures, compile_seconds=compiling, run_seconds=running)
     print_figures(figures)
     if caption:
