@@ -23,8 +23,8 @@ def placed_together(parts):
     return checked_mesh(np.vstack(points), np.vstack(tetrahedra), joined)
 
 
-def set_moving(simulation, velocity, moved=0.0):
-    """Begin with a velocity (n, 3) [m/s] and displacements (n, 3) [m] of all bodies, unturned."""
+def set_moving(simulation, velocity, moved=0.0, spin=None):
+    """Begin with a velocity [m/s], displacement [m] and spin [rad/s] of all bodies, (n, 3) each."""
     centre = simulation.model.centre
     turn = np.tile([1.0, 0.0, 0.0, 0.0], (len(centre), 1))
-    simulation.state.set_motion(centre + moved, turn, velocity)
+    simulation.state.set_motion(centre + moved, turn, velocity, spin)
