@@ -16,6 +16,36 @@ PRESSURES = (0.0, 5e6, 10e6, 15e6)
 SLID = (220e-6, 150e-6, 300e-6)
 PAPER = {"peak_MPa": 6.66, "failure_opening_um": 29.93, "energy_J_m2": 99.67}
 FRAMES = 40
+TABLE = {
+    "quantity": ("name", ""),
+    "measured": ("measured", ".4f"),
+    "law": ("law", ".4f"),
+    "unit": ("unit", ""),
+    "difference": ("error", "+.3f%"),
+}
+
+
+def ways():
+    """Corners of every specimen's way (corners, 2) [m]: opening and sliding; all begin at rest."""
+    made = [np.array([(0.0, 0.0), *((opening, 0.0) for opening in PULLED)])]
+    for pressure in PRESSURES:
+        closed = -pressure / CONCRETE.normal_stiffness
+        made.append(np.array([(0.0, 0.0), (closed, 0.0), *((closed, way) for way in SLID)]))
+    return made
+
+
+def velocities(corners, steps, step):
+    """Velocity of every step (steps, 2) [m/s] at an even pace along a way, corners to the step."""
+    legs = np.diff(corners, axis=0)
+    reached = np.cumsum(np.linalg.norm(legs, axis=1))
+    counts = np.diff(np.round(steps * reached / reached[-1]).astype(int), prepend=0)
+    legs, counts = legs[counts > 0], counts[counts > 0]
+    return np.repeat(legs / (counts[:, None] * step), counts, axis=0)
+
+
+def plans(steps, step):
+    """Velocities of every specimen at every step [s]."""
+    return [velocities(corners, steps, step) for corners in ways()]
 
 
 class Measured:

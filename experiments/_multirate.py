@@ -5,7 +5,8 @@ import os
 import numpy as np
 
 from _blast import level_shares
-from _report import figures_from, show_rows
+from _report import figures_from
+from taichi_dem import InputError
 from taichi_dem.kit.files import write_csv
 from taichi_dem.mesh.topology import faces_of_group
 
@@ -22,6 +23,16 @@ TABLE = {
 UNITS = {"evaluations": "1", "struck_um": "um", "broken_faces": "1", "residual": "1"}
 
 
+def check_speed(speed, gap, until):
+    """InputError for a fragment that does not cross a gap [m] in half of the time [s]."""
+    slowest = 2.0 * gap / until
+    if speed < slowest:
+        raise InputError(
+            f"speed must be at least {slowest:g} m/s, at which the fragment crosses its gap of "
+            f"{1e6 * gap:g} um in half of {until:g} s, got {speed:g}"
+        )
+
+
 class Impact:
     """A run of a method; an entry a frame.
 
@@ -32,8 +43,8 @@ class Impact:
     def __init__(self, name, result, costs):
         self.name, self.result, self.frames = name, result, result.frames
         self.model, self.time = result.model, result.history["time_s"]
-        self.evaluations, self.levels = np.array(costs.columns["evaluations"]), costs.levels
-        self.levels = np.array(self.levels)
+        self.evaluations = np.array(costs.columns["evaluations"])
+        self.levels = np.array(costs.levels)
         self.struck, self.far = self._moved("bar_right"), self._moved("bar_left")
 
     def _moved(self, group):
@@ -60,11 +71,6 @@ def compared(impacts, dt0):
         }
         for impact in impacts
     ]
-
-
-def show(rows):
-    """The methods as a table."""
-    show_rows(rows, TABLE)
 
 
 def figures_of(rows):

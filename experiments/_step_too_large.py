@@ -6,6 +6,7 @@ import numpy as np
 
 from _cli import figure
 from _report import show_rows, write_rows
+from taichi_dem import CONCRETE, quality_report
 from taichi_dem.kit.files import write_csv
 
 TABLE = {
@@ -16,6 +17,13 @@ TABLE = {
     "unexplained / put in": ("unexplained", ".2g"),
     "end": ("end", ""),
 }
+
+
+def longest_step(mesh, limit):
+    """Longest safe step of the worst body [s], by what sets it."""
+    report = quality_report(mesh, CONCRETE)
+    found = {"dashpots": report.dashpot_step_s, "springs": report.spring_step_s}
+    return float(found[limit].min())
 
 
 class Struck:

@@ -9,6 +9,7 @@ from _report import figures_from, write_rows
 from taichi_dem import CONCRETE, Every
 from taichi_dem.kit.files import write_csv
 from taichi_dem.plot.wave import film_spall, picture_spall, picture_wave
+from taichi_dem.simulate import run_simulation
 
 LENGTH = 4.0
 #: Bodies a cell; pictures of the film.
@@ -51,6 +52,13 @@ class Bars:
         bonds = np.flatnonzero(first != second)
         bonds = bonds[np.argsort(np.minimum(first, second)[bonds], kind="stable")]
         return bonds.reshape(self.shape[0], self.shape[1] - 1, -1)
+
+    def follow(self, simulation, until, progress):
+        """Step to the last look before a time [s]; returns itself, and the Report of the run."""
+        step, steps = simulation.method.dt0, self.when.steps
+        until = round(until / step) // steps * steps * step
+        looks = {"samples": 1, "progress": progress, "observers": [self]}
+        return self, run_simulation(simulation, until=until, **looks).report
 
     def __getattr__(self, name):
         names = ("time", "displacement", "velocity", "joints")

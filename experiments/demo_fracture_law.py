@@ -17,9 +17,9 @@ import sys
 
 import numpy as np
 
+import _fracture_law as law
 from _cli import main, parser, whole
 from _demo import placed_together
-from _fracture_law import PRESSURES, PULLED, SLID, Measured, caption, comparison, figures_of, write
 from _report import finish, show_rows
 from taichi_dem import CONCRETE, Every, Scene, Simulation, Uniform, effects
 from taichi_dem.kit.files import output_folder
@@ -28,8 +28,7 @@ from taichi_dem.mesh.mesh import group_area
 from taichi_dem.mesh.shapes import pair, single
 from taichi_dem.simulate import run_simulation
 
-NAME = "demo_fracture_law"
-QUICK, FULL = 1000, 5000
+NAME, QUICK, FULL = "demo_fracture_law", 1000, 5000
 EDGE, APART = 0.05, 0.2
 #: Bodies are driven, so the step decides only how finely the law is sampled.
 STEP = 1e-8
@@ -42,81 +41,59 @@ def options_parser():
     return made
 
 
-def ways():
-    """Corners of every specimen's way (corners, 2) [m]: opening and sliding; all begin at rest."""
-    made = [np.array([(0.0, 0.0), *((opening, 0.0) for opening in PULLED)])]
-    for pressure in PRESSURES:
-        closed = -pressure / CONCRETE.normal_stiffness
-        made.append(np.array([(0.0, 0.0), (closed, 0.0), *((closed, way) for way in SLID)]))
-    return made
-
-
-def velocities(corners, steps):
-    """Velocity of every step (steps, 2) [m/s] at an even pace along a way, corners to the step."""
-    legs = np.diff(corners, axis=0)
-    reached = np.cumsum(np.linalg.norm(legs, axis=1))
-    counts = np.diff(np.round(steps * reached / reached[-1]).astype(int), prepend=0)
-    legs, counts = legs[counts > 0], counts[counts > 0]
-    return np.repeat(legs / (counts[:, None] * STEP), counts, axis=0)
-
-
 def bench():
     """The scene of all specimens, each driven on its right."""
-    names = [f"specimen{k}" for k in range(1 + len(PRESSURES))]
-    mesh = placed_together({name: (pair(EDGE), (0, 0, APART * k)) for k, name in enumerate(names)})
+    names = {f"specimen{k}": k for k in range(1 + len(law.PRESSURES))}
+    mesh = placed_together({name: (pair(EDGE), (0, 0, APART * k)) for name, k in names.items()})
     drives = [effects.PrescribedMotion(f"{name}_right", (0.0, 0.0, 0.0)) for name in names]
     acting = [effects.Softening(), effects.ShearSlip(), effects.Fixed("left"), *drives]
     return Scene(mesh, CONCRETE, acting)
 
 
 class Bench:
-    """Observer that drives all specimens along their ways and reads their load cells.
+    """Observer that drives all specimens along their ways and reads their load cells."""
 
-    What the clamp gives the left body in a step is what the bond took from it at the step's start.
-    """
-
+    # The clamp gives the left body what the bond took from it at the start of the step.
     when = Every(steps=1)
 
     def __init__(self, simulation, steps):
         self.state, self.steps = simulation.state, steps
         self.drives = [one for one in simulation.model.supports if one.name == "prescribed_motion"]
-        self.plans = [velocities(corners, steps) for corners in ways()]
+        self.plans = law.plans(steps, STEP)
         self.moved, self.given = [], []
 
     def observe(self, view):
         """Read, and set the velocities of the next step."""
+        step = view.step
         for drive, plan in zip(self.drives, self.plans):
-            now, before = (plan[min(max(k, 0), self.steps - 1)] for k in (view.step, view.step - 1))
-            if view.step == 0 or not np.array_equal(now, before):
-                drive.motion[0], drive.motion[1] = now
+            if step == 0 or (step < self.steps and not np.array_equal(plan[step], plan[step - 1])):
+                drive.motion[0], drive.motion[1] = plan[step]
         displacement = self.state.position.to_numpy() - view.model.centre
         self.moved.append(displacement[1::2] - displacement[::2])
         self.given.append(self.state.load_impulse.to_numpy()[::2, :2])
 
 
 def measure(steps):
-    """Drive the bench; returns Measured, and the Report of the run."""
+    """Drive the bench; returns the measured curves and the Report of the run."""
     with ProgressBar("bench") as bar:
         simulation = Simulation(bench(), Uniform(STEP))
         cells = Bench(simulation, steps)
-        until = (steps + 1) * STEP
-        result = run_simulation(simulation, until=until, samples=1, progress=bar, observers=[cells])
+        looks = {"samples": 1, "progress": bar, "observers": [cells]}
+        result = run_simulation(simulation, until=(steps + 1) * STEP, **looks)
     traction = -np.diff(cells.given, axis=0) / (group_area(single(EDGE), "base") * STEP)
-    broken = round(result.broken_time[0] / STEP)
-    return Measured(np.array(cells.moved[:-1]), traction, broken), result.report
+    made = law.Measured(np.array(cells.moved[:-1]), traction, round(result.broken_time[0] / STEP))
+    return made, result.report
 
 
 def run(options):
     """Measure all specimens, compare with the law, picture."""
     steps = options.steps or (QUICK if options.quick else FULL)
-    output_folder(options.out)
+    folder = output_folder(options.out)
     made, report = measure(steps)
-    rows = comparison(made)
-    write(made, pair(EDGE).points, options.out)
-    formats = {key: (key, ".4f") for key in ("measured", "law")}
-    ends = {"unit": ("unit", ""), "difference": ("error", "+.3f%")}
-    show_rows(rows, {"quantity": ("name", ""), **formats, **ends})
-    finish(options, NAME, figures_of(rows), [report], caption(rows, steps))
+    rows = law.comparison(made)
+    law.write(made, pair(EDGE).points, folder)
+    show_rows(rows, law.TABLE)
+    finish(options, NAME, law.figures_of(rows), [report], law.caption(rows, steps))
 
 
 if __name__ == "__main__":

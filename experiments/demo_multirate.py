@@ -24,9 +24,9 @@ import numpy as np
 from _blast import Costs
 from _cli import BLAST_DRIVERS, main, number, parser
 from _demo import placed_together, set_moving
-from _multirate import Impact, caption, compared, figures_of, show, write
-from _report import finish
-from taichi_dem import CONCRETE, InputError, Multirate, Scene, Simulation, Uniform, effects
+from _multirate import TABLE, Impact, caption, check_speed, compared, figures_of, write
+from _report import finish, show_rows
+from taichi_dem import CONCRETE, Multirate, Scene, Simulation, Uniform, effects
 from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.plot_style import styles_of
 from taichi_dem.kit.progress.progress_bar import ProgressBar
@@ -84,16 +84,11 @@ def hit(name, until, options):
 def run(options):
     """Hit the bar with every method, compare, picture."""
     settings = QUICK if options.quick else FULL
-    slowest = 2.0 * GAP / settings["until"]
-    if options.speed < slowest:
-        raise InputError(
-            f"speed must be at least {slowest:g} m/s, at which the fragment crosses its gap of "
-            f"{1e6 * GAP:g} um in half of {settings['until']:g} s, got {options.speed:g}"
-        )
+    check_speed(options.speed, GAP, settings["until"])
     output_folder(options.out)
     impacts = [hit(name, settings["until"], options) for name in settings["methods"]]
     rows = compared(impacts, DT0)
-    show(rows)
+    show_rows(rows, TABLE)
     write(impacts, options.out)
     picture_impact(os.path.join(options.out, "blow.png"), impacts, DT0)
     film_impact(os.path.join(options.out, "blow.gif"), impacts[0], impacts[1], DT0, FRAMES)

@@ -19,18 +19,9 @@ import sys
 import _step_too_large as shown
 from _cli import main, number, parser
 from _report import finish
-from taichi_dem import (
-    CONCRETE,
-    At,
-    ProgressBar,
-    Scene,
-    SimulationDiverged,
-    Uniform,
-    effects,
-    quality_report,
-    simulate,
-)
+from taichi_dem import CONCRETE, At, Scene, SimulationDiverged, Uniform, effects, simulate
 from taichi_dem.kit.files import output_folder
+from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.plot.shaken import film_shaken, picture_energy
 from taichi_dem.simulation import macro_steps
@@ -60,17 +51,10 @@ def struck_bar(limit, peak):
     return Scene(bar(0.4, 0.1, (8, 2, 2)), CONCRETE, [blow, *damping])
 
 
-def longest_step(mesh, limit):
-    """Longest safe step of the worst body [s], by what sets it."""
-    report = quality_report(mesh, CONCRETE)
-    found = {"dashpots": report.dashpot_step_s, "springs": report.spring_step_s}
-    return float(found[limit].min())
-
-
 def strike(limit, share, peak):
     """Run the bar with a share of the limit as its step, to its end or as far as it goes."""
     scene = struck_bar(limit, peak)
-    step = share * longest_step(scene.mesh, limit)
+    step = share * shown.longest_step(scene.mesh, limit)
     made = shown.Struck(limit, share, step)
     made.when = At([step * mark for mark in marks(macro_steps(UNTIL[limit], step))])
     with ProgressBar(f"{share:g} x the limit of {limit}") as bar_shown:
@@ -94,7 +78,7 @@ def run(options):
     cases = (QUICK if options.quick else FULL).items()
     output_folder(options.out)
     runs = [strike(limit, share, options.peak) for limit, shares in cases for share in shares]
-    limits = {limit: longest_step(bar(0.4, 0.1, (8, 2, 2)), limit) for limit in UNTIL}
+    limits = {limit: shown.longest_step(bar(0.4, 0.1, (8, 2, 2)), limit) for limit in UNTIL}
     shown.print_runs(runs)
     shown.write(runs, options.out)
     picture_energy(os.path.join(options.out, "energy.png"), runs)

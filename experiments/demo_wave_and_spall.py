@@ -10,9 +10,8 @@ strength at depth lambda sigma_t / (2 s0): the stronger the pulse s0, the thinne
 
 The front rises over four cells of the test bar and the dashpots have a twentieth of their
 strength, so that neither the grid rings nor the pulse smears. The formula wants a steep front: at
-three times the strength the depth nears the front's length, and a bar breaks a cell too near its
-end (measured). Writes spall.gif, wave.png, spall.png, wave.csv, spall.csv and summary.json to
-results/demo_wave_and_spall/.
+three times the strength a bar breaks a cell too near its end (measured). Writes spall.gif,
+wave.png, spall.png, wave.csv, spall.csv and summary.json to results/demo_wave_and_spall/.
 """
 
 import sys
@@ -28,7 +27,6 @@ from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects
 from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.mesh.shapes import bar
-from taichi_dem.simulate import run_simulation
 
 NAME = "demo_wave_and_spall"
 WIDTH, CELLS = 0.1, 40
@@ -47,32 +45,23 @@ def options_parser():
     return made
 
 
-def follow(simulation, bars, cells, until, progress):
-    """Step to the last look before a time [s]; returns Bars, and the Report of the run."""
-    made, steps = Bars(bars, cells), Bars.when.steps
-    looks = {"samples": 1, "progress": progress, "observers": [made]}
-    until = round(until / STEP) // steps * steps * STEP
-    return made, run_simulation(simulation, until=until, **looks).report
-
-
 def push(cells, progress):
     """A weak push on the left end of an elastic bar."""
     load = effects.GasPressure("left", peak=1e4, rise=2e-4, decay_ratio=1.0)
     scene = Scene(bar(LENGTH, WIDTH, (cells, 1, 1)), CONCRETE, [load])
-    return follow(Simulation(scene, Uniform(STEP)), 1, cells, 2.6e-3, progress)
+    return Bars(1, cells).follow(Simulation(scene, Uniform(STEP)), 2.6e-3, progress)
 
 
 def spall(cells, ratios, speed, progress):
     """Bars with a pulse of each strength under way."""
     damping = {k: DAMPING * getattr(CONCRETE, k) for k in ("normal_damping", "shear_damping")}
-    shifts = enumerate(3 * WIDTH * np.arange(len(ratios)))
-    one = bar(LENGTH, WIDTH, (cells, 1, 1))
-    mesh = placed_together({f"bar{k}": (one, (0.0, 0.0, shift)) for k, shift in shifts})
+    one, places = bar(LENGTH, WIDTH, (cells, 1, 1)), range(len(ratios))
+    mesh = placed_together({f"bar{k}": (one, (0.0, 0.0, 3 * WIDTH * k)) for k in places})
     acting = [effects.Softening(), effects.BondDamping()]
     simulation = Simulation(Scene(mesh, replace(CONCRETE, **damping), acting), Uniform(STEP))
     lay_pulse(simulation, np.repeat(ratios, CELL * cells), speed)
     until = WATCHED * (FRONT + TAIL / 2.0) / speed
-    return follow(simulation, len(ratios), cells, until, progress)
+    return Bars(len(ratios), cells).follow(simulation, until, progress)
 
 
 def lay_pulse(simulation, ratio, speed):
@@ -104,8 +93,7 @@ def run(options):
     rows = made.spalled(ratios, speed, TAIL)
     show_rows(rows, TABLE)
     write(wave, made, rows, speed, options.out)
-    figures, words = figures_of(wave, rows, speed), caption(rows, wave)
-    finish(options, NAME, figures, [first, second], words)
+    finish(options, NAME, figures_of(wave, rows, speed), [first, second], caption(rows, wave))
 
 
 if __name__ == "__main__":
