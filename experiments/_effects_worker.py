@@ -6,7 +6,6 @@ The job names a function of this file and its arguments; what it measured is pri
 """
 
 import json
-import sys
 import time
 
 import numpy as np
@@ -16,6 +15,7 @@ from _cli import PAPER_BLOCK
 from _damper_response import OSCILLATOR
 from _demo import set_moving
 from _stripped import ByHand
+from _worker import read_job
 from ca_damper import Automaton, Batch, SceneTable, Spheres
 from taichi_dem import (
     CONCRETE,
@@ -112,14 +112,13 @@ def _elastic(cls):
     return lambda substeps: driver._run(1 << 60, substeps)
 
 
-def main(path):
+def main():
     """Do a job and print what it measured."""
-    with open(path, encoding="utf-8") as handle:
-        job = json.load(handle)
+    job = read_job()
     runtime.start(job["arch"], 1)
     work = {"blast": blast, "damper": damper, "absent": absent}[job["kind"]]
     print(json.dumps(work(**job["arguments"])))
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main()

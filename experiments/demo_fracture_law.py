@@ -19,13 +19,12 @@ import numpy as np
 
 import _fracture_law as law
 from _cli import main, parser, whole
-from _demo import placed_together
 from _report import finish, show_rows
 from taichi_dem import CONCRETE, Every, Scene, Simulation, Uniform, effects
 from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.mesh.mesh import group_area
-from taichi_dem.mesh.shapes import pair, single
+from taichi_dem.mesh.shapes import pair, placed_together, single
 from taichi_dem.simulate import run_simulation
 
 NAME, QUICK, FULL = "demo_fracture_law", 1000, 5000

@@ -23,14 +23,14 @@ import numpy as np
 
 from _blast import Costs
 from _cli import BLAST_DRIVERS, main, number, parser
-from _demo import placed_together, set_moving
+from _demo import set_moving
 from _multirate import TABLE, Impact, caption, check_speed, compared, figures_of, write
 from _report import finish, show_rows
 from taichi_dem import CONCRETE, Multirate, Scene, Simulation, Uniform, effects
 from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.plot_style import styles_of
 from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.mesh.shapes import bar
+from taichi_dem.mesh.shapes import bar, placed_together
 from taichi_dem.plot.impact import film_impact, picture_impact
 from taichi_dem.simulate import run_simulation
 

@@ -20,13 +20,13 @@ from dataclasses import replace
 import numpy as np
 
 from _cli import main, parser, whole
-from _demo import placed_together, set_moving
+from _demo import set_moving
 from _report import finish, show_rows
 from _wave_and_spall import CELL, LENGTH, TABLE, Bars, caption, figures_of, wave_speed, write
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects
 from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.mesh.shapes import bar
+from taichi_dem.mesh.shapes import bar, placed_together
 
 NAME = "demo_wave_and_spall"
 WIDTH, CELLS = 0.1, 40

@@ -14,6 +14,7 @@ from taichi_dem import (
     CONCRETE,
     Every,
     ImplicitDashpots,
+    Mesh,
     Multirate,
     Scene,
     Simulation,
@@ -23,7 +24,7 @@ from taichi_dem import (
 )
 from taichi_dem.mesh.contact_spheres import spheres_of_faces
 from taichi_dem.mesh.mesh import checked_mesh
-from taichi_dem.mesh.shapes import bar, pair, single
+from taichi_dem.mesh.shapes import bar, pair, placed_together, single
 from taichi_dem.mesh.topology import body_properties
 from taichi_dem.simulate import run_simulation
 
@@ -64,24 +65,18 @@ TOUCHING = {
 class Island:
     """Bodies that start with a displacement [m], a velocity [m/s] and a spin [rad/s], (n, 3)."""
 
-    points: np.ndarray
-    bodies: np.ndarray
+    mesh: Mesh
     shift: np.ndarray
     velocity: np.ndarray
     spin: np.ndarray
 
     @classmethod
-    def of(cls, *meshes, at=(0.0, 0.0, 0.0), shift=0.0, velocity=0.0, spin=0.0):
-        """Meshes side by side, each (mesh, offset [m]); the rest is broadcast to all bodies."""
-        points, bodies, count = [], [], 0
-        for mesh, offset in meshes:
-            points.append(mesh.points + offset + at)
-            bodies.append(mesh.tetrahedra + count)
-            count += len(mesh.points)
-        bodies = np.vstack(bodies)
-        motion = [np.broadcast_to(x, (len(bodies), 3)).astype(float) for x in (shift, velocity)]
-        turning = np.broadcast_to(spin, (len(bodies), 3)).astype(float)
-        return cls(np.vstack(points), bodies, *motion, turning)
+    def of(cls, *parts, at=(0.0, 0.0, 0.0), shift=0.0, velocity=0.0, spin=0.0):
+        """Parts side by side, each (mesh, offset [m]); the rest is broadcast to all bodies."""
+        placed = ((mesh, np.add(offset, at)) for mesh, offset in parts)
+        mesh = placed_together({str(k): part for k, part in enumerate(placed)})
+        shape = mesh.body_count, 3
+        return cls(mesh, *(np.broadcast_to(x, shape) for x in (shift, velocity, spin)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,7 +231,11 @@ def touching(name, until):
 
 def follow(islands, acting, method, until, material=CONCRETE):
     """Run islands by a method to a time [s]; returns a Track by island."""
-    mesh, slices = together(islands)
+    places = np.outer(range(len(islands)), (0.0, 0.0, APART))
+    meshes = {name: island.mesh for name, island in islands.items()}
+    mesh = placed_together({name: (meshes[name], at) for name, at in zip(islands, places)})
+    ends = np.cumsum([one.body_count for one in meshes.values()])
+    slices = {name: slice(e - meshes[name].body_count, e) for name, e in zip(islands, ends)}
     simulation = Simulation(Scene(mesh, material, acting), method)
     motion = {
         name: np.vstack([getattr(island, name) for island in islands.values()])
@@ -285,14 +284,3 @@ def _track(simulation, samples, part):
         compile_s=simulation.compile_seconds,
         warnings=simulation.step_resolution.findings(bodies),
     )
-
-
-def together(islands):
-    """One mesh of all islands in a row along z, and the slice of bodies of each by name."""
-    points, bodies, slices, count, first = [], [], {}, 0, 0
-    for k, (name, island) in enumerate(islands.items()):
-        points.append(island.points + np.array([0.0, 0.0, k * APART]))
-        bodies.append(island.bodies + count)
-        count, end = count + len(island.points), first + len(island.bodies)
-        slices[name], first = slice(first, end), end
-    return checked_mesh(np.vstack(points), np.vstack(bodies), {}), slices
