@@ -30,7 +30,7 @@ from _blast import blast_parser, paper_effects, print_quality
 from _cli import add_checkpoints, checkpoint_of, figure, main, number, whole
 from _deep_block import has_gmsh, made_block, stacked_block
 from _report import finish, take_defaults
-from taichi_dem import CONCRETE, ImplicitDashpots, Scene, plot, read_mesh, simulate
+from taichi_dem import CONCRETE, Every, ImplicitDashpots, Scene, plot, read_mesh, simulate
 from taichi_dem.kit.allocation import field_bytes
 from taichi_dem.kit.files import output_folder, write_csv
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREY, picture
@@ -80,28 +80,21 @@ def mesh_of(options):
 
 
 class Lines:
-    """Prints a line every tenth of the way: time per step, time left, memory; feeds a bar."""
+    """Observer that prints a line every tenth of the way: time per step, time left, memory."""
 
-    def __init__(self, bar):
-        self.bar, self.next_share, self.last = bar, 0.0, None
+    def __init__(self, until):
+        self.until, self.when, self.last = until, Every(time_s=until / LINES), (0.0, 0.0)
 
-    def __call__(self, progress):
-        """Take the progress of the run."""
-        self.bar(progress)
-        if progress.phase == "running" and progress.share >= self.next_share:
-            now = progress.time_s, progress.seconds
-            if self.last is not None and now[0] > self.last[0]:
-                self._say(progress, now)
-            self.last = now
-            self.next_share = progress.share + 1.0 / LINES
-
-    def _say(self, progress, now):
-        (time_s, seconds), (time_before, before) = now, self.last
-        step_s = (seconds - before) * STEP / (time_s - time_before)
-        left = time_left(step_s * (progress.until_s - time_s) / STEP)
-        words = f"t = {1e3 * time_s:.3f} ms, {1e3 * step_s:.3g} ms a step, {left}"
-        fields = f"{1e-6 * field_bytes():.0f} MB of fields"
-        print(f"{words}, {fields}, {memory_mb():.0f} MB in all", flush=True)
+    def observe(self, view):
+        """Print the line."""
+        now, (time_s, seconds) = (view.time_s, view.wall_seconds), self.last
+        if now[0] > time_s:
+            step_s = (now[1] - seconds) * STEP / (now[0] - time_s)
+            left = time_left(step_s * max(0.0, self.until - now[0]) / STEP)
+            words = f"t = {1e3 * now[0]:.3f} ms, {1e3 * step_s:.3g} ms a step, {left}"
+            fields = f"{1e-6 * field_bytes():.0f} MB of fields"
+            print(f"{words}, {fields}, {memory_mb():.0f} MB in all", flush=True)
+        self.last = now
 
 
 def memory_mb():
@@ -158,23 +151,23 @@ def picture_peaks(path, distance, speed, inner, law):
             handle.set_alpha(1.0)
 
 
-def figures_of(result, law, step_ms):
+def figures_of(result, law):
     """Figures for summary.json."""
-    report = result.report
-    return {
-        "tetrahedra": figure(report.body_count, "1"),
-        "broken_faces": figure(report.broken_faces, "1"),
-        "ppv_exponent": figure(None if np.isnan(law[0]) else law[0], "1"),
-        "hole_radial_displacement_mm": figure(
-            float(result.history["hole_radial_displacement_mm"][-1]), "mm"
-        ),
-        "ms_a_step": figure(step_ms, "ms"),
-        "seconds_per_simulated_ms": figure(1e-3 * step_ms * 1e-3 / STEP, "s"),
-        "memory_MB": figure(memory_mb(), "MB"),
-        "fields_MB": figure(1e-6 * field_bytes(), "MB"),
-        "ledger_residual_fraction": figure(report.energy_residual_fraction, "1"),
-        "linear_momentum_error": figure(report.linear_momentum_error, "1"),
+    report, history = result.report, result.history
+    step_ms = 1e3 * report.run_cpu_seconds / report.substeps
+    found = {
+        "tetrahedra": (report.body_count, "1"),
+        "broken_faces": (report.broken_faces, "1"),
+        "ppv_exponent": (None if np.isnan(law[0]) else law[0], "1"),
+        "hole_radial_displacement_mm": (float(history["hole_radial_displacement_mm"][-1]), "mm"),
+        "ms_a_step": (step_ms, "ms"),
+        "seconds_per_simulated_ms": (1e-6 * step_ms / STEP, "s"),
+        "memory_MB": (memory_mb(), "MB"),
+        "fields_MB": (1e-6 * field_bytes(), "MB"),
+        "ledger_residual_fraction": (report.energy_residual_fraction, "1"),
+        "linear_momentum_error": (report.linear_momentum_error, "1"),
     }
+    return {name: figure(*one) for name, one in found.items()}
 
 
 def run(options):
@@ -190,7 +183,8 @@ def run(options):
             driver=options.driver,
             samples=options.samples,
             frames=options.frames,
-            progress=Lines(bar),
+            progress=bar,
+            observers=[Lines(options.until)],
             output=options.out,
             **checkpoint_of(options),
         )
@@ -198,8 +192,7 @@ def run(options):
     distance, speed, inner = peaks(result)
     law = fitted(distance, speed, inner)
     show(result, options.out, distance, speed, inner, law)
-    report = result.report
-    figures = figures_of(result, law, 1e3 * report.run_cpu_seconds / report.substeps)
+    report, figures = result.report, figures_of(result, law)
     figures["picture_seconds"] = figure(time.perf_counter() - started, "s")
     print(f"\n{report}\n")
     finish(options, NAME, figures, [report], see="cracks.png")

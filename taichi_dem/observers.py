@@ -138,6 +138,11 @@ class RunView:
         """CPU time spent stepping so far [s]."""
         return self._parts[0].cpu_seconds()
 
+    @property
+    def wall_seconds(self) -> float:
+        """Wall time spent stepping so far [s]."""
+        return self._parts[0].running_seconds()
+
     def motion(self) -> dict:
         """Arrays of the bodies' motion by name, as ``State.motion`` gives them."""
         return {name: _locked(array) for name, array in self._parts[0].state.motion().items()}
