@@ -1,5 +1,6 @@
 """Observers of a run: objects that ``simulate`` calls on the way with a read-only view of it."""
 
+import inspect
 import math
 from dataclasses import dataclass
 from typing import Optional, Protocol, Union
@@ -179,10 +180,22 @@ def checked_observers(observers) -> tuple:
             raise InputError(
                 f"observers[{place}] must have a member when, an Every or an At, got {shown(when)}"
             )
-        if not callable(getattr(one, "observe", None)):
+        if not _takes_one(getattr(one, "observe", None)):
             got = shown(getattr(one, "observe", None))
             raise InputError(f"observers[{place}] must have a method observe(view), got {got}")
     return tuple(observers)
+
+
+def _takes_one(observe):
+    """Whether something can be called with a view; a method without its object cannot."""
+    try:
+        inspect.signature(observe).bind(None)
+    except TypeError:
+        return False
+    except ValueError:
+        # Functions of other languages may hide what they take.
+        return callable(observe)
+    return True
 
 
 class ObserverCalls:

@@ -136,6 +136,10 @@ class NoWhen:
         pass
 
 
+class BareClass(NoWhen):
+    when = Every(steps=1)
+
+
 class NoObserve:
     when = Every(steps=1)
 
@@ -147,6 +151,7 @@ class NoObserve:
         ([NoWhen()], r"observers\[0\] must have a member when, an Every or an At, got None"),
         ([Notes("often")], r"must have a member when, an Every or an At, got 'often'"),
         ([Notes(Every(steps=1)), NoObserve()], r"observers\[1\] must have a method observe"),
+        ([BareClass], r"observers\[0\] must have a method observe\(view\), got <function"),
         ([Notes(At((1.0,)))], r"times_s must lie in \[0, 8e-06\] s, got 1"),
         ([Notes(Every(time_s=1e-20))], "time_s must be at least 8e-12 for 1000000 calls"),
     ],
