@@ -32,15 +32,15 @@ def draw_bodies(axes, model, motion, values, *, magnify, limits, colours, broken
 class FilmedBodies:
     """Bodies of a film in a panel of their own, the displacement magnified, coloured by a value.
 
-    room: beside the bodies, to the left, right, below and above [m]. axis: towards the viewer.
+    margins: beside the bodies, to the left, right, below and above [m]. axis: towards the viewer.
     look: of the ``PolyCollection`` ``drawn``.
     """
 
-    def __init__(self, axes, model, magnify, room, axis=(0.0, 0.0, 1.0), **look):
+    def __init__(self, axes, model, magnify, margins, axis=(0.0, 0.0, 1.0), **look):
         self.axes, self.model, self.magnify, self.view = axes, model, magnify, View(axis)
         flat = self.view.project(model.mesh.points)
         low, high = flat.min(axis=0), flat.max(axis=0)
-        left, right, below, above = room
+        left, right, below, above = margins
         axes.set(xlim=(low[0] - left, high[0] + right), ylim=(low[1] - below, high[1] + above))
         axes.set_aspect("equal")
         axes.set_axis_off()
