@@ -9,13 +9,13 @@ digest of where the bodies are in the end, as JSON.
 import glob
 import json
 import os
-import sys
 import time
 
 import numpy as np
 import taichi as ti
 
 from _blast import METHODS, paper_effects
+from _worker import read_job
 from taichi_dem import CONCRETE, Scene, Simulation, effects, read_mesh, runtime
 from taichi_dem.kit.checkpoint import digest
 from taichi_dem.kit.field_memory import FieldMemory
@@ -98,10 +98,9 @@ def bandwidth(entries=1 << 24, repeats=5):
     return best
 
 
-def main(path):
+def main():
     """Do a job and print what it measured."""
-    with open(path, encoding="utf-8") as handle:
-        job = json.load(handle)
+    job = read_job()
     runtime.start(job["arch"], job["threads"])
     make, step = METHODS[job["method"]]
     scene = scene_of(job["mesh"], job["cells"])
@@ -122,4 +121,4 @@ def main(path):
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main()

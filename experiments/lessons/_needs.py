@@ -45,6 +45,37 @@ WORDS = {
     "friction": "friction of fragments",
 }
 
+#: Questions of the notebook, and what unfolds below them.
+QUESTIONS = {
+    "Pull gently, with 0.2 m/s. Which effects can you switch off, and how do you know?": (
+        "All but the dashpots. The table says *never acted*: without an effect that never "
+        "acted **not a bit** of the answer differs. Switch off fracture, slip, contact and "
+        "friction, and the change stays zero."
+    ),
+    "Pull with 2 m/s and switch off the contact. What do you see, what does the program say?": (
+        "The pieces pass through each other when the bar is pressed together. The run ends "
+        "without a word of error: **every figure looks fine**. Only the last row tells: "
+        "bodies overlap, *list it*. A program that stays silent here would be dangerous."
+    ),
+    "Switch off fracture. Why is contact then never missed?": (
+        "Nothing breaks, so nothing comes loose that could touch. Effects hang together: ask "
+        "for one, and others follow."
+    ),
+    "A hard pull makes the program warn of sphere dashpots. How wrong is it?": (
+        "By 0.2 %: so far do the bodies end elsewhere when the step is halved, and the "
+        "warning stays. Twice as long a step would be wrong by 2 %. A warning is a reason to "
+        "try a shorter step, and not yet an error."
+    ),
+    "Which effect is dear, and is it the one that matters most?": (
+        "Leave out one at a time and press the button. Dear and important are two things: "
+        "look at the share of the energy in the table, and at where the bodies end."
+    ),
+    "Fracture takes 2 % of the energy. Can it go?": (
+        "No. It *steers*: it takes little and decides where everything goes. The program "
+        "never drops such an effect because its energy is small, only because it never acted."
+    ),
+}
+
 
 @dataclass(frozen=True, eq=False)
 class Outcome:

@@ -106,20 +106,22 @@ class Recorder:
 
     def snapshot(self):
         """Keep the block as it is now."""
+        self.frames.append(self.frame())
+
+    def frame(self):
+        """The block as it is now, a Frame."""
         motion = self.state.motion()
         damage = np.zeros(max(1, self.model.bond_count))
         self.simulation.readings.damage(damage)
-        self.frames.append(
-            Frame(
-                time_s=self.simulation.time_s,
-                position=motion["position"],
-                rotation=motion["rotation"],
-                displacement=motion["position"] - self.model.centre,
-                velocity=motion["velocity"],
-                level=motion["level"],
-                damage=self._body_damage(damage),
-                bound=self.state.bound.to_numpy(),
-            )
+        return Frame(
+            time_s=self.simulation.time_s,
+            position=motion["position"],
+            rotation=motion["rotation"],
+            displacement=motion["position"] - self.model.centre,
+            velocity=motion["velocity"],
+            level=motion["level"],
+            damage=self._body_damage(damage),
+            bound=self.state.bound.to_numpy(),
         )
 
     def saved(self):

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 import _cli
+from _multirate import short_steps
+from _step_too_large import ended
 
 
 @pytest.mark.parametrize("blank", ["", None, math.nan, np.float64("nan")])
@@ -53,16 +55,15 @@ def test_a_summary_says_whether_its_run_was_quick_and_is_valid_json(
 def blow(levels):
     """A run of demo_multirate whose bar has bodies at 0.1, 0.4 and 0.7 m; the fragment at 0.95."""
     model = SimpleNamespace(centre=np.array([[x, 0.0, 0.0] for x in (0.1, 0.4, 0.7, 0.95)]))
-    return SimpleNamespace(levels=np.array(levels), simulation=SimpleNamespace(model=model))
+    return SimpleNamespace(levels=np.array(levels), model=model)
 
 
-def test_short_steps_of_the_blow_are_told_as_far_as_they_came(script):
-    demo = script("demo_multirate")
+def test_short_steps_of_the_blow_are_told_as_far_as_they_came():
     # From the end at 0.9 m to the body at 0.4 m; that at 0.7 m has gone back by a level.
-    words = demo.short_steps(blow([[0, 0, 0, 4], [0, 0, 3, 4], [0, 1, 2, 4]]))
+    words = short_steps(blow([[0, 0, 0, 4], [0, 0, 3, 4], [0, 1, 2, 4]]), 0.9)
     assert "run 0.50 of 0.9 m into the bar" in words and "50 % of the bodies" in words
     # Nothing is said of short steps where there were none.
-    assert "run" not in demo.short_steps(blow([[0, 0, 0, 4], [0, 0, 0, 2]]))
+    assert "run" not in short_steps(blow([[0, 0, 0, 4], [0, 0, 0, 2]]), 0.9)
 
 
 def ending(residual, sentence):
@@ -73,9 +74,8 @@ def ending(residual, sentence):
 
 
 @pytest.mark.parametrize(("residual", "words"), [(0.0123, "1.2 % of the"), (13.4, "13 times the")])
-def test_a_step_that_did_not_fail_is_not_said_to_have_failed(script, residual, words):
-    demo = script("demo_step_too_large")
-    done, failed = (demo.ended(ending(residual, said)) for said in ("", "diverged there"))
+def test_a_step_that_did_not_fail_is_not_said_to_have_failed(residual, words):
+    done, failed = (ended(ending(residual, said)) for said in ("", "diverged there"))
     assert words in done and words in failed
     assert "20 steps" in done and "20 steps" in failed
     assert '"diverged there"' in failed and '"' not in done and "shake" not in done
