@@ -1,4 +1,4 @@
-"""What all experiments share: options, exit codes, progress, summary.json."""
+"""Options, exit codes, tables and summary.json of all experiments."""
 
 import argparse
 import json
@@ -12,11 +12,11 @@ import sys
 
 import numpy as np
 
-# The experiments take the mesh from here, as they do all that they share.
+# The experiments import the mesh from here too.
 from taichi_dem import PAPER_BLOCK as PAPER_BLOCK
 from taichi_dem import Checkpoint, InputError, SimulationDiverged, runtime
 from taichi_dem.kit.checkpoint import Interrupted
-from taichi_dem.kit.files import write_text
+from taichi_dem.kit.files import write_csv, write_text
 from taichi_dem.kit.progress.lasting_output import lasting_output
 from taichi_dem.kit.validation import shown
 from taichi_dem.kit.version import __version__, taichi_version
@@ -42,36 +42,24 @@ class Parser(argparse.ArgumentParser):
 
 
 def number(low, high, *, open_low=True):
-    """Type of an option that is a number in a range; the range stands in the complaint."""
-    left = "(" if open_low else "["
-
-    def parse(text):
-        try:
-            value = float(text)
-        except ValueError:
-            value = math.nan
-        inside = low < value < high or (value == low and not open_low)
-        if not inside:
-            raise argparse.ArgumentTypeError(
-                f"must be a number in {left}{low:g}, {high:g}), got {shown(text)}"
-            )
-        return value
-
-    return parse
+    """Type of an option that is a number in a range; the complaint names the range."""
+    words = f"a number in {'(' if open_low else '['}{low:g}, {high:g})"
+    return _checked(float, words, lambda x: low < x < high or (x == low and not open_low))
 
 
 def whole(low, high):
     """Type of an option that is a whole number in a range."""
+    return _checked(int, f"a whole number from {low} to {high}", lambda x: low <= x <= high)
 
+
+def _checked(kind, words, allowed):
     def parse(text):
         try:
-            value = int(text)
+            value = kind(text)
         except ValueError:
-            value = low - 1
-        if not low <= value <= high:
-            raise argparse.ArgumentTypeError(
-                f"must be a whole number from {low} to {high}, got {shown(text)}"
-            )
+            value = None
+        if value is None or not allowed(value):
+            raise argparse.ArgumentTypeError(f"must be {words}, got {shown(text)}")
         return value
 
     return parse
@@ -127,6 +115,13 @@ def parser(name, description, drivers=()):
         made.add_argument("--driver", default=drivers[0], choices=drivers)
     made.add_argument("--threads", type=whole(1, 1024), default=None, help="CPU threads")
     return made
+
+
+def fill_in(options, values):
+    """Set the options that the command line left out to values by name."""
+    for name, value in values.items():
+        if getattr(options, name, None) is None:
+            setattr(options, name, value)
 
 
 def add_checkpoints(made):
@@ -201,29 +196,44 @@ def figure(value, unit, paper=None):
     return {"value": value, "unit": unit, "paper": paper}
 
 
+def finish(options, name, figures, runs, show=True):
+    """Write summary.json, print the figures if asked to, and where the output is.
+
+    runs: objects with compile_seconds and run_seconds, or both sums as a pair of numbers.
+    """
+    if not isinstance(runs, tuple):
+        pairs = [(made.compile_seconds, made.run_seconds) for made in runs]
+        runs = tuple(map(sum, zip(*pairs)))
+    write_summary(options.out, name, figures, compile_seconds=runs[0], run_seconds=runs[1])
+    if show:
+        print_figures(figures)
+    print(f"\nPictures and tables are in {options.out}")
+
+
+def write_rows(path, names, rows):
+    """Write rows of cells under names of columns, a sequence or words, as CSV."""
+    names = names.split() if isinstance(names, str) else names
+    columns = list(zip(*rows)) or [()] * len(names)
+    write_csv(path, dict(zip(names, columns)))
+
+
 def write_summary(folder, name, figures, *, compile_seconds, run_seconds):
     """Write summary.json: figures, machine, versions, seconds, command; see ``figure``.
 
     quick: whether the command asked for the smaller job, which the gallery's texts do not describe.
     """
     settings, arguments = runtime.settings(), sys.argv[1:]
+    machine = {"processor": processor(), "cores": os.cpu_count(), "arch": settings.arch}
     content = {
         "experiment": name,
         "figures": figures,
-        "machine": {
-            "processor": processor(),
-            "cores": os.cpu_count(),
-            "arch": settings.arch,
-            "threads": settings.threads,
-            "system": platform.platform(),
-        },
+        "machine": {**machine, "threads": settings.threads, "system": platform.platform()},
         "versions": versions(),
         "seconds": {"compile": compile_seconds, "run": run_seconds},
         "command": shlex.join([f"experiments/{name}.py", *arguments]),
         "quick": "--quick" in arguments,
     }
-    text = json.dumps(content, indent=1)
-    write_text(os.path.join(folder, "summary.json"), text)
+    write_text(os.path.join(folder, "summary.json"), json.dumps(content, indent=1))
 
 
 def processor():
