@@ -5,15 +5,17 @@ method is as good and the method's floor (what runs differ by that should not di
 below it: a single lucky run answers nothing.
 """
 
+import itertools
 import math
 import os
 from dataclasses import dataclass
 from typing import Optional
 
-from _cli import processor, versions
+import numpy as np
+
+from _cli import processor, versions, write_rows
 from _timing import Timing
 from taichi_dem import runtime
-from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.plot_style import GREY, picture, styles_of
 
 _SMALL = 6.5
@@ -59,26 +61,25 @@ def answers(points, target, floors):
     """
     methods = list(dict.fromkeys(point.method for point in points))
     found = [_answer(method, points, target, floors.get(method, 0.0)) for method in methods]
-    return sorted(found, key=_price)
-
-
-def _price(answer):
-    return answer.point.seconds.low if answer.point else math.inf
+    return sorted(found, key=lambda one: one.point.seconds.low if one.point else math.inf)
 
 
 def _answer(method, points, target, floor):
     if floor > target:
         return Answer(method, None, f"equal runs differ by {percent(floor)}")
-    reached = []
     own = sorted((point for point in points if point.method == method), key=lambda p: p.step)
-    for point in own:
-        # NaN, of a failure, is no error at all.
-        if not point.error <= target:
-            break
-        reached.append(point)
+    # NaN, of a failure, is no error at all.
+    reached = list(itertools.takewhile(lambda point: point.error <= target, own))
     if not reached:
         return Answer(method, None, f"{percent(own[0].error)} at its finest, {own[0].label}")
     return Answer(method, min(reached, key=lambda point: point.seconds.low))
+
+
+def cheapest(points, target, floors, method=None):
+    """Seconds and name of the cheapest method for an error, or of one method; None for neither."""
+    found = [a for a in answers(points, target, floors) if method in (None, a.method)]
+    point = found[0].point
+    return (point.seconds.low, point.method) if point else (None, None)
 
 
 def percent(share):
@@ -105,22 +106,20 @@ ANSWER_HEADER = ["I want", "take", "at a step of", "seconds", "evaluations", "er
 
 def write_points(path, points, floors):
     """CSV of everything a diagram shows; cells of what does not exist are empty."""
-    names = "method,step,label,error,floor,evaluations,seconds_low,seconds_median,seconds_high"
-    columns = {name: [] for name in [*names.split(","), "repeats", "residual", "failure"]}
+    names = "method step label error floor evaluations seconds_low seconds_median seconds_high"
+    rows = []
     for point in points:
         time = point.seconds
-        seconds = (time.low, time.median, time.high, time.count) if time else (math.nan,) * 4
+        seconds = (time.low, time.median, time.high, time.count) if time else [math.nan] * 4
         row = (point.method, point.step, point.label, point.error, floors.get(point.method, 0.0))
         row = (*row, point.evaluations, *seconds, point.residual, point.failure)
-        for name, value in zip(columns, row):
-            blank = isinstance(value, float) and math.isnan(value)
-            columns[name].append("" if blank else str(value))
-    write_csv(path, columns)
+        rows.append(["" if cell != cell else str(cell) for cell in row])
+    write_rows(path, f"{names} repeats residual failure", rows)
 
 
 def write_answers(path, rows):
     """The table of ``answer_rows`` as CSV."""
-    write_csv(path, dict(zip(ANSWER_HEADER, zip(*rows))))
+    write_rows(path, ANSWER_HEADER, rows)
 
 
 def machine_words():
@@ -175,7 +174,7 @@ def picture_work_precision(
         # Where a label has room is known when everything else has its place.
         figure.draw_without_rendering()
         for axis, cost in zip(axes, _COSTS):
-            _say_steps(axis, points, looks, cost)
+            _label_steps(axis, points, looks, cost)
 
 
 def picture_errors(path, errors, titles, *, time_name, caption):
@@ -226,12 +225,11 @@ def _draw_costs(axis, points, looks, cost, floors):
     for method, look in looks.items():
         good = _good(points, method)
         place = [cost_of(p, points, cost) for p in good]
-        errors = [p.error for p in good]
-        axis.plot(place, errors, label=method, **look)
+        axis.plot(place, [p.error for p in good], label=method, **look)
         if cost == "seconds" and good:
             spread = [[0.0] * len(good), [p.seconds.high - p.seconds.low for p in good]]
-            ends = {"xerr": spread, "ecolor": look["color"], "elinewidth": 1.0, "capsize": 2}
-            axis.errorbar(place, errors, fmt="none", **ends)
+            ends = {"ecolor": look["color"], "elinewidth": 1.0, "capsize": 2}
+            axis.errorbar(place, [p.error for p in good], xerr=spread, fmt="none", **ends)
         if floors.get(method):
             axis.axhline(floors[method], color=look["color"], ls=":", lw=1.0)
     if floors:
@@ -240,8 +238,11 @@ def _draw_costs(axis, points, looks, cost, floors):
 
 def _good(points, method):
     """Points with an error, coarse to fine; an error of zero has no place on a log scale."""
-    own = [p for p in points if p.method == method and p.error > 0.0]
-    return sorted(own, key=lambda p: -p.step)
+    return _coarse_first(p for p in points if p.method == method and p.error > 0.0)
+
+
+def _coarse_first(points):
+    return sorted(points, key=lambda p: -p.step)
 
 
 def _draw_ideal(axis, points, cost, order):
@@ -262,37 +263,29 @@ def _draw_ideal(axis, points, cost, order):
 
 def _draw_failures(axis, points, looks, cost):
     """Crosses along the top edge, a row a method; their height is no error."""
-    rows = {
-        m: sorted((p for p in points if p.method == m and p.failure), key=_coarse) for m in looks
-    }
-    rows = {method: own for method, own in rows.items() if own}
-    if not rows:
+    failed = [p for p in points if p.failure and p.method in looks]
+    if not failed:
         return
+    methods = [method for method in looks if any(p.method == method for p in failed)]
     bottom, top = axis.get_ylim()
     step = (top / bottom) ** 0.055
-    edge = top * step ** (len(rows) + 0.3)
+    edge = top * step ** (len(methods) + 0.3)
     axis.axhspan(top, edge, color="0.94", lw=0, label="× no result: its cost, but no error")
-    axis.set_ylim(bottom, edge)
-    widest = [cost_of(p, points, cost) for own in rows.values() for p in own]
+    widest = [cost_of(p, points, cost) for p in failed]
     left, right = axis.get_xlim()
-    axis.set_xlim(min(left, 0.8 * min(widest)), max(right, 1.25 * max(widest)))
-    for k, (method, own) in enumerate(rows.items()):
+    left, right = min(left, 0.8 * min(widest)), max(right, 1.25 * max(widest))
+    axis.set(xlim=(left, right), ylim=(bottom, edge))
+    for k, method in enumerate(methods):
+        own = _coarse_first(p for p in failed if p.method == method)
         level, colour = top * step ** (k + 0.65), looks[method]["color"]
         place = [cost_of(p, points, cost) for p in own]
         axis.plot(place, [level] * len(own), "x", color=colour, ms=6, mew=1.6)
         words = ", ".join(f"{p.label} {p.failure}" for p in own)
         # On the side where there is room for it.
-        left, right = axis.get_xlim()
         late = place[-1] ** 2 > left * right
         end, shift, side = (place[0], -7, "right") if late else (place[-1], 7, "left")
-        axis.annotate(
-            words, (end, level), (shift, -2.5), textcoords="offset points", fontsize=_SMALL,
-            color=colour, ha=side,
-        )  # fmt: skip
-
-
-def _coarse(point):
-    return -point.step
+        look = {"fontsize": _SMALL, "color": colour, "ha": side}
+        axis.annotate(words, (end, level), (shift, -2.5), textcoords="offset points", **look)
 
 
 def _draw_residuals(axis, points, looks, unit):
@@ -304,39 +297,38 @@ def _draw_residuals(axis, points, looks, unit):
     axis.xaxis.set_minor_formatter("")
 
 
-def _say_steps(axis, points, looks, cost):
+def _label_steps(axis, points, looks, cost):
     """Write every point's step beside it, where it covers least of what is there already."""
     good = [p for method in looks for p in _good(points, method)]
-    at = axis.transData.transform([(cost_of(p, points, cost), p.error) for p in good])
-    unit = axis.figure.dpi / 72.0
-    taken = [_box(x, y, 8.0 * unit, 8.0 * unit) for x, y in at]
-    inside = axis.get_window_extent()
-    frame = (inside.x0, inside.y0, inside.x1, inside.y1)
-    for (x, y), p in zip(at, good):
+    places = [(cost_of(p, points, cost), p.error) for p in good]
+    at, unit = axis.transData.transform(places), axis.figure.dpi / 72.0
+    taken = [_box(spot, 8.0 * unit, 8.0 * unit) for spot in at]
+    frame = axis.get_window_extent().get_points().ravel()
+    for spot, place, p in zip(at, places, good):
         wide, high = unit * (0.56 * _SMALL * len(p.label) + 1.0), unit * _SMALL
-        shifts = [
-            (r * (0.5 * wide + 4.0 * unit), u * (0.5 * high + 2.0 * unit)) for r, u in _PLACES
+        reach = 0.5 * wide + 4.0 * unit, 0.5 * high + 2.0 * unit
+        shifts = [np.multiply(reach, sides) for sides in _PLACES]
+        boxes = [_box(spot + shift, wide, high) for shift in shifts]
+        # What lies outside the frame counts twice.
+        hidden = [
+            _shared(box, taken).sum() + 2.0 * (wide * high - _shared(box, [frame])[0]) + 0.5 * k
+            for k, box in enumerate(boxes)
         ]
-        boxes = [_box(x + right, y + up, wide, high) for right, up in shifts]
-        k = min(range(len(boxes)), key=lambda k: _covered(boxes[k], taken, frame) + 0.5 * k)
+        k = int(np.argmin(hidden))
         taken.append(boxes[k])
-        shift = (shifts[k][0] / unit, shifts[k][1] / unit)
         look = {"fontsize": _SMALL, "color": looks[p.method]["color"], "ha": "center"}
-        place = (cost_of(p, points, cost), p.error)
+        shift = tuple(shifts[k] / unit)
         axis.annotate(p.label, place, shift, textcoords="offset points", va="center", **look)
 
 
-def _box(x, y, wide, high):
-    return x - 0.5 * wide, y - 0.5 * high, x + 0.5 * wide, y + 0.5 * high
+def _box(middle, wide, high):
+    """Left, bottom, right and top of a box."""
+    half = np.array([0.5 * wide, 0.5 * high])
+    return np.concatenate([middle - half, middle + half])
 
 
-def _covered(box, taken, frame):
-    """Area that a box shares with those taken, and what of it lies outside the frame, twice."""
-    area = (box[2] - box[0]) * (box[3] - box[1])
-    return sum(_shared(box, other) for other in taken) + 2.0 * (area - _shared(box, frame))
-
-
-def _shared(one, two):
-    wide = min(one[2], two[2]) - max(one[0], two[0])
-    high = min(one[3], two[3]) - max(one[1], two[1])
-    return max(0.0, wide) * max(0.0, high)
+def _shared(box, others):
+    """Area that a box shares with each of the others."""
+    others = np.array(others)
+    edges = np.minimum(box[2:], others[:, 2:]) - np.maximum(box[:2], others[:, :2])
+    return np.maximum(edges, 0.0).prod(axis=1)
