@@ -5,6 +5,7 @@ fields only on the thread that started it, and two starts would take each other'
 all work is handed to this thread, and what it has built is kept for whoever asks next.
 """
 
+import functools
 import threading
 from concurrent.futures import ThreadPoolExecutor
 
@@ -32,10 +33,19 @@ class Engine:
         return answer.result()
 
     def kept(self, key, make):
-        """What make() gave when it was first asked for under this key; on the engine's thread."""
+        """Result of make(), called once under a key; on the engine's thread."""
         if key not in self._kept:
             self._kept[key] = make()
         return self._kept[key]
+
+    def remember(self, work):
+        """Decorate a function so that it is called once with the same arguments, as by ``kept``."""
+
+        @functools.wraps(work)
+        def recall(*arguments):
+            return self.kept((work, *arguments), lambda: work(*arguments))
+
+        return recall
 
     def close(self):
         """End Taichi and the thread, after what has been asked for; another ask begins anew."""

@@ -1,6 +1,5 @@
 """Pictures of the lessons, as PNG in memory, in the common style; drawn on the engine's thread."""
 
-import io
 import textwrap
 
 import numpy as np
@@ -17,6 +16,7 @@ from taichi_dem.kit.plot_style import (
     GREY,
     RED,
     STYLES,
+    png_of,
     seconds,
     styled,
     styles_of,
@@ -29,12 +29,6 @@ _FILLING = STYLES["ca_static"].colour
 _MAGNIFY = 1500.0
 
 
-def _png(figure):
-    made = io.BytesIO()
-    figure.savefig(made, format="png", dpi=110)
-    return made.getvalue()
-
-
 def picture_time_step(answer):
     """The bar on its way, its far end over time, and error over cost of every step; PNG bytes."""
     with styled(0, size=(10.0, 6.0)) as (figure, _):
@@ -42,7 +36,7 @@ def picture_time_step(answer):
         _struck(figure, figure.add_subplot(grid[0, :]), answer)
         _far_end(figure.add_subplot(grid[1, 0]), answer)
         _price(figure.add_subplot(grid[1, 1]), answer)
-        return _png(figure)
+        return png_of(figure)
 
 
 def _struck(figure, axes, answer):
@@ -116,7 +110,7 @@ def picture_grains(answer):
         _response(figure.add_subplot(above[0]), answer)
         _energy(figure.add_subplot(above[1]), answer)
         _boxes(figure, grid[1].subgridspec(1, PICTURES), answer)
-        return _png(figure)
+        return png_of(figure)
 
 
 def _response(axes, answer):
@@ -175,7 +169,7 @@ def picture_needs(answer):
         figure.colorbar(drawn, ax=bars, label=words, location="bottom", aspect=50, pad=0.02)
         _step_price(figure.add_subplot(grid[0, 2]), answer)
         _broken(figure.add_subplot(grid[1, 2]), answer)
-        return _png(figure)
+        return png_of(figure)
 
 
 def _magnify(answer):
