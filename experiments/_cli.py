@@ -22,12 +22,7 @@ from taichi_dem.kit.validation import shown
 from taichi_dem.kit.version import __version__, taichi_version
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-_INTERVALS = {
-    "": "every_wall_s",
-    "s": "every_wall_s",
-    "steps": "every_steps",
-    "sim": "every_s",
-}
+_INTERVALS = {None: "every_wall_s", "s": "every_wall_s", "steps": "every_steps", "sim": "every_s"}
 BLAST_DRIVERS = ("auto", "resident", "parallel")
 #: Cells of a table that say nothing.
 BLANK = ("", "None", "nan")
@@ -67,7 +62,7 @@ def _checked(kind, words, allowed):
 
 def interval(text):
     """Type of an option that says how often: 600s on the wall, 5000steps, or 1e-5sim seconds."""
-    found = re.fullmatch(r"([0-9.]+(?:[eE][-+]?[0-9]+)?)(s|steps|sim|)", text)
+    found = re.fullmatch(r"([0-9.]+(?:[eE][-+]?[0-9]+)?)(s|steps|sim)?", text)
     try:
         unit = _INTERVALS[found[2]]
         value = int(found[1]) if unit == "every_steps" else float(found[1])
@@ -97,24 +92,21 @@ def several(kind):
 
 def parser(name, description, drivers=()):
     """Parser with the options every experiment has; drivers: to choose from, where there are."""
-    made = Parser(
-        prog=f"python experiments/{name}.py",
-        description=description,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
-    )
+    made = bare_parser(name, description)
     made.add_argument("--quick", action="store_true", help="a smaller job of under a minute")
-    made.add_argument(
-        "--out",
-        type=os.path.expanduser,
-        default=os.path.join("results", name),
-        help="folder for the output",
-    )
+    place = {"type": os.path.expanduser, "default": os.path.join("results", name)}
+    made.add_argument("--out", help="folder for the output", **place)
     made.add_argument("--arch", default="cpu", choices=runtime.ARCHITECTURES)
     if drivers:
         made.add_argument("--driver", default=drivers[0], choices=drivers)
     made.add_argument("--threads", type=whole(1, 1024), default=None, help="CPU threads")
     return made
+
+
+def bare_parser(name, description):
+    """Parser of a script without options."""
+    plain = {"formatter_class": argparse.RawDescriptionHelpFormatter, "allow_abbrev": False}
+    return Parser(prog=f"python experiments/{name}.py", description=description, **plain)
 
 
 def fill_in(options, values):
@@ -126,15 +118,10 @@ def fill_in(options, values):
 
 def add_checkpoints(made):
     """Add the options of a job that saves itself; see ``checkpoint_of``."""
-    made.add_argument(
-        "--checkpoint-every",
-        type=interval,
-        default={},
-        help="save the run every 600s on the wall, 5000steps or 1e-5sim simulated seconds",
-    )
-    made.add_argument(
-        "--resume", action="store_true", help="go on from what a run has saved in the same --out"
-    )
+    words = "save the run every 600s on the wall, 5000steps or 1e-5sim simulated seconds"
+    made.add_argument("--checkpoint-every", type=interval, default={}, help=words)
+    words = "go on from what a run has saved in the same --out"
+    made.add_argument("--resume", action="store_true", help=words)
 
 
 def checkpoint_of(options, name="checkpoint"):
@@ -165,25 +152,16 @@ def exit_code(work):
     may leave before its end (``| head -1``): the files are still written.
     """
     with lasting_output():
-        return _guarded(work)
-
-
-def _guarded(work):
-    try:
-        return work() or 0
-    except InputError as error:
-        return _say(error, 2)
-    except SimulationDiverged as error:
-        return _say(error, 3)
-    except Interrupted as error:
-        return _say(f"{error}: go on with --resume", 130)
-    except KeyboardInterrupt:
-        return _say("interrupted", 130)
-
-
-def _say(message, code):
-    print(" ".join(str(message).split()), file=sys.stderr)
-    return code
+        try:
+            return work() or 0
+        except (InputError, SimulationDiverged) as error:
+            code, words = (2 if isinstance(error, InputError) else 3), error
+        except Interrupted as error:
+            code, words = 130, f"{error}: go on with --resume"
+        except KeyboardInterrupt:
+            code, words = 130, "interrupted"
+        print(" ".join(str(words).split()), file=sys.stderr)
+        return code
 
 
 def figure(value, unit, paper=None):
@@ -268,14 +246,12 @@ def print_table(rows, header):
 
 def print_figures(figures):
     """Print the figures of summary.json, beside the paper's values where it gives any."""
-    header = ["figure", "value", "unit"]
-    rows = [[name, value_in_words(one["value"]), one["unit"]] for name, one in figures.items()]
-    papers = [one["paper"] for one in figures.values()]
-    if any(paper is not None for paper in papers):
-        header.append("paper")
-        for row, paper in zip(rows, papers):
-            row.append("" if paper is None else value_in_words(paper))
-    print_table(rows, header)
+    header, rows = ["figure", "value", "unit", "paper"], []
+    for name, one in figures.items():
+        paper = "" if one["paper"] is None else value_in_words(one["paper"])
+        rows.append([name, value_in_words(one["value"]), one["unit"], paper])
+    shown = 4 if any(row[3] for row in rows) else 3
+    print_table([row[:shown] for row in rows], header[:shown])
 
 
 def value_in_words(value):
