@@ -3,56 +3,50 @@
 import time
 
 from _bench_start import in_new_process
-from _timing import on_device, seconds_of
-from ca_damper import Automaton, Batch, SceneTable, Spheres, frequency_response
+from _timing import on_device
+from ca_damper import Automaton, Spheres, frequency_response
+from damper_cost import cycle_seconds, scenes
 
-FREQUENCY, BASE_AMPLITUDE = 6.0, 0.6e-3
 CELLS = 18 * 12
 NUMBERS = (1, 10, 20, 30, 40, 50, 60, 80, 100, 120)
+SOME = NUMBERS.index(50)
 
 
 def measure(quick):
     """Yield the figures of the damper: name, unit, values, bound."""
-    repeats = range(3 if quick else 7)
-    scan = OneScene(Automaton(traversal="scan"), NUMBERS, 1e-4)
-    rates = [1e-6 * CELLS / scan.step_seconds(50) for _ in repeats]
+    repeats, least = (3, 0.05) if quick else (7, 0.2)
+    scan = started(Automaton(traversal="scan"), 1e-4)
+    rates = [1e-6 * CELLS / step_seconds(scan, SOME) for _ in range(repeats)]
     yield "automaton, scan, N = 50", "million cells/s", rates, ">= 200"
-    listed = OneScene(Automaton(), NUMBERS, 1e-4)
-    rates = [50e-6 / listed.step_seconds(50) for _ in repeats]
+    listed = started(Automaton(), 1e-4)
+    rates = [50e-6 / step_seconds(listed, SOME) for _ in range(repeats)]
     yield "automaton, list, N = 50", "million particle steps/s", rates, ">= 100"
-    least = 0.05 if quick else 0.2
     gains = [
-        min(scan.step_seconds(n, least) / listed.step_seconds(n, least) for n in NUMBERS)
+        min(step_seconds(scan, k, least) / step_seconds(listed, k, least) for k in range(10))
         for _ in range(1 if quick else 3)
     ]
     yield "automaton, scan / list, least of N = 1 .. 120", "1", gains, "> 1"
-    spheres = OneScene(Spheres(), (50,), 2e-5)
-    rates = [50e-6 / spheres.step_seconds(50) for _ in repeats]
+    spheres = started(Spheres(), 2e-5)
+    rates = [50e-6 / step_seconds(spheres, SOME) for _ in range(repeats)]
     yield "spheres, N = 50", "million particle steps/s", rates, ">= 30"
     if not quick and not on_device():
         yield from responses()
 
 
-class OneScene:
-    """Scenes of one filling with different particle numbers, timed one by one."""
+def started(filling, dt):
+    """Scenes with all numbers of particles, long enough shaken through, with all compiled."""
+    batch = scenes(filling, list(NUMBERS), dt)
+    batch.advance(3 * batch.steps_per_cycle)
+    return batch
 
-    def __init__(self, filling, numbers, dt):
-        table = SceneTable(list(numbers), 1, dt, FREQUENCY, BASE_AMPLITUDE)
-        self.numbers, self.batch = list(numbers), Batch(filling, table)
-        # Swinging fully, so that the particles fly.
-        self.batch.start("empty")
-        self.cycle = int(self.batch.steps_per_cycle[0])
-        # Long enough to be shaken through, with all compiled.
-        self.batch.advance(3 * self.cycle)
 
-    def step_seconds(self, particles, at_least=0.2):
-        """Seconds of a step of the scene with so many particles."""
-        steps, seconds = self.cycle, 0.0
-        while seconds <= at_least:
-            steps *= 2
-            plan = [steps * (number == particles) for number in self.numbers]
-            seconds = seconds_of(self.batch.advance, plan)
-        return seconds / steps
+def step_seconds(batch, scene, least=0.2):
+    """Seconds of a step of one scene, from a run of at least some seconds."""
+    cycles, seconds = 1, 0.0
+    while seconds <= least:
+        cycles *= 2
+        seconds = cycle_seconds(batch, scene, cycles)
+    return seconds / (cycles * int(batch.steps_per_cycle[scene]))
 
 
 def responses():

@@ -71,38 +71,26 @@ def ten_scenes(begun):
 
 
 def measure(quick):
-    """Yield the figures of the start: name, unit, values, bound.
+    """Yield the waits: name, unit, values, bound; quick: of one process, and not of ten scenes.
 
-    A cold process has an empty cache of kernels of its own, a warm one that of an earlier process.
-    quick: the user's cache, filled once, and neither cold processes nor ten scenes.
+    A cold process has an empty cache of kernels of its own, a warm one that of a process before.
     """
+    waits = {}
     with tempfile.TemporaryDirectory() as folder:
-        if quick:
-            yield from waits(1, lambda k: None, cold=False)
-            return
-        caches = [os.path.join(folder, f"cache-{k}") for k in range(5)]
-        for cache in caches:
+        for k in range(1 if quick else 5):
+            cache = os.path.join(folder, f"cache-{k}")
             os.mkdir(cache)
-        yield from waits(5, caches.__getitem__)
-        ten = [in_new_process(__name__, "ten_scenes", cache=caches[0])[0] for _ in range(6)]
-        # The first of them fills the cache.
-        yield "ten_scenes_seconds", "s", ten[1:], "<= 10"
-
-
-def waits(repeats, cache_of, cold=True):
-    """Yield the waits of a first and of a second scene; cache_of: folder by repeat."""
-    runs = [[ask_all(cache_of(k)) for _ in ("cold", "warm")] for k in range(repeats)]
-    states = (("cold", "<= 15", "<= 10"), ("warm", "<= 3", "<= 3"))
-    for place, (state, wall_bound, bound) in enumerate(states):
-        if state == "cold" and not cold:
-            continue
-        step, first, second = zip(*(pair[place] for pair in runs))
-        yield f"first step, {state} cache", "s", step, wall_bound
-        yield f"first_scene_{state}_seconds", "s", first, bound
-    yield "second_scene_seconds", "s", second, "<= 0.1"
-
-
-def ask_all(cache):
-    """Seconds of ``first_step`` and of ``two_scenes`` in new processes."""
-    (step,) = in_new_process(__name__, "first_step", cache=cache)
-    return [step, *in_new_process(__name__, "two_scenes", cache=cache)]
+            for state in ("cold", "warm"):
+                first, second = in_new_process(__name__, "two_scenes", cache=cache)
+                step = [] if quick else in_new_process(__name__, "first_step", cache=cache)
+                for name, value in (("first", [first]), ("second", [second]), ("step", step)):
+                    waits[state, name] = waits.get((state, name), []) + value
+        for state, bound, wall in (("cold", "<= 10", "<= 15"), ("warm", "<= 3", "<= 3")):
+            yield f"first_scene_{state}_seconds", "s", waits[state, "first"], bound
+            if not quick:
+                yield f"first step, {state} cache", "s", waits[state, "step"], wall
+        yield "second_scene_seconds", "s", waits["warm", "second"], "<= 0.1"
+        if not quick:
+            ten = [in_new_process(__name__, "ten_scenes", cache=cache)[0] for _ in range(6)]
+            # The first of them fills the cache.
+            yield "ten_scenes_seconds", "s", ten[1:], "<= 10"

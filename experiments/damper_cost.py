@@ -16,7 +16,7 @@ import time
 import numpy as np
 
 from _cli import figure, fill_in, finish, main, parser, print_table, several, whole, write_rows
-from _timing import Timing
+from _timing import Timing, seconds_of
 from ca_damper import Automaton, Batch, SceneTable, SimulationDiverged, Spheres
 from taichi_dem import InputError
 from taichi_dem.kit.files import output_folder
@@ -112,19 +112,17 @@ def scenes(filling, particles, dt):
     return batch
 
 
-def cpu_seconds(batch, scene, cycles):
+def cycle_seconds(batch, scene, cycles):
     """CPU time of some cycles of one scene [s]; the others stand."""
     steps = [0] * batch.count
     steps[scene] = cycles * int(batch.steps_per_cycle[scene])
-    start = time.process_time()
-    batch.advance(steps)
-    return time.process_time() - start
+    return seconds_of(batch.advance, steps)
 
 
 def time_cycle(batch, scene, options):
     """Timing of a cycle of a scene in CPU seconds; at a time as many as fill a moment."""
-    cycles = 1 + int(options.seconds / max(cpu_seconds(batch, scene, 1), 1e-6))
-    return Timing.of([cpu_seconds(batch, scene, cycles) / cycles for _ in range(options.repeats)])
+    cycles = 1 + int(options.seconds / max(cycle_seconds(batch, scene, 1), 1e-6))
+    return Timing.of([cycle_seconds(batch, scene, cycles) / cycles for _ in range(options.repeats)])
 
 
 def outcomes(filling, steps, cycles):
@@ -137,7 +135,7 @@ def outcomes(filling, steps, cycles):
         for k in range(batch.count):
             dt = allowed.pop(0)
             try:
-                cpu_seconds(batch, k, cycles)
+                cycle_seconds(batch, k, cycles)
                 found.append((dt, "runs"))
             except SimulationDiverged:
                 found.append((dt, "diverges"))
