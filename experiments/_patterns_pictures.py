@@ -1,5 +1,7 @@
 """Particles over one cycle of the container (Komatsuzaki et al., Figs. 9 and 10)."""
 
+import os
+
 import numpy as np
 
 from ca_damper.plot import DrawnBox, frame_panel, moving_picture
@@ -11,19 +13,33 @@ SHOWN, SLOW, SCALE = 4, 0.1, 1.2
 SPEED = "vertical speed of particles [m/s]"
 
 
+def draw_all(folder, films, measures, phase, options):
+    """Frames of one cycle for each number of particles, an animation, the measures over the cycle.
+
+    films: (particles, name of the filling) -> (Box, frames of a cycle), as many frames in each.
+    measures: by the same keys, as ``damper_patterns.measured``. phase: of the frames [cycles].
+    """
+    amplitude = 1e-3 * options.amplitude
+    fastest = 2.0 * np.pi * options.frequency * amplitude
+    for particles in dict.fromkeys(particles for particles, _ in films):
+        rows = {name: film for (number, name), film in films.items() if number == particles}
+        path = os.path.join(folder, f"patterns_{particles}.png")
+        plot_patterns(path, rows, amplitude, fastest)
+    animate_patterns(os.path.join(folder, "patterns.gif"), films, amplitude, fastest)
+    plot_cycle(os.path.join(folder, "cycle.png"), phase, measures, options.amplitude)
+
+
 def plot_patterns(path, rows, amplitude, fastest):
     """A row of frames for every filling, from left to right through one cycle.
 
-    rows: name of the filling -> (Box, frames), evenly over the cycle, which begins when the
-    container passes its middle upwards; arrows show its velocity. amplitude: of the container [m].
-    fastest: its largest speed [m/s].
+    The cycle begins when the container passes its middle upwards; arrows show its velocity.
+    amplitude: of the container [m]. fastest: its largest speed [m/s].
     """
-    rows = {name: (box, frames[::SHOWN]) for name, (box, frames) in rows.items()}
-    count = len(next(iter(rows.values()))[1])
+    count = len(next(iter(rows.values()))[1][::SHOWN])
     size = (1.14 * count + 0.9, 2.45 * len(rows) + 0.3)
     with picture(path, len(rows), count, size=size, squeeze=False) as (figure, panels):
         for line, (name, (box, frames)) in zip(panels, rows.items()):
-            for k, (axes, frame) in enumerate(zip(line, frames)):
+            for k, (axes, frame) in enumerate(zip(line, frames[::SHOWN])):
                 frame_panel(axes, box, amplitude, margin=9.0)
                 drawn = DrawnBox(axes, box, SCALE * fastest)
                 drawn.show(frame)
@@ -32,7 +48,7 @@ def plot_patterns(path, rows, amplitude, fastest):
             line[0].text(-0.08, 0.5, styles_of(rows)[name].label, **look)
         words = "one cycle of the container; arrows: its velocity, where it is not slow"
         figure.supxlabel(words, fontsize=9)
-        for axes, frame in zip(panels[0], frames):
+        for axes, frame in zip(panels[0], frames[::SHOWN]):
             axes.set_title(f"{1e3 * (frame.time_s - frames[0].time_s):.0f} ms", loc="center")
         figure.colorbar(drawn.particles, ax=panels, label=SPEED, aspect=45, pad=0.01)
 
@@ -47,52 +63,38 @@ def mark_motion(axes, box, lift, share):
         axes.annotate("", *ends, arrowprops=look, annotation_clip=False)
 
 
-def animate_patterns(path, shots, amplitude, fastest):
-    """The boxes of all fillings side by side through one cycle, as a GIF below a megabyte.
-
-    shots: particles -> name of the filling -> (Box, frames), as many frames in each.
-    """
-    boxes = [
-        (f"{STYLES[name].label}\n{particles} particles".replace(", ", ",\n"), box, frames)
-        for particles, rows in shots.items()
-        for name, (box, frames) in rows.items()
-    ]
+def animate_patterns(path, films, amplitude, fastest):
+    """The boxes of all fillings side by side through one cycle, as a GIF below a megabyte."""
     with moving_picture(path, (4.0, 2.6)) as (figure, shoot):
-        panels, drawn = figure.subplots(1, len(boxes)), []
-        for axes, (title, box, _) in zip(panels, boxes):
+        panels, drawn = figure.subplots(1, len(films)), []
+        for axes, ((particles, name), (box, _)) in zip(panels, films.items()):
             frame_panel(axes, box, amplitude)
-            axes.set_title(title, loc="center")
+            title = STYLES[name].label.replace(", ", ",\n")
+            axes.set_title(f"{title}\n{particles} particles", loc="center")
             drawn.append(DrawnBox(axes, box, SCALE * fastest))
         bar = {"location": "bottom", "aspect": 40, "pad": 0.02}
         figure.colorbar(drawn[0].particles, ax=panels.tolist(), label=SPEED, **bar)
-        for shots in zip(*(frames for *_, frames in boxes)):
+        for shots in zip(*(frames for _, frames in films.values())):
             for one, frame in zip(drawn, shots):
                 one.show(frame)
             shoot()
 
 
-def plot_cycle(path, cycles, amplitude):
-    """Mean height of the particles and how many touch floor and ceiling, over one cycle.
-
-    cycles: particles -> name of the filling -> dict of phase (0 to 1), height_mm (in the room),
-    spread_mm, floor and ceiling (shares of the particles). amplitude: of the container [mm].
-    """
-    time = np.linspace(0.0, 1.0, 200)
-    shape = {"size": (4.2 * len(cycles) + 0.6, 5.7), "sharex": True, "sharey": "row"}
-    with picture(path, 2, len(cycles), squeeze=False, **shape) as (figure, panels):
-        for (top, bottom), (particles, fillings) in zip(panels.T, cycles.items()):
+def plot_cycle(path, phase, measures, amplitude):
+    """Mean height of the particles and how many touch floor and ceiling, over one closed cycle."""
+    numbers = list(dict.fromkeys(particles for particles, _ in measures))
+    styles = styles_of([name for _, name in measures])
+    time, closed = np.linspace(0.0, 1.0, 200), np.append(phase, 1.0)
+    shape = {"size": (4.2 * len(numbers) + 0.6, 5.7), "sharex": True, "sharey": "row"}
+    with picture(path, 2, len(numbers), squeeze=False, **shape) as (figure, panels):
+        for top, particles in zip(panels[0], numbers):
             motion = amplitude * np.sin(2.0 * np.pi * time)
             top.plot(time, motion, color=GREY, linestyle=":", label="container")
-            for name, cycle in fillings.items():
-                style = styles_of(fillings)[name]
-                phase, height, spread = (cycle[k] for k in ("phase", "height_mm", "spread_mm"))
-                top.plot(phase, height, color=style.colour, label=style.label)
-                band = {"color": style.colour, "alpha": 0.18, "linewidth": 0}
-                top.fill_between(phase, height - spread, height + spread, **band)
-                for end, line in (("floor", "-"), ("ceiling", "--")):
-                    bottom.plot(phase, 100.0 * cycle[end], color=style.colour, linestyle=line)
             top.set_title(f"{particles} particles")
-            bottom.set(xlabel="phase of the container [cycles]", xlim=(0.0, 1.0), ylim=(0.0, None))
+        for (particles, name), one in measures.items():
+            draw_measures(panels[:, numbers.index(particles)], closed, one, styles[name])
+        for axes in panels[1]:
+            axes.set(xlabel="phase of the container [cycles]", xlim=(0.0, 1.0), ylim=(0.0, None))
         panels[0, 0].set_ylabel("mean height in the room\nless that at rest [mm]")
         panels[1, 0].set_ylabel("particles that touch [%]")
         ends = {"-": "floor", "--": "ceiling"}
@@ -101,3 +103,15 @@ def plot_cycle(path, cycles, amplitude):
         keys, _ = panels[0, 0].get_legend_handles_labels()
         keys.append(area_key("± standard deviation of the cycles", fc=GREY, alpha=0.3))
         figure.legend(handles=keys, loc="outside upper left", ncols=len(keys))
+
+
+def draw_measures(panels, phase, one, style):
+    """Curves of a filling: means over the cycles, and the spread of the height between them."""
+    height, spread = (getattr(one["height_mm"], word)(axis=0) for word in ("mean", "std"))
+    height, spread = np.append(height, height[0]), np.append(spread, spread[0])
+    panels[0].plot(phase, height, color=style.colour, label=style.label)
+    band = {"color": style.colour, "alpha": 0.18, "linewidth": 0}
+    panels[0].fill_between(phase, height - spread, height + spread, **band)
+    for end, line in (("floor", "-"), ("ceiling", "--")):
+        share = 100.0 * one[end].mean(axis=0)
+        panels[1].plot(phase, np.append(share, share[0]), color=style.colour, linestyle=line)

@@ -15,12 +15,11 @@ summary.json to results/damper_patterns/.
 
 import os
 import sys
-from dataclasses import dataclass
 
 import numpy as np
 
+import _patterns_pictures as pictures
 from _cli import figure, finish, main, number, parser, print_table, whole, write_rows
-from _patterns_pictures import animate_patterns, plot_cycle, plot_patterns
 from ca_damper import Automaton, Batch, SceneTable, Spheres, film
 from ca_damper.automaton import ACCOUNTINGS
 from ca_damper.plot import Box
@@ -33,6 +32,7 @@ QUICK = {"transient": 5, "cycles": 1, "seeds": 2}
 FULL = {"transient": 30, "cycles": 4, "seeds": 5}
 PARTICLES = (20, 40)
 TITLES = {"ca": "automaton", "dem": "spheres"}
+KEYS = [(particles, name) for particles in PARTICLES for name in TITLES]
 #: Frames a cycle of the animation and the measures.
 FRAMES = 32
 #: Step of the automaton [s], and steps of the spheres within one.
@@ -45,41 +45,6 @@ COLUMNS = {
     "floor_share_least": "at floor, least",
     "floor_share_most": "at floor, most",
 }
-
-
-@dataclass(frozen=True, eq=False)
-class Shaken:
-    """Scenes of a filling in the shaken container: its Box, its Batch, and what was filmed.
-
-    frames: particles -> cycles of all seeds, the first seed's first, each a tuple of Frames.
-    """
-
-    box: Box
-    batch: Batch
-    frames: dict
-
-    def measures(self, particles):
-        """Arrays (cycles of all seeds, frames) by name; heights [mm] and shares of the particles.
-
-        height_mm: mean over the particles, in the room, less that of particles at rest on the
-        floor of a container in its middle. above_floor_mm: the same over the container's floor.
-        floor, ceiling: share of the particles less than half a diameter away from it.
-        """
-        rows = [[self._measure(frame) for frame in cycle] for cycle in self.frames[particles]]
-        names = ("height_mm", "above_floor_mm", "floor", "ceiling")
-        return dict(zip(names, np.moveaxis(np.array(rows), 2, 0)))
-
-    def _measure(self, frame):
-        below, above = self.box.gaps(frame.position)
-        near, over = 0.5 * self.box.diameter, below.mean()
-        high = 1e3 * (self.box.lift(frame.x) + over)
-        return high, 1e3 * over, (below < near).mean(), (above < near).mean()
-
-    @property
-    def phase(self):
-        """Phase of every frame [cycles]; whole steps miss even spacing by a trifle."""
-        steps = int(self.batch.steps_per_cycle[0])
-        return np.arange(FRAMES) * (steps // FRAMES) / steps
 
 
 def options_parser():
@@ -102,17 +67,22 @@ def run(options):
     jobs = {"ca": (automaton, CA_DT), "dem": (spheres, options.dt or CA_DT / STEPS_IN_ONE)}
     batches = {name: shaken_batch(*job, seeds, options) for name, job in jobs.items()}
     output_folder(options.out)
-    runs = {}
+    measures, films = {}, {}
     for name, batch in batches.items():
         with ProgressBar(TITLES[name]) as progress:
-            runs[name] = Shaken(boxes[name], batch, shake(batch, settings, progress))
-    measures = {
-        particles: {name: made.measures(particles) for name, made in runs.items()}
-        for particles in PARTICLES
-    }
-    picture(runs, measures, options)
-    write_tables(runs, measures, seeds, options.out)
-    figures = figures_of(measures, runs["ca"].phase)
+            frames = shake(batch, settings, progress)
+        for particles, cycles in frames.items():
+            measures[particles, name] = measured(boxes[name], cycles)
+            films[particles, name] = cycles
+    steps = int(batches["ca"].steps_per_cycle[0])
+    # Whole steps miss even spacing by a trifle.
+    phase = np.arange(FRAMES) * (steps // FRAMES) / steps
+    labels = {name: batch.filling.label for name, batch in batches.items()}
+    shown = {(n, labels[name]): (boxes[name], films[n, name][0]) for n, name in KEYS}
+    curves = {(n, labels[name]): measures[n, name] for n, name in KEYS}
+    pictures.draw_all(options.out, shown, curves, phase, options)
+    write_tables(films, measures, phase, seeds, options.out)
+    figures = figures_of(measures, phase)
     print_heights(figures)
     finish(options, NAME, figures, batches.values(), show=False)
 
@@ -140,6 +110,23 @@ def shake(batch, settings, progress):
     return frames
 
 
+def measured(box, cycles):
+    """Arrays (cycles of all seeds, frames) by name; heights [mm] and shares of the particles.
+
+    height_mm: mean over the particles, in the room, less that of particles at rest on the floor of
+    a container in its middle. above_floor_mm: the same over the container's floor. floor, ceiling:
+    share of the particles less than half a diameter away from it.
+    """
+    rows, near = [], 0.5 * box.diameter
+    for frame in (frame for cycle in cycles for frame in cycle):
+        below, above = box.gaps(frame.position)
+        over = below.mean()
+        heights = 1e3 * (box.lift(frame.x) + over), 1e3 * over
+        rows.append((*heights, (below < near).mean(), (above < near).mean()))
+    names = ("height_mm", "above_floor_mm", "floor", "ceiling")
+    return dict(zip(names, np.array(rows).T.reshape(4, len(cycles), FRAMES)))
+
+
 def harmonic(phase, values):
     """Amplitude and lag [degrees] behind the container of a quantity over a cycle."""
     angle = 2.0 * np.pi * phase
@@ -150,14 +137,15 @@ def harmonic(phase, values):
 
 def figures_of(measures, phase):
     """Heights and lags of the particles by filling, and how far the fillings differ."""
-    figures = {}
-    for particles, fillings in measures.items():
+    figures, units = {}, ("mm", "deg", "mm", "1", "1")
+    for particles in PARTICLES:
+        fillings = {name: measures[particles, name] for name in TITLES}
         cycles = {name: one["height_mm"].mean(axis=0) for name, one in fillings.items()}
         swings = {name: harmonic(phase, cycle) for name, cycle in cycles.items()}
         for name, one in fillings.items():
             floor, above = one["floor"].mean(axis=0), one["above_floor_mm"].mean()
             values = (*swings[name], float(above), float(floor.min()), float(floor.max()))
-            for key, value, unit in zip(COLUMNS, values, ("mm", "deg", "mm", "1", "1")):
+            for key, value, unit in zip(COLUMNS, values, units):
                 figures[f"{key}_{name}_N{particles}"] = figure(value, unit)
         (ca, late), (dem, later) = swings["ca"], swings["dem"]
         turn = (late - later + 180.0) % 360.0 - 180.0
@@ -168,49 +156,17 @@ def figures_of(measures, phase):
     return figures
 
 
-def picture(runs, measures, options):
-    """Draw frames of one cycle, the measures over the cycle, and the animation."""
-    amplitude, shots = 1e-3 * options.amplitude, {}
-    fastest = 2.0 * np.pi * options.frequency * amplitude
-    for particles in PARTICLES:
-        own = {
-            made.batch.filling.label: (made.box, made.frames[particles][0])
-            for made in runs.values()
-        }
-        shots[particles] = own
-        path = os.path.join(options.out, f"patterns_{particles}.png")
-        plot_patterns(path, own, amplitude, fastest)
-    animate_patterns(os.path.join(options.out, "patterns.gif"), shots, amplitude, fastest)
-    cycles = {
-        particles: {
-            runs[name].batch.filling.label: over_cycle(runs["ca"].phase, one)
-            for name, one in fillings.items()
-        }
-        for particles, fillings in measures.items()
-    }
-    plot_cycle(os.path.join(options.out, "cycle.png"), cycles, options.amplitude)
-
-
-def over_cycle(phase, measured):
-    """Means over the cycles, and the spread of the height between them; closed to a whole cycle."""
-    columns = {name: values.mean(axis=0) for name, values in measured.items()}
-    columns["spread_mm"] = measured["height_mm"].std(axis=0)
-    closed = {name: np.append(values, values[0]) for name, values in columns.items()}
-    return {"phase": np.append(phase, 1.0), **closed}
-
-
-def write_tables(runs, measures, seeds, folder):
+def write_tables(films, measures, phase, seeds, folder):
     """The measures of every frame, and the places of all particles in the first cycle."""
-    frames, places, phase = [], [], runs["ca"].phase
-    for particles in PARTICLES:
-        for name, made in runs.items():
-            one, cycles = measures[particles][name], made.frames[particles]
-            for row, k in np.ndindex(len(cycles), FRAMES):
-                start = row % seeds + 1, row // seeds, phase[k], 1e3 * cycles[row][k].x
-                frames.append((particles, name, *start, *(one[key][row, k] for key in one)))
-            for k, frame in enumerate(cycles[0]):
-                for place, velocity in zip(1e3 * frame.position, frame.velocity):
-                    places.append((particles, name, phase[k], *place, *velocity))
+    frames, places = [], []
+    for key in KEYS:
+        one, cycles = measures[key], films[key]
+        for row, k in np.ndindex(len(cycles), FRAMES):
+            start = row % seeds + 1, row // seeds, phase[k], 1e3 * cycles[row][k].x
+            frames.append((*key, *start, *(values[row, k] for values in one.values())))
+        for k, frame in enumerate(cycles[0]):
+            for place, velocity in zip(1e3 * frame.position, frame.velocity):
+                places.append((*key, phase[k], *place, *velocity))
     names = f"particles filling seed cycle phase container_mm {' '.join(one)}"
     write_rows(os.path.join(folder, "cycles.csv"), names, frames)
     names = "particles filling phase across_mm up_mm across_m_s up_m_s"
@@ -220,10 +176,9 @@ def write_tables(runs, measures, seeds, folder):
 def print_heights(figures):
     """Print the figures, a row each filling and number of particles."""
     rows = []
-    for particles in PARTICLES:
-        for name, title in TITLES.items():
-            values = (figures[f"{key}_{name}_N{particles}"]["value"] for key in COLUMNS)
-            rows.append((particles, title, *(f"{value:.3g}" for value in values)))
+    for particles, name in KEYS:
+        values = (figures[f"{key}_{name}_N{particles}"]["value"] for key in COLUMNS)
+        rows.append((particles, TITLES[name], *(f"{value:.3g}" for value in values)))
     print("Mean height of the particles over one cycle")
     print_table(rows, ["particles", "filling", *COLUMNS.values()])
 

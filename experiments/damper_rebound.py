@@ -28,8 +28,7 @@ from taichi_dem.kit.plot_style import BLACK, VIOLET, picture, styles_of
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 
 NAME = "damper_rebound"
-QUICK = {"impacts": 4, "every_s": 1e-3}
-FULL = {"impacts": 6, "every_s": 4e-4}
+QUICK, FULL = {"impacts": 4, "every_s": 1e-3}, {"impacts": 6, "every_s": 4e-4}
 #: Impacts that the figures speak of, and how far off the default reading may be.
 COUNTED, ALLOWED_MS = 4, 2.0
 #: The base stands still; its frequency [Hz] only makes whole steps of 1e-4 s and 2e-5 s.
@@ -94,15 +93,12 @@ class Run:
     impacts_s: np.ndarray
     apexes_m: np.ndarray
 
-    def impact_errors_ms(self):
-        """Time of the first impacts less the closed form's [ms]."""
-        found = self.impacts_s[:COUNTED]
-        return 1e3 * (found - [self.fall.impact_s(k + 1) for k in range(len(found))])
-
-    def apex_errors_mm(self):
-        """Height of the apexes after the first impacts less the closed form's [mm]."""
-        found = self.apexes_m[: min(COUNTED, len(self.impacts_s))]
-        return 1e3 * (found - [self.fall.apex_m(k + 1) for k in range(len(found))])
+    def errors(self):
+        """Errors of the first impacts [ms] and of the apexes after them [mm], two arrays."""
+        first = range(1, 1 + min(COUNTED, len(self.impacts_s)))
+        late = self.impacts_s[: len(first)] - [self.fall.impact_s(k) for k in first]
+        high = self.apexes_m[: len(first)] - [self.fall.apex_m(k) for k in first]
+        return 1e3 * late, 1e3 * high
 
 
 def options_parser():
@@ -117,13 +113,11 @@ def options_parser():
 def fillings(restitution):
     """Title -> (filling with one particle at the top, how far it falls [m])."""
     both = {"restitution": restitution, "wall_restitution": restitution}
-    lattice, spheres = Automaton(), Spheres()
+    lattice, spheres, made = Automaton(), Spheres(), {}
     top = lattice.rows - 1
-    made = {
-        reading: (Automaton(accumulator=reading, start=((COLUMN, top),), **both), top)
-        for reading in READINGS
-    }
-    made = {reading: (one, cells * lattice.width) for reading, (one, cells) in made.items()}
+    for reading in READINGS:
+        filling = Automaton(accumulator=reading, start=((COLUMN, top),), **both)
+        made[reading] = filling, top * lattice.width
     place = (0.5 * spheres.width, spheres.height - spheres.radius)
     made["dem"] = Spheres(start=(place,), **both), spheres.height - spheres.diameter
     return made
@@ -182,7 +176,7 @@ def figures_of(runs):
     """Largest errors over the impacts compared: of the default reading, and of all."""
     figures = {}
     for end, made in {"": runs[DEFAULT], **{f"_{title}": runs[title] for title in runs}}.items():
-        impact, apex = np.abs(made.impact_errors_ms()), np.abs(made.apex_errors_mm())
+        impact, apex = np.abs(made.errors())
         figures[f"impact_error_ms{end}"] = figure(float(impact.max()), "ms")
         figures[f"apex_error_mm{end}"] = figure(float(apex.max()), "mm")
     return figures
@@ -195,9 +189,8 @@ def write_tables(runs, folder):
         for title, made in runs.items()
         for row in zip(made.time_s, made.height_m, made.fall.heights(made.time_s))
     ]
-    write_rows(
-        os.path.join(folder, "heights.csv"), "filling time_s height_m closed_form_m", samples
-    )
+    names = "filling time_s height_m closed_form_m"
+    write_rows(os.path.join(folder, "heights.csv"), names, samples)
     impacts = [
         (title, k, time, made.fall.impact_s(k), apex, made.fall.apex_m(k))
         for title, made in runs.items()
@@ -219,7 +212,7 @@ def picture_rebound(path, runs):
             panels[place].set(xlim=(0.0, until), ylim=(-3.0, None), ylabel="height over floor [mm]")
         panels["first"].tick_params(labelbottom=False)
         panels["second"].set_xlabel("time [s]")
-        errors = {TITLES[title]: made.impact_errors_ms() for title, made in runs.items()}
+        errors = {TITLES[title]: made.errors()[0] for title, made in runs.items()}
         plot_errors(panels["errors"], errors)
 
 
@@ -257,8 +250,7 @@ def print_errors(runs):
     print("Error of impact [ms] and of the apex after it [mm], by impact")
     rows = []
     for title, made in runs.items():
-        pairs = zip(made.impact_errors_ms(), made.apex_errors_mm())
-        cells = [f"{late:+.3f} / {high:+.3f}" for late, high in pairs]
+        cells = [f"{late:+.3f} / {high:+.3f}" for late, high in zip(*made.errors())]
         rows.append((title, *cells, *["at rest"] * (COUNTED - len(cells))))
     print_table(rows, ["filling", *(str(k + 1) for k in range(COUNTED))])
 
