@@ -1,4 +1,4 @@
-"""A large block: steps a second, what a second thread brings, the share of memory bandwidth."""
+"""A large block: steps a second, gain of a second thread, the share of memory bandwidth."""
 
 from _blast import METHODS
 from _scaling_threads import ROUNDS, thread_gain, thread_job

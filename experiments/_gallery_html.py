@@ -1,4 +1,4 @@
-"""One static page of what the experiments wrote: pictures, figures, and what to read off."""
+"""One static page of the results of all experiments: pictures, figures, and their reading."""
 
 import json
 import os
@@ -14,11 +14,11 @@ from _cli import value_in_words
 from taichi_dem.kit.files import write_text
 
 HERE = Path(__file__).resolve().parent
-#: What ``gallery.py`` notes of a run beside what the experiment wrote.
+#: Notes of ``gallery.py`` on a run, beside the output of the experiment.
 RUN = "gallery.json"
 #: Folder of the small pictures of the list, beside the page.
 THUMBNAILS = "thumbnails"
-#: What a run says of its own pictures, where it says something.
+#: Words of a run about its own pictures, where there are any.
 CAPTION = "caption.txt"
 #: Key figures shown unfolded; all others are one touch away.
 MOST_KEY_FIGURES = 12
@@ -26,13 +26,13 @@ MOST_KEY_FIGURES = 12
 
 @dataclass(frozen=True)
 class Shown:
-    """What the page shows of one experiment.
+    """Content of the page for one experiment.
 
     page: its entry. folder: of its results, relative to the page. command: that made them.
     quick: whether it was the smaller job. pictures, more: files shown, and files linked.
-    thumbnail: small picture for the list, relative to the page, or "". caption: what the run says
-    of its own pictures, or "". key, rest: rows of figures (name, value, paper). seconds: what the
-    run took, in words. output: what it printed. failed: why it did not end well, or "".
+    thumbnail: small picture for the list, relative to the page, or "". caption: words of
+    the run about its own pictures, or "". key, rest: rows of figures (name, value, paper).
+    seconds: of the run, in words. output: as printed. failed: why it did not end well, or "".
     """
 
     page: object
@@ -157,7 +157,7 @@ def write_page(path, items):
 
 
 def machines(summaries):
-    """Where the results come from, in words, each only once."""
+    """Machines and versions of the results in words, each only once."""
     words = []
     for summary in filter(None, summaries):
         machine, versions = summary["machine"], summary["versions"]

@@ -1,4 +1,4 @@
-"""What the gallery and the first page say of each experiment: one entry an experiment.
+"""Texts of the gallery and the first page: one entry an experiment.
 
 A new experiment gets an entry here; ``gallery.py --readme`` then renews the table of README.md.
 """
@@ -18,7 +18,7 @@ SMALL_PICTURES = "docs/pictures"
 
 @dataclass(frozen=True)
 class Page:
-    """What one experiment is about.
+    """Description of one experiment.
 
     name: of the script. part: heading under which it stands. question: that it answers. look:
     what to read off its pictures. time: of the full run on two cores, in words. pictures: names
@@ -39,7 +39,7 @@ class Page:
 
     @property
     def command(self):
-        """What a user types."""
+        """Command line of a user."""
         return " ".join(filter(None, [f"python experiments/{self.name}.py", self.options]))
 
 

@@ -37,7 +37,7 @@ class Timing:
 
 
 def on_device():
-    """Whether kernels run beside the CPU, which then only waits for them."""
+    """Tell whether kernels run beside the CPU, which then only waits for them."""
     return runtime.settings().arch != "cpu"
 
 

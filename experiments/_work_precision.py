@@ -1,8 +1,8 @@
-"""Work-precision diagrams: what each method's error costs, as rows, answers, a table and a picture.
+"""Work-precision diagrams: the cost of each method's error, as answers, a table and a picture.
 
 A Point is one run of a method at one step. An error is trusted where every finer step of the same
-method is as good and the method's floor (what runs differ by that should not differ at all) lies
-below it: a single lucky run answers nothing.
+method is as good and the method's floor (the distance of runs that should not differ) lies below
+it: a single lucky run answers nothing.
 """
 
 import itertools
@@ -29,7 +29,7 @@ WALL = "wall time [s], fastest of the repeats"
 class Point:
     """A run of a method.
 
-    step: what is swept, larger is coarser (a time step, a tolerance). label: the step in words.
+    step: the swept number, larger is coarser (a time step, a tolerance). label: the step in words.
     evaluations: work done, or that would have been done by a run that failed. error, residual:
     shares, NaN where there is none. seconds: a Timing without compiling, None for a failure.
     failure: why there is no result, in a few words, or nothing.
@@ -47,7 +47,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a method needs for an error: the cheapest point, or None and the reason."""
+    """The cheapest point of a method for an error, or None and the reason."""
 
     method: str
     point: Optional[Point]

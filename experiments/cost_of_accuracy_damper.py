@@ -1,4 +1,4 @@
-"""What accuracy of the damper's response costs: automaton, spheres and RK45 on one scale.
+"""Cost of accuracy of the damper's response: automaton, spheres and RK45 on one scale.
 
     python experiments/cost_of_accuracy_damper.py          # about four minutes on one core
     python experiments/cost_of_accuracy_damper.py --quick
@@ -102,7 +102,7 @@ def options_parser():
 
 
 def run(options):
-    """Measure all methods, write pictures and tables, answer what an error costs."""
+    """Measure all methods, write pictures and tables, find the cheapest method for an error."""
     sizes = QUICK if options.quick else FULL
     folder = output_folder(options.out)
     started = time.perf_counter()

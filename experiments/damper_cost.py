@@ -1,4 +1,4 @@
-"""What a cycle costs against the number of particles, and which step each filling bears (Fig. 12).
+"""Cost of a cycle against the number of particles, and the steps that fillings bear (Fig. 12).
 
     python experiments/damper_cost.py          # about a minute
     python experiments/damper_cost.py --quick
@@ -144,7 +144,7 @@ def outcomes(filling, steps, cycles):
 
 
 def refused(filling, dt):
-    """Whether a filling refuses a step."""
+    """Tell whether a filling refuses a step."""
     try:
         filling.check(SOME, dt)
     except InputError:

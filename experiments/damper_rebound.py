@@ -1,8 +1,8 @@
 """Does a particle fall and rebound as Fig. 8 of Komatsuzaki et al. says it should?
 
-One particle falls from the top of a container at rest. Four readings of what the automaton does
-with the way travelled when a particle turns are compared, and the spheres, each with the closed
-form for its own gravity (10 m/s^2 on the lattice, 9.8 m/s^2 for the spheres). Expect "signed" and
+One particle falls from the top of a container at rest. Four ways in which the automaton treats the
+way travelled when a particle turns are compared, and the spheres, each with the closed form for its
+own gravity (10 m/s^2 on the lattice, 9.8 m/s^2 for the spheres). Expect "signed" and
 "signed_through_walls" within a millisecond, the other two off by tens of them. A blow costs the
 default about two steps: it falls in the step after the particle reached its last cell. Where the
 particle no longer rises by a cell, the automaton's static contact holds it: there its bounces end.

@@ -80,7 +80,7 @@ def swing(title, batch, begin, measured):
 
 
 def figures_of(cycles, empty, o):
-    """Amplitude of the container with particles and without, and what they take and weigh."""
+    """Amplitude of the container with particles and without; their power and apparent mass."""
     figures = {
         "amplitude_mm": (1e3 * cycles.amplitude, "mm"),
         "amplitude_empty_mm": (1e3 * empty.amplitude, "mm"),

@@ -83,14 +83,14 @@ def _shade(response, k):
 
 
 def _share_height(panels):
-    """The same height for all, what an empty container needs left out."""
+    """The same height for all, without the peak of the empty container."""
     highest = max(line.get_ydata().max() for axis in panels for line in axis.lines[:-1])
     for axis in panels:
         axis.set_ylim(0.0, 1.08 * highest)
 
 
 def _draw_peaks(place, height, responses, particle_mass):
-    """Where the curves peak and how high, over the particle number; bars from seed to seed."""
+    """Place and height of the peaks over the particle number; bars from seed to seed."""
     styles = styles_of(responses)
     for label, response in responses.items():
         style = styles[label]

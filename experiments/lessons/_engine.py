@@ -2,7 +2,7 @@
 
 Each browser that opens a lesson is served by a thread of its own, in one process. Taichi makes
 fields only on the thread that started it, and two starts would take each other's fields away. So
-all work is handed to this thread, and what it has built is kept for whoever asks next.
+all work is handed to this thread, which keeps its results for the next session.
 """
 
 import functools
@@ -23,7 +23,7 @@ class Engine:
         self._pool, self._thread, self._kept = None, None, {}
 
     def ask(self, work, *arguments):
-        """Do work(*arguments) on the thread, in its turn; returns or raises what it does."""
+        """Do work(*arguments) on the thread, in its turn; returns or raises its outcome."""
         if threading.current_thread() is self._thread:
             return work(*arguments)
         with self._lock:

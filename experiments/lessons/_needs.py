@@ -1,4 +1,4 @@
-"""Which effects a scene needs: a bar is pulled open and pressed together, with any effects.
+"""Effects that a scene needs: a bar is pulled open and pressed together, with any effects.
 
 Every choice of effects is a program of its own, and to compile one takes seconds. So answers come
 from two programs, with contact and without, in which the numbers of the other effects are such that
@@ -51,8 +51,8 @@ class Outcome:
 
     names: of the effects. motions: of all bodies, by the names of SHOWN, so far as the run came.
     broken: which bonds at the end, bool. step_s: CPU seconds of a step, NaN where that was not
-    measured. advice: what ``needed_effects`` says. sentence: what the program said where it ended
-    the run, else "". unresolved: its sentences about what the step is too long for.
+    measured. advice: of ``needed_effects``. sentence: of the program where it ended the run, or "".
+    unresolved: its sentences about processes for which the step is too long.
     """
 
     names: tuple
@@ -78,7 +78,7 @@ class Answer:
 
     @property
     def stroke(self):
-        """How far the right end is pulled out [m]."""
+        """Largest displacement of the right end [m]."""
         return self.speed / (2.0 * np.pi * FREQUENCY)
 
     @property
@@ -185,7 +185,7 @@ def answer(names, speed):
 
 
 def price(names, speed):
-    """What ``answer`` gives, with costs: both programs run one after the other."""
+    """The Answer with costs: both programs run one after the other."""
     again(names)
     chosen, complete = (measured(one, speed) for one in (names, ALL))
     return replace(answer(names, speed), chosen=chosen, complete=complete)

@@ -144,7 +144,7 @@ def _boxes(figure, grid, answer):
 
 
 def picture_needs(answer):
-    """The bar with all effects and with those chosen, and what a step costs; PNG bytes."""
+    """The bar with all effects and with those chosen, and the cost of a step; PNG bytes."""
     with styled(0, size=(10.0, 4.4)) as (figure, _):
         grid = figure.add_gridspec(2, 3, width_ratios=(1.0, 1.0, 0.75))
         bars = []

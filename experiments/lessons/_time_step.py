@@ -1,4 +1,4 @@
-"""What a time step costs: a bar is struck with any step by any method, and compared with the truth.
+"""Cost of a time step: a bar is struck with any step by any method, and compared with the truth.
 
 The bar has 12 cells of six tetrahedra. All runs on the engine's thread.
 """
@@ -50,7 +50,7 @@ class Strike:
     """A run of the bar.
 
     step [s]; moved: mean displacement of the far end [m], (SAMPLES + 1,), NaN after a divergence;
-    sentence: what the program said where it ended the run, "" where it did not; motion: of all
+    sentence: of the program where it ended the run, "" where it did not; motion: of all
     bodies at sample SHOWN, None where the run ended before. seconds: of one core for the run
     without looks on the way, NaN where that was not measured.
     """
