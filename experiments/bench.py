@@ -1,6 +1,6 @@
 """How fast is it? Rates of both packages, the papers' problems, and the first wait.
 
-    make bench                          # about twenty minutes; writes results/bench.json
+    make bench                          # about 25 minutes; writes results/bench.json
     python experiments/bench.py --quick # a minute
 
 Figures are CPU time of one core unless they say otherwise, with --arch cuda time of the wall;

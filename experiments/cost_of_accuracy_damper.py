@@ -175,15 +175,13 @@ class Sweep:
         return cached(folder, self.label, settings, ("ca_damper",), compute)
 
     def _run(self, dt, repeats):
-        filling, job = self.method.filling, self.job
+        filling, timed = self.method.filling, {"repeats": repeats, "enough": ENOUGH}
         try:
-            filling.check(job.particles, dt)
+            filling.check(self.job.particles, dt)
+            run = simulate(filling, self.job, dt, self.seeds, progress=self.bar, **timed)
+            self.curves[dt] = run
         except InputError:
             self.failures[dt] = "refused"
-            return
-        timed = {"repeats": repeats, "enough": ENOUGH, "progress": self.bar}
-        try:
-            self.curves[dt] = simulate(filling, job, dt, self.seeds, **timed)
         except SimulationDiverged:
             self.failures[dt] = "diverged"
 

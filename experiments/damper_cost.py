@@ -127,8 +127,13 @@ def time_cycle(batch, scene, options):
 
 def outcomes(filling, steps, cycles):
     """Outcome of a run of 50 particles at every step: (dt, "runs" | "diverges" | "refused")."""
-    allowed = [dt for dt in steps if not refused(filling, dt)]
-    found = [(dt, "refused") for dt in steps if dt not in allowed]
+    allowed, found = [], []
+    for dt in steps:
+        try:
+            filling.check(SOME, dt)
+            allowed.append(dt)
+        except InputError:
+            found.append((dt, "refused"))
     while allowed:
         # A batch that holds a diverged scene goes no further: the rest gets one of its own.
         batch = scenes(filling, SOME, allowed)
@@ -141,15 +146,6 @@ def outcomes(filling, steps, cycles):
                 found.append((dt, "diverges"))
                 break
     return sorted(found)
-
-
-def refused(filling, dt):
-    """Tell whether a filling refuses a step."""
-    try:
-        filling.check(SOME, dt)
-    except InputError:
-        return True
-    return False
 
 
 def write_tables(costs, borne, options):
