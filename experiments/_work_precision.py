@@ -21,7 +21,6 @@ from taichi_dem.kit.plot_style import GREY, picture, styles_of
 _SMALL = 6.5
 #: Where a label's centre may stand: right and up in widths and heights of the label, and a gap.
 _PLACES = ((1, 1), (-1, -1), (1, -1), (-1, 1), (1, 0), (-1, 0), (0, 2), (0, -2), (1, 3), (-1, -3))
-_COSTS = ("seconds", "evaluations")
 WALL = "wall time [s], fastest of the repeats"
 
 
@@ -157,13 +156,11 @@ def picture_work_precision(
     ratios = {"width_ratios": (1.0, 1.0, 0.62)[:panels]}
     size = (6.0 * min(panels, 2.62), 6.2)
     with picture(path, 1, panels, size, gridspec_kw=ratios) as (figure, axes):
-        looks = _looks(titles)
-        for axis, cost in zip(axes, _COSTS):
-            _draw_costs(axis, points, looks, cost, floors)
-            _draw_ideal(axis, points, cost, order)
-            _draw_failures(axis, points, looks, cost)
-        axes[0].set(xlabel=time_name, ylabel=error_name)
-        axes[1].set(xlabel=work_name, ylabel=error_name)
+        looks, drawn = _looks(titles), []
+        for axis, cost, name in zip(axes, ("seconds", "evaluations"), (time_name, work_name)):
+            drawn.append(_Panel(axis, points, looks, cost))
+            drawn[-1].draw(floors, order)
+            axis.set(xlabel=name, ylabel=error_name)
         if residual_names:
             _draw_residuals(axes[2], points, looks, step_unit)
             axes[2].set(xlabel=residual_names[0], ylabel=residual_names[1])
@@ -173,8 +170,8 @@ def picture_work_precision(
         figure.supxlabel(words, fontsize=7.5, x=0.01, ha="left")
         # Where a label has room is known when everything else has its place.
         figure.draw_without_rendering()
-        for axis, cost in zip(axes, _COSTS):
-            _label_steps(axis, points, looks, cost)
+        for panel in drawn:
+            panel.label_steps()
 
 
 def picture_errors(path, errors, titles, *, time_name, caption):
@@ -220,105 +217,101 @@ def cost_of(point, points, cost):
     return near.seconds.low * point.evaluations / near.evaluations if near.seconds else math.nan
 
 
-def _draw_costs(axis, points, looks, cost, floors):
-    axis.set(xscale="log", yscale="log")
-    for method, look in looks.items():
-        good = _good(points, method)
-        place = [cost_of(p, points, cost) for p in good]
-        axis.plot(place, [p.error for p in good], label=method, **look)
-        if cost == "seconds" and good:
-            spread = [[0.0] * len(good), [p.seconds.high - p.seconds.low for p in good]]
-            ends = {"ecolor": look["color"], "elinewidth": 1.0, "capsize": 2}
-            axis.errorbar(place, [p.error for p in good], xerr=spread, fmt="none", **ends)
-        if floors.get(method):
-            axis.axhline(floors[method], color=look["color"], ls=":", lw=1.0)
-    if floors:
-        axis.plot([], [], ls=":", color=GREY, label="chaos floor of each method")
-
-
 def _good(points, method):
     """Points with an error, coarse to fine; an error of zero has no place on a log scale."""
-    return _coarse_first(p for p in points if p.method == method and p.error > 0.0)
+    own = [p for p in points if p.method == method and p.error > 0.0]
+    return sorted(own, key=lambda p: -p.step)
 
 
-def _coarse_first(points):
-    return sorted(points, key=lambda p: -p.step)
+class _Panel:
+    """Errors over one cost. good, failed: (cost, point) by method, coarse to fine."""
 
+    def __init__(self, axis, points, looks, cost):
+        axis.set(xscale="log", yscale="log")
+        self.axis, self.looks, self.timed = axis, looks, cost == "seconds"
+        self.good, self.failed = {}, {}
+        for method in looks:
+            failed = [p for p in points if p.method == method and p.failure]
+            failed.sort(key=lambda p: -p.step)
+            self.good[method] = [(cost_of(p, points, cost), p) for p in _good(points, method)]
+            self.failed[method] = [(cost_of(p, points, cost), p) for p in failed]
 
-def _draw_ideal(axis, points, cost, order):
-    """The line along which twice the cost brings 2^order times the accuracy: the ideal gain."""
-    good = [(cost_of(p, points, cost), p.error) for p in points if p.error > 0.0]
-    if not good:
-        return
-    x, y = min(good, key=lambda at: at[0] * at[1] ** (1.0 / order))
-    (left, right), (bottom, top) = axis.get_xlim(), axis.get_ylim()
-    label = f"ideal gain, order {order}, from the best buy"
-    # A line that leaves at the bottom first would shift the limits.
-    end = min(right, x * (y / bottom) ** (1.0 / order))
-    start = max(left, x * (y / top) ** (1.0 / order))
-    line = [y * (x / place) ** order for place in (start, end)]
-    axis.plot([start, end], line, color=GREY, ls="--", lw=0.9, label=label)
-    axis.set(xlim=(left, right), ylim=(bottom, top))
+    def draw(self, floors, order):
+        """Draw points, floors, the ideal gain and failures."""
+        for method, look in self.looks.items():
+            place = [at for at, _ in self.good[method]]
+            errors = [p.error for _, p in self.good[method]]
+            self.axis.plot(place, errors, label=method, **look)
+            if self.timed and place:
+                slower = [p.seconds.high - p.seconds.low for _, p in self.good[method]]
+                ends = {"ecolor": look["color"], "elinewidth": 1.0, "capsize": 2, "fmt": "none"}
+                self.axis.errorbar(place, errors, xerr=[[0.0] * len(place), slower], **ends)
+            if floors.get(method):
+                self.axis.axhline(floors[method], color=look["color"], ls=":", lw=1.0)
+        if floors:
+            self.axis.plot([], [], ls=":", color=GREY, label="chaos floor of each method")
+        good = [(at, p.error) for own in self.good.values() for at, p in own]
+        if good:
+            self._draw_ideal(good, order)
+        if any(self.failed.values()):
+            self._draw_failures()
 
+    def _draw_ideal(self, good, order):
+        """The line along which twice the cost brings 2^order times the accuracy: the ideal gain."""
+        x, y = min(good, key=lambda at: at[0] * at[1] ** (1.0 / order))
+        (left, right), (bottom, top) = self.axis.get_xlim(), self.axis.get_ylim()
+        # A line that leaves at the bottom first would shift the limits.
+        end = min(right, x * (y / bottom) ** (1.0 / order))
+        start = max(left, x * (y / top) ** (1.0 / order))
+        line = [y * (x / place) ** order for place in (start, end)]
+        label = f"ideal gain, order {order}, from the best buy"
+        self.axis.plot([start, end], line, color=GREY, ls="--", lw=0.9, label=label)
+        self.axis.set(xlim=(left, right), ylim=(bottom, top))
 
-def _draw_failures(axis, points, looks, cost):
-    """Crosses along the top edge, a row a method; their height is no error."""
-    failed = [p for p in points if p.failure and p.method in looks]
-    if not failed:
-        return
-    methods = [method for method in looks if any(p.method == method for p in failed)]
-    bottom, top = axis.get_ylim()
-    step = (top / bottom) ** 0.055
-    edge = top * step ** (len(methods) + 0.3)
-    axis.axhspan(top, edge, color="0.94", lw=0, label="× no result: its cost, but no error")
-    widest = [cost_of(p, points, cost) for p in failed]
-    left, right = axis.get_xlim()
-    left, right = min(left, 0.8 * min(widest)), max(right, 1.25 * max(widest))
-    axis.set(xlim=(left, right), ylim=(bottom, edge))
-    for k, method in enumerate(methods):
-        own = _coarse_first(p for p in failed if p.method == method)
-        level, colour = top * step ** (k + 0.65), looks[method]["color"]
-        place = [cost_of(p, points, cost) for p in own]
-        axis.plot(place, [level] * len(own), "x", color=colour, ms=6, mew=1.6)
-        words = ", ".join(f"{p.label} {p.failure}" for p in own)
-        # On the side where there is room for it.
-        late = place[-1] ** 2 > left * right
-        end, shift, side = (place[0], -7, "right") if late else (place[-1], 7, "left")
-        look = {"fontsize": _SMALL, "color": colour, "ha": side}
-        axis.annotate(words, (end, level), (shift, -2.5), textcoords="offset points", **look)
+    def _draw_failures(self):
+        """Crosses along the top edge, a row a method; their height is no error."""
+        axis, failed = self.axis, {m: own for m, own in self.failed.items() if own}
+        bottom, top = axis.get_ylim()
+        step = (top / bottom) ** 0.055
+        edge = top * step ** (len(failed) + 0.3)
+        axis.axhspan(top, edge, color="0.94", lw=0, label="× no result: its cost, but no error")
+        costs = [at for own in failed.values() for at, _ in own]
+        left, right = axis.get_xlim()
+        left, right = min(left, 0.8 * min(costs)), max(right, 1.25 * max(costs))
+        axis.set(xlim=(left, right), ylim=(bottom, edge))
+        for k, (method, own) in enumerate(failed.items()):
+            level, colour = top * step ** (k + 0.65), self.looks[method]["color"]
+            place = [at for at, _ in own]
+            axis.plot(place, [level] * len(own), "x", color=colour, ms=6, mew=1.6)
+            words = ", ".join(f"{p.label} {p.failure}" for _, p in own)
+            # On the side where there is room for it.
+            late = place[-1] ** 2 > left * right
+            end, shift, side = (place[0], -7, "right") if late else (place[-1], 7, "left")
+            look = {"fontsize": _SMALL, "color": colour, "ha": side}
+            axis.annotate(words, (end, level), (shift, -2.5), textcoords="offset points", **look)
 
-
-def _draw_residuals(axis, points, looks, unit):
-    axis.set(xscale="log", yscale="log")
-    for method, look in looks.items():
-        own = [p for p in _good(points, method) if p.residual > 0.0]
-        axis.plot([p.step / unit for p in own], [p.residual for p in own], **look)
-    # Within a decade a log axis writes all its minor ticks, wide as they are.
-    axis.xaxis.set_minor_formatter("")
-
-
-def _label_steps(axis, points, looks, cost):
-    """Write every point's step beside it, where it covers least of what is there already."""
-    good = [p for method in looks for p in _good(points, method)]
-    places = [(cost_of(p, points, cost), p.error) for p in good]
-    at, unit = axis.transData.transform(places), axis.figure.dpi / 72.0
-    taken = [_box(spot, 8.0 * unit, 8.0 * unit) for spot in at]
-    frame = axis.get_window_extent().get_points().ravel()
-    for spot, place, p in zip(at, places, good):
-        wide, high = unit * (0.56 * _SMALL * len(p.label) + 1.0), unit * _SMALL
-        reach = 0.5 * wide + 4.0 * unit, 0.5 * high + 2.0 * unit
-        shifts = [np.multiply(reach, sides) for sides in _PLACES]
-        boxes = [_box(spot + shift, wide, high) for shift in shifts]
-        # What lies outside the frame counts twice.
-        hidden = [
-            _shared(box, taken).sum() + 2.0 * (wide * high - _shared(box, [frame])[0]) + 0.5 * k
-            for k, box in enumerate(boxes)
-        ]
-        k = int(np.argmin(hidden))
-        taken.append(boxes[k])
-        look = {"fontsize": _SMALL, "color": looks[p.method]["color"], "ha": "center"}
-        shift = tuple(shifts[k] / unit)
-        axis.annotate(p.label, place, shift, textcoords="offset points", va="center", **look)
+    def label_steps(self):
+        """Write every point's step beside it, where it covers least of what is there already."""
+        good = [pair for own in self.good.values() for pair in own]
+        places = [(at, p.error) for at, p in good]
+        spots, unit = self.axis.transData.transform(places), self.axis.figure.dpi / 72.0
+        taken = [_box(spot, 8.0 * unit, 8.0 * unit) for spot in spots]
+        frame = self.axis.get_window_extent().get_points().ravel()
+        for spot, place, (_, p) in zip(spots, places, good):
+            wide, high = unit * (0.56 * _SMALL * len(p.label) + 1.0), unit * _SMALL
+            reach = 0.5 * wide + 4.0 * unit, 0.5 * high + 2.0 * unit
+            shifts = [np.multiply(reach, sides) for sides in _PLACES]
+            boxes = [_box(spot + shift, wide, high) for shift in shifts]
+            # The part outside the frame counts twice.
+            hidden = [
+                _shared(box, taken).sum() + 2.0 * (wide * high - _shared(box, [frame])[0]) + 0.5 * k
+                for k, box in enumerate(boxes)
+            ]
+            k = int(np.argmin(hidden))
+            taken.append(boxes[k])
+            look = {"fontsize": _SMALL, "color": self.looks[p.method]["color"], "ha": "center"}
+            look.update(va="center", textcoords="offset points")
+            self.axis.annotate(p.label, place, tuple(shifts[k] / unit), **look)
 
 
 def _box(middle, wide, high):
@@ -332,3 +325,12 @@ def _shared(box, others):
     others = np.array(others)
     edges = np.minimum(box[2:], others[:, 2:]) - np.maximum(box[:2], others[:, :2])
     return np.maximum(edges, 0.0).prod(axis=1)
+
+
+def _draw_residuals(axis, points, looks, unit):
+    axis.set(xscale="log", yscale="log")
+    for method, look in looks.items():
+        own = [p for p in _good(points, method) if p.residual > 0.0]
+        axis.plot([p.step / unit for p in own], [p.residual for p in own], **look)
+    # Within a decade a log axis writes all its minor ticks, wide as they are.
+    axis.xaxis.set_minor_formatter("")
