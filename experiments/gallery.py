@@ -80,7 +80,7 @@ def build(options):
             for item in items
             if item.failed and item.page in wanted
         ),
-        *(f"{name}: has no entry in _gallery_pages.py" for name in without_entry()),
+        *(f"{name}: has no entry in _gallery_pages.txt" for name in without_entry()),
     ]
 
 
