@@ -45,6 +45,7 @@ def _struck(figure, axes, answer):
     shown, high = motion or truth, answer.model.mesh.points.max(axis=0)
     look = {"magnify": _MAGNIFY, "limits": (-top, top), "colours": "RdBu_r"}
     drawn = draw_bodies(axes, answer.model, shown, 1e3 * shown["velocity"][:, 0], **look)
+    drawn.set_alpha(None if motion else 0.15)
     axes.set(xlim=(-0.02, high[0] + 0.03), ylim=(-0.02, high[1] + 0.02), xlabel="x [m]", yticks=[])
     axes.spines["left"].set_visible(False)
     figure.colorbar(drawn, ax=axes, label="velocity\n[mm/s]", aspect=8, pad=0.01)
@@ -52,7 +53,6 @@ def _struck(figure, axes, answer):
         now = f"t = {1e3 * answer.time[SHOWN]:.2f} ms"
         axes.set_title(f"{now}, displacement × {_MAGNIFY:g}")
         return
-    drawn.set_alpha(0.15)
     axes.set_title("the run did not get there")
     words = textwrap.fill(answer.chosen.sentence.split(";")[0], 60)
     look = {"ha": "center", "va": "center", "color": RED, "weight": "bold"}
