@@ -14,11 +14,11 @@ from _work_precision import (
     answer_rows,
     answers,
     cheapest,
-    cost_of,
     percent,
     picture_work_precision,
     write_points,
 )
+from _work_precision_picture import cost_of
 from ca_damper import InputError
 
 
