@@ -3,9 +3,9 @@
 import json
 import os
 import re
-from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
+from types import SimpleNamespace
 from urllib.parse import quote
 
 from jinja2 import Environment, FileSystemLoader
@@ -24,51 +24,30 @@ CAPTION = "caption.txt"
 MOST_KEY_FIGURES = 12
 
 
-@dataclass(frozen=True)
-class Shown:
-    """Content of the page for one experiment.
-
-    page: its entry. folder: of its results, relative to the page. command: that made them.
-    quick: whether it was the smaller job. pictures, more: files shown, and files linked.
-    thumbnail: small picture for the list, relative to the page, or "". caption: words of
-    the run about its own pictures, or "". key, rest: rows of figures (name, value, paper).
-    seconds: of the run, in words. output: as printed. failed: why it did not end well, or "".
-    """
-
-    page: object
-    folder: str
-    command: str
-    quick: bool
-    pictures: tuple
-    more: tuple
-    thumbnail: str
-    caption: str
-    key: tuple
-    rest: tuple
-    seconds: str
-    output: str
-    failed: str
-
-
 def shown(page, root, failed=""):
-    """Result of an experiment in root/NAME; Shown, failed where there is none."""
+    """Content of the page for an experiment, by the names that _gallery.html uses.
+
+    page: its entry. root: folder of the page, in which its results stand in root/NAME. failed: why
+    it did not end well, or "". quick: whether it was the smaller job. pictures, more: files shown,
+    and files linked. caption: words of the run about its own pictures. key, rest: rows of figures
+    (name, value, paper).
+    """
     folder = Path(root, page.name)
     summary, run = read_json(folder / "summary.json"), read_json(folder / RUN)
     files = sorted(path.name for path in folder.glob("*") if path.is_file())
-    pictures = tuple(name for name in page.pictures if name in files)
+    pictures = [name for name in page.pictures if name in files]
     command = summary.get("command", page.command.split(" ", 1)[1])
     key, rest = figure_rows(summary.get("figures", {}), page.figures)
-    thumbnail = f"{THUMBNAILS}/{quote(page.name)}.png"
-    there = page.pictures[0] in files and Path(root, THUMBNAILS, f"{page.name}.png").is_file()
-    return Shown(
+    small = Path(root, THUMBNAILS, f"{page.name}.png").is_file() and page.pictures[0] in files
+    return SimpleNamespace(
         page=page,
         folder=quote(page.name),
         command=f"python {command}",
         # Summaries of older versions have the command alone.
         quick=summary.get("quick", "--quick" in command.split()),
         pictures=pictures,
-        more=tuple(name for name in files if name not in (*pictures, RUN, CAPTION)),
-        thumbnail=thumbnail if there else "",
+        more=[name for name in files if name not in (*pictures, RUN, CAPTION)],
+        thumbnail=f"{THUMBNAILS}/{quote(page.name)}.png" if small else "",
         caption=read_text(folder / CAPTION),
         key=key,
         rest=rest,
@@ -137,7 +116,7 @@ def _seconds(summary, run):
 
 
 def write_page(path, items):
-    """Write the page of all items, a sequence of Shown, as one HTML file beside their folders.
+    """Write the page of all items, a sequence of ``shown``, as one HTML file beside their folders.
 
     Raises InputError when it cannot be written.
     """
