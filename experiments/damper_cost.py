@@ -54,7 +54,7 @@ VARIANTS = {
     "ca_scan_2e-5": (SCAN, 2e-5, "scan, 20 µs", "s", "--"),
     "ca_list_2e-5": (Automaton(), 2e-5, "list, 20 µs", "s", "-"),
 }
-#: What became of a run: words and marker.
+#: Outcome of a run: words and marker.
 OUTCOMES = {
     "runs": ("runs", "o"),
     "diverges": ("diverges", "X"),
