@@ -1,15 +1,14 @@
-"""Which effects a scene needs: a bar is pulled open and pressed together, with any effects.
+"""Effects that a scene needs: a bar is pulled open and pressed together, with any effects.
 
 Every choice of effects is a program of its own, and to compile one takes seconds. So answers come
-from two programs, with contact and without, in which numbers of the other effects are set to what
-never acts: the same bits (a test demands it). What a choice costs is measured with its own program,
-when somebody asks for that. Everything here runs on the engine's thread.
+from two programs, with contact and without, in which the numbers of the other effects are such that
+they never act: the same bits (a test demands it). The cost of a choice is measured with its own
+program, on demand. All runs on the engine's thread.
 """
 
 import math
 import time
 from dataclasses import dataclass, replace
-from typing import Optional
 
 import numpy as np
 
@@ -83,8 +82,8 @@ class Outcome:
 
     names: of the effects. motions: of all bodies, by the names of SHOWN, so far as the run came.
     broken: which bonds at the end, bool. step_s: CPU seconds of a step, NaN where that was not
-    measured. advice: what ``needed_effects`` says. sentence: what the program said where it ended
-    the run, else "". unresolved: its sentences about what the step is too long for.
+    measured. advice: of ``needed_effects``. sentence: of the program where it ended the run, or "".
+    unresolved: its sentences about processes for which the step is too long.
     """
 
     names: tuple
@@ -98,7 +97,7 @@ class Outcome:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What one choice gives: the Outcome chosen and that with all effects; model: of the bar.
+    """Runs for one choice: the Outcome chosen and that with all effects; model: of the bar.
 
     speed: at which the right end begins [m/s].
     """
@@ -110,7 +109,7 @@ class Answer:
 
     @property
     def stroke(self):
-        """How far the right end is pulled out [m]."""
+        """Largest displacement of the right end [m]."""
         return self.speed / (2.0 * np.pi * FREQUENCY)
 
     @property
@@ -143,40 +142,35 @@ def scene(names):
     return Scene(bar(LENGTH, WIDTH, CELLS), CONCRETE, [*listed, effects.Fixed("left"), moved])
 
 
+@engine.remember
 def again(names):
-    """The compiled bar with these effects, made when it is first asked for."""
-    return engine.kept(names, lambda: Again(scene(names), Uniform(STEP)))
+    """The compiled bar with these effects."""
+    return Again(scene(names), Uniform(STEP))
 
 
 def silenced(made, names):
     """Set the numbers of the effects that are not named to what never acts; watch out for them."""
     model = made.model
-    dashpot, tension, shear, friction = model.dashpot, model.tension, model.shear, model.friction
-    if dashpot.name and dashpot.name not in names:
-        dashpot.law.fill(0.0)
-    if tension.name and tension.name not in names:
+    laws = (model.dashpot, model.tension, model.shear, model.friction)
+    dashpot, tension, shear, friction = (bool(law.name) and law.name not in names for law in laws)
+    if dashpot:
+        model.dashpot.law.fill(0.0)
+    if tension:
         # As strong as nothing is: strength, its opening, and the failure beyond, by a power of two.
-        tension.law[0] *= _STRONGER
-        limits = tension.unit.to_numpy()
+        model.tension.law[0] *= _STRONGER
+        limits = model.tension.unit.to_numpy()
         limits[:, 0] *= _STRONGER
-        tension.unit.from_numpy(limits)
-        tension.law[1] = 2.0 * float(limits[:, 0].max())
-    if shear.name and shear.name not in names:
-        shear.law[0] *= _STRONGER
-    if friction.name and friction.name not in names:
-        friction.law[0] = 0.0
+        model.tension.unit.from_numpy(limits)
+        model.tension.law[1] = 2.0 * float(limits[:, 0].max())
+    if shear:
+        model.shear.law[0] *= _STRONGER
+    if friction:
+        model.friction.law[0] = 0.0
     made.missing_effects.needed = unserved({EFFECTS[name].role for name in names})
     return made
 
 
-def ready(program, names, speed):
-    """The bar at rest in a program, its right end about to move at a speed [m/s]."""
-    made = silenced(again(program).back(STEP), names)
-    motion = made.model.supports[1].motion
-    motion[0], motion[1] = speed, SIDEWAYS * speed
-    return made
-
-
+@engine.remember
 def outcome(names, speed):
     """Move the bar with these effects; the Outcome knows no cost, as others stand silent by."""
     program = ALL if "sphere_contact" in names else WITHOUT_CONTACT
@@ -190,7 +184,9 @@ def measured(names, speed):
 
 def moved(program, names, speed):
     """Outcome of a program with the effects named; the others in it never act."""
-    made = ready(program, names, speed)
+    made = silenced(again(program).back(STEP), names)
+    motion = made.model.supports[1].motion
+    motion[0], motion[1] = speed, SIDEWAYS * speed
     every, motions, sentence, spent = round(UNTIL / LOOKS / STEP), {}, "", 0.0
     try:
         for k in range(1, LOOKS + 1):
@@ -216,13 +212,11 @@ def moved(program, names, speed):
 
 def answer(names, speed):
     """The Answer to a choice: effects by name, as ``allowed`` gives them, and one of SPEEDS."""
-    wanted = (names, ALL)
-    found = [engine.kept((one, speed), lambda one=one: outcome(one, speed)) for one in wanted]
-    return Answer(speed, *found, again(ALL).simulation.model)
+    return Answer(speed, outcome(names, speed), outcome(ALL, speed), again(ALL).simulation.model)
 
 
 def price(names, speed):
-    """What ``answer`` gives, with costs: both programs run one after the other."""
+    """The Answer with costs: both programs run one after the other."""
     again(names)
     chosen, complete = (measured(one, speed) for one in (names, ALL))
     return replace(answer(names, speed), chosen=chosen, complete=complete)
@@ -236,17 +230,18 @@ def compile_all():
 
 def verdicts(answer):
     """A row for every effect: (words, whether listed, what it did, what the program advises)."""
-    uses = {use.effect: use for use in answer.chosen.advice.uses}
-    missed = {finding.effect: finding for finding in answer.chosen.advice.missing}
-    return [
-        _verdict(name, uses.get(name), missed.get(EFFECTS[name].__name__), answer) for name in ALL
-    ]
-
-
-def _verdict(name, use, missed: Optional[object], answer):
-    if use is not None:
-        advice = "drop it" if name in answer.chosen.advice.droppable else "keep it"
-        return WORDS[name], True, str(use), advice
-    if missed is not None:
-        return WORDS[name], False, f"{missed.what}: up to {missed.most} at a time", "list it"
-    return WORDS[name], False, "left out", "not missed"
+    advice = answer.chosen.advice
+    uses = {use.effect: use for use in advice.uses}
+    missed = {finding.effect: finding for finding in advice.missing}
+    rows = []
+    for name, words in WORDS.items():
+        finding = missed.get(EFFECTS[name].__name__)
+        if name in uses:
+            says = "drop it" if name in advice.droppable else "keep it"
+            rows.append((words, True, str(uses[name]), says))
+        elif finding is not None:
+            did = f"{finding.what}: up to {finding.most} at a time"
+            rows.append((words, False, did, "list it"))
+        else:
+            rows.append((words, False, "left out", "not missed"))
+    return rows

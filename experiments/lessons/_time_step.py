@@ -1,6 +1,6 @@
-"""What a time step costs: a bar is struck with any step by any method, and compared with the truth.
+"""Cost of a time step: a bar is struck with any step by any method, and compared with the truth.
 
-The bar has 12 cells of six tetrahedra. Everything here runs on the engine's thread.
+The bar has 12 cells of six tetrahedra. All runs on the engine's thread.
 """
 
 import math
@@ -79,7 +79,7 @@ class Strike:
     """A run of the bar.
 
     step [s]; moved: mean displacement of the far end [m], (SAMPLES + 1,), NaN after a divergence;
-    sentence: what the program said where it ended the run, "" where it did not; motion: of all
+    sentence: of the program where it ended the run, "" where it did not; motion: of all
     bodies at sample SHOWN, None where the run ended before. seconds: of one core for the run
     without looks on the way, NaN where that was not measured.
     """
@@ -97,7 +97,7 @@ class Strike:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What one choice gives.
+    """Runs for one choice.
 
     method, rise [s]: the choice. chosen: its Strike. truth: that of the finest step. ladders: the
     Strikes at all STEPS by method, of those asked for so far with this blow. model: of the bar.
@@ -128,9 +128,10 @@ def limits():
     return float(report.dashpot_step_s.min()), float(report.spring_step_s.min())
 
 
+@engine.remember
 def again(method):
-    """The compiled bar of a method, made when it is first asked for."""
-    return engine.kept(("bar", method), lambda: Again(scene(), METHODS[method]))
+    """The compiled bar of a method."""
+    return Again(scene(), METHODS[method])
 
 
 def ready(method, step, rise):
@@ -158,8 +159,9 @@ def strike(method, step, rise):
     return Strike(step, moved, sentence, motion)
 
 
+@engine.remember
 def timed(method, step, rise):
-    """The same with what it costs, from a second run without looks on the way."""
+    """The same with its cost, from a second run without looks on the way."""
     found = strike(method, step, rise)
     if found.sentence:
         return found
@@ -169,23 +171,22 @@ def timed(method, step, rise):
     return replace(found, seconds=time.thread_time() - started)
 
 
+@engine.remember
 def truth(rise):
     """The Strike that all others are compared with."""
-    return engine.kept(("truth", rise), lambda: strike("solved", FINEST, rise))
+    return strike("solved", FINEST, rise)
 
 
-def ladder(method, rise):
-    """Strikes of a method at all STEPS."""
-    rungs = [("rung", method, step, rise) for step in STEPS]
-    return [engine.kept(key, lambda key=key: timed(*key[1:])) for key in rungs]
+@engine.remember
+def tried(rise):
+    """Methods that have been asked for with a blow: a dict of the Strikes at all STEPS, to fill."""
+    return {}
 
 
 def answer(method, step, rise):
     """The Answer to a choice: method by name, step out of STEPS and rise out of RISES [s]."""
-    own = ladder(method, rise)
-    tried = engine.kept(("tried", rise), dict)
-    tried[method] = own
-    ladders = {name: tried[name] for name in METHODS if name in tried}
+    own = tried(rise)[method] = [timed(method, one, rise) for one in STEPS]
+    ladders = {name: tried(rise)[name] for name in METHODS if name in tried(rise)}
     chosen = own[STEPS.index(step)]
     return Answer(method, rise, chosen, truth(rise), ladders, again(method).simulation.model)
 

@@ -52,6 +52,32 @@ def test_a_summary_says_whether_its_run_was_quick_and_is_valid_json(
     assert summary["figures"]["a"]["value"] is None
 
 
+def test_options_left_out_take_the_values_of_the_job_and_others_keep_theirs():
+    options = SimpleNamespace(seeds=3, particles=None)
+    _cli.fill_in(options, {"seeds": 5, "particles": [1], "cycles": 2})
+    assert vars(options) == {"seeds": 3, "particles": [1], "cycles": 2}
+
+
+@pytest.mark.parametrize(
+    ("rows", "text"), [([(1, "a"), (2, "b")], "x,y\n1,a\n2,b\n"), ([], "x,y\n")]
+)
+def test_rows_stand_under_their_names_and_names_without_rows(tmp_path, rows, text):
+    _cli.write_rows(tmp_path / "table.csv", "x y", iter(rows))
+    assert (tmp_path / "table.csv").read_text() == text
+
+
+def test_the_end_of_a_script_adds_up_what_its_runs_took(tmp_path, monkeypatch, capsys):
+    settings = SimpleNamespace(arch="cpu", threads=1)
+    monkeypatch.setattr(_cli.runtime, "settings", lambda: settings)
+    runs = [SimpleNamespace(compile_seconds=1.0, run_seconds=k) for k in (2.0, 3.0)]
+    options = SimpleNamespace(out=str(tmp_path))
+    for given in (runs, (2.0, 5.0)):
+        _cli.finish(options, "x", {"a": _cli.figure(1.5, "s")}, given)
+        summary = json.loads((tmp_path / "summary.json").read_text())
+        assert summary["seconds"] == {"compile": 2.0, "run": 5.0}
+    assert str(tmp_path) in capsys.readouterr().out
+
+
 def blow(levels):
     """A run of demo_multirate whose bar has bodies at 0.1, 0.4 and 0.7 m; the fragment at 0.95."""
     model = SimpleNamespace(centre=np.array([[x, 0.0, 0.0] for x in (0.1, 0.4, 0.7, 0.95)]))
@@ -93,4 +119,4 @@ def test_the_bar_is_looked_at_once_the_blow_has_given_energy(script, last):
 def test_grains_give_what_they_do_not_take(script, power, words):
     names = ("apparent_damping_N_s_m", "damping_ratio", "damping_ratio_empty", "apparent_mass_g")
     value = {"power_mW": power, **dict.fromkeys(names, 1.0)}
-    assert words in script("demo_damper").taken(value)[0]
+    assert words in script("_demo_damper_pictures").taken(value)[0]
