@@ -106,8 +106,9 @@ def _elastic(cls):
     simulation.start()
     driver = simulation.driver
     if cls is not None:
-        advance = cls(simulation.model, simulation.state, simulation.schedule, None)
-        driver = Resident(Step(advance, simulation.schedule, None))
+        engine = simulation.loan.engine
+        advance = cls(engine.tables, engine.state, engine.schedule, None)
+        driver = Resident(Step(advance, engine.schedule, None))
     driver.prepare()
     return lambda substeps: driver._run(1 << 60, substeps)
 

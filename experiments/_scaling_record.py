@@ -11,7 +11,6 @@ import taichi as ti
 from scipy.optimize import nnls
 
 from taichi_dem import Every, Simulation
-from taichi_dem.kit.allocation import batch_allocation
 from taichi_dem.simulate import run_simulation
 from taichi_dem.step.drivers import Once, Resident, Step
 from taichi_dem.timeline import MAX_LEVEL
@@ -30,9 +29,9 @@ class Counter:
     """
 
     def __init__(self, simulation):
-        self.model, self.schedule = simulation.model, simulation.schedule
-        self.contacts = simulation.contacts
-        shape = (self.model.body_count, MAX_LEVEL + 1)
+        engine = simulation.loan.engine
+        self.tables, self.schedule, self.contacts = engine.tables, engine.schedule, engine.contacts
+        shape = (simulation.model.body_count, MAX_LEVEL + 1)
         self.counts = ti.Vector.field(len(KINDS), ti.i32, shape=shape)
         self.ticks = ti.field(ti.i32, shape=MAX_LEVEL + 1)
 
@@ -44,7 +43,7 @@ class Counter:
     @ti.func
     def bond(self, b):
         """Charge the master of a bond that is due."""
-        self.counts[self.model.bond_slots[b][0] >> 2, self.schedule.low[None]][0] += 1
+        self.counts[self.tables.bond_slots[b][0] >> 2, self.schedule.low[None]][0] += 1
 
     @ti.func
     def pair(self, p):
@@ -131,11 +130,9 @@ def record(scene, method, until, every, progress):
     The run is stopped between two steps only, so its bits are those of an undisturbed one.
     """
     simulation = Simulation(scene, method, "resident")
-    with batch_allocation():
-        counter = Counter(simulation)
-    parts = simulation.advance, simulation.schedule, simulation.broad_phase
-    simulation.step = CountedStep(counter, *parts)
-    simulation.driver = Resident(simulation.step)
+    counter, engine = Counter(simulation), simulation.loan.engine
+    step = CountedStep(counter, engine.advance, engine.schedule, engine.broad_phase)
+    simulation.driver = Resident(step)
     made = Intervals(simulation, counter, every)
     run_simulation(simulation, until=until, samples=1, progress=progress, observers=[made])
     time_s, counts, ticks, seconds, searches = map(np.array, zip(*made.rows))

@@ -73,10 +73,11 @@ def timed(simulation, warm, steps, repeats):
 def bytes_a_step(simulation):
     """Bytes that a step of all bodies must move at least: the model read, the state written too."""
     sizes = {}
-    for part in ("model", "state"):
-        kept = FieldMemory(getattr(simulation, part), "constant" if part == "model" else "saved")
+    engine = simulation.loan.engine
+    for part, kind in (("tables", "constant"), ("state", "saved")):
+        kept = FieldMemory(getattr(engine, part), kind)
         sizes[part] = sum(array.nbytes for array in kept.read().values())
-    return sizes["model"] + 2 * sizes["state"]
+    return sizes["tables"] + 2 * sizes["state"]
 
 
 @ti.kernel

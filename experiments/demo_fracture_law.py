@@ -57,7 +57,7 @@ class Bench:
 
     def __init__(self, simulation, steps):
         self.state, self.steps = simulation.state, steps
-        self.drives = [one for one in simulation.model.supports if one.name == "prescribed_motion"]
+        self.drives = [one for one in simulation.tables.supports if one.name == "prescribed_motion"]
         self.plans = law.plans(steps, STEP)
         self.moved, self.given = [], []
 
@@ -66,7 +66,7 @@ class Bench:
         step = view.step
         for drive, plan in zip(self.drives, self.plans):
             if step == 0 or (step < self.steps and not np.array_equal(plan[step], plan[step - 1])):
-                drive.motion[0], drive.motion[1] = plan[step]
+                drive.law[0], drive.law[1] = plan[step]
         displacement = self.state.position.to_numpy() - view.model.centre
         self.moved.append(displacement[1::2] - displacement[::2])
         self.given.append(self.state.load_impulse.to_numpy()[::2, :2])

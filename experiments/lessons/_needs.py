@@ -12,10 +12,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from _again import Again
 from _engine import engine
-from taichi_dem import CONCRETE, Scene, SimulationDiverged, Uniform, effects, needed_effects
+from taichi_dem import (
+    CONCRETE,
+    Scene,
+    Simulation,
+    SimulationDiverged,
+    Uniform,
+    effects,
+    needed_effects,
+)
 from taichi_dem.diagnostics.missing_effects import unserved
+from taichi_dem.engine.model import Model
 from taichi_dem.mesh.shapes import bar
 
 LENGTH, WIDTH, CELLS = 0.3, 0.1, (3, 2, 2)
@@ -142,15 +150,22 @@ def scene(names):
     return Scene(bar(LENGTH, WIDTH, CELLS), CONCRETE, [*listed, effects.Fixed("left"), moved])
 
 
+def ready(program):
+    """The bar at rest with all effects of a program, which is compiled once."""
+    made = Simulation(scene(program), Uniform(STEP))
+    made.start()
+    return made
+
+
 @engine.remember
-def again(names):
-    """The compiled bar with these effects."""
-    return Again(scene(names), Uniform(STEP))
+def model():
+    """Constants of the bar."""
+    return Model(scene(()).mesh, CONCRETE, [])
 
 
 def silenced(made, names):
     """Set the numbers of the effects that are not named to what never acts; watch out for them."""
-    model = made.model
+    model = made.tables
     laws = (model.dashpot, model.tension, model.shear, model.friction)
     dashpot, tension, shear, friction = (bool(law.name) and law.name not in names for law in laws)
     if dashpot:
@@ -184,8 +199,8 @@ def measured(names, speed):
 
 def moved(program, names, speed):
     """Outcome of a program with the effects named; the others in it never act."""
-    made = silenced(again(program).back(STEP), names)
-    motion = made.model.supports[1].motion
+    made = silenced(ready(program), names)
+    motion = made.tables.supports[1].law
     motion[0], motion[1] = speed, SIDEWAYS * speed
     every, motions, sentence, spent = round(UNTIL / LOOKS / STEP), {}, "", 0.0
     try:
@@ -212,12 +227,12 @@ def moved(program, names, speed):
 
 def answer(names, speed):
     """The Answer to a choice: effects by name, as ``allowed`` gives them, and one of SPEEDS."""
-    return Answer(speed, outcome(names, speed), outcome(ALL, speed), again(ALL).simulation.model)
+    return Answer(speed, outcome(names, speed), outcome(ALL, speed), model())
 
 
 def price(names, speed):
     """The Answer with costs: both programs run one after the other."""
-    again(names)
+    ready(names)
     chosen, complete = (measured(one, speed) for one in (names, ALL))
     return replace(answer(names, speed), chosen=chosen, complete=complete)
 
@@ -225,7 +240,7 @@ def price(names, speed):
 def compile_all():
     """Compile both programs that answers come from, so that no later answer has to wait."""
     for names in (ALL, WITHOUT_CONTACT):
-        again(names)
+        ready(names)
 
 
 def verdicts(answer):

@@ -10,17 +10,18 @@ from typing import Optional
 
 import numpy as np
 
-from _again import Again
 from _engine import engine
 from taichi_dem import (
     CONCRETE,
     ImplicitDashpots,
     Scene,
+    Simulation,
     SimulationDiverged,
     Uniform,
     effects,
     quality_report,
 )
+from taichi_dem.engine.model import Model
 from taichi_dem.kit.plot_style import styles_of
 from taichi_dem.mesh.shapes import bar
 
@@ -116,9 +117,9 @@ class Answer:
         return np.linspace(0.0, UNTIL, SAMPLES + 1)
 
 
-def scene():
-    """The bar under a short blow on its left end."""
-    blow = effects.GasPressure("left", peak=PEAK, rise=RISES[0], decay_ratio=1.0)
+def scene(rise=RISES[0]):
+    """The bar under a short blow on its left end, with a rise [s]."""
+    blow = effects.GasPressure("left", peak=PEAK, rise=rise, decay_ratio=1.0)
     return Scene(bar(LENGTH, WIDTH, CELLS), CONCRETE, [blow, effects.BondDamping()])
 
 
@@ -128,17 +129,12 @@ def limits():
     return float(report.dashpot_step_s.min()), float(report.spring_step_s.min())
 
 
-@engine.remember
-def again(method):
-    """The compiled bar of a method."""
-    return Again(scene(), METHODS[method])
-
-
 def ready(method, step, rise):
-    """The bar at rest, with a step and a rise of the blow [s]."""
-    made = again(method).back(step)
-    # The law of GasPressure: peak, rise, and time of decay over rise.
-    made.model.loads[0].law[1] = rise
+    """The bar at rest, with a step and a rise of the blow [s]; a method is compiled once."""
+    chosen = METHODS[method]
+    name = "dt" if hasattr(chosen, "dt") else "dt0"
+    made = Simulation(scene(rise), replace(chosen, **{name: step}))
+    made.start()
     return made
 
 
@@ -178,6 +174,12 @@ def truth(rise):
 
 
 @engine.remember
+def model():
+    """Constants of the bar."""
+    return Model(scene().mesh, CONCRETE, [])
+
+
+@engine.remember
 def tried(rise):
     """Methods that have been asked for with a blow: a dict of the Strikes at all STEPS, to fill."""
     return {}
@@ -188,7 +190,7 @@ def answer(method, step, rise):
     own = tried(rise)[method] = [timed(method, one, rise) for one in STEPS]
     ladders = {name: tried(rise)[name] for name in METHODS if name in tried(rise)}
     chosen = own[STEPS.index(step)]
-    return Answer(method, rise, chosen, truth(rise), ladders, again(method).simulation.model)
+    return Answer(method, rise, chosen, truth(rise), ladders, model())
 
 
 def nearest(values, value):
@@ -199,4 +201,4 @@ def nearest(values, value):
 def compile_all():
     """Compile the bar of every method, so that no later answer has to wait for it."""
     for method in METHODS:
-        again(method)
+        ready(method, STEPS[0], RISES[0])
