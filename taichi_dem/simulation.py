@@ -119,9 +119,8 @@ class Simulation:
         self._load()
 
     def _check_reset(self, scene, method, model):
-        engine, structure = self.loan.engine, Structure(scene.effects, method)
-        structure.brute_force = self.loan.engine.structure.brute_force
-        if Structure(scene.effects, method, structure.brute_force) != engine.structure:
+        engine = self.loan.engine
+        if Structure(scene.effects, method, engine.structure.brute_force) != engine.structure:
             raise InputError(
                 "reset must have a scene and a method of the same structure, kinds of effects and "
                 f"of steps, got {scene!r} and {method!r}: make a new Simulation"

@@ -84,6 +84,7 @@ class BlastEngine(Engine):
     def load(self, model, method, max_speed):
         """Take over a scene, at rest and at time zero; max_speed [m/s]."""
         self.clear()
+        self.enter(model)
         self.tables.load(model)
         self.state.load(model, max_speed)
         if self.contacts is not None:
@@ -94,7 +95,6 @@ class BlastEngine(Engine):
             self.advance.solver.load(model, method)
         for driver in self.drivers.values():
             driver.load()
-        self.lengths = self._lengths(model)
 
     def _lengths(self, model):
         """Entries that a scene uses by those that a field has."""
@@ -110,7 +110,8 @@ class BlastEngine(Engine):
         return all(effect.accepts(given) for effect, given in self.tables.matched(model))
 
     def enter(self, model):
-        """Let the effects know whose numbers they stand for, as data of a scene come in."""
+        """Note the counts of a scene whose data come in, and whose numbers the effects stand for."""
+        self.lengths = self._lengths(model)
         for effect, given in self.tables.matched(model):
             effect.stand_for(given)
 

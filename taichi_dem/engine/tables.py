@@ -91,8 +91,7 @@ class Tables:
         self._load_bonds(model)
         if self.has_contact:
             self._load_spheres(model.spheres)
-        for effect, given in self.matched(model):
-            effect.stand_for(given)
+        for effect in self.effects:
             effect.load_scene(model)
 
     def matched(self, model):
