@@ -1,7 +1,7 @@
 """Time integration methods a user chooses from; each says how the schedule steps."""
 
 from dataclasses import dataclass
-from typing import Optional
+from typing import Optional, Protocol
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import between, choice, positive, shown
@@ -11,11 +11,42 @@ NEIGHBOURS = ("held", "drifted")
 DASHPOTS = ("full", "limited")
 
 
+class Method(Protocol):
+    """How bodies step; every member that the package asks for.
+
+    dt0: largest step [s]. name: short word for tables. uniform: whether all bodies share one step.
+    neighbour: one of NEIGHBOURS. control: a StepControl or None. dashpot: one of DASHPOTS.
+    distance: largest way in a step [m], or None. solves: whether dashpots are solved together.
+    steps_ahead: steps of a body by which its contacts are counted before they touch.
+    A method may also have ``advance``, a class derived from ``step.advance.Advance``, and
+    ``structure``, what its kernels depend on beside its class (``structure_of``).
+    """
+
+    dt0: float
+    name: str
+    uniform: bool
+    neighbour: str
+    control: Optional[StepControl]
+    dashpot: str
+    distance: Optional[float]
+    solves: bool
+    steps_ahead: float
+
+    def criterion(self):
+        """Rule for the level of a body, as ``step_control.FixedStep`` or ``Displacement``."""
+
+
 def check_method(method):
-    """InputError unless the method is an object that says how to step, one of these or alike."""
-    known = ("dt0", "criterion", "uniform", "neighbour", "solves")
-    if isinstance(method, type) or not all(hasattr(method, name) for name in known):
+    """Raise InputError, naming what is missing, unless a method is an object as ``Method`` says."""
+    wanted = [*Method.__annotations__, "criterion"]
+    missing = [name for name in wanted if not hasattr(method, name)]
+    if isinstance(method, type) or len(missing) > len(wanted) // 2:
         raise InputError(f"method must be one such as ImplicitDashpots(), got {shown(method)}")
+    if missing:
+        raise InputError(
+            f"method {type(method).__name__} must have a member {missing[0]}; methods have "
+            f"{', '.join(wanted)}"
+        )
 
 
 def _check_options(method):

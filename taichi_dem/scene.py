@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from taichi_dem.effects.base import MANY, Effect
+from taichi_dem.effects.roles import check_effect
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import positive, shown
@@ -45,6 +46,10 @@ class Scene:
         words = f"effects {effects}" if effects else "no effects"
         return in_brief(self, counted(self.mesh.body_count, "body"), words)
 
+    def effect(self, role):
+        """The effect of a role that takes one, None where none is listed."""
+        return next((effect for effect in self.effects if effect.role == role), None)
+
     def has(self, name):
         """Whether an effect of this name is listed."""
         return any(effect.name == name for effect in self.effects)
@@ -60,6 +65,7 @@ def _check_types(scene):
             raise InputError(
                 f"effects must be objects from taichi_dem.effects, got {shown(effect)}"
             )
+        check_effect(effect)
 
 
 def _check_roles(effects):

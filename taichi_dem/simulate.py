@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from taichi_dem.effects.gas_pressure import GasPressure
 from taichi_dem.kit.checkpoint import Checkpoint, digest, version_text
 from taichi_dem.kit.engine_pool import LoanMemory
 from taichi_dem.kit.errors import InputError, SimulationDiverged
@@ -220,7 +221,7 @@ def _write(result, folder, writer):
 
 def _watched_group(scene):
     """The group under gas pressure; without gas, one called hole if the mesh has it."""
-    groups = [effect.group for effect in scene.effects if effect.name == "gas_pressure"]
+    groups = [effect.group for effect in scene.effects if isinstance(effect, GasPressure)]
     groups += [name for name in scene.mesh.groups if name == "hole"]
     return groups[0] if groups else None
 

@@ -11,6 +11,7 @@ from taichi_dem.diagnostics.energy_balance import EnergyBalance
 from taichi_dem.diagnostics.missing_effects import MissingEffects
 from taichi_dem.diagnostics.report import Report
 from taichi_dem.diagnostics.step_resolution import StepResolution
+from taichi_dem.effects.gas_pressure import GasPressure
 from taichi_dem.engine.capacity import capacity_of
 from taichi_dem.engine.engine import ENGINES, Structure
 from taichi_dem.engine.model import Model
@@ -246,7 +247,7 @@ class Simulation:
 
     def gas_work(self):
         """Work of the gas pressure [J], zero without it."""
-        places = [k for k, load in enumerate(self.model.loads) if load.name == "gas_pressure"]
+        places = [k for k, load in enumerate(self.model.loads) if isinstance(load, GasPressure)]
         return sum(self.energy_balance.load_work(place) for place in places)
 
     def report(self):

@@ -2,20 +2,10 @@
 
 A user's effect holds numbers on the host. In an engine stands a bound copy of it, which has its
 fields and kernels, and into which every scene that the engine runs loads its numbers. Its ``role``
-says where ``step/advance.py`` asks for it:
-
-tension   ``traction(stiffness, u, opening)`` [Pa], ``failed(u)``, ``stored(b, u, opening)`` and
-          ``spent(b, u)`` [J/m^2], ``damage(b, u)``
-shear     ``traction(stiffness, u, sliding, pressure)`` -> (traction [Pa], energy slipped away
-          [J/m^2]), ``stored(b, u, sliding)``
-dashpot   ``traction(velocity)`` [Pa] of a contact unit
-load      ``acts_on(i)``, ``wrench(i, motion)`` -> (force [N], torque about the centre [N m]);
-          motion: a ``body_motion.BodyMotion``
-support   ``acts_on(i)``, ``held(i, t, rotation, velocity, angular_momentum)`` -> both, corrected
-contact   sphere contacts between broken faces      friction  their sliding
-
-b is a bond, u one of its three contact units (3 b, 3 b + 1, 3 b + 2), i a body. Roles ``load`` and
-``support`` take any number of effects, the others at most one.
+says where ``step/advance.py`` asks for it, and which members it must have (``effects.roles``):
+tension, shear and dashpot are laws of the contact units of bonds, contact and friction those of
+contact spheres, loads push bodies, supports hold them. Roles ``load`` and ``support`` take any
+number of effects, the others at most one.
 """
 
 import copy

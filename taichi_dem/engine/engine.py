@@ -110,7 +110,7 @@ class BlastEngine(Engine):
         return all(effect.accepts(given) for effect, given in self.tables.matched(model))
 
     def enter(self, model):
-        """Note the counts of a scene whose data come in, and whose numbers the effects stand for."""
+        """Note the counts of a scene whose data come in, and the numbers of its effects."""
         self.lengths = self._lengths(model)
         for effect, given in self.tables.matched(model):
             effect.stand_for(given)

@@ -19,6 +19,7 @@ class Wind(Effect):
     """A load of a user's own, of which nothing is known."""
 
     role, name = "load", "wind"
+    acts_on = wrench = lambda *_: None
 
 
 def moved(which, *velocity, frequency=0.0):
