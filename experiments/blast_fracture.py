@@ -122,7 +122,6 @@ def run(options):
                 frames=options.frames,
                 progress=progress,
                 output=options.out,
-                measure_gain=True,
                 **checkpoint_of(options),
             )
     except SimulationDiverged as error:

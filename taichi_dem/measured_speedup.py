@@ -4,25 +4,39 @@ The gains of a ``Report`` count evaluations. Lists that change, looks at who is 
 memory of which a part is used cost time beside them.
 """
 
+from dataclasses import is_dataclass, replace
+
 import numpy as np
 
-from taichi_dem.methods import Uniform
+from taichi_dem.kit.validation import LARGEST
 from taichi_dem.simulation import Simulation
 from taichi_dem.timeline import NEVER
 
 #: Substeps to begin with.
 _FIRST = 64
+#: Share of a run's CPU time that the measurement takes at its end, and the most of it [s].
+SHARE, MOST_SECONDS = 0.1, 0.5
+#: Shorter runs are not measured [s].
+LEAST_RUN = 0.5
 #: What a twin does not take over: its clock, its steps, impulses on their way, and its account.
 _ANEW = ("level", "bound", "tick", "last_tick", "injected_tick", "slot", "max_speed2", "bad_body")
 _ANEW += ("bond_heat", "contact_heat", "load_work", "load_impulse")
 
 
-def measured_speedup(simulation, seconds=0.5):
+def speedup_of_run(simulation):
+    """``measured_speedup`` for a share of the run's own time; None where it was too short."""
+    spent = simulation.run_cpu_seconds
+    if simulation.method.uniform or spent < LEAST_RUN or not is_dataclass(simulation.method):
+        return None
+    return measured_speedup(simulation, min(MOST_SECONDS, SHARE * spent))
+
+
+def measured_speedup(simulation, seconds=MOST_SECONDS):
     """CPU time that one step for all would have taken, over what the run took; 1 where it had one.
 
     How many evaluations that is is counted during the run. What one takes is measured for a number
-    of CPU seconds on a twin: it begins where the simulation stands, and all of its bodies take the
-    smallest step that there is then. To compile it takes some seconds more.
+    of CPU seconds on a twin in the same engine: it begins where the simulation stands, and all of
+    its bodies take the smallest step that there is then.
     Raises SimulationDiverged when the twin leaves its bounds.
     """
     if simulation.method.uniform or simulation.run_cpu_seconds == 0.0:
@@ -40,14 +54,16 @@ def measured_speedup(simulation, seconds=0.5):
 
 
 def _twin(simulation, step):
-    """A simulation at the same state with one step [s] for all, at time zero."""
-    method = Uniform(step, dashpot=simulation.method.dashpot)
-    driver = simulation.driver.name.partition(" ")[0]
-    twin = Simulation(simulation.scene, method, driver)
-    given = simulation.state.fields()
+    """A simulation at the same state with one step [s] for all, at time zero.
+
+    Its largest step is the one that all take: no body goes far enough in it to ask for less.
+    """
+    given = {name: field.to_numpy() for name, field in simulation.state.fields().items()}
+    method = replace(simulation.method, dt0=step, distance=LARGEST)
+    twin = Simulation(simulation.scene, method, simulation.driver.name.partition(" ")[0])
     for name, field in twin.state.fields().items():
         if name not in _ANEW:
-            values = given[name].to_numpy()
+            values = given[name]
             if name.endswith("_tick"):
                 # Ticks of another length: what has been, has been since the start.
                 values = np.where(values == NEVER, NEVER, 0)

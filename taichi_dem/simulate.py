@@ -14,7 +14,7 @@ from taichi_dem.kit.progress.progress import compiling
 from taichi_dem.kit.progress.progress_bar import reporting
 from taichi_dem.kit.restart import CheckpointWriter, NoCheckpointWriter, RunSnapshot, opened
 from taichi_dem.kit.validation import AUTO, instance
-from taichi_dem.measured_speedup import measured_speedup
+from taichi_dem.measured_speedup import speedup_of_run
 from taichi_dem.methods import check_method
 from taichi_dem.observers import RunView
 from taichi_dem.output.record import Recorder
@@ -37,7 +37,6 @@ def simulate(
     output=None,
     checkpoint=None,
     resume=None,
-    measure_gain=False,
     observers=(),
 ):
     """Run a scene to a time and return the result.
@@ -50,8 +49,7 @@ def simulate(
     output: folder for the result, written at the end, or up to the last good sample when the
     run diverges. checkpoint: a Checkpoint that says where and when the run saves itself, besides
     at its end and on Ctrl-C. resume: a checkpoint file to go on from, of the same scene and method;
-    the bits are those of a run that was never stopped. measure_gain: whether the report says how
-    much time steps of different length saved, which takes some seconds more (``measured_speedup``).
+    the bits are those of a run that was never stopped.
     observers: called on the way with a ``RunView``, see ``Observer``; after a resume, at the times
     that are left.
     Raises InputError for bad arguments, SimulationDiverged when the run leaves its bounds,
@@ -72,8 +70,8 @@ def simulate(
         writer = _checkpoint_writer(simulation, recorder, checkpoint, resume, arrays)
         error = _run_saved(simulation, recorder, writer, plan, report_progress)
         result = _result(simulation, recorder, error)
-        if measure_gain and error is None:
-            report = replace(result.report, measured_speedup=measured_speedup(simulation))
+        if error is None:
+            report = replace(result.report, measured_speedup=speedup_of_run(simulation))
             result = replace(result, report=report)
     if output is not None:
         _write(result, output, writer)

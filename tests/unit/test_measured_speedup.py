@@ -28,7 +28,10 @@ def test_a_twin_stands_where_the_run_does_and_takes_its_smallest_step(broken):
             assert np.array_equal(twin.state.motion()[name], values), name
     both = [run.state.broken_tick.to_numpy() == NEVER for run in (broken, twin)]
     assert np.array_equal(*both)
-    assert twin.method == Uniform(report.smallest_step_s)
+    assert twin.method.dt0 == report.smallest_step_s
+    twin.advance_to(50)
+    assert np.all(twin.state.level.to_numpy() == 0)
+    assert twin.loan.engine is broken.loan.engine
 
 
 @pytest.mark.slow
