@@ -70,8 +70,7 @@ class Simulation:
             self.advance = self._build_advance()
             self.broad_phase = None
             if self.contacts is not None:
-                parts = self.contacts, self.schedule, self.advance.solver
-                self.broad_phase = BroadPhase(*parts, brute_force)
+                self.broad_phase = BroadPhase(self.contacts, self.schedule, brute_force)
         kind = SolvedStep if self.solves else Step
         self.step = kind(self.advance, self.schedule, self.broad_phase)
         self.driver = {**DRIVERS, _MEASURED: AutoDriver}[driver](self.step)

@@ -1,55 +1,58 @@
 """Search for contact pairs: the broken ones among the neighbouring faces, then their spheres.
 
 The list is renewed when a body may have used up its body skin, or at once when a bond breaks: a
-search looks at the bodies that moved or broke, and keeps what it knows of the others. Impulses that
-wait in the slots of a pair are carried over, so results do not depend on when a search is made.
+search looks at the bodies that moved or broke, and keeps what it knows of the others. A pair keeps
+its slot of the store, so results do not depend on when a search is made.
 """
 
 import taichi as ti
 
-from taichi_dem.contact_search.candidates import Candidates
 from taichi_dem.contact_search.cell_grid import group
 from taichi_dem.contact_search.narrow_phase import NarrowPhase
-from taichi_dem.contact_search.numbering import Numbering
-from taichi_dem.contact_search.old_pairs import OldPairs
 from taichi_dem.contact_search.verlet_list import FAR, VerletList
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.types import vec3
 
 _CAPACITIES = ("", "pairs_per_body", "spheres_per_body", "neighbours_per_body")
 
 
 @ti.data_oriented
 class BroadPhase:
-    """Finds the pairs and fills the lists of a ``Contacts``.
+    """Finds the pairs that are near and their spheres, for the store of a ``Contacts``.
 
-    solver: of the dashpots, whose impulses go with the pairs, None without. brute_force: compare
-    all bodies with broken faces, for tests. everywhere: 1 when the next search looks at all bodies,
-    as is needed once they have been moved by hand. looked: 1 for those at which the last one
-    looked; searched: its tick. searches: how many there were. full: which list has no room left,
-    an index into ``_CAPACITIES``.
+    brute_force: compare all bodies with broken faces, for tests. everywhere: 1 when the next search
+    looks at all bodies, as is needed once they have been moved by hand. looked: 1 for those at
+    which the last one looked; searched: its tick. searches: how many there were. full: which list
+    has no capacity left, an index into ``_CAPACITIES``.
+    row: slots of the near pairs of body i, from neighbours.first[i] on; row_count: how many there
+    are, row_spheres: number of their spheres, row_is_new: 1 where they may be others than before.
     """
 
-    scratch_fields = ("exposed", "exposed_count", "looked")
+    scratch_fields = ("exposed", "exposed_count", "looked", "row_is_new")
 
-    def __init__(self, contacts, schedule, solver=None, brute_force=False):
+    def __init__(self, contacts, schedule, brute_force=False):
         n = contacts.model.body_count
-        self.contacts, self.schedule = contacts, schedule
-        self.solver, self.solves = solver, solver is not None
+        self.contacts, self.schedule, self.store = contacts, schedule, contacts.store
         self.model, self.state = contacts.model, contacts.state
         self.exposed = ti.field(ti.i32, shape=n)
         self.exposed_count = ti.field(ti.i32, shape=())
         self.neighbours = VerletList(contacts, brute_force)
-        self.pair_cache = self.neighbours.pair_cache
-        self.spheres = NarrowPhase(contacts, self.pair_cache)
+        self.narrow_phase = NarrowPhase(contacts)
         self.searched = ti.field(ti.i64, shape=())
         self.looked = ti.field(ti.i32, shape=n)
         self.everywhere = ti.field(ti.i32, shape=())
         self.fresh = ti.field(ti.i32, shape=())
-        self.old = OldPairs(contacts)
-        self.candidates = Candidates(contacts, solver)
         self.full = ti.field(ti.i32, shape=())
-        self.numbering = Numbering(contacts, self.neighbours, self.old, self.candidates, self.full)
+        self.row = ti.field(ti.i32, shape=2 * self.neighbours.capacity)
+        self.row_count, self.row_spheres = (ti.field(ti.i32, shape=n) for _ in range(2))
+        self.row_is_new = ti.field(ti.i32, shape=n)
         self.searches = ti.field(ti.i32, shape=())
+
+    def clear(self):
+        """Forget all pairs; the next search finds those that there are then."""
+        self.store.clear()
+        self.neighbours.clear()
+        self.contacts.search_requested.fill(0)
 
     def ask(self, everywhere=False):
         """Let the driver make a search before its next step."""
@@ -85,13 +88,15 @@ class BroadPhase:
             (self._all_anew, self.neighbours.count),
             (self.neighbours.making, self._allot),
             (self._all_anew, self.neighbours.fill),
+            (self.neighbours.making, self._update_free),
+            (self._all_anew, self.neighbours.assign_slots),
             (self._all_amended, self.neighbours.amend),
+            (self._once, self._update_free),
             (self._exposed_bodies, self._note_places),
-            (self._once, self.candidates.pack),
-            (self._pairs, self._save_pair),
-            (self._exposed_bodies, self._count_spheres),
-            (self._once, self.numbering.number_pairs),
-            (self._pairs, self._fill_pair),
+            (self._once, self._pack_spheres),
+            (self._exposed_bodies, self._update_row),
+            (self._once, self._number_pairs),
+            (self._exposed_bodies, self._update_pairs),
             (self._once, self._end),
         )
 
@@ -124,10 +129,6 @@ class BroadPhase:
         return self.neighbours.amending() * self.model.body_count
 
     @ti.func
-    def _pairs(self):
-        return self.contacts.pair_count[None]
-
-    @ti.func
     def _once(self):
         return 1
 
@@ -143,6 +144,14 @@ class BroadPhase:
     @ti.func
     def _allot(self, one):
         self.neighbours.allot()
+
+    @ti.func
+    def _update_free(self, one):
+        self.store.update_free()
+
+    @ti.func
+    def _pack_spheres(self, one):
+        self.store.pack_spheres()
 
     @ti.func
     def _end(self, one):
@@ -205,9 +214,8 @@ class BroadPhase:
         if self.neighbours.making() == 1:
             self.looked[i] = 1
         if self.looked[i] == 1:
-            self.pair_cache.note_clusters(i, self.contacts.travel[i])
+            self.narrow_phase.note_places(i, self.contacts.travel[i])
             self.contacts.travel[i] = 0.0
-            self.spheres.note_spheres(i)
 
     @ti.func
     def _bonded(self, i, j):
@@ -218,36 +226,52 @@ class BroadPhase:
         return bonded
 
     @ti.func
-    def _save_pair(self, p):
-        """Save a pair of the old list with what waits for it."""
-        self.old.keep(p)
-        if ti.static(self.schedule.has_limits):
-            self.schedule.limits.contact_limits.save(p)
-
-    @ti.func
-    def _count_spheres(self, a):
-        """Number of sphere pairs of an exposed body with each neighbour that is looked at."""
+    def _update_row(self, a):
+        """Find the sphere pairs of an exposed body with each neighbour that is looked at."""
         i = self.exposed[a]
         looked = self.looked[i]
         for k in range(self.neighbours.first[i], self.neighbours.last[i]):
             j = self.neighbours.body[k]
             if looked | self.looked[j] != 0 and self.contacts.exposed_faces[j] != 0:
-                faces = self.pair_cache.faces[k] & self._broken_faces(i, j)
-                if self.everywhere[None] == 1 or self.pair_cache.may_gain_spheres(k, i, j, faces):
-                    self._count_entry(k, i, j, faces)
+                p = self.neighbours.slot[k]
+                faces = self.neighbours.faces[k] & self._broken_faces(i, j)
+                if self.everywhere[None] == 1 or self.narrow_phase.may_gain_spheres(p, faces):
+                    self._find_spheres(p, i, j, faces)
+                    self.neighbours.changed[i] = 1
+        self.row_is_new[i] = self.neighbours.changed[i]
+        if self.row_is_new[i] == 1:
+            self._list_row(i)
 
     @ti.func
-    def _count_entry(self, k, i, j, faces):
-        """Count the spheres of entry k of the neighbours, and find how far apart the others are."""
+    def _find_spheres(self, p, i, j, faces):
+        """Count the sphere pairs of a pair, and find how far apart the others are."""
         count, hits, gap = 0, 0, 0.0
         if not self._bonded(i, j):
-            asked = faces
+            compared = faces
             if self.everywhere[None] == 0:
-                asked = self.pair_cache.to_ask(k, i, j, faces)
-            count, hits, gap = self.spheres.of_pair(i, j, asked, 0, False)
-            if asked != faces:
-                gap = ti.min(gap, self.pair_cache.gap(k, i, j))
-        self.pair_cache.found(k, i, j, faces, count, hits, gap)
+                compared = self.narrow_phase.faces_to_compare(p, faces)
+            count, hits, gap = self.narrow_phase.compare(p, compared, 0, False)
+            if compared != faces:
+                gap = ti.min(gap, self.narrow_phase.least_gap(p))
+        self.narrow_phase.note_found(p, faces, count, hits, gap)
+
+    @ti.func
+    def _list_row(self, i):
+        """List the pairs of body i that have sphere pairs near, or an impulse waiting."""
+        start, count, spheres, waiting = self.neighbours.first[i], 0, 0, 0
+        for k in range(start, self.neighbours.last[i]):
+            p = self.neighbours.slot[k]
+            found = self.store.found[p]
+            if found > 0 or self.store.waits(p):
+                self.row[start + count] = p
+                count += 1
+                spheres += found
+                waiting |= ti.cast(found == 0, ti.i32)
+            elif self.store.is_near[p] == 1:
+                self.store.leave(p)
+        self.row_count[i], self.row_spheres[i] = count, spheres
+        # Pairs that merely wait leave at the next search.
+        self.neighbours.changed[i] = waiting
 
     @ti.func
     def _broken_faces(self, i, j):
@@ -258,20 +282,67 @@ class BroadPhase:
         return spread * second
 
     @ti.func
-    def _fill_pair(self, p):
-        """Write a pair's spheres, take over what waited for it, book what its birth injects."""
-        i, j = self.contacts.pair_body[p][0], self.contacts.pair_body[p][1]
-        injected = 0.0
-        faces = self.numbering.faces[p]
-        if faces != 0:
-            self.spheres.of_pair(i, j, faces, self.contacts.pair_first[p], True)
+    def _number_pairs(self, one):
+        """Count the near pairs and their spheres, and give new ones their places."""
+        count, spheres = 0, 0
+        for i in range(self.model.body_count):
+            self.store.first_of[i] = count
+            # A body without spheres is in no pair, now or before.
+            if self.contacts.exposed_faces[i] != 0:
+                count += self.row_count[i]
+                spheres += self.row_spheres[i]
+        self.store.first_of[self.model.body_count] = count
+        self.store.near_count[None], self.store.sphere_count[None] = count, spheres
+        if count > self.store.near_pairs:
+            self.full[None] = 1
+        else:
+            for a in range(self.exposed_count[None]):
+                self._reserve_row(self.exposed[a])
+        if self.full[None] != 0:
+            self.store.near_count[None] = 0
+            for i in range(self.model.body_count + 1):
+                self.store.first_of[i] = 0
+
+    @ti.func
+    def _reserve_row(self, i):
+        """Reserve places for the sphere pairs of body i that have just been found."""
+        if self.row_is_new[i] == 1:
+            start = self.neighbours.first[i]
+            for k in range(start, start + self.row_count[i]):
+                if self.store.new_faces[self.row[k]] != 0:
+                    if self.store.reserve_spheres(self.row[k]) == 1:
+                        self.full[None] = 2
+
+    @ti.func
+    def _update_pairs(self, a):
+        """Put the near pairs of an exposed body in order, and write what is new in them."""
+        i = self.exposed[a]
+        if self.full[None] == 0:
+            start, first = self.neighbours.first[i], self.store.first_of[i]
+            for k in range(self.row_count[i]):
+                p = self.row[start + k]
+                self.store.near_slot[first + k] = p
+                entered = 1 - self.store.is_near[p]
+                if self.row_is_new[i] == 1:
+                    self._update_pair(p, i, self.store.body[p][1])
+                if ti.static(self.schedule.has_limits):
+                    fresh = self._exposed_now(i) | self._exposed_now(self.store.body[p][1])
+                    self.schedule.limits.notice_listed(p, entered, fresh)
+
+    @ti.func
+    def _update_pair(self, p, i, j):
+        """Write the sphere pairs of a pair, and book what their birth injects."""
+        if self.store.is_near[p] == 0:
+            self.store.enter(p)
+        if self.store.new_faces[p] != 0:
+            self.narrow_phase.compare(p, self.store.new_faces[p], self.store.sphere_place[p], True)
+            self.store.replace_spheres(p)
             injected = self._injected(p, i, j)
-            if ti.static(self.solves):
-                self.solver.pairs.carry_over(p, self.old)
-        self.old.hand_over(p, injected)
-        if ti.static(self.schedule.has_limits):
-            fresh = self._exposed_now(i) | self._exposed_now(j)
-            self.schedule.limits.carry_over_pair(p, self.old.former[p], fresh)
+            if injected > 0.0:
+                self.store.heat[p] = self.store.heat[p] + vec3(0.0, 0.0, injected)
+                self.store.waiting[p][0] = 1
+        elif self.store.found[p] == 0:
+            self.store.remove_spheres(p)
 
     @ti.func
     def _exposed_now(self, i):
@@ -287,8 +358,8 @@ class BroadPhase:
         energy, tick = 0.0, self.state.tick[None]
         size = ti.static(self.model.spheres_per_face)
         fresh, freed = self.fresh[None] == 1, self._freed_at(i, j, tick)
-        for k in range(self.contacts.pair_first[p], self.contacts.pair_last[p]):
-            a, b = self.contacts.pair_sphere[k][0], self.contacts.pair_sphere[k][1]
+        for k in range(self.store.first[p], self.store.last[p]):
+            a, b = self.store.sphere[k][0], self.store.sphere[k][1]
             born = ti.max(self.state.exposed_tick[a // size], self.state.exposed_tick[b // size])
             if fresh and (freed or born == tick):
                 overlap = ti.max(0.0, -self.contacts.gap(i, j, a, b))
@@ -306,12 +377,14 @@ class BroadPhase:
 
     @ti.func
     def _index_second(self):
-        """List for every body the pairs in which it is second, in order."""
-        first, touch, pairs = ti.static(
-            self.contacts.second_start, self.contacts.second_pair, self.contacts.pair_count
+        """List for every body the near pairs in which it is second, in order."""
+        start, slots, count = ti.static(
+            self.store.second_start, self.store.second_slot, self.store.near_count
         )
-        group(first, touch, self.model.body_count, pairs[None], self._second_of)
+        group(start, slots, self.model.body_count, count[None], self._second_of)
+        for a in range(count[None]):
+            slots[a] = self.store.near_slot[slots[a]]
 
     @ti.func
-    def _second_of(self, p):
-        return self.contacts.pair_body[p][1]
+    def _second_of(self, a):
+        return self.store.body[self.store.near_slot[a]][1]

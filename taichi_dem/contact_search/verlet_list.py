@@ -6,7 +6,6 @@ It reaches several skins and takes in every face, broken or not, so one list ser
 import taichi as ti
 
 from taichi_dem.contact_search.cell_grid import CellGrid
-from taichi_dem.contact_search.pair_cache import PairCache
 from taichi_dem.kit.allocation import defer_fill
 from taichi_dem.kit.types import real
 
@@ -29,25 +28,35 @@ FAR = 0.6
 class VerletList:
     """For each body the bodies of higher index near it, in order.
 
-    first[i] .. last[i]: those of body i, in body, with some room behind; known: what a
-    ``PairCache`` knows of them. placed_at, turned_to, listed: where a body was listed, and its
-    clusters [m]. reach: how far it may be from there, its body skin included [m], and ball: radius
-    of the ball around it and its reach [m]. escaped: bodies that have left their reach since, left:
-    1 for them; they are listed anew, as a few fragments fly faster than all the rest. stale: STALE
-    when all are. full: 1 when there is no room.
+    first[i] .. last[i]: row of body i, with some room behind. Of an entry: body; slot: of the pair
+    in the ``PairStore``, -1 until it gets one; faces: which faces are near, bit 4 f + g for faces f
+    and g. A list that is made anew is written into the other half of these fields, so that pairs
+    that stay find their slots; old_first, old_last: the rows before. start: of the half in use.
+    changed: 1 for a body the near pairs of whose row may be others.
+    placed_at, turned_to, listed: where a body was listed, and its clusters [m]. reach: how far it
+    may be from there, its body skin included [m], and ball: radius of the ball around it and its
+    reach [m]. escaped: bodies that have left their reach since, left: 1 for them; they are listed
+    anew, as a few fragments fly faster than all the rest. stale: STALE when all are. full: 1 when
+    there is no room.
     """
+
+    scratch_fields = ("old_first", "old_last")
 
     def __init__(self, contacts, brute_force=False):
         n = contacts.model.body_count
         self.model, self.state, self.contacts = contacts.model, contacts.state, contacts
-        self.capacity = n * contacts.law.neighbours_per_body + 1024
+        self.store, self.capacity = contacts.store, contacts.neighbour_capacity
         self.reach = ti.field(real, shape=n)
         self.ball = ti.field(real, shape=n)
         self.grid = CellGrid(self.model, self.state, self.ball, brute_force)
         self.first = ti.field(ti.i32, shape=n + 1)
         self.last = ti.field(ti.i32, shape=n)
-        self.body = ti.field(ti.i32, shape=self.capacity)
-        self.pair_cache = PairCache(contacts, self.capacity)
+        self.old_first, self.old_last = (ti.field(ti.i32, shape=n) for _ in range(2))
+        self.body, self.slot, self.faces = (
+            ti.field(ti.i32, shape=2 * self.capacity) for _ in range(3)
+        )
+        self.start = ti.field(ti.i32, shape=())
+        self.changed = ti.field(ti.i32, shape=n)
         self.placed_at = ti.Vector.field(3, real, shape=n)
         self.turned_to = ti.Matrix.field(3, 3, real, shape=n)
         self.listed = ti.Vector.field(3, real, shape=4 * n)
@@ -57,6 +66,12 @@ class VerletList:
         self.stale = ti.field(ti.i32, shape=())
         self.full = ti.field(ti.i32, shape=())
         defer_fill(self.stale.fill, STALE)
+
+    def clear(self):
+        """Forget all neighbours; the next search lists them anew."""
+        self.first.fill(0)
+        self.last.fill(0)
+        self.stale.fill(STALE)
 
     @ti.func
     def notice(self, i):
@@ -80,7 +95,7 @@ class VerletList:
         self.placed_at[i] = self.state.position[i] + ahead
         self.turned_to[i] = self.state.rotation[i]
         for face in range(4 * i, 4 * i + 4):
-            self.listed[face] = self.pair_cache.middle(i, face) + ahead
+            self.listed[face] = self.contacts.cluster_centre(i, face) + ahead
 
     @ti.func
     def begin(self):
@@ -103,34 +118,64 @@ class VerletList:
 
     @ti.func
     def list_anew(self, i):
-        """Note where body i is."""
+        """Note where body i is, and its row."""
         self.contacts.set_body_skin(i)
         self._list(i)
+        self.old_first[i], self.old_last[i] = self.first[i], self.last[i]
 
     @ti.func
     def count(self, i):
-        """Count the neighbours of body i."""
-        self.first[i + 1] = self._visit(i, 0, False) + SPARE
+        """Count the neighbours of body i, and the pairs that may have to stay."""
+        waiting = 0
+        for k in range(self.old_first[i], self.old_last[i]):
+            waiting += ti.cast(self.store.waits(self.slot[k]), ti.i32)
+        self.first[i + 1] = self._visit(i, 0, False) + waiting + SPARE
 
     @ti.func
     def allot(self):
         """Give every body its part of the list."""
-        self.first[0] = 0
+        self.start[None] = self.capacity - self.start[None]
+        self.first[0] = self.start[None]
         for i in range(self.model.body_count):
             self.first[i + 1] = self.first[i + 1] + self.first[i]
-        if self.first[self.model.body_count] > self.capacity:
+        if self.first[self.model.body_count] - self.start[None] > self.capacity:
             self.full[None] = 1
             for i in range(self.model.body_count + 1):
-                self.first[i] = 0
+                self.first[i] = self.start[None]
         for i in range(self.model.body_count):
             self.last[i] = self.first[i]
 
     @ti.func
     def fill(self, i):
-        """List the neighbours of body i, when there is room."""
-        self.pair_cache.met[i], self.pair_cache.changed[i] = 0, 1
+        """List the neighbours of body i, when there is room; pairs that were listed stay so."""
+        self.changed[i] = 1
         if self.full[None] == 0:
             self.last[i] = self.first[i] + self._visit(i, self.first[i], True)
+            for k in range(self.old_first[i], self.old_last[i]):
+                self._list_again(i, k)
+
+    @ti.func
+    def _list_again(self, i, k):
+        """Give entry k of the row before its slot in the new one, or free it if it may go."""
+        j, p = self.body[k], self.slot[k]
+        place = self._find_row_index(i, j)
+        self.store.forget_search(p)
+        if self._is_listed(i, place, j):
+            self.slot[place] = p
+        elif self.store.waits(p):
+            self._insert(self.first[i], self.last[i], j, 0, p)
+            self.last[i] = self.last[i] + 1
+        else:
+            self.store.release(p)
+
+    @ti.func
+    def assign_slots(self, i):
+        """Give the new neighbours of body i their slots, when there is room."""
+        for k in range(self.first[i], self.last[i]):
+            if self.slot[k] < 0:
+                self.slot[k] = self.store.allocate(i, self.body[k])
+                if self.slot[k] < 0:
+                    self.full[None] = 1
 
     @ti.func
     def amend(self, i):
@@ -155,33 +200,48 @@ class VerletList:
 
     @ti.func
     def _add(self, i, j):
-        """List body j as neighbour of body i, if it is one, with the faces that are near."""
+        """List body j as neighbour of body i, if it is one, with the faces that are near.
+
+        Without room in its row or in the store the list is stale.
+        """
         faces = 0
         if self._balls_near(i, j):
             faces = self._faces_near(i, j)
         if faces != 0:
             place = self._find_row_index(i, j)
-            if place < self.last[i] and self.body[ti.min(place, self.capacity - 1)] == j:
-                self.pair_cache.faces[place] = faces
+            if self._is_listed(i, place, j):
+                self.faces[place] = faces
             else:
                 self._drop_far(i)
+                p = -1
                 if self.last[i] < self.first[i + 1]:
-                    self._insert(self.first[i], self.last[i], j, faces)
+                    p = self.store.allocate(i, j)
+                if p >= 0:
+                    self._insert(self.first[i], self.last[i], j, faces, p)
                     self.last[i] = self.last[i] + 1
                 else:
                     self.stale[None] = STALE
 
     @ti.func
+    def _is_listed(self, i, place, j):
+        """Whether the entry at a place in the row of body i is body j."""
+        return place < self.last[i] and self.body[ti.min(place, 2 * self.capacity - 1)] == j
+
+    @ti.func
     def _drop_far(self, i):
-        """Drop those that are near body i no more when its row is full."""
+        """Drop those that are near body i no more when its row is full, unless something waits."""
         if self.last[i] == self.first[i + 1]:
             place = self.first[i]
             for k in range(self.first[i], self.last[i]):
-                if self._faces_near(i, self.body[k]) != 0:
+                near, p = self._faces_near(i, self.body[k]) != 0, self.slot[k]
+                if near or self.store.waits(p):
                     self._move(k, place)
                     place += 1
                 else:
-                    self.pair_cache.forget(k, i)
+                    self.store.release(p)
+                if not near:
+                    self.store.forget_search(p)
+                    self.changed[i] = 1
             self.last[i] = place
 
     @ti.func
@@ -219,24 +279,23 @@ class VerletList:
                         faces = self._faces_near(i, j)
                         if faces != 0:
                             if write:
-                                self._insert(start, start + count, j, faces)
+                                self._insert(start, start + count, j, faces, -1)
                             count += 1
         return count
 
     @ti.func
-    def _insert(self, start, end, j, faces):
-        """Enter body j into a row from start to end, in order."""
+    def _insert(self, start, end, j, faces, p):
+        """Enter body j, with which a body has slot p, into its row from start to end, in order."""
         place = end
         while place > start and self.body[ti.max(place - 1, 0)] > j:
             self._move(place - 1, place)
             place -= 1
-        self.body[place] = j
-        self.pair_cache.begin(place, faces)
+        self.body[place], self.faces[place], self.slot[place] = j, faces, p
 
     @ti.func
     def _move(self, k, place):
         self.body[place] = self.body[k]
-        self.pair_cache.move(k, place)
+        self.faces[place], self.slot[place] = self.faces[k], self.slot[k]
 
     @ti.func
     def _faces_near(self, i, j):

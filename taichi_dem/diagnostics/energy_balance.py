@@ -129,7 +129,7 @@ class EnergyBalance:
         return np.linalg.norm(lost[:3]) / linear, np.linalg.norm(lost[3:]) / angular
 
     def _pair_count(self):
-        return self.contacts.pair_count[None] if self.contacts is not None else 0
+        return self.contacts.store.near_count[None] if self.contacts is not None else 0
 
     @ti.kernel
     def _read_bodies(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
@@ -158,10 +158,11 @@ class EnergyBalance:
 
     @ti.kernel
     def _read_pairs(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
-        for p in range(self.contacts.pair_count[None]):
-            table[p, 0] = self.contacts.pair_energy(p)
+        for a in range(self.contacts.store.near_count[None]):
+            p = self.contacts.store.near_slot[a]
+            table[a, 0] = self.contacts.pair_energy(p)
             for k in ti.static(range(3)):
-                table[p, 1 + k] = self.contacts.pair_heat[p][k]
+                table[a, 1 + k] = self.contacts.store.heat[p][k]
 
     @ti.kernel
     def _read_load(self, index: ti.i32, work: ti.types.ndarray(dtype=ti.f64, ndim=1)):

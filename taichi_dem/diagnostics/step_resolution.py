@@ -49,7 +49,7 @@ class StepResolution:
             return
         if self.advance.limited and self.advance.has_dashpot and self.model.bond_count:
             self._read_bonds(self.share)
-        if self.contacts is not None and self.contacts.pair_count[None]:
+        if self.contacts is not None and self.contacts.store.near_count[None]:
             if self.advance.limited:
                 self._note_partners()
             self._read_pairs(self.pair_share, self.taken)
@@ -58,7 +58,7 @@ class StepResolution:
         """Remember steps and light partners: few contacts last until a recording."""
         schedule, mass = self.advance.schedule, self.model.body_mass
         self.step = np.minimum(self.step, schedule.dt0 / 2.0 ** self.state.level.to_numpy())
-        pairs = self.contacts.pair_body.to_numpy()[: self.contacts.pair_count[None]]
+        pairs, _, _ = self.contacts.store.near_table()
         for one, other in (pairs.T, pairs.T[::-1]):
             np.minimum.at(self.lightest, one, mass[other])
 
@@ -145,10 +145,11 @@ class StepResolution:
         share: ti.types.ndarray(dtype=ti.f64, ndim=1),
         taken: ti.types.ndarray(dtype=ti.f64, ndim=1),
     ):
-        for p in range(self.contacts.pair_count[None]):
+        for k in range(self.contacts.store.near_count[None]):
+            p = self.contacts.store.near_slot[k]
             count = self.contacts.touching(p)
             if count > 0:
-                i, j = self.contacts.pair_body[p][0], self.contacts.pair_body[p][1]
+                i, j = self.contacts.store.body[p][0], self.contacts.store.body[p][1]
                 if ti.static(self.advance.limited):
                     ti.atomic_min(share[i], self.advance.contact_share(i, j))
                 else:

@@ -15,7 +15,7 @@ class ContactForce:
     @ti.func
     def contact(self, p):
         """Evaluate the spheres of a pair of bodies: repulsion, and friction of what slides."""
-        pair = self.contacts.pair_body[p]
+        pair = self.contacts.store.body[p]
         i, j = pair[0], pair[1]
         branch = self.state.position[j] - self.state.position[i]
         # Most candidates do not touch: find out in the first body's frame, where it costs half.
@@ -28,8 +28,8 @@ class ContactForce:
             scale = self.contact_share(i, j)
         if ti.static(self.has_limits):
             margin = self.limits.contact_limits.margin(i, j)
-        for k in range(self.contacts.pair_first[p], self.contacts.pair_last[p]):
-            a, b = self.contacts.pair_sphere[k][0], self.contacts.pair_sphere[k][1]
+        for k in range(self.contacts.store.first[p], self.contacts.store.last[p]):
+            a, b = self.contacts.store.sphere[k][0], self.contacts.store.sphere[k][1]
             first, second = self.model.sphere[a], self.model.sphere[b]
             apart = turn @ second.xyz + offset - first.xyz
             reach = first[3] + second[3]
@@ -53,11 +53,11 @@ class ContactForce:
                 deepest = ti.max(deepest, overlap / reach)
         if deepest > 0.0:
             dt = self._pair_step(p, i, j)
-            self.contacts.add_impulse(2 * p, -force * dt, moment_i * dt)
-            self.contacts.add_impulse(2 * p + 1, force * dt, moment_j * dt)
+            self.contacts.add_impulse(p, 0, -force * dt, moment_i * dt)
+            self.contacts.add_impulse(p, 1, force * dt, moment_j * dt)
             heat = dt * vec3(dragged, rubbed, 0.0)
-            self.contacts.pair_heat[p] = self.contacts.pair_heat[p] + heat
-        self.contacts.deepest[p] = deepest
+            self.contacts.store.heat[p] = self.contacts.store.heat[p] + heat
+        self.contacts.store.deepest[p] = deepest
         if ti.static(self.has_limits):
             self.limits.notice_pair(p, near, HIT)
 

@@ -22,9 +22,9 @@ class PairDashpots:
     pair's candidates. entry: which candidate. normal: from first to second. arm: from the second's
     centre to the contact [m]. push: impulse of the spring, or what the gap still lets through
     [N s]. share: velocity per impulse along the normal, and across at most [1/kg]. impulse: on the
-    second, of spring, dashpot and friction, as found [N s]; entries as in
-    ``Contacts.pair_sphere``. active: the pairs that touch, count of them. order: places in it by
-    colour, those of colour c from colour_first[c] on.
+    second, of spring, dashpot and friction, as found [N s]; entries as in ``PairStore.sphere``.
+    active: the pairs that touch, count of them. order: places in it by colour, those of colour c
+    from colour_first[c] on.
     """
 
     scratch_fields = (
@@ -36,15 +36,16 @@ class PairDashpots:
         self.model, self.state, self.schedule = model, state, schedule
         self.contacts, self.velocities = contacts, velocities
         self.has_friction = bool(model.friction.name)
-        pairs, spheres = contacts.capacity, contacts.sphere_capacity
-        self.touching = ti.field(ti.i32, shape=pairs)
+        self.store = contacts.store
+        pairs, spheres = self.store.near_pairs, self.store.spheres
+        self.touching = ti.field(ti.i32, shape=self.store.slots)
         self.entry = ti.field(ti.i32, shape=spheres)
         self.normal = ti.Vector.field(3, real, shape=spheres)
         self.arm = ti.Vector.field(3, real, shape=spheres)
         self.push = ti.field(real, shape=spheres)
         self.share = ti.Vector.field(2, real, shape=spheres)
-        self.impulse = ti.Vector.field(3, real, shape=spheres)
-        self.branch = ti.Vector.field(3, real, shape=pairs)
+        self.impulse = self.store.sphere_column("solved_impulse", real, 3)
+        self.branch = ti.Vector.field(3, real, shape=self.store.slots)
         n = model.body_count
         self.count = ti.field(ti.i32, shape=())
         self.active = ti.field(ti.i32, shape=pairs)
@@ -54,19 +55,6 @@ class PairDashpots:
         self.colour_first = ti.field(ti.i32, shape=COLOURS + 3)
 
     @ti.func
-    def carry_over(self, p, old):
-        """Give the pair at place p, whose spheres are new, the impulses of those it had before.
-
-        old: the ``OldPairs``, which know where these lie.
-        """
-        start = self.contacts.pair_first[p]
-        for k in range(start, self.contacts.pair_last[p]):
-            former = old.candidate(p, self.contacts.pair_sphere[k], k - start)
-            self.impulse[k] = zero3()
-            if former >= 0:
-                self.impulse[k] = self.impulse[former]
-
-    @ti.func
     def sort(self, one):
         """List and colour the pairs that touch: those of one colour share no body.
 
@@ -74,12 +62,13 @@ class PairDashpots:
         Candidates that do not touch are left out, so that no skin changes the order.
         """
         count = 0
-        for p in range(self.contacts.pair_count[None]):
+        for k in range(self.store.near_count[None]):
+            p = self.store.near_slot[k]
             if self.touching[p] > 0:
                 self.active[count] = p
                 count += 1
                 for side in ti.static(range(2)):
-                    self.taken[self.contacts.pair_body[p][side]] = 0
+                    self.taken[self.store.body[p][side]] = 0
         for a in range(count):
             i, j = self._bodies(a)
             taken, colour = self.taken[i] | self.taken[j], 0
@@ -94,7 +83,7 @@ class PairDashpots:
 
     @ti.func
     def _bodies(self, a):
-        pair = self.contacts.pair_body[self.active[a]]
+        pair = self.store.body[self.active[a]]
         return pair[0], pair[1]
 
     @ti.func
@@ -104,7 +93,7 @@ class PairDashpots:
     @ti.func
     def begin(self, p):
         """Find what touches and its springs' impulse; start from the impulses of the last step."""
-        pair = self.contacts.pair_body[p]
+        pair = self.store.body[p]
         i, j = pair[0], pair[1]
         dt = self.schedule.step_seconds[0]
         branch = self.state.position[j] - self.state.position[i]
@@ -112,10 +101,10 @@ class PairDashpots:
         turn, offset = back @ self.state.rotation[j], back @ branch
         ahead = dt * self.contacts.approach(i, j)
         force, moment, deepest = zero3(), zero3(), 0.0
-        start = self.contacts.pair_first[p]
+        start = self.store.first[p]
         end = start
-        for k in range(start, self.contacts.pair_last[p]):
-            a, b = self.contacts.pair_sphere[k][0], self.contacts.pair_sphere[k][1]
+        for k in range(start, self.store.last[p]):
+            a, b = self.store.sphere[k][0], self.store.sphere[k][1]
             first, second = self.model.sphere[a], self.model.sphere[b]
             apart = turn @ second.xyz + offset - first.xyz
             reach = first[3] + second[3]
@@ -133,7 +122,7 @@ class PairDashpots:
                 end += 1
             else:
                 self.impulse[k] = zero3()
-        self.contacts.deepest[p], self.touching[p], self.branch[p] = deepest, end - start, branch
+        self.store.deepest[p], self.touching[p], self.branch[p] = deepest, end - start, branch
         if end > start:
             self._deposit(p, branch, force, moment)
 
@@ -160,16 +149,16 @@ class PairDashpots:
     def _deposit(self, p, branch, force, moment):
         """Let both bodies have the first guess: force on the second, moment about its centre."""
         around = moment + branch.cross(force)
-        self.contacts.add_impulse(2 * p, -force, -around)
-        self.contacts.add_impulse(2 * p + 1, force, moment)
+        self.contacts.add_impulse(p, 0, -force, -around)
+        self.contacts.add_impulse(p, 1, force, moment)
 
     @ti.func
     def visit(self, p):
         """Solve a pair's contacts, one after the other; largest squared velocity it changed."""
         change2 = 0.0
-        pair = self.contacts.pair_body[p]
+        pair = self.store.body[p]
         damping = self.schedule.step_seconds[0] * self.contacts.law.damping()
-        start = self.contacts.pair_first[p]
+        start = self.store.first[p]
         for c in range(start, start + self.touching[p]):
             found = self._visit(c, pair[0], pair[1], self.branch[p], damping)
             change2 = ti.max(change2, found)
@@ -202,14 +191,14 @@ class PairDashpots:
     def book(self, p):
         """Book what the dashpots and friction of a pair took, with its mean motion in the step."""
         if self.touching[p] > 0:
-            pair = self.contacts.pair_body[p]
+            pair = self.store.body[p]
             i, j, branch = pair[0], pair[1], self.branch[p]
             linear, angular = self.velocities.apart(i, j, branch)
             spin = self.state.spin[i]
             before = self.state.velocity[j] - self.state.velocity[i] - spin.cross(branch)
             linear = 0.5 * (linear + before)
             angular = 0.5 * (angular + self.state.spin[j] - spin)
-            start = self.contacts.pair_first[p]
+            start = self.store.first[p]
             dragged, rubbed = 0.0, 0.0
             for c in range(start, start + self.touching[p]):
                 velocity, normal = linear + angular.cross(self.arm[c]), self.normal[c]
@@ -217,4 +206,4 @@ class PairDashpots:
                 pressed, rate = impulse.dot(normal), velocity.dot(normal)
                 dragged += (ti.max(self.push[c], 0.0) - pressed) * rate
                 rubbed -= (impulse - pressed * normal).dot(velocity)
-            self.contacts.pair_heat[p] = self.contacts.pair_heat[p] + vec3(dragged, rubbed, 0.0)
+            self.store.heat[p] = self.store.heat[p] + vec3(dragged, rubbed, 0.0)
