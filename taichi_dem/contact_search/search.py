@@ -7,8 +7,9 @@ its slot of the store, so results do not depend on when a search is made.
 
 import taichi as ti
 
-from taichi_dem.contact_search.cell_grid import group
+from taichi_dem.contact_search.breaks import Breaks
 from taichi_dem.contact_search.narrow_phase import NarrowPhase
+from taichi_dem.contact_search.near_pairs import NearPairs
 from taichi_dem.contact_search.verlet_list import FAR, VerletList
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.types import vec3
@@ -24,11 +25,9 @@ class BroadPhase:
     looks at all bodies, as is needed once they have been moved by hand. looked: 1 for those at
     which the last one looked; searched: its tick. searches: how many there were. full: which list
     has no capacity left, an index into ``_CAPACITIES``.
-    row: slots of the near pairs of body i, from neighbours.first[i] on; row_count: how many there
-    are, row_spheres: number of their spheres, row_is_new: 1 where they may be others than before.
     """
 
-    scratch_fields = ("exposed", "exposed_count", "looked", "row_is_new")
+    scratch_fields = ("exposed", "exposed_count", "looked")
 
     def __init__(self, contacts, schedule, brute_force=False):
         n = contacts.model.body_count
@@ -41,11 +40,9 @@ class BroadPhase:
         self.searched = ti.field(ti.i64, shape=())
         self.looked = ti.field(ti.i32, shape=n)
         self.everywhere = ti.field(ti.i32, shape=())
-        self.fresh = ti.field(ti.i32, shape=())
-        self.full = ti.field(ti.i32, shape=())
-        self.row = ti.field(ti.i32, shape=2 * self.neighbours.capacity)
-        self.row_count, self.row_spheres = (ti.field(ti.i32, shape=n) for _ in range(2))
-        self.row_is_new = ti.field(ti.i32, shape=n)
+        self.breaks = Breaks(contacts)
+        self.near_pairs = NearPairs(contacts, self.neighbours)
+        self.full = self.near_pairs.full
         self.searches = ti.field(ti.i32, shape=())
 
     def clear(self):
@@ -158,7 +155,7 @@ class BroadPhase:
         if self.neighbours.full[None] == 1:
             self.full[None] = 3
         self.neighbours.end()
-        self._index_second()
+        self.near_pairs.index_second()
         self.schedule.start_pairs()
         self.everywhere[None] = 0
         self.searches[None] = self.searches[None] + 1
@@ -185,9 +182,7 @@ class BroadPhase:
                 count += 1
         self.exposed_count[None] = count
         self.full[None] = 0
-        # A second search at the tick of a break must not book its injection again.
-        self.fresh[None] = ti.cast(newest > self.state.injected_tick[None], ti.i32)
-        self.state.injected_tick[None] = newest
+        self.breaks.note_newest(newest)
 
     @ti.func
     def _choose(self, a):
@@ -195,12 +190,11 @@ class BroadPhase:
         i = self.exposed[a]
         far = self.contacts.travel[i] > FAR * self.contacts.body_skin[i]
         looked = self.everywhere[None] | ti.cast(far, ti.i32)
-        for face in range(4 * i, 4 * i + 4):
-            looked |= ti.cast(self.state.exposed_tick[face] > self.searched[None], ti.i32)
+        looked |= self.breaks.exposed_since(i, self.searched[None] + 1)
         self.looked[i] = looked
         if looked == 1:
             self.contacts.set_body_skin(i)
-            self.neighbours.notice(i)
+            self.neighbours.reach.notice(i)
 
     @ti.func
     def _note_places(self, a):
@@ -218,14 +212,6 @@ class BroadPhase:
             self.contacts.travel[i] = 0.0
 
     @ti.func
-    def _bonded(self, i, j):
-        bonded = False
-        for f in range(4):
-            if self.model.neighbour[4 * i + f] == j:
-                bonded = self.state.broken_tick[self.model.face_bond[4 * i + f]] < 0
-        return bonded
-
-    @ti.func
     def _update_row(self, a):
         """Find the sphere pairs of an exposed body with each neighbour that is looked at."""
         i = self.exposed[a]
@@ -238,15 +224,13 @@ class BroadPhase:
                 if self.everywhere[None] == 1 or self.narrow_phase.may_gain_spheres(p, faces):
                     self._find_spheres(p, i, j, faces)
                     self.neighbours.changed[i] = 1
-        self.row_is_new[i] = self.neighbours.changed[i]
-        if self.row_is_new[i] == 1:
-            self._list_row(i)
+        self.near_pairs.update_row(i)
 
     @ti.func
     def _find_spheres(self, p, i, j, faces):
         """Count the sphere pairs of a pair, and find how far apart the others are."""
         count, hits, gap = 0, 0, 0.0
-        if not self._bonded(i, j):
+        if not self.breaks.bonded(i, j):
             compared = faces
             if self.everywhere[None] == 0:
                 compared = self.narrow_phase.faces_to_compare(p, faces)
@@ -254,24 +238,6 @@ class BroadPhase:
             if compared != faces:
                 gap = ti.min(gap, self.narrow_phase.least_gap(p))
         self.narrow_phase.note_found(p, faces, count, hits, gap)
-
-    @ti.func
-    def _list_row(self, i):
-        """List the pairs of body i that have sphere pairs near, or an impulse waiting."""
-        start, count, spheres, waiting = self.neighbours.first[i], 0, 0, 0
-        for k in range(start, self.neighbours.last[i]):
-            p = self.neighbours.slot[k]
-            found = self.store.found[p]
-            if found > 0 or self.store.waits(p):
-                self.row[start + count] = p
-                count += 1
-                spheres += found
-                waiting |= ti.cast(found == 0, ti.i32)
-            elif self.store.is_near[p] == 1:
-                self.store.leave(p)
-        self.row_count[i], self.row_spheres[i] = count, spheres
-        # Pairs that merely wait leave at the next search.
-        self.neighbours.changed[i] = waiting
 
     @ti.func
     def _broken_faces(self, i, j):
@@ -283,108 +249,33 @@ class BroadPhase:
 
     @ti.func
     def _number_pairs(self, one):
-        """Count the near pairs and their spheres, and give new ones their places."""
-        count, spheres = 0, 0
-        for i in range(self.model.body_count):
-            self.store.first_of[i] = count
-            # A body without spheres is in no pair, now or before.
-            if self.contacts.exposed_faces[i] != 0:
-                count += self.row_count[i]
-                spheres += self.row_spheres[i]
-        self.store.first_of[self.model.body_count] = count
-        self.store.near_count[None], self.store.sphere_count[None] = count, spheres
-        if count > self.store.near_pairs:
-            self.full[None] = 1
-        else:
-            for a in range(self.exposed_count[None]):
-                self._reserve_row(self.exposed[a])
-        if self.full[None] != 0:
-            self.store.near_count[None] = 0
-            for i in range(self.model.body_count + 1):
-                self.store.first_of[i] = 0
-
-    @ti.func
-    def _reserve_row(self, i):
-        """Reserve places for the sphere pairs of body i that have just been found."""
-        if self.row_is_new[i] == 1:
-            start = self.neighbours.first[i]
-            for k in range(start, start + self.row_count[i]):
-                if self.store.new_faces[self.row[k]] != 0:
-                    if self.store.reserve_spheres(self.row[k]) == 1:
-                        self.full[None] = 2
+        self.near_pairs.number(self.exposed, self.exposed_count[None])
 
     @ti.func
     def _update_pairs(self, a):
         """Put the near pairs of an exposed body in order, and write what is new in them."""
         i = self.exposed[a]
-        if self.full[None] == 0:
-            start, first = self.neighbours.first[i], self.store.first_of[i]
-            for k in range(self.row_count[i]):
-                p = self.row[start + k]
-                self.store.near_slot[first + k] = p
-                entered = 1 - self.store.is_near[p]
-                if self.row_is_new[i] == 1:
-                    self._update_pair(p, i, self.store.body[p][1])
-                if ti.static(self.schedule.has_limits):
-                    fresh = self._exposed_now(i) | self._exposed_now(self.store.body[p][1])
-                    self.schedule.limits.notice_listed(p, entered, fresh)
+        for k in range(self.near_pairs.listed_count(i)):
+            p = self.near_pairs.put(i, k)
+            j, entered = self.store.body[p][1], 1 - self.store.is_near[p]
+            if self.near_pairs.row_is_new[i] == 1:
+                self._update_pair(p)
+            if ti.static(self.schedule.has_limits):
+                now = self.state.tick[None]
+                fresh = self.breaks.exposed_since(i, now) | self.breaks.exposed_since(j, now)
+                self.schedule.limits.notice_listed(p, entered, fresh)
 
     @ti.func
-    def _update_pair(self, p, i, j):
+    def _update_pair(self, p):
         """Write the sphere pairs of a pair, and book what their birth injects."""
         if self.store.is_near[p] == 0:
             self.store.enter(p)
         if self.store.new_faces[p] != 0:
             self.narrow_phase.compare(p, self.store.new_faces[p], self.store.sphere_place[p], True)
             self.store.replace_spheres(p)
-            injected = self._injected(p, i, j)
+            injected = self.breaks.injected(p)
             if injected > 0.0:
                 self.store.heat[p] = self.store.heat[p] + vec3(0.0, 0.0, injected)
                 self.store.waiting[p][0] = 1
         elif self.store.found[p] == 0:
             self.store.remove_spheres(p)
-
-    @ti.func
-    def _exposed_now(self, i):
-        """1 when a face of body i has got its spheres at this tick."""
-        exposed = 0
-        for face in range(4 * i, 4 * i + 4):
-            exposed |= ti.cast(self.state.exposed_tick[face] == self.state.tick[None], ti.i32)
-        return exposed
-
-    @ti.func
-    def _injected(self, p, i, j):
-        """Energy [J] of overlaps that this tick's breaks have brought into being."""
-        energy, tick = 0.0, self.state.tick[None]
-        size = ti.static(self.model.spheres_per_face)
-        fresh, freed = self.fresh[None] == 1, self._freed_at(i, j, tick)
-        for k in range(self.store.first[p], self.store.last[p]):
-            a, b = self.store.sphere[k][0], self.store.sphere[k][1]
-            born = ti.max(self.state.exposed_tick[a // size], self.state.exposed_tick[b // size])
-            if fresh and (freed or born == tick):
-                overlap = ti.max(0.0, -self.contacts.gap(i, j, a, b))
-                energy += self.contacts.law.stored(overlap)
-        return energy
-
-    @ti.func
-    def _freed_at(self, i, j, tick):
-        """Whether the bond of two bodies was released at a tick."""
-        freed = False
-        for f in range(4):
-            if self.model.neighbour[4 * i + f] == j:
-                freed = self.state.broken_tick[self.model.face_bond[4 * i + f]] == tick
-        return freed
-
-    @ti.func
-    def _index_second(self):
-        """List for every body the near pairs in which it is second, in order."""
-        start, slots, count = ti.static(
-            self.store.second_start, self.store.second_slot, self.store.near_count
-        )
-        group(start, slots, self.model.body_count, count[None], self._second_of)
-        for a in range(count[None]):
-            slots[a] = self.store.near_slot[slots[a]]
-
-    @ti.func
-    def _second_of(self, a):
-        return self.store.body[self.store.near_slot[a]][1]

@@ -6,18 +6,13 @@ It reaches several skins and takes in every face, broken or not, so one list ser
 import taichi as ti
 
 from taichi_dem.contact_search.cell_grid import CellGrid
+from taichi_dem.contact_search.reach import Reach
 from taichi_dem.kit.allocation import defer_fill
-from taichi_dem.kit.types import real
 
 #: What the list is when it needs to be made anew, and while it is.
 STALE, MAKING = 1, 2
 #: Room left behind the neighbours of each body, for fast ones that come.
 SPARE = 16
-#: Reach of the list around a body, in body skins and in skins: a longer list against fewer of them.
-BODY_SKINS, SKINS = 2.0, 3.5
-#: Largest steps by which a body is listed ahead of where it is, most of those that leave their
-#: reach being adrift, and the share of its reach that this may take.
-AHEAD, SHARE = 256.0, 0.8
 #: Bodies that leave their reach at once, at most, to be listed anew one by one.
 MOST_ESCAPED = 1024
 #: Share of its body skin that a body may use up before a search looks at it.
@@ -33,11 +28,8 @@ class VerletList:
     and g. A list that is made anew is written into the other half of these fields, so that pairs
     that stay find their slots; old_first, old_last: the rows before. start: of the half in use.
     changed: 1 for a body the near pairs of whose row may be others.
-    placed_at, turned_to, listed: where a body was listed, and its clusters [m]. reach: how far it
-    may be from there, its body skin included [m], and ball: radius of the ball around it and its
-    reach [m]. escaped: bodies that have left their reach since, left: 1 for them; they are listed
-    anew, as a few fragments fly faster than all the rest. stale: STALE when all are. full: 1 when
-    there is no room.
+    reach: the ``Reach`` that bodies may not leave. stale: STALE when all rows are to be made anew.
+    full: 1 when there is no capacity.
     """
 
     scratch_fields = ("old_first", "old_last")
@@ -46,9 +38,8 @@ class VerletList:
         n = contacts.model.body_count
         self.model, self.state, self.contacts = contacts.model, contacts.state, contacts
         self.store, self.capacity = contacts.store, contacts.neighbour_capacity
-        self.reach = ti.field(real, shape=n)
-        self.ball = ti.field(real, shape=n)
-        self.grid = CellGrid(self.model, self.state, self.ball, brute_force)
+        self.reach = Reach(contacts)
+        self.grid = CellGrid(self.model, self.state, self.reach.ball, brute_force)
         self.first = ti.field(ti.i32, shape=n + 1)
         self.last = ti.field(ti.i32, shape=n)
         self.old_first, self.old_last = (ti.field(ti.i32, shape=n) for _ in range(2))
@@ -57,12 +48,6 @@ class VerletList:
         )
         self.start = ti.field(ti.i32, shape=())
         self.changed = ti.field(ti.i32, shape=n)
-        self.placed_at = ti.Vector.field(3, real, shape=n)
-        self.turned_to = ti.Matrix.field(3, 3, real, shape=n)
-        self.listed = ti.Vector.field(3, real, shape=4 * n)
-        self.escaped = ti.field(ti.i32, shape=n)
-        self.escaped_count = ti.field(ti.i32, shape=())
-        self.left = ti.field(ti.i32, shape=n)
         self.stale = ti.field(ti.i32, shape=())
         self.full = ti.field(ti.i32, shape=())
         defer_fill(self.stale.fill, STALE)
@@ -74,34 +59,10 @@ class VerletList:
         self.stale.fill(STALE)
 
     @ti.func
-    def notice(self, i):
-        """See whether body i, which is looked at, has left the list's reach."""
-        # No point of the body went further than this: a norm of a matrix bounds what it does.
-        way = (self.state.position[i] - self.placed_at[i]).norm()
-        way += (self.state.rotation[i] - self.turned_to[i]).norm() * self.model.extent[i]
-        if not way + self.contacts.body_skin[i] < self.reach[i]:
-            self.left[i] = 1
-            self.escaped[ti.atomic_add(self.escaped_count[None], 1)] = i
-            self._list(i)
-
-    @ti.func
-    def _list(self, i):
-        """Note where body i and its clusters are, or will soon be if it goes on like this."""
-        self.reach[i] = BODY_SKINS * self.contacts.body_skin[i] + SKINS * self.contacts.skin[None]
-        self.ball[i] = self.model.extent[i] + self.reach[i]
-        ahead = AHEAD * self.contacts.dt0 * self.state.velocity[i]
-        most = SHARE * (self.reach[i] - self.contacts.body_skin[i])
-        ahead *= most / ti.max(ahead.norm(), most)
-        self.placed_at[i] = self.state.position[i] + ahead
-        self.turned_to[i] = self.state.rotation[i]
-        for face in range(4 * i, 4 * i + 4):
-            self.listed[face] = self.contacts.cluster_centre(i, face) + ahead
-
-    @ti.func
     def begin(self):
         """See whether so many bodies have left their reach that the list is made anew."""
         self.full[None] = 0
-        if self.escaped_count[None] > ti.min(self.model.body_count // 16, MOST_ESCAPED):
+        if self.reach.escaped_count[None] > ti.min(self.model.body_count // 16, MOST_ESCAPED):
             self.stale[None] = STALE
         if self.stale[None] == STALE:
             self.stale[None] = MAKING
@@ -114,13 +75,13 @@ class VerletList:
     @ti.func
     def amending(self):
         """1 while bodies that have escaped are listed anew."""
-        return ti.cast(self.stale[None] != MAKING and self.escaped_count[None] > 0, ti.i32)
+        return ti.cast(self.stale[None] != MAKING and self.reach.escaped_count[None] > 0, ti.i32)
 
     @ti.func
     def list_anew(self, i):
         """Note where body i is, and its row."""
         self.contacts.set_body_skin(i)
-        self._list(i)
+        self.reach.note_place(i)
         self.old_first[i], self.old_last[i] = self.first[i], self.last[i]
 
     @ti.func
@@ -184,19 +145,13 @@ class VerletList:
         Entries where they were stay while there is room: nothing comes of them but a look. A row
         without room leaves the list stale.
         """
-        if self.left[i] == 1:
+        if self.reach.left[i] == 1:
             for j in range(i + 1, self.model.body_count):
                 self._add(i, j)
         else:
-            for a in range(self.escaped_count[None]):
-                if self.escaped[a] > i:
-                    self._add(i, self.escaped[a])
-
-    @ti.func
-    def _balls_near(self, i, j):
-        """Whether the balls around two bodies with their reaches meet, where these were listed."""
-        reach = self.ball[i] + self.ball[j]
-        return (self.placed_at[j] - self.placed_at[i]).norm_sqr() < reach * reach
+            for a in range(self.reach.escaped_count[None]):
+                if self.reach.escaped[a] > i:
+                    self._add(i, self.reach.escaped[a])
 
     @ti.func
     def _add(self, i, j):
@@ -205,8 +160,8 @@ class VerletList:
         Without room in its row or in the store the list is stale.
         """
         faces = 0
-        if self._balls_near(i, j):
-            faces = self._faces_near(i, j)
+        if self.reach.balls_near(i, j):
+            faces = self.reach.faces_near(i, j)
         if faces != 0:
             place = self._find_row_index(i, j)
             if self._is_listed(i, place, j):
@@ -233,7 +188,7 @@ class VerletList:
         if self.last[i] == self.first[i + 1]:
             place = self.first[i]
             for k in range(self.first[i], self.last[i]):
-                near, p = self._faces_near(i, self.body[k]) != 0, self.slot[k]
+                near, p = self.reach.faces_near(i, self.body[k]) != 0, self.slot[k]
                 if near or self.store.waits(p):
                     self._move(k, place)
                     place += 1
@@ -259,9 +214,7 @@ class VerletList:
     @ti.func
     def end(self):
         """The list serves until a body has left its reach."""
-        for a in range(self.escaped_count[None]):
-            self.left[self.escaped[a]] = 0
-        self.escaped_count[None] = 0
+        self.reach.end()
         if self.stale[None] == MAKING:
             self.stale[None] = ti.select(self.full[None] == 1, STALE, 0)
 
@@ -275,8 +228,8 @@ class VerletList:
                 first, last = self.grid.row(z, y, low[0], high[0])
                 for k in range(first, last):
                     j = self.grid.member[k]
-                    if j > i and self._balls_near(i, j):
-                        faces = self._faces_near(i, j)
+                    if j > i and self.reach.balls_near(i, j):
+                        faces = self.reach.faces_near(i, j)
                         if faces != 0:
                             if write:
                                 self._insert(start, start + count, j, faces, -1)
@@ -296,23 +249,3 @@ class VerletList:
     def _move(self, k, place):
         self.body[place] = self.body[k]
         self.faces[place], self.slot[place] = self.faces[k], self.slot[k]
-
-    @ti.func
-    def _faces_near(self, i, j):
-        """Which faces of two bodies are near."""
-        wide, faces = self.reach[i] + self.reach[j], 0
-        for f in range(4):
-            faces |= self._near_face(4 * i + f, j, wide) << (4 * f)
-        return faces
-
-    @ti.func
-    def _near_face(self, face, j, wide):
-        """Which faces of body j, a bit each, come near a face of another."""
-        faces, reach = 0, self.model.cluster[face][3] + wide
-        whole = reach + self.model.extent[j]
-        if (self.placed_at[j] - self.listed[face]).norm_sqr() < whole * whole:
-            for g in range(4):
-                other = reach + self.model.cluster[4 * j + g][3]
-                apart = self.listed[4 * j + g] - self.listed[face]
-                faces |= ti.cast(apart.norm_sqr() < other * other, ti.i32) << g
-        return faces

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Uniform, effects
-from taichi_dem.contact_search.verlet_list import BODY_SKINS, SKINS
+from taichi_dem.contact_search.reach import BODY_SKINS, SKINS
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import bar, pair, single
 from taichi_dem.timeline import MACRO_TICKS
