@@ -37,6 +37,8 @@ class Contacts:
             near_pairs=n * effect.pairs_per_body + 64,
             spheres=n * effect.spheres_per_body + 4096,
         )
+        for one in model.effects:
+            one.declare(self.store)
         self.exposed_faces = ti.field(ti.i32, shape=n)
         self.travel = ti.field(real, shape=n)
         self.body_skin = ti.field(real, shape=n)

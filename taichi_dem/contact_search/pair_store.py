@@ -226,22 +226,27 @@ class PairStore:
         return same.all()
 
     @ti.func
-    def pack_spheres(self):
-        """Move the sphere pairs that are in use together, where too many are not."""
+    def pack_if_sparse(self):
+        """Pack the sphere pairs where too many places are out of use."""
         end, used = self.sphere_end[None], self.sphere_count[None]
         if end > 2 * used + SLACK or end > self.spheres // 2:
-            k, packed = 0, 0
-            while k < end:
-                p = self.owner[k]
-                count = 0
-                if self.first[p] == k:
-                    count = self.last[p] - k
-                for a in range(count):
-                    self.sphere[packed + a] = self.sphere[k + a]
-                    self.sphere_columns.copy(k + a, packed + a)
-                if count > 0:
-                    self.owner[packed] = p
-                    self.first[p], self.last[p] = packed, packed + count
-                packed += count
-                k += ti.max(1, count)
-            self.sphere_end[None] = packed
+            self.pack_spheres()
+
+    @ti.func
+    def pack_spheres(self):
+        """Move the sphere pairs that are in use together."""
+        k, packed = 0, 0
+        while k < self.sphere_end[None]:
+            p = self.owner[k]
+            count = 0
+            if self.first[p] == k:
+                count = self.last[p] - k
+            for a in range(count):
+                self.sphere[packed + a] = self.sphere[k + a]
+                self.sphere_columns.copy(k + a, packed + a)
+            if count > 0:
+                self.owner[packed] = p
+                self.first[p], self.last[p] = packed, packed + count
+            packed += count
+            k += ti.max(1, count)
+        self.sphere_end[None] = packed

@@ -148,7 +148,7 @@ class BroadPhase:
 
     @ti.func
     def _pack_spheres(self, one):
-        self.store.pack_spheres()
+        self.store.pack_if_sparse()
 
     @ti.func
     def _end(self, one):

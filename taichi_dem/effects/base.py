@@ -42,6 +42,13 @@ class Effect:
     def bind(self, model):
         """Check the effect against the model and allocate its parameters and state there."""
 
+    def declare(self, store):
+        """Declare what it keeps of a pair of bodies, or of two spheres, in a ``PairStore``.
+
+        Called where the scene has contact: ``store.column`` and ``store.sphere_column`` give
+        fields.
+        """
+
     def state(self):
         """Fields that change in a run, by name; a checkpoint holds them."""
         return {}
