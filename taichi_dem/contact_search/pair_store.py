@@ -38,7 +38,7 @@ class PairStore:
     second_start[i] on, slots of the pairs whose second body is i.
     """
 
-    scratch_fields = ("sphere_place", "freed", "freed_count", "taken_count")
+    scratch_fields = ("sphere_place", "freed")
 
     def __init__(self, bodies, slots, near_pairs, spheres):
         self.slots, self.near_pairs, self.spheres = slots, near_pairs, spheres
