@@ -8,12 +8,27 @@ class Breaks:
     """Tells the contact search which pairs are bonded, and which overlaps are new.
 
     fresh: 1 when a face has got its spheres since the last search, whose injection is booked.
+    newest: last tick at which a face of a body got its spheres, negative for none.
     """
+
+    scratch_fields = ("newest",)
 
     def __init__(self, contacts):
         self.contacts, self.store = contacts, contacts.store
         self.model, self.state = contacts.model, contacts.state
         self.fresh = ti.field(ti.i32, shape=())
+        self.newest = ti.field(ti.i64, shape=self.model.body_count)
+
+    @ti.func
+    def exposed_faces(self, i):
+        """Bit f for a face f of body i with spheres; notes when it got the last of them."""
+        exposed, newest = 0, self.state.exposed_tick[4 * i]
+        for f in range(4):
+            since = self.state.exposed_tick[4 * i + f]
+            newest = ti.max(newest, since)
+            exposed |= ti.cast(since >= 0, ti.i32) << f
+        self.newest[i] = newest
+        return exposed
 
     @ti.func
     def note_newest(self, newest):
@@ -36,10 +51,7 @@ class Breaks:
     @ti.func
     def exposed_since(self, i, tick):
         """1 when a face of body i has got its spheres at a tick or later."""
-        exposed = 0
-        for face in range(4 * i, 4 * i + 4):
-            exposed |= ti.cast(self.state.exposed_tick[face] >= tick, ti.i32)
-        return exposed
+        return ti.cast(self.newest[i] >= tick, ti.i32)
 
     @ti.func
     def injected(self, p):

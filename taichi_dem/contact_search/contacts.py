@@ -23,7 +23,7 @@ class Contacts:
     since it was last looked at [m]. body_skin: how far that may be before it is looked at again
     [m]; a pair holds the spheres whose gap is below the body skin of both. steps_ahead: steps of a
     body by which its contacts are counted before they touch. search_requested: 1 when the list may
-    miss one of them. neighbour_capacity: of the Verlet list and the store.
+    miss one of them. neighbour_capacity: of the Verlet list.
     """
 
     def __init__(self, model, state, dt0, steps_ahead=0.0):
@@ -33,8 +33,7 @@ class Contacts:
         self.neighbour_capacity = n * effect.neighbours_per_body + 1024
         self.store = PairStore(
             bodies=n,
-            slots=self.neighbour_capacity,
-            near_pairs=n * effect.pairs_per_body + 64,
+            slots=n * effect.pairs_per_body + 64,
             spheres=n * effect.spheres_per_body + 4096,
         )
         for one in model.effects:
@@ -61,13 +60,15 @@ class Contacts:
 
     @ti.func
     def pair_energy(self, p):
-        """Elastic energy of a pair's overlaps now [J]."""
+        """Elastic energy of a pair's overlaps now, and of springs between its spheres [J]."""
         energy = 0.0
         pair = self.store.body[p]
         for k in range(self.store.first[p], self.store.last[p]):
             spheres = self.store.sphere[k]
             overlap = -self.gap(pair[0], pair[1], spheres[0], spheres[1])
             energy += self.law.stored(ti.max(0.0, overlap))
+            if ti.static(self.friction.remembers):
+                energy += self.friction.stored(k)
         return energy
 
     @ti.func
@@ -93,6 +94,13 @@ class Contacts:
         for k in ti.static(range(3)):
             self.store.impulse[slot][k] = self.store.impulse[slot][k] + linear[k]
             self.store.impulse[slot][3 + k] = self.store.impulse[slot][3 + k] + angular[k]
+
+    @ti.func
+    def book_friction(self, p, energy):
+        """Book energy [J] that friction took beside an impulse, for the first body to take."""
+        if energy != 0.0:
+            self.store.heat[p][1] = self.store.heat[p][1] + energy
+            self.store.waiting[p][0] = 1
 
     @ti.func
     def gather(self, i):

@@ -13,7 +13,7 @@ class NarrowPhase:
     """Compares the spheres on the faces of two bodies, where these were last looked at.
 
     sphere: centre and radius of every sphere there [m]. cluster: centre of the ball around those of
-    a face [m]. travelled: how far any point of a body had gone by then [m].
+    a face [m].
     """
 
     def __init__(self, contacts):
@@ -22,15 +22,10 @@ class NarrowPhase:
         n = self.model.body_count
         self.sphere = ti.Vector.field(4, real, shape=4 * n * self.model.spheres_per_face)
         self.cluster = ti.Vector.field(3, real, shape=4 * n)
-        self.travelled = ti.field(real, shape=n)
 
     @ti.func
-    def note_places(self, i, travel):
-        """Note where the spheres of body i are, which has come a way of travel [m] since.
-
-        Computed once for many that ask.
-        """
-        self.travelled[i] = self.travelled[i] + travel
+    def note_places(self, i):
+        """Note where the spheres of body i are; computed once for many that ask."""
         size = ti.static(self.model.spheres_per_face)
         position, rotation = self.state.position[i], self.state.rotation[i]
         for face in range(4 * i, 4 * i + 4):
@@ -42,55 +37,13 @@ class NarrowPhase:
                     self.sphere[s] = vec4(place[0], place[1], place[2], sphere[3])
 
     @ti.func
-    def may_gain_spheres(self, p, faces):
-        """Whether a pair may have more spheres within its margin than were found.
-
-        faces: those that are broken now.
-        """
-        return self.store.broken[p] != faces or (faces != 0 and self._may_be_closer(p))
-
-    @ti.func
-    def faces_to_compare(self, p, faces):
-        """Those of the faces that are broken now which may bring a pair spheres.
-
-        They are the fresh ones, where it has none so far and cannot have got any else.
-        """
-        if self.store.found[p] == 0 and not self._may_be_closer(p):
-            faces &= ~self.store.broken[p]
-        return faces
-
-    @ti.func
-    def _may_be_closer(self, p):
-        """Whether two bodies have gone so far that more spheres may be within their margin."""
-        pair = self.store.body[p]
-        return self.least_gap(p) < self.contacts.margin(pair[0], pair[1])
-
-    @ti.func
-    def least_gap(self, p):
-        """Lower bound on the present gap of the pair's unlisted spheres [m]."""
-        pair = self.store.body[p]
-        return self.store.until[p] - self.travelled[pair[0]] - self.travelled[pair[1]]
-
-    @ti.func
-    def note_found(self, p, faces, spheres, hits, gap):
-        """Note the spheres of a pair, on which faces they are, and the smallest other gap [m].
-
-        faces: those that were broken.
-        """
-        self.store.broken[p], self.store.found[p] = faces, spheres
-        self.store.new_faces[p] = hits
-        pair = self.store.body[p]
-        self.store.until[p] = self.travelled[pair[0]] + self.travelled[pair[1]] + gap
-
-    @ti.func
-    def compare(self, p, faces, start, write):
+    def compare(self, i, j, faces, start, write):
         """Sphere pairs of two bodies within their margin: how many, and on which faces.
 
         Besides the smallest gap of others [m], no more than OUTLOOK skins beyond the margin. faces:
         bit 4 f + g for faces f and g to compare. write: enter them in the store, from start on;
         then other gaps are of no interest.
         """
-        i, j = self.store.body[p][0], self.store.body[p][1]
         margin = self.contacts.margin(i, j)
         count, hits, least = 0, 0, margin
         if not write:
@@ -124,10 +77,11 @@ class NarrowPhase:
                     other = self.sphere[b]
                     reach = mine[3] + other[3]
                     apart2 = (other.xyz - mine.xyz).norm_sqr()
-                    if apart2 < (reach + margin) * (reach + margin):
-                        if write:
-                            self.store.sphere[start + count] = [a, b]
-                        count += 1
-                    elif apart2 < (reach + least) * (reach + least):
-                        least = ti.sqrt(apart2) - reach
+                    if apart2 < (reach + least) * (reach + least):
+                        if apart2 < (reach + margin) * (reach + margin):
+                            if write:
+                                self.store.sphere[start + count] = [a, b]
+                            count += 1
+                        else:
+                            least = ti.sqrt(apart2) - reach
         return count, least

@@ -1,7 +1,7 @@
-"""The pair store: everything that belongs to a pair of bodies, in a slot of its own.
+"""The pair store: everything that belongs to a pair of bodies that are near, in a slot of its own.
 
-A pair gets a slot when it enters the Verlet list and keeps it until it leaves. Only the functions
-here allocate and free slots and the places of sphere pairs.
+A pair gets a slot when its first sphere pair comes near, and keeps it until the last has left and
+no impulse waits. Only the functions here allocate and free slots and the places of sphere pairs.
 """
 
 import numpy as np
@@ -16,61 +16,48 @@ SLACK = 4096
 
 @ti.data_oriented
 class PairStore:
-    """Slots of pairs of bodies, their sphere pairs, and the order in which pairs are visited.
+    """Slots of near pairs of bodies, their sphere pairs, and the order in which pairs are visited.
 
-    Of a slot, side by side as they are read together: body: the two bodies, first < second;
-    is_near: 1 while the pair has sphere pairs within the margin, or an impulse waits; first ..
-    last: where these sphere pairs lie in sphere; waiting: 1 for a side whose impulse waits; and
-    what the last search of the pair found: broken: faces that were compared, bit 4 f + g for faces
-    f and g; found: number of sphere pairs; new_faces: faces whose sphere pairs are not written yet;
-    until: how far the two bodies have gone, together, when the gap of other spheres may be 0 [m].
-    impulse[2 p + side]: impulse [N s] and moment about the body's centre [N m s] that wait for that
-    body, zero unless waiting says so: most pairs do not touch, and to ask is cheaper than to add
-    zeros. heat: energy into dashpots, friction, and injected [J], until the first body takes it.
-    deepest: overlap as a share of the distance at which the spheres touch.
+    Of a slot: body: the two bodies, first < second; first .. last: where the sphere pairs that a
+    search has found lie in sphere; waiting: 1 for a side whose impulse waits; impulse[2 p + side]:
+    impulse [N s] and moment about the body's centre [N m s] that wait for that body, zero unless
+    waiting says so: most pairs do not touch, and to ask is cheaper than to add zeros. heat: energy
+    into dashpots, friction, and injected [J], until the first body takes it. deepest: overlap as a
+    share of the distance at which the spheres touch. is_new: 1 until the search that found the pair
+    ends; sphere_place: new place of its sphere pairs until then.
     Of a sphere pair: sphere: the two spheres; owner: slot of the pair, where its places begin.
     columns, sphere_columns: what others declare. A column is zero when its pair comes near, or its
-    sphere pair is listed, and keeps its value as long as that lasts.
+    sphere pair is found, and keeps its value as long as that lasts.
 
-    Near pairs are visited by (first body, second body), whatever the order of slots: sums have one
+    Pairs are visited by (first body, second body), whatever the order of slots: sums have one
     order, whoever searched when. near_count: how many there are. near_slot: their slots, in order.
     first_of[i]: place there of the first pair whose first body is i; second_slot: from
     second_start[i] on, slots of the pairs whose second body is i.
     """
 
-    scratch_fields = ("sphere_place", "freed")
+    scratch_fields = ("sphere_place",)
 
-    def __init__(self, bodies, slots, near_pairs, spheres):
-        self.slots, self.near_pairs, self.spheres = slots, near_pairs, spheres
+    def __init__(self, bodies, slots, spheres):
+        self.slots, self.spheres = slots, spheres
         self._allocate_slots(slots)
         self.sphere = ti.Vector.field(2, ti.i32, shape=spheres)
         self.owner = ti.field(ti.i32, shape=spheres)
-        self.sphere_count = ti.field(ti.i32, shape=())
-        self.sphere_end = ti.field(ti.i32, shape=())
+        self.sphere_count, self.sphere_end = (ti.field(ti.i32, shape=()) for _ in range(2))
         self.columns, self.sphere_columns = Columns(slots), Columns(spheres)
         self.near_count = ti.field(ti.i32, shape=())
-        self.near_slot = ti.field(ti.i32, shape=near_pairs)
+        self.near_slot = ti.field(ti.i32, shape=slots)
         self.first_of = ti.field(ti.i32, shape=bodies + 1)
         self.second_start = ti.field(ti.i32, shape=bodies + 2)
-        self.second_slot = ti.field(ti.i32, shape=near_pairs)
+        self.second_slot = ti.field(ti.i32, shape=slots)
 
     def _allocate_slots(self, slots):
-        self.body, self.waiting = (ti.Vector.field(2, ti.i32) for _ in range(2))
-        self.is_near, self.first, self.last, self.sphere_place = (
-            ti.field(ti.i32) for _ in range(4)
-        )
-        self.broken, self.found, self.new_faces = (ti.field(ti.i32) for _ in range(3))
-        self.until = ti.field(real)
-        ti.root.dense(ti.i, slots).place(
-            *(self.body, self.is_near, self.first, self.last, self.waiting),
-            *(self.broken, self.found, self.new_faces, self.sphere_place, self.until),
-        )
+        self.body, self.waiting = (ti.Vector.field(2, ti.i32, shape=slots) for _ in range(2))
+        self.first, self.last, self.is_new = (ti.field(ti.i32, shape=slots) for _ in range(3))
+        self.sphere_place, self.free = (ti.field(ti.i32, shape=slots) for _ in range(2))
         self.impulse = ti.Vector.field(6, real, shape=2 * slots)
         self.heat = ti.Vector.field(3, real, shape=slots)
         self.deepest = ti.field(real, shape=slots)
-        self.free, self.freed = (ti.field(ti.i32, shape=slots) for _ in range(2))
-        self.free_count, self.freed_count = (ti.field(ti.i32, shape=()) for _ in range(2))
-        self.taken_count, self.used_end = (ti.field(ti.i32, shape=()) for _ in range(2))
+        self.free_count, self.used_end = (ti.field(ti.i32, shape=()) for _ in range(2))
 
     def column(self, name, kind, width=0):
         """Field with an entry a slot; kind: data type, width: components, 0 for a number.
@@ -113,44 +100,33 @@ class PairStore:
 
     @ti.func
     def allocate(self, i, j):
-        """Slot for a pair of two bodies, with nothing known of it; -1 where none is left.
-
-        Loops may allocate and free side by side: what is freed serves from ``update_free`` on.
-        """
-        left = self.free_count[None] - 1 - ti.atomic_add(self.taken_count[None], 1)
-        p = self.used_end[None] - 1 - left
+        """Slot for a pair of two bodies, all of it zero; -1 where none is left."""
+        p, left = -1, self.free_count[None] - 1
         if left >= 0:
             p = self.free[left]
-        elif p >= self.slots:
-            p = -1
+            self.free_count[None] = left
+        elif self.used_end[None] < self.slots:
+            p = self.used_end[None]
+            self.used_end[None] = p + 1
         if p >= 0:
-            self.body[p], self.waiting[p] = [i, j], [0, 0]
-            self.is_near[p], self.first[p], self.last[p] = 0, 0, 0
-            self.forget_search(p)
+            self.body[p] = [i, j]
+            self._clear(p)
         return p
 
     @ti.func
+    def _clear(self, p):
+        self.first[p], self.last[p], self.waiting[p], self.is_new[p] = 0, 0, [0, 0], 1
+        self.heat[p], self.deepest[p] = vec3(0.0), 0.0
+        for slot in range(2 * p, 2 * p + 2):
+            self.impulse[slot] = ti.Vector.zero(real, 6)
+        self.columns.clear(p)
+
+    @ti.func
     def release(self, p):
-        """Free the slot of a pair."""
-        self.first[p], self.last[p] = 0, 0
-        self.freed[ti.atomic_add(self.freed_count[None], 1)] = p
-
-    @ti.func
-    def update_free(self):
-        """Account for the slots that have been allocated and freed since the last time."""
-        taken = ti.min(self.taken_count[None], self.free_count[None])
-        beyond = self.used_end[None] + self.taken_count[None] - taken
-        self.used_end[None] = ti.min(beyond, self.slots)
-        left = self.free_count[None] - taken
-        for k in range(self.freed_count[None]):
-            self.free[left + k] = self.freed[k]
-        self.free_count[None] = left + self.freed_count[None]
-        self.taken_count[None], self.freed_count[None] = 0, 0
-
-    @ti.func
-    def forget_search(self, p):
-        """Nothing is known of the spheres of a pair: all its faces have to be compared."""
-        self.broken[p], self.found[p], self.new_faces[p], self.until[p] = 0, 0, 0, 0.0
+        """Free the slot of a pair and the places of its sphere pairs."""
+        self.remove_spheres(p)
+        self.free[self.free_count[None]] = p
+        self.free_count[None] = self.free_count[None] + 1
 
     @ti.func
     def waits(self, p):
@@ -158,43 +134,28 @@ class PairStore:
         return self.waiting[p][0] == 1 or self.waiting[p][1] == 1
 
     @ti.func
-    def enter(self, p):
-        """Begin with a pair that comes near: its columns are zero."""
-        self.is_near[p], self.deepest[p], self.heat[p] = 1, 0.0, vec3(0.0)
-        for slot in range(2 * p, 2 * p + 2):
-            self.impulse[slot] = ti.Vector.zero(real, 6)
-        self.columns.clear(p)
-
-    @ti.func
-    def leave(self, p):
-        """End with a pair that is near no more."""
-        self.is_near[p] = 0
-        self.remove_spheres(p)
-
-    @ti.func
     def remove_spheres(self, p):
         """Free the places of the sphere pairs of a pair."""
         self.first[p], self.last[p] = 0, 0
 
     @ti.func
-    def reserve_spheres(self, p):
+    def reserve_spheres(self, p, count):
         """Find new places for the sphere pairs of a pair; 1 when there are none."""
         start = self.sphere_end[None]
-        end = start + self.found[p]
-        lacking = ti.cast(end > self.spheres, ti.i32)
+        lacking = ti.cast(start + count > self.spheres, ti.i32)
         if lacking == 0:
             self.sphere_place[p], self.owner[start] = start, p
-            self.sphere_end[None] = end
+            self.sphere_end[None] = start + count
         return lacking
 
     @ti.func
-    def replace_spheres(self, p):
+    def replace_spheres(self, p, count):
         """Let the sphere pairs at a pair's new places follow its present ones.
 
         Those that stay keep their columns, those of the others are zero.
         """
         start = self.sphere_place[p]
-        end = start + self.found[p]
+        end = start + count
         if ti.static(len(self.sphere_columns) > 0):
             for k in range(start, end):
                 former = self._former(p, self.sphere[k], k - start)
@@ -202,7 +163,7 @@ class PairStore:
                     self.sphere_columns.copy(former, k)
                 else:
                     self.sphere_columns.clear(k)
-        self.first[p], self.last[p], self.new_faces[p] = start, end, 0
+        self.first[p], self.last[p] = start, end
 
     @ti.func
     def _former(self, p, spheres, nth):

@@ -66,10 +66,13 @@ class Reach:
         self.escaped_count[None] = 0
 
     @ti.func
-    def balls_near(self, i, j):
-        """Whether the balls around two bodies with their reaches meet, where these were listed."""
-        reach = self.ball[i] + self.ball[j]
-        return (self.placed_at[j] - self.placed_at[i]).norm_sqr() < reach * reach
+    def is_near(self, j, place, ball):
+        """Whether the ball around body j and its reach, where it was listed, meets another ball.
+
+        place: of the other ball's centre [m]; ball: its radius [m].
+        """
+        reach = ball + self.ball[j]
+        return (self.placed_at[j] - place).norm_sqr() < reach * reach
 
     @ti.func
     def faces_near(self, i, j):

@@ -14,6 +14,8 @@ from taichi_dem.contact_search.verlet_list import FAR, VerletList
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.types import vec3
 
+#: Marks of a body: it has spheres, and the last search looked at it.
+EXPOSED, LOOKED = 1, 2
 _CAPACITIES = ("", "pairs_per_body", "spheres_per_body", "neighbours_per_body")
 
 
@@ -22,9 +24,9 @@ class BroadPhase:
     """Finds the pairs that are near and their spheres, for the store of a ``Contacts``.
 
     brute_force: compare all bodies with broken faces, for tests. everywhere: 1 when the next search
-    looks at all bodies, as is needed once they have been moved by hand. looked: 1 for those at
-    which the last one looked; searched: its tick. searches: how many there were. full: which list
-    has no capacity left, an index into ``_CAPACITIES``.
+    looks at all bodies, as is needed once they have been moved by hand. looked: LOOKED for those at
+    which the last one looked, EXPOSED for others with spheres; searched: its tick. searches: how
+    many there were. full: which list has no capacity left, an index into ``_CAPACITIES``.
     """
 
     scratch_fields = ("exposed", "exposed_count", "looked")
@@ -36,6 +38,7 @@ class BroadPhase:
         self.exposed = ti.field(ti.i32, shape=n)
         self.exposed_count = ti.field(ti.i32, shape=())
         self.neighbours = VerletList(contacts, brute_force)
+        self.listed = self.neighbours.listed
         self.narrow_phase = NarrowPhase(contacts)
         self.searched = ti.field(ti.i64, shape=())
         self.looked = ti.field(ti.i32, shape=n)
@@ -85,13 +88,10 @@ class BroadPhase:
             (self._all_anew, self.neighbours.count),
             (self.neighbours.making, self._allot),
             (self._all_anew, self.neighbours.fill),
-            (self.neighbours.making, self._update_free),
-            (self._all_anew, self.neighbours.assign_slots),
             (self._all_amended, self.neighbours.amend),
-            (self._once, self._update_free),
             (self._exposed_bodies, self._note_places),
             (self._once, self._pack_spheres),
-            (self._exposed_bodies, self._update_row),
+            (self._exposed_bodies, self._find_spheres),
             (self._once, self._number_pairs),
             (self._exposed_bodies, self._update_pairs),
             (self._once, self._end),
@@ -143,10 +143,6 @@ class BroadPhase:
         self.neighbours.allot()
 
     @ti.func
-    def _update_free(self, one):
-        self.store.update_free()
-
-    @ti.func
     def _pack_spheres(self, one):
         self.store.pack_if_sparse()
 
@@ -169,14 +165,10 @@ class BroadPhase:
         count = 0
         newest = ti.cast(0, ti.i64)
         for i in range(self.model.body_count):
-            exposed = 0
-            for f in range(4):
-                since = self.state.exposed_tick[4 * i + f]
-                newest = ti.max(newest, since)
-                if since >= 0:
-                    exposed |= 1 << f
+            exposed = self.breaks.exposed_faces(i)
+            newest = ti.max(newest, self.breaks.newest[i])
             self.contacts.exposed_faces[i] = exposed
-            self.looked[i] = 0
+            self.looked[i] = ti.cast(exposed != 0, ti.i32)
             if exposed != 0:
                 self.exposed[count] = i
                 count += 1
@@ -191,8 +183,8 @@ class BroadPhase:
         far = self.contacts.travel[i] > FAR * self.contacts.body_skin[i]
         looked = self.everywhere[None] | ti.cast(far, ti.i32)
         looked |= self.breaks.exposed_since(i, self.searched[None] + 1)
-        self.looked[i] = looked
         if looked == 1:
+            self.looked[i] = LOOKED
             self.contacts.set_body_skin(i)
             self.neighbours.reach.notice(i)
 
@@ -206,38 +198,36 @@ class BroadPhase:
         """
         i = self.exposed[a]
         if self.neighbours.making() == 1:
-            self.looked[i] = 1
-        if self.looked[i] == 1:
-            self.narrow_phase.note_places(i, self.contacts.travel[i])
+            self.looked[i] = LOOKED
+        if self.looked[i] == LOOKED:
+            self.listed.note_travel(i, self.contacts.travel[i])
+            self.narrow_phase.note_places(i)
             self.contacts.travel[i] = 0.0
 
     @ti.func
-    def _update_row(self, a):
+    def _find_spheres(self, a):
         """Find the sphere pairs of an exposed body with each neighbour that is looked at."""
         i = self.exposed[a]
-        looked = self.looked[i]
+        least = ti.select(self.looked[i] == LOOKED, EXPOSED, LOOKED)
         for k in range(self.neighbours.first[i], self.neighbours.last[i]):
-            j = self.neighbours.body[k]
-            if looked | self.looked[j] != 0 and self.contacts.exposed_faces[j] != 0:
-                p = self.neighbours.slot[k]
-                faces = self.neighbours.faces[k] & self._broken_faces(i, j)
-                if self.everywhere[None] == 1 or self.narrow_phase.may_gain_spheres(p, faces):
-                    self._find_spheres(p, i, j, faces)
-                    self.neighbours.changed[i] = 1
-        self.near_pairs.update_row(i)
+            j = self.listed.body[k]
+            if self.looked[j] >= least:
+                faces = self.listed.faces[k] & self._broken_faces(i, j)
+                if self.everywhere[None] == 1 or self.listed.may_gain_spheres(k, i, j, faces):
+                    self._count_spheres(k, i, j, faces)
 
     @ti.func
-    def _find_spheres(self, p, i, j, faces):
-        """Count the sphere pairs of a pair, and find how far apart the others are."""
+    def _count_spheres(self, k, i, j, faces):
+        """Count the sphere pairs of an entry, and find how far apart the others are."""
         count, hits, gap = 0, 0, 0.0
         if not self.breaks.bonded(i, j):
             compared = faces
             if self.everywhere[None] == 0:
-                compared = self.narrow_phase.faces_to_compare(p, faces)
-            count, hits, gap = self.narrow_phase.compare(p, compared, 0, False)
+                compared = self.listed.faces_to_compare(k, i, j, faces)
+            count, hits, gap = self.narrow_phase.compare(i, j, compared, 0, False)
             if compared != faces:
-                gap = ti.min(gap, self.narrow_phase.least_gap(p))
-        self.narrow_phase.note_found(p, faces, count, hits, gap)
+                gap = ti.min(gap, self.listed.least_gap(k, i, j))
+        self.listed.note_found(k, i, j, faces, count, hits, gap)
 
     @ti.func
     def _broken_faces(self, i, j):
@@ -255,27 +245,28 @@ class BroadPhase:
     def _update_pairs(self, a):
         """Put the near pairs of an exposed body in order, and write what is new in them."""
         i = self.exposed[a]
-        for k in range(self.near_pairs.listed_count(i)):
-            p = self.near_pairs.put(i, k)
-            j, entered = self.store.body[p][1], 1 - self.store.is_near[p]
+        for n in range(self.near_pairs.listed_count(i)):
+            k = self.near_pairs.put(i, n)
+            p, j, entered = self.listed.slot[k], self.listed.body[k], 0
             if self.near_pairs.row_is_new[i] == 1:
-                self._update_pair(p)
+                entered = self.store.is_new[p]
+                self._update_pair(k, p, i, j)
             if ti.static(self.schedule.has_limits):
                 now = self.state.tick[None]
                 fresh = self.breaks.exposed_since(i, now) | self.breaks.exposed_since(j, now)
                 self.schedule.limits.notice_listed(p, entered, fresh)
 
     @ti.func
-    def _update_pair(self, p):
-        """Write the sphere pairs of a pair, and book what their birth injects."""
-        if self.store.is_near[p] == 0:
-            self.store.enter(p)
-        if self.store.new_faces[p] != 0:
-            self.narrow_phase.compare(p, self.store.new_faces[p], self.store.sphere_place[p], True)
-            self.store.replace_spheres(p)
+    def _update_pair(self, k, p, i, j):
+        """Write the sphere pairs of entry k, and book what their birth injects."""
+        faces, count = self.listed.new_faces[k], self.listed.found[k]
+        self.store.is_new[p], self.listed.new_faces[k] = 0, 0
+        if faces != 0:
+            self.narrow_phase.compare(i, j, faces, self.store.sphere_place[p], True)
+            self.store.replace_spheres(p, count)
             injected = self.breaks.injected(p)
             if injected > 0.0:
                 self.store.heat[p] = self.store.heat[p] + vec3(0.0, 0.0, injected)
                 self.store.waiting[p][0] = 1
-        elif self.store.found[p] == 0:
+        elif count == 0:
             self.store.remove_spheres(p)

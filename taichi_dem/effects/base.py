@@ -10,7 +10,11 @@ shear     ``traction(stiffness, u, sliding, pressure)`` -> (traction [Pa], energ
 dashpot   ``traction(velocity)`` [Pa] of a contact unit
 load      ``acts_on(i)``, ``wrench(i, t, rotation)`` -> (force [N], torque about the centre [N m])
 support   ``acts_on(i)``, ``held(i, t, rotation, velocity, angular_momentum)`` -> both, corrected
-contact   sphere contacts between broken faces      friction  their sliding
+contact   sphere contacts between broken faces: ``normal``, ``elastic``, ``damping``, ``stored``
+friction  ``force(damping, force_normal, slide)`` [N] on the second sphere, ``bound(force_normal)``
+          [N]; with ``remembers = True``, for springs across the contact of sphere pair k, whose
+          vectors are in the first body's frame: ``follow(k, normal, way)``, ``slip(k, bound, way)``
+          -> energy [J], ``spring(k)`` [N], ``stored(k)`` [J], ``part(k)`` -> energy [J]
 
 b is a bond, u one of its three contact units (3 b, 3 b + 1, 3 b + 2), i a body. Roles ``load`` and
 ``support`` take any number of effects, the others at most one.
@@ -149,6 +153,7 @@ class NoFriction(Effect):
     """Frictionless sphere contacts."""
 
     role = "friction"
+    remembers = False
 
     @ti.func
     def force(self, damping, force_normal, slide):

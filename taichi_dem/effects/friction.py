@@ -12,10 +12,16 @@ class Friction(Effect):
 
     role = "friction"
     name = "friction"
+    remembers = False
 
     def bind(self, model):
         """Take the friction coefficient from the material."""
         self.law = parameters(coefficient=model.material.friction)
+
+    @ti.func
+    def bound(self, force_normal):
+        """Largest friction [N] at a normal force [N]; of impulses likewise."""
+        return self.law[0] * force_normal
 
     @ti.func
     def force(self, damping, force_normal, slide):

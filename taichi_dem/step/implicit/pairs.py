@@ -5,7 +5,8 @@ import taichi as ti
 from taichi_dem.contact_search.cell_grid import group
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.physics.rotation import unit3, zero3
-from taichi_dem.physics.sphere_pair import meeting
+from taichi_dem.physics.sphere_pair import add_within, cut_to, meeting
+from taichi_dem.step.tangential_springs import TangentialSprings
 
 #: Colours of pairs that share no body; what finds no free one is visited last, in turn.
 COLOURS = 16
@@ -23,11 +24,14 @@ class PairDashpots:
     centre to the contact [m]. push: impulse of the spring, or what the gap still lets through
     [N s]. share: velocity per impulse along the normal, and across at most [1/kg]. impulse: on the
     second, of spring, dashpot and friction, as found [N s]; entries as in ``PairStore.sphere``.
+    Where friction sticks, pull: impulse of the spring across the contact [N s]; elapsed: time since
+    a pair was last evaluated [s].
     active: the pairs that touch, count of them. order: places in it by colour, those of colour c
     from colour_first[c] on.
     """
 
     scratch_fields = (
+        *("elapsed", "pull"),
         *("touching", "entry", "normal", "arm", "push", "share", "branch"),
         *("active", "order", "colour", "taken", "colour_first"),
     )
@@ -37,7 +41,11 @@ class PairDashpots:
         self.contacts, self.velocities = contacts, velocities
         self.has_friction = bool(model.friction.name)
         self.store = contacts.store
-        pairs, spheres = self.store.near_pairs, self.store.spheres
+        self.springs = TangentialSprings(model, state, schedule, contacts)
+        if self.springs.present:
+            self.elapsed = ti.field(real, shape=self.store.slots)
+            self.pull = ti.Vector.field(3, real, shape=self.store.spheres)
+        pairs, spheres = self.store.slots, self.store.spheres
         self.touching = ti.field(ti.i32, shape=self.store.slots)
         self.entry = ti.field(ti.i32, shape=spheres)
         self.normal = ti.Vector.field(3, real, shape=spheres)
@@ -100,7 +108,11 @@ class PairDashpots:
         back = self.state.rotation[i].transpose()
         turn, offset = back @ self.state.rotation[j], back @ branch
         ahead = dt * self.contacts.approach(i, j)
-        force, moment, deepest = zero3(), zero3(), 0.0
+        force, moment, deepest, parted = zero3(), zero3(), 0.0, 0.0
+        elapsed = 0.0
+        if ti.static(self.springs.present):
+            elapsed = self.springs.elapsed(p)
+            self.elapsed[p] = elapsed
         start = self.store.first[p]
         end = start
         for k in range(start, self.store.last[p]):
@@ -119,12 +131,30 @@ class PairDashpots:
                 force += self.impulse[k]
                 moment += arm.cross(self.impulse[k])
                 deepest = ti.max(deepest, overlap / reach)
+                if ti.static(self.springs.present):
+                    self.pull[end] = zero3()
+                    if overlap > 0.0:
+                        way = self._way(i, j, branch, arm, normal, elapsed)
+                        self.springs.follow(k, self.state.rotation[i], normal, way)
+                        self.pull[end] = dt * self.springs.force(k, self.state.rotation[i])
                 end += 1
             else:
                 self.impulse[k] = zero3()
+            if apart.norm_sqr() >= reach * reach:
+                parted += self.springs.part(k)
         self.store.deepest[p], self.touching[p], self.branch[p] = deepest, end - start, branch
         if end > start:
             self._deposit(p, branch, force, moment)
+        if ti.static(self.springs.present):
+            self.contacts.book_friction(p, parted)
+
+    @ti.func
+    def _way(self, i, j, branch, arm, normal, elapsed):
+        """Way of a contact's second sphere against the first across the normal in a time [m]."""
+        spin = self.state.spin[i]
+        velocity = self.state.velocity[j] + self.state.spin[j].cross(arm)
+        velocity -= self.state.velocity[i] + spin.cross(arm + branch)
+        return elapsed * (velocity - velocity.dot(normal) * normal)
 
     @ti.func
     def _share(self, i, j, branch, arm, normal):
@@ -176,12 +206,13 @@ class PairDashpots:
         found = ti.max(0.0, (self.push[c] - damping * free) / (1.0 + damping * share[0])) * normal
         if ti.static(self.has_friction):
             slide = velocity - rate * normal - share[1] * (held - pressed * normal)
-            rub = (-damping / (1.0 + damping * share[1])) * slide
-            bound = self.model.friction.law[0] * found.dot(normal)
-            size = rub.norm()
-            if size > bound:
-                rub *= bound / size
-            found += rub
+            bound = self.model.friction.bound(found.dot(normal))
+            stick = -damping / (1.0 + damping * share[1])
+            if ti.static(self.springs.present):
+                pull = cut_to(self.pull[c], bound)
+                found += add_within(pull, stick * (slide + share[1] * pull), bound)
+            else:
+                found += cut_to(stick * slide, bound)
         step = held - found
         self.impulse[k] = found
         self.velocities.pull(i, j, branch, step, arm.cross(step))
@@ -205,5 +236,20 @@ class PairDashpots:
                 impulse = self.impulse[self.entry[c]]
                 pressed, rate = impulse.dot(normal), velocity.dot(normal)
                 dragged += (ti.max(self.push[c], 0.0) - pressed) * rate
-                rubbed -= (impulse - pressed * normal).dot(velocity)
+                rub = impulse - pressed * normal
+                if ti.static(self.springs.present):
+                    stuck, spent = self._slip(p, c, i, j, pressed)
+                    rub -= stuck
+                    rubbed += spent
+                rubbed -= rub.dot(velocity)
             self.store.heat[p] = self.store.heat[p] + vec3(dragged, rubbed, 0.0)
+
+    @ti.func
+    def _slip(self, p, c, i, j, pressed):
+        """Let a spring slip in a step; its impulse [N s], and the energy that slipping took [J]."""
+        k, normal, rotation = self.entry[c], self.normal[c], self.state.rotation[i]
+        dt = self.schedule.step_seconds[0]
+        bound = self.model.friction.bound(pressed) / dt
+        way = self._way(i, j, self.branch[p], self.arm[c], normal, self.elapsed[p])
+        spent = self.springs.slip(k, rotation, bound, way)
+        return dt * self.springs.force(k, rotation), spent
