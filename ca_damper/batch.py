@@ -27,6 +27,7 @@ from taichi_dem.kit.allocation import check_capacity
 from taichi_dem.kit.checkpoint import version_text
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.field_memory import FieldMemory
 from taichi_dem.kit.progress.progress import compiling
 from taichi_dem.kit.restart import CheckpointWriter, NoCheckpointWriter, RunSnapshot, opened
 from taichi_dem.kit.validation import choice, instance, positive, whole
@@ -52,7 +53,7 @@ class Batch:
     """
 
     def __init__(self, filling, table, *, mount="spring", measured_cycles=1, rtol=1e-9, atol=1e-12):
-        self.generation = runtime.generation()
+        self.generation = runtime.session()
         check_filling(filling)
         instance("table", table, SceneTable)
         check_capacity()
@@ -199,7 +200,7 @@ class Batch:
         own = {"version": version_text(), "filling": repr(self.filling)}
         arrays = opened(checkpoint, resume, lambda: {**own, **identity})
         self._compile()
-        saved = RunSnapshot({**own, **identity}, self, {"batch": self, **dict(owners)})
+        saved = RunSnapshot({**own, **identity}, FieldMemory(self), {"batch": self, **dict(owners)})
         if arrays:
             saved.restore(arrays, resume)
         writer = NoCheckpointWriter()
@@ -260,7 +261,7 @@ class Batch:
         return self.account.error(self.sample()["momentum"]) if self._started else 0.0
 
     def _check_session(self):
-        if self.generation != runtime.generation():
+        if self.generation != runtime.session():
             raise InputError("this batch belongs to a Taichi session that has been stopped")
 
     def _read_status(self):

@@ -15,9 +15,9 @@ class Breaks:
 
     def __init__(self, contacts):
         self.contacts, self.store = contacts, contacts.store
-        self.model, self.state = contacts.model, contacts.state
+        self.tables, self.state = contacts.tables, contacts.state
         self.fresh = ti.field(ti.i32, shape=())
-        self.newest = ti.field(ti.i64, shape=self.model.body_count)
+        self.newest = ti.field(ti.i64, shape=self.tables.capacity.bodies)
 
     @ti.func
     def exposed_faces(self, i):
@@ -44,8 +44,8 @@ class Breaks:
         """Whether two bodies share a bond that holds."""
         bonded = False
         for f in range(4):
-            if self.model.neighbour[4 * i + f] == j:
-                bonded = self.state.broken_tick[self.model.face_bond[4 * i + f]] < 0
+            if self.tables.neighbour[4 * i + f] == j:
+                bonded = self.state.broken_tick[self.tables.face_bond[4 * i + f]] < 0
         return bonded
 
     @ti.func
@@ -58,7 +58,7 @@ class Breaks:
         """Energy [J] of overlaps of a pair that this tick's breaks have brought into being."""
         i, j = self.store.body[p][0], self.store.body[p][1]
         energy, tick = 0.0, self.state.tick[None]
-        size = ti.static(self.model.spheres_per_face)
+        size = self.tables.face_spheres[None]
         fresh, freed = self.fresh[None] == 1, self._freed_at(i, j, tick)
         for k in range(self.store.first[p], self.store.last[p]):
             a, b = self.store.sphere[k][0], self.store.sphere[k][1]
@@ -73,6 +73,6 @@ class Breaks:
         """Whether the bond of two bodies was released at a tick."""
         freed = False
         for f in range(4):
-            if self.model.neighbour[4 * i + f] == j:
-                freed = self.state.broken_tick[self.model.face_bond[4 * i + f]] == tick
+            if self.tables.neighbour[4 * i + f] == j:
+                freed = self.state.broken_tick[self.tables.face_bond[4 * i + f]] == tick
         return freed

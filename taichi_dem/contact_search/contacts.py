@@ -3,10 +3,12 @@
 A pair holds the sphere pairs that were nearer than the body skin of its bodies at the last search.
 """
 
+import numpy as np
 import taichi as ti
 
+from taichi_dem.contact_search.lengths import SPARE_PAIRS, SPARE_SPHERES
 from taichi_dem.contact_search.pair_store import PairStore
-from taichi_dem.kit.allocation import defer_fill
+from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.types import real, vec3
 
 #: Largest steps that a fast body makes before the search looks at it again.
@@ -21,42 +23,46 @@ class Contacts:
 
     exposed_faces: bit f for a broken face f. travel: bound of the way any point of a body went
     since it was last looked at [m]. body_skin: how far that may be before it is looked at again
-    [m]; a pair holds the spheres whose gap is below the body skin of both. steps_ahead: steps of a
-    body by which its contacts are counted before they touch. search_requested: 1 when the list may
-    miss one of them. neighbour_capacity: of the Verlet list.
+    [m]; a pair holds the spheres whose gap is below the body skin of both. pace: largest step [s],
+    and steps of a body by which its contacts are counted before they touch. search_requested: 1
+    when the list may miss one of them.
     """
 
-    def __init__(self, model, state, dt0, steps_ahead=0.0):
-        n, effect = model.body_count, model.contact
-        self.model, self.state, self.law, self.friction = model, state, effect, model.friction
-        self.dt0, self.steps_ahead = dt0, steps_ahead
-        self.neighbour_capacity = n * effect.neighbours_per_body + 1024
-        self.store = PairStore(
-            bodies=n,
-            slots=n * effect.pairs_per_body + 64,
-            spheres=n * effect.spheres_per_body + 4096,
-        )
-        for one in model.effects:
-            one.declare(self.store)
+    def __init__(self, tables, state):
+        n, capacity = tables.capacity.bodies, tables.capacity
+        self.tables, self.state = tables, state
+        self.law, self.friction = tables.contact, tables.friction
+        self.remembers = getattr(self.friction, "remembers", False)
+        self.pace = ti.field(real, shape=2)
+        self.store = PairStore(n, capacity.pair_entries, capacity.sphere_entries)
+        for effect in tables.effects:
+            effect.declare_columns(self.store)
         self.exposed_faces = ti.field(ti.i32, shape=n)
         self.travel = ti.field(real, shape=n)
         self.body_skin = ti.field(real, shape=n)
         self.skin = ti.field(real, shape=())
-        defer_fill(self.skin.fill, effect.skin)
         self.search_requested = ti.field(ti.i32, shape=())
+
+    def load(self, model, method):
+        """Take the numbers of a scene and a method; there are no pairs yet."""
+        effect, n = model.contact, model.body_count
+        assign(self.skin, effect.skin)
+        assign(self.pace, np.array([method.dt0, method.steps_ahead]))
+        assign(self.store.slot_limit, n * effect.pairs_per_body + SPARE_PAIRS)
+        assign(self.store.sphere_limit, n * effect.spheres_per_body + SPARE_SPHERES)
 
     @ti.func
     def cluster_centre(self, i, face):
         """Centre of the ball around the spheres of a face of body i now [m]."""
-        return self.state.position[i] + self.state.rotation[i] @ self.model.cluster[face].xyz
+        return self.state.position[i] + self.state.rotation[i] @ self.tables.cluster[face].xyz
 
     @ti.func
     def gap(self, i, j, a, b):
         """Distance between the surfaces of spheres a of body i and b of body j [m]."""
-        on_first = self.state.rotation[i] @ self.model.sphere[a].xyz
-        on_second = self.state.rotation[j] @ self.model.sphere[b].xyz
+        on_first = self.state.rotation[i] @ self.tables.sphere[a].xyz
+        on_second = self.state.rotation[j] @ self.tables.sphere[b].xyz
         apart = self.state.position[j] + on_second - self.state.position[i] - on_first
-        return apart.norm() - self.model.sphere[a][3] - self.model.sphere[b][3]
+        return apart.norm() - self.tables.sphere[a][3] - self.tables.sphere[b][3]
 
     @ti.func
     def pair_energy(self, p):
@@ -67,7 +73,7 @@ class Contacts:
             spheres = self.store.sphere[k]
             overlap = -self.gap(pair[0], pair[1], spheres[0], spheres[1])
             energy += self.law.stored(ti.max(0.0, overlap))
-            if ti.static(self.friction.remembers):
+            if ti.static(self.remembers):
                 energy += self.friction.stored(k)
         return energy
 
@@ -145,7 +151,7 @@ class Contacts:
             speed = self._speed(i, velocity, spin)
             way = self.travel[i] + speed * elapsed
             self.travel[i] = way
-            if way + self.steps_ahead * elapsed * speed > self.body_skin[i]:
+            if way + self.pace[1] * elapsed * speed > self.body_skin[i]:
                 self.search_requested[None] = 1
 
     @ti.func
@@ -155,20 +161,20 @@ class Contacts:
         A few fragments fly faster than all others: they would ask for most of the searches.
         """
         speed = self._speed(i, self.state.velocity[i], self.state.spin[i])
-        way = ti.min(STEPS * self.dt0 * speed, FARTHEST * self.model.extent[i])
+        way = ti.min(STEPS * self.pace[0] * speed, FARTHEST * self.tables.extent[i])
         self.body_skin[i] = ti.max(0.5 * self.skin[None], way)
 
     @ti.func
     def _speed(self, i, velocity, spin):
         """Bound of the speed of any point on the spheres of body i [m/s]."""
-        return velocity.norm() + spin.norm() * self.model.extent[i]
+        return velocity.norm() + spin.norm() * self.tables.extent[i]
 
     @ti.func
     def approach(self, i, j):
         """Bound of the speed at which spheres of two bodies approach each other [m/s]."""
         between = self.state.velocity[j] - self.state.velocity[i]
         first = self._speed(i, between, self.state.spin[i])
-        return first + self.state.spin[j].norm() * self.model.extent[j]
+        return first + self.state.spin[j].norm() * self.tables.extent[j]
 
     @ti.func
     def margin(self, i, j):

@@ -26,7 +26,7 @@ class ListedPairs:
         entry = [*(ti.field(ti.i32) for _ in range(5)), ti.field(real)]
         ti.root.dense(ti.i, capacity).place(*entry)
         self.slot, self.faces, self.broken, self.found, self.new_faces, self.until = entry
-        n = contacts.model.body_count
+        n = contacts.tables.capacity.bodies
         self.travelled, self.surveyed = (ti.field(real, shape=n) for _ in range(2))
         self.changed = ti.field(ti.i32, shape=n)
 

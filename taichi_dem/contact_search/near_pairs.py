@@ -18,9 +18,9 @@ class NearPairs:
     scratch_fields = ("row_is_new",)
 
     def __init__(self, contacts, neighbours):
-        self.model, self.contacts, self.store = contacts.model, contacts, contacts.store
+        self.tables, self.contacts, self.store = contacts.tables, contacts, contacts.store
         self.neighbours, self.listed = neighbours, neighbours.listed
-        n = self.model.body_count
+        n = self.tables.capacity.bodies
         self.row = ti.field(ti.i32, shape=neighbours.capacity)
         self.row_count, self.row_spheres = (ti.field(ti.i32, shape=n) for _ in range(2))
         self.row_is_new = ti.field(ti.i32, shape=n)
@@ -79,19 +79,19 @@ class NearPairs:
     @ti.func
     def _count_rows(self):
         pairs, spheres = 0, 0
-        for i in range(self.model.body_count):
+        for i in range(self.tables.body_count[None]):
             self.store.first_of[i] = pairs
             if self.contacts.exposed_faces[i] != 0:
                 pairs += self.row_count[i]
                 spheres += self.row_spheres[i]
-        self.store.first_of[self.model.body_count] = pairs
+        self.store.first_of[self.tables.body_count[None]] = pairs
         self.store.near_count[None], self.store.sphere_count[None] = pairs, spheres
 
     @ti.func
     def _clear_order(self):
         """List nothing: the run ends with an error."""
         self.store.near_count[None] = 0
-        for i in range(self.model.body_count + 1):
+        for i in range(self.tables.body_count[None] + 1):
             self.store.first_of[i] = 0
 
     @ti.func
@@ -112,7 +112,7 @@ class NearPairs:
         start, slots, count = ti.static(
             self.store.second_start, self.store.second_slot, self.store.near_count
         )
-        group(start, slots, self.model.body_count, count[None], self._second_of)
+        group(start, slots, self.tables.body_count[None], count[None], self._second_of)
         for a in range(count[None]):
             slots[a] = self.store.near_slot[slots[a]]
 

@@ -4,10 +4,10 @@ A pair gets a slot when its first sphere pair comes near, and keeps it until the
 no impulse waits. Only the functions here allocate and free slots and the places of sphere pairs.
 """
 
-import numpy as np
 import taichi as ti
 
 from taichi_dem.contact_search.pair_columns import Columns
+from taichi_dem.kit.allocation import assign, values
 from taichi_dem.kit.types import real, vec3
 
 #: Sphere pairs that may be out of use, beside as many as are in use, before the rest is packed.
@@ -26,6 +26,7 @@ class PairStore:
     share of the distance at which the spheres touch. is_new: 1 until the search that found the pair
     ends; sphere_place: new place of its sphere pairs until then.
     Of a sphere pair: sphere: the two spheres; owner: slot of the pair, where its places begin.
+    slot_limit, sphere_limit: how many the scene allows; fields have room for those of an engine.
     columns, sphere_columns: what others declare. A column is zero when its pair comes near, or its
     sphere pair is found, and keeps its value as long as that lasts.
 
@@ -39,6 +40,7 @@ class PairStore:
 
     def __init__(self, bodies, slots, spheres):
         self.slots, self.spheres = slots, spheres
+        self.slot_limit, self.sphere_limit = (ti.field(ti.i32, shape=()) for _ in range(2))
         self._allocate_slots(slots)
         self.sphere = ti.Vector.field(2, ti.i32, shape=spheres)
         self.owner = ti.field(ti.i32, shape=spheres)
@@ -72,31 +74,16 @@ class PairStore:
 
     def clear(self):
         """Free all slots; for a run that begins again."""
-        for field in (self.first, self.last, self.free_count, self.used_end):
-            field.fill(0)
-        for field in (self.sphere_count, self.sphere_end, self.near_count):
-            field.fill(0)
-        for field in (self.first_of, self.second_start):
-            field.fill(0)
+        for field in (self.first, self.last, self.first_of, self.second_start, self.free_count):
+            assign(field, 0)
+        for field in (self.used_end, self.sphere_count, self.sphere_end, self.near_count):
+            assign(field, 0)
 
     def near_table(self):
         """Near pairs in order: both bodies (n, 2), number of sphere pairs (n,) and deepest (n,)."""
-        whole = np.zeros((self.near_count[None], 3), dtype=np.int32)
-        deepest = np.zeros(len(whole))
-        if len(whole):
-            self._read_near(whole, deepest)
-        return whole[:, :2], whole[:, 2], deepest
-
-    @ti.kernel
-    def _read_near(
-        self,
-        whole: ti.types.ndarray(dtype=ti.i32, ndim=2),
-        deepest: ti.types.ndarray(dtype=ti.f64, ndim=1),
-    ):
-        for a in range(whole.shape[0]):
-            p = self.near_slot[a]
-            whole[a, 0], whole[a, 1] = self.body[p][0], self.body[p][1]
-            whole[a, 2], deepest[a] = self.last[p] - self.first[p], self.deepest[p]
+        slots = values(self.near_slot)[: int(values(self.near_count))]
+        counts = values(self.last) - values(self.first)
+        return values(self.body)[slots], counts[slots], values(self.deepest)[slots]
 
     @ti.func
     def allocate(self, i, j):
@@ -105,7 +92,7 @@ class PairStore:
         if left >= 0:
             p = self.free[left]
             self.free_count[None] = left
-        elif self.used_end[None] < self.slots:
+        elif self.used_end[None] < self.slot_limit[None]:
             p = self.used_end[None]
             self.used_end[None] = p + 1
         if p >= 0:
@@ -142,7 +129,7 @@ class PairStore:
     def reserve_spheres(self, p, count):
         """Find new places for the sphere pairs of a pair; 1 when there are none."""
         start = self.sphere_end[None]
-        lacking = ti.cast(start + count > self.spheres, ti.i32)
+        lacking = ti.cast(start + count > self.sphere_limit[None], ti.i32)
         if lacking == 0:
             self.sphere_place[p], self.owner[start] = start, p
             self.sphere_end[None] = start + count
@@ -190,7 +177,7 @@ class PairStore:
     def pack_if_sparse(self):
         """Pack the sphere pairs where too many places are out of use."""
         end, used = self.sphere_end[None], self.sphere_count[None]
-        if end > 2 * used + SLACK or end > self.spheres // 2:
+        if end > 2 * used + SLACK or end > self.sphere_limit[None] // 2:
             self.pack_spheres()
 
     @ti.func

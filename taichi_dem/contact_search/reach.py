@@ -23,8 +23,8 @@ class Reach:
     """
 
     def __init__(self, contacts):
-        n = contacts.model.body_count
-        self.model, self.state, self.contacts = contacts.model, contacts.state, contacts
+        n = contacts.tables.capacity.bodies
+        self.tables, self.state, self.contacts = contacts.tables, contacts.state, contacts
         self.reach = ti.field(real, shape=n)
         self.ball = ti.field(real, shape=n)
         self.placed_at = ti.Vector.field(3, real, shape=n)
@@ -39,7 +39,7 @@ class Reach:
         """See whether body i, which is looked at, has left its reach."""
         # No point of the body went further than this: a norm of a matrix bounds what it does.
         way = (self.state.position[i] - self.placed_at[i]).norm()
-        way += (self.state.rotation[i] - self.turned_to[i]).norm() * self.model.extent[i]
+        way += (self.state.rotation[i] - self.turned_to[i]).norm() * self.tables.extent[i]
         if not way + self.contacts.body_skin[i] < self.reach[i]:
             self.left[i] = 1
             self.escaped[ti.atomic_add(self.escaped_count[None], 1)] = i
@@ -49,8 +49,8 @@ class Reach:
     def note_place(self, i):
         """Note where body i and its clusters are, or will soon be if it goes on like this."""
         self.reach[i] = BODY_SKINS * self.contacts.body_skin[i] + SKINS * self.contacts.skin[None]
-        self.ball[i] = self.model.extent[i] + self.reach[i]
-        ahead = AHEAD * self.contacts.dt0 * self.state.velocity[i]
+        self.ball[i] = self.tables.extent[i] + self.reach[i]
+        ahead = AHEAD * self.contacts.pace[0] * self.state.velocity[i]
         most = SHARE * (self.reach[i] - self.contacts.body_skin[i])
         ahead *= most / ti.max(ahead.norm(), most)
         self.placed_at[i] = self.state.position[i] + ahead
@@ -85,11 +85,11 @@ class Reach:
     @ti.func
     def _near_face(self, face, j, wide):
         """Which faces of body j, a bit each, come near a face of another."""
-        faces, reach = 0, self.model.cluster[face][3] + wide
-        whole = reach + self.model.extent[j]
+        faces, reach = 0, self.tables.cluster[face][3] + wide
+        whole = reach + self.tables.extent[j]
         if (self.placed_at[j] - self.cluster[face]).norm_sqr() < whole * whole:
             for g in range(4):
-                other = reach + self.model.cluster[4 * j + g][3]
+                other = reach + self.tables.cluster[4 * j + g][3]
                 apart = self.cluster[4 * j + g] - self.cluster[face]
                 faces |= ti.cast(apart.norm_sqr() < other * other, ti.i32) << g
         return faces

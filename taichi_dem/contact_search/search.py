@@ -11,6 +11,7 @@ from taichi_dem.contact_search.breaks import Breaks
 from taichi_dem.contact_search.narrow_phase import NarrowPhase
 from taichi_dem.contact_search.near_pairs import NearPairs
 from taichi_dem.contact_search.verlet_list import FAR, VerletList
+from taichi_dem.kit.allocation import assign, values
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.types import vec3
 
@@ -32,9 +33,9 @@ class BroadPhase:
     scratch_fields = ("exposed", "exposed_count", "looked")
 
     def __init__(self, contacts, schedule, brute_force=False):
-        n = contacts.model.body_count
+        n = contacts.tables.capacity.bodies
         self.contacts, self.schedule, self.store = contacts, schedule, contacts.store
-        self.model, self.state = contacts.model, contacts.state
+        self.tables, self.state = contacts.tables, contacts.state
         self.exposed = ti.field(ti.i32, shape=n)
         self.exposed_count = ti.field(ti.i32, shape=())
         self.neighbours = VerletList(contacts, brute_force)
@@ -48,20 +49,24 @@ class BroadPhase:
         self.full = self.near_pairs.full
         self.searches = ti.field(ti.i32, shape=())
 
+    def load(self, model, method):
+        """Let the first search make all lists."""
+        self.neighbours.load(model, method)
+
     def clear(self):
         """Forget all pairs; the next search finds those that there are then."""
         self.store.clear()
         self.neighbours.clear()
-        self.contacts.search_requested.fill(0)
+        assign(self.contacts.search_requested, 0)
 
     def ask(self, everywhere=False):
         """Let the driver make a search before its next step."""
-        self.everywhere[None] = int(everywhere)
-        self.contacts.search_requested[None] = 1
+        assign(self.everywhere, int(everywhere))
+        assign(self.contacts.search_requested, 1)
 
     def renew(self):
         """Renew the lists, a parallel loop a phase, until no search is due."""
-        while self.contacts.search_requested[None]:
+        while values(self.contacts.search_requested):
             self._search()
 
     def search(self, everywhere=True):
@@ -72,7 +77,7 @@ class BroadPhase:
 
     def check_capacity(self):
         """Raise InputError when lists exceed the capacity that the scene gave them."""
-        option = _CAPACITIES[self.full[None]]
+        option = _CAPACITIES[int(values(self.full))]
         if option:
             raise InputError(f"contact lists are full: give SphereContact a larger {option}")
 
@@ -119,11 +124,11 @@ class BroadPhase:
 
     @ti.func
     def _all_anew(self):
-        return self.neighbours.making() * self.model.body_count
+        return self.neighbours.making() * self.tables.body_count[None]
 
     @ti.func
     def _all_amended(self):
-        return self.neighbours.amending() * self.model.body_count
+        return self.neighbours.amending() * self.tables.body_count[None]
 
     @ti.func
     def _once(self):
@@ -164,7 +169,7 @@ class BroadPhase:
         """List the bodies with spheres on some face, in order of their index."""
         count = 0
         newest = ti.cast(0, ti.i64)
-        for i in range(self.model.body_count):
+        for i in range(self.tables.body_count[None]):
             exposed = self.breaks.exposed_faces(i)
             newest = ti.max(newest, self.breaks.newest[i])
             self.contacts.exposed_faces[i] = exposed

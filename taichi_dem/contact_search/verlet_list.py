@@ -6,9 +6,10 @@ It reaches several skins and takes in every face, broken or not, so one list ser
 import taichi as ti
 
 from taichi_dem.contact_search.cell_grid import CellGrid
+from taichi_dem.contact_search.lengths import SPARE_NEIGHBOURS
 from taichi_dem.contact_search.listed_pairs import ListedPairs
 from taichi_dem.contact_search.reach import Reach
-from taichi_dem.kit.allocation import defer_fill
+from taichi_dem.kit.allocation import assign
 
 #: What the list is when it needs to be made anew, and while it is.
 STALE, MAKING = 1, 2
@@ -26,33 +27,41 @@ class VerletList:
 
     first[i] .. last[i]: row of body i in listed, the ``ListedPairs``, with some room behind.
     reach: the ``Reach`` that bodies may not leave. stale: STALE when all rows are to be made anew.
-    full: 1 when there is no capacity.
+    limit: entries that the scene allows. full: 1 when there are no more.
     """
 
     def __init__(self, contacts, brute_force=False):
-        n = contacts.model.body_count
-        self.model, self.state, self.contacts = contacts.model, contacts.state, contacts
-        self.store, self.capacity = contacts.store, contacts.neighbour_capacity
+        n = contacts.tables.capacity.bodies
+        self.tables, self.state, self.contacts = contacts.tables, contacts.state, contacts
+        self.store, self.capacity = contacts.store, contacts.tables.capacity.neighbour_entries
+        self.limit = ti.field(ti.i32, shape=())
         self.reach = Reach(contacts)
-        self.grid = CellGrid(self.model, self.state, self.reach.ball, brute_force)
+        self.grid = CellGrid(self.tables, self.state, self.reach.ball, brute_force)
         self.first = ti.field(ti.i32, shape=n + 1)
         self.last = ti.field(ti.i32, shape=n)
         self.listed = ListedPairs(contacts, self.capacity)
         self.stale = ti.field(ti.i32, shape=())
         self.full = ti.field(ti.i32, shape=())
-        defer_fill(self.stale.fill, STALE)
+
+    def load(self, model, method):
+        """Let the list be made anew."""
+        assign(self.stale, STALE)
+        each = model.contact.neighbours_per_body
+        assign(self.limit, model.body_count * each + SPARE_NEIGHBOURS)
 
     def clear(self):
         """Forget all neighbours; the next search lists them anew."""
-        self.first.fill(0)
-        self.last.fill(0)
-        self.stale.fill(STALE)
+        for field in (self.first, self.last):
+            assign(field, 0)
+        assign(self.stale, STALE)
 
     @ti.func
     def begin(self):
         """See whether so many bodies have left their reach that the list is made anew."""
         self.full[None] = 0
-        if self.reach.escaped_count[None] > ti.min(self.model.body_count // 16, MOST_ESCAPED):
+        if self.reach.escaped_count[None] > ti.min(
+            self.tables.body_count[None] // 16, MOST_ESCAPED
+        ):
             self.stale[None] = STALE
         if self.stale[None] == STALE:
             self.stale[None] = MAKING
@@ -83,13 +92,13 @@ class VerletList:
     def allot(self):
         """Give every body its part of the list."""
         self.first[0] = 0
-        for i in range(self.model.body_count):
+        for i in range(self.tables.body_count[None]):
             self.first[i + 1] = self.first[i + 1] + self.first[i]
-        if self.first[self.model.body_count] > self.capacity:
+        if self.first[self.tables.body_count[None]] > self.limit[None]:
             self.full[None] = 1
-            for i in range(self.model.body_count + 1):
+            for i in range(self.tables.body_count[None] + 1):
                 self.first[i] = 0
-        for i in range(self.model.body_count):
+        for i in range(self.tables.body_count[None]):
             self.last[i] = self.first[i]
 
     @ti.func
@@ -122,7 +131,7 @@ class VerletList:
         place, ball = self.reach.placed_at[i], self.reach.ball[i]
         escaped, count = self.reach.left[i] == 1, self.reach.escaped_count[None]
         if escaped:
-            count = self.model.body_count - i - 1
+            count = self.tables.body_count[None] - i - 1
         for a in range(count):
             j = i + 1 + a
             if not escaped:

@@ -2,7 +2,7 @@
 
 import taichi as ti
 
-from taichi_dem.effects.base import Effect, parameters
+from taichi_dem.effects.base import Effect
 from taichi_dem.physics.sphere_pair import friction_force
 
 
@@ -14,12 +14,12 @@ class Friction(Effect):
     name = "friction"
     remembers = False
 
-    def bind(self, model):
-        """Take the friction coefficient from the material."""
-        self.law = parameters(coefficient=model.material.friction)
+    def numbers(self, material):
+        """Friction coefficient."""
+        return (material.friction,)
 
     @ti.func
-    def bound(self, force_normal):
+    def limit(self, force_normal):
         """Largest friction [N] at a normal force [N]; of impulses likewise."""
         return self.law[0] * force_normal
 

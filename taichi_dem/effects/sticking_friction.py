@@ -2,7 +2,6 @@
 
 import taichi as ti
 
-from taichi_dem.effects.base import parameters
 from taichi_dem.effects.friction import Friction
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.kit.validation import between
@@ -26,12 +25,11 @@ class StickingFriction(Friction):
     def __init__(self, stiffness_ratio=0.8):
         self.stiffness_ratio = between("stiffness_ratio", stiffness_ratio, 1e-6, 1.0)
 
-    def bind(self, model):
-        """Take the friction coefficient and the contact stiffness from the material."""
-        stiffness = self.stiffness_ratio * model.material.contact_stiffness
-        self.law = parameters(coefficient=model.material.friction, stiffness=stiffness)
+    def numbers(self, material):
+        """Friction coefficient, and stiffness of the spring [N/m]."""
+        return material.friction, self.stiffness_ratio * material.contact_stiffness
 
-    def declare(self, store):
+    def declare_columns(self, store):
         """Keep the stretch [m] of the spring of each sphere pair, in the first body's frame."""
         self.stretch = store.sphere_column("tangential_stretch", real, 3)
 
@@ -47,14 +45,14 @@ class StickingFriction(Friction):
         self.stretch[k] = flat * (stretch.norm() / ti.max(flat.norm(), 1e-300)) + way
 
     @ti.func
-    def slip(self, k, bound, way):
-        """Shorten the spring of sphere pair k to what a bound [N] can hold; energy it takes [J].
+    def slip(self, k, limit, way):
+        """Shorten the spring of sphere pair k to what a limit [N] can hold; energy it takes [J].
 
         way: by which it has just been stretched [m]. The work of the way, by the mean of the forces
         before and after, is what the spring stores and what slipping takes.
         """
         trial = self.stretch[k]
-        longest = bound / self.law[1]
+        longest = limit / self.law[1]
         size = trial.norm()
         present = trial
         if size > longest:

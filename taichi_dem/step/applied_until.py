@@ -17,9 +17,9 @@ class AppliedUntil:
     their steps.
     """
 
-    def __init__(self, model, state, schedule, contacts):
+    def __init__(self, tables, state, schedule, contacts):
         self.state, self.schedule = state, schedule
-        self.bond = ti.field(ti.i64, shape=max(1, model.bond_count))
+        self.bond = ti.field(ti.i64, shape=tables.capacity.bonds)
         if contacts is not None:
             self.pair = contacts.store.column("applied_until", ti.i64)
 

@@ -33,7 +33,7 @@ class ContactForce:
             elapsed = self.springs.elapsed(p)
         for k in range(self.contacts.store.first[p], self.contacts.store.last[p]):
             a, b = self.contacts.store.sphere[k][0], self.contacts.store.sphere[k][1]
-            first, second = self.model.sphere[a], self.model.sphere[b]
+            first, second = self.tables.sphere[a], self.tables.sphere[b]
             apart = turn @ second.xyz + offset - first.xyz
             reach = first[3] + second[3]
             if ti.static(self.has_limits):
@@ -74,13 +74,13 @@ class ContactForce:
         """Friction on the second sphere and the spring's part of it [N]; what slipping took [J]."""
         rub, stuck, spent = zero3(), zero3(), 0.0
         if ti.static(self.springs.present):
-            rotation, bound = self.state.rotation[i], self.model.friction.bound(push)
+            rotation, bound = self.state.rotation[i], self.tables.friction.limit(push)
             self.springs.follow(k, rotation, normal, elapsed * slide)
             spent = self.springs.slip(k, rotation, bound, elapsed * slide)
             stuck = self.springs.force(k, rotation)
             rub = add_within(stuck, -drag * slide, bound)
         else:
-            rub = self.model.friction.force(drag, push, slide)
+            rub = self.tables.friction.force(drag, push, slide)
         return rub, stuck, spent
 
     @ti.func

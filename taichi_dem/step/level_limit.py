@@ -13,16 +13,16 @@ class LevelLimit:
     levels at the last ordering of the lists, so that no result depends on the order of bodies.
     """
 
-    def __init__(self, model, state, contacts, limits):
-        self.model, self.state, self.limits = model, state, limits
-        self.has_contact, self.jump = contacts is not None, limits.jump
+    def __init__(self, tables, state, contacts, limits):
+        self.tables, self.state, self.limits = tables, state, limits
+        self.has_contact = contacts is not None
         self.store = contacts.store if self.has_contact else None
-        self.listed_level = ti.field(ti.i32, shape=model.body_count)
+        self.listed_level = ti.field(ti.i32, shape=tables.capacity.bodies)
 
     @ti.func
     def note_all(self):
         """Take the levels of all bodies as known."""
-        for i in range(self.model.body_count):
+        for i in range(self.tables.body_count[None]):
             self.listed_level[i] = self.state.level[i]
 
     @ti.func
@@ -31,7 +31,7 @@ class LevelLimit:
         finest = -1
         for f in range(4):
             if self._bonded(4 * i + f):
-                finest = ti.max(finest, self.listed_level[self.model.neighbour[4 * i + f]])
+                finest = ti.max(finest, self.listed_level[self.tables.neighbour[4 * i + f]])
         if ti.static(self.has_contact):
             for k in range(self.store.first_of[i], self.store.first_of[i + 1]):
                 p = self.store.near_slot[k]
@@ -46,7 +46,7 @@ class LevelLimit:
     @ti.func
     def least_beside(self, finest):
         """Coarsest level that a body may have beside one of a level."""
-        return finest - self.jump
+        return finest - self.limits.jump[None]
 
     @ti.func
     def spread(self, i):
@@ -55,7 +55,7 @@ class LevelLimit:
         self.listed_level[i] = level
         for f in range(4):
             if self._bonded(4 * i + f):
-                self._notify(self.model.neighbour[4 * i + f], level)
+                self._notify(self.tables.neighbour[4 * i + f], level)
         if ti.static(self.has_contact):
             for k in range(self.store.first_of[i], self.store.first_of[i + 1]):
                 p = self.store.near_slot[k]
@@ -69,11 +69,11 @@ class LevelLimit:
     @ti.func
     def _bonded(self, face):
         bonded = False
-        if self.model.neighbour[face] >= 0:
-            bonded = self.state.broken_tick[self.model.face_bond[face]] < 0
+        if self.tables.neighbour[face] >= 0:
+            bonded = self.state.broken_tick[self.tables.face_bond[face]] < 0
         return bonded
 
     @ti.func
     def _notify(self, j, level):
-        if self.state.level[j] < level - self.jump:
+        if self.state.level[j] < level - self.limits.jump[None]:
             self.limits.notice(j, CLOSE)

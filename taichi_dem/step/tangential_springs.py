@@ -10,9 +10,9 @@ class TangentialSprings:
     evaluated: of a pair, one more than the tick at which it was last evaluated, 0 for never.
     """
 
-    def __init__(self, model, state, schedule, contacts):
-        self.friction, self.state, self.schedule = model.friction, state, schedule
-        self.present = contacts is not None and model.friction.remembers
+    def __init__(self, tables, state, schedule, contacts):
+        self.friction, self.state, self.schedule = tables.friction, state, schedule
+        self.present = contacts is not None and contacts.remembers
         self.store = contacts.store if self.present else None
         if self.present:
             self.evaluated = self.store.column("evaluated", ti.i64)

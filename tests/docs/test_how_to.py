@@ -12,7 +12,7 @@ WANTED = {
     "docs/add_a_contact_law.md": "dict(mass=simulation.model.body_mass[0], speed=speed,"
     " stiffness=stiffness, deepest=deepest, rebound=rebound, account=account,"
     " unexplained=unexplained)",
-    "docs/add_a_time_integrator.md": "dict(area=model.unit_area[0], mass=model.body_mass[0],"
+    "docs/add_a_time_integrator.md": "dict(area=model.bonds['area'][0], mass=model.body_mass[0],"
     " step=step, count=count, euler=euler, leapfrog=leapfrog)",
 }
 BLOCKS = [

@@ -12,11 +12,11 @@ from taichi_dem import (
     StepControl,
     Uniform,
     effects,
+    step_report,
 )
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import pair, single
 from taichi_dem.mesh.topology import topology_of
-from taichi_dem.stability import step_report
 from taichi_dem.stability.body_limits import LIMITED
 from taichi_dem.stability.mesh_limits import (
     bond_rates,
@@ -203,7 +203,7 @@ def test_sphere_springs_hold_up_to_their_limit(divisions, contacts):
     listed = [effects.SphereContact(divisions, outer_faces=True), gas]
     rig = Rig(facing(GAP, sides=True), listed, material=material)
     model = rig.simulation.model
-    spheres = model.sphere.to_numpy()[:contacts, :3]
+    spheres = model.spheres.centre.reshape(-1, 3)[:contacts]
     rate = CONCRETE.contact_stiffness * contact_eigenvalue(model, spheres)
     exact = 2.0 / np.sqrt(rate)
     push = pressure * 0.05**2 * 3.0**0.5 / 4.0

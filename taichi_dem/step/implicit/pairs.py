@@ -36,25 +36,25 @@ class PairDashpots:
         *("active", "order", "colour", "taken", "colour_first"),
     )
 
-    def __init__(self, model, state, schedule, contacts, velocities):
-        self.model, self.state, self.schedule = model, state, schedule
+    def __init__(self, tables, state, schedule, contacts, velocities):
+        self.tables, self.state, self.schedule = tables, state, schedule
         self.contacts, self.velocities = contacts, velocities
-        self.has_friction = bool(model.friction.name)
+        self.has_friction = bool(tables.friction.name)
         self.store = contacts.store
-        self.springs = TangentialSprings(model, state, schedule, contacts)
+        self.springs = TangentialSprings(tables, state, schedule, contacts)
         if self.springs.present:
             self.elapsed = ti.field(real, shape=self.store.slots)
             self.pull = ti.Vector.field(3, real, shape=self.store.spheres)
         pairs, spheres = self.store.slots, self.store.spheres
-        self.touching = ti.field(ti.i32, shape=self.store.slots)
+        self.touching = ti.field(ti.i32, shape=pairs)
         self.entry = ti.field(ti.i32, shape=spheres)
         self.normal = ti.Vector.field(3, real, shape=spheres)
         self.arm = ti.Vector.field(3, real, shape=spheres)
         self.push = ti.field(real, shape=spheres)
         self.share = ti.Vector.field(2, real, shape=spheres)
         self.impulse = self.store.sphere_column("solved_impulse", real, 3)
-        self.branch = ti.Vector.field(3, real, shape=self.store.slots)
-        n = model.body_count
+        self.branch = ti.Vector.field(3, real, shape=pairs)
+        n = tables.capacity.bodies
         self.count = ti.field(ti.i32, shape=())
         self.active = ti.field(ti.i32, shape=pairs)
         self.order = ti.field(ti.i32, shape=pairs)
@@ -117,7 +117,7 @@ class PairDashpots:
         end = start
         for k in range(start, self.store.last[p]):
             a, b = self.store.sphere[k][0], self.store.sphere[k][1]
-            first, second = self.model.sphere[a], self.model.sphere[b]
+            first, second = self.tables.sphere[a], self.tables.sphere[b]
             apart = turn @ second.xyz + offset - first.xyz
             reach = first[3] + second[3]
             if apart.norm_sqr() < (reach + ahead) * (reach + ahead):
@@ -206,7 +206,7 @@ class PairDashpots:
         found = ti.max(0.0, (self.push[c] - damping * free) / (1.0 + damping * share[0])) * normal
         if ti.static(self.has_friction):
             slide = velocity - rate * normal - share[1] * (held - pressed * normal)
-            bound = self.model.friction.bound(found.dot(normal))
+            bound = self.tables.friction.limit(found.dot(normal))
             stick = -damping / (1.0 + damping * share[1])
             if ti.static(self.springs.present):
                 pull = cut_to(self.pull[c], bound)
@@ -249,7 +249,7 @@ class PairDashpots:
         """Let a spring slip in a step; its impulse [N s], and the energy that slipping took [J]."""
         k, normal, rotation = self.entry[c], self.normal[c], self.state.rotation[i]
         dt = self.schedule.step_seconds[0]
-        bound = self.model.friction.bound(pressed) / dt
+        bound = self.tables.friction.limit(pressed) / dt
         way = self._way(i, j, self.branch[p], self.arm[c], normal, self.elapsed[p])
         spent = self.springs.slip(k, rotation, bound, way)
         return dt * self.springs.force(k, rotation), spent
