@@ -175,7 +175,8 @@ def test_a_break_injects_the_energy_of_the_overlaps_that_it_brings_once(again):
 def neighbouring_faces(neighbours):
     """Pairs of faces in the list of neighbours."""
     first, last = neighbours.first.to_numpy()[:-1], neighbours.last.to_numpy()
-    body, faces = neighbours.body.to_numpy(), neighbours.faces.to_numpy()
+    listed = neighbours.listed
+    body, faces = listed.body.to_numpy(), listed.faces.to_numpy()
     return {
         (4 * i + fg // 4, 4 * int(body[k]) + fg % 4)
         for i in range(len(last))

@@ -18,7 +18,7 @@ SPREAD = 0.02
 class Marked(effects.SphereContact):
     """A contact law that declares a column of each kind."""
 
-    def declare(self, store):
+    def declare_columns(self, store):
         """Declare a number and a vector of a pair, and a number of a sphere pair."""
         self.number = store.column("mark", ti.i64)
         self.vector = store.column("arrow", ti.f64, 3)
@@ -33,7 +33,7 @@ class Thrown:
         scene = Scene(bar(0.6, 0.2, (6, 2, 2)), CONCRETE, [Marked(outer_faces=True)])
         self.again = Again(scene, Uniform(1e-9))
         self.simulation, self.state = self.again.simulation, self.again.state
-        self.store, self.law = self.simulation.contacts.store, self.simulation.model.contact
+        self.store, self.law = self.simulation.contacts.store, self.simulation.tables.contact
         self.fields = self.law.number, self.law.vector, self.law.of_spheres
         self.neighbours = self.simulation.broad_phase.neighbours
         self.first_place = self.simulation.model.centre
@@ -101,11 +101,14 @@ def test_pairs_keep_their_slots_and_columns(thrown, share):
     No two near pairs share a slot, whatever has been freed.
     """
     thrown.start()
-    stayed, came, left, starts = 0, 0, set(), set()
+    stayed, came, left, anew = 0, 0, set(), 0
     for seed in range(12):
         before, _ = thrown.mark()
+        placed = thrown.neighbours.reach.placed_at.to_numpy()
         thrown.throw(seed, share)
-        starts.add(thrown.neighbours.start[None])
+        anew += int(
+            (thrown.neighbours.reach.placed_at.to_numpy() != placed).any(axis=1).mean() > 0.9
+        )
         after = slot_of_pair(thrown.store)
         assert len(set(after.values())) == len(after)
         left |= set(before) - set(after)
@@ -118,7 +121,7 @@ def test_pairs_keep_their_slots_and_columns(thrown, share):
         stayed += len(set(before) & set(after))
         came += len(left & (set(after) - set(before)))
     assert stayed > 100 and came > 5
-    assert (len(starts) == 2) == (share == 1.0)
+    assert anew == (12 if share == 1.0 else 0)
 
 
 @pytest.mark.parametrize("packed", [False, True])
@@ -143,16 +146,15 @@ def test_sphere_pairs_that_stay_keep_their_columns(thrown, packed):
 
 
 def test_slots_that_are_freed_serve_again(thrown):
-    """After many searches no more slots have been used than the longest list and what came anew."""
+    """Each near pair has a slot and no other pair has; the most at a time are all that are used."""
     thrown.start()
-    longest = 0
+    most = 0
     for seed in range(20):
         thrown.throw(seed)
-        rows = thrown.neighbours.last.to_numpy() - thrown.neighbours.first.to_numpy()[:-1]
-        store, listed = thrown.store, int(rows.sum())
-        longest = max(longest, listed)
-        assert store.used_end[None] - store.free_count[None] == listed
-    assert longest <= store.used_end[None] <= 2 * longest
+        near = int(thrown.store.near_count[None])
+        most = max(most, near)
+        assert thrown.store.used_end[None] - thrown.store.free_count[None] == near
+    assert most <= thrown.store.used_end[None] <= 2 * most
 
 
 def test_two_columns_of_one_name_are_refused():

@@ -135,12 +135,14 @@ class Spring:
 
     def __init__(self, ratio=0.5):
         scene = slope(0.2, effects.StickingFriction(ratio))
-        self.law = Simulation(scene, METHODS["uniform"]).model.friction
+        self.simulation = Simulation(scene, METHODS["uniform"])
+        self.law = self.simulation.tables.friction
         self.stiffness = ratio * scene.material.contact_stiffness
 
     def move(self, normal, way, bound):
         """Stretch by a way [m], slip to a bound [N]; force (3,) [N], stored and spent [J]."""
         found = np.zeros(5)
+        self.simulation.loan.activate()
         self._move(ti.Vector(list(normal)), ti.Vector(list(way)), bound, found)
         return found[:3], found[3], found[4]
 
