@@ -30,7 +30,8 @@ class Counter:
 
     def __init__(self, simulation):
         engine = simulation.loan.engine
-        self.tables, self.schedule, self.contacts = engine.tables, engine.schedule, engine.contacts
+        self.tables, self.schedule = engine.tables, engine.schedule
+        self.store = engine.contacts.store
         shape = (simulation.model.body_count, MAX_LEVEL + 1)
         self.counts = ti.Vector.field(len(KINDS), ti.i32, shape=shape)
         self.ticks = ti.field(ti.i32, shape=MAX_LEVEL + 1)
@@ -48,9 +49,9 @@ class Counter:
     @ti.func
     def pair(self, p):
         """Charge the first body of a contact pair that is due."""
-        place = self.contacts.pair_body[p][0], self.schedule.low[None]
+        place = self.store.body[p][0], self.schedule.low[None]
         self.counts[place][1] += 1
-        self.counts[place][2] += self.contacts.pair_last[p] - self.contacts.pair_first[p]
+        self.counts[place][2] += self.store.last[p] - self.store.first[p]
 
     def take(self):
         """Counts (bodies, classes, kinds) and ticks (classes,) since the last time; then zero."""

@@ -31,13 +31,7 @@ class Again:
 
     def search_anew(self):
         """Forget all contacts and find those that there are now."""
-        contacts = self.simulation.contacts
-        for field in (contacts.pair_count, contacts.pair_slot, contacts.pair_full):
-            field.fill(0)
-        contacts.first_of.fill(0)
-        contacts.second_start.fill(0)
-        contacts.search_requested.fill(0)
-        self.simulation.broad_phase.neighbours.stale.fill(1)
+        self.simulation.broad_phase.clear()
         self.simulation.broad_phase.search()
 
     def run(self, steps, look=None):

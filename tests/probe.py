@@ -120,7 +120,7 @@ class ContactProbe:
             simulation.state,
             simulation.advance,
         )
-        self.contacts = simulation.contacts
+        self.store = simulation.contacts.store
         self.centre = self.model.centre
         self.sphere = self.tables.sphere.to_numpy()
 
@@ -147,20 +147,17 @@ class ContactProbe:
         heat: ti.types.ndarray(dtype=ti.f64, ndim=1),
     ):
         for _ in range(1):
-            self.contacts.pair_count[None] = 1
-            self.contacts.pair_body[0] = [0, 1]
-            self.contacts.pair_sphere[0] = [a, b]
+            self.store.body[0] = [0, 1]
+            self.store.sphere[0] = [a, b]
             if swap == 1:
-                self.contacts.pair_body[0] = [1, 0]
-                self.contacts.pair_sphere[0] = [b, a]
-            self.contacts.pair_first[0], self.contacts.pair_last[0] = 0, 1
-            self.contacts.pair_heat[0] = 0.0 * self.contacts.pair_heat[0]
-            for side in ti.static(range(2)):
-                self.contacts.pair_slot[side] = 0.0 * self.contacts.pair_slot[side]
+                self.store.body[0] = [1, 0]
+                self.store.sphere[0] = [b, a]
+            self.store.first[0], self.store.last[0] = 0, 1
+            self.store.enter(0)
             self.advance.contact(0)
             for side in ti.static(range(2)):
                 place = side if swap == 0 else 1 - side
                 for k in ti.static(range(6)):
-                    wrench[side, k] = self.contacts.pair_slot[place][k]
+                    wrench[side, k] = self.store.impulse[place][k]
             for k in ti.static(range(3)):
-                heat[k] = self.contacts.pair_heat[0][k]
+                heat[k] = self.store.heat[0][k]

@@ -12,21 +12,24 @@ OUTLOOK = 7.0
 class NarrowPhase:
     """Compares the spheres on the faces of two bodies, where these were last looked at.
 
-    sphere: centre and radius of every sphere there [m]. pair_cache: the ``PairCache``, which knows
-    where the balls around those of a face are.
+    sphere: centre and radius of every sphere there [m]. cluster: centre of the ball around those of
+    a face [m].
     """
 
-    def __init__(self, contacts, pair_cache):
+    def __init__(self, contacts):
         self.contacts, self.tables, self.state = contacts, contacts.tables, contacts.state
-        self.pair_cache = pair_cache
-        self.sphere = ti.Vector.field(4, real, shape=self.tables.capacity.spheres)
+        self.store = contacts.store
+        capacity = self.tables.capacity
+        self.sphere = ti.Vector.field(4, real, shape=capacity.spheres)
+        self.cluster = ti.Vector.field(3, real, shape=capacity.faces)
 
     @ti.func
-    def note_spheres(self, i):
+    def note_places(self, i):
         """Note where the spheres of body i are; computed once for many that ask."""
         size = self.tables.face_spheres[None]
         position, rotation = self.state.position[i], self.state.rotation[i]
         for face in range(4 * i, 4 * i + 4):
+            self.cluster[face] = self.contacts.cluster_centre(i, face)
             if self.state.exposed_tick[face] >= 0:
                 for s in range(size * face, size * face + size):
                     sphere = self.tables.sphere[s]
@@ -34,12 +37,12 @@ class NarrowPhase:
                     self.sphere[s] = vec4(place[0], place[1], place[2], sphere[3])
 
     @ti.func
-    def of_pair(self, i, j, faces, start, write):
+    def compare(self, i, j, faces, start, write):
         """Sphere pairs of two bodies within their margin: how many, and on which faces.
 
         Besides the smallest gap of others [m], no more than OUTLOOK skins beyond the margin. faces:
-        bit 4 f + g for faces f and g to compare. write: enter the pairs among the candidates, from
-        start on; then other gaps are of no interest.
+        bit 4 f + g for faces f and g to compare. write: enter them in the store, from start on;
+        then other gaps are of no interest.
         """
         margin = self.contacts.margin(i, j)
         count, hits, least = 0, 0, margin
@@ -48,12 +51,18 @@ class NarrowPhase:
         for fg in range(16):
             if (faces >> fg) & 1 == 1:
                 face_i, face_j = 4 * i + fg // 4, 4 * j + fg % 4
-                if self.pair_cache.clusters_near(face_i, face_j, least):
+                if self._clusters_near(face_i, face_j, least):
                     place = start + count
                     more, least = self._of_faces(face_i, face_j, place, margin, least, write)
                     count += more
                     hits |= ti.cast(more > 0, ti.i32) << fg
         return count, hits, least
+
+    @ti.func
+    def _clusters_near(self, face_i, face_j, wide):
+        """Whether the balls around the spheres of two faces come nearer than wide [m]."""
+        reach = self.tables.cluster[face_i][3] + self.tables.cluster[face_j][3] + wide
+        return (self.cluster[face_j] - self.cluster[face_i]).norm_sqr() < reach * reach
 
     @ti.func
     def _of_faces(self, face_i, face_j, start, margin, least, write):
@@ -63,15 +72,16 @@ class NarrowPhase:
             mine = self.sphere[a]
             whole = mine[3] + self.tables.cluster[face_j][3] + least
             # A sphere far from the ball around those of the other face is as far from all of them.
-            if (self.pair_cache.cluster[face_j] - mine.xyz).norm_sqr() < whole * whole:
+            if (self.cluster[face_j] - mine.xyz).norm_sqr() < whole * whole:
                 for b in range(size * face_j, size * face_j + size):
                     other = self.sphere[b]
                     reach = mine[3] + other[3]
                     apart2 = (other.xyz - mine.xyz).norm_sqr()
-                    if apart2 < (reach + margin) * (reach + margin):
-                        if write:
-                            self.contacts.pair_sphere[start + count] = [a, b]
-                        count += 1
-                    elif apart2 < (reach + least) * (reach + least):
-                        least = ti.sqrt(apart2) - reach
+                    if apart2 < (reach + least) * (reach + least):
+                        if apart2 < (reach + margin) * (reach + margin):
+                            if write:
+                                self.store.sphere[start + count] = [a, b]
+                            count += 1
+                        else:
+                            least = ti.sqrt(apart2) - reach
         return count, least

@@ -57,12 +57,12 @@ class DivergenceCheck:
             raise SimulationDiverged(self._sentence(body, motion, f"moves at {speed:.3g} m/s"))
 
     def _check_overlap(self):
-        if self.contacts is None or not self.contacts.pair_count[None]:
+        if self.contacts is None or not self.contacts.store.near_count[None]:
             return
-        deepest = self.contacts.deepest.to_numpy()[: self.contacts.pair_count[None]]
+        bodies, _, deepest = self.contacts.store.near_table()
         pair = int(deepest.argmax())
         if deepest[pair] > DEEPEST_OVERLAP:
-            body, other = (int(k) for k in self.contacts.pair_body[pair])
+            body, other = bodies[pair].tolist()
             share = f"{100 * deepest[pair]:.0f} % of their radii"
             what = f"has a contact sphere inside one of body {other} ({share})"
             raise SimulationDiverged(self._sentence(body, self.state.motion(), what))
@@ -121,7 +121,7 @@ class DivergenceCheck:
     def _pairs(self):
         if self.contacts is None:
             return np.zeros((0, 2), dtype=int)
-        return self.contacts.pair_body.to_numpy()[: self.contacts.pair_count[None]]
+        return self.contacts.store.near_table()[0]
 
     def _advice(self, body, links):
         """What limits the step around a body, and a step that would do.
@@ -157,10 +157,9 @@ class DivergenceCheck:
 
     def _contact_rates(self):
         """Sphere pairs near every body over its mass [1/kg], (body_count,)."""
-        counts = self.contacts.pair_last.to_numpy() - self.contacts.pair_first.to_numpy()
+        pairs, counts, _ = self.contacts.store.near_table()
         rates = np.zeros(self.model.body_count)
-        for pair, bodies in enumerate(self._pairs()):
-            count = max(1, counts[pair])
+        for bodies, count in zip(pairs, np.maximum(1, counts)):
             rates[bodies] = np.maximum(rates[bodies], count / self.model.body_mass[bodies])
         return rates
 

@@ -130,4 +130,4 @@ class EnergyBalance:
         return np.linalg.norm(lost[:3]) / linear, np.linalg.norm(lost[3:]) / angular
 
     def _pair_count(self):
-        return self.contacts.pair_count[None] if self.contacts is not None else 0
+        return self.contacts.store.near_count[None] if self.contacts is not None else 0

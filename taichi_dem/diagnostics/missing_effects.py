@@ -133,7 +133,7 @@ class MissingEffects:
     def _count_touching(self):
         contacts = self.contacts
         if contacts is not None:
-            deepest = contacts.deepest.to_numpy()[: contacts.pair_count[None]]
+            _, _, deepest = contacts.store.near_table()
             self.touching = max(self.touching, int((deepest > 0.0).sum()))
 
     def _all(self):

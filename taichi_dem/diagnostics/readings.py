@@ -46,10 +46,11 @@ class Readings:
     @ti.kernel
     def pairs(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
         """Strain, and heats that the first body has not taken, of every pair [J]."""
-        for p in range(self.contacts.pair_count[None]):
-            table[p, 0] = self.contacts.pair_energy(p)
+        for a in range(self.contacts.store.near_count[None]):
+            p = self.contacts.store.near_slot[a]
+            table[a, 0] = self.contacts.pair_energy(p)
             for k in ti.static(range(3)):
-                table[p, 1 + k] = self.contacts.pair_heat[p][k]
+                table[a, 1 + k] = self.contacts.store.heat[p][k]
 
     @ti.kernel
     def load_work(self, index: ti.i32, work: ti.types.ndarray(dtype=ti.f64, ndim=1)):
@@ -129,10 +130,11 @@ class Readings:
         share: least share, where dashpots are limited; else taken: largest part of a speed that
         they take in a step.
         """
-        for p in range(self.contacts.pair_count[None]):
+        for a in range(self.contacts.store.near_count[None]):
+            p = self.contacts.store.near_slot[a]
             count = self.contacts.touching(p)
             if count > 0:
-                i, j = self.contacts.pair_body[p][0], self.contacts.pair_body[p][1]
+                i, j = self.contacts.store.body[p][0], self.contacts.store.body[p][1]
                 if ti.static(self.advance.limited):
                     ti.atomic_min(share[i], self.advance.contact_share(i, j))
                 else:

@@ -48,7 +48,7 @@ class StepResolution:
             return
         if self.limited and self.has_dashpot and self.model.bond_count:
             self.readings.bond_shares(self.share)
-        if self.contacts is not None and self.contacts.pair_count[None]:
+        if self.contacts is not None and self.contacts.store.near_count[None]:
             if self.limited:
                 self._note_partners()
             self.readings.contact_shares(self.pair_share, self.taken)
@@ -57,7 +57,7 @@ class StepResolution:
         """Remember steps and light partners: few contacts last until a recording."""
         schedule, mass = self.schedule, self.model.body_mass
         self.step = np.minimum(self.step, schedule.dt0 / 2.0 ** self.state.level.to_numpy())
-        pairs = self.contacts.pair_body.to_numpy()[: self.contacts.pair_count[None]]
+        pairs, _, _ = self.contacts.store.near_table()
         for one, other in (pairs.T, pairs.T[::-1]):
             np.minimum.at(self.lightest, one, mass[other])
 

@@ -7,6 +7,7 @@ from taichi_dem.effects.gravity import Gravity
 from taichi_dem.effects.shear_slip import ShearSlip
 from taichi_dem.effects.softening import Softening
 from taichi_dem.effects.sphere_contact import SphereContact
+from taichi_dem.effects.sticking_friction import StickingFriction
 from taichi_dem.effects.supports import Fixed, PrescribedMotion, Roller
 
 __all__ = [
@@ -20,4 +21,5 @@ __all__ = [
     "ShearSlip",
     "Softening",
     "SphereContact",
+    "StickingFriction",
 ]

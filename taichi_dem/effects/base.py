@@ -34,6 +34,8 @@ class Effect:
 
     role = ""
     name = ""
+    #: Whether a friction law keeps a spring for each sphere pair (``roles.FrictionMemory``).
+    remembers = False
 
     def __repr__(self):
         return by_arguments(self)
@@ -44,6 +46,12 @@ class Effect:
 
     def declare(self, capacity):
         """Declare further fields, with the capacity of an engine; no field may be used here."""
+
+    def declare_columns(self, store):
+        """Declare what it keeps of a pair of bodies, or of two spheres, in a ``PairStore``.
+
+        ``store.column`` and ``store.sphere_column`` give fields. Asked in scenes with contact.
+        """
 
     def load(self, model):
         """Fill the declared fields for a scene; they are zero before. Raises InputError."""
@@ -187,6 +195,11 @@ class NoFriction(Effect):
     """Frictionless sphere contacts."""
 
     role = "friction"
+
+    @ti.func
+    def limit(self, force_normal):
+        """No friction at any normal force."""
+        return 0.0
 
     @ti.func
     def force(self, damping, force_normal, slide):

@@ -18,6 +18,11 @@ class Friction(Effect):
         return (material.friction,)
 
     @ti.func
+    def limit(self, force_normal):
+        """Largest friction [N] at a normal force [N]; of impulses likewise."""
+        return self.law[0] * force_normal
+
+    @ti.func
     def force(self, damping, force_normal, slide):
         """Force [N] on the second sphere against its sliding velocity [m/s]."""
         return friction_force(self.law[0], damping, force_normal, slide)

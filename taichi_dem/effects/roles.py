@@ -62,10 +62,40 @@ class ContactLaw(Protocol):
 
 
 class FrictionLaw(Protocol):
-    """Tangential law of contact spheres; role "friction"."""
+    """Tangential law of contact spheres; role "friction".
+
+    One with ``remembers = True`` also keeps the contract ``FrictionMemory``.
+    """
+
+    remembers: bool
+
+    def limit(self, force_normal):
+        """Largest friction [N] at a normal force [N]; of impulses likewise."""
 
     def force(self, damping, force_normal, slide):
         """Force [N] on the second sphere against its sliding velocity [m/s]."""
+
+
+class FrictionMemory(Protocol):
+    """Springs across contacts, of which each sphere pair keeps its own.
+
+    Vectors are in the first body's frame.
+    """
+
+    def follow(self, k, normal, way):
+        """Turn the spring of pair k into the present contact plane and stretch it by a way [m]."""
+
+    def slip(self, k, limit, way):
+        """Let the spring slip beyond a limit [N]; energy [J] that this takes."""
+
+    def spring(self, k):
+        """Force [N] on the second sphere."""
+
+    def stored(self, k):
+        """Energy [J]."""
+
+    def part(self, k):
+        """Forget the spring as the spheres part; energy [J] that it had."""
 
 
 class Load(Protocol):
@@ -102,7 +132,8 @@ CONTRACTS = {
 
 def members_of(contract) -> tuple:
     """Names of the members that a Protocol asks for."""
-    return tuple(name for name in vars(contract) if not name.startswith("_"))
+    names = (*contract.__dict__.get("__annotations__", ()), *vars(contract))
+    return tuple(name for name in names if not name.startswith("_"))
 
 
 def check_effect(effect):
@@ -112,11 +143,12 @@ def check_effect(effect):
         raise InputError(
             f"role of effect {kind} must be one of {', '.join(CONTRACTS)}, got {effect.role!r}"
         )
-    missing = [
-        name for name in members_of(CONTRACTS[effect.role]) if not hasattr(type(effect), name)
-    ]
+    wanted = members_of(CONTRACTS[effect.role])
+    if getattr(effect, "remembers", False):
+        wanted += members_of(FrictionMemory)
+    missing = [name for name in wanted if not hasattr(type(effect), name)]
     if missing:
         raise InputError(
-            f"effect {kind} must have a ti.func {missing[0]}, as its role {effect.role} asks for "
-            f"{', '.join(members_of(CONTRACTS[effect.role]))}"
+            f"effect {kind} must have a member {missing[0]}, as its role {effect.role} asks for "
+            f"{', '.join(wanted)}"
         )

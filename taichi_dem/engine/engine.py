@@ -58,8 +58,8 @@ class BlastEngine(Engine):
         self.advance = self._advance(method)
         self.broad_phase = None
         if self.contacts is not None:
-            parts = self.contacts, self.schedule, self.advance.solver
-            self.broad_phase = BroadPhase(*parts, self.structure.brute_force)
+            parts = self.contacts, self.schedule, self.structure.brute_force
+            self.broad_phase = BroadPhase(*parts)
         kind = SolvedStep if method.solves else Step
         self.step = kind(self.advance, self.schedule, self.broad_phase)
         self.drivers = {name: driver(self.step) for name, driver in DRIVERS.items()}

@@ -26,6 +26,34 @@ def friction_force(coefficient, damping, force_normal, slide):
     return force
 
 
+@ti.func
+def cut_to(vector, bound):
+    """The vector, shortened to a bound where it is longer."""
+    size = vector.norm()
+    if size > bound:
+        vector *= bound / size
+    return vector
+
+
+@ti.func
+def add_within(held, more, bound):
+    """Held + share * more, with the largest share up to 1 that keeps its size within a bound.
+
+    held: vector no longer than the bound.
+    """
+    square, along = more.norm_sqr(), held.dot(more)
+    left = ti.max(0.0, bound * bound - held.norm_sqr())
+    share = 1.0
+    if square + 2.0 * along > left:
+        root = ti.sqrt(along * along + square * left)
+        # Two ways to write one root of the quadratic: none subtracts what is nearly equal.
+        if along > 0.0:
+            share = left / (root + along)
+        else:
+            share = (root - along) / square
+    return held + share * more
+
+
 @ti.dataclass
 class Meeting:
     """Where two spheres meet: overlap [m], negative while they are apart.

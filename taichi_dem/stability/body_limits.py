@@ -156,19 +156,18 @@ class StabilityLimits:
         if count != self.contact_limits.count[p]:
             self.contact_limits.count[p] = count
             for side in ti.static(range(2)):
-                self.notice(self.contacts.pair_body[p][side], event)
+                self.notice(self.contacts.store.body[p][side], event)
 
     @ti.func
-    def carry_over_pair(self, p, old, fresh):
-        """Take over what is known of a pair from its former place.
+    def notice_listed(self, p, entered, fresh):
+        """Count the contacts of a pair that a search lists: entered and fresh tell why, if not 0.
 
         Entering the list does not change a body's limits: a search lists what may come near, and
         how far it looks must not matter. Spheres that a break has just set free may touch already.
         """
-        self.contact_limits.restore(p, old)
         if fresh != 0:
             self.notice_pair(p, self.contact_limits.count_within_margin(p), RELEASE)
-        elif old < 0:
+        elif entered != 0:
             self.notice_pair(p, self.contact_limits.count_within_margin(p), HIT)
 
     @ti.func

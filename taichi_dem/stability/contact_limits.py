@@ -35,20 +35,16 @@ class ContactLimits:
 
     A sphere pair counts from the moment at which it could touch within some steps of the finer of
     its bodies: it is evaluated once a step, and the coarser body is woken before the next time.
-    count: how many of the sphere pairs of a body pair count. applied_until: tick up to which a pair
-    has given its impulse.
+    count: how many of the sphere pairs of a body pair count.
     """
 
     constant_fields = ("ahead", "root_mass", "root_inertia")
-    scratch_fields = ("old_count", "old_applied_until")
 
     def __init__(self, tables, state, contacts):
         self.tables, self.state, self.contacts = tables, state, contacts
+        self.store = contacts.store
         self.ahead = ti.field(real, shape=MAX_LEVEL + 1)
-        self.count = ti.field(ti.i32, shape=contacts.capacity)
-        self.old_count = ti.field(ti.i32, shape=contacts.capacity)
-        self.applied_until = ti.field(ti.i64, shape=contacts.capacity)
-        self.old_applied_until = ti.field(ti.i64, shape=contacts.capacity)
+        self.count = self.store.column("count_within_margin", ti.i32)
         # M^-1/2 as 1 / sqrt(m) and I^-1/2 in the body frame.
         self.root_mass = ti.field(real, shape=tables.capacity.bodies)
         self.root_inertia = ti.Matrix.field(3, 3, real, shape=tables.capacity.bodies)
@@ -67,21 +63,9 @@ class ContactLimits:
         return ahead * self.contacts.approach(i, j)
 
     @ti.func
-    def save(self, p):
-        """Save what is known of a pair before the list is renewed."""
-        self.old_count[p], self.old_applied_until[p] = self.count[p], self.applied_until[p]
-
-    @ti.func
-    def restore(self, p, old):
-        """Take it over for the pair at place p; old: its former place, -1 for none."""
-        self.count[p], self.applied_until[p] = 0, 0
-        if old >= 0:
-            self.applied_until[p], self.count[p] = self.old_applied_until[old], self.old_count[old]
-
-    @ti.func
     def count_within_margin(self, p):
-        """How many of the sphere pairs of the pair at place p count now."""
-        pair = self.contacts.pair_body[p]
+        """How many of the sphere pairs of a pair count now."""
+        pair = self.store.body[p]
         return self.contacts.closer(p, self.margin(pair[0], pair[1]))
 
     @ti.func
@@ -94,25 +78,25 @@ class ContactLimits:
         springs [1/s^2]. Partners stand still, as in ``quality.bond_rates``.
         """
         a, b, c = mat3(0.0), mat3(0.0), mat3(0.0)
-        for p in range(self.contacts.first_of[i], self.contacts.first_of[i + 1]):
-            if self.count[p] != 0:
-                a, b, c = self._add_pair(p, 0, a, b, c)
-        for k in range(self.contacts.second_start[i], self.contacts.second_start[i + 1]):
-            if self.count[self.contacts.second_pair[k]] != 0:
-                a, b, c = self._add_pair(self.contacts.second_pair[k], 1, a, b, c)
+        for k in range(self.store.first_of[i], self.store.first_of[i + 1]):
+            if self.count[self.store.near_slot[k]] != 0:
+                a, b, c = self._add_pair(self.store.near_slot[k], 0, a, b, c)
+        for k in range(self.store.second_start[i], self.store.second_start[i + 1]):
+            if self.count[self.store.second_slot[k]] != 0:
+                a, b, c = self._add_pair(self.store.second_slot[k], 1, a, b, c)
         return largest_eigenvalue(a, b, c)
 
     @ti.func
     def _add_pair(self, p, side, a, b, c):
         """Add the near contacts of a pair to the block of its first (0) or second (1) body."""
-        i, j = self.contacts.pair_body[p][0], self.contacts.pair_body[p][1]
+        i, j = self.store.body[p][0], self.store.body[p][1]
         if side == 1:
             i, j = j, i
         back, margin = self.state.rotation[i].transpose(), self.margin(i, j)
         turn = back @ self.state.rotation[j]
         offset = back @ (self.state.position[j] - self.state.position[i])
-        for k in range(self.contacts.pair_first[p], self.contacts.pair_last[p]):
-            spheres = self.contacts.pair_sphere[k]
+        for k in range(self.store.first[p], self.store.last[p]):
+            spheres = self.store.sphere[k]
             mine, other = self.tables.sphere[spheres[0]], self.tables.sphere[spheres[1]]
             if side == 1:
                 mine, other = other, mine

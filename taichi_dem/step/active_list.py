@@ -5,6 +5,12 @@ import taichi as ti
 from taichi_dem.timeline import MAX_LEVEL
 
 
+@ti.func
+def itself(a):
+    """A member that is its own number."""
+    return a
+
+
 @ti.data_oriented
 class ActiveList:
     """Indices in order of falling key; end[k] counts the members with a key of at least k.
@@ -30,11 +36,16 @@ class ActiveList:
         return self.order[a]
 
     @ti.func
-    def fill(self, count, key_of: ti.template()):
-        """List those of 0 .. count - 1 whose key is not negative. key_of: function of a member."""
+    def fill(self, count, member_of: ti.template(), key_of: ti.template()):
+        """List those members whose key is not negative.
+
+        member_of: function of 0 .. count - 1, ``itself`` where members are just these. key_of:
+        function of a member.
+        """
         for k in range(MAX_LEVEL + 2):
             self.end[k] = 0
-        for m in range(count):
+        for a in range(count):
+            m = member_of(a)
             key = key_of(m)
             self.key[m] = key
             if key >= 0:
@@ -44,7 +55,8 @@ class ActiveList:
             members = self.end[MAX_LEVEL - back]
             self.end[MAX_LEVEL - back] = total
             total += members
-        for m in range(count):
+        for a in range(count):
+            m = member_of(a)
             key = self.key[m]
             if key >= 0:
                 self._put(m, self.end[key])

@@ -14,6 +14,7 @@ from taichi_dem.physics.bond import bond_motion, unit_arm, unit_opening, unit_ve
 from taichi_dem.physics.rotation import mean_spin, rotation_matrix, spin_of, turned, zero3
 from taichi_dem.stability.body_limits import RELEASE
 from taichi_dem.step.contact_force import ContactForce
+from taichi_dem.step.tangential_springs import TangentialSprings
 
 
 @ti.data_oriented
@@ -26,6 +27,8 @@ class Advance(ContactForce):
         self.solves_bonds = self.solves and solver.has_bonds
         self.contacts = contacts
         self.has_contact = contacts is not None
+        if not self.solves:
+            self.springs = TangentialSprings(tables, state, schedule, contacts)
         # Without fast_math a product with zero is not folded: what is absent must not be written.
         self.has_dashpot = bool(tables.dashpot.name)
         self.limits, self.retimes = schedule.limits, schedule.retimes

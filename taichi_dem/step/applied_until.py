@@ -13,13 +13,15 @@ class AppliedUntil:
     woken and takes a shorter step, the bond is due again although its impulse is still ahead of the
     clock: it applies no more until the tick up to which it has. That is a time of the coarser
     step and so of any finer one: no impulse is ever applied in part.
-    bond: that tick for every bond; those of the pairs are in ``ContactLimits``, which carries them
-    through a search. schedule: knows their steps.
+    bond, pair: that tick for every bond, and for every slot of the pair store. schedule: knows
+    their steps.
     """
 
-    def __init__(self, tables, state, schedule, limits):
-        self.state, self.schedule, self.contact_limits = state, schedule, limits.contact_limits
+    def __init__(self, tables, state, schedule, contacts):
+        self.state, self.schedule = state, schedule
         self.bond = ti.field(ti.i64, shape=tables.capacity.bonds)
+        if contacts is not None:
+            self.pair = contacts.store.column("applied_until", ti.i64)
 
     @ti.func
     def is_pending(self, b, i, j):
@@ -36,9 +38,9 @@ class AppliedUntil:
     def apply_pair(self, p, i, j):
         """The same for a pair in contact; 0 where it has applied its impulse already."""
         dt, until = 0.0, self._until(i, j)
-        if self.contact_limits.applied_until[p] < until:
+        if self.pair[p] < until:
             dt = self.schedule.pair_step(i, j)
-            self.contact_limits.applied_until[p] = until
+            self.pair[p] = until
         return dt
 
     @ti.func

@@ -4,7 +4,7 @@ import taichi as ti
 
 from taichi_dem.kit.types import vec3
 from taichi_dem.physics.rotation import zero3
-from taichi_dem.physics.sphere_pair import meeting
+from taichi_dem.physics.sphere_pair import add_within, meeting
 from taichi_dem.stability.body_limits import HIT
 
 
@@ -15,21 +15,24 @@ class ContactForce:
     @ti.func
     def contact(self, p):
         """Evaluate the spheres of a pair of bodies: repulsion, and friction of what slides."""
-        pair = self.contacts.pair_body[p]
+        pair = self.contacts.store.body[p]
         i, j = pair[0], pair[1]
         branch = self.state.position[j] - self.state.position[i]
         # Most candidates do not touch: find out in the first body's frame, where it costs half.
         back = self.state.rotation[i].transpose()
         turn, offset = back @ self.state.rotation[j], back @ branch
         force, moment_i, moment_j = zero3(), zero3(), zero3()
-        dragged, rubbed, deepest = 0.0, 0.0, 0.0
+        dragged, rubbed, slipped, deepest = 0.0, 0.0, 0.0, 0.0
         scale, margin, near = 1.0, 0.0, 0
         if ti.static(self.limited):
             scale = self.contact_share(i, j)
         if ti.static(self.has_limits):
             margin = self.limits.contact_limits.margin(i, j)
-        for k in range(self.contacts.pair_first[p], self.contacts.pair_last[p]):
-            a, b = self.contacts.pair_sphere[k][0], self.contacts.pair_sphere[k][1]
+        elapsed = 0.0
+        if ti.static(self.springs.present):
+            elapsed = self.springs.elapsed(p)
+        for k in range(self.contacts.store.first[p], self.contacts.store.last[p]):
+            a, b = self.contacts.store.sphere[k][0], self.contacts.store.sphere[k][1]
             first, second = self.tables.sphere[a], self.tables.sphere[b]
             apart = turn @ second.xyz + offset - first.xyz
             reach = first[3] + second[3]
@@ -43,23 +46,42 @@ class ContactForce:
                 slide = velocity - rate * normal
                 push = self.contacts.law.normal(overlap, self._limited(rate, scale))
                 drag = self._limited(self.contacts.law.damping(), scale)
-                rub = self.tables.friction.force(drag, push, slide)
+                rub, stuck, spent = self._rub(k, i, normal, push, drag, slide, elapsed)
                 pushed = push * normal + rub
                 force += pushed
                 moment_i -= arm.cross(pushed)
                 moment_j += (arm - branch).cross(pushed)
                 dragged += (self.contacts.law.elastic(overlap) - push) * rate
-                rubbed -= rub.dot(slide)
+                rubbed -= (rub - stuck).dot(slide)
+                slipped += spent
                 deepest = ti.max(deepest, overlap / reach)
+            else:
+                slipped += self.springs.part(k)
         if deepest > 0.0:
             dt = self._pair_step(p, i, j)
-            self.contacts.add_impulse(2 * p, -force * dt, moment_i * dt)
-            self.contacts.add_impulse(2 * p + 1, force * dt, moment_j * dt)
+            self.contacts.add_impulse(p, 0, -force * dt, moment_i * dt)
+            self.contacts.add_impulse(p, 1, force * dt, moment_j * dt)
             heat = dt * vec3(dragged, rubbed, 0.0)
-            self.contacts.pair_heat[p] = self.contacts.pair_heat[p] + heat
-        self.contacts.deepest[p] = deepest
+            self.contacts.store.heat[p] = self.contacts.store.heat[p] + heat
+        if ti.static(self.springs.present):
+            self.contacts.book_friction(p, slipped)
+        self.contacts.store.deepest[p] = deepest
         if ti.static(self.has_limits):
             self.limits.notice_pair(p, near, HIT)
+
+    @ti.func
+    def _rub(self, k, i, normal, push, drag, slide, elapsed):
+        """Friction on the second sphere and the spring's part of it [N]; what slipping took [J]."""
+        rub, stuck, spent = zero3(), zero3(), 0.0
+        if ti.static(self.springs.present):
+            rotation, bound = self.state.rotation[i], self.tables.friction.limit(push)
+            self.springs.follow(k, rotation, normal, elapsed * slide)
+            spent = self.springs.slip(k, rotation, bound, elapsed * slide)
+            stuck = self.springs.force(k, rotation)
+            rub = add_within(stuck, -drag * slide, bound)
+        else:
+            rub = self.tables.friction.force(drag, push, slide)
+        return rub, stuck, spent
 
     @ti.func
     def _limited(self, value, scale):

@@ -14,8 +14,9 @@ class LevelLimit:
     """
 
     def __init__(self, tables, state, contacts, limits):
-        self.tables, self.state, self.contacts, self.limits = tables, state, contacts, limits
+        self.tables, self.state, self.limits = tables, state, limits
         self.has_contact = contacts is not None
+        self.store = contacts.store if self.has_contact else None
         self.listed_level = ti.field(ti.i32, shape=tables.capacity.bodies)
 
     @ti.func
@@ -32,13 +33,14 @@ class LevelLimit:
             if self._bonded(4 * i + f):
                 finest = ti.max(finest, self.listed_level[self.tables.neighbour[4 * i + f]])
         if ti.static(self.has_contact):
-            for p in range(self.contacts.first_of[i], self.contacts.first_of[i + 1]):
+            for k in range(self.store.first_of[i], self.store.first_of[i + 1]):
+                p = self.store.near_slot[k]
                 if self.limits.contact_limits.count[p] > 0:
-                    finest = ti.max(finest, self.listed_level[self.contacts.pair_body[p][1]])
-            for k in range(self.contacts.second_start[i], self.contacts.second_start[i + 1]):
-                p = self.contacts.second_pair[k]
+                    finest = ti.max(finest, self.listed_level[self.store.body[p][1]])
+            for k in range(self.store.second_start[i], self.store.second_start[i + 1]):
+                p = self.store.second_slot[k]
                 if self.limits.contact_limits.count[p] > 0:
-                    finest = ti.max(finest, self.listed_level[self.contacts.pair_body[p][0]])
+                    finest = ti.max(finest, self.listed_level[self.store.body[p][0]])
         return self.least_beside(finest)
 
     @ti.func
@@ -55,13 +57,14 @@ class LevelLimit:
             if self._bonded(4 * i + f):
                 self._notify(self.tables.neighbour[4 * i + f], level)
         if ti.static(self.has_contact):
-            for p in range(self.contacts.first_of[i], self.contacts.first_of[i + 1]):
+            for k in range(self.store.first_of[i], self.store.first_of[i + 1]):
+                p = self.store.near_slot[k]
                 if self.limits.contact_limits.count[p] > 0:
-                    self._notify(self.contacts.pair_body[p][1], level)
-            for k in range(self.contacts.second_start[i], self.contacts.second_start[i + 1]):
-                p = self.contacts.second_pair[k]
+                    self._notify(self.store.body[p][1], level)
+            for k in range(self.store.second_start[i], self.store.second_start[i + 1]):
+                p = self.store.second_slot[k]
                 if self.limits.contact_limits.count[p] > 0:
-                    self._notify(self.contacts.pair_body[p][0], level)
+                    self._notify(self.store.body[p][0], level)
 
     @ti.func
     def _bonded(self, face):

@@ -10,7 +10,7 @@ import taichi as ti
 from taichi_dem.kit.allocation import assign, raise_to, values
 from taichi_dem.kit.types import real
 from taichi_dem.stability.step_control import DISPLACEMENT, LARGEST, NEIGHBOUR
-from taichi_dem.step.active_list import ActiveList
+from taichi_dem.step.active_list import ActiveList, itself
 from taichi_dem.step.applied_until import AppliedUntil
 from taichi_dem.step.level_limit import LevelLimit
 from taichi_dem.timeline import MACRO_TICKS, MAX_LEVEL, device_coarsest_active, device_ticks_of
@@ -36,17 +36,18 @@ class Schedule:
         self.has_limits = limits is not None
         self.controlled = self.has_limits and limits.control is not None
         self.retimes = self.controlled and limits.wakes != 0
-        self.applied_until = AppliedUntil(tables, state, self, limits) if self.retimes else None
+        self.applied_until = AppliedUntil(tables, state, self, contacts) if self.retimes else None
         self.spreads = self.controlled and not uniform and limits.spreads
         if self.spreads:
             self.level_limit = LevelLimit(tables, state, contacts, limits)
         self.criterion, self.uniform, self.drifted = criterion, uniform, drifted
         self.has_contact = contacts is not None
+        self.store = contacts.store if self.has_contact else None
         capacity = tables.capacity
         self.step_seconds = ti.field(real, shape=MAX_LEVEL + 1)
         self.bodies = ActiveList(capacity.bodies)
         self.bonds = ActiveList(capacity.bonds)
-        self.pairs = ActiveList(contacts.capacity if contacts else 1)
+        self.pairs = ActiveList(self.store.slots if self.has_contact else 1)
         self.low = ti.field(ti.i32, shape=())
         self.finest = ti.field(ti.i32, shape=())
         self.wanted = ti.field(ti.i32, shape=())
@@ -180,17 +181,17 @@ class Schedule:
                     j = self.tables.neighbour[4 * i + f]
                     self.bodies.move(j, self._body_key(j))
         if ti.static(self.has_contact):
-            for p in range(self.contacts.first_of[i], self.contacts.first_of[i + 1]):
-                self._move_pair(p, 1)
-            for k in range(self.contacts.second_start[i], self.contacts.second_start[i + 1]):
-                self._move_pair(self.contacts.second_pair[k], 0)
+            for k in range(self.store.first_of[i], self.store.first_of[i + 1]):
+                self._move_pair(self.store.near_slot[k], 1)
+            for k in range(self.store.second_start[i], self.store.second_start[i + 1]):
+                self._move_pair(self.store.second_slot[k], 0)
 
     @ti.func
     def _move_pair(self, p, partner: ti.template()):
         # As a plain argument, the component's number crashes the compiler of Quadrants.
         self.pairs.move(p, self._pair_key(p))
         if ti.static(self.drifted):
-            j = self.contacts.pair_body[p][partner]
+            j = self.store.body[p][partner]
             self.bodies.move(j, self._body_key(j))
 
     @ti.func
@@ -201,10 +202,10 @@ class Schedule:
         self.changed_count[None] = 0
         if ti.static(self.spreads):
             self.level_limit.note_all()
-        self.bodies.fill(self.tables.body_count[None], self._body_key)
-        self.bonds.fill(self.tables.bond_count[None], self._bond_key)
+        self.bodies.fill(self.tables.body_count[None], itself, self._body_key)
+        self.bonds.fill(self.tables.bond_count[None], itself, self._bond_key)
         if ti.static(self.has_contact):
-            self.pairs.fill(self.contacts.pair_count[None], self._pair_key)
+            self._list_pairs()
         self._find_finest()
 
     @ti.func
@@ -214,10 +215,18 @@ class Schedule:
         All lists are filled anew on the occasion: what lies side by side is then visited in turn,
         which moving entries undoes with time (5 % of the time of a run).
         """
-        self.pairs.fill(self.contacts.pair_count[None], self._pair_key)
+        self._list_pairs()
         if ti.static(not self.uniform):
-            self.bodies.fill(self.tables.body_count[None], self._body_key)
-            self.bonds.fill(self.tables.bond_count[None], self._bond_key)
+            self.bodies.fill(self.tables.body_count[None], itself, self._body_key)
+            self.bonds.fill(self.tables.bond_count[None], itself, self._bond_key)
+
+    @ti.func
+    def _list_pairs(self):
+        self.pairs.fill(self.store.near_count[None], self._near_pair, self._pair_key)
+
+    @ti.func
+    def _near_pair(self, a):
+        return self.store.near_slot[a]
 
     @ti.func
     def _level_all(self):
@@ -267,7 +276,7 @@ class Schedule:
 
     @ti.func
     def _pair_key(self, p):
-        pair = self.contacts.pair_body[p]
+        pair = self.store.body[p]
         return self._key(pair[0], pair[1])
 
     @ti.func

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, effects
-from taichi_dem.contact_search import candidates
+from taichi_dem.contact_search import pair_store
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.step.implicit.colouring import edge_colours
 from tests.again import Again
@@ -84,12 +84,12 @@ def test_whole_searches_give_the_same_bits(block, reference):
 @pytest.mark.slow
 def test_packing_what_pairs_list_changes_no_bit(block, reference, monkeypatch):
     """At every search, impulses that the sweeps begin with included; the others left gaps."""
-    monkeypatch.setattr(candidates, "SLACK", -(1 << 30))
+    monkeypatch.setattr(pair_store, "SLACK", -(1 << 30))
     packed = Simulation(brisk_scene(), ImplicitDashpots(STEP))
     packed.advance_to(STEPS)
     assert differing(reference[0], fields_of(packed.state)) == []
-    ends = [one.contacts.sphere_end[None] for one in (packed, block.simulation)]
-    assert packed.contacts.sphere_count[None] <= ends[0] < ends[1]
+    ends = [one.contacts.store.sphere_end[None] for one in (packed, block.simulation)]
+    assert packed.contacts.store.sphere_count[None] <= ends[0] < ends[1]
 
 
 @pytest.mark.slow

@@ -44,12 +44,17 @@ def scattered(again, skin, spread):
     return simulation
 
 
+def near_slots(store):
+    """Slots of the near pairs in the order in which they are visited."""
+    return store.near_slot.to_numpy()[: store.near_count[None]]
+
+
 def listed(simulation):
     """Sphere pairs in the lists of the search."""
-    contacts = simulation.contacts
-    spheres = contacts.pair_sphere.to_numpy()
-    first, last = contacts.pair_first.to_numpy(), contacts.pair_last.to_numpy()
-    parts = [spheres[first[p] : last[p]] for p in range(contacts.pair_count[None])]
+    store = simulation.contacts.store
+    spheres = store.sphere.to_numpy()
+    first, last = store.first.to_numpy(), store.last.to_numpy()
+    parts = [spheres[first[p] : last[p]] for p in near_slots(store)]
     return [tuple(pair) for pair in np.concatenate(parts).tolist()]
 
 
@@ -91,39 +96,44 @@ def test_the_search_lists_all_near_spheres_and_no_others(again, skin, spread):
 def test_pairs_stand_in_order_and_are_indexed_from_both_bodies(again):
     """Sums over a body's pairs have one order only if the lists do."""
     contacts = scattered(again, 2e-4, 0.01).contacts
-    count = contacts.pair_count[None]
-    bodies = contacts.pair_body.to_numpy()[:count]
+    store, slots = contacts.store, near_slots(contacts.store)
+    bodies = store.body.to_numpy()[slots]
     assert np.all(bodies[:, 0] < bodies[:, 1])
     assert bodies.tolist() == sorted(bodies.tolist())
-    first, second_start = contacts.first_of.to_numpy(), contacts.second_start.to_numpy()
-    second_pair = contacts.second_pair.to_numpy()
+    first, second_start = store.first_of.to_numpy(), store.second_start.to_numpy()
+    second_slot = store.second_slot.to_numpy()
     for i in range(contacts.tables.body_count[None]):
         assert list(range(first[i], first[i + 1])) == np.flatnonzero(bodies[:, 0] == i).tolist()
-        seconds = second_pair[second_start[i] : second_start[i + 1]].tolist()
-        assert seconds == np.flatnonzero(bodies[:, 1] == i).tolist()
+        seconds = second_slot[second_start[i] : second_start[i + 1]].tolist()
+        assert seconds == slots[bodies[:, 1] == i].tolist()
+
+
+def slot_of_pair(store):
+    """Slots of the near pairs by their two bodies."""
+    slots = near_slots(store)
+    bodies = store.body.to_numpy()[slots].tolist()
+    return {tuple(pair): int(p) for pair, p in zip(bodies, slots)}
 
 
 def test_waiting_impulses_survive_a_search(again):
-    """A slot keeps its bits, also when its pair has moved out of reach; what is new has none."""
+    """They keep their bits, also when the pair has moved out of reach; a new pair has none."""
     simulation = scattered(again, 2e-4, 0.01)
-    contacts = simulation.contacts
-    count = contacts.pair_count[None]
-    slots = np.zeros((2 * contacts.capacity, 6))
-    slots[: 2 * count] = np.random.default_rng(0).standard_normal((2 * count, 6))
-    contacts.pair_slot.from_numpy(slots)
-    contacts.pair_full.from_numpy(slots.any(axis=1).astype(np.int32))
-    before = dict(zip(map(tuple, contacts.pair_body.to_numpy()[:count].tolist()), range(count)))
+    store = simulation.contacts.store
+    before, impulses = slot_of_pair(store), np.zeros((store.slots, 2, 6))
+    for p in before.values():
+        impulses[p] = np.random.default_rng(p).standard_normal((2, 6))
+    store.impulse.from_numpy(impulses.reshape(-1, 6))
+    store.waiting.from_numpy(impulses.any(axis=2).astype(np.int32))
     motion = simulation.state.motion()
     motion["position"][::3] = np.roll(motion["position"][::3], 1, axis=0)
     simulation.state.set_motion(motion["position"], motion["orientation"])
     simulation.broad_phase.search()
-    after = contacts.pair_body.to_numpy()[: contacts.pair_count[None]].tolist()
-    kept = contacts.pair_slot.to_numpy()
-    assert set(before) < {tuple(pair) for pair in after}
-    for place, pair in enumerate(after):
-        old = before.get(tuple(pair))
-        rows = np.zeros((2, 6)) if old is None else slots[2 * old : 2 * old + 2]
-        assert np.array_equal(kept[2 * place : 2 * place + 2], rows)
+    after, found = slot_of_pair(store), store.impulse.to_numpy().reshape(-1, 2, 6)
+    assert set(before) < set(after)
+    for pair, p in after.items():
+        wanted = impulses[p] if pair in before else np.zeros((2, 6))
+        assert np.array_equal(found[p], wanted)
+        assert before.get(pair, p) == p
 
 
 def overlap_energy(simulation, born_after):
@@ -146,8 +156,8 @@ def overlap_energy(simulation, born_after):
 def test_a_break_injects_the_energy_of_the_overlaps_that_it_brings_once(again):
     """Faces that break now bring k d^2 / 2 an overlap; a second search at the tick nothing."""
     simulation = scattered(again, 2e-4, 0.02)
-    state, contacts = simulation.state, simulation.contacts
-    assert not contacts.pair_heat.to_numpy().any()
+    state, store = simulation.state, simulation.contacts.store
+    assert not store.heat.to_numpy()[near_slots(store)].any()
     exposed = state.exposed_tick.to_numpy()
     free = np.flatnonzero(exposed < 0)
     exposed[free[: len(free) // 2]] = 7
@@ -157,7 +167,7 @@ def test_a_break_injects_the_energy_of_the_overlaps_that_it_brings_once(again):
     wanted = overlap_energy(simulation, 0)
     assert 0.0 < wanted < 0.9 * overlap_energy(simulation, -1)
     for _ in range(2):
-        injected = contacts.pair_heat.to_numpy()[:, 2].sum()
+        injected = store.heat.to_numpy()[near_slots(store), 2].sum()
         assert injected == pytest.approx(wanted, rel=1e-9)
         simulation.broad_phase.search()
 
@@ -165,7 +175,8 @@ def test_a_break_injects_the_energy_of_the_overlaps_that_it_brings_once(again):
 def neighbouring_faces(neighbours):
     """Pairs of faces in the list of neighbours."""
     first, last = neighbours.first.to_numpy()[:-1], neighbours.last.to_numpy()
-    body, faces = neighbours.body.to_numpy(), neighbours.pair_cache.faces.to_numpy()
+    listed = neighbours.listed
+    body, faces = listed.body.to_numpy(), listed.faces.to_numpy()
     return {
         (4 * i + fg // 4, 4 * int(body[k]) + fg % 4)
         for i in range(len(last))
@@ -214,14 +225,14 @@ def test_one_list_of_neighbours_serves_until_a_body_has_left_its_reach(again, dr
     way = random.standard_normal(motion["position"].shape)
     way *= drift * skin / np.linalg.norm(way, axis=1, keepdims=True)
     spin = turn * random.standard_normal(motion["orientation"].shape)
-    listed_at, made = neighbours.turned_to.to_numpy(), 0
+    listed_at, made = neighbours.reach.turned_to.to_numpy(), 0
     for step in range(1, 41):
         turned = motion["orientation"] + step * spin
         turned /= np.linalg.norm(turned, axis=1, keepdims=True)
         simulation.state.set_motion(motion["position"] + step * way, turned)
         simulation.broad_phase.search()
         assert near_faces(simulation, skin) <= neighbouring_faces(neighbours)
-        before, listed_at = listed_at, neighbours.turned_to.to_numpy()
+        before, listed_at = listed_at, neighbours.reach.turned_to.to_numpy()
         made += (listed_at != before).any(axis=(1, 2)).mean() > 0.5
     assert 3 <= made <= 40 // 5
 

@@ -34,7 +34,7 @@ def own_effect(role, names):
 @pytest.mark.parametrize(("role", "name"), MEMBERS)
 def test_an_effect_without_a_member_of_its_role_is_refused_by_the_name_of_it(role, name):
     others = [member for member in members_of(CONTRACTS[role]) if member != name]
-    with pytest.raises(InputError, match=rf"effect Own must have a ti.func {name}, as its role"):
+    with pytest.raises(InputError, match=rf"effect Own must have a member {name}, as its role"):
         Scene(pair(), CONCRETE, [own_effect(role, others)])
 
 

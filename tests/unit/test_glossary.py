@@ -24,7 +24,7 @@ PARTS = {
     "health": "divergence",
     "keeper": "CheckpointWriter",
     "leeway": "skin",
-    "lookout": "pair_cache",
+    "lookout": "pair_store",
     "missed": "missing",
     "news": "new_faces",
     "owes": "is_pending",
@@ -90,13 +90,6 @@ VERBS = ("act", "ahead", "full", "happen", "keep", "known", "look", "place", "ta
 
 #: Names that are left, by file. This list is to shrink: a name in it that no longer exists fails.
 REMAINING = {
-    # Until the contact search has one store for a pair.
-    ("taichi_dem/contact_search/candidates.py", "candidates"),
-    ("taichi_dem/contact_search/candidates.py", "take"),
-    ("taichi_dem/contact_search/numbering.py", "numbering"),
-    ("taichi_dem/contact_search/old_pairs.py", "keep"),
-    ("taichi_dem/contact_search/old_pairs.py", "old_pairs"),
-    ("taichi_dem/contact_search/old_pairs.py", "place"),
     # Options that users give.
     ("taichi_dem/stability/step_control.py", "wake"),
     ("ca_damper/automaton/options.py", "ledger"),

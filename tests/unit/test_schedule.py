@@ -4,7 +4,7 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem.stability.step_control import Displacement
-from taichi_dem.step.schedule import ActiveList
+from taichi_dem.step.active_list import ActiveList, itself
 from taichi_dem.timeline import MAX_LEVEL, coarsest_active
 
 
@@ -27,7 +27,7 @@ class Sorter:
     def fill(self, count: ti.i32):
         """Take in the first count members."""
         for _ in range(1):
-            self.list.fill(count, self.key_of)
+            self.list.fill(count, itself, self.key_of)
 
     @ti.kernel
     def move(self, member: ti.i32, key: ti.i32):

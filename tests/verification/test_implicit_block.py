@@ -7,7 +7,7 @@ from taichi_dem import ImplicitDashpots
 from taichi_dem.step.implicit.pairs import COLOURS
 from tests.again import Again
 from tests.scenes import brisk_scene
-from tests.unit.test_broad_phase import expected, listed
+from tests.unit.test_broad_phase import expected, listed, near_slots
 from tests.unit.test_colouring import is_proper
 
 EPS = np.finfo(float).eps
@@ -92,11 +92,12 @@ def test_touching_pairs_of_a_colour_share_no_body(block):
         count = pairs.count[None]
         counts.append(count)
         active, order = pairs.active.to_numpy()[:count], pairs.order.to_numpy()[:count]
-        touching = pairs.touching.to_numpy()[: contacts.pair_count[None]]
-        assert active.tolist() == np.flatnonzero(touching > 0).tolist()
+        slots = near_slots(contacts.store)
+        touching = pairs.touching.to_numpy()[slots]
+        assert active.tolist() == slots[touching > 0].tolist()
         colours = pairs.colour.to_numpy()[:count]
         assert colours.max(initial=0) < COLOURS
-        assert count == 0 or is_proper(contacts.pair_body.to_numpy()[active], colours)
+        assert count == 0 or is_proper(contacts.store.body.to_numpy()[active], colours)
         assert order.tolist() == np.argsort(colours, kind="stable").tolist()
         first = pairs.colour_first.to_numpy()[: COLOURS + 1]
         assert first.tolist() == np.searchsorted(colours[order], np.arange(COLOURS + 1)).tolist()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Uniform, effects
-from taichi_dem.contact_search.verlet_list import BODY_SKINS, SKINS
+from taichi_dem.contact_search.reach import BODY_SKINS, SKINS
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import bar, pair, single
 from taichi_dem.timeline import MACRO_TICKS
@@ -270,7 +270,7 @@ def test_one_fast_fragment_keeps_the_list_of_neighbours_right(implicit):
         assert wanted <= found
         besides = found - near_balls(simulation, reach)
         assert all(fragment in (a // 4, b // 4) for a, b in besides)
-        body, last = neighbours.body.to_numpy(), neighbours.last.to_numpy()
+        body, last = neighbours.listed.body.to_numpy(), neighbours.last.to_numpy()
         for start, end in zip(neighbours.first.to_numpy(), last):
             assert (np.diff(body[start:end]) > 0).all()
         assert set(listed(simulation)) == expected(simulation, skin)

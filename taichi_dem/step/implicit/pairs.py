@@ -5,7 +5,8 @@ import taichi as ti
 from taichi_dem.contact_search.cell_grid import group
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.physics.rotation import unit3, zero3
-from taichi_dem.physics.sphere_pair import meeting
+from taichi_dem.physics.sphere_pair import add_within, cut_to, meeting
+from taichi_dem.step.tangential_springs import TangentialSprings
 
 #: Colours of pairs that share no body; what finds no free one is visited last, in turn.
 COLOURS = 16
@@ -22,12 +23,15 @@ class PairDashpots:
     pair's candidates. entry: which candidate. normal: from first to second. arm: from the second's
     centre to the contact [m]. push: impulse of the spring, or what the gap still lets through
     [N s]. share: velocity per impulse along the normal, and across at most [1/kg]. impulse: on the
-    second, of spring, dashpot and friction, as found [N s]; entries as in
-    ``Contacts.pair_sphere``. active: the pairs that touch, count of them. order: places in it by
-    colour, those of colour c from colour_first[c] on.
+    second, of spring, dashpot and friction, as found [N s]; entries as in ``PairStore.sphere``.
+    Where friction sticks, pull: impulse of the spring across the contact [N s]; elapsed: time since
+    a pair was last evaluated [s].
+    active: the pairs that touch, count of them. order: places in it by colour, those of colour c
+    from colour_first[c] on.
     """
 
     scratch_fields = (
+        *("elapsed", "pull"),
         *("touching", "entry", "normal", "arm", "push", "share", "branch"),
         *("active", "order", "colour", "taken", "colour_first"),
     )
@@ -36,14 +40,19 @@ class PairDashpots:
         self.tables, self.state, self.schedule = tables, state, schedule
         self.contacts, self.velocities = contacts, velocities
         self.has_friction = bool(tables.friction.name)
-        pairs, spheres = contacts.capacity, contacts.sphere_capacity
+        self.store = contacts.store
+        self.springs = TangentialSprings(tables, state, schedule, contacts)
+        if self.springs.present:
+            self.elapsed = ti.field(real, shape=self.store.slots)
+            self.pull = ti.Vector.field(3, real, shape=self.store.spheres)
+        pairs, spheres = self.store.slots, self.store.spheres
         self.touching = ti.field(ti.i32, shape=pairs)
         self.entry = ti.field(ti.i32, shape=spheres)
         self.normal = ti.Vector.field(3, real, shape=spheres)
         self.arm = ti.Vector.field(3, real, shape=spheres)
         self.push = ti.field(real, shape=spheres)
         self.share = ti.Vector.field(2, real, shape=spheres)
-        self.impulse = ti.Vector.field(3, real, shape=spheres)
+        self.impulse = self.store.sphere_column("solved_impulse", real, 3)
         self.branch = ti.Vector.field(3, real, shape=pairs)
         n = tables.capacity.bodies
         self.count = ti.field(ti.i32, shape=())
@@ -54,19 +63,6 @@ class PairDashpots:
         self.colour_first = ti.field(ti.i32, shape=COLOURS + 3)
 
     @ti.func
-    def carry_over(self, p, old):
-        """Give the pair at place p, whose spheres are new, the impulses of those it had before.
-
-        old: the ``OldPairs``, which know where these lie.
-        """
-        start = self.contacts.pair_first[p]
-        for k in range(start, self.contacts.pair_last[p]):
-            former = old.candidate(p, self.contacts.pair_sphere[k], k - start)
-            self.impulse[k] = zero3()
-            if former >= 0:
-                self.impulse[k] = self.impulse[former]
-
-    @ti.func
     def sort(self, one):
         """List and colour the pairs that touch: those of one colour share no body.
 
@@ -74,12 +70,13 @@ class PairDashpots:
         Candidates that do not touch are left out, so that no skin changes the order.
         """
         count = 0
-        for p in range(self.contacts.pair_count[None]):
+        for k in range(self.store.near_count[None]):
+            p = self.store.near_slot[k]
             if self.touching[p] > 0:
                 self.active[count] = p
                 count += 1
                 for side in ti.static(range(2)):
-                    self.taken[self.contacts.pair_body[p][side]] = 0
+                    self.taken[self.store.body[p][side]] = 0
         for a in range(count):
             i, j = self._bodies(a)
             taken, colour = self.taken[i] | self.taken[j], 0
@@ -94,7 +91,7 @@ class PairDashpots:
 
     @ti.func
     def _bodies(self, a):
-        pair = self.contacts.pair_body[self.active[a]]
+        pair = self.store.body[self.active[a]]
         return pair[0], pair[1]
 
     @ti.func
@@ -104,18 +101,22 @@ class PairDashpots:
     @ti.func
     def begin(self, p):
         """Find what touches and its springs' impulse; start from the impulses of the last step."""
-        pair = self.contacts.pair_body[p]
+        pair = self.store.body[p]
         i, j = pair[0], pair[1]
         dt = self.schedule.step_seconds[0]
         branch = self.state.position[j] - self.state.position[i]
         back = self.state.rotation[i].transpose()
         turn, offset = back @ self.state.rotation[j], back @ branch
         ahead = dt * self.contacts.approach(i, j)
-        force, moment, deepest = zero3(), zero3(), 0.0
-        start = self.contacts.pair_first[p]
+        force, moment, deepest, parted = zero3(), zero3(), 0.0, 0.0
+        elapsed = 0.0
+        if ti.static(self.springs.present):
+            elapsed = self.springs.elapsed(p)
+            self.elapsed[p] = elapsed
+        start = self.store.first[p]
         end = start
-        for k in range(start, self.contacts.pair_last[p]):
-            a, b = self.contacts.pair_sphere[k][0], self.contacts.pair_sphere[k][1]
+        for k in range(start, self.store.last[p]):
+            a, b = self.store.sphere[k][0], self.store.sphere[k][1]
             first, second = self.tables.sphere[a], self.tables.sphere[b]
             apart = turn @ second.xyz + offset - first.xyz
             reach = first[3] + second[3]
@@ -130,12 +131,30 @@ class PairDashpots:
                 force += self.impulse[k]
                 moment += arm.cross(self.impulse[k])
                 deepest = ti.max(deepest, overlap / reach)
+                if ti.static(self.springs.present):
+                    self.pull[end] = zero3()
+                    if overlap > 0.0:
+                        way = self._way(i, j, branch, arm, normal, elapsed)
+                        self.springs.follow(k, self.state.rotation[i], normal, way)
+                        self.pull[end] = dt * self.springs.force(k, self.state.rotation[i])
                 end += 1
             else:
                 self.impulse[k] = zero3()
-        self.contacts.deepest[p], self.touching[p], self.branch[p] = deepest, end - start, branch
+            if apart.norm_sqr() >= reach * reach:
+                parted += self.springs.part(k)
+        self.store.deepest[p], self.touching[p], self.branch[p] = deepest, end - start, branch
         if end > start:
             self._deposit(p, branch, force, moment)
+        if ti.static(self.springs.present):
+            self.contacts.book_friction(p, parted)
+
+    @ti.func
+    def _way(self, i, j, branch, arm, normal, elapsed):
+        """Way of a contact's second sphere against the first across the normal in a time [m]."""
+        spin = self.state.spin[i]
+        velocity = self.state.velocity[j] + self.state.spin[j].cross(arm)
+        velocity -= self.state.velocity[i] + spin.cross(arm + branch)
+        return elapsed * (velocity - velocity.dot(normal) * normal)
 
     @ti.func
     def _share(self, i, j, branch, arm, normal):
@@ -160,16 +179,16 @@ class PairDashpots:
     def _deposit(self, p, branch, force, moment):
         """Let both bodies have the first guess: force on the second, moment about its centre."""
         around = moment + branch.cross(force)
-        self.contacts.add_impulse(2 * p, -force, -around)
-        self.contacts.add_impulse(2 * p + 1, force, moment)
+        self.contacts.add_impulse(p, 0, -force, -around)
+        self.contacts.add_impulse(p, 1, force, moment)
 
     @ti.func
     def visit(self, p):
         """Solve a pair's contacts, one after the other; largest squared velocity it changed."""
         change2 = 0.0
-        pair = self.contacts.pair_body[p]
+        pair = self.store.body[p]
         damping = self.schedule.step_seconds[0] * self.contacts.law.damping()
-        start = self.contacts.pair_first[p]
+        start = self.store.first[p]
         for c in range(start, start + self.touching[p]):
             found = self._visit(c, pair[0], pair[1], self.branch[p], damping)
             change2 = ti.max(change2, found)
@@ -187,12 +206,13 @@ class PairDashpots:
         found = ti.max(0.0, (self.push[c] - damping * free) / (1.0 + damping * share[0])) * normal
         if ti.static(self.has_friction):
             slide = velocity - rate * normal - share[1] * (held - pressed * normal)
-            rub = (-damping / (1.0 + damping * share[1])) * slide
-            bound = self.tables.friction.law[0] * found.dot(normal)
-            size = rub.norm()
-            if size > bound:
-                rub *= bound / size
-            found += rub
+            bound = self.tables.friction.limit(found.dot(normal))
+            stick = -damping / (1.0 + damping * share[1])
+            if ti.static(self.springs.present):
+                pull = cut_to(self.pull[c], bound)
+                found += add_within(pull, stick * (slide + share[1] * pull), bound)
+            else:
+                found += cut_to(stick * slide, bound)
         step = held - found
         self.impulse[k] = found
         self.velocities.pull(i, j, branch, step, arm.cross(step))
@@ -202,19 +222,34 @@ class PairDashpots:
     def book(self, p):
         """Book what the dashpots and friction of a pair took, with its mean motion in the step."""
         if self.touching[p] > 0:
-            pair = self.contacts.pair_body[p]
+            pair = self.store.body[p]
             i, j, branch = pair[0], pair[1], self.branch[p]
             linear, angular = self.velocities.apart(i, j, branch)
             spin = self.state.spin[i]
             before = self.state.velocity[j] - self.state.velocity[i] - spin.cross(branch)
             linear = 0.5 * (linear + before)
             angular = 0.5 * (angular + self.state.spin[j] - spin)
-            start = self.contacts.pair_first[p]
+            start = self.store.first[p]
             dragged, rubbed = 0.0, 0.0
             for c in range(start, start + self.touching[p]):
                 velocity, normal = linear + angular.cross(self.arm[c]), self.normal[c]
                 impulse = self.impulse[self.entry[c]]
                 pressed, rate = impulse.dot(normal), velocity.dot(normal)
                 dragged += (ti.max(self.push[c], 0.0) - pressed) * rate
-                rubbed -= (impulse - pressed * normal).dot(velocity)
-            self.contacts.pair_heat[p] = self.contacts.pair_heat[p] + vec3(dragged, rubbed, 0.0)
+                rub = impulse - pressed * normal
+                if ti.static(self.springs.present):
+                    stuck, spent = self._slip(p, c, i, j, pressed)
+                    rub -= stuck
+                    rubbed += spent
+                rubbed -= rub.dot(velocity)
+            self.store.heat[p] = self.store.heat[p] + vec3(dragged, rubbed, 0.0)
+
+    @ti.func
+    def _slip(self, p, c, i, j, pressed):
+        """Let a spring slip in a step; its impulse [N s], and the energy that slipping took [J]."""
+        k, normal, rotation = self.entry[c], self.normal[c], self.state.rotation[i]
+        dt = self.schedule.step_seconds[0]
+        bound = self.tables.friction.limit(pressed) / dt
+        way = self._way(i, j, self.branch[p], self.arm[c], normal, self.elapsed[p])
+        spent = self.springs.slip(k, rotation, bound, way)
+        return dt * self.springs.force(k, rotation), spent

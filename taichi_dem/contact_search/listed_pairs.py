@@ -1,0 +1,97 @@
+"""Entries of the Verlet list: what only the search asks of a pair."""
+
+import taichi as ti
+
+from taichi_dem.kit.types import real
+
+
+@ti.data_oriented
+class ListedPairs:
+    """The pair of each entry of the Verlet list, with the results of its last search.
+
+    A block lists forty pairs for one that is near: what only a search asks lies here, in the order
+    in which it asks; the slot in the ``PairStore`` holds all else.
+    Of an entry: body: the second of the two; slot: of the pair, -1 while it is not near; faces:
+    which of their faces are near, bit 4 f + g for faces f and g; broken: faces that were compared;
+    found: number of sphere pairs within the margin; new_faces: faces whose sphere pairs are not
+    written yet; until: how far the two have gone, together, when the gap of others may be 0 [m].
+    Of a body: travelled: how far any point of it had gone when it was last looked at [m]; surveyed:
+    that and its body skin; changed: 1 when the near pairs of its row, or their entries, may be
+    others.
+    """
+
+    def __init__(self, contacts, capacity):
+        self.contacts = contacts
+        self.body = ti.field(ti.i32, shape=capacity)
+        entry = [*(ti.field(ti.i32) for _ in range(5)), ti.field(real)]
+        ti.root.dense(ti.i, capacity).place(*entry)
+        self.slot, self.faces, self.broken, self.found, self.new_faces, self.until = entry
+        n = contacts.tables.capacity.bodies
+        self.travelled, self.surveyed = (ti.field(real, shape=n) for _ in range(2))
+        self.changed = ti.field(ti.i32, shape=n)
+
+    @ti.func
+    def begin(self, k, j, faces, p):
+        """Begin entry k for a pair with body j, of which nothing is known but the near faces.
+
+        p: its slot, -1 for none.
+        """
+        self.body[k], self.slot[k], self.faces[k] = j, p, faces
+        self.forget(k)
+
+    @ti.func
+    def forget(self, k):
+        """Forget the last search of entry k: all its faces have to be compared."""
+        self.broken[k], self.found[k], self.new_faces[k], self.until[k] = 0, 0, 0, 0.0
+
+    @ti.func
+    def move(self, k, place):
+        """Move entry k to another place."""
+        self.body[place], self.slot[place] = self.body[k], self.slot[k]
+        self.faces[place], self.broken[place] = self.faces[k], self.broken[k]
+        self.found[place], self.new_faces[place] = self.found[k], self.new_faces[k]
+        self.until[place] = self.until[k]
+
+    @ti.func
+    def note_travel(self, i, way):
+        """Note that body i, which is looked at, has come a way [m] since the last time."""
+        self.travelled[i] = self.travelled[i] + way
+        self.surveyed[i] = self.travelled[i] + self.contacts.body_skin[i]
+
+    @ti.func
+    def may_gain_spheres(self, k, i, j, faces):
+        """Whether entry k, bodies i and j, may have more sphere pairs than were found.
+
+        faces: those that are broken now.
+        """
+        return self.broken[k] != faces or (faces != 0 and self._may_be_closer(k, i, j))
+
+    @ti.func
+    def faces_to_compare(self, k, i, j, faces):
+        """Those of the faces that are broken now which may bring entry k sphere pairs.
+
+        They are the fresh ones, where it has none so far and cannot have got any else.
+        """
+        if self.found[k] == 0 and not self._may_be_closer(k, i, j):
+            faces &= ~self.broken[k]
+        return faces
+
+    @ti.func
+    def _may_be_closer(self, k, i, j):
+        """Whether two bodies have gone so far that more spheres may be within their margin."""
+        return self.until[k] < self.surveyed[i] + self.surveyed[j]
+
+    @ti.func
+    def least_gap(self, k, i, j):
+        """Lower bound on the present gap of the pair's spheres that were not found [m]."""
+        return self.until[k] - self.travelled[i] - self.travelled[j]
+
+    @ti.func
+    def note_found(self, k, i, j, faces, count, hits, gap):
+        """Note the sphere pairs of entry k, on which faces they are, and the least other gap [m].
+
+        faces: those that were broken.
+        """
+        self.broken[k], self.found[k], self.new_faces[k] = faces, count, hits
+        self.until[k] = self.travelled[i] + self.travelled[j] + gap
+        self.changed[i] = 1

@@ -1,0 +1,78 @@
+"""Friction of contact spheres that stick until they slip (Cundall and Strack 1979)."""
+
+import taichi as ti
+
+from taichi_dem.effects.friction import Friction
+from taichi_dem.kit.types import real, vec3
+from taichi_dem.kit.validation import between
+
+
+@ti.data_oriented
+class StickingFriction(Friction):
+    """Friction with a tangential spring in each contact of two spheres, up to Coulomb's limit.
+
+    What rests on a slope below the friction angle stays, where ``Friction`` lets it creep. The
+    spring's stretch turns with the first body and is lost when the spheres part.
+    stiffness_ratio: stiffness of the spring over the material's contact stiffness; spheres of a
+    Poisson's ratio nu have 2 (1 - nu) / (2 - nu) (Mindlin 1949).
+    Raises InputError unless it lies between 1e-6 and 1.
+    Source: Cundall and Strack, Geotechnique 29 (1979) 47; not in the paper.
+    """
+
+    name = "sticking_friction"
+    remembers = True
+
+    def __init__(self, stiffness_ratio=0.8):
+        self.stiffness_ratio = between("stiffness_ratio", stiffness_ratio, 1e-6, 1.0)
+
+    def numbers(self, material):
+        """Friction coefficient, and stiffness of the spring [N/m]."""
+        return material.friction, self.stiffness_ratio * material.contact_stiffness
+
+    def declare_columns(self, store):
+        """Keep the stretch [m] of the spring of each sphere pair, in the first body's frame."""
+        self.stretch = store.sphere_column("tangential_stretch", real, 3)
+
+    @ti.func
+    def follow(self, k, normal, way):
+        """Turn the spring of sphere pair k into the plane of contact and stretch it by a way [m].
+
+        normal: of the contact; way: of the second sphere against the first across the normal.
+        """
+        stretch = self.stretch[k]
+        flat = stretch - stretch.dot(normal) * normal
+        # Turned, not projected: to turn with the contact takes no energy.
+        self.stretch[k] = flat * (stretch.norm() / ti.max(flat.norm(), 1e-300)) + way
+
+    @ti.func
+    def slip(self, k, limit, way):
+        """Shorten the spring of sphere pair k to what a limit [N] can hold; energy it takes [J].
+
+        way: by which it has just been stretched [m]. The work of the way, by the mean of the forces
+        before and after, is what the spring stores and what slipping takes.
+        """
+        trial = self.stretch[k]
+        longest = limit / self.law[1]
+        size = trial.norm()
+        present = trial
+        if size > longest:
+            present = trial * (longest / size)
+        self.stretch[k] = present
+        return 0.5 * self.law[1] * (trial - way + present).dot(trial - present)
+
+    @ti.func
+    def spring(self, k):
+        """Force of the spring of sphere pair k on the second sphere [N]."""
+        return -self.law[1] * self.stretch[k]
+
+    @ti.func
+    def stored(self, k):
+        """Elastic energy in the spring of sphere pair k [J]."""
+        return 0.5 * self.law[1] * self.stretch[k].norm_sqr()
+
+    @ti.func
+    def part(self, k):
+        """Lose the spring of sphere pair k, whose spheres touch no more; its energy [J]."""
+        energy = self.stored(k)
+        self.stretch[k] = vec3(0.0)
+        return energy

@@ -1,0 +1,51 @@
+"""Springs between contact spheres that stick, for friction laws that remember; else nothing."""
+
+import taichi as ti
+
+
+@ti.data_oriented
+class TangentialSprings:
+    """Calls a friction law with memory: vectors here are in world axes, there in the first body's.
+
+    evaluated: of a pair, one more than the tick at which it was last evaluated, 0 for never.
+    """
+
+    def __init__(self, tables, state, schedule, contacts):
+        self.friction, self.state, self.schedule = tables.friction, state, schedule
+        self.present = contacts is not None and contacts.remembers
+        self.store = contacts.store if self.present else None
+        if self.present:
+            self.evaluated = self.store.column("evaluated", ti.i64)
+
+    @ti.func
+    def elapsed(self, p):
+        """Seconds since pair p was last evaluated, 0 for never; it is evaluated now."""
+        elapsed, present = 0.0, self.state.tick[None] + 1
+        if self.evaluated[p] > 0:
+            elapsed = self.schedule.seconds(present - self.evaluated[p])
+        self.evaluated[p] = present
+        return elapsed
+
+    @ti.func
+    def follow(self, k, rotation, normal, way):
+        """Stretch the spring of sphere pair k by a way [m]."""
+        back = rotation.transpose()
+        self.friction.follow(k, back @ normal, back @ way)
+
+    @ti.func
+    def slip(self, k, rotation, bound, way):
+        """Shorten the spring of sphere pair k to a bound [N] after a way [m]; energy spent [J]."""
+        return self.friction.slip(k, bound, rotation.transpose() @ way)
+
+    @ti.func
+    def force(self, k, rotation):
+        """Force of the spring of sphere pair k on the second sphere [N]."""
+        return rotation @ self.friction.spring(k)
+
+    @ti.func
+    def part(self, k):
+        """Energy [J] that is lost as the spheres of a pair no longer touch; 0 without springs."""
+        energy = 0.0
+        if ti.static(self.present):
+            energy = self.friction.part(k)
+        return energy
