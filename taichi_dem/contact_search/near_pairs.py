@@ -58,13 +58,13 @@ class NearPairs:
                 self.row[start + count] = k
                 count += 1
                 spheres += found
-                self._give_room(k, i)
+                self._reserve_spheres(k, i)
         self.row_count[i], self.row_spheres[i] = count, spheres
         # Pairs that merely wait leave at the next search.
         self.listed.changed[i] = waiting
 
     @ti.func
-    def _give_room(self, k, i):
+    def _reserve_spheres(self, k, i):
         """Give entry k of body i a slot, and places for sphere pairs that have just been found."""
         p = self.listed.slot[k]
         if p < 0:

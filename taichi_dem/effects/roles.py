@@ -67,8 +67,6 @@ class FrictionLaw(Protocol):
     One with ``remembers = True`` also keeps the contract ``FrictionMemory``.
     """
 
-    remembers: bool
-
     def limit(self, force_normal):
         """Largest friction [N] at a normal force [N]; of impulses likewise."""
 
@@ -132,8 +130,7 @@ CONTRACTS = {
 
 def members_of(contract) -> tuple:
     """Names of the members that a Protocol asks for."""
-    names = (*contract.__dict__.get("__annotations__", ()), *vars(contract))
-    return tuple(name for name in names if not name.startswith("_"))
+    return tuple(name for name in vars(contract) if not name.startswith("_"))
 
 
 def check_effect(effect):
