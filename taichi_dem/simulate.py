@@ -192,16 +192,17 @@ def _run(simulation, recorder, writer, plan, calls):
 
     Those marks up to which a resumed run has come have been seen to.
     """
-    tick, view = simulation.state.tick, RunView(simulation, recorder)
-    seen = tick[None] if recorder.rows else -1
+    view = RunView(simulation, recorder)
+    seen = simulation.state.tick[None] if recorder.rows else -1
     marks = sorted(calls.steps | writer.marks(plan.last, plan.dt0))
     for step in (mark for mark in marks if mark * MACRO_TICKS > seen):
 
         def between(end=step * MACRO_TICKS):
             """Observe by the clock, and save if due; at a mark its observers come first."""
-            if tick[None] < plan.last * MACRO_TICKS:
+            tick = simulation.state.tick[None]
+            if tick < plan.last * MACRO_TICKS:
                 calls.by_clock(view)
-            if tick[None] < end:
+            if tick < end:
                 writer.save_if_needed()
 
         simulation.advance_to(step, between)

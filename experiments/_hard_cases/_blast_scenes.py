@@ -79,23 +79,24 @@ class Island:
         return cls(mesh, *(np.broadcast_to(x, shape) for x in (shift, velocity, spin)))
 
 
-@dataclass(frozen=True, eq=False)
 class Track:
-    """What the bodies of an island did: arrays over samples; see ``follow``.
+    """Samples of the bodies of an island; see ``follow``.
 
-    time_s (s,); position, velocity, momentum (s, n, 3), rotation (s, n, 3, 3); mass (n,), inertia
-    (n, 3, 3) in body axes; broken: faces at the end. dt: largest step. compile_s: of the run.
-    warnings: of the step, about the island's own bonds.
+    time_s (s,); motion: arrays (s, n, ...) by name, as ``State.motion`` gives them; mass (n,),
+    inertia (n, 3, 3) in body axes; broken: faces at the end. dt: largest step. compile_s: of the
+    run. warnings: of the step, about the island's own bonds.
     """
 
-    time_s: np.ndarray
-    motion: dict
-    mass: np.ndarray
-    inertia: np.ndarray
-    broken: int
-    dt: float
-    compile_s: float
-    warnings: tuple
+    def __init__(self, simulation, samples, part):
+        model, bodies = simulation.model, np.zeros(simulation.model.body_count, dtype=bool)
+        bodies[part] = True
+        broken = simulation.state.broken_tick.to_numpy()[: model.bond_count] >= 0
+        self.broken = int((bodies[model.topology.master] & broken).sum())
+        self.time_s = samples["time_s"]
+        self.motion = {name: array[:, part] for name, array in samples["motion"].items()}
+        self.mass, self.inertia = model.body_mass[part], model.body_inertia[part]
+        self.dt, self.compile_s = simulation.method.dt0, simulation.compile_seconds
+        self.warnings = simulation.step_resolution.findings(bodies)
 
     @property
     def moved(self):
@@ -104,11 +105,8 @@ class Track:
 
     def kinetic(self):
         """Kinetic energy of the island [J], (s,)."""
-        return self.translational() + self.rotational()
-
-    def translational(self):
-        """Part of the kinetic energy [J], (s,)."""
-        return 0.5 * (self.mass * (self.motion["velocity"] ** 2).sum(axis=2)).sum(axis=1)
+        speed2 = (self.motion["velocity"] ** 2).sum(axis=2)
+        return 0.5 * (self.mass * speed2).sum(axis=1) + self.rotational()
 
     def rotational(self):
         """Part of the kinetic energy [J], (s,)."""
@@ -243,7 +241,7 @@ def follow(islands, acting, method, until, material=CONCRETE):
     }
     set_moving(simulation, *motion.values())
     samples = march(simulation, until)
-    return {name: _track(simulation, samples, part) for name, part in slices.items()}
+    return {name: Track(simulation, samples, part) for name, part in slices.items()}
 
 
 class _Motions:
@@ -266,21 +264,3 @@ def march(simulation, until):
     run_simulation(simulation, until=until, samples=SAMPLES, progress=None, observers=[kept])
     motion = {name: np.array([one[name] for one in kept.found]) for name in kept.found[0]}
     return {"motion": motion, "time_s": np.array(kept.times)}
-
-
-def _track(simulation, samples, part):
-    model = simulation.model
-    top, broken = model.topology, simulation.state.broken_tick.to_numpy() >= 0
-    bodies = np.zeros(model.body_count, dtype=bool)
-    bodies[part] = True
-    inside = bodies[top.master]
-    return Track(
-        time_s=samples["time_s"],
-        motion={name: array[:, part] for name, array in samples["motion"].items()},
-        mass=model.body_mass[part],
-        inertia=model.body_inertia[part],
-        broken=int((inside & broken[: len(inside)]).sum()),
-        dt=simulation.method.dt0,
-        compile_s=simulation.compile_seconds,
-        warnings=simulation.step_resolution.findings(bodies),
-    )
