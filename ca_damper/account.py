@@ -15,11 +15,15 @@ class MomentumAccount:
     of what was given [N s].
     """
 
-    def __init__(self, table, weight):
+    def __init__(self, table):
         self.table, self.weight = table, ti.field(ti.f64, shape=())
-        self.weight[None] = weight
         for name in ("expected", "late", "exchanged"):
-            setattr(self, name, ti.field(ti.f64, shape=table.count))
+            setattr(self, name, table.field(ti.f64))
+
+    @ti.kernel
+    def load(self, weight: ti.f64):
+        """Take over the weight of a particle [N]."""
+        self.weight[None] = weight
 
     @ti.func
     def begin(self, s, momentum, late):
@@ -41,6 +45,8 @@ class MomentumAccount:
 
         momentum: of the fillings, at the start of the last step for what is carried (scenes,).
         """
-        missing = np.abs(momentum + self.late.to_numpy() - self.expected.to_numpy())
-        exchanged = self.exchanged.to_numpy()
+        late, expected, exchanged = map(
+            self.table.in_use, (self.late, self.expected, self.exchanged)
+        )
+        missing = np.abs(momentum + late - expected)
         return float((missing / np.where(exchanged > 0.0, exchanged, np.inf)).max())

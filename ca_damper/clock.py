@@ -41,11 +41,10 @@ class Clock:
 
     def __init__(self, table):
         self.table = table
-        self.steps = ti.field(ti.i32, shape=table.count)
-        self.position = ti.field(ti.i32, shape=table.count)
-        self.circle = ti.Vector.field(2, ti.f64, shape=table.count)
-        self.turn = ti.Vector.field(2, ti.f64, shape=table.count)
-        self.half_turn = ti.Vector.field(2, ti.f64, shape=table.count)
+        self.steps, self.position = table.field(ti.i32), table.field(ti.i32)
+        self.circle = table.vector(2, ti.f64)
+        self.turn = table.vector(2, ti.f64)
+        self.half_turn = table.vector(2, ti.f64)
 
     def set(self, steps):
         """Give every scene its steps a cycle, (scenes,); the phase stays as it is."""
@@ -59,7 +58,7 @@ class Clock:
         steps: ti.types.ndarray(dtype=ti.i32, ndim=1),
         turns: ti.types.ndarray(dtype=ti.f64, ndim=2),
     ):
-        for s in range(self.table.count):
+        for s in range(steps.shape[0]):
             self.steps[s] = steps[s]
             self.turn[s] = ti.Vector([turns[0, s], turns[1, s]])
             self.half_turn[s] = ti.Vector([turns[2, s], turns[3, s]])

@@ -18,18 +18,20 @@ _MOST_ATTEMPTS = 1000
 class SprungContainer:
     """The container on its spring, integrated by RK45 within every step of the filling.
 
-    gravity [m/s^2]; rtol, atol: local error allowed; both in m and m/s for atol.
+    gravity [m/s^2]. tolerance: local error allowed, rtol and atol, the latter in m and m/s.
     """
 
-    def __init__(self, table, clock, gravity, rtol, atol):
+    def __init__(self, table, clock):
         self.table, self.clock = table, clock
-        self.state = ti.Vector.field(2, ti.f64, shape=table.count)
-        self.slope = ti.Vector.field(2, ti.f64, shape=table.count)
-        self.impulse = ti.field(ti.f64, shape=table.count)
-        self.carried = ti.field(ti.f64, shape=table.count)
-        self.impulse_velocity = ti.field(ti.f64, shape=table.count)
+        self.state, self.slope = table.vector(2, ti.f64), table.vector(2, ti.f64)
+        self.impulse, self.carried = table.field(ti.f64), table.field(ti.f64)
+        self.impulse_velocity = table.field(ti.f64)
         self.gravity = ti.field(ti.f64, shape=())
         self.tolerance = ti.field(ti.f64, shape=2)
+
+    @ti.kernel
+    def load(self, gravity: ti.f64, rtol: ti.f64, atol: ti.f64):
+        """Take over the numbers of a batch."""
         self.gravity[None] = gravity
         self.tolerance[0], self.tolerance[1] = rtol, atol
 
@@ -97,6 +99,9 @@ class DrivenContainer:
 
     def __init__(self, table, clock):
         self.table, self.clock = table, clock
+
+    def load(self, gravity, rtol, atol):
+        """Nothing to load: nothing is integrated."""
 
     @ti.func
     def start(self, s, x, v):

@@ -84,35 +84,84 @@ class Geometry:
         return width * np.column_stack([column + 0.5, row + 0.5 + 0.5 * ((column + 1) % 2)])
 
 
+@ti.dataclass
+class LatticeSize:
+    """Columns and rows inside the walls, and with them: height of a column, cells of all.
+
+    first: cell that a particle can take. end: one past the last.
+    """
+
+    columns: ti.i32
+    rows: ti.i32
+    height: ti.i32
+    cells: ti.i32
+    first: ti.i32
+    end: ti.i32
+
+
 @ti.data_oriented
 class Lattice:
-    """The tables of a geometry on the device."""
+    """The tables of a geometry on the device, with room for others.
 
-    def __init__(self, geometry):
-        self.geometry = geometry
-        self.cells, self.height = geometry.cells, geometry.height
-        self.columns, self.rows = geometry.columns, geometry.rows
-        #: From the first to past the last cell that a particle may take.
-        self.first = geometry.cell_of(0, 0)
-        self.end = geometry.cell_of(self.columns - 1, self.rows - 1) + 1
-        self.neighbour = ti.field(ti.i16, shape=(self.cells + 1, KINDS))
-        self.blank = ti.field(ti.i8, shape=self.cells + 1)
+    geometry: the one that is loaded. size: a LatticeSize, shape ().
+    """
+
+    def __init__(self, table):
+        most = table.length("cells")
+        self.geometry = None
+        self.size = LatticeSize.field(shape=())
+        self.neighbour = ti.field(ti.i16, shape=(most, KINDS))
+        self.blank = ti.field(ti.i8, shape=most)
         self.cosine = ti.field(ti.f64, shape=(KINDS, DIRECTIONS))
 
-    def load(self):
-        """Fill the tables; apart from making them, as every first use of new fields is dear."""
+    def load(self, geometry):
+        """Take over the tables of a geometry."""
+        self.geometry = geometry
         cosines = np.zeros((KINDS, DIRECTIONS))
         cosines[:DIRECTIONS] = alignments()
-        self._load(self.geometry.neighbours(), self.geometry.blank()[:, None], cosines)
+        self._load_size(geometry.columns, geometry.rows)
+        self._load(geometry.neighbours(), geometry.blank()[:, None], cosines)
+
+    @ti.kernel
+    def _load_size(self, columns: ti.i32, rows: ti.i32):
+        height = rows + 2
+        self.size[None] = LatticeSize(
+            columns, rows, height, (columns + 2) * height, height + 1, columns * height + rows + 1
+        )
 
     @ti.kernel
     def _load(self, neighbours: _TABLE, blank: _TABLE, cosines: _COSINES):
-        for cell in range(self.cells + 1):
+        for cell in range(blank.shape[0]):
             self.blank[cell] = ti.cast(blank[cell, 0], ti.i8)
             for kind in range(KINDS):
                 self.neighbour[cell, kind] = ti.cast(neighbours[cell, kind], ti.i16)
         for kind, direction in ti.ndrange(KINDS, DIRECTIONS):
             self.cosine[kind, direction] = cosines[kind, direction]
+
+    @ti.func
+    def cell_count(self):
+        """Number of cells, walls included; that of the cell beyond the lattice."""
+        return self.size[None].cells
+
+    @ti.func
+    def column_count(self):
+        """Number of columns inside the walls."""
+        return self.size[None].columns
+
+    @ti.func
+    def row_count(self):
+        """Number of rows inside the walls."""
+        return self.size[None].rows
+
+    @ti.func
+    def first(self):
+        """First cell that a particle can take."""
+        return self.size[None].first
+
+    @ti.func
+    def end(self):
+        """One past the last cell that a particle can take."""
+        return self.size[None].end
 
     @ti.func
     def cell_ahead(self, cell, kind):
@@ -127,17 +176,19 @@ class Lattice:
     @ti.func
     def cell_of(self, column, row):
         """Number of the cell in a column and row, both counted inside the walls."""
-        return (column + 1) * self.height + row + 1
+        return (column + 1) * self.size[None].height + row + 1
 
     @ti.func
     def height_of(self, cell):
         """Height of a cell's centre above the floor of the lower columns, in cells."""
-        return cell % self.height - 0.5 + 0.5 * ((cell // self.height) % 2)
+        height = self.size[None].height
+        return cell % height - 0.5 + 0.5 * ((cell // height) % 2)
 
     @ti.func
     def in_side_wall(self, cell):
         """Whether a wall cell belongs to a side wall; the corners do."""
-        return cell < self.height or cell >= self.cells - self.height
+        size = self.size[None]
+        return cell < size.height or cell >= size.cells - size.height
 
 
 @ti.func

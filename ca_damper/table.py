@@ -1,7 +1,6 @@
 """The numbers of every scene of a batch, one row a scene."""
 
 import numpy as np
-import taichi as ti
 
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
@@ -10,15 +9,12 @@ from taichi_dem.kit.validation import choice, shown
 #: Scenes of a table, and the largest seed.
 _MOST_SCENES, _MOST_SEED = 2**24, 2**31 - 1
 
-_ROWS = ti.types.ndarray(dtype=ti.f64, ndim=2)
 
-
-@ti.data_oriented
 class SceneTable:
-    """What tells one scene of a batch from another; fields of shape (scenes,).
+    """What tells one scene of a batch from another, one row a scene; plain NumPy.
 
-    particles [-], seed [-] (cast to u32 for hashing), dt [s], frequency [Hz] and base_amplitude [m]
-    of the base motion, and the primary structure: mass [kg], stiffness [N/m], damping [N s/m].
+    particles [-], seed [-], dt [s], frequency [Hz] and base_amplitude [m] of the base motion, and
+    the primary structure: mass [kg], stiffness [N/m], damping [N s/m].
 
     The numbers are given as scalars or sequences and are broadcast against each other. Here they
     are checked to be numbers, whole ones where they count; a Batch checks their ranges. Whatever a
@@ -46,10 +42,6 @@ class SceneTable:
         rows = _broadcast(dict(zip(self.COLUMNS, values)))
         self.count = len(rows[0])
         self._host = dict(zip(self.COLUMNS, (row.copy() for row in rows)))
-        for name in self.COLUMNS:
-            kind = ti.i32 if name in ("particles", "seed") else ti.f64
-            setattr(self, name, ti.field(kind, shape=self.count))
-        self._load(np.stack(rows).astype(np.float64))
 
     def __repr__(self):
         ends = {name: (of.min(), of.max()) for name, of in self._host.items()}
@@ -60,7 +52,7 @@ class SceneTable:
         return in_brief(self, counted(self.count, "scene"), *words)
 
     def change(self, **numbers):
-        """Give all scenes other numbers by name, each a scalar or (scenes,); compiles nothing.
+        """Give all scenes other numbers by name, each a scalar or (scenes,).
 
         Raises InputError for a name that is no column.
         """
@@ -68,35 +60,19 @@ class SceneTable:
             choice("number to change", name, self.COLUMNS)
             kind = np.int64 if name in ("particles", "seed") else np.float64
             self._host[name] = np.broadcast_to(values, self.count).astype(kind)
-        self._load(np.stack([self._host[name] for name in self.COLUMNS]).astype(np.float64))
 
     def drive(self, frequency, dt):
         """Change frequency [Hz] and step [s] of all scenes, each a scalar or (scenes,)."""
         pair = np.stack([np.broadcast_to(x, self.count) for x in (frequency, dt)])
         self._host["frequency"], self._host["dt"] = pair.astype(np.float64)
-        self._drive(np.ascontiguousarray(pair, dtype=np.float64))
 
     def column(self, name):
-        """What the table says under a name, (scenes,); reads no field."""
+        """What the table says under a name, (scenes,)."""
         return self._host[name]
 
     def row(self, s):
         """Numbers of scene s by name."""
         return {name: self._host[name][s].item() for name in self.COLUMNS}
-
-    @ti.kernel
-    def _load(self, rows: _ROWS):
-        for s in range(self.count):
-            self.particles[s] = ti.cast(rows[0, s], ti.i32)
-            self.seed[s] = ti.cast(rows[1, s], ti.i32)
-            self.dt[s], self.frequency[s] = rows[2, s], rows[3, s]
-            self.base_amplitude[s], self.mass[s] = rows[4, s], rows[5, s]
-            self.stiffness[s], self.damping[s] = rows[6, s], rows[7, s]
-
-    @ti.kernel
-    def _drive(self, pair: _ROWS):
-        for s in range(self.count):
-            self.frequency[s], self.dt[s] = pair[0, s], pair[1, s]
 
 
 def _broadcast(values):

@@ -32,14 +32,14 @@ def above_others(ranked):
 class ConflictResolution:
     """Largest rank that ever claimed a cell, shape (scenes, cells + 1)."""
 
-    def __init__(self, lattice, scenes):
+    def __init__(self, table, lattice):
         self.lattice = lattice
-        self.claims = ti.field(ti.i64, shape=(scenes, lattice.cells + 1))
+        self.claims = table.field(ti.i64, "cells")
 
     @ti.func
     def clear(self, s):
         """No claims."""
-        for cell in range(self.lattice.cells + 1):
+        for cell in range(self.lattice.cell_count() + 1):
             self.claims[s, cell] = ti.cast(0, ti.i64)
 
     @ti.func

@@ -10,7 +10,7 @@ from ca_damper.automaton.impulse_balance import GRAVITY, QUANTUM
 from ca_damper.automaton.placement import DrawnCells, NamedCells
 from ca_damper.automaton.transport import Transport
 from ca_damper.filling import Action
-from ca_damper.lattice import DIRECTIONS, EMPTY, HELD, WALL, unit_vectors
+from ca_damper.lattice import DIRECTIONS, EMPTY, HELD, WALL, Geometry, unit_vectors
 from ca_damper.random_numbers import stream
 
 
@@ -25,15 +25,18 @@ class DeviceAutomaton:
         self.accounting = components.accounting
         self.resting, self.impulse_balance = components.resting, components.impulse_balance
         self.event_counts = components.event_counts
-        self.transport, self.ejection = Transport(components), Ejection(components)
+        self.transport, self.ejection = Transport(table, components), Ejection(table, components)
         both, pairs_first = options.pair_rule == "both", options.priority == "pairs_first"
-        self.collisions = Collisions(components, both, pairs_first)
-        self.placement = DrawnCells(self.cells, table)
-        if options.start is not None:
-            self.placement = NamedCells(self.cells, options.start)
-        self.velocity = ti.field(ti.f64, shape=table.count)
-        for loaded in (self.lattice, self.parameters, self.placement):
-            loaded.load()
+        self.collisions = Collisions(table, components, both, pairs_first)
+        placement = DrawnCells if options.start is None else NamedCells
+        self.placement = placement(table, self.cells)
+        self.velocity = table.field(ti.f64)
+
+    def load(self, options):
+        """Take over the numbers of an automaton of the same structure."""
+        self.lattice.load(Geometry(options.columns, options.rows))
+        self.parameters.load(options)
+        self.placement.load(options.start)
 
     @ti.func
     def reset(self, s):
@@ -70,7 +73,7 @@ class DeviceAutomaton:
     def energy(self, s):
         """Kinetic and potential energy [J]; what is held moves as the container did last."""
         total = 0.0
-        for cell in range(self.lattice.cells):
+        for cell in range(self.lattice.cell_count()):
             kind = self.cells.at(s, cell)
             if kind != EMPTY and kind != WALL:
                 speed = self.velocity[s] if kind == HELD else self.cells.speed[s, cell]
@@ -83,7 +86,7 @@ class DeviceAutomaton:
     def momentum(self, s):
         """Momentum along x [kg m/s]; what is held moves as the container did last."""
         total = self.resting.count(s) * self.velocity[s]
-        for cell in range(self.lattice.cells):
+        for cell in range(self.lattice.cell_count()):
             total += self.cells.vertical_speed(s, cell)
         return self.parameters.mass[None] * total
 
@@ -91,7 +94,7 @@ class DeviceAutomaton:
     def divergence_code(self, s):
         """1 when a particle needs more than one cell a step, which no rule gives it."""
         fastest = 0.0
-        for cell in range(self.lattice.cells):
+        for cell in range(self.lattice.cell_count()):
             fastest = max(fastest, self.cells.speed[s, cell])
         return 0 if fastest * self.table.dt[s] < self.parameters.width[None] else 1
 
@@ -112,4 +115,4 @@ class DeviceAutomaton:
         return {"position": position[present], "velocity": velocity[present]}
 
     def _row(self, field, s):
-        return np.array([field[s, cell] for cell in range(self.lattice.cells)])
+        return np.array([field[s, cell] for cell in range(self.lattice.geometry.cells)])

@@ -18,8 +18,9 @@ _COUNTED = {
 class EventCounts:
     """Events since the reset, shape (scenes, kinds of event)."""
 
-    def __init__(self, scenes):
-        self.events = ti.field(ti.i64, shape=(scenes, HOLDS + 1))
+    def __init__(self, table):
+        self.table = table
+        self.events = table.field(ti.i64, HOLDS + 1)
 
     @ti.func
     def clear(self, s):
@@ -38,6 +39,6 @@ class EventCounts:
 
         The automaton keeps no account of energy: what it does steers.
         """
-        total = self.events.to_numpy().sum(axis=0)
+        total = self.table.in_use(self.events).sum(axis=0)
         found = [(name, *_COUNTED[name]) for name in effects if name in _COUNTED]
         return tuple(EffectUse(name, what, int(total[k]), steers=True) for name, k, what in found)

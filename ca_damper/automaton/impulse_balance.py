@@ -26,8 +26,8 @@ class ImpulseBalance:
 
     active = True
 
-    def __init__(self, scenes):
-        self.velocity_gain = ti.field(ti.i64, shape=(scenes, _COUNT))
+    def __init__(self, table):
+        self.velocity_gain = table.field(ti.i64, _COUNT)
 
     @ti.func
     def clear(self, s):

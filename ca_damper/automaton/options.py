@@ -2,24 +2,27 @@
 
 from dataclasses import dataclass
 from numbers import Integral
+from typing import Optional, Tuple, Type
 
+from ca_damper.automaton.accounting import ACCOUNTINGS, Accounting
 from ca_damper.automaton.accumulator import READINGS
 from ca_damper.automaton.conflict_resolution import MOST_CELLS
 from ca_damper.automaton.device import DeviceAutomaton
-from ca_damper.filling import check_places
+from ca_damper.filling import Structure
+from ca_damper.scene_fields import SceneFields
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import choice, flag, fraction, positive, shown, whole
-
-ACCOUNTINGS = {"landing": "ca_landing", "landing+ejection": "ca_ejection", "static": "ca_static"}
 
 
 @dataclass(frozen=True)
 class Automaton:
     """Particles as a cellular automaton (Komatsuzaki et al., section 5).
 
-    accounting: what acts on the container: "landing" (particles that meet a wall),
-    "landing+ejection" (also those that a wall pushes along), "static" (both, and the heap that
-    lies on the floor). restitution: between particles; wall_restitution: between particle and
+    accounting: which impulses act on the container: "landing" (of particles that meet a wall after
+    a change of cell), "landing+ejection" (also of those that a wall pushes along), "all", or
+    another word of ``accounting.ACCOUNTINGS``. static_contact: whether particles come to rest on
+    the floor and on the heap there, move with the container and weigh on it; None: as suits the
+    accounting, True with "all" and False with the others. restitution: between particles; wall_restitution: between particle and
     wall. pair_rule: "both" of a pair change and momentum stays in its line, or "one_sided" as
     printed: each that looks at another changes alone. priority: of the events of a particle, at
     "random" or "pairs_first". accumulator: what a turn does to the way travelled, one of
@@ -32,7 +35,8 @@ class Automaton:
     Raises InputError for what is not allowed.
     """
 
-    accounting: str = "static"
+    accounting: str = "all"
+    static_contact: Optional[bool] = None
     restitution: float = 0.75
     wall_restitution: float = 0.75
     pair_rule: str = "both"
@@ -66,10 +70,12 @@ class Automaton:
 
     def _check_rules(self):
         flag("ledger", self.ledger)
-        if self.ledger and self.accounting == "static":
+        if self.static_contact is not None:
+            flag("static_contact", self.static_contact)
+        if self.ledger and self._accounting.counts_all:
             raise InputError(
-                "ledger must be False with accounting 'static', where everything acts on the "
-                "container and nothing is left to write down, got True"
+                f"ledger must be False with accounting {self.accounting!r}, where everything acts "
+                "on the container and nothing is left to write down, got True"
             )
         if self.pair_rule == "one_sided" and self.priority != "random":
             raise InputError(
@@ -108,16 +114,26 @@ class Automaton:
         return whole_numbers and 0 <= column < self.columns and 0 <= row < self.rows
 
     @property
-    def label(self):
-        """Short word for tables and files."""
+    def _accounting(self) -> Type[Accounting]:
         return ACCOUNTINGS[self.accounting]
 
     @property
-    def effects(self):
+    def particles_rest(self) -> bool:
+        """Whether there is static contact."""
+        asked = self.static_contact
+        return self._accounting.static_contact if asked is None else asked
+
+    @property
+    def label(self) -> str:
+        """Short word for tables and files."""
+        return self._accounting.labels[self.particles_rest]
+
+    @property
+    def effects(self) -> Tuple[str, ...]:
         """What is computed, in words for the report."""
-        counted = {"landing": (), "landing+ejection": ("ejection",)}
-        more = counted.get(self.accounting, ("ejection", "static contact"))
-        return ("pairs", "landing", *more, *(("ledger",) if self.ledger else ()))
+        resting = ("static contact",) if self.particles_rest else ()
+        ledger = ("ledger",) if self.ledger else ()
+        return ("pairs", "landing", *self._accounting.effects, *resting, *ledger)
 
     @property
     def default_dt(self):
@@ -157,7 +173,15 @@ class Automaton:
         """What the one code of ``divergence_code`` means, and a step that would do [s]."""
         return "holds a particle faster than one cell a step", 0.2 * dt
 
-    def bind(self, table):
-        """The automaton on the device, for all scenes of a SceneTable."""
-        check_places(table.count, (self.columns + 2) * (self.rows + 2))
+    @property
+    def structure(self) -> Structure:
+        """Rules are compiled; numbers, the size of the lattice and the cells of start are not."""
+        rules = (self.accounting, self._accounting, self.particles_rest, self.accumulator)
+        pairs = self.pair_rule, self.priority
+        key = (*rules, *pairs, self.traversal, self.ledger, self.start is None)
+        # One more for the cell beyond the lattice.
+        return Structure(key, {"cells": (self.columns + 2) * (self.rows + 2) + 1})
+
+    def bind(self, table: SceneFields) -> DeviceAutomaton:
+        """The automaton on the device, for all scenes of a table."""
         return DeviceAutomaton(self, table)

@@ -19,9 +19,9 @@ class StaticContact:
     held: number of them, shape (scenes,).
     """
 
-    def __init__(self, cells, accumulator, parameters):
+    def __init__(self, table, cells, accumulator, parameters):
         self.cells, self.accumulator, self.parameters = cells, accumulator, parameters
-        self.held = ti.field(ti.i32, shape=cells.kind.shape[0])
+        self.held = table.field(ti.i32)
 
     @ti.func
     def clear(self, s):

@@ -14,12 +14,12 @@ class Transport:
     crossing: cells of particles that may change their cell, shape (scenes, cells).
     """
 
-    def __init__(self, components):
+    def __init__(self, table, components):
         self.cells, self.lattice = components.cells, components.lattice
         self.conflict_resolution = components.conflict_resolution
         self.accumulator, self.resting = components.accumulator, components.resting
         self.accounting, self.parameters = components.accounting, components.parameters
-        self.crossing = ti.field(ti.i16, shape=(self.cells.kind.shape[0], self.lattice.cells))
+        self.crossing = table.field(ti.i16, "cells")
 
     @ti.func
     def fly_all(self, s, dt, pull, contacts: ti.template()):

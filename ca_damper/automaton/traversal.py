@@ -19,12 +19,12 @@ class Scan:
     @ti.func
     def size(self, s):
         """Cells to visit in a step."""
-        return self.lattice.end - self.lattice.first
+        return self.lattice.end() - self.lattice.first()
 
     @ti.func
     def cell(self, s, k):
         """The k-th cell to visit."""
-        return self.lattice.first + k
+        return self.lattice.first() + k
 
     @ti.func
     def placed(self, s, k, cell):
@@ -43,15 +43,14 @@ class Scan:
 class ParticleList:
     """Only the cells that hold a particle.
 
-    cells: of particle number k, shape (scenes, capacity). number: of the particle in a cell, shape
-    (scenes, cells + 1); meaningless in the other cells.
+    cells: of particle number k. number: of the particle in a cell, meaningless in the other cells.
+    Both of shape (scenes, cells).
     """
 
     def __init__(self, lattice, table):
         self.lattice, self.table = lattice, table
-        capacity = lattice.columns * lattice.rows
-        self.cells = ti.field(ti.i16, shape=(table.count, capacity))
-        self.number = ti.field(ti.i16, shape=(table.count, lattice.cells + 1))
+        self.cells = table.field(ti.i16, "cells")
+        self.number = table.field(ti.i16, "cells")
 
     @ti.func
     def size(self, s):
@@ -78,7 +77,7 @@ class ParticleList:
     def sort(self, s, cells: ti.template()):
         """Number the particles by their cells again: neighbours then mostly do alike, and fast."""
         count = 0
-        for cell in range(self.lattice.first, self.lattice.end):
+        for cell in range(self.lattice.first(), self.lattice.end()):
             kind = cells.at(s, cell)
             if kind != EMPTY and kind != WALL:
                 self.placed(s, count, cell)

@@ -21,10 +21,11 @@ class EffectActivity:
     sphere on sphere [W]. motion: energy of going and of turning [J].
     """
 
-    def __init__(self, scenes):
-        self.touches = ti.field(ti.i64, shape=scenes)
-        self.power = ti.Vector.field(2, ti.f64, shape=scenes)
-        self.motion = ti.Vector.field(2, ti.f64, shape=scenes)
+    def __init__(self, table):
+        self.table = table
+        self.touches = table.field(ti.i64)
+        self.power = table.vector(2, ti.f64)
+        self.motion = table.vector(2, ti.f64)
 
     @ti.func
     def clear(self, s):
@@ -47,8 +48,10 @@ class EffectActivity:
 
     def uses(self, effects):
         """An EffectUse for each of the named effects, over all scenes."""
-        power, motion = (field.to_numpy().sum(axis=0) for field in (self.power, self.motion))
-        touches = int(self.touches.to_numpy().sum())
+        power, motion = (
+            self.table.in_use(field).sum(axis=0) for field in (self.power, self.motion)
+        )
+        touches = int(self.table.in_use(self.touches).sum())
         # Spheres keep their spin: where none turns at any look, none has been turned.
         turned = touches if motion[1] > 0.0 else 0
         unseen = "" if touches else _UNSEEN

@@ -6,10 +6,11 @@ from typing import ClassVar, Optional
 
 import numpy as np
 
-from ca_damper.filling import check_places
+from ca_damper.filling import Structure
+from ca_damper.scene_fields import SceneFields
 from ca_damper.spheres.contact_law import POWERS, contact_duration, pair_numbers
 from ca_damper.spheres.dynamics import DIVERGENCES, DeviceSpheres
-from ca_damper.spheres.search import SEARCHES
+from ca_damper.spheres.search import SEARCHES, search_sizes
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import choice, finite, flag, fraction, positive, shown, whole
 
@@ -140,9 +141,14 @@ class Spheres:
         """Step [s] to stay at or below, and why; see ``safe_step``."""
         return self.safe_step(), "five steps in a contact"
 
-    def bind(self, table):
-        """The spheres on the device, for all scenes of a SceneTable."""
-        check_places(table.count, self.capacity)
+    @property
+    def structure(self) -> Structure:
+        """Effects, laws and the search are compiled; numbers, box and places of start are not."""
+        key = (self.damping, self.rubs, self.rotation, self.search, self.start is None)
+        return Structure(key, {"spheres": self.capacity, **search_sizes(self)})
+
+    def bind(self, table: SceneFields) -> DeviceSpheres:
+        """The spheres on the device, for all scenes of a table."""
         return DeviceSpheres(self, table)
 
     def _check_restitution(self, name):

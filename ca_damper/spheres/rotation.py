@@ -58,8 +58,8 @@ class Rotation:
     def bind(self, bodies):
         """Allocate spins and torques."""
         self.bodies = bodies
-        self.spin = ti.field(ti.f64, shape=bodies.capacity)
-        self.torque = ti.field(ti.f64, shape=bodies.capacity)
+        self.spin = bodies.table.field(ti.f64, "spheres", flat=True)
+        self.torque = bodies.table.field(ti.f64, "spheres", flat=True)
 
     @ti.func
     def reset(self, i):

@@ -1,0 +1,105 @@
+"""Numbers and state of the scenes of a batch on the device, with room for batches of other sizes.
+
+Fields are allocated once, with a capacity. How many scenes are in use, and how much of each of them,
+is read from fields at run time, so that a batch of another size compiles nothing.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Dict, List, Tuple, Union
+
+import numpy as np
+import taichi as ti
+from taichi.lang.util import to_numpy_type
+
+from ca_damper.table import SceneTable
+
+_ROWS = ti.types.ndarray(dtype=ti.f64, ndim=2)
+
+#: Length of an axis of a field: a number, or the name of one of the sizes.
+Length = Union[int, str]
+
+
+@dataclass(frozen=True, eq=False)
+class SceneField:
+    """A field of the scenes.
+
+    lengths: of its axes after that of the scenes. flat: whether the first of them and the scenes
+    share one axis, places of a scene side by side.
+    """
+
+    field: ti.Field
+    lengths: Tuple[Length, ...]
+    flat: bool
+    bytes: int
+
+
+@ti.data_oriented
+class SceneFields:
+    """What tells one scene of a batch from another; fields of shape (capacity,).
+
+    particles [-], seed [-] (cast to u32 for hashing), dt [s], frequency [Hz] and base_amplitude [m]
+    of the base motion, and the primary structure: mass [kg], stiffness [N/m], damping [N s/m].
+
+    capacity: most scenes. sizes: most places that a scene can have, by name. scenes: number of
+    scenes in use, shape (); scene_count: the same in Python. Whatever a scene does depends on its
+    own row only (on its seed, not on its index), so that no bit depends on what else is in a batch.
+    """
+
+    def __init__(self, capacity: int, sizes: Dict[str, int]):
+        self.capacity, self.sizes, self.scene_count = capacity, dict(sizes), 0
+        self.made: List[SceneField] = []
+        self.scenes = ti.field(ti.i32, shape=())
+        for name in SceneTable.COLUMNS:
+            kind = ti.i32 if name in ("particles", "seed") else ti.f64
+            setattr(self, name, self.field(kind))
+
+    def field(self, dtype, *lengths: Length, flat: bool = False) -> ti.Field:
+        """Declare a field of the scenes; lengths: of its axes after that of the scenes."""
+        return self._noted(ti.field(dtype, shape=self._shape(lengths, flat)), dtype, 1, lengths, flat)
+
+    def vector(self, n: int, dtype, *lengths: Length, flat: bool = False) -> ti.Field:
+        """Declare a field of vectors with n components; else as ``field``."""
+        shape = self._shape(lengths, flat)
+        return self._noted(ti.Vector.field(n, dtype, shape=shape), dtype, n, lengths, flat)
+
+    def _shape(self, lengths, flat):
+        shape = (self.capacity, *(self.length(length) for length in lengths))
+        return (shape[0] * shape[1], *shape[2:]) if flat else shape
+
+    def length(self, length: Length) -> int:
+        """Number of places of a scene along an axis."""
+        return self.sizes[length] if isinstance(length, str) else length
+
+    def _noted(self, field, dtype, components, lengths, flat):
+        count = math.prod(self._shape(lengths, flat)) * components
+        size = count * np.dtype(to_numpy_type(dtype)).itemsize
+        self.made.append(SceneField(field, lengths, flat, size))
+        return field
+
+    def load(self, table: SceneTable) -> None:
+        """Take over the rows of a table that fits."""
+        self.scene_count = table.count
+        rows = [table.column(name) for name in SceneTable.COLUMNS]
+        self._load(np.stack(rows).astype(np.float64))
+
+    def in_use(self, field: ti.Field) -> np.ndarray:
+        """Rows of the scenes in use, of a field whose first axis is that of the scenes."""
+        return field.to_numpy()[: self.scene_count]
+
+    @ti.kernel
+    def _load(self, rows: _ROWS):
+        for _ in range(1):
+            self.scenes[None] = rows.shape[1]
+        for s in range(rows.shape[1]):
+            self.particles[s] = ti.cast(rows[0, s], ti.i32)
+            self.seed[s] = ti.cast(rows[1, s], ti.i32)
+            self.dt[s], self.frequency[s] = rows[2, s], rows[3, s]
+            self.base_amplitude[s], self.mass[s] = rows[4, s], rows[5, s]
+            self.stiffness[s], self.damping[s] = rows[6, s], rows[7, s]
+
+    @ti.kernel
+    def drive(self, pair: _ROWS):
+        """Change frequency [Hz] and step [s] of all scenes: pair[0] and pair[1], (scenes,) each."""
+        for s in range(pair.shape[1]):
+            self.frequency[s], self.dt[s] = pair[0, s], pair[1, s]
