@@ -52,7 +52,7 @@ class Batch:
     """
 
     def __init__(self, filling, table, *, mount="spring", measured_cycles=1, rtol=1e-9, atol=1e-12):
-        self.generation = runtime.generation()
+        self.generation = runtime.session()
         check_filling(filling)
         instance("table", table, SceneTable)
         check_capacity()
@@ -260,7 +260,7 @@ class Batch:
         return self.account.error(self.sample()["momentum"]) if self._started else 0.0
 
     def _check_session(self):
-        if self.generation != runtime.generation():
+        if self.generation != runtime.session():
             raise InputError("this batch belongs to a Taichi session that has been stopped")
 
     def _read_status(self):

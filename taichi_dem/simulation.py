@@ -54,7 +54,7 @@ class Simulation:
     """
 
     def __init__(self, scene, method, driver="auto", brute_force=False):
-        self.generation = runtime.generation()
+        self.generation = runtime.session()
         instance("scene", scene, Scene)
         check_method(method)
         choice("driver", driver, ("auto", *DRIVERS))
@@ -158,7 +158,7 @@ class Simulation:
         Raises SimulationDiverged with place and reason when the run leaves its bounds, InputError
         for a number that is none.
         """
-        if self.generation != runtime.generation():
+        if self.generation != runtime.session():
             raise InputError("this simulation belongs to a Taichi session that has been stopped")
         end = whole("macro_step", macro_step, 0, MOST_STEPS) * MACRO_TICKS
         self.start()

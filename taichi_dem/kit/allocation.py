@@ -1,21 +1,209 @@
-"""Taichi crashes beyond 512 field trees a session, so allocation is batched.
+"""Field trees: fields declared in one block, allocated together, read and written in place.
 
-A group is what is declared between two uses of any field. A model that wrote each field as soon as
-it was made would take twenty groups, and the thirtieth model of a notebook would end it.
+Taichi crashes beyond 512 field trees a session and never frees one of them by itself. So each engine
+declares all of its fields in the block of one ``FieldTree``, which owns their memory.
+On a CPU an array lies where each field does (``array_of``): reading or writing compiles nothing.
 """
 
 import contextlib
+import ctypes
+import math
+import os
 
+import numpy as np
 import taichi as ti
 from taichi._snode.fields_builder import FieldsBuilder
 from taichi.lang import impl
+from taichi.lang.matrix import MatrixField
+from taichi.lang.snode import SNode
+from taichi.lang.util import to_numpy_type
 
 from taichi_dem.kit.errors import InputError
 
-#: Groups after which nothing new is begun; what has begun needs some more.
-MOST_GROUPS = 480
+#: Trees after which nothing new is begun; what has begun needs some more.
+MOST_TREES = 480
+#: Share of the free memory that a tree may take.
+_SHARE = 0.9
 
 _waiting = None
+
+
+class FieldTree:
+    """Fields declared in its ``with`` block; memory is taken at the end of the block, all at once.
+
+    advice: what to do where the machine lacks the memory, as the end of a sentence. bytes: size of
+    all fields. Raises InputError, before anything is allocated, where the machine lacks the memory
+    or the session has no room for another tree.
+    """
+
+    def __init__(self, advice="take a smaller one"):
+        self.advice, self.bytes, self._tree = advice, 0, None
+
+    def __enter__(self):
+        check_capacity()
+        self._before, self._builder = impl._root_fb, FieldsBuilder()
+        impl._root_fb = self._builder
+        self._anchor = ti.field(ti.i64, shape=1)
+        return self
+
+    def __exit__(self, kind, *_):
+        impl._root_fb = self._before
+        # Taichi would refuse every later kernel while it knows of a builder that is not finalized.
+        impl.get_runtime().finalize_fields_builder(self._builder)
+        if kind is not None:
+            return
+        self.bytes = _declared_bytes(self._builder.root.ptr)
+        check_memory(self.bytes, self.advice)
+        impl.get_runtime().initialize_fields_builder(self._builder)
+        self._tree = self._builder.finalize(raise_warning=False)
+        if impl.current_cfg().arch != ti.cuda:
+            _bases[self._tree.id] = _address(self._anchor) - _offset(self._anchor.snode.ptr)
+
+    def memory(self) -> np.ndarray:
+        """Array of all bytes of the tree, in place; on a CPU only."""
+        size = self._builder.root.ptr.cell_size_bytes
+        return _array_at(_bases[self._tree.id], np.uint8, (size,))
+
+    def clear(self):
+        """Set all fields to zero."""
+        ti.sync()
+        self.memory()[:] = 0
+
+    def destroy(self):
+        """Give the memory back; the fields must not be used any more."""
+        _bases.pop(self._tree.id, None)
+        self._tree.destroy()
+        self._tree = None
+
+
+#: Addresses of the trees of the session by their numbers.
+_bases: dict = {}
+
+
+def array_of(field) -> np.ndarray:
+    """Array that lies where a field of a ``FieldTree`` does; on a CPU only.
+
+    Writing to it writes to the field. It serves as long as the tree exists.
+    """
+    first = _first_scalar(field).snode.ptr
+    kind = np.dtype(to_numpy_type(field.dtype))
+    shape, strides = tuple(field.shape), ()
+    if shape:
+        strides = (first.parent.cell_size_bytes,)
+        for length in reversed(shape[1:]):
+            strides = (strides[0] * length, *strides)
+    if isinstance(field, MatrixField):
+        entry = (field.n,) if field.ndim == 1 else (field.n, field.m)
+        steps = (kind.itemsize,) if field.ndim == 1 else (field.m * kind.itemsize, kind.itemsize)
+        shape, strides = shape + entry, strides + steps
+    base = _bases[first.get_snode_tree_id()]
+    return _array_at(base + _offset(first), kind, shape, strides)
+
+
+def values(field) -> np.ndarray:
+    """Copy of all entries of a field."""
+    if impl.current_cfg().arch == ti.cuda:
+        return field.to_numpy()
+    ti.sync()
+    return array_of(field).copy()
+
+
+def assign(field, array):
+    """Write an array to the first entries of a field; the others keep their values.
+
+    A number fills the whole field.
+    """
+    if np.ndim(array) == 0 and field.shape:
+        array = np.full(values(field).shape, array)
+    if impl.current_cfg().arch == ti.cuda:
+        whole = field.to_numpy()
+        whole[slice(len(array)) if whole.ndim else ()] = array
+        field.from_numpy(whole)
+        return
+    ti.sync()
+    place = array_of(field)
+    place[slice(len(array)) if np.ndim(array) else ()] = array
+
+
+def available_bytes() -> float:
+    """Memory that a new allocation may take, infinite where the system does not tell."""
+    found = [_free_memory()]
+    with contextlib.suppress(OSError, ValueError):
+        with (
+            open("/sys/fs/cgroup/memory.max") as most,
+            open("/sys/fs/cgroup/memory.current") as now,
+        ):
+            found.append(float(most.read()) - float(now.read()))
+    return min(found)
+
+
+def _free_memory() -> float:
+    with contextlib.suppress(OSError, ValueError, StopIteration):
+        with open("/proc/meminfo") as lines:
+            line = next(line for line in lines if line.startswith("MemAvailable"))
+            return 1024.0 * float(line.split()[1])
+    with contextlib.suppress(AttributeError, OSError, ValueError):
+        return float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+    return math.inf
+
+
+def check_memory(needed, advice):
+    """Raise InputError, which ends with an advice, where the memory needed [bytes] is not free."""
+    free = available_bytes()
+    if needed > _SHARE * free:
+        raise InputError(
+            f"this needs {needed / 1e9:.3g} GB of memory, of which {free / 1e9:.3g} GB are free: "
+            f"{advice}"
+        )
+
+
+def _declared_bytes(node) -> int:
+    """Bytes of all fields placed below a node that is not allocated yet."""
+    total = 0
+    for child in map(node.get_ch, range(node.get_num_ch())):
+        if child.is_place():
+            total += np.dtype(to_numpy_type(child.data_type())).itemsize
+        else:
+            total += math.prod(SNode(child).shape) * _declared_bytes(child)
+    return total
+
+
+def _first_scalar(field):
+    if not isinstance(field, MatrixField):
+        return field
+    return field.get_scalar_field(*((0,) if field.ndim == 1 else (0, 0)))
+
+
+def _offset(node) -> int:
+    """Bytes from the beginning of its tree to a node."""
+    offset = 0
+    while node.parent is not None:
+        offset += node.offset_bytes_in_parent_cell
+        node = node.parent
+    return offset
+
+
+def _address(field) -> int:
+    """Address of the first entry of a field of one dimension."""
+    found = np.zeros(1, dtype=np.uint64)
+
+    @ti.kernel
+    def ask(found: ti.types.ndarray(dtype=ti.u64, ndim=1)):
+        """Fill in the address."""
+        for _ in range(1):
+            found[0] = ti.get_addr(field, 0)
+
+    ask(found)
+    return int(found[0])
+
+
+def _array_at(address, kind, shape, strides=None) -> np.ndarray:
+    kind = np.dtype(kind)
+    size = int(np.prod(shape, dtype=np.int64)) * kind.itemsize
+    if strides is not None and shape:
+        size = sum((n - 1) * step for n, step in zip(shape, strides)) + kind.itemsize
+    memory = (ctypes.c_char * size).from_address(address)
+    return np.ndarray(shape, kind, memory, strides=strides)
 
 
 @contextlib.contextmanager
@@ -50,10 +238,10 @@ def defer_fill(load, *arguments):
 def check_capacity():
     """Raise InputError when the session has no room for more fields."""
     program = impl.get_runtime().prog
-    groups = program.get_snode_tree_size() if program is not None else 0
-    if groups > MOST_GROUPS:
+    trees = program.get_snode_tree_size() if program is not None else 0
+    if trees > MOST_TREES:
         raise InputError(
-            f"groups of fields in a Taichi session must stay below {MOST_GROUPS}, got {groups}: "
+            f"groups of fields in a Taichi session must stay below {MOST_TREES}, got {trees}: "
             "call runtime.stop() and runtime.start() after some hundred simulations"
         )
 

@@ -9,6 +9,7 @@ import contextlib
 import io
 import os
 import tempfile
+import threading
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -48,7 +49,20 @@ class Settings:
 _STALE_LOCK_S = 10.0
 
 _current = None
-_generation = 0
+_session = None
+_on_clear = []
+
+
+class Session:
+    """What one start of Taichi brought about; objects that own fields remember theirs.
+
+    program: Taichi's own object of it. thread: the one that started it, the only one that may use
+    it. cleared: whether its engines have been given back since.
+    """
+
+    def __init__(self):
+        self.program, self.thread = impl.get_runtime().prog, threading.get_ident()
+        self.cleared = False
 
 
 def start(arch="cpu", threads=None, debug=False):
@@ -59,35 +73,80 @@ def start(arch="cpu", threads=None, debug=False):
     Returns the settings in force. Raises InputError for an unknown or absent architecture, a
     thread count below one, or a second start with other settings in the same process.
     """
-    global _current, _generation
+    global _current, _session
     wanted = _checked(arch, threads, debug)
-    if _current is not None and impl.get_runtime().prog is not None:
+    if _current is not None and impl.get_runtime().prog is _session.program:
         if wanted != _current:
             raise InputError(
                 f"Taichi already runs with {_current}, asked for {wanted}: call stop()"
             )
         return _current
     _initialise(wanted)
-    _current = wanted
-    _generation += 1
+    _current, _session = wanted, Session()
     return _current
 
 
 def stop():
     """End the Taichi session; every model, state and result field made in it becomes invalid."""
-    global _current
+    global _current, _session
     ti.reset()
-    _current = None
+    _current = _session = None
 
 
-def generation():
-    """Number of the running session; objects that own fields remember the one they were made in.
+def clear():
+    """Give back the memory of all engines; simulations and batches made so far become invalid.
+
+    Kernels compile anew afterwards; Taichi itself goes on. Does nothing before the first start.
+    """
+    global _session
+    if _session is None:
+        return
+    check_session(_session, "session")
+    for forget in _on_clear:
+        forget()
+    _session.cleared = True
+    _session = Session()
+
+
+def when_cleared(forget):
+    """Have forget() called by ``clear``."""
+    _on_clear.append(forget)
+
+
+def session():
+    """The running ``Session``; objects that own fields remember the one they were made in.
 
     Raises InputError when Taichi was not started.
     """
-    if _current is None:
+    if _session is None:
         raise InputError("Taichi is not started: call runtime.start() first")
-    return _generation
+    return _session
+
+
+def check_session(made_in, what):
+    """Raise InputError unless a session is the present one, unharmed, and asked by its thread.
+
+    what: whose session it is, in words, such as "simulation".
+    """
+    if made_in.cleared:
+        raise InputError(f"the memory of this {what} has been given back by runtime.clear()")
+    if made_in is not _session:
+        raise InputError(f"this {what} belongs to a Taichi session that has been stopped")
+    if impl.get_runtime().prog is not made_in.program:
+        raise InputError(
+            f"this {what} belongs to a Taichi session that ti.init or ti.reset has ended: start "
+            "and stop Taichi by runtime.start() and runtime.stop() only"
+        )
+    check_thread(what)
+
+
+def check_thread(what):
+    """Raise InputError on another thread than the one that started Taichi."""
+    if threading.get_ident() != session().thread:
+        raise InputError(
+            f"a {what} must be made and used on the thread that called runtime.start(): Taichi "
+            "would crash on another"
+        )
 
 
 def settings():

@@ -38,9 +38,9 @@ from taichi_dem import (
     needed_effects,
     quality_report,
     simulate,
+    step_report,
 )
 from taichi_dem.mesh.shapes import bar, pair, single
-from taichi_dem.stability import step_report
 from tests.bad_input.refusals import assert_refused, steady
 
 PAIR = pair()

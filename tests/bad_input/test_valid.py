@@ -20,9 +20,9 @@ from taichi_dem import (
     Uniform,
     effects,
     quality_report,
+    step_report,
 )
 from taichi_dem.mesh.shapes import bar, pair, single
-from taichi_dem.stability import step_report
 from tests.bad_input.refusals import ends_within, steady
 
 few = settings(steady, max_examples=3)

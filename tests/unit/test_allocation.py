@@ -44,6 +44,6 @@ def test_a_simulation_takes_one_group_of_fields():
 
 def test_a_session_at_its_limit_is_said_in_words(monkeypatch):
     Simulation(brisk_scene(), Multirate(1e-8, 2e-7))
-    monkeypatch.setattr(allocation, "MOST_GROUPS", 0)
+    monkeypatch.setattr(allocation, "MOST_TREES", 0)
     with pytest.raises(InputError, match=r"must stay below 0, got \d+: call runtime.stop"):
         Simulation(brisk_scene(), Multirate(1e-8, 2e-7))

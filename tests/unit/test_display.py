@@ -59,7 +59,7 @@ def of_the_blast():
         taichi_dem.needed_effects(result),
         MissingEffect("Softening", "bonds are stretched"),
     )
-    yield from (taichi_dem.stability.step_report(scene), taichi_dem.quality_report(mesh, CONCRETE))
+    yield from (taichi_dem.step_report(scene), taichi_dem.quality_report(mesh, CONCRETE))
     yield taichi_dem.Checkpoint("run.npz")
 
 

@@ -9,10 +9,11 @@ import pytest
 
 from taichi_dem import CONCRETE, Scene, Uniform, checked_mesh, effects, simulate
 from taichi_dem.diagnostics.missing_effects import MissingEffects
-from taichi_dem.diagnostics.outer_faces import LEAST_OVERLAP, OuterFaces, outer_faces_warnings
+from taichi_dem.diagnostics.outer_faces import LEAST_OVERLAP, OuterFaces
 from taichi_dem.engine.model import Model
 from taichi_dem.engine.state import State
 from taichi_dem.mesh.shapes import bar, pair, single
+from taichi_dem.scene import outer_faces_warnings
 from taichi_dem.simulation import Simulation
 from taichi_dem.stability.step_report import step_report
 

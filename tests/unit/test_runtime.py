@@ -35,7 +35,7 @@ first = runtime.start(threads=1)
 said["same"] = runtime.start(threads=1) is first
 refused("other", lambda: runtime.start(threads=2))
 simulation = Simulation(Scene(pair(), CONCRETE), Uniform())
-said["generation"] = runtime.generation()
+said["session"] = runtime.session() is not None
 runtime.stop()
 said["after"] = runtime.settings() is None
 refused("stopped", lambda: simulation.advance_to(1))

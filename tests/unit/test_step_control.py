@@ -18,10 +18,10 @@ from taichi_dem import (
     effects,
     read_mesh,
     simulate,
+    step_report,
 )
 from taichi_dem.mesh.shapes import bar, pair, single
 from taichi_dem.mesh.topology import topology_of
-from taichi_dem.stability import step_report
 from taichi_dem.stability.body_limits import LIMITED
 from taichi_dem.stability.mesh_limits import (
     bond_rates,

@@ -12,11 +12,11 @@ from taichi_dem import (
     StepControl,
     Uniform,
     effects,
+    step_report,
 )
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import pair, single
 from taichi_dem.mesh.topology import topology_of
-from taichi_dem.stability import step_report
 from taichi_dem.stability.body_limits import LIMITED
 from taichi_dem.stability.mesh_limits import (
     bond_rates,

@@ -1,0 +1,187 @@
+"""Engines of a session: what is compiled once for a structure and then runs any scene of it.
+
+An engine owns the fields and kernels of one structure, with a capacity. A scene that fits is loaded
+into it in milliseconds; a larger one gets a larger engine. Several scenes may be alive on one engine
+at once: they take turns, and the data of those that wait are kept aside, bit for bit.
+
+Each kind of engine has an ``EnginePool``. A simulation borrows an engine from it as a ``Loan`` and
+asks ``loan.activate()`` before it touches a field.
+"""
+
+import weakref
+
+import taichi as ti
+from taichi.lang import impl
+
+from taichi_dem.kit import runtime
+from taichi_dem.kit.allocation import FieldTree
+from taichi_dem.kit.field_memory import FieldMemory
+
+
+class Engine:
+    """Base of engines: fields in one ``FieldTree`` and who has data in them.
+
+    capacity: tuple of whole numbers, the most that fits. Derived classes declare all of their
+    fields in ``declare``, which is called once. tree: the fields' memory.
+    """
+
+    #: What to do where the machine lacks the memory, as the end of a sentence.
+    advice = "take a smaller one"
+
+    def __init__(self, structure, capacity):
+        self.structure, self.capacity = structure, tuple(capacity)
+        self._holder, self._used = None, False
+        self.tree = FieldTree(self.advice)
+        with self.tree:
+            self.declare()
+
+    def declare(self):
+        """Declare all fields; no field may be used here."""
+        raise NotImplementedError
+
+    def accepts(self, scene) -> bool:
+        """Whether a scene of the engine's structure and size can run in it as it is compiled."""
+        return True
+
+    def fits(self, size) -> bool:
+        """Whether so many of each find room."""
+        return all(most >= wanted for most, wanted in zip(self.capacity, size))
+
+    def clear(self):
+        """Set all fields to zero, as they are in a new engine."""
+        if self._used:
+            _memory_of(self).clear()
+        self._used = True
+
+
+class _WholeTree:
+    """The memory of an engine on a CPU: one copy for all of its fields."""
+
+    def __init__(self, engine):
+        self.tree = engine.tree
+
+    def read(self):
+        """Copy of all bytes."""
+        ti.sync()
+        return self.tree.memory().copy()
+
+    def write(self, saved):
+        """Give all fields their bytes back."""
+        ti.sync()
+        self.tree.memory()[:] = saved
+
+    def clear(self):
+        """Set all fields to zero."""
+        self.tree.clear()
+
+
+class _FieldByField:
+    """The memory of an engine on a GPU."""
+
+    def __init__(self, engine):
+        self.memories = [FieldMemory(engine, kind) for kind in ("saved", "constant", "scratch")]
+
+    def read(self):
+        """Copies of all fields."""
+        return [memory.read() for memory in self.memories]
+
+    def write(self, saved):
+        """Give all fields their values back."""
+        for memory, arrays in zip(self.memories, saved):
+            memory.write(arrays)
+
+    def clear(self):
+        """Set all fields to zero."""
+        for memory in self.memories:
+            for field in memory.fields.values():
+                field.fill(0)
+
+
+def _memory_of(engine):
+    return (_FieldByField if impl.current_cfg().arch == ti.cuda else _WholeTree)(engine)
+
+
+class Loan:
+    """The right to an engine: data of one owner, on the device or kept aside.
+
+    engine: the engine borrowed. what: the owner in words, such as "simulation".
+    """
+
+    def __init__(self, pool, engine, what):
+        self.pool, self.engine, self.what = pool, engine, what
+        self.session, self._aside = runtime.session(), None
+
+    def activate(self):
+        """Bring the owner's data to the device; those of another owner are kept aside.
+
+        Raises InputError for a session that has been stopped, restarted or cleared, and on another
+        thread than the one that started it.
+        """
+        runtime.check_session(self.session, self.what)
+        holder = self.engine._holder() if self.engine._holder is not None else None
+        if holder is self:
+            return
+        memory = _memory_of(self.engine)
+        if holder is not None:
+            holder._aside = memory.read()
+        if self._aside is not None:
+            memory.write(self._aside)
+            self._aside = None
+        self.engine._holder = weakref.ref(self)
+
+    def move(self, engine):
+        """Take the data along to another engine of the same structure and capacity."""
+        self.activate()
+        self._aside = _memory_of(self.engine).read()
+        self.engine._holder = None
+        self.engine = engine
+        self.activate()
+
+
+class EnginePool:
+    """Engines of one kind, by structure.
+
+    kind: class derived from ``Engine``. least: smallest capacity of an engine; sizes are rounded up
+    to powers of two from there, so that few of them are ever compiled.
+    """
+
+    def __init__(self, kind, least):
+        self.kind, self.least = kind, tuple(least)
+        self._session, self._engines = None, {}
+        runtime.when_cleared(self._forget)
+
+    def borrow(self, structure, size, scene, what) -> Loan:
+        """A ``Loan`` of an engine of a structure in which a scene of some size fits.
+
+        structure: hashable, equal for scenes that compile to the same kernels. size: as many whole
+        numbers as ``least`` has. Its owner loads the scene after ``activate``.
+        """
+        runtime.check_thread(what)
+        if self._session is not runtime.session():
+            self._engines, self._session = {}, runtime.session()
+        engines = self._engines.setdefault(structure, [])
+        fitting = [engine for engine in engines if engine.fits(size) and engine.accepts(scene)]
+        if not fitting:
+            capacity = [power_of_two(wanted, low) for wanted, low in zip(size, self.least)]
+            fitting = [self.kind(structure, capacity)]
+            engines += fitting
+        return Loan(self, min(fitting, key=lambda engine: engine.tree.bytes), what)
+
+    @property
+    def count(self) -> int:
+        """Engines of the present session."""
+        return sum(map(len, self._engines.values()))
+
+    def _forget(self):
+        for engines in self._engines.values():
+            for engine in engines:
+                engine.tree.destroy()
+        self._engines = {}
+
+
+def power_of_two(wanted, least=1) -> int:
+    """Smallest power of two times ``least`` that is no smaller than ``wanted``."""
+    size = max(1, int(least))
+    while size < wanted:
+        size *= 2
+    return size
