@@ -6,7 +6,7 @@ from taichi_dem.kit import runtime  # isort: skip
 from ca_damper.automaton import Automaton
 from ca_damper.batch import Batch
 from ca_damper.errors import InputError, SimulationDiverged
-from ca_damper.filling import Empty, RigidMass
+from ca_damper.fixed_mass import Empty, RigidMass
 from ca_damper.needed_effects import needed_effects
 from ca_damper.oscillator import Oscillator
 from ca_damper.record import film

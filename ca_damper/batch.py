@@ -1,29 +1,29 @@
 """Many scenes, run together in launches of bounded length.
 
-A launch takes every scene the same share of its way and lasts about a sixth of a second, so that
-Ctrl-C, progress and the look at diverged scenes are prompt.
+A batch borrows the engine of its structure: a batch of another size, or of other numbers, runs in the
+same one and compiles nothing. Batches alive at once on one engine take turns.
 """
 
 import contextlib
 import time
+from typing import Any, Callable, Dict, Iterator, List, Optional, Tuple
 
 import numpy as np
-import taichi as ti
 
 from ca_damper import measures
-from ca_damper.account import MomentumAccount
 from ca_damper.checks import MOST_CYCLES, STARTS, check_record_fits, for_all
-from ca_damper.clock import Clock, steps_per_cycle
-from ca_damper.container import DrivenContainer, SprungContainer
-from ca_damper.coupling import LOST, Coupling
-from ca_damper.errors import SimulationDiverged
-from ca_damper.filling import check_filling
+from ca_damper.clock import steps_per_cycle
+from ca_damper.container import CONTAINERS
+from ca_damper.divergence import divergence
+from ca_damper.engine import DamperEngine, borrow
+from ca_damper.filling import check_filling, structure_of
+from ca_damper.launches import Launches
 from ca_damper.oscillator import Oscillator
 from ca_damper.progress import BatchProgress
 from ca_damper.report import RK45_STAGES, Report
+from ca_damper.scene_memory import SceneMemory
 from ca_damper.table import SceneTable, dealt
 from taichi_dem.kit import runtime
-from taichi_dem.kit.allocation import check_capacity
 from taichi_dem.kit.checkpoint import version_text
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
@@ -31,12 +31,9 @@ from taichi_dem.kit.progress.progress import compiling
 from taichi_dem.kit.restart import CheckpointWriter, NoCheckpointWriter, RunSnapshot, opened
 from taichi_dem.kit.validation import choice, instance, positive, whole
 
-MOUNTS = ("spring", "base")
+MOUNTS = tuple(CONTAINERS)
 
-#: A launch is kept near this long [s].
-LAUNCH_SECONDS = 0.15
 _MOST_STEPS = 2**31 - 1
-_LOST_IN_WORDS = "lost its container, whose motion is no finite number"
 _STRUCTURE = ("mass", "stiffness", "damping", "base_amplitude")
 
 
@@ -44,48 +41,65 @@ class Batch:
     """A filling, a table of scenes and the container's mount, ready to run.
 
     table.dt holds the largest step of every scene; it is shortened so that a whole number of steps
-    makes a cycle of the base: ``steps_per_cycle``, (scenes,).
+    makes a cycle of the base: ``steps_per_cycle``, (scenes,). The batch keeps a table of its own.
     mount: "spring", or "base" for a container that moves like the base whatever the filling does.
     measured_cycles: most cycles that one run may measure. rtol, atol: of RK45, on the spring.
     ``run_seconds`` and ``compile_seconds`` tell what was spent, ``report()`` all of it in short.
     Raises InputError for a scene that the filling refuses or a step out of range.
     """
 
-    def __init__(self, filling, table, *, mount="spring", measured_cycles=1, rtol=1e-9, atol=1e-12):
-        self.generation = runtime.session()
-        check_filling(filling)
-        instance("table", table, SceneTable)
-        check_capacity()
-        choice("mount", mount, MOUNTS)
+    def __init__(
+        self,
+        filling: Any,
+        table: SceneTable,
+        *,
+        mount: str = "spring",
+        measured_cycles: int = 1,
+        rtol: float = 1e-9,
+        atol: float = 1e-12,
+    ):
+        runtime.session()
+        self.filling = check_filling(filling)
+        self.table = instance("table", table, SceneTable).copy()
+        self.count, self.mount = table.count, choice("mount", mount, MOUNTS)
         self.measured_cycles = whole("measured_cycles", measured_cycles, 0, 100_000)
         check_record_fits(table.count, self.measured_cycles)
-        positive("rtol", rtol, zero_allowed=True)
-        positive("atol", atol)
-        compiling("set-up", 0.0)
-        self.filling, self.table, self.count, self.mount = filling, table, table.count, mount
-        self.oscillators = self._structures()
-        self.largest_dt, self.clock = table.column("dt"), Clock(table)
-        frequency = table.column("frequency")
+        rtol = positive("rtol", rtol, zero_allowed=True)
+        atol = positive("atol", atol)
+        self.oscillators, self.largest_dt = self._structures(), self.table.column("dt")
+        frequency = self.table.column("frequency")
         dt = self._fit_steps(frequency)
-        container = DrivenContainer(table, self.clock)
-        if mount == "spring":
-            container = SprungContainer(table, self.clock, filling.gravity, rtol, atol)
-        self.device = filling.bind(table)
-        self.account = MomentumAccount(table, filling.particle_mass * filling.gravity)
-        self.coupling = Coupling(
-            *(table, self.clock, container, self.device, self.account),
-            *(filling.gravity, self.measured_cycles),
-        )
+        compiling("set-up", 0.0)
+        self.loan = borrow(self.filling, mount, self.count, self.measured_cycles)
+        self.engine.clear()
+        self.engine.load(self.filling, self.table, rtol, atol)
         self._set_pace(frequency, dt)
         self.time_origin = np.zeros(self.count)
-        self.run_seconds = self.compile_seconds = 0.0
+        self.launches, self.compile_seconds = Launches(self.count), 0.0
         self.scene_steps = self.particle_steps = 0
-        # Scene-steps a launch; one each to begin with, as nobody knows yet what a step costs.
-        self._pace = float(self.count)
-        self._compiled = self._started = False
-        # Of the present run: share done and seconds it took; whether it goes on from a checkpoint.
-        self._done, self._seconds, self.going_on = 0.0, 0.0, False
+        self._started = False
+        # Whether the present run goes on from a checkpoint.
+        self.going_on = False
         self.writer = NoCheckpointWriter()
+
+    @property
+    def engine(self) -> DamperEngine:
+        """The engine, with the data of this batch on it.
+
+        Raises InputError for a session that has been stopped or cleared, and on another thread.
+        """
+        self.loan.activate()
+        return self.loan.engine
+
+    @property
+    def device(self) -> Any:
+        """The filling on the device."""
+        return self.engine.device
+
+    @property
+    def run_seconds(self) -> float:
+        """Time spent on stepping [s]."""
+        return self.launches.run_seconds
 
     def __repr__(self):
         return in_brief(self, self.filling.label, f"{self.count:,} scenes", f"on the {self.mount}")
@@ -96,10 +110,10 @@ class Batch:
         start: the container begins at "rest", or in the steady state of the "empty" container, or
         in that of a container with the particles as "rigid" mass.
         """
-        self._check_session()
+        coupling = self.engine.coupling
         choice("start", start, STARTS)
         compiling("placing", 0.2)
-        self.coupling.start(np.ascontiguousarray(self._initial(start)))
+        coupling.start(np.ascontiguousarray(self._initial(start)))
         self._started = True
         self.time_origin[:] = 0.0
         self._check_divergence()
@@ -110,12 +124,14 @@ class Batch:
         The bits are those of a batch that is made with them, and nothing is compiled.
         Raises InputError for what that batch would refuse.
         """
-        self._check_session()
+        engine = self.engine
         self.table.change(**{"dt": self.largest_dt, **numbers})
         self._started, self.largest_dt = False, self.table.column("dt")
         self.oscillators = self._structures()
         frequency = self.table.column("frequency")
-        self._set_pace(frequency, self._fit_steps(frequency))
+        dt = self._fit_steps(frequency)
+        engine.table.load(self.table)
+        self._set_pace(frequency, dt)
 
     def _structures(self):
         """What every scene hangs on; InputError for numbers that cannot be meant."""
@@ -129,7 +145,7 @@ class Batch:
         self._check_cycle_is_full()
         before, frequency = self.time_s, for_all("frequency", frequency, self.count)
         self._set_pace(frequency, self._fit_steps(frequency))
-        self.coupling.renew()
+        self.engine.coupling.renew()
         self.time_origin += before - self.time_s
 
     def run(self, transient_cycles, measured_cycles, progress=None):
@@ -148,7 +164,7 @@ class Batch:
         self._go((transient + measured) * steps, transient * steps, progress)
         record = np.empty((self.count, measured, len(measures.COLUMNS)))
         if measured:
-            self.coupling.read(record)
+            self.engine.coupling.read(record)
         return measures.Cycles(self.table.column("frequency"), self.steps_per_cycle, record)
 
     def advance(self, steps, progress=None):
@@ -174,7 +190,7 @@ class Batch:
         """
         self._check_started()
         values = np.empty((len(measures.SAMPLE), self.count))
-        self.coupling.sample(values)
+        self.engine.coupling.sample(values)
         return {"time_s": self.time_s, **dict(zip(measures.SAMPLE, values))}
 
     def snapshot(self, s):
@@ -184,7 +200,7 @@ class Batch:
 
     def attempts(self):
         """Steps that RK45 has tried since the start, (scenes,); one a step unless some failed."""
-        return self.coupling.attempts.to_numpy()
+        return self.engine.table.in_use(self.engine.coupling.attempts)
 
     @contextlib.contextmanager
     def checkpointed(self, checkpoint, resume, identity, owners=()):
@@ -199,7 +215,9 @@ class Batch:
         own = {"version": version_text(), "filling": repr(self.filling)}
         arrays = opened(checkpoint, resume, lambda: {**own, **identity})
         self._compile()
-        saved = RunSnapshot({**own, **identity}, self, {"batch": self, **dict(owners)})
+        sizes = {"cycles": max(1, self.measured_cycles), **structure_of(self.filling).sizes}
+        memory = SceneMemory(lambda: self.engine, sizes)
+        saved = RunSnapshot({**own, **identity}, memory, {"batch": self, **dict(owners)})
         if arrays:
             saved.restore(arrays, resume)
         writer = NoCheckpointWriter()
@@ -219,7 +237,7 @@ class Batch:
         """What a checkpoint holds of it beside the fields, arrays by name."""
         pace = [self.table.column(name) for name in ("frequency", "dt")]
         return {
-            "run": np.array([self._done, self._seconds, self.run_seconds]),
+            "run": self.launches.saved(),
             "steps": np.array([self.scene_steps, self.particle_steps]),
             "pace": np.stack([*pace, self.time_origin]),
             "steps_per_cycle": self.steps_per_cycle,
@@ -227,7 +245,7 @@ class Batch:
 
     def resume(self, saved):
         """Take over what ``saved`` gave."""
-        self._done, self._seconds, self.run_seconds = saved["run"].tolist()
+        self.launches.resume(saved["run"])
         self.scene_steps, self.particle_steps = saved["steps"].tolist()
         frequency, dt, self.time_origin = saved["pace"].copy()
         self.steps_per_cycle = saved["steps_per_cycle"]
@@ -257,20 +275,16 @@ class Batch:
         )
 
     def _momentum_error(self):
-        return self.account.error(self.sample()["momentum"]) if self._started else 0.0
-
-    def _check_session(self):
-        if self.generation != runtime.session():
-            raise InputError("this batch belongs to a Taichi session that has been stopped")
+        return self.engine.account.error(self.sample()["momentum"]) if self._started else 0.0
 
     def _read_status(self):
         """Step, position in the cycle, and status of all scenes, (3, scenes)."""
         seen = np.empty((3, self.count), dtype=np.int32)
-        self.coupling.read_status(seen)
+        self.engine.coupling.read_status(seen)
         return seen
 
     def _check_started(self):
-        self._check_session()
+        self.loan.activate()
         if not self._started:
             raise InputError("this batch has no state yet: call start() first")
 
@@ -296,8 +310,10 @@ class Batch:
         return dt
 
     def _set_pace(self, frequency, dt):
+        engine = self.engine
         self.table.drive(frequency, dt)
-        self.clock.set(self.steps_per_cycle)
+        engine.table.drive(np.ascontiguousarray(np.stack([frequency, dt]), dtype=np.float64))
+        engine.clock.set(self.steps_per_cycle)
 
     def _initial(self, start):
         """(x, v) of the container at the beginning, shape (scenes, 2)."""
@@ -325,73 +341,46 @@ class Batch:
             raise InputError(f"steps since the start must stay below {_MOST_STEPS}: run fewer")
         order = dealt((1 + self.table.column("particles")) * steps, runtime.settings().threads)
         plan = np.stack([begin, begin + steps, begin + before_measuring, order])
-        self.coupling.aim(plan.astype(np.int32))
-        self._done = self._seconds = 0.0
+        self.engine.coupling.aim(plan.astype(np.int32))
+        self.launches.begin()
 
     def _compile(self):
-        """Compile the launch without stepping."""
-        if not self._compiled:
+        """Compile the launch without stepping, unless a batch on this engine has done so."""
+        engine = self.engine
+        if not engine.is_compiled:
             started = time.perf_counter()
             compiling("time step", 0.4)
-            self.coupling.advance(0.0)
+            engine.coupling.advance(0.0)
             self.compile_seconds += time.perf_counter() - started
-            self._compiled = True
+            engine.is_compiled = True
 
     def _launch_until_done(self, steps, progress):
         """Launch, tell and save; a run that was saved at its end is told and saved once more."""
-        total, done = max(1, int(steps.sum())), -1.0
+        launches, total, done = self.launches, max(1, int(steps.sum())), -1.0
         while done < 1.0:
-            done, started = self._done, time.perf_counter()
-            try:
-                self._done = self._launch(done, total)
-            finally:
-                self._seconds += time.perf_counter() - started
-                self.run_seconds += time.perf_counter() - started
-            if done < 1.0 == self._done:
+            done = launches.done
+            launches.launch(total, self._advance, self._check_divergence)
+            if done < 1.0 == launches.done:
                 self._count(steps)
             if progress is not None:
-                progress(BatchProgress(self._done, self._seconds, round(self._done * total)))
+                progress(
+                    BatchProgress(launches.done, launches.seconds, round(launches.done * total))
+                )
             self.writer.save_if_needed()
-            done = self._done
+            done = launches.done
+
+    def _advance(self, share):
+        self.engine.coupling.advance(share)
 
     def _count(self, steps):
         self.scene_steps += int(steps.sum())
         self.particle_steps += int((self.table.column("particles") * steps).sum())
 
-    def _launch(self, done, total):
-        """One launch from a share of the way, total scene-steps long; returns the share reached."""
-        share = min(1.0, done + self._pace / total)
-        started = time.perf_counter()
-        self.coupling.advance(share)
-        ti.sync()
-        seconds = time.perf_counter() - started
-        # What a short way allowed to see says nothing of how fast a long one may go.
-        if share < 1.0:
-            self._pace *= min(4.0, max(0.25, LAUNCH_SECONDS / seconds))
-            self._pace = max(self._pace, float(self.count))
-        self._check_divergence()
-        return share
-
     def _check_divergence(self):
-        status = self._read_status()[2]
+        step, _, status = self._read_status()
         if status.any():
             # Scenes stop where they diverge: the first of them in time speaks for all.
-            self._report_divergence(int(np.argmin(np.where(status != 0, self.time_s, np.inf))))
-
-    def _report_divergence(self, s):
-        row, step, now = self.table.row(s), self.coupling.step[s], float(self.time_s[s])
-        code, dt = self.coupling.status[s], row["dt"]
-        words, allowed = self.filling.divergence(max(code, 1), row["particles"], dt)
-        if code == LOST:
-            # What the filling bears at most is still the best advice.
-            words, allowed = _LOST_IN_WORDS, min(allowed, 0.5 * dt)
-        raise SimulationDiverged(
-            f"the scene of particles = {row['particles']} and seed {row['seed']} at "
-            f"{row['frequency']:.5g} Hz diverged by step {step}, t = {now:.4g} s: it {words}; "
-            f"dt must be at most {allowed:.3g} s, was {dt:.3g} s",
-            scene=row,
-            step=step,
-            time_s=now,
-            dt=dt,
-            dt_allowed=allowed,
-        )
+            time_s = self.time_s
+            s = int(np.argmin(np.where(status != 0, time_s, np.inf)))
+            found = int(status[s]), int(step[s]), float(time_s[s])
+            raise divergence(self.filling, self.table.row(s), *found)

@@ -1,6 +1,6 @@
 """How the container moves: on its spring, pushed by base and filling, or fixed to the base.
 
-Both have the ti.funcs ``start(s, x, v)``, ``motion(s)`` at the beginning of a step, and
+Both have ``load`` for the numbers of a batch, and the ti.funcs ``start(s, x, v)``, ``motion(s)`` at the beginning of a step, and
 ``advance(s, action)`` over it, which returns the attempts that the integration took, or -1.
 """
 
@@ -122,3 +122,7 @@ class DrivenContainer:
     def advance(self, s, action):
         """Nothing to integrate: the clock moves the base."""
         return 1
+
+
+#: Containers by the word for their mount.
+CONTAINERS = {"spring": SprungContainer, "base": DrivenContainer}

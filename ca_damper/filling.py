@@ -45,12 +45,17 @@ class Action:
     carried: ti.f64
 
 
+#: Places for particles in all scenes of a batch: they are counted in 32 bits.
+_MOST_PLACES = 2**25
+
+
 @dataclass(frozen=True)
 class Structure:
     """What the compiler sees of a filling; fillings of equal ``key`` share their compiled kernels.
 
     key: the options that decide what is compiled. sizes: places that a scene needs, by name, for
-    ``SceneFields.field``; an engine has room for more, so that smaller ones compile nothing.
+    ``SceneFields.field``, those for particles first; an engine has room for more, so that smaller
+    ones compile nothing.
     """
 
     key: Hashable
@@ -149,6 +154,15 @@ def check_filling(filling: Any) -> Any:
         )
     _check_members("filling", filling, members)
     return filling
+
+
+def check_places(scenes: int, places: int) -> None:
+    """InputError where so many scenes with so many places for particles each cannot be counted."""
+    if scenes * places > _MOST_PLACES:
+        raise InputError(
+            f"scenes x places for particles must be at most {_MOST_PLACES} in one batch, got "
+            f"{scenes} x {places}: run fewer scenes at a time"
+        )
 
 
 def check_device(filling: Any, device: Any) -> Any:

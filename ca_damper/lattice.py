@@ -103,12 +103,13 @@ class LatticeSize:
 class Lattice:
     """The tables of a geometry on the device, with room for others.
 
-    geometry: the one that is loaded. size: a LatticeSize, shape ().
+    size: a LatticeSize, shape ().
     """
+
+    constant_fields = ("size", "neighbour", "blank", "cosine")
 
     def __init__(self, table):
         most = table.length("cells")
-        self.geometry = None
         self.size = LatticeSize.field(shape=())
         self.neighbour = ti.field(ti.i16, shape=(most, KINDS))
         self.blank = ti.field(ti.i8, shape=most)
@@ -116,11 +117,16 @@ class Lattice:
 
     def load(self, geometry):
         """Take over the tables of a geometry."""
-        self.geometry = geometry
         cosines = np.zeros((KINDS, DIRECTIONS))
         cosines[:DIRECTIONS] = alignments()
         self._load_size(geometry.columns, geometry.rows)
         self._load(geometry.neighbours(), geometry.blank()[:, None], cosines)
+
+    @property
+    def geometry(self):
+        """The geometry that is loaded."""
+        size = self.size[None]
+        return Geometry(int(size.columns), int(size.rows))
 
     @ti.kernel
     def _load_size(self, columns: ti.i32, rows: ti.i32):

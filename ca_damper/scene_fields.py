@@ -4,15 +4,15 @@ Fields are allocated once, with a capacity. How many scenes are in use, and how 
 is read from fields at run time, so that a batch of another size compiles nothing.
 """
 
-import math
 from dataclasses import dataclass
 from typing import Dict, List, Tuple, Union
 
 import numpy as np
 import taichi as ti
-from taichi.lang.util import to_numpy_type
+from taichi.lang import impl
 
 from ca_damper.table import SceneTable
+from taichi_dem.kit.allocation import array_of, values
 
 _ROWS = ti.types.ndarray(dtype=ti.f64, ndim=2)
 
@@ -31,7 +31,6 @@ class SceneField:
     field: ti.Field
     lengths: Tuple[Length, ...]
     flat: bool
-    bytes: int
 
 
 @ti.data_oriented
@@ -47,7 +46,7 @@ class SceneFields:
     """
 
     def __init__(self, capacity: int, sizes: Dict[str, int]):
-        self.capacity, self.sizes, self.scene_count = capacity, dict(sizes), 0
+        self.capacity, self.sizes = capacity, dict(sizes)
         self.made: List[SceneField] = []
         self.scenes = ti.field(ti.i32, shape=())
         for name in SceneTable.COLUMNS:
@@ -56,12 +55,12 @@ class SceneFields:
 
     def field(self, dtype, *lengths: Length, flat: bool = False) -> ti.Field:
         """Declare a field of the scenes; lengths: of its axes after that of the scenes."""
-        return self._noted(ti.field(dtype, shape=self._shape(lengths, flat)), dtype, 1, lengths, flat)
+        return self._noted(ti.field(dtype, shape=self._shape(lengths, flat)), lengths, flat)
 
     def vector(self, n: int, dtype, *lengths: Length, flat: bool = False) -> ti.Field:
         """Declare a field of vectors with n components; else as ``field``."""
         shape = self._shape(lengths, flat)
-        return self._noted(ti.Vector.field(n, dtype, shape=shape), dtype, n, lengths, flat)
+        return self._noted(ti.Vector.field(n, dtype, shape=shape), lengths, flat)
 
     def _shape(self, lengths, flat):
         shape = (self.capacity, *(self.length(length) for length in lengths))
@@ -71,21 +70,30 @@ class SceneFields:
         """Number of places of a scene along an axis."""
         return self.sizes[length] if isinstance(length, str) else length
 
-    def _noted(self, field, dtype, components, lengths, flat):
-        count = math.prod(self._shape(lengths, flat)) * components
-        size = count * np.dtype(to_numpy_type(dtype)).itemsize
-        self.made.append(SceneField(field, lengths, flat, size))
+    def _noted(self, field, lengths, flat):
+        self.made.append(SceneField(field, lengths, flat))
         return field
 
     def load(self, table: SceneTable) -> None:
         """Take over the rows of a table that fits."""
-        self.scene_count = table.count
         rows = [table.column(name) for name in SceneTable.COLUMNS]
         self._load(np.stack(rows).astype(np.float64))
 
     def in_use(self, field: ti.Field) -> np.ndarray:
         """Rows of the scenes in use, of a field whose first axis is that of the scenes."""
-        return field.to_numpy()[: self.scene_count]
+        return values(field)[: self.scene_count]
+
+    def row(self, field: ti.Field, s: int) -> np.ndarray:
+        """Entries of scene s of a field whose first axis is that of the scenes."""
+        if impl.current_cfg().arch == ti.cuda:
+            return field.to_numpy()[s]
+        ti.sync()
+        return array_of(field)[s].copy()
+
+    @property
+    def scene_count(self) -> int:
+        """Number of scenes in use, in Python."""
+        return int(values(self.scenes))
 
     @ti.kernel
     def _load(self, rows: _ROWS):

@@ -43,6 +43,10 @@ class SceneTable:
         self.count = len(rows[0])
         self._host = dict(zip(self.COLUMNS, (row.copy() for row in rows)))
 
+    def copy(self) -> "SceneTable":
+        """A table of the same numbers, to be changed without this one."""
+        return SceneTable(**self._host)
+
     def __repr__(self):
         ends = {name: (of.min(), of.max()) for name, of in self._host.items()}
         words = (

@@ -104,15 +104,16 @@ class DeviceAutomaton:
 
     def snapshot(self, s):
         """Positions and velocities of the particles, by cell (see ``ca_damper.filling``)."""
-        kind = self._row(self.cells.kind, s)
+        geometry = self.lattice.geometry
+        kind, travelled, speed = (
+            self.table.row(field, s)[: geometry.cells]
+            for field in (self.cells.kind, self.cells.travelled, self.cells.speed)
+        )
         flying, present = kind < DIRECTIONS, (kind != EMPTY) & (kind != WALL)
         way = np.zeros((len(kind), 2))
         way[flying] = unit_vectors()[kind[flying]]
-        position = self.lattice.geometry.centres(self.parameters.width[None])
-        position = position + way * self._row(self.cells.travelled, s)[:, None]
-        velocity = way * self._row(self.cells.speed, s)[:, None]
+        position = geometry.centres(self.parameters.width[None])
+        position = position + way * travelled[:, None]
+        velocity = way * speed[:, None]
         velocity[kind == HELD, 1] = self.velocity[s]
         return {"position": position[present], "velocity": velocity[present]}
-
-    def _row(self, field, s):
-        return np.array([field[s, cell] for cell in range(self.lattice.geometry.cells)])

@@ -53,7 +53,7 @@ class Ejection:
         """One cell up (way 1) or down (-1); returns counted gain of velocity along x [quanta]."""
         self.mark(s, way)
         impulse = ti.cast(0, ti.i64)
-        for k in range(self.cells.traversal.size(s)):
+        for k in range(self.cells.traversal.begin(), self.cells.traversal.end(s)):
             cell = self.cells.traversal.cell(s, k)
             if self.pushed[s, cell] == 1 and self.cells.at(s, cell) != HELD:
                 impulse += self.push(s, cell, way, velocity)

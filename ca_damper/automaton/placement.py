@@ -40,6 +40,8 @@ class DrawnCells:
 class NamedCells:
     """Cells named by the user, the same in every scene."""
 
+    constant_fields = ("named", "count")
+
     def __init__(self, table, cells):
         self.cells = cells
         self.count = ti.field(ti.i32, shape=())

@@ -72,7 +72,7 @@ class StaticContact:
         if self.held[s] > 0:
             kind = UP if velocity > 0.0 else DOWN
             travelled = self.accumulator.at_wall(kind, self.cells.offset[s])
-            for k in range(self.cells.traversal.size(s)):
+            for k in range(self.cells.traversal.begin(), self.cells.traversal.end(s)):
                 cell = self.cells.traversal.cell(s, k)
                 if self.cells.at(s, cell) == HELD:
                     self.cells.put(s, cell, kind, abs(velocity), travelled)

@@ -28,7 +28,7 @@ class Transport:
         Returns how many touch something, how many may move on, and how many fly obliquely.
         """
         contact_count, crossing_count, oblique = 0, 0, 0
-        for k in range(self.cells.traversal.size(s)):
+        for k in range(self.cells.traversal.begin(), self.cells.traversal.end(s)):
             cell = self.cells.traversal.cell(s, k)
             touches, free, upward = self.fly(s, cell, dt, pull)
             if touches:

@@ -17,14 +17,19 @@ class Scan:
         self.lattice = lattice
 
     @ti.func
-    def size(self, s):
-        """Cells to visit in a step."""
-        return self.lattice.end() - self.lattice.first()
+    def begin(self):
+        """First of the numbers k of the cells to visit in a step."""
+        return self.lattice.first()
+
+    @ti.func
+    def end(self, s):
+        """One past the last of them."""
+        return self.lattice.end()
 
     @ti.func
     def cell(self, s, k):
-        """The k-th cell to visit."""
-        return self.lattice.first() + k
+        """Cell number k to visit."""
+        return k
 
     @ti.func
     def placed(self, s, k, cell):
@@ -53,13 +58,18 @@ class ParticleList:
         self.number = table.field(ti.i16, "cells")
 
     @ti.func
-    def size(self, s):
-        """Cells to visit in a step."""
+    def begin(self):
+        """First of the numbers k of the cells to visit in a step."""
+        return 0
+
+    @ti.func
+    def end(self, s):
+        """One past the last of them."""
         return self.table.particles[s]
 
     @ti.func
     def cell(self, s, k):
-        """The k-th cell to visit."""
+        """Cell number k to visit."""
         return ti.cast(self.cells[s, k], ti.i32)
 
     @ti.func

@@ -21,6 +21,7 @@ from ca_damper.spheres.contact_law import Contact, ContactLaw, pair_numbers, wal
 from ca_damper.spheres.effect_activity import EffectActivity
 from ca_damper.spheres.rotation import NoRotation, Rotation
 from ca_damper.spheres.search import SEARCHES
+from taichi_dem.kit.allocation import values
 
 # Codes of divergence; a speed is a runaway's when it crosses more than a radius in a step.
 FINE, NOT_FINITE, RUNAWAY, OVERLAP, ENERGY_GAINED = range(5)
@@ -285,7 +286,7 @@ class DeviceSpheres:
         """Places and velocities of the spheres of scene s, and their spins [rad/s] if they turn."""
         count = self.table.particles[s]
         rows = slice(s * self.bodies.stride, s * self.bodies.stride + count)
-        velocity = self.bodies.velocity.to_numpy()[rows]
-        position = self.bodies.position.to_numpy()[rows] - self.bodies.lead[s] * velocity
+        velocity = values(self.bodies.velocity)[rows]
+        position = values(self.bodies.position)[rows] - self.bodies.lead[s] * velocity
         shift = np.array([0.5 * self.bodies.body[None].width, -self.bodies.floor[s]])
         return {"position": position + shift, "velocity": velocity, **self.rotation.snapshot(rows)}

@@ -2,6 +2,8 @@
 
 import taichi as ti
 
+from taichi_dem.kit.allocation import values
+
 
 @ti.data_oriented
 class NoRotation:
@@ -95,7 +97,7 @@ class Rotation:
 
     def snapshot(self, rows):
         """Spins [rad/s] of some spheres."""
-        return {"spin": self.spin.to_numpy()[rows]}
+        return {"spin": values(self.spin)[rows]}
 
     @ti.func
     def _inertia(self):
