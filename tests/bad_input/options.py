@@ -149,6 +149,7 @@ DAMPER = [
     *taken(Automaton, "zero or positive", ("gravity", "static_threshold")),
     *taken(Automaton, "whole", ("columns", "rows")),
     *taken(Automaton, "flag", ("ledger",)),
+    *taken(Automaton, "flag", ("static_contact",), (None,)),
     *taken(Spheres, "word", ("damping", "search")),
     *taken(Spheres, "share", ("restitution", "wall_restitution")),
     *taken(Spheres, "positive", (*_MODULI, "width", "height")),

@@ -5,7 +5,7 @@ import pytest
 
 from ca_damper.automaton import Automaton
 from ca_damper.batch import Batch
-from ca_damper.filling import Empty
+from ca_damper.fixed_mass import Empty
 from ca_damper.measures import peak
 from ca_damper.oscillator import Oscillator
 from ca_damper.spheres import Spheres
@@ -60,7 +60,7 @@ def test_rigid_limit(particles):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("accounting", ["landing+ejection", "static"])
+@pytest.mark.parametrize("accounting", ["landing+ejection", "all"])
 def test_damping_grows_with_the_particles(accounting):
     """The highest response of five seeds falls from N = 10 to N = 50.
 

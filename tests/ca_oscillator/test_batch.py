@@ -21,7 +21,7 @@ from ca_damper import (
     SimulationDiverged,
     runtime,
 )
-from ca_damper import batch as batch_module
+from ca_damper import launches
 from ca_damper.clock import steps_per_cycle
 from ca_damper.progress import BatchProgress, Stages
 from ca_damper.table import dealt
@@ -54,10 +54,10 @@ def test_company_and_order_in_a_batch_change_no_bit():
 def test_number_of_launches_changes_no_bit(monkeypatch):
     once = kicked(range(5))
     told = []
-    monkeypatch.setattr(batch_module, "LAUNCH_SECONDS", 1e-9)
+    monkeypatch.setattr(launches, "LAUNCH_SECONDS", 1e-9)
     table = SceneTable(PARTICLES, SEEDS, 5e-4, FREQUENCIES, 0.6e-3)
     batch = Batch(KICKS, table, measured_cycles=2)
-    batch._pace = 100.0
+    batch.launches.pace = 100.0
     batch.start()
     cycles = batch.run(1, 2, told.append)
     assert len(told) > 20
@@ -136,7 +136,7 @@ def test_a_cycle_ends_exactly_where_it_began():
     batch = Batch(Empty(), SceneTable(0, 1, 1e-4, FREQUENCIES, 0.6e-3))
     batch.start()
     batch.advance(batch.steps_per_cycle)
-    assert (batch.clock.circle.to_numpy() == [0.0, 1.0]).all()
+    assert (batch.engine.table.in_use(batch.engine.clock.circle) == [0.0, 1.0]).all()
     assert (batch.sample()["y"] == 0.0).all()
 
 
@@ -230,7 +230,7 @@ def test_launches_are_bounded_and_progress_is_told():
     assert told[-1].seconds_left == 0.0
     assert told[-1].steps == 40 * 150 * 1667
     # The pace follows the launch before; a crowded machine may stretch one.
-    assert np.median(np.diff(times)) < 2.0 * batch_module.LAUNCH_SECONDS
+    assert np.median(np.diff(times)) < 2.0 * launches.LAUNCH_SECONDS
 
 
 def test_time_left_and_stages():

@@ -75,7 +75,7 @@ def test_an_interrupted_batch_goes_on_to_the_same_bits(shaken, tmp_path):
     batch.start()
     straight, steps = shaken.run(), batch.scene_steps
     batch.start()
-    batch._pace = 3.0
+    batch.launches.pace = 3.0
     with pytest.raises(Interrupted, match=r"interrupted at t = .* s, saved in .*run.npz"):
         with batch.checkpointed(checkpoint, None, IDENTITY):
             shaken.run(CtrlCAt(2))
