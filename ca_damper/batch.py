@@ -97,6 +97,12 @@ class Batch:
         return self.engine.device
 
     @property
+    def memory(self) -> SceneMemory:
+        """State of the batch on the device, as arrays."""
+        sizes = {"cycles": max(1, self.measured_cycles), **structure_of(self.filling).sizes}
+        return SceneMemory(self.loan, sizes)
+
+    @property
     def run_seconds(self) -> float:
         """Time spent on stepping [s]."""
         return self.launches.run_seconds
@@ -215,9 +221,7 @@ class Batch:
         own = {"version": version_text(), "filling": repr(self.filling)}
         arrays = opened(checkpoint, resume, lambda: {**own, **identity})
         self._compile()
-        sizes = {"cycles": max(1, self.measured_cycles), **structure_of(self.filling).sizes}
-        memory = SceneMemory(lambda: self.engine, sizes)
-        saved = RunSnapshot({**own, **identity}, memory, {"batch": self, **dict(owners)})
+        saved = RunSnapshot({**own, **identity}, self.memory, {"batch": self, **dict(owners)})
         if arrays:
             saved.restore(arrays, resume)
         writer = NoCheckpointWriter()

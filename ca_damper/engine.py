@@ -9,14 +9,14 @@ from ca_damper.account import MomentumAccount
 from ca_damper.clock import Clock
 from ca_damper.container import CONTAINERS
 from ca_damper.coupling import Coupling
-from ca_damper.filling import check_device, check_places, structure_of
+from ca_damper.filling import LEAST_PLACES, check_device, check_places, structure_of
 from ca_damper.scene_fields import SceneFields
 from ca_damper.table import SceneTable
 from taichi_dem.kit.engine_pool import Engine, EnginePool, Loan
 from taichi_dem.kit.errors import InputError
 
 #: Least room for scenes, measured cycles, and places of a scene: below, nothing is saved.
-_LEAST = (64, 32, *(256,) * 8)
+_LEAST = (64, 32, *(LEAST_PLACES,) * 8)
 
 
 @dataclass(frozen=True)
@@ -47,20 +47,27 @@ class DamperEngine(Engine):
         self.container = CONTAINERS[self.structure.mount](self.table, self.clock)
         self.device = self._bound()
         self.account = MomentumAccount(self.table)
-        self.coupling = Coupling(
-            self.table, self.clock, self.container, self.device, self.account
-        )
+        self.coupling = Coupling(self.table, self.clock, self.container, self.device, self.account)
         self.is_compiled = False
 
     def _bound(self) -> Any:
         filling, builder = self.structure.filling, impl._root_fb
-        device = filling.bind(self.table)
-        if impl._root_fb is not builder:
+        try:
+            return check_device(filling, filling.bind(self.table))
+        finally:
+            self._refuse_use(builder)
+
+    def _refuse_use(self, builder: Any) -> None:
+        """InputError where a field of the engine was used before all of them are declared."""
+        runtime = impl.get_runtime()
+        if builder not in runtime.unfinalized_fields_builder:
+            # Taichi closed the tree at that use and opened another; the end of ours asks for it.
+            runtime.unfinalized_fields_builder.pop(impl._root_fb, None)
+            runtime.initialize_fields_builder(builder)
             raise InputError(
                 "bind of a filling must declare its fields and use none of them: write their "
-                f"values in 'load', got {type(filling).__name__}"
+                f"values in 'load', got {type(self.structure.filling).__name__}"
             )
-        return check_device(filling, device)
 
     def load(self, filling: Any, table: SceneTable, rtol: float, atol: float) -> None:
         """Take over the numbers of a batch; the state follows with ``coupling.start``."""

@@ -45,6 +45,8 @@ class Action:
     carried: ti.f64
 
 
+#: Places of a scene that an engine has at least.
+LEAST_PLACES = 256
 #: Places for particles in all scenes of a batch: they are counted in 32 bits.
 _MOST_PLACES = 2**25
 
@@ -177,9 +179,7 @@ def check_device(filling: Any, device: Any) -> Any:
 def _members(contract: Any) -> Dict[str, str]:
     """First line of the docstring of each member of a contract, by name."""
     public = {name: member for name, member in vars(contract).items() if name[0] != "_"}
-    return {
-        name: (inspect.getdoc(member) or "").splitlines()[0] for name, member in public.items()
-    }
+    return {name: (inspect.getdoc(member) or "").splitlines()[0] for name, member in public.items()}
 
 
 def _check_members(what: str, thing: Any, members: Dict[str, str]) -> None:

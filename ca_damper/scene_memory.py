@@ -1,23 +1,31 @@
 """The state of a batch as arrays: what its scenes use of the fields, whatever the room beside it."""
 
-from typing import Dict
+from typing import Any, Dict, List
 
 import numpy as np
+import taichi as ti
 
 from ca_damper.scene_fields import SceneField
 from taichi_dem.kit.allocation import array_of, assign, values
+from taichi_dem.kit.engine_pool import Loan
 from taichi_dem.kit.field_memory import fields_of
 
 
 class SceneMemory:
     """Reads and writes the state of a batch, for checkpoints that another session can go on from.
 
-    engine: gives the batch's engine, on which it is active. sizes: places that a scene of it uses,
-    by name. Arrays of the scenes are cut to what is in use, as engines differ in capacity.
+    loan: of the batch's engine. sizes: places that a scene of it uses, by name. Arrays of the scenes
+    are cut to what is in use, as engines differ in capacity.
     """
 
-    def __init__(self, engine, sizes: Dict[str, int]):
-        self.engine, self.sizes = engine, sizes
+    def __init__(self, loan: Loan, sizes: Dict[str, int]):
+        self.loan, self.sizes = loan, sizes
+
+    @property
+    def engine(self) -> Any:
+        """The engine, with the data of the batch on it."""
+        self.loan.activate()
+        return self.loan.engine
 
     def read(self) -> Dict[str, np.ndarray]:
         """Copies of all that changes in a run, by name."""
@@ -41,12 +49,12 @@ class SceneMemory:
         for name, field in self._others().items():
             assign(field, arrays[name])
 
-    def _made(self):
-        return self.engine().table.made
+    def _made(self) -> List[SceneField]:
+        return self.engine.table.made
 
-    def _others(self):
+    def _others(self) -> Dict[str, ti.Field]:
         """Fields that are not of the scenes: those of fillings that declare them by themselves."""
-        engine = self.engine()
+        engine = self.engine
         scenes = {id(one.field) for one in engine.table.made}
         found = [one for one in fields_of(engine) if one.kind == "saved"]
         return {f"others/{one.name}": one.field for one in found if id(one.field) not in scenes}
@@ -56,7 +64,7 @@ class SceneMemory:
 
     def _window(self, one: SceneField, whole: np.ndarray) -> np.ndarray:
         """Part of an array of a field that the batch uses."""
-        table = self.engine().table
+        table = self.engine.table
         if one.flat:
             entry = whole.shape[1:]
             whole = whole.reshape(table.capacity, table.length(one.lengths[0]), *entry)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import taichi as ti
 
-from ca_damper.filling import Motion, structure_of
+from ca_damper.filling import LEAST_PLACES, Motion, structure_of
 from ca_damper.scene_fields import SceneFields
 from ca_damper.table import SceneTable
 from taichi_dem.kit.allocation import values
@@ -79,7 +79,7 @@ class _Structure:
         return self.key == other.key
 
 
-_POOL = EnginePool(DrivenEngine, (8, 1, *(256,) * 8))
+_POOL = EnginePool(DrivenEngine, (8, 1, *(LEAST_PLACES,) * 8))
 
 
 class Driven:

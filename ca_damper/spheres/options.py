@@ -6,11 +6,12 @@ from typing import ClassVar, Optional
 
 import numpy as np
 
-from ca_damper.filling import Structure
+from ca_damper.filling import LEAST_PLACES, Structure
 from ca_damper.scene_fields import SceneFields
 from ca_damper.spheres.contact_law import POWERS, contact_duration, pair_numbers
 from ca_damper.spheres.dynamics import DIVERGENCES, DeviceSpheres
-from ca_damper.spheres.search import SEARCHES, search_sizes
+from ca_damper.spheres.search import SEARCHES, listed_pairs
+from taichi_dem.kit.engine_pool import power_of_two
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import choice, finite, flag, fraction, positive, shown, whole
 
@@ -145,7 +146,9 @@ class Spheres:
     def structure(self) -> Structure:
         """Effects, laws and the search are compiled; numbers, box and places of start are not."""
         key = (self.damping, self.rubs, self.rotation, self.search, self.start is None)
-        return Structure(key, {"spheres": self.capacity, **search_sizes(self)})
+        # As many as go with the spheres of an engine, so that both find room or neither.
+        pairs = listed_pairs(power_of_two(self.capacity, LEAST_PLACES))
+        return Structure(key, {"spheres": self.capacity, "pairs": pairs})
 
     def bind(self, table: SceneFields) -> DeviceSpheres:
         """The spheres on the device, for all scenes of a table."""

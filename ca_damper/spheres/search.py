@@ -75,9 +75,10 @@ class CellList:
     def bind(self, bodies):
         """Allocate cells and list for all scenes."""
         self.bodies, table = bodies, bodies.table
-        self.cell_stride, self.list_stride = table.length("grid"), table.length("pairs")
+        # A cell is larger than a sphere: there are no more of them.
+        self.cell_stride, self.list_stride = table.length("spheres"), table.length("pairs")
         self.grid = Grid.field(shape=())
-        self.cell_first = table.field(ti.i32, "grid", flat=True)
+        self.cell_first = table.field(ti.i32, "spheres", flat=True)
         self.next = table.field(ti.i32, "spheres", flat=True)
         self.pair = table.vector(2, ti.i32, "pairs", flat=True)
         self.pair_first = table.field(ti.i32)
@@ -86,8 +87,7 @@ class CellList:
 
     def load(self, options):
         """Write the skin and the grid to the device."""
-        sizes = search_sizes(options)
-        self._load(skin_of(options), *grid_of(options), sizes["pairs"])
+        self._load(skin_of(options), *grid_of(options), listed_pairs(options.capacity))
 
     @ti.kernel
     def _load(self, skin: ti.f64, columns: ti.i32, rows: ti.i32, pairs: ti.i32):
@@ -201,7 +201,6 @@ def grid_of(options):
     return max(1, int(options.width / size)), max(1, int(options.height / size))
 
 
-def search_sizes(options):
-    """Places that a scene needs for the search, by name."""
-    columns, rows = grid_of(options)
-    return {"grid": columns * rows, "pairs": _PAIRS_PER_SPHERE * options.capacity}
+def listed_pairs(capacity):
+    """Places for pairs in the list of a scene that has places for so many spheres."""
+    return _PAIRS_PER_SPHERE * capacity

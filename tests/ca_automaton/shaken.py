@@ -18,7 +18,9 @@ class Shaken(Driven):
     def state(self):
         """Kind, speed and way in all cells and the one beyond, to compare bits."""
         cells, count = self.device.cells, self.geometry.cells + 1
-        return [self.in_use(field)[:, :count] for field in (cells.kind, cells.speed, cells.travelled)]
+        return [
+            self.in_use(field)[:, :count] for field in (cells.kind, cells.speed, cells.travelled)
+        ]
 
     def put(self, field, rows):
         """Write a field in the cells of all scenes."""

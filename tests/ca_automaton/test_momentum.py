@@ -64,7 +64,9 @@ def test_momentum_is_accounted_for(options):
 
 def test_what_is_left_to_the_ledger():
     """Landing leaves pushes and the heap's rest to it; one particle alone meets none but walls."""
-    left = {name: ledger(shaken(3000, accounting=name)) != 0 for name in ("landing", "landing+ejection")}
+    left = {
+        name: ledger(shaken(3000, accounting=name)) != 0 for name in ("landing", "landing+ejection")
+    }
     pushes, rest = ITEMS.index("ejections"), ITEMS.index("rest")
     assert left["landing"][2, [pushes, rest]].tolist() == [True, True]
     assert left["landing+ejection"][2, [pushes, rest]].tolist() == [False, True]

@@ -86,7 +86,11 @@ def test_labels():
 
 
 def test_particles_rest_as_suits_the_accounting_unless_the_user_says_otherwise():
-    assert [Automaton(accounting=name).particles_rest for name in ACCOUNTINGS] == [False, False, True]
+    assert [Automaton(accounting=name).particles_rest for name in ACCOUNTINGS] == [
+        False,
+        False,
+        True,
+    ]
     resting = Automaton(accounting="landing", static_contact=True)
     assert resting.particles_rest
     assert resting.effects == ("pairs", "landing", "static contact")

@@ -30,6 +30,7 @@ class Kicks:
 
     label: ClassVar[str] = "kicks"
     effects: ClassVar[tuple] = ("kicks",)
+    step_bound: ClassVar[None] = None
     default_dt: ClassVar[float] = 1e-4
     capacity: ClassVar[int] = 10
     particle_mass: ClassVar[float] = 0.2e-3
