@@ -1,7 +1,8 @@
 """How the container moves: on its spring, pushed by base and filling, or fixed to the base.
 
-Both have ``load`` for the numbers of a batch, and the ti.funcs ``start(s, x, v)``, ``motion(s)`` at the beginning of a step, and
-``advance(s, action)`` over it, which returns the attempts that the integration took, or -1.
+Both have ``load`` for the numbers of a batch, and the ti.funcs ``start(s, x, v)``, ``motion(s)`` at
+the beginning of a step, and ``advance(s, action)`` over it, which returns the attempts that the
+integration took, or -1.
 """
 
 import taichi as ti

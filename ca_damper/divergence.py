@@ -1,6 +1,6 @@
 """Divergence of a scene in words: which, when, why, and a step that would do."""
 
-from typing import Any, Dict
+from typing import Any
 
 from ca_damper.coupling import LOST
 from ca_damper.errors import SimulationDiverged
@@ -9,7 +9,7 @@ _LOST_IN_WORDS = "lost its container, whose motion is no finite number"
 
 
 def divergence(
-    filling: Any, row: Dict[str, Any], code: int, step: int, time_s: float
+    filling: Any, row: dict[str, Any], code: int, step: int, time_s: float
 ) -> SimulationDiverged:
     """Exception for a scene, a row of the table, that diverged with a code by a step."""
     dt = row["dt"]

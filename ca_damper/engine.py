@@ -1,7 +1,8 @@
-"""Engine of the damper: all fields and kernels of one structure, compiled once for any batch of it."""
+"""Engine of the damper: fields and kernels of one structure, compiled once for all its batches."""
 
+from collections.abc import Hashable
 from dataclasses import dataclass, field
-from typing import Any, Hashable, Tuple
+from typing import Any
 
 from taichi.lang import impl
 
@@ -21,14 +22,14 @@ _LEAST = (64, 32, *(LEAST_PLACES,) * 8)
 
 @dataclass(frozen=True)
 class EngineStructure:
-    """What the compiler sees of a batch: structure of its filling, mount, and which sizes there are.
+    """What the compiler sees of a batch: key of its filling's structure, mount, names of sizes.
 
     filling: one of that structure, which declares the fields.
     """
 
     key: Hashable
     mount: str
-    sizes: Tuple[str, ...]
+    sizes: tuple[str, ...]
     filling: Any = field(compare=False)
 
 

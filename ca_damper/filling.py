@@ -1,13 +1,14 @@
 """Contract of a filling of the container: what goes in is its motion, what comes out its load.
 
 A filling is a frozen dataclass of a user's options, checked when it is made (``Filling``). It binds
-itself to the scenes of an engine (``DeviceFilling``), which is compiled once and then runs any batch
-of any filling with the same ``Structure``. ``fixed_mass.py`` has a complete example.
+itself to the scenes of an engine (``DeviceFilling``), which is compiled once and then runs every
+batch of a filling with the same ``Structure``. ``fixed_mass.py`` has a complete example.
 """
 
 import inspect
+from collections.abc import Hashable
 from dataclasses import dataclass, field
-from typing import Any, Dict, Hashable, Optional, Protocol, Tuple
+from typing import Any, Optional, Protocol
 
 import numpy as np
 import taichi as ti
@@ -61,7 +62,7 @@ class Structure:
     """
 
     key: Hashable
-    sizes: Dict[str, int] = field(default_factory=dict)
+    sizes: dict[str, int] = field(default_factory=dict)
 
 
 class Filling(Protocol):
@@ -93,17 +94,17 @@ class Filling(Protocol):
         """Gravity that acts on the particles, downwards [m/s^2]."""
 
     @property
-    def effects(self) -> Tuple[str, ...]:
+    def effects(self) -> tuple[str, ...]:
         """What it computes, in words for the report."""
 
     @property
-    def step_bound(self) -> Optional[Tuple[float, str]]:
+    def step_bound(self) -> Optional[tuple[float, str]]:
         """Longest step that it allows or advises [s], and why; None where any will do."""
 
     def check(self, particles: int, dt: float) -> None:
         """Raise InputError for a number of particles or a step [s] that it cannot do."""
 
-    def divergence(self, code: int, particles: int, dt: float) -> Tuple[str, float]:
+    def divergence(self, code: int, particles: int, dt: float) -> tuple[str, float]:
         """Say what a code of divergence means, in words that follow "it", and a step that does."""
 
     def bind(self, table: SceneFields) -> "DeviceFilling":
@@ -136,10 +137,10 @@ class DeviceFilling(Protocol):
     def divergence_code(self, s) -> int:
         """Find out whether the scene diverged: 0, or a code from 1 up; asked every few steps."""
 
-    def uses(self, effects: Tuple[str, ...]) -> Tuple[EffectUse, ...]:
+    def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:
         """What each of the named effects did, for those that can be counted."""
 
-    def snapshot(self, s: int) -> Dict[str, np.ndarray]:
+    def snapshot(self, s: int) -> dict[str, np.ndarray]:
         """Positions [m] and velocities [m/s] of the particles, (particles, 2) each, by name.
 
         (horizontal, vertical); positions count from the container's lower left inner corner.
@@ -176,13 +177,13 @@ def check_device(filling: Any, device: Any) -> Any:
     return device
 
 
-def _members(contract: Any) -> Dict[str, str]:
+def _members(contract: Any) -> dict[str, str]:
     """First line of the docstring of each member of a contract, by name."""
     public = {name: member for name, member in vars(contract).items() if name[0] != "_"}
     return {name: (inspect.getdoc(member) or "").splitlines()[0] for name, member in public.items()}
 
 
-def _check_members(what: str, thing: Any, members: Dict[str, str]) -> None:
+def _check_members(what: str, thing: Any, members: dict[str, str]) -> None:
     for name, purpose in members.items():
         if not hasattr(thing, name):
             raise InputError(

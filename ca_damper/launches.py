@@ -14,12 +14,13 @@ class Launches:
     """Way of the present run, gone in launches that take every scene the same share.
 
     A launch lasts about a sixth of a second, so that Ctrl-C, progress and the look at diverged
-    scenes are prompt. done: share of the way that is behind. seconds: spent on it. run_seconds:
-    spent on all runs. pace: scene-steps that a launch may have.
+    scenes are prompt. done: share of the way that is behind. seconds: spent on it. run_seconds,
+    scene_steps, particle_steps: of all runs. pace: scene-steps that a launch may have.
     """
 
     def __init__(self, scenes: int):
         self.done = self.seconds = self.run_seconds = 0.0
+        self.scene_steps = self.particle_steps = 0
         # One a scene to begin with, as nobody knows yet what a step costs.
         self.scenes, self.pace = scenes, float(scenes)
 
@@ -27,7 +28,9 @@ class Launches:
         """Begin another run."""
         self.done = self.seconds = 0.0
 
-    def launch(self, total: int, advance: Callable[[float], None], check: Callable[[], None]):
+    def launch(
+        self, total: int, advance: Callable[[float], None], check: Callable[[], None]
+    ) -> None:
         """Go on by one launch; total: scene-steps of the way. check: what is asked after it."""
         started = time.perf_counter()
         try:
@@ -40,17 +43,27 @@ class Launches:
             check()
             self.done = share
         finally:
-            self.seconds += time.perf_counter() - started
-            self.run_seconds += time.perf_counter() - started
+            spent = time.perf_counter() - started
+            self.seconds += spent
+            self.run_seconds += spent
 
     def _adapt(self, seconds: float) -> None:
         self.pace *= min(4.0, max(0.25, LAUNCH_SECONDS / seconds))
         self.pace = max(self.pace, float(self.scenes))
 
-    def saved(self) -> np.ndarray:
-        """What a checkpoint holds of it."""
-        return np.array([self.done, self.seconds, self.run_seconds])
+    def count(self, steps: np.ndarray, particles: np.ndarray) -> None:
+        """Count the steps of a run that has ended; both (scenes,)."""
+        self.scene_steps += int(steps.sum())
+        self.particle_steps += int((particles * steps).sum())
 
-    def resume(self, saved: np.ndarray) -> None:
+    def saved(self) -> dict[str, np.ndarray]:
+        """What a checkpoint holds of it, arrays by name."""
+        return {
+            "run": np.array([self.done, self.seconds, self.run_seconds]),
+            "steps": np.array([self.scene_steps, self.particle_steps]),
+        }
+
+    def resume(self, saved: dict[str, np.ndarray]) -> None:
         """Take over what ``saved`` gave."""
-        self.done, self.seconds, self.run_seconds = saved.tolist()
+        self.done, self.seconds, self.run_seconds = saved["run"].tolist()
+        self.scene_steps, self.particle_steps = saved["steps"].tolist()

@@ -1,11 +1,11 @@
 """Numbers and state of the scenes of a batch on the device, with room for batches of other sizes.
 
-Fields are allocated once, with a capacity. How many scenes are in use, and how much of each of them,
-is read from fields at run time, so that a batch of another size compiles nothing.
+Fields are allocated once, with a capacity. How many scenes are in use, and how much of each, is
+read from fields at run time, so that a batch of another size compiles nothing.
 """
 
 from dataclasses import dataclass
-from typing import Dict, List, Tuple, Union
+from typing import Union
 
 import numpy as np
 import taichi as ti
@@ -29,7 +29,7 @@ class SceneField:
     """
 
     field: ti.Field
-    lengths: Tuple[Length, ...]
+    lengths: tuple[Length, ...]
     flat: bool
 
 
@@ -45,9 +45,9 @@ class SceneFields:
     own row only (on its seed, not on its index), so that no bit depends on what else is in a batch.
     """
 
-    def __init__(self, capacity: int, sizes: Dict[str, int]):
+    def __init__(self, capacity: int, sizes: dict[str, int]):
         self.capacity, self.sizes = capacity, dict(sizes)
-        self.made: List[SceneField] = []
+        self.made: list[SceneField] = []
         self.scenes = ti.field(ti.i32, shape=())
         for name in SceneTable.COLUMNS:
             kind = ti.i32 if name in ("particles", "seed") else ti.f64

@@ -1,12 +1,12 @@
-"""The state of a batch as arrays: what its scenes use of the fields, whatever the room beside it."""
+"""The state of a batch as arrays: what its scenes use of the fields of an engine."""
 
-from typing import Any, Dict, List
+from typing import Any
 
 import numpy as np
 import taichi as ti
 
 from ca_damper.scene_fields import SceneField
-from taichi_dem.kit.allocation import array_of, assign, values
+from taichi_dem.kit.allocation import assign, values
 from taichi_dem.kit.engine_pool import Loan
 from taichi_dem.kit.field_memory import fields_of
 
@@ -14,11 +14,11 @@ from taichi_dem.kit.field_memory import fields_of
 class SceneMemory:
     """Reads and writes the state of a batch, for checkpoints that another session can go on from.
 
-    loan: of the batch's engine. sizes: places that a scene of it uses, by name. Arrays of the scenes
-    are cut to what is in use, as engines differ in capacity.
+    loan: of the batch's engine. sizes: places that a scene of it uses, by name. Arrays of the
+    scenes are cut to what is in use, as engines differ in capacity.
     """
 
-    def __init__(self, loan: Loan, sizes: Dict[str, int]):
+    def __init__(self, loan: Loan, sizes: dict[str, int]):
         self.loan, self.sizes = loan, sizes
 
     @property
@@ -27,12 +27,12 @@ class SceneMemory:
         self.loan.activate()
         return self.loan.engine
 
-    def read(self) -> Dict[str, np.ndarray]:
+    def read(self) -> dict[str, np.ndarray]:
         """Copies of all that changes in a run, by name."""
         scenes = {f"scenes/{k}": self._cut(one) for k, one in enumerate(self._made())}
         return {**scenes, **{name: values(field) for name, field in self._others().items()}}
 
-    def misfit(self, arrays: Dict[str, np.ndarray]) -> str:
+    def misfit(self, arrays: dict[str, np.ndarray]) -> str:
         """Name of a field that arrays, as ``read`` gave them, lack or do not fit; else ""."""
         for name, mine in self.read().items():
             array = arrays.get(name)
@@ -40,7 +40,7 @@ class SceneMemory:
                 return name
         return ""
 
-    def write(self, arrays: Dict[str, np.ndarray]) -> None:
+    def write(self, arrays: dict[str, np.ndarray]) -> None:
         """Give the fields their values back, from what ``read`` gave and ``misfit`` accepts."""
         for k, one in enumerate(self._made()):
             whole = values(one.field)
@@ -49,10 +49,10 @@ class SceneMemory:
         for name, field in self._others().items():
             assign(field, arrays[name])
 
-    def _made(self) -> List[SceneField]:
+    def _made(self) -> list[SceneField]:
         return self.engine.table.made
 
-    def _others(self) -> Dict[str, ti.Field]:
+    def _others(self) -> dict[str, ti.Field]:
         """Fields that are not of the scenes: those of fillings that declare them by themselves."""
         engine = self.engine
         scenes = {id(one.field) for one in engine.table.made}

@@ -1,4 +1,4 @@
-"""Containers whose motion is prescribed, around any filling: the time loop of the filling's tests."""
+"""Containers whose motion is prescribed, around any filling: the time loop of its tests."""
 
 import math
 

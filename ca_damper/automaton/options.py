@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from numbers import Integral
-from typing import Optional, Tuple, Type
+from typing import Optional
 
 from ca_damper.automaton.accounting import ACCOUNTINGS, Accounting
 from ca_damper.automaton.accumulator import READINGS
@@ -22,11 +22,11 @@ class Automaton:
     a change of cell), "landing+ejection" (also of those that a wall pushes along), "all", or
     another word of ``accounting.ACCOUNTINGS``. static_contact: whether particles come to rest on
     the floor and on the heap there, move with the container and weigh on it; None: as suits the
-    accounting, True with "all" and False with the others. restitution: between particles; wall_restitution: between particle and
-    wall. pair_rule: "both" of a pair change and momentum stays in its line, or "one_sided" as
-    printed: each that looks at another changes alone. priority: of the events of a particle, at
-    "random" or "pairs_first". accumulator: what a turn does to the way travelled, one of
-    accumulator.READINGS. static_threshold: relative speed below which a particle rests on the
+    accounting, True with "all" and False with the others. restitution: between particles;
+    wall_restitution: between particle and wall. pair_rule: "both" of a pair change and momentum
+    stays in its line, or "one_sided" as printed: each that looks at another changes alone.
+    priority: of the events of a particle, at "random" or "pairs_first". accumulator: what a turn
+    does to the way travelled, one of accumulator.READINGS. static_threshold: relative speed below which a particle rests on the
     heap, in units of g dt. width: of a cell, the diameter of a particle [m]. columns, rows: cells
     inside the walls. particle_mass [kg], gravity [m/s^2]. v_max: fastest particle to expect [m/s];
     it bounds the step, dt < width / v_max. start: (column, row) of every particle, counted from 0
@@ -114,7 +114,7 @@ class Automaton:
         return whole_numbers and 0 <= column < self.columns and 0 <= row < self.rows
 
     @property
-    def _accounting(self) -> Type[Accounting]:
+    def _accounting(self) -> type[Accounting]:
         return ACCOUNTINGS[self.accounting]
 
     @property
@@ -129,7 +129,7 @@ class Automaton:
         return self._accounting.labels[self.particles_rest]
 
     @property
-    def effects(self) -> Tuple[str, ...]:
+    def effects(self) -> tuple[str, ...]:
         """What is computed, in words for the report."""
         resting = ("static contact",) if self.particles_rest else ()
         ledger = ("ledger",) if self.ledger else ()

@@ -19,8 +19,9 @@ class RunSnapshot:
     """All of a run that changes: the fields on the device and what its owners hold beside them.
 
     identity: what two runs must share for one to go on from the other, words by name. root: of
-    which all fields are taken, or what reads and writes them as ``FieldMemory`` does. owners: by name, objects with ``saved()``, which gives arrays by
-    name, and ``resume(arrays)``, which takes them over.
+    which all fields are taken, or what reads and writes them as ``FieldMemory`` does. owners: by
+    name, objects with ``saved()``, which gives arrays by name, and ``resume(arrays)``, which takes
+    them over.
     """
 
     def __init__(self, identity, root, owners):

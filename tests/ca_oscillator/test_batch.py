@@ -19,9 +19,9 @@ from ca_damper import (
     RigidMass,
     SceneTable,
     SimulationDiverged,
+    launches,
     runtime,
 )
-from ca_damper import launches
 from ca_damper.clock import steps_per_cycle
 from ca_damper.progress import BatchProgress, Stages
 from ca_damper.table import dealt

@@ -225,7 +225,7 @@ def test_clear_gives_the_memory_back_and_batches_are_refused_in_a_sentence():
     assert resident_bytes() - before < 0.2 * taken
     assert _POOL.count == 0
     for use in uses(batch):
-        with pytest.raises(InputError, match="given back by runtime.clear") as refused:
+        with pytest.raises(InputError, match=r"given back by runtime\.clear") as refused:
             use()
         assert "\n" not in str(refused.value)
     lived(some_batch(some_automaton, 1))

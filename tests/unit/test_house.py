@@ -37,9 +37,12 @@ LAYERS = {
     ),
     "ca_damper": (
         ("errors", "random_numbers", "lattice", "table", "progress", "measures", "report"),
+        ("launches", "scene_fields"),
         ("filling", "rk45", "oscillator", "clock", "record", "account", "checks"),
-        ("container", "automaton", "spheres"),
+        ("fixed_mass", "container", "automaton", "spheres", "scene_numbers", "scene_memory"),
         ("coupling",),
+        ("engine", "divergence"),
+        ("loaded_scenes",),
         ("batch", "needed_effects"),
         ("plot",),
         ("response",),

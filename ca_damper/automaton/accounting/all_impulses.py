@@ -1,6 +1,6 @@
 """Accounting that keeps momentum: everything but gravity acts on the container."""
 
-from typing import ClassVar, Tuple
+from typing import ClassVar
 
 import taichi as ti
 
@@ -16,8 +16,8 @@ class AllImpulses(Uncounted):
     the mean force is the weight.
     """
 
-    labels: ClassVar[Tuple[str, str]] = ("ca_all", "ca_static")
-    effects: ClassVar[Tuple[str, ...]] = ("ejection",)
+    labels: ClassVar[tuple[str, str]] = ("ca_all", "ca_static")
+    effects: ClassVar[tuple[str, ...]] = ("ejection",)
     static_contact: ClassVar[bool] = True
     counts_all: ClassVar[bool] = True
 

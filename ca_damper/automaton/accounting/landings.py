@@ -4,7 +4,7 @@ Only a landing counts: the first blow to a wall after a change of cell. Blows be
 floor that it lies on are left out and go to the impulse balance, if there is one.
 """
 
-from typing import ClassVar, Tuple
+from typing import ClassVar
 
 import taichi as ti
 
@@ -20,7 +20,7 @@ class Landings(Uncounted):
     (scenes, cells + 1); meaningless in cells without a particle.
     """
 
-    labels: ClassVar[Tuple[str, str]] = ("ca_landing", "ca_landing_static")
+    labels: ClassVar[tuple[str, str]] = ("ca_landing", "ca_landing_static")
 
     def __init__(self, table, lattice, impulse_balance):
         self.impulse_balance, self.lattice = impulse_balance, lattice
@@ -59,8 +59,8 @@ class Landings(Uncounted):
 class LandingsAndPushes(Landings):
     """Landings, and pushes by the walls: closest to the paper's Fig. 11."""
 
-    labels: ClassVar[Tuple[str, str]] = ("ca_ejection", "ca_ejection_static")
-    effects: ClassVar[Tuple[str, ...]] = ("ejection",)
+    labels: ClassVar[tuple[str, str]] = ("ca_ejection", "ca_ejection_static")
+    effects: ClassVar[tuple[str, ...]] = ("ejection",)
 
     @ti.func
     def push(self, s, gain):

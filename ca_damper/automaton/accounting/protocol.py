@@ -1,6 +1,6 @@
 """Contract of an accounting: which impulses of the particles act on the container."""
 
-from typing import ClassVar, Protocol, Tuple
+from typing import ClassVar, Protocol
 
 
 class Accounting(Protocol):
@@ -12,9 +12,9 @@ class Accounting(Protocol):
     """
 
     #: Labels of an automaton without and with static contact, for tables and files.
-    labels: ClassVar[Tuple[str, str]]
+    labels: ClassVar[tuple[str, str]]
     #: What is counted beside "landing", in words for the report.
-    effects: ClassVar[Tuple[str, ...]]
+    effects: ClassVar[tuple[str, ...]]
     #: Whether particles rest on the floor unless the user says otherwise.
     static_contact: ClassVar[bool]
     #: Whether every gain counts, so that nothing is left for the impulse balance.

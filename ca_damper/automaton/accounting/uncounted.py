@@ -1,6 +1,6 @@
 """Accounting that counts nothing: the base of those that count something."""
 
-from typing import ClassVar, Tuple
+from typing import ClassVar
 
 import taichi as ti
 
@@ -11,8 +11,8 @@ from ca_damper.automaton.impulse_balance import EJECTIONS, REST
 class Uncounted:
     """No impulse acts on the container; each goes to the impulse balance, if there is one."""
 
-    labels: ClassVar[Tuple[str, str]] = ("ca_uncounted", "ca_uncounted_static")
-    effects: ClassVar[Tuple[str, ...]] = ()
+    labels: ClassVar[tuple[str, str]] = ("ca_uncounted", "ca_uncounted_static")
+    effects: ClassVar[tuple[str, ...]] = ()
     static_contact: ClassVar[bool] = False
     counts_all: ClassVar[bool] = False
 
