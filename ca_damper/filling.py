@@ -5,7 +5,6 @@ itself to the scenes of an engine (``DeviceFilling``), which is compiled once an
 batch of a filling with the same ``Structure``. ``fixed_mass.py`` has a complete example.
 """
 
-import inspect
 from collections.abc import Hashable
 from dataclasses import dataclass, field
 from typing import Any, Optional, Protocol
@@ -13,6 +12,7 @@ from typing import Any, Optional, Protocol
 import numpy as np
 import taichi as ti
 
+from ca_damper.contracts import check_members, members_of
 from ca_damper.scene_fields import SceneFields
 from taichi_dem.kit.effect_usage import EffectUse
 from taichi_dem.kit.errors import InputError
@@ -149,13 +149,13 @@ class DeviceFilling(Protocol):
 
 def check_filling(filling: Any) -> Any:
     """Return the filling; InputError unless it has all members of the contract."""
-    members = _members(Filling)
+    members = members_of(Filling)
     if isinstance(filling, type) or not any(hasattr(filling, name) for name in members):
         raise InputError(
             f"filling must be one such as Automaton(), Spheres() or RigidMass(), "
             f"got {shown(filling)}"
         )
-    _check_members("filling", filling, members)
+    check_members("filling", filling, members)
     return filling
 
 
@@ -170,25 +170,11 @@ def check_places(scenes: int, places: int) -> None:
 
 def check_device(filling: Any, device: Any) -> Any:
     """Return what a filling bound; InputError unless it has all members of the contract."""
-    members = _members(DeviceFilling)
+    members = members_of(DeviceFilling)
     if hasattr(filling, "structure"):
         members = {**members, "load": "Take over the numbers of a filling of the same structure."}
-    _check_members("what bind of a filling returns", device, members)
+    check_members("what bind of a filling returns", device, members)
     return device
-
-
-def _members(contract: Any) -> dict[str, str]:
-    """First line of the docstring of each member of a contract, by name."""
-    public = {name: member for name, member in vars(contract).items() if name[0] != "_"}
-    return {name: (inspect.getdoc(member) or "").splitlines()[0] for name, member in public.items()}
-
-
-def _check_members(what: str, thing: Any, members: dict[str, str]) -> None:
-    for name, purpose in members.items():
-        if not hasattr(thing, name):
-            raise InputError(
-                f"{what} must have {name!r} ({purpose.rstrip('.')}), got {shown(thing)} without it"
-            )
 
 
 def structure_of(filling: Any) -> Structure:

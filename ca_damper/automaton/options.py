@@ -8,6 +8,7 @@ from ca_damper.automaton.accounting import ACCOUNTINGS, Accounting
 from ca_damper.automaton.accumulator import READINGS
 from ca_damper.automaton.conflict_resolution import MOST_CELLS
 from ca_damper.automaton.device import DeviceAutomaton
+from ca_damper.contracts import check_members, members_of
 from ca_damper.filling import Structure
 from ca_damper.scene_fields import SceneFields
 from taichi_dem.kit.errors import InputError
@@ -26,12 +27,13 @@ class Automaton:
     wall_restitution: between particle and wall. pair_rule: "both" of a pair change and momentum
     stays in its line, or "one_sided" as printed: each that looks at another changes alone.
     priority: of the events of a particle, at "random" or "pairs_first". accumulator: what a turn
-    does to the way travelled, one of accumulator.READINGS. static_threshold: relative speed below which a particle rests on the
-    heap, in units of g dt. width: of a cell, the diameter of a particle [m]. columns, rows: cells
-    inside the walls. particle_mass [kg], gravity [m/s^2]. v_max: fastest particle to expect [m/s];
-    it bounds the step, dt < width / v_max. start: (column, row) of every particle, counted from 0
-    at the lower left; cells are drawn from the seed if None. traversal: "list" of particles or
-    "scan" of all cells, same bits. ledger: write down where uncounted momentum goes.
+    does to the way travelled, one of accumulator.READINGS. static_threshold: relative speed below
+    which a particle rests on the heap, in units of g dt. width: of a cell, the diameter of a
+    particle [m]. columns, rows: cells inside the walls. particle_mass [kg], gravity [m/s^2]. v_max:
+    fastest particle to expect [m/s]; it bounds the step, dt < width / v_max. start: (column, row)
+    of every particle, counted from 0 at the lower left; cells are drawn from the seed if None.
+    traversal: "list" of particles or "scan" of all cells, same bits. ledger: write down where
+    uncounted momentum goes.
     Raises InputError for what is not allowed.
     """
 
@@ -55,6 +57,7 @@ class Automaton:
 
     def __post_init__(self):
         choice("accounting", self.accounting, ACCOUNTINGS)
+        check_members(f"accounting {self.accounting!r}", self._accounting, members_of(Accounting))
         choice("pair_rule", self.pair_rule, ("both", "one_sided"))
         choice("priority", self.priority, ("random", "pairs_first"))
         choice("accumulator", self.accumulator, READINGS)

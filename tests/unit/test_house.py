@@ -37,7 +37,7 @@ LAYERS = {
     ),
     "ca_damper": (
         ("errors", "random_numbers", "lattice", "table", "progress", "measures", "report"),
-        ("launches", "scene_fields"),
+        ("contracts", "launches", "scene_fields"),
         ("filling", "rk45", "oscillator", "clock", "record", "account", "checks"),
         ("fixed_mass", "container", "automaton", "spheres", "scene_numbers", "scene_memory"),
         ("coupling",),
