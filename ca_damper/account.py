@@ -3,6 +3,8 @@
 import numpy as np
 import taichi as ti
 
+from ca_damper.scene_fields import SceneFields
+
 
 @ti.data_oriented
 class MomentumAccount:
@@ -15,7 +17,7 @@ class MomentumAccount:
     of what was given [N s].
     """
 
-    def __init__(self, table):
+    def __init__(self, table: SceneFields):
         self.table, self.weight = table, ti.field(ti.f64, shape=())
         for name in ("expected", "late", "exchanged"):
             setattr(self, name, table.field(ti.f64))
@@ -40,7 +42,7 @@ class MomentumAccount:
         self.exchanged[s] = self.exchanged[s] + ti.abs(force) * dt
         self.late[s] = late
 
-    def error(self, momentum):
+    def error(self, momentum: np.ndarray) -> float:
         """Momentum out of nothing as a share of what was exchanged, of the worst scene.
 
         momentum: of the fillings, at the start of the last step for what is carried (scenes,).

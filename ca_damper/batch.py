@@ -168,7 +168,7 @@ class Batch(LoadedScenes):
             finally:
                 self.writer = NoCheckpointWriter()
 
-    def _now(self):
+    def _now(self) -> tuple[int, float]:
         """Mean step and time [s] of the scenes."""
         return int(self._read_status()[0].mean()), float(self.time_s.mean())
 
@@ -207,7 +207,7 @@ class Batch(LoadedScenes):
             run_seconds=self.run_seconds,
         )
 
-    def _go(self, steps, before_measuring, progress):
+    def _go(self, steps: np.ndarray, before_measuring: np.ndarray, progress: Any) -> None:
         """Take every scene a number of steps on, in launches of bounded length."""
         if not self.going_on:
             self._aim(steps, before_measuring)
@@ -215,7 +215,7 @@ class Batch(LoadedScenes):
         self._compile()
         self._launch_until_done(steps, progress)
 
-    def _aim(self, steps, before_measuring):
+    def _aim(self, steps: np.ndarray, before_measuring: np.ndarray) -> None:
         """Say how far every scene is to go."""
         begin = self._read_status()[0].astype(np.int64)
         if (begin + steps).max() > _MOST_STEPS:
@@ -225,7 +225,7 @@ class Batch(LoadedScenes):
         self.engine.coupling.aim(plan.astype(np.int32))
         self.launches.begin()
 
-    def _compile(self):
+    def _compile(self) -> None:
         """Compile the launch without stepping, unless a batch on this engine has done so."""
         engine = self.engine
         if not engine.is_compiled:
@@ -235,7 +235,7 @@ class Batch(LoadedScenes):
             self.compile_seconds += time.perf_counter() - started
             engine.is_compiled = True
 
-    def _launch_until_done(self, steps, progress):
+    def _launch_until_done(self, steps: np.ndarray, progress: Any) -> None:
         """Launch, tell and save; a run that was saved at its end is told and saved once more."""
         launches, total, done = self.launches, max(1, int(steps.sum())), -1.0
         while done < 1.0:
@@ -249,5 +249,5 @@ class Batch(LoadedScenes):
             self.writer.save_if_needed()
             done = launches.done
 
-    def _advance(self, share):
+    def _advance(self, share: float) -> None:
         self.engine.coupling.advance(share)

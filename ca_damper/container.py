@@ -8,8 +8,10 @@ integration took, or -1.
 import taichi as ti
 
 from ca_damper import rk45
+from ca_damper.clock import Clock
 from ca_damper.filling import Action, Motion
 from ca_damper.oscillator import Forcing, slope
+from ca_damper.scene_fields import SceneFields
 
 #: Attempts within one step of the filling after which the container counts as lost.
 _MOST_ATTEMPTS = 1000
@@ -22,7 +24,7 @@ class SprungContainer:
     gravity [m/s^2]. tolerance: local error allowed, rtol and atol, the latter in m and m/s.
     """
 
-    def __init__(self, table, clock):
+    def __init__(self, table: SceneFields, clock: Clock):
         self.table, self.clock = table, clock
         self.state, self.slope = table.vector(2, ti.f64), table.vector(2, ti.f64)
         self.impulse, self.carried = table.field(ti.f64), table.field(ti.f64)
@@ -98,10 +100,10 @@ class SprungContainer:
 class DrivenContainer:
     """The container fixed to the base: x = y0 sin(2 pi f t), whatever the filling does."""
 
-    def __init__(self, table, clock):
+    def __init__(self, table: SceneFields, clock: Clock):
         self.table, self.clock = table, clock
 
-    def load(self, gravity, rtol, atol):
+    def load(self, gravity: float, rtol: float, atol: float) -> None:
         """Nothing to load: nothing is integrated."""
 
     @ti.func

@@ -4,9 +4,14 @@ One scene a thread, the whole time loop inside the kernel. All state lies in fie
 launches, so that neither their number nor what else is in the batch changes a bit.
 """
 
+from typing import Any
+
 import taichi as ti
 
 from ca_damper import measures
+from ca_damper.account import MomentumAccount
+from ca_damper.clock import Clock
+from ca_damper.scene_fields import SceneFields
 from taichi_dem.kit import runtime
 
 #: Status of a scene whose container has no finite motion any more; fillings use codes above zero.
@@ -31,7 +36,14 @@ class Coupling:
     measured cycles, shape (scenes, cycles, columns of ``measures.COLUMNS``).
     """
 
-    def __init__(self, table, clock, container, device, account):
+    def __init__(
+        self,
+        table: SceneFields,
+        clock: Clock,
+        container: Any,
+        device: Any,
+        account: MomentumAccount,
+    ):
         self.table, self.clock, self.container, self.device = table, clock, container, device
         self.account = account
         self.padding = _CPU_BLOCK if runtime.settings().arch == "cpu" else 1

@@ -8,6 +8,7 @@ import taichi as ti
 
 from ca_damper.filling import Action, Filling, Structure
 from ca_damper.scene_fields import SceneFields
+from taichi_dem.kit.effect_usage import EffectUse
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import positive, shown, whole
 
@@ -24,12 +25,12 @@ class Empty:
     particle_mass: ClassVar[float] = 0.0
     gravity: ClassVar[float] = 9.8
 
-    def check(self, particles, dt):
+    def check(self, particles: int, dt: float) -> None:
         """InputError unless there are no particles."""
         if particles != 0:
             raise InputError(f"particles must be 0 in an empty container, got {shown(particles)}")
 
-    def divergence(self, code, particles, dt):
+    def divergence(self, code: int, particles: int, dt: float) -> tuple[str, float]:
         """Nothing that could diverge; named because the protocol asks for it."""
         return "is empty", dt
 
@@ -59,15 +60,15 @@ class RigidMass:
     default_dt: ClassVar[float] = 1e-4
     capacity: ClassVar[int] = 1_000_000
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         positive("particle_mass", self.particle_mass)
         positive("gravity", self.gravity, zero_allowed=True)
 
-    def check(self, particles, dt):
+    def check(self, particles: int, dt: float) -> None:
         """InputError for more than a million particles."""
         whole("particles", particles, 0, self.capacity)
 
-    def divergence(self, code, particles, dt):
+    def divergence(self, code: int, particles: int, dt: float) -> tuple[str, float]:
         """A fixed mass has no state that could diverge; named because the protocol asks for it."""
         return "is rigid", dt
 
@@ -129,11 +130,11 @@ class FixedMass:
         """Always fine."""
         return 0
 
-    def uses(self, effects):
+    def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:
         """Nothing to count: a fixed mass acts in every step."""
         return ()
 
-    def snapshot(self, s):
+    def snapshot(self, s: int) -> dict[str, np.ndarray]:
         """All particles on the floor, in the corner."""
         count = self.table.particles[s]
         velocity = np.column_stack([np.zeros(count), np.full(count, self.velocity[s])])

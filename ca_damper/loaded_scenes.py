@@ -116,21 +116,21 @@ class LoadedScenes:
         engine = self.engine
         return engine.table.in_use(engine.coupling.attempts)
 
-    def _momentum_error(self):
+    def _momentum_error(self) -> float:
         return self.engine.account.error(self.sample()["momentum"]) if self._started else 0.0
 
-    def _read_status(self):
+    def _read_status(self) -> np.ndarray:
         """Step, position in the cycle, and status of all scenes, (3, scenes)."""
         seen = np.empty((3, self.count), dtype=np.int32)
         self.engine.coupling.read_status(seen)
         return seen
 
-    def _check_started(self):
+    def _check_started(self) -> None:
         self.loan.activate()
         if not self._started:
             raise InputError("this batch has no state yet: call start() first")
 
-    def _check_cycle_is_full(self):
+    def _check_cycle_is_full(self) -> None:
         self._check_started()
         position = self._read_status()[1]
         if position.any():
@@ -140,12 +140,12 @@ class LoadedScenes:
                 f"{self.steps_per_cycle[late]}: advance it first"
             )
 
-    def _load_pace(self):
+    def _load_pace(self) -> None:
         engine = self.engine
         engine.table.drive(np.ascontiguousarray(self.numbers.pace()))
         engine.clock.set(self.steps_per_cycle)
 
-    def _check_divergence(self):
+    def _check_divergence(self) -> None:
         step, _, status = self._read_status()
         if status.any():
             # Scenes stop where they diverge: the first of them in time speaks for all.

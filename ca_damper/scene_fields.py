@@ -5,7 +5,7 @@ read from fields at run time, so that a batch of another size compiles nothing.
 """
 
 from dataclasses import dataclass
-from typing import Union
+from typing import Any, Union
 
 import numpy as np
 import taichi as ti
@@ -53,16 +53,16 @@ class SceneFields:
             kind = ti.i32 if name in ("particles", "seed") else ti.f64
             setattr(self, name, self.field(kind))
 
-    def field(self, dtype, *lengths: Length, flat: bool = False) -> ti.Field:
+    def field(self, dtype: Any, *lengths: Length, flat: bool = False) -> ti.Field:
         """Declare a field of the scenes; lengths: of its axes after that of the scenes."""
         return self._noted(ti.field(dtype, shape=self._shape(lengths, flat)), lengths, flat)
 
-    def vector(self, n: int, dtype, *lengths: Length, flat: bool = False) -> ti.Field:
+    def vector(self, n: int, dtype: Any, *lengths: Length, flat: bool = False) -> ti.Field:
         """Declare a field of vectors with n components; else as ``field``."""
         shape = self._shape(lengths, flat)
         return self._noted(ti.Vector.field(n, dtype, shape=shape), lengths, flat)
 
-    def _shape(self, lengths, flat):
+    def _shape(self, lengths: tuple[Length, ...], flat: bool) -> tuple[int, ...]:
         shape = (self.capacity, *(self.length(length) for length in lengths))
         return (shape[0] * shape[1], *shape[2:]) if flat else shape
 
@@ -70,7 +70,7 @@ class SceneFields:
         """Number of places of a scene along an axis."""
         return self.sizes[length] if isinstance(length, str) else length
 
-    def _noted(self, field, lengths, flat):
+    def _noted(self, field: ti.Field, lengths: tuple[Length, ...], flat: bool) -> ti.Field:
         self.made.append(SceneField(field, lengths, flat))
         return field
 

@@ -1,5 +1,7 @@
 """The numbers of every scene of a batch, one row a scene."""
 
+from typing import Any
+
 import numpy as np
 
 from taichi_dem.kit.display import counted, in_brief
@@ -29,14 +31,14 @@ class SceneTable:
 
     def __init__(
         self,
-        particles,
-        seed,
-        dt,
-        frequency=6.0,
-        base_amplitude=0.0,
-        mass=0.086,
-        stiffness=123.4,
-        damping=0.08,
+        particles: Any,
+        seed: Any,
+        dt: Any,
+        frequency: Any = 6.0,
+        base_amplitude: Any = 0.0,
+        mass: Any = 0.086,
+        stiffness: Any = 123.4,
+        damping: Any = 0.08,
     ):
         values = (particles, seed, dt, frequency, base_amplitude, mass, stiffness, damping)
         rows = _broadcast(dict(zip(self.COLUMNS, values)))
@@ -47,7 +49,7 @@ class SceneTable:
         """A table of the same numbers, to be changed without this one."""
         return SceneTable(**self._host)
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         ends = {name: (of.min(), of.max()) for name, of in self._host.items()}
         words = (
             f"{name} {low:.6g}" + (f" to {high:.6g}" if high > low else "")
@@ -55,7 +57,7 @@ class SceneTable:
         )
         return in_brief(self, counted(self.count, "scene"), *words)
 
-    def change(self, **numbers):
+    def change(self, **numbers: Any) -> None:
         """Give all scenes other numbers by name, each a scalar or (scenes,).
 
         Raises InputError for a name that is no column.
@@ -65,21 +67,21 @@ class SceneTable:
             kind = np.int64 if name in ("particles", "seed") else np.float64
             self._host[name] = np.broadcast_to(values, self.count).astype(kind)
 
-    def drive(self, frequency, dt):
+    def drive(self, frequency: Any, dt: Any) -> None:
         """Change frequency [Hz] and step [s] of all scenes, each a scalar or (scenes,)."""
         pair = np.stack([np.broadcast_to(x, self.count) for x in (frequency, dt)])
         self._host["frequency"], self._host["dt"] = pair.astype(np.float64)
 
-    def column(self, name):
+    def column(self, name: str) -> np.ndarray:
         """What the table says under a name, (scenes,)."""
         return self._host[name]
 
-    def row(self, s):
+    def row(self, s: int) -> dict[str, Any]:
         """Numbers of scene s by name."""
         return {name: self._host[name][s].item() for name in self.COLUMNS}
 
 
-def _broadcast(values):
+def _broadcast(values: dict[str, Any]) -> list[np.ndarray]:
     """Numbers by name as arrays of one shape (scenes,); InputError for what is none."""
     columns = {name: _numbers(name, value) for name, value in values.items()}
     for name in ("particles", "seed"):
@@ -95,7 +97,7 @@ def _broadcast(values):
     return [np.broadcast_to(column, count) for column in columns.values()]
 
 
-def _numbers(name, value):
+def _numbers(name: str, value: Any) -> np.ndarray:
     """One number or a sequence as an array (n,) of its own type; InputError for anything else."""
     try:
         column = np.atleast_1d(value)
@@ -106,7 +108,7 @@ def _numbers(name, value):
     return column
 
 
-def _check_whole(name, column):
+def _check_whole(name: str, column: np.ndarray) -> None:
     inside = (column >= 0) & (column <= _MOST_SEED)
     bad = column[~(inside & (column == np.floor(column)))]
     if len(bad):
@@ -115,7 +117,7 @@ def _check_whole(name, column):
         )
 
 
-def dealt(cost, threads):
+def dealt(cost: np.ndarray, threads: int) -> np.ndarray:
     """Scene numbers in an order that gives each thread the same cost, (scenes,) i32.
 
     A thread takes a contiguous part of the loop, so dear and cheap scenes are dealt out like cards.

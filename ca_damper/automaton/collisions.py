@@ -5,6 +5,8 @@ a wall, or approach another particle? Events claim the particles they need, so t
 part in two events of a step. Then the winners act; no two of them touch the same particle.
 """
 
+from typing import Any
+
 import taichi as ti
 
 from ca_damper.automaton.collision_laws import deflected, speed_after_pair, speed_after_wall
@@ -14,6 +16,7 @@ from ca_damper.automaton.event_counts import PAIRS as PAIRS_MET
 from ca_damper.automaton.impulse_balance import PAIRS
 from ca_damper.lattice import EMPTY, WALL, mirrored, turned_back
 from ca_damper.random_numbers import DEFLECT, EVENT, bits, unit
+from ca_damper.scene_fields import SceneFields
 
 NOTHING, JOIN, FLOOR, SIDE, PAIR = range(5)
 _CELL_BITS = 16
@@ -29,7 +32,7 @@ class Collisions:
     both: whether both of a pair are updated. pairs_first: whether pairs come before walls.
     """
 
-    def __init__(self, table, components, both, pairs_first):
+    def __init__(self, table: SceneFields, components: Any, both: bool, pairs_first: bool):
         self.cells, self.lattice = components.cells, components.lattice
         self.conflict_resolution = components.conflict_resolution
         self.accumulator, self.resting = components.accumulator, components.resting

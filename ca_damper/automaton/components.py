@@ -1,6 +1,7 @@
 """Components that the rules of an automaton share."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import taichi as ti
 
@@ -13,6 +14,7 @@ from ca_damper.automaton.state import Cells
 from ca_damper.automaton.static_contact import NoStaticContact, StaticContact
 from ca_damper.automaton.traversal import ParticleList, Scan
 from ca_damper.lattice import Lattice
+from ca_damper.scene_fields import SceneFields
 
 
 @ti.data_oriented
@@ -27,7 +29,7 @@ class Parameters:
         for name in ("width", "mass", "gravity", "particle", "wall", "threshold"):
             setattr(self, name, ti.field(ti.f64, shape=()))
 
-    def load(self, options):
+    def load(self, options: Any) -> None:
         """Take the values from the options."""
         self._load(options.width, options.particle_mass, options.gravity)
         self._load_collisions(
@@ -59,7 +61,7 @@ class Components:
     event_counts: EventCounts
 
 
-def assemble(options, table):
+def assemble(options: Any, table: SceneFields) -> Components:
     """Components for a user's options; those left out are neither stored nor evaluated."""
     lattice, parameters = Lattice(table), Parameters()
     traversal = (Scan if options.traversal == "scan" else ParticleList)(lattice, table)

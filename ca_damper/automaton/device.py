@@ -1,5 +1,7 @@
 """Automaton on the device, and the order in which its rules act."""
 
+from typing import Any
+
 import numpy as np
 import taichi as ti
 
@@ -12,13 +14,15 @@ from ca_damper.automaton.transport import Transport
 from ca_damper.filling import Action
 from ca_damper.lattice import DIRECTIONS, EMPTY, HELD, WALL, Geometry, unit_vectors
 from ca_damper.random_numbers import stream
+from ca_damper.scene_fields import SceneFields
+from taichi_dem.kit.effect_usage import EffectUse
 
 
 @ti.data_oriented
 class DeviceAutomaton:
     """Automata of all scenes of a table; the protocol is in ``ca_damper.filling``."""
 
-    def __init__(self, options, table):
+    def __init__(self, options: Any, table: SceneFields):
         components = assemble(options, table)
         self.table, self.parameters, self.lattice = table, components.parameters, components.lattice
         self.cells, self.conflict_resolution = components.cells, components.conflict_resolution
@@ -32,7 +36,7 @@ class DeviceAutomaton:
         self.placement = placement(table, self.cells)
         self.velocity = table.field(ti.f64)
 
-    def load(self, options):
+    def load(self, options: Any) -> None:
         """Take over the numbers of an automaton of the same structure."""
         self.lattice.load(Geometry(options.columns, options.rows))
         self.parameters.load(options)
@@ -98,11 +102,11 @@ class DeviceAutomaton:
             fastest = max(fastest, self.cells.speed[s, cell])
         return 0 if fastest * self.table.dt[s] < self.parameters.width[None] else 1
 
-    def uses(self, effects):
+    def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:
         """How often each of the named effects acted."""
         return self.event_counts.uses(effects)
 
-    def snapshot(self, s):
+    def snapshot(self, s: int) -> dict[str, np.ndarray]:
         """Positions and velocities of the particles, by cell (see ``ca_damper.filling``)."""
         geometry = self.lattice.geometry
         kind, travelled, speed = (

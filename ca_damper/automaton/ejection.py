@@ -7,10 +7,13 @@ their cell, and those slower than the wall take its velocity. A column always ha
 stays in the room has nothing pushed in its way, or it would touch it and be pushed.
 """
 
+from typing import Any
+
 import taichi as ti
 
 from ca_damper.automaton.event_counts import PUSHES
 from ca_damper.lattice import DIRECTIONS, DOWN, HELD, UP
+from ca_damper.scene_fields import SceneFields
 
 
 @ti.data_oriented
@@ -21,7 +24,7 @@ class Ejection:
     shape (scenes, cells).
     """
 
-    def __init__(self, table, components):
+    def __init__(self, table: SceneFields, components: Any):
         self.cells, self.lattice = components.cells, components.lattice
         self.parameters = components.parameters
         self.accumulator, self.accounting = components.accumulator, components.accounting

@@ -2,6 +2,7 @@
 
 import taichi as ti
 
+from ca_damper.scene_fields import SceneFields
 from taichi_dem.kit.effect_usage import EffectUse
 
 PAIRS, WALLS, PUSHES, HOLDS = range(4)
@@ -18,7 +19,7 @@ _COUNTED = {
 class EventCounts:
     """Events since the reset, shape (scenes, kinds of event)."""
 
-    def __init__(self, table):
+    def __init__(self, table: SceneFields):
         self.table = table
         self.events = table.field(ti.i64, HOLDS + 1)
 
@@ -34,7 +35,7 @@ class EventCounts:
         # Not "+=", which would be an atomic addition; a scene is one thread.
         self.events[s, kind] = self.events[s, kind] + 1
 
-    def uses(self, effects):
+    def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:
         """An EffectUse for each named effect that is an event, over all scenes.
 
         The automaton keeps no account of energy: what it does steers.

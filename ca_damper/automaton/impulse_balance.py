@@ -7,6 +7,8 @@ Sums are integers, so that no order of execution reaches their bits.
 
 import taichi as ti
 
+from ca_damper.scene_fields import SceneFields
+
 #: Unit of sums of velocities [m/s]; 2^-40 leaves room for 8 million m/s in an i64.
 QUANTUM = 2.0**-40
 ITEMS = ("gravity", "pairs", "ejections", "rest")
@@ -26,7 +28,7 @@ class ImpulseBalance:
 
     active = True
 
-    def __init__(self, table):
+    def __init__(self, table: SceneFields):
         self.velocity_gain = table.field(ti.i64, _COUNT)
 
     @ti.func

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from numbers import Integral
-from typing import Optional
+from typing import Any, Optional
 
 from ca_damper.automaton.accounting import ACCOUNTINGS, Accounting
 from ca_damper.automaton.accumulator import READINGS
@@ -55,7 +55,7 @@ class Automaton:
     traversal: str = "list"
     ledger: bool = False
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         choice("accounting", self.accounting, ACCOUNTINGS)
         check_members(f"accounting {self.accounting!r}", self._accounting, members_of(Accounting))
         choice("pair_rule", self.pair_rule, ("both", "one_sided"))
@@ -71,7 +71,7 @@ class Automaton:
         self._check_rules()
         self._check_lattice()
 
-    def _check_rules(self):
+    def _check_rules(self) -> None:
         flag("ledger", self.ledger)
         if self.static_contact is not None:
             flag("static_contact", self.static_contact)
@@ -86,7 +86,7 @@ class Automaton:
                 f"alone and no two events compete, got {self.priority!r}"
             )
 
-    def _check_lattice(self):
+    def _check_lattice(self) -> None:
         for name in ("columns", "rows"):
             whole(name, getattr(self, name), 1, MOST_CELLS)
         cells = (self.columns + 2) * (self.rows + 2)
@@ -98,7 +98,7 @@ class Automaton:
         if self.start is not None:
             object.__setattr__(self, "start", self._checked_start())
 
-    def _checked_start(self):
+    def _checked_start(self) -> tuple:
         if not isinstance(self.start, (tuple, list)):
             raise InputError(f"start must be a tuple of (column, row), got {shown(self.start)}")
         cells = [tuple(cell) if isinstance(cell, (tuple, list)) else cell for cell in self.start]
@@ -112,7 +112,7 @@ class Automaton:
             raise InputError(f"start must not name a cell twice, got {shown(self.start)}")
         return tuple(cells)
 
-    def _inside(self, column, row):
+    def _inside(self, column: Any, row: Any) -> bool:
         whole_numbers = isinstance(column, Integral) and isinstance(row, Integral)
         return whole_numbers and 0 <= column < self.columns and 0 <= row < self.rows
 
@@ -139,26 +139,26 @@ class Automaton:
         return ("pairs", "landing", *self._accounting.effects, *resting, *ledger)
 
     @property
-    def default_dt(self):
+    def default_dt(self) -> float:
         """The paper's step, 1e-4 s."""
         return 1e-4
 
     @property
-    def capacity(self):
+    def capacity(self) -> int:
         """Most particles that fit: one a cell."""
         return self.columns * self.rows
 
     @property
-    def longest_dt(self):
+    def longest_dt(self) -> float:
         """Step that a particle at v_max would need for a whole cell [s]."""
         return self.width / self.v_max
 
     @property
-    def step_bound(self):
+    def step_bound(self) -> tuple[float, str]:
         """Longest step [s], and why."""
         return self.longest_dt, "a cell crossed at v_max"
 
-    def check(self, particles, dt):
+    def check(self, particles: int, dt: float) -> None:
         """InputError unless so many particles fit and the step is shorter than width / v_max."""
         whole("particles", particles, 0, self.capacity)
         if self.start is not None and particles != len(self.start):
@@ -172,7 +172,7 @@ class Automaton:
                 f"of {self.width:g} m at v_max = {self.v_max:g} m/s, got {dt:g}"
             )
 
-    def divergence(self, code, particles, dt):
+    def divergence(self, code: int, particles: int, dt: float) -> tuple[str, float]:
         """What the one code of ``divergence_code`` means, and a step that would do [s]."""
         return "holds a particle faster than one cell a step", 0.2 * dt
 

@@ -1,10 +1,13 @@
 """Where the particles of a scene stand at its start."""
 
+from typing import Any
+
 import numpy as np
 import taichi as ti
 
 from ca_damper.lattice import DOWN
 from ca_damper.random_numbers import START, uniform
+from ca_damper.scene_fields import SceneFields
 
 
 @ti.data_oriented
@@ -15,10 +18,10 @@ class DrawnCells:
     (selection sampling, Knuth, The Art of Computer Programming 2, 3.4.2).
     """
 
-    def __init__(self, table, cells):
+    def __init__(self, table: SceneFields, cells: Any):
         self.cells, self.lattice, self.table = cells, cells.lattice, table
 
-    def load(self, named):
+    def load(self, named: Any) -> None:
         """Nothing to load."""
 
     @ti.func
@@ -42,12 +45,12 @@ class NamedCells:
 
     constant_fields = ("named", "count")
 
-    def __init__(self, table, cells):
+    def __init__(self, table: SceneFields, cells: Any):
         self.cells = cells
         self.count = ti.field(ti.i32, shape=())
         self.named = ti.field(ti.i32, shape=table.length("cells"))
 
-    def load(self, named):
+    def load(self, named: Any) -> None:
         """Take over the user's cells: (column, row) of each."""
         geometry = self.cells.lattice.geometry
         self._load(np.array([geometry.cell_of(*cell) for cell in named], dtype=np.int32))

@@ -1,8 +1,11 @@
 """What stands in the cells of every scene, and who moves it from one cell to another."""
 
+from typing import Any
+
 import taichi as ti
 
 from ca_damper.lattice import EMPTY
+from ca_damper.scene_fields import SceneFields
 
 
 @ti.data_oriented
@@ -16,7 +19,7 @@ class Cells:
     Velocities are those of the room, not of the container.
     """
 
-    def __init__(self, table, lattice, traversal, accounting):
+    def __init__(self, table: SceneFields, lattice: Any, traversal: Any, accounting: Any):
         self.lattice, self.traversal = lattice, traversal
         self.followers = (traversal, accounting)
         self.kind = table.field(ti.i8, "cells")

@@ -7,9 +7,12 @@ pressed on the floor. When the container's acceleration falls below -g the heap 
 stands. To particles under way the heap is wall.
 """
 
+from typing import Any
+
 import taichi as ti
 
 from ca_damper.lattice import DOWN, HELD, UP, WALL
+from ca_damper.scene_fields import SceneFields
 
 
 @ti.data_oriented
@@ -19,7 +22,7 @@ class StaticContact:
     held: number of them, shape (scenes,).
     """
 
-    def __init__(self, table, cells, accumulator, parameters):
+    def __init__(self, table: SceneFields, cells: Any, accumulator: Any, parameters: Any):
         self.cells, self.accumulator, self.parameters = cells, accumulator, parameters
         self.held = table.field(ti.i32)
 

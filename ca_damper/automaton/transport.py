@@ -1,10 +1,13 @@
 """Transport: free flight and the change of cell (Komatsuzaki et al., 5.2)."""
 
+from typing import Any
+
 import taichi as ti
 
 from ca_damper.automaton.conflict_resolution import rank
 from ca_damper.lattice import DOWN, EMPTY
 from ca_damper.random_numbers import MOVE
+from ca_damper.scene_fields import SceneFields
 
 
 @ti.data_oriented
@@ -14,7 +17,7 @@ class Transport:
     crossing: cells of particles that may change their cell, shape (scenes, cells).
     """
 
-    def __init__(self, table, components):
+    def __init__(self, table: SceneFields, components: Any):
         self.cells, self.lattice = components.cells, components.lattice
         self.conflict_resolution = components.conflict_resolution
         self.accumulator, self.resting = components.accumulator, components.resting

@@ -4,16 +4,19 @@ Neither order reaches a result: rules read what no other cell writes, rivals are
 apart by their random numbers, and impulses are summed as integers.
 """
 
+from typing import Any
+
 import taichi as ti
 
 from ca_damper.lattice import EMPTY, WALL
+from ca_damper.scene_fields import SceneFields
 
 
 @ti.data_oriented
 class Scan:
     """Every cell from the first to the last, walls between the columns included."""
 
-    def __init__(self, lattice, table):
+    def __init__(self, lattice: Any, table: SceneFields):
         self.lattice = lattice
 
     @ti.func
@@ -52,7 +55,7 @@ class ParticleList:
     Both of shape (scenes, cells).
     """
 
-    def __init__(self, lattice, table):
+    def __init__(self, lattice: Any, table: SceneFields):
         self.lattice, self.table = lattice, table
         self.cells = table.field(ti.i16, "cells")
         self.number = table.field(ti.i16, "cells")

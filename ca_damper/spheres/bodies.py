@@ -1,9 +1,12 @@
 """The spheres of all scenes: their numbers, places and velocities, and how they start."""
 
+from typing import Any
+
 import numpy as np
 import taichi as ti
 
 from ca_damper.random_numbers import uniform
+from ca_damper.scene_fields import SceneFields
 
 # Purposes of the random numbers drawn here; the automaton has those before.
 _CHOOSE, _SHIFT, _STIR = 4, 5, 6
@@ -42,7 +45,7 @@ class Bodies:
     at the time of the velocities [m], as foreseen by the last step.
     """
 
-    def __init__(self, table, given):
+    def __init__(self, table: SceneFields, given: bool):
         self.table, self.given = table, given
         self.stride = table.length("spheres")
         self.body = Body.field(shape=())
@@ -54,7 +57,7 @@ class Bodies:
         if given:
             self.start = ti.Vector.field(2, ti.f64, shape=self.stride)
 
-    def load(self, options):
+    def load(self, options: Any) -> None:
         """Write the numbers of the options to the device."""
         self._load(options.radius, options.particle_mass, options.gravity)
         self._load_box(options.width, options.height, *options.lattice)

@@ -11,17 +11,20 @@ contacts and gravity give, to round-off, and the blows on the container are its 
 """
 
 import math
+from typing import Any
 
 import numpy as np
 import taichi as ti
 
 from ca_damper.filling import Action
+from ca_damper.scene_fields import SceneFields
 from ca_damper.spheres.bodies import Bodies, vec2
 from ca_damper.spheres.contact_law import Contact, ContactLaw, pair_numbers, wall_numbers
 from ca_damper.spheres.effect_activity import EffectActivity
 from ca_damper.spheres.rotation import NoRotation, Rotation
 from ca_damper.spheres.search import SEARCHES
 from taichi_dem.kit.allocation import values
+from taichi_dem.kit.effect_usage import EffectUse
 
 # Codes of divergence; a speed is a runaway's when it crosses more than a radius in a step.
 FINE, NOT_FINITE, RUNAWAY, OVERLAP, ENERGY_GAINED = range(5)
@@ -53,7 +56,7 @@ class DeviceSpheres:
     of a look.
     """
 
-    def __init__(self, options, table):
+    def __init__(self, options: Any, table: SceneFields):
         self.table = table
         self.bodies = Bodies(table, options.start is not None)
         self.law, self.rubs = ContactLaw(options.damping), options.rubs
@@ -69,7 +72,7 @@ class DeviceSpheres:
         self.contact_of_pair = Contact.field(shape=())
         self.contact_of_wall = Contact.field(shape=())
 
-    def load(self, options):
+    def load(self, options: Any) -> None:
         """Take over the numbers of spheres of the same structure."""
         share = self.rotation.tangential_share
         self.bodies.load(options)
@@ -278,11 +281,11 @@ class DeviceSpheres:
             dragged = (push - self.law.elastic(contact, overlap)) * approach
             self.effect_activity.note_contact(s, dragged, rubbed)
 
-    def uses(self, effects):
+    def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:
         """What each of the named effects did."""
         return self.effect_activity.uses(effects)
 
-    def snapshot(self, s):
+    def snapshot(self, s: int) -> dict[str, np.ndarray]:
         """Places and velocities of the spheres of scene s, and their spins [rad/s] if they turn."""
         count = self.table.particles[s]
         rows = slice(s * self.bodies.stride, s * self.bodies.stride + count)

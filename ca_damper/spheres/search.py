@@ -4,6 +4,8 @@ Both name the pairs (i, j), i < j, in the same order, so that the forces on a sp
 ascending partner and both give the same bits.
 """
 
+from typing import Any
+
 import taichi as ti
 
 from ca_damper.spheres.bodies import vec2
@@ -32,11 +34,11 @@ class AllPairs:
 
     tracks_motion = False
 
-    def bind(self, bodies):
+    def bind(self, bodies: Any) -> None:
         """Nothing to allocate."""
         self.bodies = bodies
 
-    def load(self, options):
+    def load(self, options: Any) -> None:
         """Nothing to write."""
 
     @ti.func
@@ -72,7 +74,7 @@ class CellList:
 
     tracks_motion = True
 
-    def bind(self, bodies):
+    def bind(self, bodies: Any) -> None:
         """Allocate cells and list for all scenes."""
         self.bodies, table = bodies, bodies.table
         # A cell is larger than a sphere: there are no more of them.
@@ -85,7 +87,7 @@ class CellList:
         self.travel = table.field(ti.f64)
         self.full = table.field(ti.i32)
 
-    def load(self, options):
+    def load(self, options: Any) -> None:
         """Write the skin and the grid to the device."""
         self._load(skin_of(options), *grid_of(options), listed_pairs(options.capacity))
 
@@ -190,17 +192,17 @@ class CellList:
 SEARCHES = {"cells": CellList, "all_pairs": AllPairs}
 
 
-def skin_of(options):
+def skin_of(options: Any) -> float:
     """Skin [m]; from 10 to 160 spheres this one is the fastest, if by little."""
     return options.radius / 3.0
 
 
-def grid_of(options):
+def grid_of(options: Any) -> tuple[int, int]:
     """Columns and rows of the cells."""
     size = options.diameter + skin_of(options)
     return max(1, int(options.width / size)), max(1, int(options.height / size))
 
 
-def listed_pairs(capacity):
+def listed_pairs(capacity: int) -> int:
     """Places for pairs in the list of a scene that has places for so many spheres."""
     return _PAIRS_PER_SPHERE * capacity

@@ -36,9 +36,9 @@ LAYERS = {
         ("__main__",),
     ),
     "ca_damper": (
-        ("errors", "random_numbers", "lattice", "table", "progress", "measures", "report"),
+        ("errors", "random_numbers", "table", "progress", "measures", "report"),
         ("contracts", "launches", "scene_fields"),
-        ("filling", "rk45", "oscillator", "clock", "record", "account", "checks"),
+        ("filling", "lattice", "rk45", "oscillator", "clock", "record", "account", "checks"),
         ("fixed_mass", "container", "automaton", "spheres", "scene_numbers", "scene_memory"),
         ("coupling",),
         ("engine", "divergence"),

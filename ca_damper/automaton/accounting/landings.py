@@ -4,12 +4,13 @@ Only a landing counts: the first blow to a wall after a change of cell. Blows be
 floor that it lies on are left out and go to the impulse balance, if there is one.
 """
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import taichi as ti
 
 from ca_damper.automaton.accounting.uncounted import Uncounted
 from ca_damper.automaton.impulse_balance import REST, quanta
+from ca_damper.scene_fields import SceneFields
 
 
 @ti.data_oriented
@@ -22,7 +23,7 @@ class Landings(Uncounted):
 
     labels: ClassVar[tuple[str, str]] = ("ca_landing", "ca_landing_static")
 
-    def __init__(self, table, lattice, impulse_balance):
+    def __init__(self, table: SceneFields, lattice: Any, impulse_balance: Any):
         self.impulse_balance, self.lattice = impulse_balance, lattice
         self.arrived = table.field(ti.i8, "cells")
 

@@ -1,10 +1,11 @@
 """Accounting that counts nothing: the base of those that count something."""
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import taichi as ti
 
 from ca_damper.automaton.impulse_balance import EJECTIONS, REST
+from ca_damper.scene_fields import SceneFields
 
 
 @ti.data_oriented
@@ -16,7 +17,7 @@ class Uncounted:
     static_contact: ClassVar[bool] = False
     counts_all: ClassVar[bool] = False
 
-    def __init__(self, table, lattice, impulse_balance):
+    def __init__(self, table: SceneFields, lattice: Any, impulse_balance: Any):
         self.impulse_balance = impulse_balance
 
     @property
