@@ -23,7 +23,6 @@ from taichi_dem.kit import runtime
 from taichi_dem.kit.checkpoint import version_text
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.progress.progress import compiling
 from taichi_dem.kit.restart import CheckpointWriter, NoCheckpointWriter, RunSnapshot, opened
 from taichi_dem.kit.validation import choice, whole
 
@@ -78,7 +77,7 @@ class Batch(LoadedScenes):
         """
         coupling = self.engine.coupling
         choice("start", start, STARTS)
-        compiling("placing", 0.2)
+        self._tell_compiling("placing", 0.2)
         coupling.start(np.ascontiguousarray(self.numbers.initial(start)))
         self._started = True
         self.time_origin[:] = 0.0
@@ -230,7 +229,7 @@ class Batch(LoadedScenes):
         engine = self.engine
         if not engine.is_compiled:
             started = time.perf_counter()
-            compiling("time step", 0.4)
+            self._tell_compiling("time step", 0.4)
             engine.coupling.advance(0.0)
             self.compile_seconds += time.perf_counter() - started
             engine.is_compiled = True

@@ -50,9 +50,9 @@ class LoadedScenes:
         rtol = positive("rtol", rtol, zero_allowed=True)
         atol = positive("atol", atol)
         self.numbers = SceneNumbers(self.filling, table)
-        compiling("set-up", 0.0)
         self.loan = borrow(self.filling, mount, self.count, self.measured_cycles)
         engine = self.engine
+        self._tell_compiling("set-up", 0.0)
         engine.clear()
         engine.load(self.filling, self.table, rtol, atol)
         self._load_pace()
@@ -115,6 +115,11 @@ class LoadedScenes:
         """Steps that RK45 has tried since the start, (scenes,); one a step unless some failed."""
         engine = self.engine
         return engine.table.in_use(engine.coupling.attempts)
+
+    def _tell_compiling(self, part: str, share: float) -> None:
+        """Report that a part is compiled next, unless another batch has had it compiled."""
+        if not self.engine.is_compiled:
+            compiling(part, share)
 
     def _momentum_error(self) -> float:
         return self.engine.account.error(self.sample()["momentum"]) if self._started else 0.0
