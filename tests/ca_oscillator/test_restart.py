@@ -53,7 +53,6 @@ class Shaken:
 
 
 @pytest.fixture(
-    scope="module",
     params=[
         (Automaton(), 1e-3),
         pytest.param((Spheres(), 2e-5), marks=pytest.mark.slow),
