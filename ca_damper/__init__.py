@@ -12,9 +12,9 @@ from ca_damper.oscillator import Oscillator
 from ca_damper.record import film
 from ca_damper.report import Report
 from ca_damper.response import Response, frequency_response
+from ca_damper.scenes.table import SceneTable
 from ca_damper.spheres import Spheres
 from ca_damper.sweep import Sweep, sweep_up_and_down
-from ca_damper.table import SceneTable
 from taichi_dem.kit.progress.progress import Progress
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.kit.version import __version__

@@ -1,7 +1,7 @@
 """Many scenes, run together in launches of bounded length.
 
 A batch compiles nothing where one of the same structure has run before, of whatever size and
-numbers (see ``engine.py``).
+numbers (see ``engine/damper_engine.py``).
 """
 
 import contextlib
@@ -13,12 +13,12 @@ import numpy as np
 
 from ca_damper import measures
 from ca_damper.checks import MOST_CYCLES, STARTS, for_all
+from ca_damper.engine.launches import Launches
+from ca_damper.engine.loaded_scenes import LoadedScenes
 from ca_damper.filling import Filling
-from ca_damper.launches import Launches
-from ca_damper.loaded_scenes import LoadedScenes
 from ca_damper.progress import BatchProgress
 from ca_damper.report import RK45_STAGES, Report
-from ca_damper.table import SceneTable, dealt
+from ca_damper.scenes.table import SceneTable, dealt
 from taichi_dem.kit import runtime
 from taichi_dem.kit.checkpoint import version_text
 from taichi_dem.kit.display import in_brief

@@ -7,7 +7,7 @@ import numpy as np
 import taichi as ti
 
 from ca_damper.filling import Action, Filling, Structure
-from ca_damper.scene_fields import SceneFields
+from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.effect_usage import EffectUse
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import positive, shown, whole

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import taichi as ti
 
-from ca_damper.scene_fields import SceneFields
+from ca_damper.scenes.scene_fields import SceneFields
 
 #: What stands in a cell: a particle on its way in one of six directions, clockwise from up ...
 UP, UP_RIGHT, DOWN_RIGHT, DOWN, DOWN_LEFT, UP_LEFT = range(6)

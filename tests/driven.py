@@ -6,8 +6,8 @@ import numpy as np
 import taichi as ti
 
 from ca_damper.filling import LEAST_PLACES, Motion, structure_of
-from ca_damper.scene_fields import SceneFields
-from ca_damper.table import SceneTable
+from ca_damper.scenes.scene_fields import SceneFields
+from ca_damper.scenes.table import SceneTable
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.engine_pool import Engine, EnginePool
 

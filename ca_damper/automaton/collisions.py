@@ -16,7 +16,7 @@ from ca_damper.automaton.event_counts import PAIRS as PAIRS_MET
 from ca_damper.automaton.impulse_balance import PAIRS
 from ca_damper.lattice import EMPTY, WALL, mirrored, turned_back
 from ca_damper.random_numbers import DEFLECT, EVENT, bits, unit
-from ca_damper.scene_fields import SceneFields
+from ca_damper.scenes.scene_fields import SceneFields
 
 NOTHING, JOIN, FLOOR, SIDE, PAIR = range(5)
 _CELL_BITS = 16

@@ -14,7 +14,7 @@ from ca_damper.automaton.state import Cells
 from ca_damper.automaton.static_contact import NoStaticContact, StaticContact
 from ca_damper.automaton.traversal import ParticleList, Scan
 from ca_damper.lattice import Lattice
-from ca_damper.scene_fields import SceneFields
+from ca_damper.scenes.scene_fields import SceneFields
 
 
 @ti.data_oriented

@@ -9,7 +9,7 @@ from typing import Any
 import taichi as ti
 
 from ca_damper.random_numbers import bits
-from ca_damper.scene_fields import SceneFields
+from ca_damper.scenes.scene_fields import SceneFields
 
 #: Room for cell numbers in a rank.
 MOST_CELLS = 1 << 12

@@ -14,7 +14,7 @@ from ca_damper.automaton.transport import Transport
 from ca_damper.filling import Action
 from ca_damper.lattice import DIRECTIONS, EMPTY, HELD, WALL, Geometry, unit_vectors
 from ca_damper.random_numbers import stream
-from ca_damper.scene_fields import SceneFields
+from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.effect_usage import EffectUse
 
 

@@ -13,7 +13,7 @@ import taichi as ti
 
 from ca_damper.automaton.event_counts import PUSHES
 from ca_damper.lattice import DIRECTIONS, DOWN, HELD, UP
-from ca_damper.scene_fields import SceneFields
+from ca_damper.scenes.scene_fields import SceneFields
 
 
 @ti.data_oriented

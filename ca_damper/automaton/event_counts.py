@@ -2,7 +2,7 @@
 
 import taichi as ti
 
-from ca_damper.scene_fields import SceneFields
+from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.effect_usage import EffectUse
 
 PAIRS, WALLS, PUSHES, HOLDS = range(4)

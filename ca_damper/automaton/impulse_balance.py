@@ -7,7 +7,7 @@ Sums are integers, so that no order of execution reaches their bits.
 
 import taichi as ti
 
-from ca_damper.scene_fields import SceneFields
+from ca_damper.scenes.scene_fields import SceneFields
 
 #: Unit of sums of velocities [m/s]; 2^-40 leaves room for 8 million m/s in an i64.
 QUANTUM = 2.0**-40

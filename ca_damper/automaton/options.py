@@ -10,7 +10,7 @@ from ca_damper.automaton.conflict_resolution import MOST_CELLS
 from ca_damper.automaton.device import DeviceAutomaton
 from ca_damper.contracts import check_members, members_of
 from ca_damper.filling import Structure
-from ca_damper.scene_fields import SceneFields
+from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import choice, flag, fraction, positive, shown, whole
 

@@ -7,7 +7,7 @@ import taichi as ti
 
 from ca_damper.lattice import DOWN
 from ca_damper.random_numbers import START, uniform
-from ca_damper.scene_fields import SceneFields
+from ca_damper.scenes.scene_fields import SceneFields
 
 
 @ti.data_oriented

@@ -7,7 +7,7 @@ import taichi as ti
 from ca_damper.automaton.conflict_resolution import rank
 from ca_damper.lattice import DOWN, EMPTY
 from ca_damper.random_numbers import MOVE
-from ca_damper.scene_fields import SceneFields
+from ca_damper.scenes.scene_fields import SceneFields
 
 
 @ti.data_oriented

@@ -9,7 +9,7 @@ from typing import Any
 import taichi as ti
 
 from ca_damper.lattice import EMPTY, WALL
-from ca_damper.scene_fields import SceneFields
+from ca_damper.scenes.scene_fields import SceneFields
 
 
 @ti.data_oriented

@@ -6,7 +6,7 @@ import numpy as np
 import taichi as ti
 
 from ca_damper.random_numbers import uniform
-from ca_damper.scene_fields import SceneFields
+from ca_damper.scenes.scene_fields import SceneFields
 
 # Purposes of the random numbers drawn here; the automaton has those before.
 _CHOOSE, _SHIFT, _STIR = 4, 5, 6

@@ -17,7 +17,7 @@ import numpy as np
 import taichi as ti
 
 from ca_damper.filling import Action
-from ca_damper.scene_fields import SceneFields
+from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.bodies import Bodies, vec2
 from ca_damper.spheres.contact_law import Contact, ContactLaw, pair_numbers, wall_numbers
 from ca_damper.spheres.effect_activity import EffectActivity

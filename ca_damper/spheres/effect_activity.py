@@ -8,7 +8,7 @@ from typing import Optional
 import numpy as np
 import taichi as ti
 
-from ca_damper.scene_fields import SceneFields
+from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.effect_usage import EffectUse
 
 vec2 = ti.types.vector(2, ti.f64)

@@ -7,7 +7,7 @@ from typing import ClassVar, Optional
 import numpy as np
 
 from ca_damper.filling import LEAST_PLACES, Structure
-from ca_damper.scene_fields import SceneFields
+from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.contact_law import POWERS, contact_duration, pair_numbers
 from ca_damper.spheres.dynamics import DIVERGENCES, DeviceSpheres
 from ca_damper.spheres.search import SEARCHES, listed_pairs

@@ -4,7 +4,7 @@ from dataclasses import fields, replace
 from typing import Callable, NamedTuple
 
 from ca_damper import Automaton, Batch, Oscillator, RigidMass, SceneTable, Spheres, rk45
-from ca_damper.clock import steps_per_cycle
+from ca_damper.scenes.clock import steps_per_cycle
 from taichi_dem import (
     CONCRETE,
     Checkpoint,

@@ -8,8 +8,8 @@ from ca_damper.batch import Batch
 from ca_damper.fixed_mass import Empty
 from ca_damper.measures import peak
 from ca_damper.oscillator import Oscillator
+from ca_damper.scenes.table import SceneTable
 from ca_damper.spheres import Spheres
-from ca_damper.table import SceneTable
 
 MASS, GRAVITY = 0.2e-3, 10.0
 OSCILLATOR = Oscillator()

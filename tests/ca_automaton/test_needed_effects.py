@@ -5,7 +5,7 @@ import json
 import pytest
 
 from ca_damper import Automaton, Batch, InputError, SceneTable, Spheres, needed_effects
-from ca_damper.scene_fields import SceneFields
+from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.effect_activity import EffectActivity
 from taichi_dem.kit.allocation import FieldTree
 from taichi_dem.kit.effect_usage import Advice

@@ -19,12 +19,12 @@ from ca_damper import (
     RigidMass,
     SceneTable,
     SimulationDiverged,
-    launches,
     runtime,
 )
-from ca_damper.clock import steps_per_cycle
+from ca_damper.engine import launches
 from ca_damper.progress import BatchProgress, Stages
-from ca_damper.table import dealt
+from ca_damper.scenes.clock import steps_per_cycle
+from ca_damper.scenes.table import dealt
 from taichi_dem.kit.progress.progress import Compiling
 from tests.ca_oscillator.kicks import BAD_SEED, CODE, Kicks
 from tests.scenes import ROOT
@@ -110,6 +110,30 @@ def test_steps_that_are_none_are_refused(steps):
     batch.start()
     with pytest.raises(InputError, match="steps must be whole numbers"):
         batch.advance(steps)
+
+
+def test_a_batch_leaves_the_table_that_it_is_made_with_as_it_is():
+    table = SceneTable([3, 4], 1, 5e-4, 6.0, 0.6e-3)
+    before = {name: table.column(name).tolist() for name in table.COLUMNS}
+    batch = Batch(KICKS, table)
+    batch.start()
+    batch.drive(6.3)
+    batch.change(particles=2)
+    assert {name: table.column(name).tolist() for name in table.COLUMNS} == before
+
+
+def test_a_refused_change_leaves_the_batch_as_it_is():
+    batches = [Batch(KICKS, SceneTable(3, 1, 5e-4, 6.0, 0.6e-3)) for _ in range(2)]
+    for batch in batches:
+        batch.start()
+        batch.run(1, 0)
+    with pytest.raises(InputError, match="mass must be"):
+        batches[0].change(seed=7, mass=-1.0)
+    with pytest.raises(InputError, match="dt must lie"):
+        batches[0].drive(1e5)
+    for batch in batches:
+        batch.run(1, 0)
+    assert batches[0].sample()["x"] == batches[1].sample()["x"]
 
 
 def test_a_new_start_repeats_the_run():

@@ -19,7 +19,7 @@ from ca_damper import (
 )
 from ca_damper.automaton.accounting import ACCOUNTINGS, Accounting, Uncounted
 from ca_damper.contracts import members_of
-from ca_damper.engine import _POOL
+from ca_damper.engine.damper_engine import _POOL
 from ca_damper.filling import Action, DeviceFilling, Filling
 from ca_damper.fixed_mass import FixedMass
 
@@ -85,7 +85,9 @@ def members_asked(path, owner):
     [("filling", Filling, {"structure"}), ("device", DeviceFilling, {"load"})],
 )
 def test_the_package_asks_for_no_more_than_the_contract_has(owner, contract, optional):
-    paths = [path for path in PACKAGE.glob("*.py") if path.stem not in ("__init__", "fixed_mass")]
+    folders = (PACKAGE, PACKAGE / "engine", PACKAGE / "scenes")
+    paths = [path for folder in folders for path in folder.glob("*.py")]
+    paths = [path for path in paths if path.stem not in ("__init__", "fixed_mass")]
     asked = {name for path in paths for name in members_asked(path, owner)}
     assert asked <= {*members_of(contract), *optional, "fixed_mass", "filling"}
     assert set(members_of(contract)) <= asked

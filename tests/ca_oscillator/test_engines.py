@@ -11,7 +11,7 @@ from taichi.lang import impl
 from taichi.lang.kernel_impl import Kernel
 
 from ca_damper import Automaton, Batch, Empty, InputError, RigidMass, SceneTable, Spheres, runtime
-from ca_damper.engine import _POOL
+from ca_damper.engine.damper_engine import _POOL
 from ca_damper.fixed_mass import FixedMass
 from taichi_dem.kit import allocation
 from tests.ca_oscillator.kicks import Kicks

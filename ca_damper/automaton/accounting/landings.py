@@ -10,7 +10,7 @@ import taichi as ti
 
 from ca_damper.automaton.accounting.uncounted import Uncounted
 from ca_damper.automaton.impulse_balance import REST, quanta
-from ca_damper.scene_fields import SceneFields
+from ca_damper.scenes.scene_fields import SceneFields
 
 
 @ti.data_oriented

@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 import taichi as ti
 
 from ca_damper.automaton.impulse_balance import EJECTIONS, REST
-from ca_damper.scene_fields import SceneFields
+from ca_damper.scenes.scene_fields import SceneFields
 
 
 @ti.data_oriented

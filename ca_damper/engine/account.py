@@ -3,7 +3,7 @@
 import numpy as np
 import taichi as ti
 
-from ca_damper.scene_fields import SceneFields
+from ca_damper.scenes.scene_fields import SceneFields
 
 
 @ti.data_oriented

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from ca_damper.coupling import LOST
+from ca_damper.engine.coupling import LOST
 from ca_damper.errors import SimulationDiverged
 
 _LOST_IN_WORDS = "lost its container, whose motion is no finite number"

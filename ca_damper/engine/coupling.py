@@ -9,9 +9,9 @@ from typing import Any
 import taichi as ti
 
 from ca_damper import measures
-from ca_damper.account import MomentumAccount
-from ca_damper.clock import Clock
-from ca_damper.scene_fields import SceneFields
+from ca_damper.engine.account import MomentumAccount
+from ca_damper.scenes.clock import Clock
+from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit import runtime
 
 #: Status of a scene whose container has no finite motion any more; fillings use codes above zero.

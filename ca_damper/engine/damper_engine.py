@@ -6,13 +6,13 @@ from typing import Any
 
 from taichi.lang import impl
 
-from ca_damper.account import MomentumAccount
-from ca_damper.clock import Clock
-from ca_damper.container import CONTAINERS
-from ca_damper.coupling import Coupling
+from ca_damper.engine.account import MomentumAccount
+from ca_damper.engine.container import CONTAINERS
+from ca_damper.engine.coupling import Coupling
 from ca_damper.filling import LEAST_PLACES, check_device, check_places, structure_of
-from ca_damper.scene_fields import SceneFields
-from ca_damper.table import SceneTable
+from ca_damper.scenes.clock import Clock
+from ca_damper.scenes.scene_fields import SceneFields
+from ca_damper.scenes.table import SceneTable
 from taichi_dem.kit.engine_pool import Engine, EnginePool, Loan
 from taichi_dem.kit.errors import InputError
 

@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from ca_damper.clock import steps_per_cycle
 from ca_damper.oscillator import Oscillator
-from ca_damper.table import SceneTable
+from ca_damper.scenes.clock import steps_per_cycle
+from ca_damper.scenes.table import SceneTable
 
 _STRUCTURE = ("mass", "stiffness", "damping", "base_amplitude")
 

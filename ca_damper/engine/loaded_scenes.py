@@ -10,13 +10,13 @@ import numpy as np
 
 from ca_damper import measures
 from ca_damper.checks import check_record_fits
-from ca_damper.container import CONTAINERS
-from ca_damper.divergence import divergence
-from ca_damper.engine import DamperEngine, borrow
+from ca_damper.engine.container import CONTAINERS
+from ca_damper.engine.damper_engine import DamperEngine, borrow
+from ca_damper.engine.divergence import divergence
 from ca_damper.filling import Filling, check_filling, structure_of
-from ca_damper.scene_memory import SceneMemory
-from ca_damper.scene_numbers import SceneNumbers
-from ca_damper.table import SceneTable
+from ca_damper.scenes.scene_memory import SceneMemory
+from ca_damper.scenes.scene_numbers import SceneNumbers
+from ca_damper.scenes.table import SceneTable
 from taichi_dem.kit import runtime
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import compiling

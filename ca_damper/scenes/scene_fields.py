@@ -11,7 +11,7 @@ import numpy as np
 import taichi as ti
 from taichi.lang import impl
 
-from ca_damper.table import SceneTable
+from ca_damper.scenes.table import SceneTable
 from taichi_dem.kit.allocation import array_of, values
 
 _ROWS = ti.types.ndarray(dtype=ti.f64, ndim=2)

@@ -8,10 +8,10 @@ integration took, or -1.
 import taichi as ti
 
 from ca_damper import rk45
-from ca_damper.clock import Clock
 from ca_damper.filling import Action, Motion
 from ca_damper.oscillator import Forcing, slope
-from ca_damper.scene_fields import SceneFields
+from ca_damper.scenes.clock import Clock
+from ca_damper.scenes.scene_fields import SceneFields
 
 #: Attempts within one step of the filling after which the container counts as lost.
 _MOST_ATTEMPTS = 1000

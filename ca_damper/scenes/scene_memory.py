@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import taichi as ti
 
-from ca_damper.scene_fields import SceneField
+from ca_damper.scenes.scene_fields import SceneField
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.kit.engine_pool import Loan
 from taichi_dem.kit.field_memory import fields_of
