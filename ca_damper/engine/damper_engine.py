@@ -36,7 +36,10 @@ class EngineStructure:
 class DamperEngine(Engine):
     """Clock, container, filling and measures of the scenes of one batch at a time."""
 
-    advice = "run fewer scenes at a time, or measure fewer cycles"
+    advice = (
+        "run fewer scenes at a time, measure fewer cycles, or give back the memory of earlier "
+        "batches by runtime.clear()"
+    )
     structure: EngineStructure
 
     def declare(self) -> None:
