@@ -1,31 +1,71 @@
 """The paper's blast, and the methods by which its experiments run it."""
 
-from _cli import PAPER_BLOCK
+import numpy as np
+
+from _cli import BLAST_DRIVERS, PAPER_BLOCK, parser
 from taichi_dem import (
     CONCRETE,
+    Every,
     ImplicitDashpots,
     Multirate,
     Scene,
     StepControl,
     Uniform,
     effects,
+    quality_report,
     read_mesh,
 )
 
 #: Metres that a body may go in a second's worth of the paper's largest step: l = 1e-7 m at 1e-8 s.
 WAY_PER_STEP = 10.0
+EFFECTS = {
+    "bond_damping": effects.BondDamping,
+    "softening": effects.Softening,
+    "shear_slip": effects.ShearSlip,
+    "sphere_contact": effects.SphereContact,
+    "friction": effects.Friction,
+    "gas_pressure": effects.GasPressure,
+    "gravity": effects.Gravity,
+}
+
+
+def blast_parser(name, description, drivers=BLAST_DRIVERS):
+    """Parser of an experiment on the paper's block or another mesh."""
+    made = parser(name, description, drivers)
+    made.add_argument("--mesh", default=PAPER_BLOCK, help="tetrahedra with a face group hole")
+    return made
+
+
+class Costs:
+    """Observer that keeps what a run has cost at every sample, and the levels of its bodies."""
+
+    when = Every(samples=1)
+
+    def __init__(self):
+        self.columns, self.levels, self.view = {"cpu_s": [], "evaluations": []}, [], None
+
+    def observe(self, view):
+        """Take a row."""
+        self.view = view
+        self.columns["cpu_s"].append(view.cpu_seconds)
+        self.columns["evaluations"].append(view.evaluations)
+        self.levels.append(view.motion()["level"])
+
+
+def level_shares(levels):
+    """Share of bodies on each level: rows (sample, level) that sum to 1."""
+    count = max(int(level.max()) for level in levels) + 1
+    return np.array([np.bincount(level, minlength=count) / len(level) for level in levels])
 
 
 def paper_effects():
     """All effects of the paper's scene."""
-    return [
-        effects.BondDamping(),
-        effects.Softening(),
-        effects.ShearSlip(),
-        effects.SphereContact(),
-        effects.Friction(),
-        effects.GasPressure(),
-    ]
+    return [make() for name, make in EFFECTS.items() if name != "gravity"]
+
+
+def print_quality(scene):
+    """Print the worst of a scene's mesh."""
+    print("\n".join(str(quality_report(scene.mesh, scene.material)).splitlines()[:7]))
 
 
 def paper_scene(mesh=PAPER_BLOCK):

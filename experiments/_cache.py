@@ -1,4 +1,4 @@
-"""Results that are dear to compute, kept beside the output under everything they depend on."""
+"""Costly results, kept beside the output under a digest of everything they depend on."""
 
 import hashlib
 import json
@@ -11,9 +11,9 @@ _ROOT = Path(__file__).resolve().parents[1]
 
 
 def cached(folder, name, settings, packages, compute):
-    """What ``compute()`` returns, a JSON-like dict, from a file if it was computed before.
+    """Result of ``compute()``, a JSON-like dict, from a file if it was computed before.
 
-    settings: whatever else the result depends on, by its repr. packages: folders whose sources
+    settings: everything else the result depends on, by its repr. packages: folders whose sources
     it depends on. The file's name holds a digest of both, so that a change of either computes
     anew. Returns (result, whether it came from the file).
     """

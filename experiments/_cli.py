@@ -1,4 +1,4 @@
-"""What all experiments share: options, exit codes, progress, summary.json."""
+"""Options, exit codes, tables and summary.json of all experiments."""
 
 import argparse
 import json
@@ -12,22 +12,17 @@ import sys
 
 import numpy as np
 
-# The experiments take the mesh from here, as they do all that they share.
+# The experiments import the mesh from here too.
 from taichi_dem import PAPER_BLOCK as PAPER_BLOCK
 from taichi_dem import Checkpoint, InputError, SimulationDiverged, runtime
 from taichi_dem.kit.checkpoint import Interrupted
-from taichi_dem.kit.files import write_text
+from taichi_dem.kit.files import write_csv, write_text
 from taichi_dem.kit.progress.lasting_output import lasting_output
 from taichi_dem.kit.validation import shown
 from taichi_dem.kit.version import __version__, taichi_version
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-_INTERVALS = {
-    "": "every_wall_s",
-    "s": "every_wall_s",
-    "steps": "every_steps",
-    "sim": "every_s",
-}
+_INTERVALS = {None: "every_wall_s", "s": "every_wall_s", "steps": "every_steps", "sim": "every_s"}
 BLAST_DRIVERS = ("auto", "resident", "parallel")
 #: Cells of a table that say nothing.
 BLANK = ("", "None", "nan")
@@ -42,36 +37,24 @@ class Parser(argparse.ArgumentParser):
 
 
 def number(low, high, *, open_low=True):
-    """Type of an option that is a number in a range; the range stands in the complaint."""
-    left = "(" if open_low else "["
-
-    def parse(text):
-        try:
-            value = float(text)
-        except ValueError:
-            value = math.nan
-        inside = low < value < high or (value == low and not open_low)
-        if not inside:
-            raise argparse.ArgumentTypeError(
-                f"must be a number in {left}{low:g}, {high:g}), got {shown(text)}"
-            )
-        return value
-
-    return parse
+    """Type of an option that is a number in a range; the complaint names the range."""
+    words = f"a number in {'(' if open_low else '['}{low:g}, {high:g})"
+    return _checked(float, words, lambda x: low < x < high or (x == low and not open_low))
 
 
 def whole(low, high):
     """Type of an option that is a whole number in a range."""
+    return _checked(int, f"a whole number from {low} to {high}", lambda x: low <= x <= high)
 
+
+def _checked(kind, words, allowed):
     def parse(text):
         try:
-            value = int(text)
+            value = kind(text)
         except ValueError:
-            value = low - 1
-        if not low <= value <= high:
-            raise argparse.ArgumentTypeError(
-                f"must be a whole number from {low} to {high}, got {shown(text)}"
-            )
+            value = None
+        if value is None or not allowed(value):
+            raise argparse.ArgumentTypeError(f"must be {words}, got {shown(text)}")
         return value
 
     return parse
@@ -79,7 +62,7 @@ def whole(low, high):
 
 def interval(text):
     """Type of an option that says how often: 600s on the wall, 5000steps, or 1e-5sim seconds."""
-    found = re.fullmatch(r"([0-9.]+(?:[eE][-+]?[0-9]+)?)(s|steps|sim|)", text)
+    found = re.fullmatch(r"([0-9.]+(?:[eE][-+]?[0-9]+)?)(s|steps|sim)?", text)
     try:
         unit = _INTERVALS[found[2]]
         value = int(found[1]) if unit == "every_steps" else float(found[1])
@@ -109,19 +92,10 @@ def several(kind):
 
 def parser(name, description, drivers=()):
     """Parser with the options every experiment has; drivers: to choose from, where there are."""
-    made = Parser(
-        prog=f"python experiments/{name}.py",
-        description=description,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
-    )
+    made = bare_parser(name, description)
     made.add_argument("--quick", action="store_true", help="a smaller job of under a minute")
-    made.add_argument(
-        "--out",
-        type=os.path.expanduser,
-        default=os.path.join("results", name),
-        help="folder for the output",
-    )
+    place = {"type": os.path.expanduser, "default": os.path.join("results", name)}
+    made.add_argument("--out", help="folder for the output", **place)
     made.add_argument("--arch", default="cpu", choices=runtime.ARCHITECTURES)
     if drivers:
         made.add_argument("--driver", default=drivers[0], choices=drivers)
@@ -129,17 +103,25 @@ def parser(name, description, drivers=()):
     return made
 
 
+def bare_parser(name, description):
+    """Parser of a script without options."""
+    plain = {"formatter_class": argparse.RawDescriptionHelpFormatter, "allow_abbrev": False}
+    return Parser(prog=f"python experiments/{name}.py", description=description, **plain)
+
+
+def fill_in(options, values):
+    """Set the options that the command line left out to values by name."""
+    for name, value in values.items():
+        if getattr(options, name, None) is None:
+            setattr(options, name, value)
+
+
 def add_checkpoints(made):
     """Add the options of a job that saves itself; see ``checkpoint_of``."""
-    made.add_argument(
-        "--checkpoint-every",
-        type=interval,
-        default={},
-        help="save the run every 600s on the wall, 5000steps or 1e-5sim simulated seconds",
-    )
-    made.add_argument(
-        "--resume", action="store_true", help="go on from what a run has saved in the same --out"
-    )
+    words = "save the run every 600s on the wall, 5000steps or 1e-5sim simulated seconds"
+    made.add_argument("--checkpoint-every", type=interval, default={}, help=words)
+    words = "go on from what a run has saved in the same --out"
+    made.add_argument("--resume", action="store_true", help=words)
 
 
 def checkpoint_of(options, name="checkpoint"):
@@ -170,25 +152,16 @@ def exit_code(work):
     may leave before its end (``| head -1``): the files are still written.
     """
     with lasting_output():
-        return _guarded(work)
-
-
-def _guarded(work):
-    try:
-        return work() or 0
-    except InputError as error:
-        return _say(error, 2)
-    except SimulationDiverged as error:
-        return _say(error, 3)
-    except Interrupted as error:
-        return _say(f"{error}: go on with --resume", 130)
-    except KeyboardInterrupt:
-        return _say("interrupted", 130)
-
-
-def _say(message, code):
-    print(" ".join(str(message).split()), file=sys.stderr)
-    return code
+        try:
+            return work() or 0
+        except (InputError, SimulationDiverged) as error:
+            code, words = (2 if isinstance(error, InputError) else 3), error
+        except Interrupted as error:
+            code, words = 130, f"{error}: go on with --resume"
+        except KeyboardInterrupt:
+            code, words = 130, "interrupted"
+        print(" ".join(str(words).split()), file=sys.stderr)
+        return code
 
 
 def figure(value, unit, paper=None):
@@ -201,29 +174,44 @@ def figure(value, unit, paper=None):
     return {"value": value, "unit": unit, "paper": paper}
 
 
+def finish(options, name, figures, runs, show=True):
+    """Write summary.json, print the figures if asked to, and where the output is.
+
+    runs: objects with compile_seconds and run_seconds, or both sums as a pair of numbers.
+    """
+    if not isinstance(runs, tuple):
+        pairs = [(made.compile_seconds, made.run_seconds) for made in runs]
+        runs = tuple(map(sum, zip(*pairs)))
+    write_summary(options.out, name, figures, compile_seconds=runs[0], run_seconds=runs[1])
+    if show:
+        print_figures(figures)
+    print(f"\nPictures and tables are in {options.out}")
+
+
+def write_rows(path, names, rows):
+    """Write rows of cells under names of columns, a sequence or words, as CSV."""
+    names = names.split() if isinstance(names, str) else names
+    columns = list(zip(*rows)) or [()] * len(names)
+    write_csv(path, dict(zip(names, columns)))
+
+
 def write_summary(folder, name, figures, *, compile_seconds, run_seconds):
     """Write summary.json: figures, machine, versions, seconds, command; see ``figure``.
 
     quick: whether the command asked for the smaller job, which the gallery's texts do not describe.
     """
     settings, arguments = runtime.settings(), sys.argv[1:]
+    machine = {"processor": processor(), "cores": os.cpu_count(), "arch": settings.arch}
     content = {
         "experiment": name,
         "figures": figures,
-        "machine": {
-            "processor": processor(),
-            "cores": os.cpu_count(),
-            "arch": settings.arch,
-            "threads": settings.threads,
-            "system": platform.platform(),
-        },
+        "machine": {**machine, "threads": settings.threads, "system": platform.platform()},
         "versions": versions(),
         "seconds": {"compile": compile_seconds, "run": run_seconds},
         "command": shlex.join([f"experiments/{name}.py", *arguments]),
         "quick": "--quick" in arguments,
     }
-    text = json.dumps(content, indent=1)
-    write_text(os.path.join(folder, "summary.json"), text)
+    write_text(os.path.join(folder, "summary.json"), json.dumps(content, indent=1))
 
 
 def processor():
@@ -258,14 +246,12 @@ def print_table(rows, header):
 
 def print_figures(figures):
     """Print the figures of summary.json, beside the paper's values where it gives any."""
-    header = ["figure", "value", "unit"]
-    rows = [[name, value_in_words(one["value"]), one["unit"]] for name, one in figures.items()]
-    papers = [one["paper"] for one in figures.values()]
-    if any(paper is not None for paper in papers):
-        header.append("paper")
-        for row, paper in zip(rows, papers):
-            row.append("" if paper is None else value_in_words(paper))
-    print_table(rows, header)
+    header, rows = ["figure", "value", "unit", "paper"], []
+    for name, one in figures.items():
+        paper = "" if one["paper"] is None else value_in_words(one["paper"])
+        rows.append([name, value_in_words(one["value"]), one["unit"], paper])
+    shown = 4 if any(row[3] for row in rows) else 3
+    print_table([row[:shown] for row in rows], header[:shown])
 
 
 def value_in_words(value):

@@ -12,7 +12,7 @@ OSCILLATOR = Oscillator()
 
 @dataclass(frozen=True)
 class Job:
-    """Which curve: particles, frequency ratios f/f0, cycles before measuring, cycles measured."""
+    """A response curve: particles, ratios f/f0, cycles before measuring, cycles measured."""
 
     particles: int
     ratios: tuple

@@ -39,7 +39,7 @@ class DashpotSystem:
         self.colours = edge_colours(self.bodies.T, model.body_count)
         self.onto = self._jacobians(solver.bonds.branch.to_numpy()[holds])
         self.gives = np.zeros((model.body_count, 6, 6))
-        self.gives[:, :3, :3] = model.mass_inverse.to_numpy()[:, None, None] * np.eye(3)
+        self.gives[:, :3, :3] = (1.0 / model.body_mass)[:, None, None] * np.eye(3)
         self.gives[:, 3:, 3:] = solver.velocities.turn.to_numpy()
         a, b, c = (f.to_numpy()[holds] for f in (solver.bonds.a, solver.bonds.b, solver.bonds.c))
         solved = np.block([[a, b], [b.swapaxes(1, 2), c]])

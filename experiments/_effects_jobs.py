@@ -1,9 +1,5 @@
 """Jobs of ``cost_of_effects.py``: what is measured, and the processes that measure it."""
 
-import json
-import os
-import subprocess
-import sys
 import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -11,9 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from _timing import Timing
-from taichi_dem import InputError
-
-_WORKER = os.path.join(os.path.dirname(os.path.abspath(__file__)), "_effects_worker.py")
+from _worker import ask_worker
 
 
 @dataclass
@@ -69,16 +63,9 @@ def run_all(jobs, repeats, workers, arch, bar):
 
 def _measure(job, place, arch):
     """Run a job once in a process of its own, with a kernel cache of its own at a place."""
-    cache = place / "kernels"
-    cache.mkdir(parents=True, exist_ok=True)
-    task = place / "job.json"
-    task.write_text(json.dumps({"kind": job.kind, "arch": arch, "arguments": job.arguments}))
-    environment = {**os.environ, "TI_OFFLINE_CACHE": "1", "TI_OFFLINE_CACHE_FILE_PATH": str(cache)}
-    done = subprocess.run(
-        [sys.executable, _WORKER, str(task)], capture_output=True, text=True, env=environment
-    )
-    if done.returncode != 0:
-        raise InputError(f"the run of {job.label} ended with: {done.stderr.strip()[-300:]}")
-    job.results.append(json.loads(done.stdout))
+    place.mkdir(exist_ok=True)
+    cache = {"TI_OFFLINE_CACHE": "1", "TI_OFFLINE_CACHE_FILE_PATH": str(place)}
+    task = {"kind": job.kind, "arch": arch, "arguments": job.arguments}
+    job.results.append(ask_worker("_effects_worker", task, f"of {job.label}", **cache))
     if not job.compiled_kB:
-        job.compiled_kB = 1e-3 * sum(p.stat().st_size for p in cache.rglob("*.tic"))
+        job.compiled_kB = 1e-3 * sum(p.stat().st_size for p in place.rglob("*.tic"))

@@ -6,14 +6,16 @@ The job names a function of this file and its arguments; what it measured is pri
 """
 
 import json
-import sys
 import time
 
 import numpy as np
 
+from _blast import EFFECTS
 from _cli import PAPER_BLOCK
 from _damper_response import OSCILLATOR
+from _demo import set_moving
 from _stripped import ByHand
+from _worker import read_job
 from ca_damper import Automaton, Batch, SceneTable, Spheres
 from taichi_dem import (
     CONCRETE,
@@ -21,7 +23,6 @@ from taichi_dem import (
     Scene,
     Simulation,
     Uniform,
-    effects,
     read_mesh,
     runtime,
     simulate,
@@ -30,14 +31,6 @@ from taichi_dem.kit.allocation import field_bytes
 from taichi_dem.kit.errors import SimulationDiverged
 from taichi_dem.step.drivers import Resident, Step
 
-EFFECTS = {
-    "gas_pressure": effects.GasPressure,
-    "bond_damping": effects.BondDamping,
-    "softening": effects.Softening,
-    "shear_slip": effects.ShearSlip,
-    "sphere_contact": effects.SphereContact,
-    "friction": effects.Friction,
-}
 FILLINGS = {"spheres": Spheres, "automaton": Automaton}
 PEAK = 575e6
 
@@ -109,26 +102,24 @@ def _elastic(cls):
     """A function that takes an elastic block, its bodies shaken, some substeps on."""
     step = 1e-8
     simulation = Simulation(Scene(read_mesh(PAPER_BLOCK), CONCRETE, []), Uniform(step), "resident")
-    still = np.tile([1.0, 0.0, 0.0, 0.0], (simulation.model.body_count, 1))
-    shaken = np.random.default_rng(1).normal(size=(len(still), 3))
-    simulation.state.set_motion(simulation.model.centre, still, shaken)
+    set_moving(simulation, np.random.default_rng(1).normal(size=simulation.model.centre.shape))
     simulation.start()
     driver = simulation.driver
     if cls is not None:
-        advance = cls(simulation.model, simulation.state, simulation.schedule, None)
-        driver = Resident(Step(advance, simulation.schedule, None))
+        engine = simulation.loan.engine
+        advance = cls(engine.tables, engine.state, engine.schedule, None)
+        driver = Resident(Step(advance, engine.schedule, None))
     driver.prepare()
     return lambda substeps: driver._run(1 << 60, substeps)
 
 
-def main(path):
+def main():
     """Do a job and print what it measured."""
-    with open(path, encoding="utf-8") as handle:
-        job = json.load(handle)
+    job = read_job()
     runtime.start(job["arch"], 1)
     work = {"blast": blast, "damper": damper, "absent": absent}[job["kind"]]
     print(json.dumps(work(**job["arguments"])))
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main()

@@ -1,11 +1,11 @@
-"""One static page of what the experiments wrote: pictures, figures, and what to read off."""
+"""One static page of the results of all experiments: pictures, figures, and their reading."""
 
 import json
 import os
 import re
-from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
+from types import SimpleNamespace
 from urllib.parse import quote
 
 from jinja2 import Environment, FileSystemLoader
@@ -14,78 +14,51 @@ from _cli import value_in_words
 from taichi_dem.kit.files import write_text
 
 HERE = Path(__file__).resolve().parent
-#: What ``gallery.py`` notes of a run beside what the experiment wrote.
+#: Notes of ``gallery.py`` on a run, beside the output of the experiment.
 RUN = "gallery.json"
 #: Folder of the small pictures of the list, beside the page.
 THUMBNAILS = "thumbnails"
-#: What a run says of its own pictures, where it says something.
+#: Words of a run about its own pictures, where there are any.
 CAPTION = "caption.txt"
 #: Key figures shown unfolded; all others are one touch away.
 MOST_KEY_FIGURES = 12
 
 
-@dataclass(frozen=True)
-class Shown:
-    """What the page shows of one experiment.
-
-    page: its entry. folder: of its results, relative to the page. command: that made them.
-    quick: whether it was the smaller job. pictures, more: files shown, and files linked.
-    thumbnail: small picture for the list, relative to the page, or "". caption: what the run says
-    of its own pictures, or "". key, rest: rows of figures (name, value, paper). seconds: what the
-    run took, in words. output: what it printed. failed: why it did not end well, or "".
-    """
-
-    page: object
-    folder: str
-    command: str
-    quick: bool
-    pictures: tuple
-    more: tuple
-    thumbnail: str
-    caption: str
-    key: tuple
-    rest: tuple
-    seconds: str
-    output: str
-    failed: str
-
-
 def shown(page, root, failed=""):
-    """What there is to show of an experiment in root/NAME; Shown, failed where there is nothing."""
+    """Content of the page for an experiment, by the names that _gallery.html uses.
+
+    page: its entry. root: folder of the page, in which its results stand in root/NAME. failed: why
+    it did not end well, or "". quick: whether it was the smaller job. pictures, more: files shown,
+    and files linked. caption: words of the run about its own pictures. key, rest: rows of figures
+    (name, value, paper).
+    """
     folder = Path(root, page.name)
     summary, run = read_json(folder / "summary.json"), read_json(folder / RUN)
-    if not summary and not failed:
-        failed = "it has not been run"
     files = sorted(path.name for path in folder.glob("*") if path.is_file())
-    pictures = tuple(name for name in page.pictures if name in files)
+    pictures = [name for name in page.pictures if name in files]
     command = summary.get("command", page.command.split(" ", 1)[1])
     key, rest = figure_rows(summary.get("figures", {}), page.figures)
-    return Shown(
+    small = Path(root, THUMBNAILS, f"{page.name}.png").is_file() and page.pictures[0] in files
+    return SimpleNamespace(
         page=page,
         folder=quote(page.name),
         command=f"python {command}",
         # Summaries of older versions have the command alone.
         quick=summary.get("quick", "--quick" in command.split()),
         pictures=pictures,
-        more=tuple(name for name in files if name not in (*pictures, RUN, CAPTION)),
-        thumbnail=thumbnail_of(page, root) if page.pictures[0] in files else "",
-        caption=read_caption(folder / CAPTION),
+        more=[name for name in files if name not in (*pictures, RUN, CAPTION)],
+        thumbnail=f"{THUMBNAILS}/{quote(page.name)}.png" if small else "",
+        caption=read_text(folder / CAPTION),
         key=key,
         rest=rest,
         seconds=_seconds(summary, run),
         output=run.get("output", ""),
-        failed=failed,
+        failed=failed or ("" if summary else "it has not been run"),
     )
 
 
-def thumbnail_of(page, root):
-    """An experiment's small picture relative to the page in root, "" where there is none."""
-    name = f"{page.name}.png"
-    return f"{THUMBNAILS}/{quote(name)}" if Path(root, THUMBNAILS, name).is_file() else ""
-
-
-def read_caption(path):
-    """Text of a caption, "" where there is none."""
+def read_text(path):
+    """Text of a file, "" where there is none that can be read."""
     try:
         return Path(path).read_text(encoding="utf-8").strip()
     except (OSError, ValueError):
@@ -95,8 +68,8 @@ def read_caption(path):
 def read_json(path):
     """Content of a JSON file, an empty dict where there is none that can be read."""
     try:
-        content = json.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        content = json.loads(read_text(path))
+    except (ValueError, RecursionError):
         content = {}
     return content if isinstance(content, dict) else {}
 
@@ -106,17 +79,15 @@ def figure_rows(figures, patterns):
 
     figures: of summary.json. Key are those with a paper's value and those that match a pattern.
     """
-    rows = [
-        (in_words(name, item["unit"]), with_unit(item["value"], item["unit"]), papers_value(item))
-        for name, item in figures.items()
-    ]
-    wanted = [
-        item["paper"] is not None or any(fnmatchcase(name, p) for p in patterns)
-        for name, item in figures.items()
-    ]
+    key, rest = [], []
+    for name, item in figures.items():
+        value, paper = (with_unit(item[k], item["unit"]) for k in ("value", "paper"))
+        known = item["paper"] is not None
+        row = (in_words(name, item["unit"]), value, paper if known else "")
+        wanted = known or any(fnmatchcase(name, pattern) for pattern in patterns)
+        (key if wanted else rest).append(row)
     # Those with a paper's value first, so that the cut never takes them.
-    key = sorted((row for row, want in zip(rows, wanted) if want), key=lambda row: not row[2])
-    rest = [row for row, want in zip(rows, wanted) if not want]
+    key.sort(key=lambda row: not row[2])
     return tuple(key[:MOST_KEY_FIGURES]), tuple(key[MOST_KEY_FIGURES:] + rest)
 
 
@@ -136,23 +107,16 @@ def with_unit(value, unit):
     return words if unit in ("", "1") or value is None else f"{words} {unit}"
 
 
-def papers_value(item):
-    """The paper's value of a figure with its unit, "" where it gives none."""
-    return "" if item["paper"] is None else with_unit(item["paper"], item["unit"])
-
-
 def _seconds(summary, run):
-    parts = []
-    if "seconds" in run:
-        parts.append(f"{run['seconds']:.0f} s in all")
-    for name, words in (("compile", "compiling"), ("run", "computing")):
-        if name in summary.get("seconds", {}):
-            parts.append(f"{summary['seconds'][name]:.1f} s {words}")
+    spent = summary.get("seconds", {})
+    parts = [f"{run['seconds']:.0f} s in all"] if "seconds" in run else []
+    parts += [f"{spent['compile']:.1f} s compiling"] if "compile" in spent else []
+    parts += [f"{spent['run']:.1f} s computing"] if "run" in spent else []
     return ", ".join(parts)
 
 
 def write_page(path, items):
-    """Write the page of all items, a sequence of Shown, as one HTML file beside their folders.
+    """Write the page of all items, a sequence of ``shown``, as one HTML file beside their folders.
 
     Raises InputError when it cannot be written.
     """
@@ -172,7 +136,7 @@ def write_page(path, items):
 
 
 def machines(summaries):
-    """Where the results come from, in words, each only once."""
+    """Machines and versions of the results in words, each only once."""
     words = []
     for summary in filter(None, summaries):
         machine, versions = summary["machine"], summary["versions"]

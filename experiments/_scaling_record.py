@@ -10,10 +10,8 @@ import numpy as np
 import taichi as ti
 from scipy.optimize import nnls
 
-from taichi_dem import Simulation
-from taichi_dem.kit.allocation import batch_allocation
-from taichi_dem.simulate import progress_of
-from taichi_dem.simulation import macro_steps
+from taichi_dem import Every, Simulation
+from taichi_dem.simulate import run_simulation
 from taichi_dem.step.drivers import Once, Resident, Step
 from taichi_dem.timeline import MAX_LEVEL
 
@@ -31,9 +29,9 @@ class Counter:
     """
 
     def __init__(self, simulation):
-        self.model, self.schedule = simulation.model, simulation.schedule
-        self.contacts = simulation.contacts
-        shape = (self.model.body_count, MAX_LEVEL + 1)
+        engine = simulation.loan.engine
+        self.tables, self.schedule, self.contacts = engine.tables, engine.schedule, engine.contacts
+        shape = (simulation.model.body_count, MAX_LEVEL + 1)
         self.counts = ti.Vector.field(len(KINDS), ti.i32, shape=shape)
         self.ticks = ti.field(ti.i32, shape=MAX_LEVEL + 1)
 
@@ -45,7 +43,7 @@ class Counter:
     @ti.func
     def bond(self, b):
         """Charge the master of a bond that is due."""
-        self.counts[self.model.bond_slots[b][0] >> 2, self.schedule.low[None]][0] += 1
+        self.counts[self.tables.bond_slots[b][0] >> 2, self.schedule.low[None]][0] += 1
 
     @ti.func
     def pair(self, p):
@@ -111,29 +109,32 @@ class Record:
         return fitted / scale
 
 
-def record(scene, method, until, every, bar):
-    """Run a scene and count, in intervals of some largest steps; a Record.
+class Intervals:
+    """Observer that takes what has been counted, a row an interval of some largest steps."""
+
+    def __init__(self, simulation, counter, every):
+        self.when, self.simulation, self.counter = Every(steps=every), simulation, counter
+        self.rows, self.before = [], np.zeros(2)
+
+    def observe(self, view):
+        """End an interval; what was counted before the first step belongs to none."""
+        taken, now = self.counter.take(), np.array([view.cpu_seconds, self.simulation.searches])
+        if view.step > 0:
+            self.rows.append((view.time_s, *taken, *(now - self.before)))
+            self.before = now
+
+
+def record(scene, method, until, every, progress):
+    """Run a scene and count, in intervals of some largest steps: (Record, Simulation).
 
     The run is stopped between two steps only, so its bits are those of an undisturbed one.
     """
     simulation = Simulation(scene, method, "resident")
-    with batch_allocation():
-        counter = Counter(simulation)
-    parts = simulation.advance, simulation.schedule, simulation.broad_phase
-    simulation.step = CountedStep(counter, *parts)
-    simulation.driver = Resident(simulation.step)
-    simulation.start()
-    counter.take()
-    rows, last = [], macro_steps(until, method.dt0)
-    before = np.zeros(2)
-    for end in (*range(every, last, every), last):
-        simulation.advance_to(end, lambda: bar(progress_of(simulation, last * method.dt0)))
-        now = np.array([simulation.run_cpu_seconds, simulation.searches])
-        rows.append((simulation.time_s, *counter.take(), *(now - before)))
-        before = now
-    time_s, counts, ticks, seconds, searches = zip(*rows)
-    ticks = np.array(ticks)
+    counter, engine = Counter(simulation), simulation.loan.engine
+    step = CountedStep(counter, engine.advance, engine.schedule, engine.broad_phase)
+    simulation.driver = Resident(step)
+    made = Intervals(simulation, counter, every)
+    run_simulation(simulation, until=until, samples=1, progress=progress, observers=[made])
+    time_s, counts, ticks, seconds, searches = map(np.array, zip(*made.rows))
     used = 1 + int(np.flatnonzero(ticks.any(axis=0)).max())
-    counts = np.array([table[:, :used] for table in counts])
-    arrays = np.array(time_s), counts, ticks[:, :used], np.array(seconds), np.array(searches)
-    return Record(*arrays), simulation
+    return Record(time_s, counts[:, :, :used], ticks[:, :used], seconds, searches), simulation

@@ -1,32 +1,19 @@
 """What a second thread, or a device, does for whole steps of a large block."""
 
-import json
-import os
-import subprocess
-import sys
-import tempfile
-
 import numpy as np
 
+from _worker import ask_worker
 from taichi_dem import InputError
 
 #: How often runs on one and on two threads take turns.
 ROUNDS = 2
-_WORKER = os.path.join(os.path.dirname(os.path.abspath(__file__)), "_scaling_worker.py")
 
 
 def thread_job(mesh, cells, method, threads, steps, repeats, arch="cpu"):
     """What ``_scaling_worker`` says of whole steps by the parallel driver."""
     job = {"mesh": mesh, "cells": cells, "method": method, "threads": threads, "arch": arch}
     job.update(driver="parallel", warm=2, steps=steps, repeats=repeats)
-    with tempfile.TemporaryDirectory() as folder:
-        path = os.path.join(folder, "job.json")
-        with open(path, "w", encoding="utf-8") as handle:
-            json.dump(job, handle)
-        done = subprocess.run([sys.executable, _WORKER, path], capture_output=True, text=True)
-    if done.returncode != 0:
-        raise InputError(f"the run on {threads} threads ended with: {done.stderr.strip()[-300:]}")
-    return json.loads(done.stdout.splitlines()[-1])
+    return ask_worker("_scaling_worker", job, f"on {threads} threads")
 
 
 def thread_gain(mesh, cells, method, steps, rounds, repeats):

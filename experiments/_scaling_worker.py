@@ -9,13 +9,13 @@ digest of where the bodies are in the end, as JSON.
 import glob
 import json
 import os
-import sys
 import time
 
 import numpy as np
 import taichi as ti
 
 from _blast import METHODS, paper_effects
+from _worker import read_job
 from taichi_dem import CONCRETE, Scene, Simulation, effects, read_mesh, runtime
 from taichi_dem.kit.checkpoint import digest
 from taichi_dem.kit.field_memory import FieldMemory
@@ -73,10 +73,11 @@ def timed(simulation, warm, steps, repeats):
 def bytes_a_step(simulation):
     """Bytes that a step of all bodies must move at least: the model read, the state written too."""
     sizes = {}
-    for part in ("model", "state"):
-        kept = FieldMemory(getattr(simulation, part), "constant" if part == "model" else "saved")
+    engine = simulation.loan.engine
+    for part, kind in (("tables", "constant"), ("state", "saved")):
+        kept = FieldMemory(getattr(engine, part), kind)
         sizes[part] = sum(array.nbytes for array in kept.read().values())
-    return sizes["model"] + 2 * sizes["state"]
+    return sizes["tables"] + 2 * sizes["state"]
 
 
 @ti.kernel
@@ -98,10 +99,9 @@ def bandwidth(entries=1 << 24, repeats=5):
     return best
 
 
-def main(path):
+def main():
     """Do a job and print what it measured."""
-    with open(path, encoding="utf-8") as handle:
-        job = json.load(handle)
+    job = read_job()
     runtime.start(job["arch"], job["threads"])
     make, step = METHODS[job["method"]]
     scene = scene_of(job["mesh"], job["cells"])
@@ -122,4 +122,4 @@ def main(path):
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main()

@@ -16,19 +16,19 @@ class ByHand(Advance):
     def bond(self, b):
         """Elastic traction of three units, given to both bodies."""
         if self.state.broken_tick[b] < 0:
-            slots = self.model.bond_slots[b]
+            slots = self.tables.bond_slots[b]
             motion = self._motion(b, slots)
             force, torque = zero3(), zero3()
             for q in range(3):
                 u = 3 * b + q
-                arm = unit_arm(motion, self.model.vertex_slave[u])
-                opening = unit_opening(motion, arm, self.model.vertex_master[u])
-                k = self.model.bond_stiffness[b]
+                arm = unit_arm(motion, self.tables.vertex_slave[u])
+                opening = unit_opening(motion, arm, self.tables.vertex_master[u])
+                k = self.tables.bond_stiffness[b]
                 traction = vec3(k[0] * opening[0], k[1] * opening[1], k[1] * opening[2])
                 force += traction
                 torque += arm.cross(traction)
             dt = self.schedule.pair_step(slots[0] >> 2, slots[1] >> 2)
-            area = self.model.unit_area[b]
+            area = self.tables.unit_area[b]
             self._pull_together(slots, motion, force * (area * dt), torque * (area * dt))
 
     @ti.func
@@ -41,10 +41,10 @@ class ByHand(Advance):
             linear += taken[0:3]
             angular += taken[3:6]
             self.state.slot[4 * i + f] = 0.0 * taken
-        velocity = self.state.velocity[i] + linear * self.model.mass_inverse[i]
+        velocity = self.state.velocity[i] + linear * self.tables.mass_inverse[i]
         momentum = self.state.angular_momentum[i] + angular
-        spin = spin_of(self.state.rotation[i], self.model.inertia_inverse[i], momentum)
-        inverse = self.model.inertia_inverse[i]
+        spin = spin_of(self.state.rotation[i], self.tables.inertia_inverse[i], momentum)
+        inverse = self.tables.inertia_inverse[i]
         turning = mean_spin(self.state.rotation[i], inverse, momentum, spin, elapsed)
         orientation = turned(self.state.orientation[i], turning, elapsed)
         self.state.orientation[i] = orientation
@@ -52,7 +52,9 @@ class ByHand(Advance):
         self.state.position[i] = self.state.position[i] + elapsed * velocity
         self.state.last_tick[i] = self.state.tick[None]
         speed2 = velocity.norm_sqr()
-        if not (speed2 + spin.norm_sqr() * self.model.radius[i] ** 2 < self.state.max_speed2[None]):
+        if not (
+            speed2 + spin.norm_sqr() * self.tables.radius[i] ** 2 < self.state.max_speed2[None]
+        ):
             ti.atomic_min(self.state.bad_body[None], i)
         self.state.velocity[i], self.state.angular_momentum[i] = velocity, momentum
         self.state.spin[i] = spin

@@ -4,7 +4,7 @@ import statistics
 import time
 from dataclasses import dataclass
 
-from taichi_dem import InputError
+from taichi_dem import InputError, runtime
 
 
 @dataclass(frozen=True)
@@ -30,22 +30,30 @@ class Timing:
         return (self.high - self.low) / self.median if self.median > 0.0 else 0.0
 
     def __str__(self):
-        """Median, and what lies between the extremes where there is more than one run."""
+        """Median, and the extremes where there is more than one run."""
         if self.count == 1:
             return f"{self.median:.3g} s"
         return f"{self.median:.3g} s ({self.low:.3g} to {self.high:.3g}, {self.count} runs)"
 
 
-def measure(work, repeats=5, warm_up=1, clock=time.perf_counter):
-    """Time a function without arguments, after calls that compile and fill the caches.
+def on_device():
+    """Tell whether kernels run beside the CPU, which then only waits for them."""
+    return runtime.settings().arch != "cpu"
 
-    work must wait for what it starts: a kernel on a GPU is over only after ``ti.sync()``.
-    """
-    for _ in range(warm_up):
-        work()
-    seconds = []
-    for _ in range(repeats):
-        started = clock()
-        work()
-        seconds.append(clock() - started)
-    return Timing.of(seconds)
+
+def clock():
+    """CPU seconds of this process so far, or the wall clock where a device works [s]."""
+    if on_device():
+        # Imported before the package it would print its version.
+        import taichi as ti
+
+        ti.sync()
+        return time.perf_counter()
+    return time.process_time()
+
+
+def seconds_of(work, *arguments):
+    """Seconds that work(*arguments) takes by ``clock``."""
+    started = clock()
+    work(*arguments)
+    return clock() - started

@@ -1,33 +1,28 @@
-"""Work-precision diagrams: what each method's error costs, as rows, answers, a table and a picture.
+"""Work-precision diagrams: the cost of each method's error, as answers, a table and a picture.
 
 A Point is one run of a method at one step. An error is trusted where every finer step of the same
-method is as good and the method's floor (what runs differ by that should not differ at all) lies
-below it: a single lucky run answers nothing.
+method is as good and the method's floor (the distance of runs that should not differ) lies below
+it: a single lucky run answers nothing.
 """
 
+import itertools
 import math
-import os
 from dataclasses import dataclass
 from typing import Optional
 
-from _cli import processor, versions
+from _cli import write_rows
 from _timing import Timing
-from taichi_dem import runtime
-from taichi_dem.kit.files import write_csv
-from taichi_dem.kit.plot_style import GREY, picture, styles_of
 
-_SMALL = 6.5
-#: Where a label's centre may stand: right and up in widths and heights of the label, and a gap.
-_PLACES = ((1, 1), (-1, -1), (1, -1), (-1, 1), (1, 0), (-1, 0), (0, 2), (0, -2), (1, 3), (-1, -3))
-_COSTS = ("seconds", "evaluations")
-WALL = "wall time [s], fastest of the repeats"
+# The experiments import the pictures from here too.
+from _work_precision_picture import picture_errors as picture_errors
+from _work_precision_picture import picture_work_precision as picture_work_precision
 
 
 @dataclass(frozen=True)
 class Point:
     """A run of a method.
 
-    step: what is swept, larger is coarser (a time step, a tolerance). label: the step in words.
+    step: the swept number, larger is coarser (a time step, a tolerance). label: the step in words.
     evaluations: work done, or that would have been done by a run that failed. error, residual:
     shares, NaN where there is none. seconds: a Timing without compiling, None for a failure.
     failure: why there is no result, in a few words, or nothing.
@@ -45,7 +40,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a method needs for an error: the cheapest point, or None and the reason."""
+    """The cheapest point of a method for an error, or None and the reason."""
 
     method: str
     point: Optional[Point]
@@ -59,26 +54,25 @@ def answers(points, target, floors):
     """
     methods = list(dict.fromkeys(point.method for point in points))
     found = [_answer(method, points, target, floors.get(method, 0.0)) for method in methods]
-    return sorted(found, key=_price)
-
-
-def _price(answer):
-    return answer.point.seconds.low if answer.point else math.inf
+    return sorted(found, key=lambda one: one.point.seconds.low if one.point else math.inf)
 
 
 def _answer(method, points, target, floor):
     if floor > target:
         return Answer(method, None, f"equal runs differ by {percent(floor)}")
-    reached = []
     own = sorted((point for point in points if point.method == method), key=lambda p: p.step)
-    for point in own:
-        # NaN, of a failure, is no error at all.
-        if not point.error <= target:
-            break
-        reached.append(point)
+    # NaN, of a failure, is no error at all.
+    reached = list(itertools.takewhile(lambda point: point.error <= target, own))
     if not reached:
         return Answer(method, None, f"{percent(own[0].error)} at its finest, {own[0].label}")
     return Answer(method, min(reached, key=lambda point: point.seconds.low))
+
+
+def cheapest(points, target, floors, method=None):
+    """Seconds and name of the cheapest method for an error, or of one method; None for neither."""
+    found = [a for a in answers(points, target, floors) if method in (None, a.method)]
+    point = found[0].point
+    return (point.seconds.low, point.method) if point else (None, None)
 
 
 def percent(share):
@@ -105,238 +99,17 @@ ANSWER_HEADER = ["I want", "take", "at a step of", "seconds", "evaluations", "er
 
 def write_points(path, points, floors):
     """CSV of everything a diagram shows; cells of what does not exist are empty."""
-    names = "method,step,label,error,floor,evaluations,seconds_low,seconds_median,seconds_high"
-    columns = {name: [] for name in [*names.split(","), "repeats", "residual", "failure"]}
+    names = "method step label error floor evaluations seconds_low seconds_median seconds_high"
+    rows = []
     for point in points:
         time = point.seconds
-        seconds = (time.low, time.median, time.high, time.count) if time else (math.nan,) * 4
+        seconds = (time.low, time.median, time.high, time.count) if time else [math.nan] * 4
         row = (point.method, point.step, point.label, point.error, floors.get(point.method, 0.0))
         row = (*row, point.evaluations, *seconds, point.residual, point.failure)
-        for name, value in zip(columns, row):
-            blank = isinstance(value, float) and math.isnan(value)
-            columns[name].append("" if blank else str(value))
-    write_csv(path, columns)
+        rows.append(["" if cell != cell else str(cell) for cell in row])
+    write_rows(path, f"{names} repeats residual failure", rows)
 
 
 def write_answers(path, rows):
     """The table of ``answer_rows`` as CSV."""
-    write_csv(path, dict(zip(ANSWER_HEADER, zip(*rows))))
-
-
-def machine_words():
-    """Machine, threads, versions and commit in a line, to stand on a picture."""
-    settings, known = runtime.settings(), versions()
-    threads = f"{settings.threads} thread{'s' if settings.threads > 1 else ''}"
-    software = f"taichi {known['taichi']}, python {known['python']}"
-    place = f"{processor()}, {os.cpu_count()} cores, {settings.arch}, {threads}"
-    return f"{place}; {software}, commit {known['commit'] or 'unknown'}"
-
-
-def picture_work_precision(
-    path,
-    points,
-    titles,
-    *,
-    floors,
-    caption,
-    error_name,
-    work_name,
-    time_name=WALL,
-    residual_names=(),
-    step_unit=1.0,
-    order=1,
-):
-    """Error over wall time and over evaluations; the residual of each run over its step.
-
-    titles: of the methods, in the order of the legend. time_name: what the times are. floors:
-    dotted, by method. order: of the line of ideal gain, error ~ cost^-order, drawn through the
-    best buy. residual_names: of a third panel's axes (step, residual), none if empty; step_unit: of
-    its step [s]. Failures are crosses on the top edge, above what they would have cost, with their
-    reason.
-    """
-    panels = 3 if residual_names else 2
-    ratios = {"width_ratios": (1.0, 1.0, 0.62)[:panels]}
-    size = (6.0 * min(panels, 2.62), 6.2)
-    with picture(path, 1, panels, size, gridspec_kw=ratios) as (figure, axes):
-        looks = _looks(titles)
-        for axis, cost in zip(axes, _COSTS):
-            _draw_costs(axis, points, looks, cost, floors)
-            _draw_ideal(axis, points, cost, order)
-            _draw_failures(axis, points, looks, cost)
-        axes[0].set(xlabel=time_name, ylabel=error_name)
-        axes[1].set(xlabel=work_name, ylabel=error_name)
-        if residual_names:
-            _draw_residuals(axes[2], points, looks, step_unit)
-            axes[2].set(xlabel=residual_names[0], ylabel=residual_names[1])
-        figure.legend(*_legend(axes[0], titles), loc="outside upper left", ncols=3)
-        marks = "At the points: what is swept. Bars: to the slowest repeat."
-        words = f"{caption}\n{marks} {machine_words()}"
-        figure.supxlabel(words, fontsize=7.5, x=0.01, ha="left")
-        # Where a label has room is known when everything else has its place.
-        figure.draw_without_rendering()
-        for axis, cost in zip(axes, _COSTS):
-            _say_steps(axis, points, looks, cost)
-
-
-def picture_errors(path, errors, titles, *, time_name, caption):
-    """Several errors over one cost.
-
-    errors: by what they are of, then by method: pairs (cost, error), coarse to fine. An error of
-    zero lies on the bottom edge.
-    """
-    with picture(path, 1, len(errors), (4.6 * len(errors), 5.0)) as (figure, axes):
-        looks = _looks(titles)
-        for axis, (words, by_method) in zip(axes, errors.items()):
-            seen = [error for pairs in by_method.values() for _, error in pairs if error > 0.0]
-            bottom = 0.5 * min(seen, default=1.0)
-            for method, pairs in by_method.items():
-                height = [max(error, bottom) for _, error in pairs]
-                axis.plot([cost for cost, _ in pairs], height, label=method, **looks[method])
-            axis.set(xscale="log", yscale="log", title=words, xlabel=time_name)
-            axis.set_ylabel("error [1]")
-        figure.legend(*_legend(axes[0], titles), loc="outside upper left", ncols=4)
-        figure.supxlabel(f"{caption}\n{machine_words()}", fontsize=7.5, x=0.01, ha="left")
-
-
-def _looks(titles):
-    """Colour and mark of every method."""
-    return {
-        method: {"color": style.colour, "marker": style.marker, "ms": 5, "lw": 1.2}
-        for method, style in styles_of(titles).items()
-    }
-
-
-def _legend(axis, titles):
-    handles, labels = axis.get_legend_handles_labels()
-    return handles, [titles.get(label, label) for label in labels]
-
-
-def cost_of(point, points, cost):
-    """Cost of a point; of one without a time, at the rate of the method's nearest run."""
-    if cost == "evaluations" or point.seconds:
-        return point.evaluations if cost == "evaluations" else point.seconds.low
-    timed = [p for p in points if p.seconds] or [point]
-    own = [p for p in timed if p.method == point.method] or timed
-    near = min(own, key=lambda p: abs(math.log(p.step / point.step)))
-    return near.seconds.low * point.evaluations / near.evaluations if near.seconds else math.nan
-
-
-def _draw_costs(axis, points, looks, cost, floors):
-    axis.set(xscale="log", yscale="log")
-    for method, look in looks.items():
-        good = _good(points, method)
-        place = [cost_of(p, points, cost) for p in good]
-        errors = [p.error for p in good]
-        axis.plot(place, errors, label=method, **look)
-        if cost == "seconds" and good:
-            spread = [[0.0] * len(good), [p.seconds.high - p.seconds.low for p in good]]
-            ends = {"xerr": spread, "ecolor": look["color"], "elinewidth": 1.0, "capsize": 2}
-            axis.errorbar(place, errors, fmt="none", **ends)
-        if floors.get(method):
-            axis.axhline(floors[method], color=look["color"], ls=":", lw=1.0)
-    if floors:
-        axis.plot([], [], ls=":", color=GREY, label="chaos floor of each method")
-
-
-def _good(points, method):
-    """Points with an error, coarse to fine; an error of zero has no place on a log scale."""
-    own = [p for p in points if p.method == method and p.error > 0.0]
-    return sorted(own, key=lambda p: -p.step)
-
-
-def _draw_ideal(axis, points, cost, order):
-    """The line along which twice the cost brings 2^order times the accuracy: the ideal gain."""
-    good = [(cost_of(p, points, cost), p.error) for p in points if p.error > 0.0]
-    if not good:
-        return
-    x, y = min(good, key=lambda at: at[0] * at[1] ** (1.0 / order))
-    (left, right), (bottom, top) = axis.get_xlim(), axis.get_ylim()
-    label = f"ideal gain, order {order}, from the best buy"
-    # A line that leaves at the bottom first would shift the limits.
-    end = min(right, x * (y / bottom) ** (1.0 / order))
-    start = max(left, x * (y / top) ** (1.0 / order))
-    line = [y * (x / place) ** order for place in (start, end)]
-    axis.plot([start, end], line, color=GREY, ls="--", lw=0.9, label=label)
-    axis.set(xlim=(left, right), ylim=(bottom, top))
-
-
-def _draw_failures(axis, points, looks, cost):
-    """Crosses along the top edge, a row a method; their height is no error."""
-    rows = {
-        m: sorted((p for p in points if p.method == m and p.failure), key=_coarse) for m in looks
-    }
-    rows = {method: own for method, own in rows.items() if own}
-    if not rows:
-        return
-    bottom, top = axis.get_ylim()
-    step = (top / bottom) ** 0.055
-    edge = top * step ** (len(rows) + 0.3)
-    axis.axhspan(top, edge, color="0.94", lw=0, label="× no result: its cost, but no error")
-    axis.set_ylim(bottom, edge)
-    widest = [cost_of(p, points, cost) for own in rows.values() for p in own]
-    left, right = axis.get_xlim()
-    axis.set_xlim(min(left, 0.8 * min(widest)), max(right, 1.25 * max(widest)))
-    for k, (method, own) in enumerate(rows.items()):
-        level, colour = top * step ** (k + 0.65), looks[method]["color"]
-        place = [cost_of(p, points, cost) for p in own]
-        axis.plot(place, [level] * len(own), "x", color=colour, ms=6, mew=1.6)
-        words = ", ".join(f"{p.label} {p.failure}" for p in own)
-        # On the side where there is room for it.
-        left, right = axis.get_xlim()
-        late = place[-1] ** 2 > left * right
-        end, shift, side = (place[0], -7, "right") if late else (place[-1], 7, "left")
-        axis.annotate(
-            words, (end, level), (shift, -2.5), textcoords="offset points", fontsize=_SMALL,
-            color=colour, ha=side,
-        )  # fmt: skip
-
-
-def _coarse(point):
-    return -point.step
-
-
-def _draw_residuals(axis, points, looks, unit):
-    axis.set(xscale="log", yscale="log")
-    for method, look in looks.items():
-        own = [p for p in _good(points, method) if p.residual > 0.0]
-        axis.plot([p.step / unit for p in own], [p.residual for p in own], **look)
-    # Within a decade a log axis writes all its minor ticks, wide as they are.
-    axis.xaxis.set_minor_formatter("")
-
-
-def _say_steps(axis, points, looks, cost):
-    """Write every point's step beside it, where it covers least of what is there already."""
-    good = [p for method in looks for p in _good(points, method)]
-    at = axis.transData.transform([(cost_of(p, points, cost), p.error) for p in good])
-    unit = axis.figure.dpi / 72.0
-    taken = [_box(x, y, 8.0 * unit, 8.0 * unit) for x, y in at]
-    inside = axis.get_window_extent()
-    frame = (inside.x0, inside.y0, inside.x1, inside.y1)
-    for (x, y), p in zip(at, good):
-        wide, high = unit * (0.56 * _SMALL * len(p.label) + 1.0), unit * _SMALL
-        shifts = [
-            (r * (0.5 * wide + 4.0 * unit), u * (0.5 * high + 2.0 * unit)) for r, u in _PLACES
-        ]
-        boxes = [_box(x + right, y + up, wide, high) for right, up in shifts]
-        k = min(range(len(boxes)), key=lambda k: _covered(boxes[k], taken, frame) + 0.5 * k)
-        taken.append(boxes[k])
-        shift = (shifts[k][0] / unit, shifts[k][1] / unit)
-        look = {"fontsize": _SMALL, "color": looks[p.method]["color"], "ha": "center"}
-        place = (cost_of(p, points, cost), p.error)
-        axis.annotate(p.label, place, shift, textcoords="offset points", va="center", **look)
-
-
-def _box(x, y, wide, high):
-    return x - 0.5 * wide, y - 0.5 * high, x + 0.5 * wide, y + 0.5 * high
-
-
-def _covered(box, taken, frame):
-    """Area that a box shares with those taken, and what of it lies outside the frame, twice."""
-    area = (box[2] - box[0]) * (box[3] - box[1])
-    return sum(_shared(box, other) for other in taken) + 2.0 * (area - _shared(box, frame))
-
-
-def _shared(one, two):
-    wide = min(one[2], two[2]) - max(one[0], two[0])
-    high = min(one[3], two[3]) - max(one[1], two[1])
-    return max(0.0, wide) * max(0.0, high)
+    write_rows(path, ANSWER_HEADER, rows)

@@ -26,21 +26,11 @@ import time
 
 import numpy as np
 
-from _blast import paper_effects
-from _cli import (
-    BLAST_DRIVERS,
-    add_checkpoints,
-    checkpoint_of,
-    figure,
-    main,
-    number,
-    parser,
-    print_figures,
-    whole,
-    write_summary,
-)
+from _blast import blast_parser, paper_effects, print_quality
+from _cli import add_checkpoints, checkpoint_of, figure, main, number, whole
 from _deep_block import has_gmsh, made_block, stacked_block
-from taichi_dem import CONCRETE, ImplicitDashpots, Scene, plot, quality_report, read_mesh, simulate
+from _report import finish, take_defaults
+from taichi_dem import CONCRETE, Every, ImplicitDashpots, Scene, plot, read_mesh, simulate
 from taichi_dem.kit.allocation import field_bytes
 from taichi_dem.kit.files import output_folder, write_csv
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREY, picture
@@ -65,9 +55,10 @@ LINES = 10
 
 def options_parser():
     """Options of this experiment."""
-    made = parser(NAME, __doc__, BLAST_DRIVERS)
+    made = blast_parser(NAME, __doc__)
+    # Without it, Gmsh makes one.
+    made.set_defaults(mesh=None)
     made.add_argument("--tetrahedra", type=whole(2000, 2000000), help="about how many, 20000")
-    made.add_argument("--mesh", help="a mesh of one's own, with a face group hole along z")
     made.add_argument("--until", type=number(0, 1), help="simulated time [s], 1e-3")
     made.add_argument("--samples", type=whole(1, 1000000), help="rows of the time series, 200")
     made.add_argument("--frames", type=whole(1, 10000), help="snapshots, 10")
@@ -89,42 +80,27 @@ def mesh_of(options):
 
 
 class Lines:
-    """Prints a line every tenth of the way: time per step, time left, memory; feeds a bar."""
+    """Observer that prints a line every tenth of the way: time per step, time left, memory."""
 
-    def __init__(self, bar):
-        self.bar, self.next_share, self.last = bar, 0.0, None
+    def __init__(self, until):
+        self.until, self.when, self.last = until, Every(time_s=until / LINES), (0.0, 0.0)
 
-    def __call__(self, progress):
-        """Take the progress of the run."""
-        self.bar(progress)
-        if progress.phase == "running" and progress.share >= self.next_share:
-            now = progress.time_s, progress.seconds
-            if self.last is not None and now[0] > self.last[0]:
-                self._say(progress, now)
-            self.last = now
-            self.next_share = progress.share + 1.0 / LINES
-
-    def _say(self, progress, now):
-        (time_s, seconds), (time_before, before) = now, self.last
-        step_ms = 1e3 * (seconds - before) * STEP / (time_s - time_before)
-        left = time_left(seconds_left(step_ms, progress))
-        print(f"t = {1e3 * time_s:.3f} ms, {step_ms:.3g} ms a step, {left}, {memory()}", flush=True)
-
-
-def seconds_left(step_ms, progress):
-    """Seconds until the end at the present time per step."""
-    return 1e-3 * step_ms * (progress.until_s - progress.time_s) / STEP
+    def observe(self, view):
+        """Print the line."""
+        now, (time_s, seconds) = (view.time_s, view.wall_seconds), self.last
+        if now[0] > time_s:
+            step_s = (now[1] - seconds) * STEP / (now[0] - time_s)
+            left = time_left(step_s * max(0.0, self.until - now[0]) / STEP)
+            words = f"t = {1e3 * now[0]:.3f} ms, {1e3 * step_s:.3g} ms a step, {left}"
+            fields = f"{1e-6 * field_bytes():.0f} MB of fields"
+            print(f"{words}, {fields}, {memory_mb():.0f} MB in all", flush=True)
+        self.last = now
 
 
 def memory_mb():
     """Most memory that the process has taken so far [MB]."""
     size = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return size / (1e6 if sys.platform == "darwin" else 1e3)
-
-
-def memory():
-    """Memory in words: fields of the simulation, and the whole process."""
-    return f"{1e-6 * field_bytes():.0f} MB of fields, {memory_mb():.0f} MB in all"
 
 
 def peaks(result):
@@ -156,25 +132,17 @@ def picture_peaks(path, distance, speed, inner, law):
     """Peak speed of every body over its distance from the hole, and the power law."""
     slope, level = law
     with picture(path, size=(6.6, 4.6)) as (_, axes):
-        for chosen, colour, words in (
-            (~inner, GREY, "bodies nearer to a free side"),
-            (inner, BLUE, "bodies nearer to the hole"),
-        ):
-            size = {"s": 4, "alpha": 0.4, "linewidths": 0, "color": colour}
-            axes.scatter(distance[chosen], speed[chosen], label=words, **size)
+        look = {"s": 4, "alpha": 0.4, "linewidths": 0}
+        for chosen, colour, side in ((~inner, GREY, "a free side"), (inner, BLUE, "the hole")):
+            words = f"bodies nearer to {side}"
+            axes.scatter(distance[chosen], speed[chosen], color=colour, label=words, **look)
         ends = np.array([FROM_RADII, distance[inner].max()])
-        axes.plot(ends, level * ends**slope, color=BLACK, label=f"power {slope:.2f} (fitted)")
-        start = level * ends[0] ** slope
-        axes.plot(
-            ends,
-            start * (ends / ends[0]) ** -0.5,
-            ":",
-            color=BLACK,
-            label="power -0.5 (cylindrical wave)",
-        )
-        axes.set(
-            xscale="log", yscale="log", xlabel="distance from the axis / radius of the hole [1]"
-        )
+        fit, wave = level * ends**slope, (ends / ends[0]) ** -0.5
+        axes.plot(ends, fit, color=BLACK, label=f"power {slope:.2f} (fitted)")
+        words = "power -0.5 (cylindrical wave)"
+        axes.plot(ends, fit[0] * wave, ":", color=BLACK, label=words)
+        axes.set(xscale="log", yscale="log")
+        axes.set(xlabel="distance from the axis / radius of the hole [1]")
         axes.set(ylabel="peak particle velocity [m/s]")
         positive = speed[speed > 0.0]
         axes.set_ylim(0.5 * np.percentile(positive, 0.1), 2.0 * positive.max())
@@ -183,32 +151,30 @@ def picture_peaks(path, distance, speed, inner, law):
             handle.set_alpha(1.0)
 
 
-def figures_of(result, law, step_ms):
+def figures_of(result, law):
     """Figures for summary.json."""
-    report = result.report
-    return {
-        "tetrahedra": figure(report.body_count, "1"),
-        "broken_faces": figure(report.broken_faces, "1"),
-        "ppv_exponent": figure(None if np.isnan(law[0]) else law[0], "1"),
-        "hole_radial_displacement_mm": figure(
-            float(result.history["hole_radial_displacement_mm"][-1]), "mm"
-        ),
-        "ms_a_step": figure(step_ms, "ms"),
-        "seconds_per_simulated_ms": figure(1e-3 * step_ms * 1e-3 / STEP, "s"),
-        "memory_MB": figure(memory_mb(), "MB"),
-        "fields_MB": figure(1e-6 * field_bytes(), "MB"),
-        "ledger_residual_fraction": figure(report.energy_residual_fraction, "1"),
-        "linear_momentum_error": figure(report.linear_momentum_error, "1"),
+    report, history = result.report, result.history
+    step_ms = 1e3 * report.run_cpu_seconds / report.substeps
+    found = {
+        "tetrahedra": (report.body_count, "1"),
+        "broken_faces": (report.broken_faces, "1"),
+        "ppv_exponent": (None if np.isnan(law[0]) else law[0], "1"),
+        "hole_radial_displacement_mm": (float(history["hole_radial_displacement_mm"][-1]), "mm"),
+        "ms_a_step": (step_ms, "ms"),
+        "seconds_per_simulated_ms": (1e-6 * step_ms / STEP, "s"),
+        "memory_MB": (memory_mb(), "MB"),
+        "fields_MB": (1e-6 * field_bytes(), "MB"),
+        "ledger_residual_fraction": (report.energy_residual_fraction, "1"),
+        "linear_momentum_error": (report.linear_momentum_error, "1"),
     }
+    return {name: figure(*one) for name, one in found.items()}
 
 
 def run(options):
     """Run, picture, print."""
-    for name, value in (QUICK if options.quick else FULL).items():
-        if getattr(options, name) is None:
-            setattr(options, name, value)
+    take_defaults(options, FULL, QUICK)
     scene = Scene(mesh_of(options), CONCRETE, paper_effects())
-    print("\n".join(str(quality_report(scene.mesh, scene.material)).splitlines()[:7]))
+    print_quality(scene)
     with ProgressBar("blasting") as bar:
         result = simulate(
             scene,
@@ -217,7 +183,8 @@ def run(options):
             driver=options.driver,
             samples=options.samples,
             frames=options.frames,
-            progress=Lines(bar),
+            progress=bar,
+            observers=[Lines(options.until)],
             output=options.out,
             **checkpoint_of(options),
         )
@@ -225,14 +192,10 @@ def run(options):
     distance, speed, inner = peaks(result)
     law = fitted(distance, speed, inner)
     show(result, options.out, distance, speed, inner, law)
-    report = result.report
-    figures = figures_of(result, law, 1e3 * report.run_cpu_seconds / report.substeps)
+    report, figures = result.report, figures_of(result, law)
     figures["picture_seconds"] = figure(time.perf_counter() - started, "s")
-    seconds = {"compile_seconds": report.compile_seconds, "run_seconds": report.run_seconds}
-    write_summary(options.out, NAME, figures, **seconds)
     print(f"\n{report}\n")
-    print_figures(figures)
-    print(f"\nPictures, tables and the ParaView series are in {options.out}: see cracks.png first")
+    finish(options, NAME, figures, [report], see="cracks.png")
 
 
 def show(result, folder, distance, speed, inner, law):

@@ -22,20 +22,16 @@ import sys
 
 import numpy as np
 
-from _blast import explicit_limited, multirate_controlled
-from _cli import (
-    BLAST_DRIVERS,
-    PAPER_BLOCK,
-    add_checkpoints,
-    checkpoint_of,
-    figure,
-    main,
-    number,
-    parser,
-    print_figures,
-    whole,
-    write_summary,
+from _blast import (
+    EFFECTS,
+    blast_parser,
+    explicit_limited,
+    level_shares,
+    multirate_controlled,
+    print_quality,
 )
+from _cli import add_checkpoints, checkpoint_of, figure, main, number, whole
+from _report import finish, take_defaults
 from taichi_dem import (
     CONCRETE,
     ImplicitDashpots,
@@ -44,9 +40,7 @@ from taichi_dem import (
     Scene,
     SimulationDiverged,
     Uniform,
-    effects,
     plot,
-    quality_report,
     read_mesh,
     simulate,
 )
@@ -65,15 +59,6 @@ METHODS = {
     "uniform": (lambda dt0, distance: Uniform(dt0, distance), 1e-8, 1e-7),
     "fixed": (lambda dt0, distance: Uniform(dt0), 1e-8, None),
 }
-EFFECTS = {
-    "bond_damping": effects.BondDamping,
-    "softening": effects.Softening,
-    "shear_slip": effects.ShearSlip,
-    "sphere_contact": effects.SphereContact,
-    "friction": effects.Friction,
-    "gas_pressure": effects.GasPressure,
-    "gravity": effects.Gravity,
-}
 DEFAULT = [name for name in EFFECTS if name != "gravity"]
 QUICK = {"until": 8e-5, "frames": 6, "samples": 20}
 FULL = {"until": 5e-4, "frames": 40, "samples": 200}
@@ -81,8 +66,7 @@ FULL = {"until": 5e-4, "frames": 40, "samples": 200}
 
 def options_parser():
     """Options of this experiment."""
-    made = parser(NAME, __doc__, BLAST_DRIVERS)
-    made.add_argument("--mesh", default=PAPER_BLOCK, help="tetrahedra with a face group hole")
+    made = blast_parser(NAME, __doc__)
     made.add_argument("--until", type=number(0, 1), help="simulated time [s], 5e-4")
     made.add_argument("--method", choices=METHODS, default="implicit")
     made.add_argument("--dt0", type=number(0, 1), help="largest step [s], by method")
@@ -123,13 +107,10 @@ def build_scene(options):
 
 def run(options):
     """Run, picture, print."""
-    defaults = QUICK if options.quick else FULL
-    for name, value in defaults.items():
-        if getattr(options, name) is None:
-            setattr(options, name, value)
+    take_defaults(options, FULL, QUICK)
     method = chosen_method(options.method, options.dt0, options.l)
     scene = build_scene(options)
-    print("\n".join(str(quality_report(scene.mesh, scene.material)).splitlines()[:7]))
+    print_quality(scene)
     try:
         with ProgressBar("blasting") as progress:
             result = simulate(
@@ -149,40 +130,31 @@ def run(options):
             picture(error.result, options.out)
         raise
     picture(result, options.out)
-    figures = figures_of(result)
-    write_summary(
-        options.out,
-        NAME,
-        figures,
-        compile_seconds=result.report.compile_seconds,
-        run_seconds=result.report.run_seconds,
-    )
     print(f"\n{result.report}\n")
-    print_figures(figures)
-    print(f"\nPictures, tables and the ParaView series are in {options.out}: see cracks.png first")
+    finish(options, NAME, figures_of(result), [result.report], see="cracks.png")
 
 
 def figures_of(result):
     """Figures for summary.json, beside the paper's where it names one."""
     history, report = result.history, result.report
-    figures = {}
-    if "monitor_displacement_mm" in history:
-        radial = float(history["hole_radial_displacement_mm"][-1])
-        figures["hole_radial_displacement_mm"] = figure(radial, "mm")
-        monitor = float(history["monitor_displacement_mm"][-1])
-        at_paper_time = abs(report.until_s - 5e-4) < 1e-9
-        figures["monitor_displacement_mm"] = figure(monitor, "mm", 1.93 if at_paper_time else None)
+    paper_mm = 1.93 if abs(report.until_s - 5e-4) < 1e-9 else None
     per_ms = report.run_cpu_seconds / (1e3 * report.until_s)
-    return {
-        **figures,
-        "broken_faces": figure(report.broken_faces, "1"),
-        "ledger_residual_fraction": figure(report.energy_residual_fraction, "1"),
-        "linear_momentum_error": figure(report.linear_momentum_error, "1"),
-        "angular_momentum_error": figure(report.angular_momentum_error, "1"),
-        "smallest_step_s": figure(float(history["smallest_step_s"].min()), "s", 4e-11),
-        "contact_evaluations": figure(report.contact_evaluations, "1"),
-        "seconds_per_simulated_ms": figure(per_ms, "s", 2702 * 60 / 0.5),
+    found = {
+        "hole_radial_displacement_mm": (history.get("hole_radial_displacement_mm"), "mm"),
+        "monitor_displacement_mm": (history.get("monitor_displacement_mm"), "mm", paper_mm),
+        "broken_faces": (report.broken_faces, "1"),
+        "ledger_residual_fraction": (report.energy_residual_fraction, "1"),
+        "linear_momentum_error": (report.linear_momentum_error, "1"),
+        "angular_momentum_error": (report.angular_momentum_error, "1"),
+        "smallest_step_s": (float(history["smallest_step_s"].min()), "s", 4e-11),
+        "contact_evaluations": (report.contact_evaluations, "1"),
+        "seconds_per_simulated_ms": (per_ms, "s", 2702 * 60 / 0.5),
     }
+    # Columns by their last row; a scene without a hole has none.
+    found = {
+        k: (float(v[-1]) if isinstance(v, np.ndarray) else v, *r) for k, (v, *r) in found.items()
+    }
+    return {name: figure(*one) for name, one in found.items() if one[0] is not None}
 
 
 def picture(result, folder):
@@ -198,32 +170,19 @@ def picture(result, folder):
         pressure = gas[0].pressure_at(time_s)
         plot.plot_pressure(at("pressure.png"), time_s, pressure, result.history["time_s"][-1])
         write_csv(at("pressure.csv"), {"time_s": time_s, "pressure_pa": pressure})
-    frames, model = result.frames, result.model
-    top = max(int(frame.level.max()) for frame in frames)
+    frames, model, dt0 = result.frames, result.model, result.method.dt0
     plot.plot_history(at("history.png"), result.history)
     plot.plot_energy(at("energy.png"), result.history)
     plot.plot_cracks(at("cracks.png"), model, frames[-1], result.broken_time, magnify=3.0)
-    picked = [frames[k] for k in np.unique(np.linspace(0, len(frames) - 1, 7).round().astype(int))]
-    if top > 0:
-        plot.plot_steps(
-            at("steps.png"), model, picked[1:] or picked, result.method.dt0, result.broken_time
-        )
-        _picture_levels(frames, top, result.method.dt0, at)
+    shares, time_s = level_shares([f.level for f in frames]), [frame.time_s for frame in frames]
+    if shares.shape[1] > 1:
+        picked = np.unique(np.linspace(0, len(frames) - 1, 7).round().astype(int))
+        picked = [frames[k] for k in picked]
+        plot.plot_steps(at("steps.png"), model, picked[1:] or picked, dt0, result.broken_time)
+        plot.plot_levels(at("levels.png"), time_s, shares, dt0)
+        columns = {f"level_{k}": column for k, column in enumerate(shares.T)}
+        write_csv(at("levels.csv"), {"time_s": time_s, **columns})
     plot.save_animation(at("blast.gif"), model, frames, result.broken_time, magnify=3.0)
-
-
-def _picture_levels(frames, top, dt0, at):
-    """Shares of the bodies on each level over time."""
-    shares = np.array([level_shares(frame.level, top) for frame in frames])
-    time_s = [frame.time_s for frame in frames]
-    plot.plot_levels(at("levels.png"), time_s, shares, dt0)
-    columns = {f"level_{k}": column for k, column in enumerate(shares.T)}
-    write_csv(at("levels.csv"), {"time_s": time_s, **columns})
-
-
-def level_shares(level, top):
-    """Share of bodies on each level from 0 to top."""
-    return np.bincount(level, minlength=top + 1) / len(level)
 
 
 def _write_bodies(result, path):

@@ -21,33 +21,47 @@ import sys
 
 import numpy as np
 
-from _blast import METHODS, paper_scene
-from _cli import (
-    BLAST_DRIVERS,
-    PAPER_BLOCK,
-    figure,
-    main,
-    number,
-    parser,
-    print_figures,
-    print_table,
-    several,
-    whole,
-    write_summary,
+from _blast import METHODS, Costs, blast_parser, paper_scene
+from _cli import figure, main, number, several, whole
+from _report import figures_from, finish, show_rows, take_defaults, write_rows
+from taichi_dem import (
+    ImplicitDashpots,
+    InputError,
+    ProgressBar,
+    SimulationDiverged,
+    plot,
+    simulate,
 )
-from taichi_dem import ImplicitDashpots, InputError, Simulation, SimulationDiverged, plot
 from taichi_dem.kit.files import output_folder, write_csv
-from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.output.record import Recorder
-from taichi_dem.simulate import progress_of
-from taichi_dem.simulation import macro_steps
 
 NAME = "blast_methods"
 REFERENCE = ImplicitDashpots(2.5e-8, sweeps=(6, 40))
 QUICK = {"until": 1e-5, "stable_until": 1e-5, "samples": 10, "doublings": 0}
+FULL = {"until": 5e-4, "stable_until": 1e-4, "samples": 100, "doublings": 8}
 #: Error of the displacement beyond which a run counts as unstable though no body ran away.
 USABLE = 0.1
-FULL = {"until": 5e-4, "stable_until": 1e-4, "samples": 100, "doublings": 8}
+MOVED = "hole_radial_displacement_mm"
+UNITS = {
+    "seconds": "s",
+    "displacement_error": "1",
+    "broken_faces": "1",
+    "ledger_residual_fraction": "1",
+    "largest_stable_step_s": "s",
+    "evaluations": "1",
+}
+TABLE = {
+    "method": ("method", ""),
+    "step [s]": ("step_s", ".2g"),
+    "smallest": ("smallest_step_s", ".2g"),
+    "stable to": ("largest_stable_step_s", ".2g"),
+    "CPU [s]": ("seconds", ".3g"),
+    "evaluations": ("evaluations", ","),
+    "hole [mm]": ("displacement_mm", ".4f"),
+    "error": ("displacement_error", ".2g%"),
+    "faces": ("broken_faces", ""),
+    "residual": ("ledger_residual_fraction", ".2g%"),
+    "most bound by": ("bound_by", ""),
+}
 
 
 def method_name(text):
@@ -59,8 +73,7 @@ def method_name(text):
 
 def options_parser():
     """Options of this experiment."""
-    made = parser(NAME, __doc__, BLAST_DRIVERS)
-    made.add_argument("--mesh", default=PAPER_BLOCK, help="tetrahedra with a face group hole")
+    made = blast_parser(NAME, __doc__)
     made.add_argument("--until", type=number(0, 1), help="simulated time [s], 5e-4")
     made.add_argument("--stable-until", type=number(0, 1), help="for the stable step [s], 1e-4")
     made.add_argument("--samples", type=whole(1, 100000), help="rows of the time series, 100")
@@ -71,38 +84,35 @@ def options_parser():
     return made
 
 
-def follow(scene, method, options, title):
-    """Report and time series of one run."""
-    last = macro_steps(options.until, method.dt0)
-    seconds, evaluations = [], []
-    with ProgressBar(title) as bar:
-        simulation = Simulation(scene, method, options.driver)
-        recorder = Recorder(simulation, "hole")
-        simulation.start()
-        for step in sorted({round(last * k / options.samples) for k in range(options.samples + 1)}):
-            simulation.advance_to(step, lambda: bar(progress_of(simulation, options.until)))
-            recorder.sample()
-            seconds.append(simulation.run_cpu_seconds)
-            evaluations.append(simulation.evaluations())
-    return simulation.report(), {
-        **recorder.history(),
-        "cpu_s": seconds,
-        "evaluations": evaluations,
-    }
+def follow(scene, method, options, name):
+    """Report and time series of one run; writes the series."""
+    costs = Costs()
+    with ProgressBar(name) as bar:
+        result = simulate(
+            scene,
+            method=method,
+            until=options.until,
+            driver=options.driver,
+            samples=options.samples,
+            progress=bar,
+            observers=[costs],
+        )
+    series = {**result.history, **costs.columns}
+    write_csv(os.path.join(options.out, f"history_{name}.csv"), series)
+    return result.report, series
 
 
 def serves(scene, method, exact, options):
     """Whether a method reaches the time for stability, undiverged and near the reference."""
-    simulation = Simulation(scene, method, options.driver)
-    recorder = Recorder(simulation, "hole")
+    until, driver = options.stable_until, options.driver
     try:
-        simulation.advance_to(macro_steps(options.stable_until, method.dt0))
+        found = simulate(
+            scene, method=method, until=until, driver=driver, samples=1, progress=None
+        ).history
     except SimulationDiverged:
         return False
-    recorder.sample()
-    moved = recorder.history()["hole_radial_displacement_mm"][-1]
-    wanted = np.interp(simulation.time_s, exact["time_s"], exact["hole_radial_displacement_mm"])
-    return abs(moved / wanted - 1.0) < USABLE
+    wanted = np.interp(found["time_s"][-1], exact["time_s"], exact[MOVED])
+    return abs(found[MOVED][-1] / wanted - 1.0) < USABLE
 
 
 def largest_stable_step(scene, make, step, exact, options):
@@ -118,7 +128,7 @@ def largest_stable_step(scene, make, step, exact, options):
 
 def row_of(name, report, series, wanted, stable, step):
     """One row of the table; wanted: displacement of the reference [mm]."""
-    moved = float(series["hole_radial_displacement_mm"][-1])
+    moved = float(series[MOVED][-1])
     return {
         "method": name,
         "step_s": step,
@@ -136,89 +146,33 @@ def row_of(name, report, series, wanted, stable, step):
 
 def run(options):
     """Run the reference and all methods, compare, picture."""
-    for name, value in (QUICK if options.quick else FULL).items():
-        if getattr(options, name) is None:
-            setattr(options, name, value)
+    take_defaults(options, FULL, QUICK)
     scene = paper_scene(options.mesh)
     output_folder(options.out)
     best, exact = follow(scene, REFERENCE, options, "reference")
-    write_csv(os.path.join(options.out, "history_reference.csv"), exact)
-    wanted = float(exact["hole_radial_displacement_mm"][-1])
-    rows, reports, histories = [], [best], {}
+    wanted = float(exact[MOVED][-1])
+    rows, reports, histories = [], [best], {"reference": exact}
     for name in options.methods:
         make, step = METHODS[name]
-        report, series = follow(scene, make(step), options, name)
-        write_csv(os.path.join(options.out, f"history_{name}.csv"), series)
+        report, histories[name] = follow(scene, make(step), options, name)
         stable = largest_stable_step(scene, make, step, exact, options)
-        rows.append(row_of(name, report, series, wanted, stable, step))
+        rows.append(row_of(name, report, histories[name], wanted, stable, step))
         reports.append(report)
-        histories[name] = series
-    write_csv(
-        os.path.join(options.out, "methods.csv"),
-        {key: [row[key] for row in rows] for key in rows[0]},
-    )
-    path, moved = os.path.join(options.out, "methods.png"), "hole_radial_displacement_mm"
-    plot.plot_methods(path, {"reference": exact, **histories}, moved)
-    figures = figures_of(rows, best, wanted)
-    write_summary(
-        options.out,
-        NAME,
-        figures,
-        compile_seconds=sum(report.compile_seconds for report in reports),
-        run_seconds=sum(report.run_seconds for report in reports),
-    )
-    print_rows(rows, best, wanted)
-    print()
-    print_figures(figures)
-    print(f"\nPictures and tables are in {options.out}")
-
-
-def figures_of(rows, best, wanted):
-    """Figures for summary.json: the table's, by method, and the reference's."""
-    units = {
-        "seconds": "s",
-        "displacement_error": "1",
-        "broken_faces": "1",
-        "ledger_residual_fraction": "1",
-        "largest_stable_step_s": "s",
-        "evaluations": "1",
-    }
+    write_rows(options.out, "methods.csv", rows)
+    plot.plot_methods(os.path.join(options.out, "methods.png"), histories, MOVED)
     figures = {
         "reference_displacement_mm": figure(wanted, "mm"),
         "reference_broken_faces": figure(best.broken_faces, "1"),
         "reference_seconds": figure(best.run_cpu_seconds, "s"),
     }
     for row in rows:
-        for key, unit in units.items():
-            figures[f"{key}_{row['method']}"] = figure(row[key], unit)
-    return figures
-
-
-def print_rows(rows, best, wanted):
-    """The comparison as a table."""
+        figures.update(figures_from(row, UNITS, f"{{}}_{row['method']}"))
     print(
         f"Reference: {REFERENCE.name} at {REFERENCE.dt:g} s, {best.run_cpu_seconds:.3g} s of CPU: "
         f"hole {wanted:.4f} mm, {best.broken_faces} faces\n"
     )
-    header = ["method", "step [s]", "smallest", "stable to", "CPU [s]", "evaluations"]
-    header += ["hole [mm]", "error", "faces", "residual", "most bound by"]
-    cells = [
-        (
-            row["method"],
-            f"{row['step_s']:.2g}",
-            f"{row['smallest_step_s']:.2g}",
-            f"{row['largest_stable_step_s']:.2g}",
-            f"{row['seconds']:.3g}",
-            f"{row['evaluations']:,}",
-            f"{row['displacement_mm']:.4f}",
-            f"{100 * row['displacement_error']:.2g} %",
-            row["broken_faces"],
-            f"{100 * row['ledger_residual_fraction']:.2g} %",
-            row["bound_by"],
-        )
-        for row in rows
-    ]
-    print_table(cells, header)
+    show_rows(rows, TABLE)
+    finish(options, NAME, figures, reports)
 
 
 if __name__ == "__main__":

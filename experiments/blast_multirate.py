@@ -17,56 +17,56 @@ import math
 import os
 import sys
 
-import numpy as np
-
-from _blast import paper_scene
-from _cli import (
-    BLAST_DRIVERS,
-    PAPER_BLOCK,
-    figure,
-    main,
-    number,
-    parser,
-    print_figures,
-    print_table,
-    whole,
-    write_summary,
-)
+from _blast import Costs, blast_parser, level_shares, paper_scene
+from _cli import figure, main, number, whole
+from _report import finish, show_rows, take_defaults, write_rows
 from _timing import Timing
 from taichi_dem import (
+    At,
     InputError,
     Multirate,
-    Simulation,
+    ProgressBar,
     Uniform,
     plot,
+    simulate,
 )
 from taichi_dem.kit.files import output_folder, write_csv
 from taichi_dem.kit.plot_style import styles_of
-from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.output.record import Recorder
-from taichi_dem.simulate import progress_of
-from taichi_dem.simulation import macro_steps
+from taichi_dem.output.hole_monitor import HoleMonitor
 
 NAME = "blast_multirate"
 METHODS = {
-    "uniform": lambda dt0, distance: Uniform(dt0, distance),
-    "multirate_held": lambda dt0, distance: Multirate(dt0, distance),
+    "uniform": Uniform,
+    "multirate_held": Multirate,
     "multirate_drifted": lambda dt0, distance: Multirate(dt0, distance, "drifted"),
 }
-QUICK = {"l": 1e-7, "early": 2e-5, "until": 6e-5, "repeats": 1, "samples": 12}
-FULL = {"l": 1e-7, "early": 5e-5, "until": 5e-4, "repeats": 1, "samples": 100}
+QUICK = {"l": 1e-7, "until": 6e-5, "repeats": 1, "samples": 12}
+FULL = {"l": 1e-7, "until": 5e-4, "repeats": 1, "samples": 100}
+EARLY, QUICK_EARLY = 5e-5, 2e-5
 #: The paper's minutes at its two instants [s], and its displacements [mm] at the second.
 PAPER_MINUTES = {
     "uniform": {5e-5: 16, 5e-4: 3897},
     "multirate_held": {5e-5: 14, 5e-4: 2702},
 }
 PAPER_MM = {"uniform": {5e-4: 2.16}, "multirate_held": {5e-4: 1.93}}
+TABLE = {
+    "method": ("method", ""),
+    "time [s]": ("time_s", ".3g"),
+    "CPU [s]": ("cpu_s", ".3g"),
+    "evaluations": ("evaluations", ","),
+    "ideal": ("ideal_gain", ".2f"),
+    "boundary": ("boundary_gain", ".2f"),
+    "realised": ("realised_gain", ".2f"),
+    "displacement [mm]": ("displacement_mm", ".4f"),
+    "difference": ("displacement_difference", "+.2f%"),
+    "broken": ("broken_faces", ""),
+    "residual": ("residual_fraction", ".2g%"),
+}
 
 
 def options_parser():
     """Options of this experiment."""
-    made = parser(NAME, __doc__, BLAST_DRIVERS)
-    made.add_argument("--mesh", default=PAPER_BLOCK, help="tetrahedra with a face group hole")
+    made = blast_parser(NAME, __doc__)
     made.add_argument("--l", type=number(0, 1), help="largest way of a body in a step [m], 1e-7")
     made.add_argument("--dt0", type=number(0, 1), default=1e-8, help="largest step [s]")
     made.add_argument("--early", type=number(0, 1), help="first instant compared [s], 5e-5")
@@ -76,41 +76,47 @@ def options_parser():
     return made
 
 
+class Instant:
+    """Report and displacements [mm] at an instant [s]: of the hole, and of the body watched."""
+
+    def __init__(self, time_s):
+        self.when = At((time_s,))
+
+    def observe(self, view):
+        """Look at the run."""
+        hole, place = HoleMonitor(view.model, "hole"), view.motion()["position"]
+        self.report, self.radial_mm = view.report(), 1e3 * hole.radial_displacement(place)
+        self.moved_mm = 1e3 * hole.monitored_displacement(place)
+
+
 def follow(name, options, scene):
-    """One run of a method: (report at the early instant, report at the end, series, seconds)."""
-    method = METHODS[name](options.dt0, options.l)
-    last = macro_steps(options.until, method.dt0)
-    early = min(last, macro_steps(options.early, method.dt0))
-    marks = {round(last * k / options.samples) for k in range(options.samples + 1)}
-    reports, costs = {}, {"cpu_s": [], "evaluations": [], "level": []}
+    """One run of a method: an Instant each for early and late, and the series."""
+    method, costs = METHODS[name](options.dt0, options.l), Costs()
+    instants = [Instant(time_s) for time_s in (options.early, options.until)]
     with ProgressBar(styles_of([name])[name].label) as bar:
-        simulation = Simulation(scene, method, options.driver)
-        recorder = Recorder(simulation, "hole")
-        simulation.start()
         try:
-            for step in sorted(marks | {early}):
-                simulation.advance_to(step, lambda: bar(progress_of(simulation, options.until)))
-                reports[step] = simulation.report()
-                recorder.sample()
-                costs["cpu_s"].append(simulation.run_cpu_seconds)
-                costs["evaluations"].append(reports[step].contact_evaluations)
-                costs["level"].append(simulation.state.level.to_numpy())
+            result = simulate(
+                scene,
+                method=method,
+                until=options.until,
+                driver=options.driver,
+                samples=options.samples,
+                progress=bar,
+                observers=[costs, *instants],
+            )
         finally:
             # Also what a run that diverged, or was interrupted, had reached.
-            write_csv(os.path.join(options.out, f"history_{name}.csv"), recorder.history())
-    series = {**recorder.history(), **costs}
-    series["row_early"] = sorted(marks | {early}).index(early)
-    return reports[early], reports[last], series
+            if costs.view is not None:
+                history = costs.view.history()
+                write_csv(os.path.join(options.out, f"history_{name}.csv"), history)
+    return (*instants, {**result.history, **costs.columns}, costs.levels)
 
 
 def run(options):
     """Run all methods, compare, picture."""
-    defaults = QUICK if options.quick else FULL
-    for name, value in defaults.items():
-        if getattr(options, name) is None and name != "early":
-            setattr(options, name, value)
+    take_defaults(options, FULL, QUICK)
     if options.early is None:
-        options.early = min(defaults["early"], options.until)
+        options.early = min(QUICK_EARLY if options.quick else EARLY, options.until)
     if options.early > options.until:
         raise InputError(f"early must be at most until, {options.until:g} s, got {options.early:g}")
     scene = paper_scene(options.mesh)
@@ -119,61 +125,45 @@ def run(options):
         name: [follow(name, options, scene) for _ in range(options.repeats)] for name in METHODS
     }
     rows = table_of(runs)
-    write_csv(os.path.join(options.out, "comparison.csv"), columns_of(rows))
-    series = {name: made[0][2] for name, made in runs.items()}
-    picture(series, options)
-    figures = figures_of(rows)
-    compile_seconds = sum(one[1].compile_seconds for made in runs.values() for one in made)
-    run_seconds = sum(one[1].run_seconds for made in runs.values() for one in made)
-    write_summary(
-        options.out, NAME, figures, compile_seconds=compile_seconds, run_seconds=run_seconds
-    )
-    print_comparison(rows, options)
-    print()
-    print_figures(figures)
-    print(f"\nPictures and tables are in {options.out}")
+    write_rows(options.out, "comparison.csv", rows)
+    picture(runs, options)
+    print(f"One step for all against a step for each, all at l = {options.l:g} m\n")
+    show_rows(rows, TABLE)
+    if options.repeats > 1:
+        spread = max(row["cpu_spread"] for row in rows)
+        print(f"CPU times: medians of {options.repeats} runs, spread up to {spread:.0%}\n")
+    reports = [one[1].report for made in runs.values() for one in made]
+    finish(options, NAME, figures_of(rows), reports)
 
 
 def table_of(runs):
     """A row, as a dict, for every method and instant; the first run's counts, all runs' times."""
     rows = []
     for place, instant in enumerate(("early", "late")):
+        base = len(rows)
         for name, made in runs.items():
-            report, series = made[0][place], made[0][2]
-            at = series["row_early"] if instant == "early" else -1
-            timing = Timing.of([one[place].run_cpu_seconds for one in made])
-            rows.append(
-                {
-                    "method": name,
-                    "instant": instant,
-                    "time_s": report.until_s,
-                    "cpu_s": timing.median,
-                    "cpu_spread": timing.spread,
-                    "substeps": report.substeps,
-                    "evaluations": report.contact_evaluations,
-                    "ideal_gain": report.ideal_gain,
-                    "boundary_gain": report.boundary_gain,
-                    "displacement_mm": float(series["monitor_displacement_mm"][at]),
-                    "radial_mm": float(series["hole_radial_displacement_mm"][at]),
-                    "broken_faces": report.broken_faces,
-                    "residual_fraction": report.energy_residual_fraction,
-                }
-            )
-    for row in rows:
-        one = reference(rows, row["instant"])
-        row["realised_gain"] = one["cpu_s"] / max(row["cpu_s"], 1e-12)
-        row["displacement_difference"] = row["displacement_mm"] / one["displacement_mm"] - 1.0
+            first = made[0][place]
+            report, moved = first.report, float(first.moved_mm)
+            timing = Timing.of([one[place].report.run_cpu_seconds for one in made])
+            row = {
+                "method": name,
+                "instant": instant,
+                "time_s": report.until_s,
+                "cpu_s": timing.median,
+                "cpu_spread": timing.spread,
+                "substeps": report.substeps,
+                "evaluations": report.contact_evaluations,
+                "ideal_gain": report.ideal_gain,
+                "boundary_gain": report.boundary_gain,
+                "displacement_mm": moved,
+                "radial_mm": float(first.radial_mm),
+                "broken_faces": report.broken_faces,
+                "residual_fraction": report.energy_residual_fraction,
+            }
+            rows.append(row)
+            row["realised_gain"] = rows[base]["cpu_s"] / max(row["cpu_s"], 1e-12)
+            row["displacement_difference"] = moved / rows[base]["displacement_mm"] - 1.0
     return rows
-
-
-def reference(rows, instant):
-    """The row of the uniform run at an instant."""
-    return next(row for row in rows if (row["method"], row["instant"]) == ("uniform", instant))
-
-
-def columns_of(rows):
-    """Rows as columns."""
-    return {name: [row[name] for row in rows] for name in rows[0]}
 
 
 def figures_of(rows):
@@ -186,16 +176,14 @@ def figures_of(rows):
         figures[f"{key}_cpu_s"] = figure(row["cpu_s"], "s", minutes and 60.0 * minutes)
         figures[f"{key}_evaluations"] = figure(row["evaluations"], "1")
         figures[f"{key}_displacement_mm"] = figure(row["displacement_mm"], "mm", moved)
-        if name == "uniform":
-            continue
-        figures[f"{key}_ideal_gain"] = figure(row["ideal_gain"], "1")
-        figures[f"{key}_boundary_gain"] = figure(row["boundary_gain"], "1")
-        gain = minutes and base / minutes
-        figures[f"{key}_realised_gain"] = figure(row["realised_gain"], "1", gain)
-        difference = moved and moved / base_moved - 1.0
-        figures[f"{key}_displacement_difference"] = figure(
-            row["displacement_difference"], "1", difference
-        )
+        papers = {
+            "ideal_gain": None,
+            "boundary_gain": None,
+            "realised_gain": minutes and base / minutes,
+            "displacement_difference": moved and moved / base_moved - 1.0,
+        }
+        if name != "uniform":
+            figures.update({f"{key}_{k}": figure(row[k], "1", v) for k, v in papers.items()})
     return figures
 
 
@@ -205,51 +193,20 @@ def paper(values, name, row):
     return found[0] if found else None
 
 
-def print_comparison(rows, options):
-    """The comparison as a table."""
-    header = ["method", "time [s]", "CPU [s]", "evaluations", "ideal", "boundary", "realised"]
-    header += ["displacement [mm]", "difference", "broken", "residual"]
-    cells = [
-        (
-            row["method"],
-            f"{row['time_s']:.3g}",
-            f"{row['cpu_s']:.3g}",
-            f"{row['evaluations']:,}",
-            *(f"{row[name]:.2f}" for name in ("ideal_gain", "boundary_gain", "realised_gain")),
-            f"{row['displacement_mm']:.4f}",
-            f"{100 * row['displacement_difference']:+.2f} %",
-            row["broken_faces"],
-            f"{100 * row['residual_fraction']:.2g} %",
-        )
-        for row in rows
-    ]
-    print(f"One step for all against a step for each, all at l = {options.l:g} m\n")
-    print_table(cells, header)
-    if options.repeats > 1:
-        print(f"CPU times: medians of {options.repeats} runs, spread up to ", end="")
-        print(f"{100 * max(row['cpu_spread'] for row in rows):.0f} %")
-
-
-def picture(series, options):
+def picture(runs, options):
     """Draw and write all that is plotted."""
 
     def at(name):
         return os.path.join(options.out, name)
 
+    series = {name: made[0][2] for name, made in runs.items()}
     for name, made in series.items():
-        shares = level_shares(made.pop("level"))
-        made.pop("row_early")
+        shares = level_shares(runs[name][0][3])
         levels = {f"level_{k}": column for k, column in enumerate(shares.T)}
         write_csv(at(f"{name}.csv"), {**made, **levels})
         if name != "uniform":
             plot.plot_levels(at(f"levels_{name}.png"), made["time_s"], shares, options.dt0)
     plot.plot_methods(at("methods.png"), series, "monitor_displacement_mm")
-
-
-def level_shares(levels):
-    """Share of bodies on each level: rows (sample, level) that sum to 1."""
-    count = max(int(level.max()) for level in levels) + 1
-    return np.array([np.bincount(level, minlength=count) / len(level) for level in levels])
 
 
 if __name__ == "__main__":

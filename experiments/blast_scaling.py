@@ -26,18 +26,9 @@ import time
 
 import numpy as np
 
-from _blast import paper_scene
-from _cli import (
-    PAPER_BLOCK,
-    figure,
-    main,
-    number,
-    parser,
-    print_figures,
-    print_table,
-    whole,
-    write_summary,
-)
+from _blast import blast_parser, paper_scene
+from _cli import figure, main, number, whole
+from _report import finish, show_rows, take_defaults, write_rows
 from _scaling_picture import picture_scaling
 from _scaling_record import record
 from _scaling_simulate import WAYS, Workers, acceleration
@@ -61,22 +52,23 @@ PAPER_STATIC, PAPER_REBALANCED = 20381.0 / 3493.0, 9787.0 / 9023.0
 PAPER_ONE, PAPER_MANY, PAPER_FIXED, PAPER_SERIAL = 2702.0, 501.0, 541.0, 0.05
 #: Boxes of the bar for the threads, six tetrahedra each.
 CELLS, QUICK_CELLS = (40, 20, 20), (20, 10, 10)
+TABLE = {
+    "way of sharing": ("way", ""),
+    "workers": ("workers", ""),
+    "slowest/fastest": ("imbalance", ".3g"),
+    "contact": ("contact", ".3g"),
+    "whole": ("whole", ".3g"),
+}
 
 
 def options_parser():
     """Options of this experiment."""
-    made = parser(NAME, __doc__)
-    made.add_argument("--mesh", default=PAPER_BLOCK, help="tetrahedra with a face group hole")
+    made = blast_parser(NAME, __doc__, ())
     made.add_argument("--until", type=number(0, 1), help="simulated time [s], 5e-4")
     made.add_argument("--l", type=number(0, 1), help="the paper's way of a body in a step [m]")
     made.add_argument("--every", type=whole(1, 100000), default=50, help="steps an interval, 50")
     made.add_argument("--repeats", type=whole(1, 100), default=5, help="of the threads' times")
     return made
-
-
-def simulated(workers, counts):
-    """What every number of workers takes, a ``Shared`` by way and number."""
-    return {way: {count: workers.share(way, count) for count in counts} for way in WAYS}
 
 
 def figures_of(workers, shared, gains):
@@ -104,47 +96,42 @@ def figures_of(workers, shared, gains):
     return made
 
 
-def write_tables(folder, workers, shared):
-    """Acceleration and imbalance over the number of workers; times of each of 24."""
-    columns = {"workers": [], "way": [], "contact": [], "whole": [], "imbalance": []}
-    for way, by_count in shared.items():
-        for count, one in by_count.items():
-            gains = [acceleration(workers.total, one.elapsed, s) for s in (0.0, PAPER_SERIAL)]
-            for column, value in zip(columns.values(), (count, way, *gains)):
-                column.append(value)
-            columns["imbalance"].append(imbalance(one.seconds))
-    write_csv(os.path.join(folder, "scaling.csv"), columns)
-    each = {f"{way}_s": shared[way][PAPER_WORKERS].seconds for way in WAYS}
-    numbers = np.arange(1, PAPER_WORKERS + 1)
-    write_csv(os.path.join(folder, "shares.csv"), {"worker": numbers, **each})
-
-
-def show(workers, shared):
-    """Print what some numbers of workers gain."""
-    rows = []
-    for way, words in WAYS.items():
-        for count in (2, 4, PAPER_WORKERS, 256):
-            one = shared[way][count]
-            gains = [acceleration(workers.total, one.elapsed, s) for s in (0.0, PAPER_SERIAL)]
-            rows.append(
-                (words, count, f"{imbalance(one.seconds):.3g}", *(f"{g:.3g}" for g in gains))
-            )
-    print_table(rows, ["way of sharing", "workers", "slowest/fastest", "contact", "whole"])
+def row_of(workers, way, count, one):
+    """Acceleration and imbalance with a number of workers; one: a ``Shared``."""
+    gains = [acceleration(workers.total, one.elapsed, share) for share in (0.0, PAPER_SERIAL)]
+    names = ("workers", "way", "contact", "whole", "imbalance")
+    return dict(zip(names, (count, way, *gains, imbalance(one.seconds))))
 
 
 def run(options):
     """Record, simulate, measure, picture."""
-    for name, value in (QUICK if options.quick else FULL).items():
-        if getattr(options, name) is None:
-            setattr(options, name, value)
+    take_defaults(options, FULL, QUICK)
     scene = paper_scene(options.mesh)
     output_folder(options.out)
     started = time.perf_counter()
     with ProgressBar("blast") as bar:
         method = Multirate(DT0, options.l)
         recorded, simulation = record(scene, method, options.until, options.every, bar)
-    workers = Workers(recorded)
-    shared = simulated(workers, QUICK_COUNTS if options.quick else COUNTS)
+    workers, counts = Workers(recorded), QUICK_COUNTS if options.quick else COUNTS
+    shared = {way: {count: workers.share(way, count) for count in counts} for way in WAYS}
+    gains = measured(options)
+    rows = [row_of(workers, way, *one) for way in WAYS for one in shared[way].items()]
+    write_rows(options.out, "scaling.csv", rows)
+    each = {f"{way}_s": shared[way][PAPER_WORKERS].seconds for way in WAYS}
+    numbers = np.arange(1, PAPER_WORKERS + 1)
+    write_csv(os.path.join(options.out, "shares.csv"), {"worker": numbers, **each})
+    path = os.path.join(options.out, "scaling.png")
+    paper = PAPER_ONE / PAPER_FIXED, PAPER_ONE / PAPER_MANY
+    points = dict(zip(("2 threads, bar", "2 threads, block"), ((2, g["gain"]) for g in gains)))
+    picture_scaling(path, workers, shared, PAPER_WORKERS, PAPER_SERIAL, paper, points)
+    shown = [row for row in rows if row["workers"] in (2, 4, PAPER_WORKERS, 256)]
+    show_rows([{**row, "way": WAYS[row["way"]]} for row in shown], TABLE)
+    seconds = simulation.compile_seconds, time.perf_counter() - started
+    finish(options, NAME, figures_of(workers, shared, gains), [], seconds=seconds)
+
+
+def measured(options):
+    """What a second thread gains on the bar, and on the paper's block."""
     cells, *often = (QUICK_CELLS, 1, 2) if options.quick else (CELLS, ROUNDS, options.repeats)
     blocks = ("", cells, "paper_multirate", 10), (options.mesh, None, "paper_multirate", 400)
     gains = []
@@ -152,18 +139,7 @@ def run(options):
         for block in blocks:
             bar.count(len(gains), len(blocks))
             gains.append(thread_gain(*block, *often))
-    figures = figures_of(workers, shared, gains)
-    write_tables(options.out, workers, shared)
-    path = os.path.join(options.out, "scaling.png")
-    paper = PAPER_ONE / PAPER_FIXED, PAPER_ONE / PAPER_MANY
-    measured = dict(zip(("2 threads, bar", "2 threads, block"), ((2, g["gain"]) for g in gains)))
-    picture_scaling(path, workers, shared, PAPER_WORKERS, PAPER_SERIAL, paper, measured)
-    seconds = simulation.compile_seconds, time.perf_counter() - started
-    write_summary(options.out, NAME, figures, compile_seconds=seconds[0], run_seconds=seconds[1])
-    show(workers, shared)
-    print()
-    print_figures(figures)
-    print(f"\nThe picture and the tables are in {options.out}")
+    return gains
 
 
 if __name__ == "__main__":

@@ -20,23 +20,15 @@ import sys
 
 import numpy as np
 
-from _blast import paper_scene
-from _cli import (
-    PAPER_BLOCK,
-    figure,
-    main,
-    parser,
-    print_figures,
-    print_table,
-    write_summary,
-)
+from _blast import blast_parser, paper_scene
+from _cli import figure, main
 from _dashpot_system import DashpotSystem
-from taichi_dem import ImplicitDashpots, Simulation
-from taichi_dem.kit.files import output_folder, write_csv
+from _report import finish, show_rows, write_rows
+from taichi_dem import At, ImplicitDashpots, Simulation
+from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.plot_style import BROWN, GREY, STYLES, VIOLET, picture
 from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.simulate import progress_of
-from taichi_dem.simulation import macro_steps
+from taichi_dem.simulate import run_simulation
 
 NAME = "blast_sweeps"
 TIMES, QUICK_TIMES = (2e-5, 1e-4, 2e-4, 4e-4), (5e-6, 2e-5)
@@ -52,34 +44,40 @@ KICK, SWEEPS = 0.05, 30
 
 def options_parser():
     """Options of this experiment."""
-    made = parser(NAME, __doc__)
-    made.add_argument("--mesh", default=PAPER_BLOCK, help="tetrahedra with a face group hole")
-    return made
+    return blast_parser(NAME, __doc__, ())
 
 
-def errors_at(simulation):
-    """Error after 0, 1, ... sweeps, an array by way."""
-    system, state = DashpotSystem(simulation), simulation.state.motion()
-    still = np.hstack([state["velocity"], state["spin"]])
-    fastest = np.linalg.norm(state["velocity"], axis=1).max()
-    kicked = still.copy()
-    random = np.random.default_rng(0)
-    kicked[:, :3] += KICK * fastest * random.standard_normal(state["velocity"].shape)
-    twist = system.twists(still)
-    exact = next(itertools.islice(system.gauss_seidel(kicked, twist), 200, None))
-    ways = {
-        "gauss_seidel": system.gauss_seidel(kicked, twist),
-        "jacobi": system.jacobi(kicked, twist),
-        "momentum": system.jacobi(kicked, twist, momentum=True),
-    }
+class Solving:
+    """Observer that solves the dashpots in every way at some times [s].
 
-    def error(motion):
-        return np.linalg.norm((motion - exact)[:, :3], axis=1).max() / fastest
+    found: by time, error after 0, 1, ... sweeps, an array by way.
+    """
 
-    return {
-        name: np.array([error(kicked), *map(error, itertools.islice(way, SWEEPS))])
-        for name, way in ways.items()
-    }
+    def __init__(self, simulation, times):
+        self.simulation, self.when, self.found = simulation, At(times), {}
+
+    def observe(self, view):
+        """Solve."""
+        system, motion = DashpotSystem(self.simulation), view.motion()
+        still = np.hstack([motion["velocity"], motion["spin"]])
+        fastest = np.linalg.norm(motion["velocity"], axis=1).max()
+        kicked, random = still.copy(), np.random.default_rng(0)
+        kicked[:, :3] += KICK * fastest * random.standard_normal(motion["velocity"].shape)
+        twist = system.twists(still)
+        exact = next(itertools.islice(system.gauss_seidel(kicked, twist), 200, None))
+        ways = {
+            "gauss_seidel": system.gauss_seidel(kicked, twist),
+            "jacobi": system.jacobi(kicked, twist),
+            "momentum": system.jacobi(kicked, twist, momentum=True),
+        }
+
+        def error(moving):
+            return np.linalg.norm((moving - exact)[:, :3], axis=1).max() / fastest
+
+        self.found[view.time_s] = {
+            name: np.array([error(kicked), *map(error, itertools.islice(way, SWEEPS))])
+            for name, way in ways.items()
+        }
 
 
 def sweeps_to(errors, tolerance):
@@ -108,57 +106,34 @@ def run(options):
     """Go from time to time, solve in every way, compare."""
     scene = paper_scene(options.mesh)
     output_folder(options.out)
-    found = {}
     times = QUICK_TIMES if options.quick else TIMES
     with ProgressBar("blast") as bar:
         simulation = Simulation(scene, ImplicitDashpots(refresh=4e-7))
-        simulation.start()
-        for time_s in times:
-            last = macro_steps(time_s, simulation.method.dt0)
-            simulation.advance_to(last, lambda: bar(progress_of(simulation, times[-1])))
-            found[simulation.time_s] = errors_at(simulation)
-    write_csv(
-        os.path.join(options.out, "sweeps.csv"),
-        {
-            "time_s": np.repeat(list(found), SWEEPS + 1),
-            "sweeps": np.tile(np.arange(SWEEPS + 1), len(found)),
-            **{name: np.concatenate([errors[name] for errors in found.values()]) for name in WAYS},
-        },
-    )
-    draw(os.path.join(options.out, "sweeps.png"), found)
-    figures = figures_of(found)
-    write_summary(
-        options.out,
-        NAME,
-        figures,
-        compile_seconds=simulation.compile_seconds,
-        run_seconds=simulation.run_seconds,
-    )
-    print_rows(found)
-    print()
-    print_figures(figures)
-    print(f"\nPicture and table are in {options.out}")
-
-
-def figures_of(found):
-    """Most sweeps over all times, by way and tolerance."""
-    return {
-        f"sweeps_{name}_{tolerance:g}": figure(
-            max(sweeps_to(errors[name], tolerance) for errors in found.values()), "1"
-        )
-        for name in WAYS
-        for tolerance in TOLERANCES
-    }
-
-
-def print_rows(found):
-    """Sweeps to every tolerance, a row a time and way."""
-    cells = [
-        (f"{1e6 * time_s:.0f}", words, *(sweeps_to(errors[name], t) for t in TOLERANCES))
+        solving = Solving(simulation, times)
+        looks = {"samples": 1, "progress": bar, "observers": [solving]}
+        report = run_simulation(simulation, until=times[-1], **looks).report
+    found = solving.found
+    rows = [
+        {"time_s": time_s, "sweeps": k, **{way: errors[way][k] for way in WAYS}}
         for time_s, errors in found.items()
-        for name, (words, _) in WAYS.items()
+        for k in range(SWEEPS + 1)
     ]
-    print_table(cells, ["t [us]", "way", *(f"to {100 * t:g} %" for t in TOLERANCES)])
+    write_rows(options.out, "sweeps.csv", rows)
+    draw(os.path.join(options.out, "sweeps.png"), found)
+    rows = [
+        {"t": 1e6 * time_s, "way": way, **{t: sweeps_to(errors[way], t) for t in TOLERANCES}}
+        for time_s, errors in found.items()
+        for way in WAYS
+    ]
+    figures = {
+        f"sweeps_{way}_{t:g}": figure(max(row[t] for row in rows if row["way"] == way), "1")
+        for way in WAYS
+        for t in TOLERANCES
+    }
+    rows = [{**row, "way": WAYS[row["way"]][0]} for row in rows]
+    tolerances = {f"to {100 * t:g} %": (t, "") for t in TOLERANCES}
+    show_rows(rows, {"t [us]": ("t", ".0f"), "way": ("way", ""), **tolerances})
+    finish(options, NAME, figures, [report])
 
 
 if __name__ == "__main__":

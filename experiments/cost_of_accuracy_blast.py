@@ -21,25 +21,11 @@ import time
 from dataclasses import dataclass, replace
 from typing import Callable
 
-from _blast_accuracy import (
-    SPLIT,
-    Outcome,
-    blast,
-    displacement_error,
-    energy_error,
-    faces_error,
-)
+from _blast import blast_parser
+from _blast_accuracy import MEASURES, SPLIT, Outcome, blast, displacement_error
 from _cache import cached
-from _cli import (
-    BLAST_DRIVERS,
-    PAPER_BLOCK,
-    figure,
-    main,
-    parser,
-    print_figures,
-    print_table,
-    write_summary,
-)
+from _cli import figure, main, print_table
+from _report import finish, write_rows
 from _timing import Timing
 from _work_precision import (
     ANSWER_HEADER,
@@ -53,7 +39,7 @@ from _work_precision import (
     write_points,
 )
 from taichi_dem import ImplicitDashpots, Multirate, StepControl, Uniform, read_mesh
-from taichi_dem.kit.files import output_folder, write_csv
+from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.plot_style import power, styles_of
 from taichi_dem.kit.plot_style import seconds as seconds_in_words
 from taichi_dem.kit.progress.progress_bar import ProgressBar
@@ -90,9 +76,7 @@ def controlled(dt0):
 
 METHODS = {
     "uniform": Method(
-        lambda way: Uniform(PAPER_DT0, way),
-        (1e-6, 3e-7, 1e-7, PAPER_L),
-        by_way=True,
+        lambda way: Uniform(PAPER_DT0, way), (1e-6, 3e-7, 1e-7, PAPER_L), by_way=True
     ),
     "multirate_held": Method(
         lambda way: Multirate(PAPER_DT0, way),
@@ -101,24 +85,13 @@ METHODS = {
         by_way=True,
     ),
     "multirate_drifted": Method(
-        lambda way: Multirate(PAPER_DT0, way, "drifted"),
-        (3e-7, 1e-7, 3e-8),
-        by_way=True,
+        lambda way: Multirate(PAPER_DT0, way, "drifted"), (3e-7, 1e-7, 3e-8), by_way=True
     ),
-    "controlled": Method(
-        controlled,
-        (3.2e-7, 1.6e-7, 8e-8, 4e-8, 2e-8),
-    ),
+    "controlled": Method(controlled, (3.2e-7, 1.6e-7, 8e-8, 4e-8, 2e-8)),
     "limited": Method(
-        lambda dt: Uniform(dt, dashpot="limited"),
-        (1e-7, 4e-8, 2e-8, 1e-8, 5e-9),
-        (2e-8,),
+        lambda dt: Uniform(dt, dashpot="limited"), (1e-7, 4e-8, 2e-8, 1e-8, 5e-9), (2e-8,)
     ),
-    "implicit": Method(
-        ImplicitDashpots,
-        (4e-6, 2e-6, 1e-6, 5e-7, 2.5e-7, 1e-7, 5e-8),
-        (5e-7,),
-    ),
+    "implicit": Method(ImplicitDashpots, (4e-6, 2e-6, 1e-6, 5e-7, 2.5e-7, 1e-7, 5e-8), (5e-7,)),
     "fixed": Method(Uniform, (1e-8, 4e-9, 2e-9, 1e-9)),
 }
 FULL = {"until": 1e-4, "methods": tuple(METHODS), "reference": 1.25e-8, "twins": tuple(METHODS)}
@@ -133,8 +106,7 @@ CHECK = "multirate_held"
 
 def options_parser():
     """Options of this experiment; times are of one thread."""
-    made = parser(NAME, __doc__, BLAST_DRIVERS)
-    made.add_argument("--mesh", default=PAPER_BLOCK, help="tetrahedra with a face group hole")
+    made = blast_parser(NAME, __doc__)
     made.set_defaults(threads=1)
     return made
 
@@ -150,20 +122,17 @@ def run(options):
     made = {name: Sweep(name, mesh, sizes, options, reference) for name in sizes["methods"]}
     points = [point for sweep in made.values() for point in sweep.points]
     floors = {name: sweep.floor for name, sweep in made.items() if sweep.twins}
-    rows = answer_rows(points, TARGETS, floors, titles_of(made))
+    titles = {name: style.label for name, style in styles_of(made).items()}
+    rows = answer_rows(points, TARGETS, floors, titles)
     write_all(options.out, made, points, floors, rows, reference)
-    picture_all(options.out, made, points, floors, reference, sizes)
-    figures = figures_of(made, points, floors, reference)
-    compiling = sum(sweep.compile_s for sweep in made.values())
-    compiling += 0.0 if kept else reference.compile_s
-    spent = time.perf_counter() - started
-    write_summary(
-        options.out, NAME, figures, compile_seconds=compiling, run_seconds=spent - compiling
-    )
+    picture_all(options.out, made, points, floors, reference, sizes, titles)
+    runs = [run for sweep in made.values() for run in sweep.everything]
+    compiling = sum(run.compile_seconds for run in [*runs, *([] if kept else [reference])])
     print_table(rows, ANSWER_HEADER)
     print()
-    print_figures(figures)
-    print(f"\nPictures and tables are in {options.out}")
+    figures = figures_of(made, points, floors, reference)
+    spent = time.perf_counter() - started
+    finish(options, NAME, figures, [], seconds=(compiling, spent - compiling))
 
 
 def reference_of(mesh, sizes, options, bar):
@@ -185,7 +154,7 @@ class Sweep:
     """All runs of one method.
 
     runs: Outcome by step, coarse to fine. twins: of those that were run again disturbed. points:
-    of the diagram. compile_s: of everything.
+    of the diagram.
     """
 
     def __init__(self, name, mesh, sizes, options, reference):
@@ -198,14 +167,17 @@ class Sweep:
             again = name in sizes["twins"] and (step != steps[0] or len(steps) == 1)
             with ProgressBar(f"{name}, {self.method.label(step)}") as bar:
                 self._run(step, again, bar)
-        everything = (*self.runs.values(), *self.twins.values())
-        self.compile_s = sum(run.compile_s for run in everything)
 
     def _run(self, step, again, bar):
         settings = (self.mesh, self.method.make(step), self.until, self.driver)
         run = self.runs[step] = blast(*settings, progress=bar)
         if again and not run.failure and run.cpu_s < ENOUGH:
             self.twins[step] = blast(*settings, seed=1, progress=bar)
+
+    @property
+    def everything(self):
+        """All runs."""
+        return (*self.runs.values(), *self.twins.values())
 
     @property
     def points(self):
@@ -240,11 +212,6 @@ class Sweep:
         return displacement_error(self.twins[step], self.runs[step])
 
 
-def titles_of(made):
-    """Titles by method."""
-    return {name: style.label for name, style in styles_of(made).items()}
-
-
 def write_all(folder, made, points, floors, rows, reference):
     """CSV of points, of every run with all its errors and its energy split, and of answers."""
     write_points(os.path.join(folder, "points.csv"), points, floors)
@@ -253,14 +220,14 @@ def write_all(folder, made, points, floors, rows, reference):
     for name, sweep in made.items():
         for runs, again in ((sweep.runs, False), (sweep.twins, True)):
             table += [_row(name, step, one, reference, again) for step, one in runs.items()]
-    write_csv(os.path.join(folder, "runs.csv"), {key: [r[key] for r in table] for key in table[0]})
+    write_rows(folder, "runs.csv", table)
 
 
 def _row(name, step, run, reference, again):
     failed = bool(run.failure)
     measures = {
         f"{measure}_error": math.nan if failed else error(run, reference)
-        for measure, error in MEASURES.items()
+        for measure, (error, _) in MEASURES.items()
     }
     return {
         "method": name,
@@ -271,7 +238,7 @@ def _row(name, step, run, reference, again):
         "evaluations": run.evaluations,
         "cpu_s": run.cpu_s,
         "wall_s": run.wall_s,
-        "compile_s": run.compile_s,
+        "compile_s": run.compile_seconds,
         "residual": run.residual,
         "reached_s": run.reached_s,
         **{f"{term}_J": run.energy[term] for term in (*SPLIT, "load_work")},
@@ -280,14 +247,7 @@ def _row(name, step, run, reference, again):
     }
 
 
-MEASURES = {
-    "displacement": displacement_error,
-    "faces": faces_error,
-    "energy": energy_error,
-}
-
-
-def picture_all(folder, made, points, floors, reference, sizes):
+def picture_all(folder, made, points, floors, reference, sizes, titles):
     """The work-precision diagram, and the same for broken faces and energy."""
     scene = (
         f"{len(reference.moved)} bodies to {1e6 * sizes['until']:.0f} µs, "
@@ -302,7 +262,7 @@ def picture_all(folder, made, points, floors, reference, sizes):
     picture_work_precision(
         os.path.join(folder, "work_precision.png"),
         points,
-        titles_of(made),
+        titles,
         floors=shown,
         time_name=TIME,
         error_name="error of the displacement field [1]",
@@ -313,23 +273,20 @@ def picture_all(folder, made, points, floors, reference, sizes):
         f"/ RMS of the reference. Step control has limited dashpots.\n{against}; "
         f"the paper's multirate rule at its finest lies {percent(check)} from it. {chaos}.",
     )
-    errors = {}
-    for measure, words in (
-        ("displacement", "displacement field"),
-        ("faces", "faces broken in one only"),
-        ("energy", "energy split / work of the gas"),
-    ):
-        errors[words] = {
+    errors = {
+        words: {
             name: [
-                (point.seconds.low, MEASURES[measure](sweep.runs[point.step], reference))
+                (point.seconds.low, error(sweep.runs[point.step], reference))
                 for point in sweep.points
                 if not point.failure
             ]
             for name, sweep in made.items()
         }
+        for error, words in MEASURES.values()
+    }
     caption = f"Paper's block, {scene}. {against}. Points at the bottom edge have no error at all."
     path = os.path.join(folder, "errors.png")
-    picture_errors(path, errors, titles_of(made), time_name=TIME, caption=caption)
+    picture_errors(path, errors, titles, time_name=TIME, caption=caption)
 
 
 def distance_of_check(made):

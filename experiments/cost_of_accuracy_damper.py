@@ -1,4 +1,4 @@
-"""What accuracy of the damper's response costs: automaton, spheres and RK45 on one scale.
+"""Cost of accuracy of the damper's response: automaton, spheres and RK45 on one scale.
 
     python experiments/cost_of_accuracy_damper.py          # about four minutes on one core
     python experiments/cost_of_accuracy_damper.py --quick
@@ -18,33 +18,23 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+import _cost_damper_pictures as pictures
 from _cache import cached
-from _cli import figure, main, parser, print_figures, print_table, write_summary
-from _cost_rk45 import WAYS as RK45_WAYS
+from _cli import figure, finish, main, parser, print_table, write_rows
 from _cost_rk45 import rk45_points
-from _damper_response import (
-    OSCILLATOR,
-    Job,
-    distance,
-    scene_steps,
-    seed_variance,
-    simulate,
-)
+from _damper_response import OSCILLATOR, Job, distance, scene_steps, seed_variance, simulate
 from _work_precision import (
     ANSWER_HEADER,
     Point,
     answer_rows,
     answers,
-    percent,
-    picture_work_precision,
+    cheapest,
     write_answers,
     write_points,
 )
 from ca_damper import Automaton, SimulationDiverged, Spheres
-from ca_damper.plot.cost import picture_curves
 from taichi_dem import InputError
-from taichi_dem.kit.files import output_folder, write_csv
-from taichi_dem.kit.plot_style import STYLES, styles_of
+from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.plot_style import seconds as seconds_in_words
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 
@@ -53,6 +43,7 @@ SPHERES = "dem_tsuji"
 CA_STEPS = (2e-3, 1.1e-3, 7e-4, 5e-4, 3e-4, 2e-4, 1e-4, 5e-5)
 DEM_STEPS = (1e-4, 6e-5, 4e-5, 3e-5, 2e-5, 1.4e-5)
 PRINTED_STEPS = (6e-5, 4e-5, 2e-5)
+SOFT = Spheres(young=5e6, wall_young=5e6)
 SOFT_STEPS = (4e-4, 2.5e-4, 2e-4, 1e-4, 5e-5)
 
 
@@ -78,10 +69,7 @@ METHODS = {
     "ca_landing": automaton("landing"),
     SPHERES: Method(Spheres(), DEM_STEPS, 5e-6, 3, (1e-4, 3e-5)),
     "dem_printed": Method(Spheres(damping="printed"), PRINTED_STEPS, 5e-6, 3, (4e-5,)),
-    "dem_soft": Method(
-        Spheres(young=5e6, wall_young=5e6),
-        *(SOFT_STEPS, 2.5e-5, 3, (2e-4,)),
-    ),
+    "dem_soft": Method(SOFT, SOFT_STEPS, 2.5e-5, 3, (2e-4,)),
 }
 FULL = {
     "job": Job(30, (0.92, 0.95, 0.966, 0.98, 1.0, 1.04), 40, 40),
@@ -112,58 +100,61 @@ def options_parser():
 
 
 def run(options):
-    """Measure all methods, write pictures and tables, answer what an error costs."""
+    """Measure all methods, write pictures and tables, find the cheapest method for an error."""
     sizes = QUICK if options.quick else FULL
-    output_folder(options.out)
+    folder = output_folder(options.out)
     started = time.perf_counter()
     with ProgressBar("sweep") as bar:
         made = {name: Sweep(name, METHODS[name], sizes, options, bar) for name in sizes["methods"]}
-    empty, empty_compile = rk45_points(sizes["job"], sizes["repeats"], options.quick)
-    floors = {label: sweep.floor for label, sweep in made.items()}
-    own = [point for sweep in made.values() for point in sweep.points]
-    truth = made[SPHERES].reference["mean"]
+    empty, compiling = rk45_points(sizes["job"], sizes["repeats"], options.quick)
+    compiling += sum(sweep.compile_s for sweep in made.values())
+    truth = made[SPHERES].mean
+    own = [point for sweep in made.values() for point in sweep.against(sweep.mean)]
     toward = [point for sweep in made.values() for point in sweep.against(truth)]
-    names = {name: style.label for name, style in styles_of(made).items()}
-    rows = answer_rows(own, TARGETS, floors, names)
-    write_all(options.out, made, own, toward, empty, floors, rows)
-    picture_all(options.out, made, own, toward, empty, floors, sizes)
-    figures = figures_of(made, own, toward, empty, floors)
-    compiling = empty_compile + sum(sweep.compile_s for sweep in made.values())
-    spent = time.perf_counter() - started
-    write_summary(
-        options.out, NAME, figures, compile_seconds=compiling, run_seconds=spent - compiling
-    )
+    floors = {label: sweep.floor for label, sweep in made.items()}
+    rows = answer_rows(own, TARGETS, floors, pictures.titles_of(made))
+    write_points(os.path.join(folder, "points.csv"), own, floors)
+    write_points(os.path.join(folder, "points_against_spheres.csv"), toward, floors)
+    write_points(os.path.join(folder, "points_empty.csv"), empty, {})
+    write_answers(os.path.join(folder, "answers.csv"), rows)
+    write_curves(os.path.join(folder, "curves.csv"), made)
+    pictures.draw_all(folder, made, own, toward, empty, floors)
+    spent = time.perf_counter() - started - compiling
     print_table(rows, ANSWER_HEADER)
     print()
-    print_figures(figures)
-    print(f"\nPictures and tables are in {options.out}")
+    finish(options, NAME, figures_of(made, own, toward, empty, floors), (compiling, spent))
 
 
 class Sweep:
     """All runs of one method.
 
-    points: against its own reference. curves: Curve by step. reference: dict of the curve at the
-    finest step: mean [m] over ratios, rms, compile_s, force_check. roundoff: spread of runs that
-    differ by the last bit of the base's amplitude, None if not asked for. compile_s: of everything.
+    curves: Curve by step; failures: the reason by step. reference: dict of the curve at the finest
+    step: mean [m] over ratios, rms, compile_s, force_check. roundoff: spread of runs that differ by
+    the last bit of the base's amplitude, None if not asked for. compile_s: of everything.
     """
 
     def __init__(self, label, method, sizes, options, bar):
         self.label, self.method, self.job = label, method, sizes["job"]
-        self.seeds, self.repeats = range(1, sizes["seeds"] + 1), sizes["repeats"]
-        self.bar, self.quick = bar, options.quick
-        self.curves, self.failures = {}, {}
-        self.reference, kept = self._reference(os.path.join(options.out, "references"))
-        for dt in method.steps_of_quick if options.quick else method.steps:
-            self._run(dt)
+        self.seeds, self.bar = range(1, sizes["seeds"] + 1), bar
+        self.curves, self.failures, self.roundoff = {}, {}, None
+        steps = method.steps_of_quick if options.quick else method.steps
+        finest = method.reference_step, method.reference_seeds
+        if options.quick:
+            finest = 0.5 * min(steps), 2
+        folder = os.path.join(options.out, "references")
+        self.reference, kept = self._reference(folder, *finest)
+        self.mean, self.rms = (np.array(self.reference[name]) for name in ("mean", "rms"))
+        for dt in steps:
+            self._run(dt, sizes["repeats"])
         self.compile_s = sum(curve.compile_s for curve in self.curves.values())
         self.compile_s += 0.0 if kept else self.reference["compile_s"]
-        self.roundoff = self._twins() if label in sizes["twins"] and self.curves else None
-        self.points = self.against(self.reference["mean"])
+        if label in sizes["twins"] and self.curves:
+            ulps = range(len(TWINS))
+            twins = simulate(method.filling, self.job, max(self.curves), TWINS, ulps=ulps)
+            self.compile_s += twins.compile_s
+            self.roundoff = seed_variance(twins.rms) ** 0.5
 
-    def _reference(self, folder):
-        step, count = self.method.reference_step, self.method.reference_seeds
-        if self.quick:
-            step, count = 0.5 * min(self.method.steps_of_quick), 2
+    def _reference(self, folder, step, count):
         settings = (self.method.filling, OSCILLATOR, self.job, step, count)
         # Seeds of its own: a run that shares them would look better than it is.
         seeds = range(1001, 1001 + count)
@@ -171,46 +162,33 @@ class Sweep:
         def compute():
             curve = simulate(self.method.filling, self.job, step, seeds, progress=self.bar)
             words = {"mean": curve.mean.tolist(), "rms": curve.rms.tolist(), "step": step}
-            words["seconds"], words["compile_s"] = curve.timing.low, curve.compile_s
-            return {**words, "force_check": curve.force_check, "balance": curve.balance}
+            return {**words, "compile_s": curve.compile_s, "force_check": curve.force_check}
 
         return cached(folder, self.label, settings, ("ca_damper",), compute)
 
-    def _run(self, dt):
-        filling, job = self.method.filling, self.job
+    def _run(self, dt, repeats):
+        filling, timed = self.method.filling, {"repeats": repeats, "enough": ENOUGH}
         try:
-            filling.check(job.particles, dt)
+            filling.check(self.job.particles, dt)
+            run = simulate(filling, self.job, dt, self.seeds, progress=self.bar, **timed)
+            self.curves[dt] = run
         except InputError:
             self.failures[dt] = "refused"
-            return
-        try:
-            self.curves[dt] = simulate(
-                *(filling, job, dt, self.seeds),
-                repeats=self.repeats,
-                enough=ENOUGH,
-                progress=self.bar,
-            )
         except SimulationDiverged:
             self.failures[dt] = "diverged"
-
-    def _twins(self):
-        step, ulps = max(self.curves), range(len(TWINS))
-        curve = simulate(self.method.filling, self.job, step, TWINS, ulps=ulps)
-        self.compile_s += curve.compile_s
-        return seed_variance(curve.rms) ** 0.5
 
     def against(self, truth):
         """Points with errors against a curve [m]."""
         points = []
         for dt in sorted([*self.curves, *self.failures], reverse=True):
             work = self.job.particles * scene_steps(self.job, dt, len(self.seeds))
-            blank = Point(self.label, dt, seconds_in_words(dt), work)
+            point = Point(self.label, dt, seconds_in_words(dt), work)
             if dt in self.failures:
-                points.append(replace(blank, failure=self.failures[dt]))
+                points.append(replace(point, failure=self.failures[dt]))
                 continue
             curve = self.curves[dt]
             error = distance(curve.mean, truth)
-            points.append(replace(blank, error=error, seconds=curve.timing, residual=curve.balance))
+            points.append(replace(point, error=error, seconds=curve.timing, residual=curve.balance))
         return points
 
     @property
@@ -220,123 +198,60 @@ class Sweep:
         The variance from seed to seed is the mean over all runs of the method, as a single run may
         see one of several steady motions only.
         """
-        count = len(self.reference["rms"][0])
-        return self.seed_spread * (1.0 / len(self.seeds) + 1.0 / count) ** 0.5
+        return self.seed_spread * (1.0 / len(self.seeds) + 1.0 / self.rms.shape[1]) ** 0.5
 
     @property
     def seed_spread(self):
         """Standard deviation from seed to seed of a response, as a share of the peak."""
-        runs = [self.reference["rms"], *(curve.rms for curve in self.curves.values())]
+        runs = [self.rms, *(curve.rms for curve in self.curves.values())]
         return float(np.mean([seed_variance(rms) for rms in runs]) ** 0.5)
 
     @property
     def check_step(self):
         """Distance of the reference to the finest run of the sweep, which has other seeds."""
-        return distance(self.curves[min(self.curves)].mean, self.reference["mean"])
+        return distance(self.curves[min(self.curves)].mean, self.mean)
 
 
-def write_all(folder, made, own, toward, empty, floors, rows):
-    """CSV of points, references, curves and answers."""
-    write_points(os.path.join(folder, "points.csv"), own, floors)
-    write_points(os.path.join(folder, "points_against_spheres.csv"), toward, floors)
-    write_points(os.path.join(folder, "points_empty.csv"), empty, {})
-    write_answers(os.path.join(folder, "answers.csv"), rows)
-    names = ("method", "ratio", "step_s", "seed", "rms_m", "reference")
-    columns = {name: [] for name in names}
+def write_curves(path, made):
+    """A row a method, step, ratio and seed."""
+    rows = []
     for label, sweep in made.items():
         runs = [(dt, curve.rms, 0) for dt, curve in sweep.curves.items()]
-        runs.append((sweep.reference["step"], np.array(sweep.reference["rms"]), 1))
-        for dt, rms, is_reference in runs:
+        for dt, rms, is_reference in [*runs, (sweep.reference["step"], sweep.rms, 1)]:
             for k, j in np.ndindex(*rms.shape):
                 seed = j + (1001 if is_reference else 1)
-                row = (label, sweep.job.ratios[k], dt, seed, float(rms[k, j]), is_reference)
-                for name, value in zip(names, row):
-                    columns[name].append(value)
-    write_csv(os.path.join(folder, "curves.csv"), columns)
-
-
-def picture_all(folder, made, own, toward, empty, floors, sizes):
-    """Work-precision diagrams and the curves that they are about."""
-    job = sizes["job"]
-    scenes = (
-        f"{job.particles} particles, f/f0 = {', '.join(f'{r:g}' for r in job.ratios)}, "
-        f"{sizes['seeds']} seeds, {job.transient} + {job.measured} cycles"
-    )
-    names = {name: style.label for name, style in styles_of(made).items()}
-    shared = {"titles": names, "floors": floors, "work_name": "particle steps [1]"}
-    truth = seconds_in_words(made[SPHERES].reference["step"])
-    shorter = max(sweep.reference["step"] / min(sweep.curves) for sweep in made.values())
-    error = "Error: RMS over the frequencies of (response - reference), mean over seeds,"
-    picture_work_precision(
-        os.path.join(folder, "work_precision.png"),
-        own,
-        error_name="error of the response curve / its peak [1]",
-        residual_names=(
-            "step [µs]",
-            "mean force on the container: missing share of the weight [1]",
-        ),
-        step_unit=1e-6,
-        caption=f"{scenes}. {error} as a share of the peak.\nReference of each method: itself with "
-        f"other seeds, at {shorter:.2g} of its finest step or less. Dotted: what seeds alone make "
-        "of it.",
-        **shared,
-    )
-    picture_work_precision(
-        os.path.join(folder, "against_spheres.png"),
-        toward,
-        error_name="difference to the spheres' curve / its peak [1]",
-        caption=f"{scenes}. {error} as a share of the peak.\n"
-        f"Reference of all: spheres, p = 1/4, at {truth}.",
-        **shared,
-    )
-    picture_work_precision(
-        os.path.join(folder, "rk45.png"),
-        empty,
-        {name: STYLES[name].label for name in RK45_WAYS},
-        floors={},
-        order=5,
-        error_name="error of the response curve / its peak [1]",
-        work_name="evaluations of the right-hand side [1]",
-        caption="Empty container. Error: RMS over the frequencies of (response - transfer "
-        "function), as a share of the peak. Steps are at most 3.9 ms; rtol 0.01 where the longest "
-        "step is swept, free steps in Python.",
-    )
-    curves = {
-        name: (job.ratios, 1e3 * np.array(sweep.reference["rms"])) for name, sweep in made.items()
-    }
-    picture_curves(os.path.join(folder, "curves.png"), curves, OSCILLATOR)
+                rows.append((label, sweep.job.ratios[k], dt, seed, rms[k, j], is_reference))
+    write_rows(path, "method ratio step_s seed rms_m reference", rows)
 
 
 def figures_of(made, own, toward, empty, floors):
     """Cheapest ways to an error, floors, checks of the references, distances of the models."""
     figures = {}
-    for target in (0.01, 0.001):
-        words = percent(target).replace(" %", "_percent")
-        best = answers(own, target, floors)[0]
-        seconds = best.point.seconds.low if best.point else None
-        prefix = "cheapest_seconds_at_" if target == 0.01 else "seconds_at_"
-        figures[f"{prefix}{words}"] = figure(seconds, "s")
-        figures[f"cheapest_method_at_{words}"] = figure(best.method if best.point else None, "")
-    best = answers(toward, 0.02, floors)[0]
-    seconds = best.point.seconds.low if best.point else None
-    figures["cheapest_seconds_to_spheres_within_2_percent"] = figure(seconds, "s")
-    name = best.method if best.point else None
-    figures["cheapest_method_to_spheres_within_2_percent"] = figure(name, "")
+    for points, target, seconds_key, end in (
+        (own, 0.01, "cheapest_seconds", "at_1_percent"),
+        (own, 0.001, "seconds", "at_0.1_percent"),
+        (toward, 0.02, "cheapest_seconds", "to_spheres_within_2_percent"),
+    ):
+        seconds, method = cheapest(points, target, floors)
+        figures[f"{seconds_key}_{end}"] = figure(seconds, "s")
+        figures[f"cheapest_method_{end}"] = figure(method, "")
     figures["chaos_floor"] = figure(min(floors.values()), "1")
     for label, sweep in made.items():
-        best = next(a for a in answers(own, 0.01, floors) if a.method == label)
-        seconds = best.point.seconds.low if best.point else None
+        seconds, _ = cheapest(own, 0.01, floors, label)
         figures[f"seconds_at_1_percent_{label}"] = figure(seconds, "s")
-        figures[f"chaos_floor_{label}"] = figure(sweep.floor, "1")
-        if sweep.roundoff is not None:
-            figures[f"roundoff_spread_{label}"] = figure(sweep.roundoff, "1")
-        figures[f"seed_spread_{label}"] = figure(sweep.seed_spread, "1")
-        figures[f"check_step_{label}"] = figure(sweep.check_step, "1")
-        figures[f"check_force_{label}"] = figure(sweep.reference["force_check"], "1")
-        gap = distance(sweep.reference["mean"], made[SPHERES].reference["mean"])
-        figures[f"distance_to_spheres_{label}"] = figure(gap, "1")
-    best = answers(empty, 1e-6, {})[0]
-    figures["rk45_evaluations_at_1e-6"] = figure(best.point.evaluations, "1")
+        values = {
+            "chaos_floor": sweep.floor,
+            "roundoff_spread": sweep.roundoff,
+            "seed_spread": sweep.seed_spread,
+            "check_step": sweep.check_step,
+            "check_force": sweep.reference["force_check"],
+            "distance_to_spheres": distance(sweep.mean, made[SPHERES].mean),
+        }
+        for name, value in values.items():
+            if value is not None:
+                figures[f"{name}_{label}"] = figure(value, "1")
+    evaluations = answers(empty, 1e-6, {})[0].point.evaluations
+    figures["rk45_evaluations_at_1e-6"] = figure(evaluations, "1")
     return figures
 
 

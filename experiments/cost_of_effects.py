@@ -19,20 +19,12 @@ import sys
 
 import numpy as np
 
-from _cli import (
-    figure,
-    main,
-    number,
-    parser,
-    print_figures,
-    print_table,
-    whole,
-    write_summary,
-)
+from _cli import figure, main, number, parser, whole
 from _damper_response import distance
 from _effects_jobs import Job, run_all
 from _effects_picture import picture_effects
-from taichi_dem.kit.files import output_folder, write_csv
+from _report import finish, show_rows, take_defaults, write_rows
+from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 
 NAME = "cost_of_effects"
@@ -74,6 +66,8 @@ AUTOMATON = (
     ("static contact", {"accounting": "landing+ejection"}),
     ("ejection and static contact", {"accounting": "landing"}),
 )
+#: Step of a filling [s], and its variants.
+FILLINGS = {"spheres": (3e-5, SPHERES), "automaton": (1e-4, AUTOMATON)}
 ADDED = ("rotation",)
 VARIANTS = tuple(label for label, _ in SPHERES + AUTOMATON)
 COSTS = (
@@ -81,6 +75,7 @@ COSTS = (
     *("spared_percent", "spared_least_percent", "spared_most_percent"),
     *("memory_MB", "before_first_step_s", "compiled_kB"),
 )
+HIDDEN = ("group", "failed", "run_s", "spared_least_percent", "spared_most_percent")
 
 
 def options_parser():
@@ -93,40 +88,29 @@ def options_parser():
 
 def run(options):
     """Measure, then write and print."""
-    for name, value in (QUICK if options.quick else FULL).items():
-        if getattr(options, name, None) is None:
-            setattr(options, name, value)
+    take_defaults(options, FULL, QUICK)
     output_folder(options.out)
     jobs = [*blast_jobs(options), *damper_jobs(options), absent_job(options)]
     workers = options.threads or min(2, os.cpu_count() or 1)
     with ProgressBar("measuring") as bar:
         seconds = run_all(jobs, options.repeats, workers, options.arch, bar)
     blast, damper = blast_rows(jobs), damper_rows(jobs)
-    figures = figures_of(jobs, blast, damper)
-    write_rows(os.path.join(options.out, "blast.csv"), blast)
-    write_rows(os.path.join(options.out, "damper.csv"), damper)
+    write_rows(options.out, "blast.csv", blast)
+    write_rows(options.out, "damper.csv", damper)
     picture(blast, damper, os.path.join(options.out, "effects.png"))
-    compiling = sum(job.first.get("compile_s", 0.0) for job in jobs)
-    write_summary(options.out, NAME, figures, compile_seconds=compiling, run_seconds=seconds)
     show(blast, "The blast: hole's displacement [mm] and broken faces")
     show(damper, "The damper: peak of the response [mm]; first rows: what two seeds may differ by")
-    print()
-    print_figures(figures)
-    print(f"\nThe picture and the tables are in {options.out}")
+    compiling = sum(job.first.get("compile_s", 0.0) for job in jobs)
+    finish(options, NAME, figures_of(jobs, blast, damper), [], seconds=(compiling, seconds))
 
 
 def picture(blast, damper, path):
     """Bars: what an effect costs, and what changes without it."""
-    parts = [
-        ("Blast of the paper's block", verdicts(blast, ("blast",)), _chance(blast) or 0.0),
-        ("Damper, spheres", verdicts(damper, ("spheres",)), _floor(damper, "spheres")),
-        ("Damper, automaton", verdicts(damper, ("automaton",)), _floor(damper, "automaton")),
-    ]
+    parts = [("Blast of the paper's block", verdicts(blast), _chance(blast) or 0.0)]
+    for group in FILLINGS:
+        own = [row for row in damper if row["group"] == group]
+        parts.append((f"Damper, {group}", verdicts(own), own[0]["change_percent"]))
     picture_effects(path, parts)
-
-
-def _floor(rows, group):
-    return next(row["change_percent"] for row in rows if row["group"] == group)
 
 
 def _chance(blast):
@@ -141,33 +125,33 @@ def blast_jobs(options):
         gone = (name, *ALONG.get(name, ()))
         wanted[f"without {' and '.join(gone)}"] = tuple(e for e in ORDER if e not in gone)
     wanted["gas pressure alone"] = ()
-    for k, name in enumerate(options.added):
-        wanted[f"up to {name}"] = ORDER[: k + 1]
-    made = {}
+    wanted.update({f"up to {name}": ORDER[: k + 1] for k, name in enumerate(options.added)})
+    first = {}
     for label, names in wanted.items():
-        if names not in made.values():
-            made[label] = names
-    jobs = [_blast_job(label, names, options) for label, names in made.items()]
-    if options.repeats > 1:
-        jobs.append(_blast_job(LAST_BIT, ORDER, options, ulps=1))
-    return jobs
-
-
-def _blast_job(label, names, options, ulps=0):
-    names = ["gas_pressure", *names]
-    arguments = {"names": names, "until": options.until, "step": STEP, "ulps": ulps}
-    return Job("blast", label, "blast", arguments)
+        first.setdefault(names, label)
+    common = {"until": options.until, "step": STEP}
+    jobs = [(label, names, 0) for names, label in first.items()]
+    jobs += [(LAST_BIT, ORDER, 1)] if options.repeats > 1 else []
+    return [
+        Job("blast", label, "blast", {"names": ["gas_pressure", *names], "ulps": ulps, **common})
+        for label, names, ulps in jobs
+    ]
 
 
 def damper_jobs(options):
     """Both fillings as they are, and with each effect left out or added."""
-    jobs = []
-    for filling, step, variants in (("spheres", 3e-5, SPHERES), ("automaton", 1e-4, AUTOMATON)):
-        common = {"filling": filling, "particles": PARTICLES, "step": step, "seeds": SEEDS}
-        common.update(ratios=options.ratios, cycles=options.cycles)
-        for label, chosen in ((f"{filling} as they are", {}), *variants):
-            jobs.append(Job(filling, label, "damper", {**common, "options": chosen}))
-    return jobs
+    common = {"particles": PARTICLES, "seeds": SEEDS}
+    common.update(ratios=options.ratios, cycles=options.cycles)
+    return [
+        Job(
+            filling,
+            label,
+            "damper",
+            {**common, "filling": filling, "step": step, "options": chosen},
+        )
+        for filling, (step, variants) in FILLINGS.items()
+        for label, chosen in ((f"{filling} as they are", {}), *variants)
+    ]
 
 
 def absent_job(options):
@@ -181,19 +165,16 @@ def blast_rows(jobs):
     blasts = [job for job in jobs if job.group == "blast"]
     rows = [_cost_row(job, blasts[0]) for job in blasts]
     for row, job in zip(rows, blasts):
-        done = not job.failed
-        row["hole_mm"] = job.first["hole_mm"] if done else None
-        row["broken_faces"] = job.first["broken"] if done else None
-        row["energy_percent"] = _energy(row["scene"], blasts[0])
-        row["change_percent"] = _percent(row["hole_mm"], rows[0]["hole_mm"])
+        row["hole_mm"] = None if job.failed else job.first["hole_mm"]
+        row["broken_faces"] = None if job.failed else job.first["broken"]
+        # Of the first effect that is left out, in the complete scene.
+        name = row["scene"].replace("without ", "").split()[0]
+        share = blasts[0].first.get("shares", {}).get(name)
+        row["energy_percent"] = None if share is None else 100.0 * share
+        wanted, found = rows[0]["hole_mm"], row["hole_mm"]
+        change = None if job.failed else 100.0 * abs(found - wanted) / abs(wanted)
+        row["change_percent"] = change
     return rows
-
-
-def _energy(scene, complete):
-    """Share of the energy that the first effect left out of a scene takes in the complete one."""
-    name = scene.replace("without ", "").split()[0]
-    share = complete.first.get("shares", {}).get(name)
-    return None if share is None else 100.0 * share
 
 
 def damper_rows(jobs):
@@ -202,7 +183,7 @@ def damper_rows(jobs):
     The floor is half of the distance of two seeds: what the mean over them may owe to chance.
     """
     rows = []
-    for group in ("spheres", "automaton"):
+    for group in FILLINGS:
         curves = [job for job in jobs if job.group == group]
         whole_curve = _curve(curves[0])
         for job in curves:
@@ -219,10 +200,6 @@ def damper_rows(jobs):
 def _curve(job):
     """Mean over the seeds [mm], (ratios,)."""
     return np.mean(np.atleast_2d(job.first.get("rms_mm", np.nan)), axis=0)
-
-
-def _percent(value, of):
-    return None if value is None else 100.0 * abs(value - of) / abs(of)
 
 
 def _cost_row(job, complete):
@@ -246,13 +223,13 @@ def _cost_row(job, complete):
     }
 
 
-def verdicts(rows, groups):
-    """(name, cost [%] with its least and most, change [%]) for each effect of some groups."""
+def verdicts(rows):
+    """(name, cost [%] with its least and most, change [%]) for each effect left out or added."""
     found = []
     for row in rows:
         name = row["scene"].replace("without ", "")
         alone = row["scene"].startswith("without ") or name in VARIANTS
-        if row["group"] in groups and alone and not row["failed"]:
+        if alone and not row["failed"]:
             costs = [row[f"spared_{key}percent"] for key in ("", "least_", "most_")]
             if name in ADDED:
                 name, costs = f"{name} (added)", [-costs[0], -costs[2], -costs[1]]
@@ -266,10 +243,12 @@ def figures_of(jobs, blast, damper):
     # Each against its neighbour in time: a machine is never equally fast for long.
     ratio = np.array(times["composed"]) / np.array(times["by_hand"])
     low, middle, high = 100.0 * (np.percentile(ratio, [25, 50, 75]) - 1.0)
-    figures = {"overhead_absent_percent": figure(float(middle), "%")}
-    figures["overhead_absent_low_percent"] = figure(float(low), "%")
-    figures["overhead_absent_high_percent"] = figure(float(high), "%")
-    figures["blast_seconds"] = figure(blast[0]["run_s"], "s")
+    figures = {
+        "overhead_absent_percent": figure(float(middle), "%"),
+        "overhead_absent_low_percent": figure(float(low), "%"),
+        "overhead_absent_high_percent": figure(float(high), "%"),
+        "blast_seconds": figure(blast[0]["run_s"], "s"),
+    }
     if _chance(blast) is not None:
         figures["blast_chance_percent"] = figure(_chance(blast), "%")
     for row in blast:
@@ -295,27 +274,19 @@ def _add(figures, name, row, complete):
     figures[f"{name}_{what}_change_percent"] = figure(row["change_percent"], "%")
 
 
-def write_rows(path, rows):
-    """CSV with a column for every key."""
-    write_csv(path, {key: [row[key] for row in rows] for key in rows[0]})
-
-
 def show(rows, title):
     """Print the rows that did not fail, and why the others did."""
-    hidden = ("group", "failed", "run_s", "spared_least_percent", "spared_most_percent")
-    names = [name for name in rows[0] if name not in hidden]
-    cells = [[_cell(row[name]) for name in names] for row in rows]
     print(f"\n{title}")
-    print_table(cells, names)
+    names = [name for name in rows[0] if name not in HIDDEN]
+    cells = [{name: _cell(row[name]) for name in names} for row in rows]
+    show_rows(cells, {name: (name, "") for name in names})
     for row in rows:
         if row["failed"]:
             print(f"{row['scene']}: {row['failed']}")
 
 
 def _cell(value):
-    if value is None:
-        return "-"
-    return value if isinstance(value, (str, int)) else f"{value:.3g}"
+    return value if isinstance(value, (str, int, type(None))) else f"{value:.3g}"
 
 
 if __name__ == "__main__":

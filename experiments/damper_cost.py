@@ -1,4 +1,4 @@
-"""What a cycle costs against the number of particles, and which step each filling bears (Fig. 12).
+"""Cost of a cycle against the number of particles, and the steps that fillings bear (Fig. 12).
 
     python experiments/damper_cost.py          # about a minute
     python experiments/damper_cost.py --quick
@@ -13,51 +13,53 @@ import os
 import sys
 import time
 
-from _cli import (
-    figure,
-    main,
-    parser,
-    print_figures,
-    print_table,
-    several,
-    whole,
-    write_summary,
-)
-from _timing import Timing
+import numpy as np
+
+from _cli import figure, fill_in, finish, main, parser, print_table, several, whole, write_rows
+from _timing import Timing, seconds_of
 from ca_damper import Automaton, Batch, SceneTable, SimulationDiverged, Spheres
-from ca_damper.plot.cost import picture_cost, picture_steps
 from taichi_dem import InputError
-from taichi_dem.kit.files import output_folder, write_csv
+from taichi_dem.kit.files import output_folder
+from taichi_dem.kit.plot_style import BLACK, STYLES, picture, styles_of
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 
 NAME = "damper_cost"
-FREQUENCY = 6.0
-BASE_AMPLITUDE = 0.6e-3
+FREQUENCY, BASE_AMPLITUDE = 6.0, 0.6e-3
 #: Particles in the search for the longest step.
 SOME = 50
+#: Steps tried for stability [s].
+STEPS = (1e-5, 2e-5, 3e-5, 5e-5, 7e-5, 1e-4, 2e-4, 3e-4, 5e-4, 7e-4, 1e-3, 1.5e-3, 2e-3, 3e-3)
 FULL = {
     "particles": [1, 2, 5, 10, 20, 30, 40, 50, 60, 80, 100, 120, 140, 160],
     "repeats": 5,
     "seconds": 0.05,
     "cycles": 20,
+    "steps": STEPS,
 }
-QUICK = {"particles": [1, 10, 50, 160], "repeats": 3, "seconds": 0.01, "cycles": 3}
-#: Steps tried for stability [s].
-STEPS = (1e-5, 2e-5, 3e-5, 5e-5, 7e-5, 1e-4, 2e-4, 3e-4, 5e-4, 7e-4, 1e-3, 1.5e-3, 2e-3, 3e-3)
-STEPS_OF_QUICK = (2e-5, 1e-4, 1e-3, 2e-3)
-
-
-def variants():
-    """What is compared: label, filling, step [s]."""
-    list_, scan = Automaton(), Automaton(traversal="scan")
-    return (
-        ("dem_pairs", Spheres(search="all_pairs"), 2e-5),
-        ("dem_cells", Spheres(), 2e-5),
-        ("ca_scan_1e-4", scan, 1e-4),
-        ("ca_list_1e-4", list_, 1e-4),
-        ("ca_scan_2e-5", scan, 2e-5),
-        ("ca_list_2e-5", list_, 2e-5),
-    )
+QUICK = {
+    "particles": [1, 10, 50, 160],
+    "repeats": 3,
+    "seconds": 0.01,
+    "cycles": 3,
+    "steps": (2e-5, 1e-4, 1e-3, 2e-3),
+}
+PAIRS, SCAN = Spheres(search="all_pairs"), Automaton(traversal="scan")
+#: Label: filling, step [s], search or traversal with the step, marker, line. The paper's way is
+#: dashed, markers tell the automaton's steps apart.
+VARIANTS = {
+    "dem_pairs": (PAIRS, 2e-5, "all pairs, 20 µs", "^", "--"),
+    "dem_cells": (Spheres(), 2e-5, "cells, 20 µs", "^", "-"),
+    "ca_scan_1e-4": (SCAN, 1e-4, "scan, 100 µs", "o", "--"),
+    "ca_list_1e-4": (Automaton(), 1e-4, "list, 100 µs", "o", "-"),
+    "ca_scan_2e-5": (SCAN, 2e-5, "scan, 20 µs", "s", "--"),
+    "ca_list_2e-5": (Automaton(), 2e-5, "list, 20 µs", "s", "-"),
+}
+#: Outcome of a run: words and marker.
+OUTCOMES = {
+    "runs": ("runs", "o"),
+    "diverges": ("diverges", "X"),
+    "refused": ("refused before the first step", "|"),
+}
 
 
 def options_parser():
@@ -71,44 +73,34 @@ def options_parser():
 
 def run(options):
     """Time all variants, find their longest steps, write tables and pictures."""
-    for name, value in (QUICK if options.quick else FULL).items():
-        if getattr(options, name, None) is None:
-            setattr(options, name, value)
-    output_folder(options.out)
+    fill_in(options, QUICK if options.quick else FULL)
+    folder = output_folder(options.out)
     started = time.perf_counter()
-    costs = time_all(options)
-    borne = find_steps(STEPS_OF_QUICK if options.quick else STEPS, options.cycles)
+    with ProgressBar("timing") as bar:
+        costs = time_all(options, bar)
+    fillings = (Spheres(), Automaton(), Automaton(accounting="landing"))
+    borne = {one.label: outcomes(one, options.steps, options.cycles) for one in fillings}
     write_tables(costs, borne, options)
-    picture_cost(os.path.join(options.out, "cost.png"), options.particles, costs)
-    picture_steps(os.path.join(options.out, "steps.png"), borne)
-    figures = figures_of(costs, borne, options)
+    picture_cost(os.path.join(folder, "cost.png"), options.particles, costs)
+    picture_steps(os.path.join(folder, "steps.png"), borne)
     seconds = time.perf_counter() - started
     compiling = sum(cost["compile_s"] for cost in costs.values())
-    write_summary(
-        options.out, NAME, figures, compile_seconds=compiling, run_seconds=seconds - compiling
-    )
     print_costs(costs, options.particles)
-    print()
-    print_figures(figures)
-    print(f"\nPictures and tables are in {options.out}")
+    finish(options, NAME, figures_of(costs, borne, options), (compiling, seconds - compiling))
 
 
-def time_all(options):
+def time_all(options, bar):
     """CPU seconds a cycle: {label: {"timings": a Timing for each N, "steps", "compile_s"}}."""
-    costs, done = {}, 0
-    total = len(variants()) * len(options.particles)
-    with ProgressBar("timing") as bar:
-        for label, filling, dt in variants():
-            batch = scenes(filling, options.particles, dt)
-            steps = int(batch.steps_per_cycle[0])
-            batch.advance(steps)
-            timings = []
-            for k in range(len(options.particles)):
-                timings.append(time_cycle(batch, k, options))
-                done += 1
-                bar.count(done, total)
-            costs[label] = {"timings": timings, "steps": steps}
-            costs[label]["compile_s"] = batch.compile_seconds
+    costs, numbers = {}, options.particles
+    for label, (filling, dt, *_) in VARIANTS.items():
+        batch = scenes(filling, numbers, dt)
+        steps = int(batch.steps_per_cycle[0])
+        batch.advance(steps)
+        timings = []
+        for k in range(len(numbers)):
+            timings.append(time_cycle(batch, k, options))
+            bar.count(len(costs) * len(numbers) + k + 1, len(VARIANTS) * len(numbers))
+        costs[label] = {"timings": timings, "steps": steps, "compile_s": batch.compile_seconds}
     return costs
 
 
@@ -120,38 +112,35 @@ def scenes(filling, particles, dt):
     return batch
 
 
-def cpu_seconds(batch, scene, cycles):
+def cycle_seconds(batch, scene, cycles):
     """CPU time of some cycles of one scene [s]; the others stand."""
     steps = [0] * batch.count
     steps[scene] = cycles * int(batch.steps_per_cycle[scene])
-    start = time.process_time()
-    batch.advance(steps)
-    return time.process_time() - start
+    return seconds_of(batch.advance, steps)
 
 
 def time_cycle(batch, scene, options):
     """Timing of a cycle of a scene in CPU seconds; at a time as many as fill a moment."""
-    cycles = 1 + int(options.seconds / max(cpu_seconds(batch, scene, 1), 1e-6))
-    return Timing.of([cpu_seconds(batch, scene, cycles) / cycles for _ in range(options.repeats)])
-
-
-def find_steps(steps, cycles):
-    """What becomes of 50 particles at each step: {label: [(dt, outcome)]}."""
-    fillings = (Spheres(), Automaton(), Automaton(accounting="landing"))
-    return {filling.label: outcomes(filling, steps, cycles) for filling in fillings}
+    cycles = 1 + int(options.seconds / max(cycle_seconds(batch, scene, 1), 1e-6))
+    return Timing.of([cycle_seconds(batch, scene, cycles) / cycles for _ in range(options.repeats)])
 
 
 def outcomes(filling, steps, cycles):
-    """(dt, "runs" | "diverges" | "refused") for every step."""
-    allowed = [dt for dt in steps if not refused(filling, dt)]
-    found = [(dt, "refused") for dt in steps if dt not in allowed]
+    """Outcome of a run of 50 particles at every step: (dt, "runs" | "diverges" | "refused")."""
+    allowed, found = [], []
+    for dt in steps:
+        try:
+            filling.check(SOME, dt)
+            allowed.append(dt)
+        except InputError:
+            found.append((dt, "refused"))
     while allowed:
         # A batch that holds a diverged scene goes no further: the rest gets one of its own.
         batch = scenes(filling, SOME, allowed)
         for k in range(batch.count):
             dt = allowed.pop(0)
             try:
-                cpu_seconds(batch, k, cycles)
+                cycle_seconds(batch, k, cycles)
                 found.append((dt, "runs"))
             except SimulationDiverged:
                 found.append((dt, "diverges"))
@@ -159,27 +148,17 @@ def outcomes(filling, steps, cycles):
     return sorted(found)
 
 
-def refused(filling, dt):
-    """Whether a filling refuses a step."""
-    try:
-        filling.check(SOME, dt)
-    except InputError:
-        return True
-    return False
-
-
 def write_tables(costs, borne, options):
     """CSV of all timings, and of the steps tried."""
-    rows = {name: [] for name in ("variant", "particles", "steps", "cpu_s", "low_s", "high_s")}
-    for label, cost in costs.items():
-        for particles, timing in zip(options.particles, cost["timings"]):
-            row = (label, particles, cost["steps"], timing.median, timing.low, timing.high)
-            for name, value in zip(rows, row):
-                rows[name].append(value)
-    write_csv(os.path.join(options.out, "cost.csv"), rows)
+    timed = [
+        (label, particles, cost["steps"], timing.median, timing.low, timing.high)
+        for label, cost in costs.items()
+        for particles, timing in zip(options.particles, cost["timings"])
+    ]
+    names = "variant particles steps cpu_s low_s high_s"
+    write_rows(os.path.join(options.out, "cost.csv"), names, timed)
     tried = [(label, dt, word) for label, found in borne.items() for dt, word in found]
-    names = ("filling", "dt_s", "outcome")
-    write_csv(os.path.join(options.out, "steps.csv"), dict(zip(names, zip(*tried))))
+    write_rows(os.path.join(options.out, "steps.csv"), "filling dt_s outcome", tried)
 
 
 def figures_of(costs, borne, options):
@@ -200,13 +179,48 @@ def figures_of(costs, borne, options):
 
 
 def print_costs(costs, particles):
-    """Milliseconds a cycle."""
-    rows = [
-        (n, *(f"{1e3 * cost['timings'][k].median:.3g}" for cost in costs.values()))
-        for k, n in enumerate(particles)
-    ]
+    """Print the milliseconds a cycle."""
+    timings = zip(*(cost["timings"] for cost in costs.values()))
+    rows = [(n, *(f"{1e3 * t.median:.3g}" for t in row)) for n, row in zip(particles, timings)]
     print("CPU milliseconds a cycle")
     print_table(rows, ["N", *costs])
+    print()
+
+
+def picture_cost(path, particles, costs):
+    """CPU time of a cycle over the number of particles, linear and logarithmic."""
+    with picture(path, 1, 2, (10.0, 5.0)) as (figure, axes):
+        for label, cost in costs.items():
+            filling, _, words, mark, line = VARIANTS[label]
+            style = STYLES[filling.label]
+            look = {"color": style.colour, "marker": mark, "ms": 4, "ls": line, "lw": 1.2}
+            low, middle, high = (
+                [1e3 * getattr(timing, name) for timing in cost["timings"]]
+                for name in ("low", "median", "high")
+            )
+            bars = [np.subtract(middle, low), np.subtract(high, middle)]
+            for axis in axes:
+                axis.errorbar(particles, middle, bars, label=f"{style.label}, {words}", **look)
+        axes[0].set(title="bars: range of the repeats", ylim=(0, None))
+        axes[1].set(title="the same, logarithmic", yscale="log")
+        for axis in axes:
+            axis.set(xlabel="particles N [1]", ylabel="CPU time of a cycle [ms]")
+        handles, labels = axes[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper left", ncols=3)
+
+
+def picture_steps(path, borne):
+    """Outcome of a run at each step: a row a filling. borne: {name: [(dt [s], outcome)]}."""
+    styles = styles_of(borne)
+    with picture(path, 1, 1, (7.0, 1.2 + 0.5 * len(borne))) as (_, axis):
+        for word, (words, mark) in OUTCOMES.items():
+            axis.plot([], [], mark, color=BLACK, label=words, ms=7)
+            for row, (name, found) in enumerate(borne.items()):
+                steps = [1e6 * dt for dt, outcome in found if outcome == word]
+                axis.plot(steps, [row] * len(steps), mark, color=styles[name].colour, ms=7)
+        axis.set(xscale="log", xlabel="step [µs]", ylim=(-0.6, len(borne) - 0.4))
+        axis.set_yticks(range(len(borne)), [style.label for style in styles.values()])
+        axis.legend(ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
 
 
 if __name__ == "__main__":

@@ -15,16 +15,16 @@ summary.json to results/damper_patterns/.
 
 import os
 import sys
-from dataclasses import dataclass
 
 import numpy as np
 
-from _cli import figure, main, number, parser, print_table, whole, write_summary
-from ca_damper import Automaton, Batch, SceneTable, Spheres, film, plot
+import _patterns_pictures as pictures
+from _cli import figure, finish, main, number, parser, print_table, whole, write_rows
+from ca_damper import Automaton, Batch, SceneTable, Spheres, film
 from ca_damper.automaton import ACCOUNTINGS
+from ca_damper.plot import Box
 from ca_damper.progress import Stages
-from taichi_dem.kit.files import output_folder, write_csv
-from taichi_dem.kit.plot_style import STYLES
+from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 
 NAME = "damper_patterns"
@@ -32,48 +32,19 @@ QUICK = {"transient": 5, "cycles": 1, "seeds": 2}
 FULL = {"transient": 30, "cycles": 4, "seeds": 5}
 PARTICLES = (20, 40)
 TITLES = {"ca": "automaton", "dem": "spheres"}
-#: Frames a cycle of the animation and the measures; the pictures show every fourth of them.
-FRAMES, SHOWN = 32, 4
+KEYS = [(particles, name) for particles in PARTICLES for name in TITLES]
+#: Frames a cycle of the animation and the measures.
+FRAMES = 32
 #: Step of the automaton [s], and steps of the spheres within one.
 CA_DT, STEPS_IN_ONE = 1e-4, 5
-#: Ends of the colour scale as a share of the container's largest speed.
-SCALE = 1.2
-
-
-@dataclass(frozen=True, eq=False)
-class Shaken:
-    """Scenes of a filling in the shaken container: its Box, its Batch, and what was filmed.
-
-    frames: particles -> cycles of all seeds, the first seed's first, each a tuple of Frames.
-    """
-
-    box: plot.Box
-    frames: dict
-    seeds: int
-    batch: Batch
-
-    @property
-    def filling(self):
-        """Label of the filling."""
-        return self.batch.filling.label
-
-    def measures(self, particles):
-        """Arrays (cycles of all seeds, frames) by name; heights [mm] and shares of the particles.
-
-        height_mm: mean over the particles, in the room, less that of particles at rest on the
-        floor of a container in its middle. above_floor_mm: the same over the container's floor.
-        floor, ceiling: share of the particles less than half a diameter away from it.
-        """
-        rows = [[self._measure(frame) for frame in cycle] for cycle in self.frames[particles]]
-        names = ("height_mm", "above_floor_mm", "floor", "ceiling")
-        return dict(zip(names, np.moveaxis(np.array(rows), 2, 0)))
-
-    def _measure(self, frame):
-        below, above = self.box.gaps(frame.position)
-        near = 0.5 * self.box.diameter
-        over = below.mean()
-        high = 1e3 * (self.box.lift(frame.x) + over)
-        return high, 1e3 * over, (below < near).mean(), (above < near).mean()
+#: Figure of summary.json by filling and particles: column of the table.
+COLUMNS = {
+    "height_amplitude_mm": "swing [mm]",
+    "height_lag_deg": "lag [deg]",
+    "height_above_floor_mm": "above floor [mm]",
+    "floor_share_least": "at floor, least",
+    "floor_share_most": "at floor, most",
+}
 
 
 def options_parser():
@@ -87,64 +58,73 @@ def options_parser():
     return made
 
 
+def run(options):
+    """Shake both fillings, compare, picture."""
+    settings = QUICK if options.quick else FULL
+    seeds = options.seeds or settings["seeds"]
+    automaton, spheres = Automaton(accounting=options.accounting), Spheres()
+    boxes = {"ca": Box.of_automaton(automaton), "dem": Box.of_spheres(spheres)}
+    jobs = {"ca": (automaton, CA_DT), "dem": (spheres, options.dt or CA_DT / STEPS_IN_ONE)}
+    batches = {name: shaken_batch(*job, seeds, options) for name, job in jobs.items()}
+    output_folder(options.out)
+    measures, films = {}, {}
+    for name, batch in batches.items():
+        with ProgressBar(TITLES[name]) as progress:
+            frames = shake(batch, settings, progress)
+        for particles, cycles in frames.items():
+            measures[particles, name] = measured(boxes[name], cycles)
+            films[particles, name] = cycles
+    steps = int(batches["ca"].steps_per_cycle[0])
+    # Whole steps miss even spacing by a trifle.
+    phase = np.arange(FRAMES) * (steps // FRAMES) / steps
+    labels = {name: batch.filling.label for name, batch in batches.items()}
+    shown = {(n, labels[name]): (boxes[name], films[n, name][0]) for n, name in KEYS}
+    curves = {(n, labels[name]): measures[n, name] for n, name in KEYS}
+    pictures.draw_all(options.out, shown, curves, phase, options)
+    write_tables(films, measures, phase, seeds, options.out)
+    figures = figures_of(measures, phase)
+    print_heights(figures)
+    finish(options, NAME, figures, batches.values(), show=False)
+
+
 def shaken_batch(filling, dt, seeds, options):
-    """Batch of all numbers of particles and seeds; InputError for a step that cannot be meant."""
+    """Batch of all numbers of particles and seeds; InputError for a step out of range."""
     particles, seed = np.repeat(PARTICLES, seeds), np.tile(np.arange(seeds) + 1, len(PARTICLES))
     table = SceneTable(particles, seed, dt, options.frequency, 1e-3 * options.amplitude)
     return Batch(filling, table, mount="base", measured_cycles=0)
 
 
-def shake(batch, box, settings, progress):
-    """Shake the container through a transient, then film some cycles; returns a Shaken."""
+def shake(batch, settings, progress):
+    """Shake the container through a transient, then film some cycles; returns the frames."""
     batch.start()
-    count = settings["transient"] + settings["cycles"]
-    tell = Stages(progress, np.arange(settings["transient"], count + 1) / count)
-    batch.run(settings["transient"], 0, tell)
+    transient, cycles = settings["transient"], settings["cycles"]
+    tell = Stages(progress, np.arange(transient, transient + cycles + 1) / (transient + cycles))
+    batch.run(transient, 0, tell)
     steps = int(batch.steps_per_cycle[0])
-    frames = {count: [] for count in PARTICLES}
-    for _ in range(settings["cycles"]):
-        every = steps // FRAMES
-        shot = film(batch, steps, sample_every=steps, frame_every=every, progress=tell)
-        for count, cycle in zip(batch.table.column("particles").tolist(), shot.frames):
-            frames[count].append(cycle[:FRAMES])
-    return Shaken(box, frames, settings["seeds"], batch)
+    frames = {particles: [] for particles in PARTICLES}
+    for _ in range(cycles):
+        every = {"sample_every": steps, "frame_every": steps // FRAMES}
+        shot = film(batch, steps, **every, progress=tell)
+        for particles, cycle in zip(batch.table.column("particles").tolist(), shot.frames):
+            frames[particles].append(cycle[:FRAMES])
+    return frames
 
 
-def run(options):
-    """Shake both fillings, compare, picture."""
-    settings = dict(QUICK if options.quick else FULL)
-    settings["seeds"] = options.seeds or settings["seeds"]
-    automaton, spheres = Automaton(accounting=options.accounting), Spheres()
-    boxes = {"ca": plot.Box.of_automaton(automaton), "dem": plot.Box.of_spheres(spheres)}
-    jobs = {"ca": (automaton, CA_DT), "dem": (spheres, options.dt or CA_DT / STEPS_IN_ONE)}
-    batches = {name: shaken_batch(*job, settings["seeds"], options) for name, job in jobs.items()}
-    output_folder(options.out)
-    runs = {}
-    for name, batch in batches.items():
-        with ProgressBar(TITLES[name]) as progress:
-            runs[name] = shake(batch, boxes[name], settings, progress)
-    measures = {
-        particles: {name: made.measures(particles) for name, made in runs.items()}
-        for particles in PARTICLES
-    }
-    phase = phases(runs["ca"].batch)
-    picture(runs, measures, phase, options)
-    write_tables(runs, measures, phase, options.out)
-    figures = figures_of(measures, phase)
-    write_summary(
-        options.out,
-        NAME,
-        figures,
-        compile_seconds=sum(made.batch.compile_seconds for made in runs.values()),
-        run_seconds=sum(made.batch.run_seconds for made in runs.values()),
-    )
-    show(figures, options)
+def measured(box, cycles):
+    """Arrays (cycles of all seeds, frames) by name; heights [mm] and shares of the particles.
 
-
-def phases(batch):
-    """Phase of every frame [cycles]; whole steps miss even spacing by a trifle."""
-    steps = int(batch.steps_per_cycle[0])
-    return np.arange(FRAMES) * (steps // FRAMES) / steps
+    height_mm: mean over the particles, in the room, less that of particles at rest on the floor of
+    a container in its middle. above_floor_mm: the same over the container's floor. floor, ceiling:
+    share of the particles less than half a diameter away from it.
+    """
+    rows, near = [], 0.5 * box.diameter
+    for frame in (frame for cycle in cycles for frame in cycle):
+        below, above = box.gaps(frame.position)
+        over = below.mean()
+        heights = 1e3 * (box.lift(frame.x) + over), 1e3 * over
+        rows.append((*heights, (below < near).mean(), (above < near).mean()))
+    names = ("height_mm", "above_floor_mm", "floor", "ceiling")
+    return dict(zip(names, np.array(rows).T.reshape(4, len(cycles), FRAMES)))
 
 
 def harmonic(phase, values):
@@ -156,19 +136,17 @@ def harmonic(phase, values):
 
 
 def figures_of(measures, phase):
-    """How high the particles swing and how late, by filling, and how far the fillings differ."""
-    figures = {}
-    for particles, fillings in measures.items():
+    """Heights and lags of the particles by filling, and how far the fillings differ."""
+    figures, units = {}, ("mm", "deg", "mm", "1", "1")
+    for particles in PARTICLES:
+        fillings = {name: measures[particles, name] for name in TITLES}
         cycles = {name: one["height_mm"].mean(axis=0) for name, one in fillings.items()}
         swings = {name: harmonic(phase, cycle) for name, cycle in cycles.items()}
-        for name, (amplitude, lag) in swings.items():
-            end, floor = f"{name}_N{particles}", fillings[name]["floor"].mean(axis=0)
-            figures[f"height_amplitude_mm_{end}"] = figure(amplitude, "mm")
-            figures[f"height_lag_deg_{end}"] = figure(lag, "deg")
-            above = float(fillings[name]["above_floor_mm"].mean())
-            figures[f"height_above_floor_mm_{end}"] = figure(above, "mm")
-            figures[f"floor_share_least_{end}"] = figure(float(floor.min()), "1")
-            figures[f"floor_share_most_{end}"] = figure(float(floor.max()), "1")
+        for name, one in fillings.items():
+            floor, above = one["floor"].mean(axis=0), one["above_floor_mm"].mean()
+            values = (*swings[name], float(above), float(floor.min()), float(floor.max()))
+            for key, value, unit in zip(COLUMNS, values, units):
+                figures[f"{key}_{name}_N{particles}"] = figure(value, unit)
         (ca, late), (dem, later) = swings["ca"], swings["dem"]
         turn = (late - later + 180.0) % 360.0 - 180.0
         figures[f"amplitude_difference_mm_N{particles}"] = figure(ca - dem, "mm")
@@ -178,83 +156,31 @@ def figures_of(measures, phase):
     return figures
 
 
-def picture(runs, measures, phase, options):
-    """Draw frames of one cycle, the measures over the cycle, and the animation."""
-
-    def at(name):
-        return os.path.join(options.out, name)
-
-    amplitude = 1e-3 * options.amplitude
-    fastest = SCALE * 2.0 * np.pi * options.frequency * amplitude
-    rows = {}
-    for particles in PARTICLES:
-        lines = {
-            made.filling: (made.box, made.frames[particles][0][::SHOWN])
-            for name, made in runs.items()
-        }
-        plot.plot_patterns(at(f"patterns_{particles}.png"), lines, amplitude, fastest)
-        for made in runs.values():
-            title = STYLES[made.filling].label.replace(", ", ",\n")
-            rows[f"{title}\n{particles} particles"] = made.box, made.frames[particles][0]
-    plot.animate_patterns(at("patterns.gif"), rows, amplitude, fastest)
-    cycles = {
-        particles: {runs[name].filling: over_cycle(phase, one) for name, one in fillings.items()}
-        for particles, fillings in measures.items()
-    }
-    time = np.linspace(0.0, 1.0, 200)
-    container = time, options.amplitude * np.sin(2.0 * np.pi * time)
-    plot.plot_cycle(at("cycle.png"), cycles, container)
-
-
-def over_cycle(phase, measured):
-    """Means over the cycles, and the spread of the height between them; closed to a whole cycle."""
-    means = {name: values.mean(axis=0) for name, values in measured.items()}
-    columns = {**means, "spread_mm": measured["height_mm"].std(axis=0)}
-    closed = {name: np.append(values, values[0]) for name, values in columns.items()}
-    return {"phase": np.append(phase, 1.0), **closed}
-
-
-def write_tables(runs, measures, phase, folder):
+def write_tables(films, measures, phase, seeds, folder):
     """The measures of every frame, and the places of all particles in the first cycle."""
-    rows = []
-    for particles in PARTICLES:
-        for name, made in runs.items():
-            one = measures[particles][name]
-            for row, frames in enumerate(made.frames[particles]):
-                start = row % made.seeds + 1, row // made.seeds
-                for k, frame in enumerate(frames):
-                    values = (one[key][row, k] for key in one)
-                    rows.append((particles, name, *start, phase[k], 1e3 * frame.x, *values))
-    names = ("particles", "filling", "seed", "cycle", "phase", "container_mm", *one)
-    write_csv(os.path.join(folder, "cycles.csv"), dict(zip(names, zip(*rows))))
-    rows = [
-        (particles, name, phase[k], *1e3 * place, *velocity)
-        for particles in PARTICLES
-        for name, made in runs.items()
-        for k, frame in enumerate(made.frames[particles][0])
-        for place, velocity in zip(frame.position, frame.velocity)
-    ]
-    names = ("particles", "filling", "phase", "across_mm", "up_mm", "across_m_s", "up_m_s")
-    write_csv(os.path.join(folder, "particles.csv"), dict(zip(names, zip(*rows))))
+    frames, places = [], []
+    for key in KEYS:
+        one, cycles = measures[key], films[key]
+        for row, k in np.ndindex(len(cycles), FRAMES):
+            start = row % seeds + 1, row // seeds, phase[k], 1e3 * cycles[row][k].x
+            frames.append((*key, *start, *(values[row, k] for values in one.values())))
+        for k, frame in enumerate(cycles[0]):
+            for place, velocity in zip(1e3 * frame.position, frame.velocity):
+                places.append((*key, phase[k], *place, *velocity))
+    names = f"particles filling seed cycle phase container_mm {' '.join(one)}"
+    write_rows(os.path.join(folder, "cycles.csv"), names, frames)
+    names = "particles filling phase across_mm up_mm across_m_s up_m_s"
+    write_rows(os.path.join(folder, "particles.csv"), names, places)
 
 
-def show(figures, options):
+def print_heights(figures):
     """Print the figures, a row each filling and number of particles."""
-    columns = {
-        "height_amplitude_mm": "swing [mm]",
-        "height_lag_deg": "lag [deg]",
-        "height_above_floor_mm": "above floor [mm]",
-        "floor_share_least": "at floor, least",
-        "floor_share_most": "at floor, most",
-    }
     rows = []
-    for particles in PARTICLES:
-        for name, title in TITLES.items():
-            values = (figures[f"{key}_{name}_N{particles}"]["value"] for key in columns)
-            rows.append((particles, title, *(f"{value:.3g}" for value in values)))
+    for particles, name in KEYS:
+        values = (figures[f"{key}_{name}_N{particles}"]["value"] for key in COLUMNS)
+        rows.append((particles, TITLES[name], *(f"{value:.3g}" for value in values)))
     print("Mean height of the particles over one cycle")
-    print_table(rows, ["particles", "filling", *columns.values()])
-    print(f"\nPictures, animation and tables are in {options.out}")
+    print_table(rows, ["particles", "filling", *COLUMNS.values()])
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
 """Does a particle fall and rebound as Fig. 8 of Komatsuzaki et al. says it should?
 
-One particle falls from the top of a container at rest. Four readings of what the automaton does
-with the way travelled when a particle turns are compared, and the spheres, each with the closed
-form for its own gravity (10 m/s^2 on the lattice, 9.8 m/s^2 for the spheres). Expect "signed" and
+One particle falls from the top of a container at rest. Four ways in which the automaton treats the
+way travelled when a particle turns are compared, and the spheres, each with the closed form for its
+own gravity (10 m/s^2 on the lattice, 9.8 m/s^2 for the spheres). Expect "signed" and
 "signed_through_walls" within a millisecond, the other two off by tens of them. A blow costs the
 default about two steps: it falls in the step after the particle reached its last cell. Where the
 particle no longer rises by a cell, the automaton's static contact holds it: there its bounces end.
@@ -20,23 +20,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from _cli import figure, main, number, parser, print_table, write_summary
-from ca_damper import Batch, SceneTable, film, plot
-from ca_damper.automaton import Automaton
+from _cli import figure, finish, main, number, parser, print_table, write_rows
+from ca_damper import Automaton, Batch, SceneTable, Spheres, film
 from ca_damper.automaton.accumulator import READINGS
-from ca_damper.spheres import Spheres
-from taichi_dem.kit.files import output_folder, write_csv
+from taichi_dem.kit.files import output_folder
+from taichi_dem.kit.plot_style import BLACK, VIOLET, picture, styles_of
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 
 NAME = "damper_rebound"
-QUICK = {"impacts": 4, "every_s": 1e-3}
-FULL = {"impacts": 6, "every_s": 4e-4}
+QUICK, FULL = {"impacts": 4, "every_s": 1e-3}, {"impacts": 6, "every_s": 4e-4}
 #: Impacts that the figures speak of, and how far off the default reading may be.
 COUNTED, ALLOWED_MS = 4, 2.0
 #: The base stands still; its frequency [Hz] only makes whole steps of 1e-4 s and 2e-5 s.
 FREQUENCY = 10.0
 #: Column from which the particle falls; the second is one of those that stand lower.
 COLUMN = 1
+DEFAULT = Automaton().accumulator
 TITLES = {
     "signed": "automaton\nsigned (default)",
     "signed_through_walls": "automaton\nsigned through walls",
@@ -44,6 +43,10 @@ TITLES = {
     "kept": "automaton\nkept",
     "dem": "spheres",
 }
+#: Errors below this [ms] would lengthen a logarithmic axis for nothing.
+SHORTEST = 5e-3
+#: First impact to fourth: light to dark, as no colour of a filling is meant.
+SHADES = ("#D0D0D0", "#A0A0A0", "#6A6A6A", "#2A2A2A")
 
 
 @dataclass(frozen=True)
@@ -90,20 +93,12 @@ class Run:
     impacts_s: np.ndarray
     apexes_m: np.ndarray
 
-    @property
-    def compared(self):
-        """Impacts that are compared: the first four, or as many as there were."""
-        return min(COUNTED, len(self.impacts_s))
-
-    def impact_errors_ms(self):
-        """Time of the first impacts less the closed form's [ms]."""
-        theory = [self.fall.impact_s(k + 1) for k in range(self.compared)]
-        return 1e3 * (self.impacts_s[: self.compared] - theory)
-
-    def apex_errors_mm(self):
-        """Height of the first apexes less the closed form's [mm]."""
-        theory = [self.fall.apex_m(k + 1) for k in range(self.compared)]
-        return 1e3 * (self.apexes_m[: self.compared] - theory)
+    def errors(self):
+        """Errors of the first impacts [ms] and of the apexes after them [mm], two arrays."""
+        first = range(1, 1 + min(COUNTED, len(self.impacts_s)))
+        late = self.impacts_s[: len(first)] - [self.fall.impact_s(k) for k in first]
+        high = self.apexes_m[: len(first)] - [self.fall.apex_m(k) for k in first]
+        return 1e3 * late, 1e3 * high
 
 
 def options_parser():
@@ -118,15 +113,13 @@ def options_parser():
 def fillings(restitution):
     """Title -> (filling with one particle at the top, how far it falls [m])."""
     both = {"restitution": restitution, "wall_restitution": restitution}
-    made = {}
+    lattice, spheres, made = Automaton(), Spheres(), {}
+    top = lattice.rows - 1
     for reading in READINGS:
-        plain = Automaton(accumulator=reading, **both)
-        start = ((COLUMN, plain.rows - 1),)
-        falls = (plain.rows - 1) * plain.width
-        made[reading] = Automaton(accumulator=reading, start=start, **both), falls
-    plain = Spheres()
-    place = (0.5 * plain.width, plain.height - plain.radius)
-    made["dem"] = Spheres(start=(place,), **both), plain.height - plain.diameter
+        filling = Automaton(accumulator=reading, start=((COLUMN, top),), **both)
+        made[reading] = filling, top * lattice.width
+    place = (0.5 * spheres.width, spheres.height - spheres.radius)
+    made["dem"] = Spheres(start=(place,), **both), spheres.height - spheres.diameter
     return made
 
 
@@ -164,87 +157,102 @@ def analysed(batch, fall, history):
 
 def run(options):
     """Drop the particle in every filling, compare, picture."""
-    settings = QUICK if options.quick else FULL
-    batches, falls = {}, {}
+    batches, runs = {}, {}
     for title, (filling, height) in fillings(options.restitution).items():
         dt = options.dt if title == "dem" else options.ca_dt
-        batches[title] = Batch(filling, SceneTable(1, 1, dt, FREQUENCY, 0.0), mount="base")
-        falls[title] = Fall(height, options.restitution, filling.gravity)
+        batch = Batch(filling, SceneTable(1, 1, dt, FREQUENCY, 0.0), mount="base")
+        batches[title] = batch, Fall(height, options.restitution, filling.gravity)
     output_folder(options.out)
-    runs = {}
-    for title, batch in batches.items():
+    for title, job in batches.items():
         with ProgressBar(title) as progress:
-            runs[title] = drop(batch, falls[title], settings, progress)
-    write(runs, options.out)
-    figures = figures_of(runs)
-    write_summary(
-        options.out,
-        NAME,
-        figures,
-        compile_seconds=sum(batch.compile_seconds for batch in batches.values()),
-        run_seconds=sum(batch.run_seconds for batch in batches.values()),
-    )
-    show(runs, options.out)
+            runs[title] = drop(*job, QUICK if options.quick else FULL, progress)
+    picture_rebound(os.path.join(options.out, "rebound.png"), runs)
+    write_tables(runs, options.out)
+    print_errors(runs)
+    finish(options, NAME, figures_of(runs), [batch for batch, _ in batches.values()], show=False)
 
 
 def figures_of(runs):
     """Largest errors over the impacts compared: of the default reading, and of all."""
-    default = Automaton().accumulator
     figures = {}
-    for title, made in {"": runs[default], **runs}.items():
-        end = f"_{title}" if title else ""
-        impact, apex = np.abs(made.impact_errors_ms()), np.abs(made.apex_errors_mm())
+    for end, made in {"": runs[DEFAULT], **{f"_{title}": runs[title] for title in runs}}.items():
+        impact, apex = np.abs(made.errors())
         figures[f"impact_error_ms{end}"] = figure(float(impact.max()), "ms")
         figures[f"apex_error_mm{end}"] = figure(float(apex.max()), "mm")
     return figures
 
 
-def write(runs, folder):
-    """Picture and tables."""
-    default, spheres = runs[Automaton().accumulator], runs["dem"]
-    falls = {}
-    for title, made in (("ca_static", default), ("dem", spheres)):
-        time = np.linspace(0.0, made.time_s[-1], 2000)
-        exact = f"closed form, g = {made.fall.gravity:g} m/s²"
-        falls[title] = (made.time_s, made.height_m, time, made.fall.heights(time), exact)
-    errors = {TITLES[title]: made.impact_errors_ms() for title, made in runs.items()}
-    plot.plot_rebound(os.path.join(folder, "rebound.png"), falls, errors, ALLOWED_MS)
-    write_csv(os.path.join(folder, "heights.csv"), heights_table(runs))
-    write_csv(os.path.join(folder, "impacts.csv"), impacts_table(runs))
+def write_tables(runs, folder):
+    """A row a sample of every run, and a row an impact."""
+    samples = [
+        (title, *row)
+        for title, made in runs.items()
+        for row in zip(made.time_s, made.height_m, made.fall.heights(made.time_s))
+    ]
+    names = "filling time_s height_m closed_form_m"
+    write_rows(os.path.join(folder, "heights.csv"), names, samples)
+    impacts = [
+        (title, k, time, made.fall.impact_s(k), apex, made.fall.apex_m(k))
+        for title, made in runs.items()
+        for k, (time, apex) in enumerate(zip(made.impacts_s, made.apexes_m), start=1)
+    ]
+    names = "filling impact time_s closed_form_s apex_m closed_form_apex_m"
+    write_rows(os.path.join(folder, "impacts.csv"), names, impacts)
 
 
-def heights_table(runs):
-    """A row a sample of every run."""
-    sizes = [len(made.time_s) for made in runs.values()]
-    columns = {
-        "time_s": [made.time_s for made in runs.values()],
-        "height_m": [made.height_m for made in runs.values()],
-        "closed_form_m": [made.fall.heights(made.time_s) for made in runs.values()],
-    }
-    joined = {name: np.concatenate(parts) for name, parts in columns.items()}
-    return {"filling": np.repeat(list(runs), sizes), **joined}
+def picture_rebound(path, runs):
+    """Height over time beside the closed form, and errors of the times of impact."""
+    mosaic = [["first", "errors"], ["second", "errors"]]
+    falls = {"ca_static": runs[DEFAULT], "dem": runs["dem"]}
+    with picture(path, 0, 0, size=(10.4, 4.6)) as (figure, _):
+        panels = figure.subplot_mosaic(mosaic, width_ratios=[1.7, 1.0])
+        until = max(made.time_s[-1] for made in falls.values())
+        for place, (name, made) in zip(("first", "second"), falls.items()):
+            plot_fall(panels[place], styles_of(falls)[name], made)
+            panels[place].set(xlim=(0.0, until), ylim=(-3.0, None), ylabel="height over floor [mm]")
+        panels["first"].tick_params(labelbottom=False)
+        panels["second"].set_xlabel("time [s]")
+        errors = {TITLES[title]: made.errors()[0] for title, made in runs.items()}
+        plot_errors(panels["errors"], errors)
 
 
-def impacts_table(runs):
-    """A row an impact of every run."""
-    rows = []
-    for title, made in runs.items():
-        for k, (time, apex) in enumerate(zip(made.impacts_s, made.apexes_m), start=1):
-            rows.append((title, k, time, made.fall.impact_s(k), apex, made.fall.apex_m(k)))
-    names = ("filling", "impact", "time_s", "closed_form_s", "apex_m", "closed_form_apex_m")
-    return dict(zip(names, zip(*rows)))
+def plot_fall(axes, style, made):
+    """Samples of a run on its closed form."""
+    time = np.linspace(0.0, made.time_s[-1], 2000)
+    exact = f"closed form, g = {made.fall.gravity:g} m/s²"
+    axes.plot(time, 1e3 * made.fall.heights(time), color=BLACK, linewidth=0.9, label=exact)
+    every = max(1, len(made.time_s) // 130)
+    points = made.time_s[::every], 1e3 * made.height_m[::every]
+    look = {"color": style.colour, "markersize": 3.6, "markerfacecolor": "none"}
+    axes.plot(*points, style.marker, label=style.label, **look)
+    axes.legend(loc="upper right")
 
 
-def show(runs, folder):
+def plot_errors(axes, errors):
+    """Bars by impact; errors: title -> errors of the impacts [ms]."""
+    count = max(len(values) for values in errors.values())
+    for k in range(count):
+        own = [(row, values[k]) for row, values in enumerate(errors.values()) if k < len(values)]
+        rows = [row + 0.19 * (k - 0.5 * (count - 1)) for row, _ in own]
+        widths = [max(SHORTEST, abs(error)) for _, error in own]
+        axes.barh(rows, widths, 0.17, color=SHADES[k % len(SHADES)], label=f"impact {k + 1}")
+    words = f"most that passes, {ALLOWED_MS:g} ms"
+    axes.axvline(ALLOWED_MS, color=VIOLET, linewidth=1.0, linestyle="--", label=words)
+    axes.set_yticks(range(len(errors)), list(errors))
+    axes.set(xscale="log", xlabel="error of the time of impact [ms]", xlim=(SHORTEST, None))
+    axes.invert_yaxis()
+    axes.grid(False, axis="y")
+    axes.legend(loc="lower center", bbox_to_anchor=(0.4, 1.0), ncols=2, columnspacing=1.2)
+
+
+def print_errors(runs):
     """Print the errors of every impact."""
     print("Error of impact [ms] and of the apex after it [mm], by impact")
     rows = []
     for title, made in runs.items():
-        pairs = zip(made.impact_errors_ms(), made.apex_errors_mm())
-        cells = [f"{late:+.3f} / {high:+.3f}" for late, high in pairs]
+        cells = [f"{late:+.3f} / {high:+.3f}" for late, high in zip(*made.errors())]
         rows.append((title, *cells, *["at rest"] * (COUNTED - len(cells))))
     print_table(rows, ["filling", *(str(k + 1) for k in range(COUNTED))])
-    print(f"\nPicture and tables are in {folder}")
 
 
 if __name__ == "__main__":

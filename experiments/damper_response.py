@@ -26,32 +26,27 @@ from _cli import (
     add_checkpoints,
     checkpoint_of,
     figure,
+    fill_in,
+    finish,
     main,
     number,
     parser,
-    print_figures,
     print_table,
     several,
     whole,
-    write_summary,
+    write_rows,
 )
 from ca_damper import Automaton, Response, Spheres, Sweep, frequency_response, sweep_up_and_down
-from ca_damper.plot.response import picture_hysteresis, picture_measures, picture_responses
+from ca_damper.plot import picture_hysteresis, picture_measures, picture_responses
 from ca_damper.response import Grid
 from taichi_dem import InputError
-from taichi_dem.kit.files import output_folder, write_csv
+from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 
 NAME = "damper_response"
 #: 33 ratios f/f0, every 0.005 where the peaks of 0 to 50 particles lie.
-RATIOS = np.unique(
-    np.round(
-        np.concatenate(
-            [[0.80, 0.84, 0.87, 0.89], np.arange(0.90, 1.0201, 0.005), [1.04, 1.06, 1.09, 1.12]]
-        ),
-        4,
-    )
-)
+COARSE = ([0.80, 0.84, 0.87, 0.89], [1.04, 1.06, 1.09, 1.12])
+RATIOS = np.round(np.concatenate([COARSE[0], np.arange(0.90, 1.0201, 0.005), COARSE[1]]), 4)
 #: Of both fillings [kg].
 PARTICLE_MASS = Spheres().particle_mass
 FULL = {
@@ -63,6 +58,7 @@ FULL = {
     "measured": 20,
     "sweep_particles": [10, 50],
     "sweep_seeds": 2,
+    "ratios": RATIOS,
 }
 QUICK = {
     **FULL,
@@ -72,18 +68,22 @@ QUICK = {
     "measured": 5,
     "sweep_particles": [10],
     "sweep_seeds": 1,
+    "ratios": RATIOS[::4],
 }
-QUICK_RATIOS = RATIOS[::4]
 
 
-@dataclass(frozen=True)
+@dataclass
 class Measured:
-    """A filling's responses, its sweep, and the seconds they took."""
+    """A filling's response and sweep, and the seconds they took."""
 
     response: Response
     sweep: Sweep
-    compile_s: float
-    run_s: float
+    compile_seconds: float
+    run_seconds: float
+
+    def peaks(self):
+        """Rows of the response: particles, ratios of the peaks and their RMS [m], by seed."""
+        return zip(self.response.particles, *self.response.peaks())
 
 
 def fillings():
@@ -112,99 +112,60 @@ def options_parser():
 
 def run(options):
     """Measure all fillings, write tables and pictures."""
-    for name, value in (QUICK if options.quick else FULL).items():
-        if getattr(options, name) is None:
-            setattr(options, name, value)
-    chosen = chosen_fillings(options.fillings)
-    check_resume(options)
-    for filling in chosen.values():
-        check(filling, options)
-    output_folder(options.out)
-    measured = {label: measure(filling, options) for label, filling in chosen.items()}
-    write_tables(measured, options.out)
-    picture_all(measured, options.out)
-    figures = figures_of(measured)
-    write_summary(
-        options.out,
-        NAME,
-        figures,
-        compile_seconds=sum(one.compile_s for one in measured.values()),
-        run_seconds=sum(one.run_s for one in measured.values()),
-    )
-    print_peaks(measured)
-    print()
-    print_figures(figures)
-    print(f"\nPictures and tables are in {options.out}")
-
-
-def chosen_fillings(labels):
-    """Fillings by label; InputError for a label that is none."""
+    fill_in(options, QUICK if options.quick else FULL)
     known = fillings()
-    for label in labels:
+    for label in options.fillings:
         if label not in known:
             raise InputError(f"fillings must be some of {', '.join(known)}, got {label!r}")
-    return {label: known[label] for label in labels}
-
-
-def check(filling, options):
-    """InputError for what either job of a filling would refuse after the others have run."""
-    ratios = QUICK_RATIOS if options.quick else RATIOS
-    dt = options.dem_dt if filling.label == "dem" else options.ca_dt
-    for particles in (options.particles, options.sweep_particles):
-        Grid(filling, particles, ratios, 1, None, dt)
-
-
-def measure(filling, options):
-    """Response and sweep of one filling."""
-    spheres = filling.label == "dem"
-    shared = {
-        "ratios": QUICK_RATIOS if options.quick else RATIOS,
-        "dt": options.dem_dt if spheres else options.ca_dt,
-        "measured_cycles": options.measured,
-    }
-    response, one = timed(
-        f"{filling.label} response",
-        lambda progress: frequency_response(
-            filling,
-            particles=options.particles,
-            seeds=options.dem_seeds if spheres else options.seeds,
-            transient_cycles=options.transient,
-            progress=progress,
-            **kept(options, f"{filling.label}_response"),
-            **shared,
-        ),
-    )
-    sweep, two = timed(
-        f"{filling.label} sweep",
-        lambda progress: sweep_up_and_down(
-            filling,
-            particles=options.sweep_particles,
-            seeds=options.sweep_seeds,
-            transient_cycles=max(1, options.transient // 3),
-            progress=progress,
-            **kept(options, f"{filling.label}_sweep"),
-            **shared,
-        ),
-    )
-    return Measured(response, sweep, one[0] + two[0], one[1] + two[1])
-
-
-def check_resume(options):
-    """Raise InputError when there is nothing to go on from."""
     if options.resume and not any(Path(options.out).glob("checkpoint_*.npz")):
         raise InputError(f"resume must be left out: there is no checkpoint in {options.out}")
+    jobs = {label: jobs_of(known[label], options) for label in options.fillings}
+    output_folder(options.out)
+    measured = {label: measure(label, *pair, options) for label, pair in jobs.items()}
+    write_tables(measured, options.out)
+    responses = {label: one.response for label, one in measured.items()}
+    sweeps = {label: one.sweep for label, one in measured.items()}
+    paths = {k: os.path.join(options.out, f"{k}.png") for k in ("response", "measures")}
+    picture_responses(paths["response"], responses, PARTICLE_MASS)
+    picture_measures(paths["measures"], responses, PARTICLE_MASS)
+    picture_hysteresis(os.path.join(options.out, "hysteresis.png"), sweeps)
+    print_peaks(measured)
+    finish(options, NAME, figures_of(measured), measured.values())
 
 
-def kept(options, name):
-    """Arguments checkpoint and resume of one of the jobs; those not begun yet have no file."""
-    arguments = checkpoint_of(options, f"checkpoint_{name}")
-    if options.resume and not os.path.exists(arguments["resume"]):
-        arguments["resume"] = None
-    return arguments
+def jobs_of(filling, options):
+    """Arguments of the response and of the sweep; InputError for those that would be refused."""
+    spheres = filling.label == "dem"
+    shared = {
+        "filling": filling,
+        "ratios": options.ratios,
+        "dt": options.dem_dt if spheres else options.ca_dt,
+    }
+    response = {"particles": options.particles, "transient_cycles": options.transient}
+    response["seeds"] = options.dem_seeds if spheres else options.seeds
+    sweep = {"particles": options.sweep_particles, "seeds": options.sweep_seeds}
+    sweep["transient_cycles"] = max(1, options.transient // 3)
+    for job in (response, sweep):
+        Grid(particles=job["particles"], seeds=1, oscillator=None, **shared)
+        job.update(shared, measured_cycles=options.measured)
+    return response, sweep
 
 
-def timed(title, work):
-    """What work(progress) returns, and its seconds: (to compile and set up, to run)."""
+def measure(label, response, sweep, options):
+    """Response and sweep of one filling by their arguments."""
+    made = Measured(None, None, 0.0, 0.0)
+    jobs = {"response": (frequency_response, response), "sweep": (sweep_up_and_down, sweep)}
+    for name, (work, arguments) in jobs.items():
+        kept = checkpoint_of(options, f"checkpoint_{label}_{name}")
+        # Jobs not begun before the interruption have no file.
+        if options.resume and not os.path.exists(kept["resume"]):
+            kept["resume"] = None
+        setattr(made, name, timed(made, f"{label} {name}", work, {**arguments, **kept}))
+    return made
+
+
+def timed(made, title, work, arguments):
+    """Result of work(**arguments) under a progress bar; adds its seconds to those of made."""
     started, told = time.perf_counter(), [0.0]
     with ProgressBar(title) as bar:
 
@@ -213,74 +174,55 @@ def timed(title, work):
                 told[0] = present.seconds
             bar(present)
 
-        made = work(progress)
-    return made, (time.perf_counter() - started - told[0], told[0])
+        found = work(progress=progress, **arguments)
+    made.compile_seconds += time.perf_counter() - started - told[0]
+    made.run_seconds += told[0]
+    return found
 
 
 def write_tables(measured, folder):
-    """CSV of every scene, of the peaks, of the sweeps; what each response cost as JSON."""
-    peaks = {"filling": [], "particles": [], "seed": [], "peak_ratio": [], "peak_rms_mm": []}
+    """CSV of every scene, of the peaks, of the sweeps; the cost of each response as JSON."""
+    rows = []
     for label, one in measured.items():
         one.response.write_csv(os.path.join(folder, f"response_{label}.csv"))
         one.response.report.write(os.path.join(folder, f"report_{label}.json"))
         one.sweep.up.write_csv(os.path.join(folder, f"sweep_up_{label}.csv"))
         one.sweep.down.write_csv(os.path.join(folder, f"sweep_down_{label}.csv"))
-        ratio, rms = one.response.peaks()
-        for k, particles in enumerate(one.response.particles):
-            for m, seed in enumerate(one.response.seeds):
-                row = (label, particles, seed, float(ratio[k, m]), 1e3 * float(rms[k, m]))
-                for name, value in zip(peaks, row):
-                    peaks[name].append(value)
-    write_csv(os.path.join(folder, "peaks.csv"), peaks)
-
-
-def picture_all(measured, folder):
-    """All pictures."""
-    responses = {label: one.response for label, one in measured.items()}
-    picture_responses(os.path.join(folder, "response.png"), responses, PARTICLE_MASS)
-    picture_measures(os.path.join(folder, "measures.png"), responses, PARTICLE_MASS)
-    sweeps = {label: one.sweep for label, one in measured.items()}
-    picture_hysteresis(os.path.join(folder, "hysteresis.png"), sweeps)
+        for particles, ratio, rms in one.peaks():
+            by_seed = zip(one.response.seeds, ratio, 1e3 * rms)
+            rows += [(label, particles, *row) for row in by_seed]
+    names = "filling particles seed peak_ratio peak_rms_mm"
+    write_rows(os.path.join(folder, "peaks.csv"), names, rows)
 
 
 def figures_of(measured):
     """Median over seeds of where each curve peaks and how high; hysteresis; seconds."""
     figures = {}
     for label, one in measured.items():
-        ratio, rms = one.response.peaks()
-        for k, particles in enumerate(one.response.particles):
+        for particles, ratio, rms in one.peaks():
             key = f"{label}_N{particles}"
-            figures[f"peak_ratio_{key}"] = figure(float(np.median(ratio[k])), "1")
-            figures[f"peak_rms_mm_{key}"] = figure(1e3 * float(np.median(rms[k])), "mm")
-        for k, particles in enumerate(one.sweep.up.particles):
-            largest = float(np.abs(one.sweep.hysteresis[k]).max())
+            figures[f"peak_ratio_{key}"] = figure(float(np.median(ratio)), "1")
+            figures[f"peak_rms_mm_{key}"] = figure(1e3 * float(np.median(rms)), "mm")
+        for particles, hysteresis in zip(one.sweep.up.particles, one.sweep.hysteresis):
+            largest = float(np.abs(hysteresis).max())
             figures[f"hysteresis_{label}_N{particles}"] = figure(largest, "1")
-        figures[f"run_seconds_{label}"] = figure(one.run_s, "s")
+        figures[f"run_seconds_{label}"] = figure(one.run_seconds, "s")
     return figures
 
 
 def print_peaks(measured):
-    """Peaks beside those of a rigid mass."""
+    """Print the peaks beside those of a rigid mass."""
     rows = []
     for label, one in measured.items():
-        response = one.response
-        ratio, rms = response.peaks()
-        for k, particles in enumerate(response.particles):
-            rigid_ratio, rigid_rms = response.oscillator.peak(particles * PARTICLE_MASS)
-            low, high = 1e3 * rms[k].min(), 1e3 * rms[k].max()
-            rows.append(
-                (
-                    label,
-                    particles,
-                    f"{np.median(ratio[k]):.4f}",
-                    f"{rigid_ratio:.4f}",
-                    f"{1e3 * np.median(rms[k]):.2f}",
-                    f"{low:.2f} .. {high:.2f}",
-                    f"{1e3 * rigid_rms:.2f}",
-                )
-            )
+        for particles, ratio, rms in one.peaks():
+            rigid_ratio, rigid = one.response.oscillator.peak(particles * PARTICLE_MASS)
+            middle, low, high = 1e3 * np.median(rms), 1e3 * rms.min(), 1e3 * rms.max()
+            place = f"{np.median(ratio):.4f}", f"{rigid_ratio:.4f}"
+            height = f"{middle:.2f}", f"{low:.2f} .. {high:.2f}", f"{1e3 * rigid:.2f}"
+            rows.append((label, particles, *place, *height))
     header = ["filling", "N", "peak f/f0", "rigid", "peak RMS [mm]", "seeds", "rigid [mm]"]
     print_table(rows, header)
+    print()
 
 
 if __name__ == "__main__":

@@ -9,7 +9,6 @@ Open results/index.html: it needs no server. Ends with exit code 1 and a list wh
 failed or is missing from the page.
 """
 
-import argparse
 import json
 import os
 import re
@@ -20,7 +19,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from _cli import Parser, exit_code, several
+from _cli import bare_parser, exit_code, several
 from _gallery_html import CAPTION, RUN, THUMBNAILS, shown, write_page
 from _gallery_pages import SMALL_PICTURES, TOOLS, pages, readme_table
 from taichi_dem import InputError
@@ -33,154 +32,16 @@ SMALL, THUMBNAIL = (960, 256), (480, 64)
 
 def options_parser():
     """Options of the gallery."""
-    made = Parser(
-        prog="python experiments/gallery.py",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
-    )
+    made = bare_parser("gallery", __doc__)
     made.add_argument("--quick", action="store_true", help="run smaller jobs of under a minute")
-    made.add_argument(
-        "--out", type=os.path.expanduser, default="results", help="folder for page and results"
-    )
+    out = {"type": os.path.expanduser, "default": "results"}
+    made.add_argument("--out", help="folder for page and results", **out)
     made.add_argument("--only", type=several(str), default=None, help="names, by comma")
     made.add_argument("--reuse", action="store_true", help="run only what has no result yet")
     made.add_argument("--readme", action="store_true", help="renew README.md, run nothing")
-    made.add_argument(
-        "--pictures", action="store_true", help=f"renew {SMALL_PICTURES}, run nothing"
-    )
+    words = f"renew {SMALL_PICTURES}, run nothing"
+    made.add_argument("--pictures", action="store_true", help=words)
     return made
-
-
-def scripts():
-    """Names of all experiments there are."""
-    names = {path.stem for path in HERE.glob("*.py") if not path.stem.startswith("_")}
-    return sorted(names - set(TOOLS))
-
-
-def chosen(only):
-    """Entries of the experiments asked for, all by default; InputError for an unknown name."""
-    known = {page.name: page for page in pages()}
-    for name in only or ():
-        if name not in known:
-            raise InputError(f"only must name experiments out of {', '.join(known)}, got {name!r}")
-    return tuple(known[name] for name in only or known)
-
-
-def run_one(page, out, quick):
-    """Run an experiment and note what it printed; returns why it failed, or ""."""
-    folder = os.path.join(out, page.name)
-    _forget(folder, page.pictures)
-    line = [sys.executable, str(HERE / f"{page.name}.py"), *page.options.split()]
-    line += ["--out", folder, *(["--quick"] if quick else [])]
-    started = time.perf_counter()
-    done = subprocess.run(line, capture_output=True, text=True)
-    note = {"seconds": time.perf_counter() - started, "output": done.stdout}
-    write_text(os.path.join(output_folder(folder), RUN), json.dumps(note, indent=1))
-    if done.returncode == 0:
-        return ""
-    said = done.stderr.strip().splitlines() or ["it said nothing"]
-    return f"exit code {done.returncode}: {said[-1]}"
-
-
-def _forget(folder, pictures):
-    """Remove what the page shows of an earlier run, so that none of it passes for this one's."""
-    for name in ("summary.json", RUN, CAPTION, *pictures):
-        Path(folder, name).unlink(missing_ok=True)
-
-
-def run_all(wanted, options):
-    """Run what is wanted, one after the other, and say how each ended; name -> why it failed."""
-    failed = {}
-    for number, page in enumerate(wanted, 1):
-        there = os.path.exists(os.path.join(options.out, page.name, "summary.json"))
-        if options.reuse and there:
-            continue
-        print(f"{number:2d}/{len(wanted)} {page.name} ... ", end="", flush=True)
-        started = time.perf_counter()
-        failed[page.name] = run_one(page, options.out, options.quick)
-        print(failed[page.name] or f"{time.perf_counter() - started:.0f} s", flush=True)
-    return failed
-
-
-def build(options):
-    """Run what is asked for and write the page; returns a line for each thing amiss."""
-    wanted, out = chosen(options.only), output_folder(options.out)
-    failed = run_all(wanted, options)
-    write_thumbnails(out)
-    items = [shown(page, out, failed.get(page.name, "")) for page in pages()]
-    path = os.path.join(out, "index.html")
-    write_page(path, items)
-    print(f"The page is {path}: open it in any browser.")
-    names = {page.name for page in wanted}
-    return [
-        *(f"{i.page.name}: {i.failed}" for i in items if i.failed and i.page.name in names),
-        *(f"{name}: has no entry in _gallery_pages.py" for name in without_entry()),
-    ]
-
-
-def without_entry():
-    """Names of experiments that the page would not show."""
-    return sorted(set(scripts()) - {page.name for page in pages()})
-
-
-def write_thumbnails(out):
-    """Small pictures for the page's list; none of a picture that cannot be read."""
-    folder = output_folder(os.path.join(out, THUMBNAILS))
-    for page in pages():
-        try:
-            shrink_picture(page, out, folder, THUMBNAIL)
-        except InputError:
-            Path(folder, f"{page.name}.png").unlink(missing_ok=True)
-
-
-def shrink_pictures(out, folder):
-    """Small copies of each experiment's first picture for the repository; the names written."""
-    written = [shrink_picture(page, out, folder, SMALL) for page in pages()]
-    return list(filter(None, written))
-
-
-def shrink_picture(page, out, folder, size):
-    """Small copy of an experiment's first picture; its name, None without a picture. size: SMALL.
-
-    Raises InputError when the picture cannot be read or the copy not be written.
-    """
-    source, target = (
-        Path(out, page.name, page.pictures[0]),
-        os.path.join(folder, f"{page.name}.png"),
-    )
-    if not source.is_file():
-        return None
-    write_whole(target, small_copy(source, *size))
-    return target
-
-
-def small_copy(source, side, colours):
-    """A function that writes a picture, the last image of a film, within a side [pixels] as PNG."""
-
-    def write(name):
-        with Image.open(source) as image:
-            image.seek(getattr(image, "n_frames", 1) - 1)
-            made = image.convert("RGB")
-        made.thumbnail((side, side))
-        # With too few colours, or without the means, thin lines take those of their neighbours.
-        made = made.quantize(colours, kmeans=3, dither=Image.Dither.NONE)
-        made.save(name, format="PNG", optimize=True)
-
-    return write
-
-
-def renew_readme(root):
-    """Renew the table of README.md in a folder, and show pictures whose place was kept for them."""
-    path = Path(root, "README.md")
-
-    def show(place):
-        return place[1] if Path(root, place[2]).is_file() else place[0]
-
-    text = path.read_text(encoding="utf-8")
-    text = re.sub(r"\| question \|.*?\n\n", lambda _: f"{readme_table()}\n", text, flags=re.DOTALL)
-    text = re.sub(r"<!-- (!\[[^]]+\]\((.+?)\)) -->", show, text)
-    write_text(path, text)
 
 
 def main(arguments=None):
@@ -197,6 +58,119 @@ def _work(options):
     if amiss:
         print("\n".join(["Without a result:", *amiss]), file=sys.stderr)
     return 1 if amiss else 0
+
+
+def build(options):
+    """Run the experiments asked for and write the page; returns a line for each thing amiss."""
+    known = {page.name: page for page in pages()}
+    for name in options.only or ():
+        if name not in known:
+            raise InputError(f"only must name experiments out of {', '.join(known)}, got {name!r}")
+    out = output_folder(options.out)
+    wanted = [known[name] for name in options.only or known]
+    failed = run_all(wanted, options)
+    write_thumbnails(out)
+    items = [shown(page, out, failed.get(page.name, "")) for page in pages()]
+    path = os.path.join(out, "index.html")
+    write_page(path, items)
+    print(f"The page is {path}: open it in any browser.")
+    return [
+        *(
+            f"{item.page.name}: {item.failed}"
+            for item in items
+            if item.failed and item.page in wanted
+        ),
+        *(f"{name}: has no entry in _gallery_pages.txt" for name in without_entry()),
+    ]
+
+
+def run_all(wanted, options):
+    """Run experiments one after the other, and print how each ended; name -> why it failed."""
+    failed = {}
+    for number, page in enumerate(wanted, 1):
+        if options.reuse and Path(options.out, page.name, "summary.json").exists():
+            continue
+        print(f"{number:2d}/{len(wanted)} {page.name} ... ", end="", flush=True)
+        started = time.perf_counter()
+        failed[page.name] = run_one(page, options.out, options.quick)
+        print(failed[page.name] or f"{time.perf_counter() - started:.0f} s", flush=True)
+    return failed
+
+
+def run_one(page, out, quick):
+    """Run an experiment and note what it printed; returns why it failed, or ""."""
+    folder = output_folder(os.path.join(out, page.name))
+    # None of an earlier run shall pass for this one's.
+    for name in ("summary.json", RUN, CAPTION, *page.pictures):
+        Path(folder, name).unlink(missing_ok=True)
+    line = [sys.executable, str(HERE / f"{page.name}.py"), *page.options.split()]
+    line += ["--out", folder, *(["--quick"] if quick else [])]
+    started = time.perf_counter()
+    done = subprocess.run(line, capture_output=True, text=True)
+    note = {"seconds": time.perf_counter() - started, "output": done.stdout}
+    write_text(os.path.join(folder, RUN), json.dumps(note, indent=1))
+    if done.returncode == 0:
+        return ""
+    said = done.stderr.strip().splitlines() or ["it said nothing"]
+    return f"exit code {done.returncode}: {said[-1]}"
+
+
+def without_entry():
+    """Names of experiments that the page would not show."""
+    names = {path.stem for path in HERE.glob("*.py") if not path.stem.startswith("_")}
+    return sorted(names - set(TOOLS) - {page.name for page in pages()})
+
+
+def write_thumbnails(out):
+    """Small pictures for the page's list; none of a picture that cannot be read."""
+    folder = output_folder(os.path.join(out, THUMBNAILS))
+    for page in pages():
+        try:
+            shrink_picture(page, out, folder, THUMBNAIL)
+        except InputError:
+            Path(folder, f"{page.name}.png").unlink(missing_ok=True)
+
+
+def shrink_pictures(out, folder):
+    """Small copies of each experiment's first picture for the repository; the names written."""
+    return list(filter(None, (shrink_picture(page, out, folder, SMALL) for page in pages())))
+
+
+def shrink_picture(page, out, folder, size):
+    """Small copy of an experiment's first picture; its name, None without a picture. size: SMALL.
+
+    Raises InputError when the picture cannot be read or the copy not be written.
+    """
+    source = Path(out, page.name, page.pictures[0])
+    target = os.path.join(folder, f"{page.name}.png")
+    if not source.is_file():
+        return None
+    write_whole(target, lambda name: write_small(name, source, *size))
+    return target
+
+
+def write_small(name, source, side, colours):
+    """Write a picture, the last image of a film, within a side [pixels] as PNG."""
+    with Image.open(source) as image:
+        image.seek(getattr(image, "n_frames", 1) - 1)
+        made = image.convert("RGB")
+    made.thumbnail((side, side))
+    # With too few colours, or without the means, thin lines take those of their neighbours.
+    made = made.quantize(colours, kmeans=3, dither=Image.Dither.NONE)
+    made.save(name, format="PNG", optimize=True)
+
+
+def renew_readme(root):
+    """Renew the table of README.md in a folder, and show pictures whose place was kept for them."""
+    path = Path(root, "README.md")
+
+    def show(place):
+        return place[1] if Path(root, place[2]).is_file() else place[0]
+
+    text = path.read_text(encoding="utf-8")
+    text = re.sub(r"\| question \|.*?\n\n", lambda _: f"{readme_table()}\n", text, flags=re.DOTALL)
+    text = re.sub(r"<!-- (!\[[^]]+\]\((.+?)\)) -->", show, text)
+    write_text(path, text)
 
 
 if __name__ == "__main__":

@@ -16,20 +16,12 @@ import sys
 import textwrap
 import time
 
-from _cli import (
-    figure,
-    main,
-    parser,
-    print_figures,
-    print_table,
-    several,
-    whole,
-    write_summary,
-)
+from _cli import figure, main, parser, several, whole
 from _hard_cases import judge, named, registry
 from _hard_cases._case import FAILED, PASSED, REFUSED
 from _hard_cases._margins import case_title, method_styles, picture_margins, with_powers
-from taichi_dem.kit.files import output_folder, write_csv
+from _report import finish, show_rows, write_rows
+from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.plot_style import GREY, RED, picture, power
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 
@@ -60,7 +52,7 @@ def run(options):
     started = time.perf_counter()
     results = ask(cases, options.quick)
     compiling = sum(result.compile_s for result in results)
-    write_table(os.path.join(options.out, "hard_cases.csv"), results)
+    write_rows(options.out, "hard_cases.csv", [row_of(result) for result in results])
     for case in cases:
         picture_case(os.path.join(options.out, f"{case.name}.png"), case, results)
     for package in dict.fromkeys(case.package for case in cases):
@@ -69,15 +61,10 @@ def run(options):
         path = os.path.join(options.out, f"hard_cases_{package}.png")
         picture_sheet(path, own, seen, options.columns)
     picture_margins(os.path.join(options.out, "hard_cases.png"), results)
-    figures = figures_of(cases, results)
-    spent = time.perf_counter() - started
-    write_summary(
-        options.out, NAME, figures, compile_seconds=compiling, run_seconds=spent - compiling
-    )
     print_results(results)
-    print()
-    print_figures(figures)
-    print(f"\nPictures and tables are in {options.out}")
+    spent = time.perf_counter() - started
+    seconds = compiling, spent - compiling
+    finish(options, NAME, figures_of(cases, results), [], seconds=seconds)
 
 
 def ask(cases, quick):
@@ -91,18 +78,14 @@ def ask(cases, quick):
     return results
 
 
-def write_table(path, results):
-    """One row a case and method; cells of what does not exist are empty."""
+def row_of(result):
+    """Row of the CSV; cells without a value are empty."""
+    limit = result.limit
+    worst = (limit.name, limit.value, limit.bound, limit.formula) if limit else ("",) * 4
+    row = (result.case, result.package, result.method, result.status, *worst)
+    row = (*row, result.margin if limit else "", f"{result.seconds:.3g}", result.words)
     names = "case,package,method,status,figure,value,bound,formula,margin,seconds,words"
-    columns = {name: [] for name in names.split(",")}
-    for result in results:
-        limit = result.limit
-        worst = (limit.name, limit.value, limit.bound, limit.formula) if limit else ("",) * 4
-        margin = result.margin if limit else ""
-        row = (result.case, result.package, result.method, result.status, *worst, margin)
-        for name, value in zip(columns, (*row, f"{result.seconds:.3g}", result.words)):
-            columns[name].append(str(value))
-    write_csv(path, columns)
+    return dict(zip(names.split(","), map(str, row)))
 
 
 def looks_of(results):
@@ -210,16 +193,16 @@ def figures_of(cases, results):
 def print_results(results):
     """The table: case, method, status, worst figure, margin."""
     rows = [
-        (
-            result.case,
-            result.method,
-            result.status,
-            f"{result.margin:.3g}" if result.limit else "",
-            result.words if len(result.words) < 90 else result.words[:87] + "...",
-        )
+        {
+            **row_of(result),
+            "margin": result.margin if result.limit else None,
+            "words": result.words if len(result.words) < 90 else result.words[:87] + "...",
+        }
         for result in results
     ]
-    print_table(rows, ["case", "method", "status", "margin", "worst figure, or what it said"])
+    formats = {name: (name, "") for name in ("case", "method", "status")}
+    words = {"worst figure, or what it said": ("words", "")}
+    show_rows(rows, {**formats, "margin": ("margin", ".3g"), **words})
 
 
 if __name__ == "__main__":

@@ -13,25 +13,22 @@ Needs gmsh: ``make mesh`` installs it and runs this script. Takes two seconds.
 import os
 import sys
 
-from _cli import Parser, exit_code
+from _cli import bare_parser, exit_code
 from taichi_dem import CONCRETE, PAPER_BLOCK, quality_report, read_mesh
 from taichi_dem.kit.files import output_folder
 from taichi_dem.mesh.gmsh import block_with_hole
 
-MESHES = os.path.dirname(PAPER_BLOCK)
-
 
 def main(arguments=None):
-    """Write the meshes and print what they are like; returns the exit code."""
-    parser = Parser(prog="python experiments/make_meshes.py", description=__doc__.splitlines()[0])
-    parser.add_argument("--out", default=MESHES, help="folder to write to")
-    return exit_code(lambda: write(parser.parse_args(arguments).out))
+    """Write the meshes and print their quality; returns the exit code."""
+    made = bare_parser("make_meshes", __doc__.splitlines()[0])
+    made.add_argument("--out", default=os.path.dirname(PAPER_BLOCK), help="folder to write to")
+    return exit_code(lambda: write(made.parse_args(arguments).out))
 
 
 def write(folder):
-    """Write the meshes to a folder and print what they are like."""
-    output_folder(folder)
-    path = os.path.join(folder, "paper_block.msh")
+    """Write the meshes to a folder and print their quality."""
+    path = os.path.join(output_folder(folder), "paper_block.msh")
     block_with_hole(path)
     print(path)
     print(quality_report(read_mesh(path), CONCRETE))

@@ -30,6 +30,7 @@ from taichi_dem.mesh.reorder import in_space_order
 from taichi_dem.meshes import PAPER_BLOCK
 from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
 from taichi_dem.needed_effects import needed_effects
+from taichi_dem.observers import At, Every, Observer, RunView
 from taichi_dem.output.record import write_paraview
 from taichi_dem.scene import Scene
 from taichi_dem.simulate import simulate
@@ -41,14 +42,18 @@ from taichi_dem.stability.step_report import step_report
 __all__ = [
     "CONCRETE",
     "PAPER_BLOCK",
+    "At",
     "Checkpoint",
+    "Every",
     "ImplicitDashpots",
     "InputError",
     "Material",
     "Mesh",
     "Multirate",
+    "Observer",
     "Progress",
     "ProgressBar",
+    "RunView",
     "Scene",
     "Simulation",
     "SimulationDiverged",

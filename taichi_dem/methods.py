@@ -34,6 +34,20 @@ def _steps_ahead(method):
     return rule.ahead if rule is not None else 0.0
 
 
+def structure_of(method):
+    """What of a method its kernels depend on, hashable: all but its numbers.
+
+    A method of one's own says so by a member ``structure``; else any change of its numbers compiles
+    anew, as kernels may have read them.
+    """
+    if type(method).__module__ != __name__:
+        return getattr(method, "structure", (type(method), repr(method)))
+    rule = method.control
+    if rule is not None:
+        rule = rule.criteria, rule.wake, rule.level_jump is not None
+    return type(method), method.neighbour, method.dashpot, method.distance is None, rule
+
+
 def _suffix(method):
     """What a name adds for control and limited dashpots."""
     controlled = "_controlled" if method.control is not None else ""
@@ -78,9 +92,7 @@ class Uniform:
 
     def criterion(self):
         """Step rule for the schedule."""
-        if self.distance is None:
-            return FixedStep()
-        return Displacement(self.distance, self.dt0)
+        return FixedStep() if self.distance is None else Displacement()
 
 
 @dataclass(frozen=True)
@@ -121,7 +133,7 @@ class Multirate:
 
     def criterion(self):
         """Step rule for the schedule."""
-        return Displacement(self.distance, self.dt0)
+        return Displacement()
 
 
 @dataclass(frozen=True)

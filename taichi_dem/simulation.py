@@ -5,32 +5,26 @@ import time
 
 import numpy as np
 
-from taichi_dem.contact_search.contacts import Contacts
-from taichi_dem.contact_search.search import BroadPhase
 from taichi_dem.diagnostics.divergence import DivergenceCheck
 from taichi_dem.diagnostics.effect_activity import effect_activity
 from taichi_dem.diagnostics.energy_balance import EnergyBalance
 from taichi_dem.diagnostics.missing_effects import MissingEffects
 from taichi_dem.diagnostics.report import Report
 from taichi_dem.diagnostics.step_resolution import StepResolution
+from taichi_dem.engine.capacity import capacity_of
+from taichi_dem.engine.engine import ENGINES, Structure
 from taichi_dem.engine.model import Model
-from taichi_dem.engine.state import State
+from taichi_dem.engine.view import PartView
 from taichi_dem.kit import runtime
-from taichi_dem.kit.allocation import batch_allocation
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.progress.progress import compiling
 from taichi_dem.kit.validation import choice, instance, positive, whole
 from taichi_dem.methods import check_method
 from taichi_dem.scene import Scene
-from taichi_dem.stability.body_limits import limits_for
 from taichi_dem.stability.step_control import counted_criteria
-from taichi_dem.step.advance import Advance
 from taichi_dem.step.auto_driver import AutoDriver
-from taichi_dem.step.drivers import DRIVERS, SolvedStep, Step
-from taichi_dem.step.implicit.advance import SolvedAdvance
-from taichi_dem.step.implicit.solver import Solver
-from taichi_dem.step.schedule import Schedule
+from taichi_dem.step.drivers import DRIVERS
 from taichi_dem.timeline import MACRO_TICKS, NEVER
 
 #: Largest steps of a run, of which the ticks are counted in 64 bits.
@@ -45,70 +39,98 @@ _MEASURED = "measured"
 
 
 class Simulation:
-    """One scene, one method, one driver.
+    """One scene, one method, one driver, on an engine of the session.
 
     driver: "resident", "parallel", or "auto": parallel on a GPU and for large scenes, for those of
     middle size on several threads whichever proves the quicker.
     brute_force: contact search without cells, for tests.
-    Raises InputError for what is no scene or method, an unknown driver, or "resident" on a GPU.
+    model: the scene's arrays. tables, state, schedule, contacts, broad_phase, advance, step: parts
+    of the engine, with the data of this simulation (``engine.view``); contacts and broad_phase are
+    None without contact.
+    Raises InputError for what is no scene or method, an unknown driver, "resident" on a GPU, or a
+    scene that finds no room in the machine's memory.
     """
 
     def __init__(self, scene, method, driver="auto", brute_force=False):
-        self.generation = runtime.session()
         instance("scene", scene, Scene)
         check_method(method)
         choice("driver", driver, ("auto", *DRIVERS))
+        runtime.check_thread("simulation")
         started = time.perf_counter()
         compiling("set-up", 0.0)
-        self.scene, self.method = scene, method
-        self.solves = method.solves
-        with batch_allocation():
-            self.model = Model(scene.mesh, scene.material, scene.effects)
-            driver = _driver_name(driver, self.model.bond_count)
-            self.state = State(self.model, scene.max_speed)
-            self._build_schedule()
-            self.advance = self._build_advance()
-            self.broad_phase = None
-            if self.contacts is not None:
-                parts = self.contacts, self.schedule, self.advance.solver
-                self.broad_phase = BroadPhase(*parts, brute_force)
-        kind = SolvedStep if self.solves else Step
-        self.step = kind(self.advance, self.schedule, self.broad_phase)
-        self.driver = {**DRIVERS, _MEASURED: AutoDriver}[driver](self.step)
-        self.energy_balance = None
+        self.scene, self.method, self.solves = scene, method, method.solves
+        self.model = Model(scene.mesh, scene.material, scene.effects)
+        name = _driver_name(driver, self.model.bond_count)
+        structure = Structure(scene.effects, method, brute_force)
+        self.loan = ENGINES.borrow(structure, capacity_of(self.model), self.model, "simulation")
+        self._take_parts()
+        self._load()
+        self.driver = self._driver(name)
         self.compile_seconds = time.perf_counter() - started
-        self.run_seconds = self.run_cpu_seconds = 0.0
-        self.started = None
 
     def __repr__(self):
         bodies = counted(self.model.body_count, "body")
         bonds = counted(self.model.bond_count, "bond")
         return in_brief(self, bodies, bonds, self.method.name, f"{self.driver.name} driver")
 
-    def _build_schedule(self):
-        model, state, method = self.model, self.state, self.method
-        self.contacts = None
-        if model.has_contact:
-            self.contacts = Contacts(model, state, method.dt0, method.steps_ahead)
-        drifted = method.neighbour == "drifted"
-        limits = limits_for(model, state, self.contacts, method)
-        self.schedule = Schedule(
-            model,
-            state,
-            self.contacts,
-            method.criterion(),
-            method.dt0,
-            method.uniform,
-            drifted,
-            limits,
+    def _take_parts(self):
+        """Name the parts of the engine as this simulation sees them."""
+        self.tables, self.state, self.schedule, self.advance, self.step, self.readings = (
+            PartView(self.loan, (name,))
+            for name in ("tables", "state", "schedule", "advance", "step", "readings")
         )
+        self.contacts = self.broad_phase = self.outer_overlaps = None
+        if self.model.has_contact:
+            self.contacts, self.broad_phase, self.outer_overlaps = (
+                PartView(self.loan, (name,))
+                for name in ("contacts", "broad_phase", "outer_overlaps")
+            )
 
-    def _build_advance(self):
-        parts = self.model, self.state, self.schedule, self.contacts
-        if self.solves:
-            return SolvedAdvance(*parts, Solver(*parts, self.method))
-        # A method may bring an order of its own (docs/add_a_time_integrator.md).
-        return getattr(self.method, "advance", Advance)(*parts)
+    def _load(self):
+        """Put the scene into the engine, at rest and at time zero."""
+        self.loan.activate()
+        self.loan.engine.load(self.model, self.method, self.scene.max_speed)
+        self.energy_balance = None
+        self.run_seconds = self.run_cpu_seconds = 0.0
+        self.started = None
+
+    def _driver(self, name):
+        """Driver of the engine, or one that measures both."""
+        if name == _MEASURED:
+            drivers = {each: PartView(self.loan, ("drivers", each)) for each in DRIVERS}
+            return AutoDriver(self.step, drivers)
+        return PartView(self.loan, ("drivers", name))
+
+    def reset(self, scene=None, method=None):
+        """Begin again at time zero and at rest, with another scene or method if one is given.
+
+        They must be of the present structure: the same kinds of effects, the same kind of method;
+        then nothing is compiled. Raises InputError where they are not, or find no room.
+        """
+        scene = self.scene if scene is None else instance("scene", scene, Scene)
+        method = self.method if method is None else method
+        check_method(method)
+        model = self.model
+        if scene is not self.scene:
+            model = Model(scene.mesh, scene.material, scene.effects)
+        self._check_reset(scene, method, model)
+        self.scene, self.method, self.model = scene, method, model
+        self.loan.scene = model
+        self._load()
+
+    def _check_reset(self, scene, method, model):
+        engine, structure = self.loan.engine, Structure(scene.effects, method)
+        structure.brute_force = self.loan.engine.structure.brute_force
+        if Structure(scene.effects, method, structure.brute_force) != engine.structure:
+            raise InputError(
+                "reset must have a scene and a method of the same structure, kinds of effects and "
+                f"of steps, got {scene!r} and {method!r}: make a new Simulation"
+            )
+        if not engine.fits(capacity_of(model)) or not engine.accepts(model):
+            raise InputError(
+                f"reset must have a scene that fits, up to {engine.capacity[0]} bodies with such "
+                f"contact lists, got {scene!r}: make a new Simulation"
+            )
 
     @property
     def time_s(self):
@@ -133,16 +155,21 @@ class Simulation:
         self.driver.prepare()
         self._check_capacity()
         compiling("energy balance", 0.85)
-        self.energy_balance = EnergyBalance(self.model, self.state, self.advance, self.contacts)
-        self.divergence_check = DivergenceCheck(
-            self.model, self.state, self.schedule, self.contacts, self.energy_balance, self.solves
-        )
-        self.missing_effects = MissingEffects(self.model, self.state, self.advance)
-        self.step_resolution = StepResolution(self.model, self.state, self.advance)
+        self._open_balance()
         self.sample()
         self.divergence_check.check()
         self.evaluation_rate()
         self.compile_seconds += time.perf_counter() - started
+
+    def _open_balance(self):
+        """Begin the energy balance and all that looks at the run."""
+        read = self.model, self.state, self.readings, self.contacts
+        self.energy_balance = EnergyBalance(*read)
+        self.divergence_check = DivergenceCheck(
+            self.model, self.state, self.schedule, self.contacts, self.energy_balance, self.solves
+        )
+        self.missing_effects = MissingEffects(*read, self.outer_overlaps)
+        self.step_resolution = StepResolution(*read, self.schedule, self.advance)
 
     def sample(self):
         """Look for effects that are missed, and for bonds that the step does not resolve.
@@ -158,8 +185,7 @@ class Simulation:
         Raises SimulationDiverged with place and reason when the run leaves its bounds, InputError
         for a number that is none.
         """
-        if self.generation != runtime.session():
-            raise InputError("this simulation belongs to a Taichi session that has been stopped")
+        runtime.check_session(self.loan.session, "simulation")
         end = whole("macro_step", macro_step, 0, MOST_STEPS) * MACRO_TICKS
         self.start()
         self.started, self.started_cpu = time.perf_counter(), time.process_time()
@@ -214,7 +240,7 @@ class Simulation:
         members = self.schedule.members()
         steps = 2.0 ** np.arange(len(members))
         if self.schedule.uniform:
-            steps[:] = 2.0 ** self.schedule.finest[None]
+            steps[:] = 2.0 ** int(self.schedule.finest[None])
         if self.solves:
             steps *= 1.0 + self.sweeps() / max(1, int(self.schedule.evaluations[0]))
         return float(members @ steps) / self.method.dt0

@@ -1,31 +1,24 @@
-"""A scene that is run again and again, with other steps and other starts, compiled once."""
+"""A scene that is run again and again, with other steps and other starts."""
+
+from dataclasses import replace
 
 import numpy as np
 
 from taichi_dem import Simulation
-from taichi_dem.timeline import MACRO_TICKS, MAX_LEVEL
+from taichi_dem.timeline import MACRO_TICKS
 
 
 class Again:
-    """A simulation that can be put back to its start.
-
-    Its method gives all but the step, its largest one: ``restart`` takes that.
-    """
+    """A simulation that begins anew at each ``restart``; its method gives all but the step."""
 
     def __init__(self, scene, method):
-        self.simulation = Simulation(scene, method)
-        self.simulation.start()
+        self.simulation, self.method = Simulation(scene, method), method
         self.state, self.model = self.simulation.state, self.simulation.model
-        self._first = {name: f.to_numpy() for name, f in self.state.fields().items()}
 
     def restart(self, step, velocity=None, position=None, orientation=None, spin=None):
         """Begin at t = 0 with a step [s] and the motion that is given; the mesh's own otherwise."""
-        for name, field in self.state.fields().items():
-            field.from_numpy(self._first[name])
-        self.state.slot.fill(0.0)
-        lengths = step / 2.0 ** np.arange(MAX_LEVEL + 1)
-        self.simulation.schedule.step_seconds.from_numpy(lengths)
-        self.simulation.schedule.evaluations.fill(0)
+        name = "dt" if hasattr(self.method, "dt") else "dt0"
+        self.simulation.reset(method=replace(self.method, **{name: step}))
         if position is not None or velocity is not None:
             still = np.tile([1.0, 0.0, 0.0, 0.0], (self.model.body_count, 1))
             self.state.set_motion(
@@ -34,10 +27,7 @@ class Again:
                 velocity,
                 spin,
             )
-        self.simulation.step.prime()
-        if self.simulation.contacts is not None:
-            self.search_anew()
-        self._open_account()
+        self.simulation.start()
 
     def search_anew(self):
         """Forget all contacts and find those that there are now."""
@@ -49,14 +39,6 @@ class Again:
         contacts.search_requested.fill(0)
         self.simulation.broad_phase.neighbours.stale.fill(1)
         self.simulation.broad_phase.search()
-
-    def _open_account(self):
-        balance = self.simulation.energy_balance
-        balance.start_energy = 0.0
-        account = balance.account()
-        strain = account["bond_strain"] + account["sphere_strain"]
-        balance.start_energy = account["kinetic"] + strain
-        balance.start_momentum = balance.momentum()
 
     def run(self, steps, look=None):
         """Go on to a number of steps since the start; look() is called after steps with a search.

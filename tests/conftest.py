@@ -6,6 +6,8 @@
 import pytest
 
 from taichi_dem import InputError, runtime
+from taichi_dem.engine.engine import ENGINES
+from taichi_dem.kit.allocation import field_bytes, tree_count
 from taichi_dem.simulation import CPU_ONLY
 from tests import arch
 
@@ -20,16 +22,34 @@ def pytest_configure(config):
     arch.choose(config.getoption("--arch"))
 
 
+#: Bytes of fields beyond which the next file begins with a session of its own.
+_MOST_BYTES = 2e9
+_MOST_TREES = 200
+
+
 @pytest.fixture(scope="module", autouse=True)
 def taichi_session():
     """Two threads, whatever the machine has: results must not depend on their number.
 
-    A session a file: Taichi crashes beyond 512 groups of fields in one.
+    Files share a session, and so the engines that have been compiled, while there is room.
     """
-    runtime.stop()
+    if runtime.settings() is not None and _is_full():
+        runtime.stop()
     if arch.chosen() == "cuda" and not runtime.cuda_present():
         pytest.skip("no CUDA device answers here")
     runtime.start(arch.chosen(), threads=2)
+
+
+def _is_full():
+    started = runtime.settings()
+    other = (started.arch, started.threads, started.debug) != (arch.chosen(), 2, False)
+    return other or field_bytes() > _MOST_BYTES or tree_count() > _MOST_TREES
+
+
+@pytest.fixture
+def compiled_anew(monkeypatch):
+    """Engines of this test alone: for constants of kernels that a test changes."""
+    monkeypatch.setattr(ENGINES, "_engines", {})
 
 
 def _skipping():

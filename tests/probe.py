@@ -27,9 +27,9 @@ class BondProbe:
         )
         corners = mesh.points[self.model.topology.vertices[0]]
         self.area = 0.5 * np.linalg.norm(np.cross(*(corners[1:] - corners[0])))
-        self.frame = self.model.bond_frame[0].to_numpy()
+        self.frame = self.tables.bond_frame[0].to_numpy()
         self.centre = self.model.centre
-        self._slots = self.model.bond_slots[0].to_numpy()
+        self._slots = self.tables.bond_slots[0].to_numpy()
         fields = self.state.fields()
         names = ("softening_unit", "shear_slip", "broken_tick", "exposed_tick", "bond_heat")
         self._changing = [(fields[n], fields[n].to_numpy()) for n in names if n in fields]
@@ -88,7 +88,7 @@ class BondProbe:
     @ti.kernel
     def _evaluate(self, wrench: ti.types.ndarray(dtype=ti.f64, ndim=2)):
         for _ in range(1):
-            slots = self.model.bond_slots[0]
+            slots = self.tables.bond_slots[0]
             for side in ti.static(range(2)):
                 self.state.slot[slots[side]] = 0.0 * self.state.slot[slots[side]]
             self.advance.bond(0)
@@ -103,7 +103,7 @@ class BondProbe:
     @ti.kernel
     def _spent(self, spent: ti.types.ndarray(dtype=ti.f64, ndim=1)):
         for q in range(3):
-            spent[q] = self.model.tension.spent(0, q)
+            spent[q] = self.tables.tension.spent(0, q)
 
 
 @ti.data_oriented
@@ -122,7 +122,7 @@ class ContactProbe:
         )
         self.contacts = simulation.contacts
         self.centre = self.model.centre
-        self.sphere = self.model.sphere.to_numpy()
+        self.sphere = self.tables.sphere.to_numpy()
 
     def evaluate(self, spheres, position, orientation=None, velocity=None, spin=None, swap=False):
         """Force [N] and torque [N m] on both bodies (2, 6), and the three heats per STEP [W].

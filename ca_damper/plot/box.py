@@ -37,7 +37,7 @@ class Box:
         return cls(spheres.width, spheres.height, spheres.diameter)
 
     def lift(self, x):
-        """How high the box stands [m] when the container is displaced by x [m]."""
+        """Height of the box [m] when the container is displaced by x [m]."""
         cell = self.diameter
         return np.floor(np.asarray(x) / cell + 0.5) * cell if self.staggered else np.asarray(x)
 

@@ -59,8 +59,8 @@ def _draw_curves(axis, response, rows=None):
     empty = oscillator.base_amplitude * np.abs(
         oscillator.transfer(fine * oscillator.natural_frequency)
     )
-    bare = STYLES["empty"].label
-    axis.plot(fine, 1e3 * empty / np.sqrt(2.0), color=GREY, ls=":", lw=1.0, label=bare)
+    look = {"color": GREY, "ls": ":", "lw": 1.0, "label": STYLES["empty"].label}
+    axis.plot(fine, 1e3 * empty / np.sqrt(2.0), **look)
     axis.set(xlabel="frequency f / f$_0$ [1]", ylabel="RMS displacement [mm]")
 
 
@@ -73,8 +73,7 @@ def _band(axis, x, values, colour, label):
 def _legend_of_bands(figure, axis):
     """Legend above all panels, made from one of them: what bands are is its last entry."""
     handles, _ = axis.get_legend_handles_labels()
-    band = area_key("lowest to highest seed", fc=GREY, alpha=0.3)
-    handles.append(band)
+    handles.append(area_key("lowest to highest seed", fc=GREY, alpha=0.3))
     figure.legend(handles=handles, loc="outside upper center", ncols=len(handles))
 
 
@@ -83,14 +82,14 @@ def _shade(response, k):
 
 
 def _share_height(panels):
-    """The same height for all, what an empty container needs left out."""
+    """The same height for all, without the peak of the empty container."""
     highest = max(line.get_ydata().max() for axis in panels for line in axis.lines[:-1])
     for axis in panels:
         axis.set_ylim(0.0, 1.08 * highest)
 
 
 def _draw_peaks(place, height, responses, particle_mass):
-    """Where the curves peak and how high, over the particle number; bars from seed to seed."""
+    """Place and height of the peaks over the particle number; bars from seed to seed."""
     styles = styles_of(responses)
     for label, response in responses.items():
         style = styles[label]
@@ -163,11 +162,11 @@ def picture_hysteresis(path, sweeps):
 
 def _draw_ways(axis, sweep, k):
     """Each seed a line; up and down apart by colour and mark."""
+    ways = (
+        (sweep.up, "frequency rising", _SHADES(0.15), ">"),
+        (sweep.down, "frequency falling", _SHADES(0.75), "<"),
+    )
     for seed in range(len(sweep.up.seeds)):
-        words = {"up": "frequency rising", "down": "frequency falling"}
-        name = words if seed == 0 else {}
-        up, down = 1e3 * sweep.up.rms[k, :, seed], 1e3 * sweep.down.rms[k, :, seed]
-        axis.plot(sweep.up.ratios, up, color=_SHADES(0.15), marker=">", ms=3, label=name.get("up"))
-        axis.plot(
-            sweep.up.ratios, down, color=_SHADES(0.75), marker="<", ms=3, label=name.get("down")
-        )
+        for way, words, colour, mark in ways:
+            look = {"color": colour, "marker": mark, "ms": 3, "label": words if seed == 0 else None}
+            axis.plot(sweep.up.ratios, 1e3 * way.rms[k, :, seed], **look)

@@ -1,7 +1,7 @@
 """Hard cases of both packages, one registry for the experiment and the tests.
 
-A file in this folder whose name does not begin with an underscore holds cases in a tuple ``CASES``
-(see ``_case.Case``); nothing else has to be told of it.
+A file in this folder whose name does not begin with an underscore holds cases in a list ``CASES``
+(see ``_case.cases_of``); nothing else has to be told of it.
 """
 
 import importlib

@@ -3,7 +3,7 @@
 import numpy as np
 
 from _hard_cases._blast_scenes import EPS
-from _hard_cases._case import Case, Curves, Limit, Measured
+from _hard_cases._case import Curves, Limit, Measured
 from _hard_cases._references import damped_opening
 from taichi_dem import CONCRETE
 
@@ -73,14 +73,3 @@ def bond_area(mesh):
     shared = sorted(set(mesh.tetrahedra[0]) & set(mesh.tetrahedra[1]))
     corners = mesh.points[shared]
     return 0.5 * np.linalg.norm(np.cross(corners[1] - corners[0], corners[2] - corners[0]))
-
-
-def blast_case(run, methods, refused=None):
-    """A Case of the blast by its function."""
-    name = run.__name__
-    return Case(name, "blast", run.__doc__.split("\n")[0], tuple(methods), run, refused or {})
-
-
-def refuse(methods, words):
-    """Words that are due, for several methods."""
-    return dict.fromkeys(methods, words)

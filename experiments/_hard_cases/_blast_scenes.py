@@ -9,9 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from _demo import set_moving
 from taichi_dem import (
     CONCRETE,
+    Every,
     ImplicitDashpots,
+    Mesh,
     Multirate,
     Scene,
     Simulation,
@@ -21,9 +24,9 @@ from taichi_dem import (
 )
 from taichi_dem.mesh.contact_spheres import spheres_of_faces
 from taichi_dem.mesh.mesh import checked_mesh
-from taichi_dem.mesh.shapes import bar, pair, single
+from taichi_dem.mesh.shapes import bar, pair, placed_together, single
 from taichi_dem.mesh.topology import body_properties
-from taichi_dem.simulation import macro_steps
+from taichi_dem.simulate import run_simulation
 
 EPS = np.finfo(float).eps
 #: Distance of islands [m].
@@ -35,7 +38,6 @@ OPENING = 5e-6
 #: A bond's dashpots alone stop a pair of bodies of 35 g after 0.7 us: 30 um need 43 m/s at least.
 TEARING = 100.0
 FAR = 1000.0
-_STILL = np.array([1.0, 0.0, 0.0, 0.0])
 #: Methods by name: loose(step), in contact.
 FREE = {
     "uniform": Uniform(1e-7),
@@ -63,24 +65,18 @@ TOUCHING = {
 class Island:
     """Bodies that start with a displacement [m], a velocity [m/s] and a spin [rad/s], (n, 3)."""
 
-    points: np.ndarray
-    bodies: np.ndarray
+    mesh: Mesh
     shift: np.ndarray
     velocity: np.ndarray
     spin: np.ndarray
 
     @classmethod
-    def of(cls, *meshes, at=(0.0, 0.0, 0.0), shift=0.0, velocity=0.0, spin=0.0):
-        """Meshes side by side, each (mesh, offset [m]); the rest is broadcast to all bodies."""
-        points, bodies, count = [], [], 0
-        for mesh, offset in meshes:
-            points.append(mesh.points + offset + at)
-            bodies.append(mesh.tetrahedra + count)
-            count += len(mesh.points)
-        bodies = np.vstack(bodies)
-        motion = [np.broadcast_to(x, (len(bodies), 3)).astype(float) for x in (shift, velocity)]
-        turning = np.broadcast_to(spin, (len(bodies), 3)).astype(float)
-        return cls(np.vstack(points), bodies, *motion, turning)
+    def of(cls, *parts, at=(0.0, 0.0, 0.0), shift=0.0, velocity=0.0, spin=0.0):
+        """Parts side by side, each (mesh, offset [m]); the rest is broadcast to all bodies."""
+        placed = ((mesh, np.add(offset, at)) for mesh, offset in parts)
+        mesh = placed_together({str(k): part for k, part in enumerate(placed)})
+        shape = mesh.body_count, 3
+        return cls(mesh, *(np.broadcast_to(x, shape) for x in (shift, velocity, spin)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,13 +213,8 @@ def sphere_on_base(mesh):
 
 def contact_effects():
     """All effects but loads, spheres on all outer faces."""
-    return [
-        effects.BondDamping(),
-        effects.Softening(),
-        effects.ShearSlip(),
-        effects.SphereContact(outer_faces=True),
-        effects.Friction(),
-    ]
+    bonds = [effects.BondDamping(), effects.Softening(), effects.ShearSlip()]
+    return [*bonds, effects.SphereContact(outer_faces=True), effects.Friction()]
 
 
 @functools.cache
@@ -240,31 +231,41 @@ def touching(name, until):
 
 def follow(islands, acting, method, until, material=CONCRETE):
     """Run islands by a method to a time [s]; returns a Track by island."""
-    mesh, slices = together(islands)
+    places = np.outer(range(len(islands)), (0.0, 0.0, APART))
+    meshes = {name: island.mesh for name, island in islands.items()}
+    mesh = placed_together({name: (meshes[name], at) for name, at in zip(islands, places)})
+    ends = np.cumsum([one.body_count for one in meshes.values()])
+    slices = {name: slice(e - meshes[name].body_count, e) for name, e in zip(islands, ends)}
     simulation = Simulation(Scene(mesh, material, acting), method)
-    centre = simulation.model.centre
-    shift, velocity, spin = (
-        np.vstack([getattr(island, name) for island in islands.values()])
-        for name in ("shift", "velocity", "spin")
-    )
-    simulation.state.set_motion(centre + shift, np.tile(_STILL, (len(centre), 1)), velocity, spin)
+    motion = {
+        name: np.vstack([getattr(island, name) for island in islands.values()])
+        for name in ("velocity", "shift", "spin")
+    }
+    set_moving(simulation, *motion.values())
     samples = march(simulation, until)
-    samples["compile_s"] = simulation.compile_seconds
     return {name: _track(simulation, samples, part) for name, part in slices.items()}
+
+
+class _Motions:
+    """Observer that keeps the motion at every sample."""
+
+    when = Every(samples=1)
+
+    def __init__(self):
+        self.times, self.found = [], []
+
+    def observe(self, view):
+        """Keep it."""
+        self.times.append(view.time_s)
+        self.found.append(view.motion())
 
 
 def march(simulation, until):
     """Step to a time [s]; motion at SAMPLES evenly spaced times, as arrays by name."""
-    last = macro_steps(until, simulation.method.dt0)
-    simulation.start()
-    found, times = [simulation.state.motion()], [0.0]
-    for k in range(1, SAMPLES + 1):
-        simulation.advance_to(max(1, round(last * k / SAMPLES)))
-        simulation.sample()
-        found.append(simulation.state.motion())
-        times.append(simulation.time_s)
-    motion = {name: np.array([one[name] for one in found]) for name in found[0]}
-    return {"motion": motion, "time_s": np.array(times)}
+    kept = _Motions()
+    run_simulation(simulation, until=until, samples=SAMPLES, progress=None, observers=[kept])
+    motion = {name: np.array([one[name] for one in kept.found]) for name in kept.found[0]}
+    return {"motion": motion, "time_s": np.array(kept.times)}
 
 
 def _track(simulation, samples, part):
@@ -280,18 +281,6 @@ def _track(simulation, samples, part):
         inertia=model.body_inertia[part],
         broken=int((inside & broken[: len(inside)]).sum()),
         dt=simulation.method.dt0,
-        compile_s=samples["compile_s"],
+        compile_s=simulation.compile_seconds,
         warnings=simulation.step_resolution.findings(bodies),
     )
-
-
-def together(islands):
-    """One mesh of all islands in a row along z, and the slice of bodies of each by name."""
-    points, bodies, slices, count, first = [], [], {}, 0, 0
-    for k, (name, island) in enumerate(islands.items()):
-        points.append(island.points + np.array([0.0, 0.0, k * APART]))
-        bodies.append(island.bodies + count)
-        count += len(island.points)
-        slices[name] = slice(first, first + len(island.bodies))
-        first += len(island.bodies)
-    return checked_mesh(np.vstack(points), np.vstack(bodies), {}), slices

@@ -80,6 +80,27 @@ class Case:
         return (*self.methods, *self.refused)
 
 
+def cases_of(package):
+    """A list of cases, and a decorator that makes a Case of a function and adds it.
+
+    Its arguments: methods that claim the case, and pairs (methods that refuse it, the words due).
+    The first line of the docstring is the question.
+    """
+    cases = []
+
+    def case(methods, *refusals):
+        refused = {name: words for names, words in refusals for name in names}
+
+        def add(run):
+            question = run.__doc__.split("\n")[0]
+            cases.append(Case(run.__name__, package, question, tuple(methods), run, refused))
+            return run
+
+        return add
+
+    return cases, case
+
+
 @dataclass(frozen=True)
 class Result:
     """How a method fared; see ``Measured``.

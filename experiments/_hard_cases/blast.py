@@ -6,7 +6,6 @@ from _hard_cases import _blast_scenes as scenes
 from _hard_cases._blast_limits import (
     ACCURACY,
     as_converged,
-    blast_case,
     bond_area,
     eased_pair,
     gap_of,
@@ -14,59 +13,66 @@ from _hard_cases._blast_limits import (
     momentum_kept,
     no_energy_made,
     pair_opening,
-    refuse,
     touching_until,
 )
 from _hard_cases._blast_scenes import EPS, OPENING, SPIN, TEARING
-from _hard_cases._case import Limit
+from _hard_cases._case import Limit, cases_of
 from _hard_cases._references import damped_opening, speed_torn
 from taichi_dem import CONCRETE
 from taichi_dem.mesh.shapes import pair
 
 FREE = tuple(scenes.FREE)
-
-
 TOUCHING = tuple(scenes.TOUCHING)
+LIMITED = ("limited", "controlled")
+_PAIR_TOO_FAST = ("uniform", "multirate_held", "multirate_drifted"), "throw bodies apart"
+CASES, case = cases_of("blast")
+
+
+def but(*unable):
+    """All methods of bodies that touch but some."""
+    return tuple(method for method in TOUCHING if method not in unable)
 
 
 def _free_until(quick):
     return 4e-4 if quick else 4e-3
 
 
-def _spin(axis, method, quick):
-    track = scenes.loose(method, _free_until(quick))[f"spin_{axis}"]
-    energy = track.rotational() / track.rotational()[0]
-    momentum = track.motion["angular_momentum"][:, 0]
-    kept = np.linalg.norm(momentum - momentum[0], axis=1).max() / np.linalg.norm(momentum[0])
-    steps = track.time_s[-1] / track.dt
-    # The midpoint rule turns about an axis that is off by (w dt)^2 / 12 at most: what the energy,
-    # w . L / 2 at a given L, then misses is the difference of the principal inertias.
-    inertias = np.linalg.eigvalsh(track.inertia[0])
-    uneven = (inertias[2] - inertias[0]) / inertias[0]
-    bound = (SPIN * track.dt) ** 2 / 12.0 * uneven + steps * EPS
-    limits = (
-        Limit("energy error", float(abs(energy - 1.0).max()), bound, "(w dt)^2 (I3 - I1) / 12 I1"),
-        Limit("angular momentum error", float(kept), steps * EPS, "n eps: rounding"),
-        Limit("drift of the centre [m]", float(abs(track.moved).max()), 0.0, "nothing acts"),
+def _spin(axis):
+    """Add the case of a turn about one axis."""
+
+    def spin(method, quick):
+        track = scenes.loose(method, _free_until(quick))[f"spin_{axis}"]
+        energy = track.rotational() / track.rotational()[0]
+        momentum = track.motion["angular_momentum"][:, 0]
+        kept = np.linalg.norm(momentum - momentum[0], axis=1).max() / np.linalg.norm(momentum[0])
+        steps = track.time_s[-1] / track.dt
+        # The midpoint rule turns about an axis that is off by (w dt)^2 / 12 at most: the energy,
+        # w . L / 2 at a given L, then misses the difference of the principal inertias.
+        inertias = np.linalg.eigvalsh(track.inertia[0])
+        uneven = (inertias[2] - inertias[0]) / inertias[0]
+        bound = (SPIN * track.dt) ** 2 / 12.0 * uneven + steps * EPS
+        formula, drift = "(w dt)^2 (I3 - I1) / 12 I1", float(abs(track.moved).max())
+        limits = (
+            Limit("energy error", float(abs(energy - 1.0).max()), bound, formula),
+            Limit("angular momentum error", float(kept), steps * EPS, "n eps: rounding"),
+            Limit("drift of the centre [m]", drift, 0.0, "nothing acts"),
+        )
+        return measured(
+            track, method, limits, energy - 1.0, "energy of spin / at the start - 1 [1]"
+        )
+
+    spin.__name__ = f"spin_about_{axis}"
+    spin.__doc__ = (
+        f"An uneven body at 1e4 rad/s about {axis} tumbles and keeps energy and angular momentum."
     )
-    return measured(track, method, limits, energy - 1.0, "energy of spin / at the start - 1 [1]")
+    case(FREE)(spin)
 
 
-def spin_about_x(method, quick):
-    """An uneven body at 1e4 rad/s about x tumbles and keeps energy and angular momentum."""
-    return _spin("x", method, quick)
+for one in "xyz":
+    _spin(one)
 
 
-def spin_about_y(method, quick):
-    """An uneven body at 1e4 rad/s about y tumbles and keeps energy and angular momentum."""
-    return _spin("y", method, quick)
-
-
-def spin_about_z(method, quick):
-    """An uneven body at 1e4 rad/s about z tumbles and keeps energy and angular momentum."""
-    return _spin("z", method, quick)
-
-
+@case(FREE)
 def fragment_at_1_km_s(method, quick):
     """A fragment of 1.1 km/s flies straight: position to rounding, velocity to the bit."""
     track = scenes.loose(method, _free_until(quick))["fast"]
@@ -83,11 +89,13 @@ def fragment_at_1_km_s(method, quick):
     return measured(track, method, limits, track.moved[:, 0, 0], "x [m]")
 
 
+@case(FREE)
 def one_element(method, quick):
     """A single body that nothing acts on stays where it is, to the bit."""
     return _stays(scenes.loose(method, _free_until(quick))["still"], method)
 
 
+@case(TOUCHING)
 def two_elements(method, quick):
     """A bonded pair that nothing acts on stays where it is, to the bit, beside a fast fragment."""
     return _stays(scenes.touching(method, touching_until(quick))["still"], method)
@@ -98,6 +106,7 @@ def _stays(track, method):
     return measured(track, method, (moved,), abs(track.moved).max(axis=(1, 2)), "displacement [m]")
 
 
+@case(TOUCHING)
 def fragment_hits_block(method, quick):
     """A fragment of 100 m/s hits a resting block at once: no energy, no momentum from nowhere."""
     track = scenes.touching(method, touching_until(quick))["hit"]
@@ -111,6 +120,7 @@ def fragment_hits_block(method, quick):
     return measured(track, method, limits, track.kinetic() / given, "kinetic energy / given [1]")
 
 
+@case(("implicit",), _PAIR_TOO_FAST, (LIMITED, "parts too fast"))
 def deep_overlap_at_start(method, quick):
     """Two fragments that begin 1 mm inside each other are pushed apart as their dashpots let them.
 
@@ -129,12 +139,14 @@ def deep_overlap_at_start(method, quick):
     return measured(track, method, limits, 1e6 * parted, "distance [µm]")
 
 
+@case(TOUCHING)
 def strained_block_in_flight(method, quick):
     """A pulled pair that flies at 23 m/s keeps its momentum and eases as it would at rest."""
     track = scenes.touching(method, touching_until(quick))["strained"]
     return eased_pair(track, method, OPENING, pair())
 
 
+@case(TOUCHING)
 def coordinates_at_1_km(method, quick):
     """The same pair 1.7 km from the origin moves as at the origin, but for rounding of its place.
 
@@ -150,12 +162,14 @@ def coordinates_at_1_km(method, quick):
     return measured(far, method, limits, 1e6 * gap_of(far, OPENING), "opening [µm]")
 
 
+@case(but(*LIMITED), (LIMITED, "give way too fast"))
 def slivers(method, quick):
     """Two slivers of aspect 50 pulled by 1 µm ease as slowly as their dashpots make them."""
     track = scenes.touching(method, touching_until(quick))["sliver"]
     return eased_pair(track, method, 1e-6, pair(0.05, 0.05 / 50))
 
 
+@case(but("implicit"), (("implicit",), "failed late"))
 def zero_gap_on_breakage(method, quick):
     """A pair torn apart at 200 m/s: its spheres appear where they touch, and give nothing."""
     track = scenes.touching(method, touching_until(quick))["torn"]
@@ -170,6 +184,7 @@ def zero_gap_on_breakage(method, quick):
     return measured(track, method, limits, track.kinetic() / given, "kinetic energy / given [1]")
 
 
+@case(TOUCHING)
 def four_broken_faces(method, quick):
     """All four neighbours are torn off one body: it stays in the middle, by symmetry."""
     track = scenes.touching(method, touching_until(quick))["four_torn"]
@@ -196,6 +211,7 @@ def energy_left(track, left, mass):
     return as_converged(name, track.kinetic()[-1], left * given, given, late, formula)
 
 
+@case(TOUCHING)
 def bond_crushed(method, quick):
     """A pair pressed together at 10 m/s through its bond is stopped as its dashpots stop it."""
     track = scenes.touching(method, touching_until(quick))["crushed"]
@@ -209,33 +225,3 @@ def bond_crushed(method, quick):
     late, formula = max(ACCURACY, late / deepest), "1 %, or the start late by v dt"
     error = as_converged("opening error / deepest", gap, true, deepest, late, formula)
     return measured(track, method, (momentum_kept(track), error), 1e6 * gap, "opening [µm]")
-
-
-def but(*unable):
-    """All methods of bodies that touch but some."""
-    return tuple(method for method in TOUCHING if method not in unable)
-
-
-LIMITED = ("limited", "controlled")
-_PAIR_TOO_FAST = refuse(("uniform", "multirate_held", "multirate_drifted"), "throw bodies apart")
-
-CASES = (
-    blast_case(spin_about_x, FREE),
-    blast_case(spin_about_y, FREE),
-    blast_case(spin_about_z, FREE),
-    blast_case(fragment_at_1_km_s, FREE),
-    blast_case(one_element, FREE),
-    blast_case(two_elements, TOUCHING),
-    blast_case(fragment_hits_block, TOUCHING),
-    blast_case(
-        deep_overlap_at_start,
-        ("implicit",),
-        {**_PAIR_TOO_FAST, **refuse(LIMITED, "parts too fast")},
-    ),
-    blast_case(strained_block_in_flight, TOUCHING),
-    blast_case(coordinates_at_1_km, TOUCHING),
-    blast_case(slivers, but(*LIMITED), refuse(LIMITED, "give way too fast")),
-    blast_case(zero_gap_on_breakage, but("implicit"), refuse(("implicit",), "failed late")),
-    blast_case(four_broken_faces, TOUCHING),
-    blast_case(bond_crushed, TOUCHING),
-)

@@ -3,8 +3,7 @@
 import numpy as np
 
 from _hard_cases import _blast_scenes as scenes
-from _hard_cases._blast_limits import blast_case, refuse
-from _hard_cases._case import Curves, Limit, Measured
+from _hard_cases._case import Curves, Limit, Measured, cases_of
 from taichi_dem import CONCRETE, Multirate, StepControl
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import single
@@ -16,13 +15,17 @@ LIGHT = 0.06
 #: Largest step times the fastest frequency: of the paper's rule well below the limit of the
 #: springs, and beyond the first resonance, pi, which step control has to avoid by itself.
 BELOW, BEYOND = 0.3, 4.0
+MULTIRATE = ("multirate_drifted", "multirate_held")
+CASES, case = cases_of("blast")
 
 
+@case(("controlled", *MULTIRATE))
 def step_ratio_resonance(method, quick):
     """Undamped trios swing while their bodies step at 1 to 16 to one another: nothing is gained."""
     return _scan(method, BEYOND if method == "controlled" else BELOW, quick)
 
 
+@case((), (MULTIRATE, "came from nowhere"))
 def step_ratio_beyond_resonance(method, quick):
     """The same at largest steps up to 1.3 times half a period of the light body."""
     return _scan(method, BEYOND, quick)
@@ -65,11 +68,3 @@ def _trio(edge):
         points.append(centre + share * (centre - corners[k]))
     mesh = checked_mesh(points, bodies, {})
     return scenes.Island.of((mesh, 0.0), velocity=[[0, 0, 0], [0.5, 0, 0], [0, 0.05, 0]])
-
-
-MULTIRATE = ("multirate_drifted", "multirate_held")
-
-CASES = (
-    blast_case(step_ratio_resonance, ("controlled", *MULTIRATE)),
-    blast_case(step_ratio_beyond_resonance, (), refuse(MULTIRATE, "came from nowhere")),
-)

@@ -3,9 +3,12 @@
 import numpy as np
 
 from _hard_cases import _damper_scenes as scenes
-from _hard_cases._case import Case, Curves, Limit, Measured
+from _hard_cases._case import Curves, Limit, Measured, cases_of
 from _hard_cases._damper_scenes import AUTOMATA, EXACT, SPHERES, filling
 from ca_damper import Batch, SceneTable, SimulationDiverged
+
+CASES, case = cases_of("damper")
+_ALL = (*AUTOMATA, *SPHERES)
 
 
 def _sound(run, method, *more, shown=None):
@@ -17,6 +20,7 @@ def _sound(run, method, *more, shown=None):
     return Measured(tuple(limits), shown, run.batch.compile_seconds)
 
 
+@case(_ALL)
 def full_box(method, quick):
     """Every cell taken, shaken at 3.5 g: nothing can move far, nothing may be lost."""
     what = filling(method)
@@ -25,6 +29,7 @@ def full_box(method, quick):
     return _sound(run, method, *more, shown=scenes.places(run, method))
 
 
+@case(("empty", *_ALL))
 def empty_box(method, quick):
     """No particle, at resonance: the transfer function, to RK45's tolerance and its round-off."""
     run = scenes.spring(filling(method), 0, 20 if quick else 1000)
@@ -32,18 +37,21 @@ def empty_box(method, quick):
     return Measured((limit,), scenes.swings(run, method), run.batch.compile_seconds)
 
 
+@case(_ALL)
 def one_particle(method, quick):
     """One particle, shaken at 3.5 g."""
     run = scenes.drive(filling(method), 1, 20 if quick else 500)
     return _sound(run, method, scenes.speed_bounded(run))
 
 
+@case((), (_ALL, "particles must"))
 def too_many(method, quick):
     """One more than fits."""
     what = filling(method)
     return _sound(scenes.drive(what, what.capacity + 1, 1), method)
 
 
+@case(("automaton",), (SPHERES, "restitution must lie in"))
 def no_rebound(method, quick):
     """Restitution 0: a particle stays where it falls, at less than the speed of what rests."""
     none = {"restitution": 0.0, "wall_restitution": 0.0}
@@ -58,6 +66,7 @@ def no_rebound(method, quick):
     return Measured((limit,), _energy_in_time(history, method))
 
 
+@case(_ALL)
 def full_rebound(method, quick):
     """Restitution 1: a particle bounces for ever; energy may err by the lateness of each blow.
 
@@ -86,12 +95,14 @@ def _energy_in_time(history, method):
     return Curves("time [s]", "energy / energy at the start [1]", lines)
 
 
+@case(_ALL)
 def no_gravity(method, quick):
     """Nothing pulls down: the mean force comes from walls alone, and momentum is kept."""
     what = filling(method, gravity=0.0)
     return _sound(scenes.drive(what, 30, 10 if quick else 100), method)
 
 
+@case(AUTOMATA)
 def wall_near_a_cell_a_step(method, quick):
     """The wall takes half a cell a step: what it throws back, (1 + e) V, just fits in one."""
     what, dt = filling(method), 1e-3
@@ -100,6 +111,7 @@ def wall_near_a_cell_a_step(method, quick):
     return _sound(run, method)
 
 
+@case((), (AUTOMATA, "faster than one cell a step"))
 def wall_above_a_cell_a_step(method, quick):
     """The wall takes 1.5 cells a step: particles that it pushes skip cells."""
     what, dt = filling(method), 1e-3
@@ -107,17 +119,20 @@ def wall_above_a_cell_a_step(method, quick):
     return _sound(scenes.drive(what, 30, 5, dt=dt, amplitude=amplitude), method)
 
 
+@case(AUTOMATA)
 def longest_steps(method, quick):
     """Steps of 1.1 ms, of the 1.2 ms in which the largest speed crosses a cell, shaken at 3.5 g."""
     run = scenes.drive(filling(method), 50, 20 if quick else 200, dt=1.1e-3)
     return _sound(run, method, scenes.speed_bounded(run))
 
 
+@case((), (AUTOMATA, "dt must lie in"))
 def step_above_limit(method, quick):
     """A step in which a particle at the largest speed would cross more than a cell."""
     return _sound(scenes.drive(filling(method), 50, 1, dt=2e-3), method)
 
 
+@case(SPHERES)
 def spheres_near_limit(method, quick):
     """Steps of 30 us, four in a contact, shaken at 2.2 g."""
     run = scenes.drive(filling(method), 30, 5 if quick else 50, dt=3e-5, amplitude=0.015)
@@ -134,12 +149,14 @@ def _flight_energy(run):
     return Limit("energy [J]", energy, most, "N m ((2 V)^2 / 2 + g H)")
 
 
+@case((), (SPHERES, "dt must be at most"))
 def spheres_beyond_limit(method, quick):
     """Steps of 0.1 ms: a contact is over before it is seen."""
     run = scenes.drive(filling(method), 30, 3, dt=1e-4, amplitude=0.015)
     return _sound(run, method, _flight_energy(run))
 
 
+@case((), (("spheres",), "dt must be at most"))
 def spheres_that_gain(method, quick):
     """Steps of 40 us, three in a contact: some contacts give back more than they took.
 
@@ -149,6 +166,7 @@ def spheres_that_gain(method, quick):
     return _sound(run, method, _flight_energy(run))
 
 
+@case(SPHERES)
 def advised_step(method, quick):
     """The step that the end of a diverged run advises must do."""
     what = filling(method)
@@ -160,6 +178,7 @@ def advised_step(method, quick):
     return Measured((Limit("runs that diverged", np.nan, 1.0, "0.1 ms has to diverge"),))
 
 
+@case(EXACT)
 def resonance_for_long(method, quick):
     """Thirty particles at the peak of the damped response, for 1000 cycles.
 
@@ -175,6 +194,7 @@ def resonance_for_long(method, quick):
     return _sound(run, method, weight, taken, shown=scenes.swings(run, method))
 
 
+@case(EXACT)
 def rigid_limit(method, quick):
     """Fifty particles that never lift: those of a structure heavier by N m, to 2e-3."""
     run = scenes.spring(
@@ -184,6 +204,7 @@ def rigid_limit(method, quick):
     return _sound(run, method, rigid, shown=scenes.swings(run, method))
 
 
+@case(EXACT)
 def heavy_particles(method, quick):
     """Particles ten times as heavy as the container (1 g), never lifting: no added-mass blow-up."""
     what = filling(method)
@@ -193,6 +214,7 @@ def heavy_particles(method, quick):
     return _sound(run, method, rigid, shown=scenes.swings(run, method))
 
 
+@case(_ALL)
 def light_particles(method, quick):
     """Particles of 0.1 mg: the container feels no more of them than their share of its mass."""
     what = filling(method, particle_mass=1e-7)
@@ -206,6 +228,7 @@ def light_particles(method, quick):
     return _sound(run, method, limit, shown=scenes.swings(run, method))
 
 
+@case(_ALL)
 def odd_step(method, quick):
     """A step that does not divide the cycle is shortened, never lengthened."""
     asked = 1.37e-4 if method in AUTOMATA else 1.7e-5
@@ -218,6 +241,7 @@ def odd_step(method, quick):
     return _sound(run, method, whole, longer)
 
 
+@case(EXACT)
 def still_heap(method, quick):
     """A hundred particles in a container at rest come to rest, and weigh what they weigh."""
     seconds = 1.0 if quick else 10.0
@@ -235,6 +259,7 @@ def still_heap(method, quick):
     return Measured(limits, place, run.batch.compile_seconds)
 
 
+@case(_ALL)
 def violent_base(method, quick):
     """348 g: the base swings 24 mm at 60 Hz, its walls at 9 m/s."""
     dt = 1e-5 if method in AUTOMATA else 2e-6
@@ -242,6 +267,7 @@ def violent_base(method, quick):
     return _sound(run, method, scenes.speed_bounded(run))
 
 
+@case(EXACT)
 def single_cell(method, quick):
     """A box as large as its one particle: it can only ride along, at 3.5 g as below g."""
     boxed = {"automaton": {"columns": 1, "rows": 1}, "spheres": {"width": 6e-3, "height": 6e-3}}
@@ -263,6 +289,7 @@ def _mass_error(when, run, bound, formula):
     return Limit(f"apparent mass error {when}", abs(mass - 1.0), bound, formula)
 
 
+@case(SPHERES)
 def hard_spheres(method, quick):
     """Spheres of steel's modulus run at the step advised for them, a tenth of the soft ones'."""
     what = filling(method, young=2e11, wall_young=2e11)
@@ -271,6 +298,7 @@ def hard_spheres(method, quick):
     return _sound(run, method, _flight_energy(run))
 
 
+@case((), (SPHERES, "dt must be at most"))
 def hard_spheres_at_long_step(method, quick):
     """Spheres of steel's modulus at the step of the soft ones."""
     what = filling(method, young=2e11, wall_young=2e11)
@@ -278,6 +306,7 @@ def hard_spheres_at_long_step(method, quick):
     return _sound(run, method, _flight_energy(run))
 
 
+@case(SPHERES)
 def rough_spheres(method, quick):
     """Friction 1000: nothing chatters, energy of a still heap falls to rest."""
     what = filling(method, friction=1e3, wall_friction=1e3)
@@ -287,51 +316,9 @@ def rough_spheres(method, quick):
     return Measured((rise,), _energy_in_time(history, method))
 
 
+@case((), (_ALL, "frequency must"))
 def infinite_numbers(method, quick):
     """A frequency that is no number."""
     batch = Batch(filling(method), SceneTable(30, 1, 1e-4, np.nan, 0.024), mount="base")
     batch.start()
     return Measured((Limit("runs", np.nan, 0.0, "there is no such cycle"),))
-
-
-def _case(run, methods, refused=None):
-    name = run.__name__
-    return Case(name, "damper", run.__doc__.split("\n")[0], tuple(methods), run, refused or {})
-
-
-_ALL = (*AUTOMATA, *SPHERES)
-
-
-def _decline(methods, words):
-    return dict.fromkeys(methods, words)
-
-
-CASES = (
-    _case(full_box, _ALL),
-    _case(empty_box, ("empty", *_ALL)),
-    _case(one_particle, _ALL),
-    _case(too_many, (), _decline(_ALL, "particles must")),
-    _case(no_rebound, ("automaton",), _decline(SPHERES, "restitution must lie in")),
-    _case(full_rebound, _ALL),
-    _case(no_gravity, _ALL),
-    _case(wall_near_a_cell_a_step, AUTOMATA),
-    _case(wall_above_a_cell_a_step, (), _decline(AUTOMATA, "faster than one cell a step")),
-    _case(longest_steps, AUTOMATA),
-    _case(step_above_limit, (), _decline(AUTOMATA, "dt must lie in")),
-    _case(spheres_near_limit, SPHERES),
-    _case(spheres_beyond_limit, (), _decline(SPHERES, "dt must be at most")),
-    _case(spheres_that_gain, (), _decline(("spheres",), "dt must be at most")),
-    _case(advised_step, SPHERES),
-    _case(resonance_for_long, EXACT),
-    _case(rigid_limit, EXACT),
-    _case(heavy_particles, EXACT),
-    _case(light_particles, _ALL),
-    _case(odd_step, _ALL),
-    _case(still_heap, EXACT),
-    _case(violent_base, _ALL),
-    _case(single_cell, EXACT),
-    _case(hard_spheres, SPHERES),
-    _case(hard_spheres_at_long_step, (), _decline(SPHERES, "dt must be at most")),
-    _case(rough_spheres, SPHERES),
-    _case(infinite_numbers, (), _decline(_ALL, "frequency must")),
-)

@@ -2,9 +2,10 @@
 
 Each browser that opens a lesson is served by a thread of its own, in one process. Taichi makes
 fields only on the thread that started it, and two starts would take each other's fields away. So
-all work is handed to this thread, and what it has built is kept for whoever asks next.
+all work is handed to this thread, which keeps its results for the next session.
 """
 
+import functools
 import threading
 from concurrent.futures import ThreadPoolExecutor
 
@@ -22,7 +23,7 @@ class Engine:
         self._pool, self._thread, self._kept = None, None, {}
 
     def ask(self, work, *arguments):
-        """Do work(*arguments) on the thread, in its turn; returns or raises what it does."""
+        """Do work(*arguments) on the thread, in its turn; returns or raises its outcome."""
         if threading.current_thread() is self._thread:
             return work(*arguments)
         with self._lock:
@@ -32,10 +33,19 @@ class Engine:
         return answer.result()
 
     def kept(self, key, make):
-        """What make() gave when it was first asked for under this key; on the engine's thread."""
+        """Result of make(), called once under a key; on the engine's thread."""
         if key not in self._kept:
             self._kept[key] = make()
         return self._kept[key]
+
+    def remember(self, work):
+        """Decorate a function so that it is called once with the same arguments, as by ``kept``."""
+
+        @functools.wraps(work)
+        def recall(*arguments):
+            return self.kept((work, *arguments), lambda: work(*arguments))
+
+        return recall
 
     def close(self):
         """End Taichi and the thread, after what has been asked for; another ask begins anew."""

@@ -1,7 +1,6 @@
 """Why a box of grains damps: one box on its spring, shaken at several frequencies at once.
 
-The grains are those of the automaton with static contact. Everything here runs on the engine's
-thread.
+The grains are those of the automaton with static contact. All runs on the engine's thread.
 """
 
 import math
@@ -16,8 +15,13 @@ from ca_damper.record import Frame
 #: Frequencies by the natural one of the empty box, and the cycles before and while measuring.
 RATIOS = (0.88, 0.9, 0.92, 0.94, 0.95, 0.96, 0.97, 0.98, 0.99, 1.0, 1.02, 1.05)
 TRANSIENT, MEASURED = 60, 15
-#: Grains, their share of the box's mass, and the base's amplitude [m] at the beginning.
-FIRST = {"grains": 30, "share": 0.07, "base": 0.6e-3, "ratio": 0.97}
+#: Sliders of the page: steps, the first, label.
+CHOICES = {
+    "base": ((0.05, 0.1, 0.2, 0.4, 0.6, 1.0, 1.5, 2.0), 0.6, "base moves by [mm]"),
+    "ratio": (RATIOS, 0.97, "frequency / own frequency"),
+    "grains": ((5, 10, 20, 30, 40, 60), 30, "grains (160 fill the box)"),
+    "share": ((2, 4, 7, 10, 15, 20), 7, "their mass [% of the box's]"),
+}
 #: Pictures of one cycle.
 PICTURES = 4
 FILLING = Automaton()
@@ -25,7 +29,7 @@ FILLING = Automaton()
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What one choice gives.
+    """Motion and energies for one choice.
 
     grains, share (of their mass in the box's), ratio: the choice. oscillator: the box and its
     spring. rms: of the box at all RATIOS [m]. place: of the chosen ratio in RATIOS. amplitude: of
@@ -74,27 +78,26 @@ def structure(grains, share, base):
     return Oscillator(mass, scale * paper.stiffness, scale * paper.damping, base)
 
 
-def batch():
-    """The compiled batch, a scene a ratio, made when it is first asked for."""
+@engine.remember
+def compiled():
+    """The batch, a scene a ratio."""
+    frequency = np.array(RATIOS) * Oscillator().natural_frequency
+    table = SceneTable(CHOICES["grains"][1], 1, FILLING.default_dt, frequency)
+    return Batch(FILLING, table, measured_cycles=MEASURED)
 
-    def make():
-        frequency = np.array(RATIOS) * Oscillator().natural_frequency
-        table = SceneTable(FIRST["grains"], 1, FILLING.default_dt, frequency)
-        return Batch(FILLING, table, measured_cycles=MEASURED)
 
-    return engine.kept("box", make)
+def answer_to(choice):
+    """The Answer to the values of the sliders."""
+    share, base = 0.01 * choice["share"], 1e-3 * choice["base"]
+    return answer(choice["grains"], share, base, choice["ratio"])
 
 
 def answer(grains, share, base, ratio):
     """The Answer to a choice: grains, their share of the box's mass, base [m], ratio of RATIOS."""
-    o = structure(grains, share, base)
-    cycles, frames = engine.kept((grains, share, base), lambda: shaken(grains, o))
-    place = RATIOS.index(ratio)
+    place, o = RATIOS.index(ratio), structure(grains, share, base)
+    cycles, frames = shaken(grains, o)
     return Answer(
-        grains=grains,
-        share=share,
-        ratio=ratio,
-        oscillator=o,
+        *(grains, share, ratio, o),
         rms=cycles.rms,
         place=place,
         amplitude=float(cycles.amplitude[place]),
@@ -104,35 +107,27 @@ def answer(grains, share, base, ratio):
     )
 
 
+@engine.remember
 def shaken(grains, o):
     """Shake until all is as it will stay; returns Cycles at all RATIOS, and Frames of each."""
-    made = batch()
+    batch = compiled()
     numbers = {"mass": o.mass, "stiffness": o.stiffness, "damping": o.damping}
-    made.change(particles=grains, base_amplitude=o.base_amplitude, **numbers)
-    made.start("rigid")
-    made.run(TRANSIENT, 0)
-    frames = one_cycle(made)
-    return made.run(0, MEASURED), frames
+    batch.change(particles=grains, base_amplitude=o.base_amplitude, **numbers)
+    batch.start("rigid")
+    batch.run(TRANSIENT, 0)
+    marks, shots = [batch.steps_per_cycle * k // PICTURES for k in range(PICTURES + 1)], []
+    for steps in np.diff(marks, axis=0):
+        present = batch.sample()
+        shots.append([frame(batch, present, s) for s in range(batch.count)])
+        batch.advance(steps)
+    return batch.run(0, MEASURED), tuple(zip(*shots))
 
 
-def one_cycle(made):
-    """Go on by a cycle; returns Frames at PICTURES even parts of it, a tuple for each scene."""
-    marks = [made.steps_per_cycle * k // PICTURES for k in range(PICTURES + 1)]
-    shots = []
-    for here, there in zip(marks, marks[1:]):
-        shots.append(frames_now(made))
-        made.advance(there - here)
-    return tuple(zip(*shots))
-
-
-def frames_now(made):
-    """A Frame of each scene as it is."""
-    present = [made.sample()[name].tolist() for name in ("time_s", "x", "y")]
-    seen = [made.snapshot(s) for s in range(made.count)]
-    return [
-        Frame(*numbers, shot["position"], shot["velocity"])
-        for *numbers, shot in zip(*present, seen)
-    ]
+def frame(batch, present, s):
+    """A Frame of a scene as it is."""
+    shot = batch.snapshot(s)
+    numbers = (float(present[name][s]) for name in ("time_s", "x", "y"))
+    return Frame(*numbers, shot["position"], shot["velocity"])
 
 
 def energies(cycles, o):

@@ -1,22 +1,29 @@
-"""Which effects a scene needs: a bar is pulled open and pressed together, with any effects.
+"""Effects that a scene needs: a bar is pulled open and pressed together, with any effects.
 
 Every choice of effects is a program of its own, and to compile one takes seconds. So answers come
-from two programs, with contact and without, in which numbers of the other effects are set to what
-never acts: the same bits (a test demands it). What a choice costs is measured with its own program,
-when somebody asks for that. Everything here runs on the engine's thread.
+from two programs, with contact and without, in which the numbers of the other effects are such that
+they never act: the same bits (a test demands it). The cost of a choice is measured with its own
+program, on demand. All runs on the engine's thread.
 """
 
 import math
 import time
 from dataclasses import dataclass, replace
-from typing import Optional
 
 import numpy as np
 
-from _again import Again
 from _engine import engine
-from taichi_dem import CONCRETE, Scene, SimulationDiverged, Uniform, effects, needed_effects
+from taichi_dem import (
+    CONCRETE,
+    Scene,
+    Simulation,
+    SimulationDiverged,
+    Uniform,
+    effects,
+    needed_effects,
+)
 from taichi_dem.diagnostics.missing_effects import unserved
+from taichi_dem.engine.model import Model
 from taichi_dem.mesh.shapes import bar
 
 LENGTH, WIDTH, CELLS = 0.3, 0.1, (3, 2, 2)
@@ -45,6 +52,37 @@ WORDS = {
     "friction": "friction of fragments",
 }
 
+#: Questions of the notebook, and what unfolds below them.
+QUESTIONS = {
+    "Pull gently, with 0.2 m/s. Which effects can you switch off, and how do you know?": (
+        "All but the dashpots. The table says *never acted*: without an effect that never "
+        "acted **not a bit** of the answer differs. Switch off fracture, slip, contact and "
+        "friction, and the change stays zero."
+    ),
+    "Pull with 2 m/s and switch off the contact. What do you see, what does the program say?": (
+        "The pieces pass through each other when the bar is pressed together. The run ends "
+        "without a word of error: **every figure looks fine**. Only the last row tells: "
+        "bodies overlap, *list it*. A program that stays silent here would be dangerous."
+    ),
+    "Switch off fracture. Why is contact then never missed?": (
+        "Nothing breaks, so nothing comes loose that could touch. Effects hang together: ask "
+        "for one, and others follow."
+    ),
+    "A hard pull makes the program warn of sphere dashpots. How wrong is it?": (
+        "By 0.2 %: so far do the bodies end elsewhere when the step is halved, and the "
+        "warning stays. Twice as long a step would be wrong by 2 %. A warning is a reason to "
+        "try a shorter step, and not yet an error."
+    ),
+    "Which effect is dear, and is it the one that matters most?": (
+        "Leave out one at a time and press the button. Dear and important are two things: "
+        "look at the share of the energy in the table, and at where the bodies end."
+    ),
+    "Fracture takes 2 % of the energy. Can it go?": (
+        "No. It *steers*: it takes little and decides where everything goes. The program "
+        "never drops such an effect because its energy is small, only because it never acted."
+    ),
+}
+
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
@@ -52,8 +90,8 @@ class Outcome:
 
     names: of the effects. motions: of all bodies, by the names of SHOWN, so far as the run came.
     broken: which bonds at the end, bool. step_s: CPU seconds of a step, NaN where that was not
-    measured. advice: what ``needed_effects`` says. sentence: what the program said where it ended
-    the run, else "". unresolved: its sentences about what the step is too long for.
+    measured. advice: of ``needed_effects``. sentence: of the program where it ended the run, or "".
+    unresolved: its sentences about processes for which the step is too long.
     """
 
     names: tuple
@@ -67,7 +105,7 @@ class Outcome:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What one choice gives: the Outcome chosen and that with all effects; model: of the bar.
+    """Runs for one choice: the Outcome chosen and that with all effects; model: of the bar.
 
     speed: at which the right end begins [m/s].
     """
@@ -79,7 +117,7 @@ class Answer:
 
     @property
     def stroke(self):
-        """How far the right end is pulled out [m]."""
+        """Largest displacement of the right end [m]."""
         return self.speed / (2.0 * np.pi * FREQUENCY)
 
     @property
@@ -112,40 +150,42 @@ def scene(names):
     return Scene(bar(LENGTH, WIDTH, CELLS), CONCRETE, [*listed, effects.Fixed("left"), moved])
 
 
-def again(names):
-    """The compiled bar with these effects, made when it is first asked for."""
-    return engine.kept(names, lambda: Again(scene(names), Uniform(STEP)))
+def ready(program):
+    """The bar at rest with all effects of a program, which is compiled once."""
+    made = Simulation(scene(program), Uniform(STEP))
+    made.start()
+    return made
+
+
+@engine.remember
+def model():
+    """Constants of the bar."""
+    return Model(scene(()).mesh, CONCRETE, [])
 
 
 def silenced(made, names):
     """Set the numbers of the effects that are not named to what never acts; watch out for them."""
-    model = made.model
-    dashpot, tension, shear, friction = model.dashpot, model.tension, model.shear, model.friction
-    if dashpot.name and dashpot.name not in names:
-        dashpot.law.fill(0.0)
-    if tension.name and tension.name not in names:
+    model = made.tables
+    laws = (model.dashpot, model.tension, model.shear, model.friction)
+    dashpot, tension, shear, friction = (bool(law.name) and law.name not in names for law in laws)
+    if dashpot:
+        model.dashpot.law.fill(0.0)
+    if tension:
         # As strong as nothing is: strength, its opening, and the failure beyond, by a power of two.
-        tension.law[0] *= _STRONGER
-        limits = tension.unit.to_numpy()
+        model.tension.law[0] *= _STRONGER
+        limits = model.tension.unit.to_numpy()
         limits[:, 0] *= _STRONGER
-        tension.unit.from_numpy(limits)
-        tension.law[1] = 2.0 * float(limits[:, 0].max())
-    if shear.name and shear.name not in names:
-        shear.law[0] *= _STRONGER
-    if friction.name and friction.name not in names:
-        friction.law[0] = 0.0
+        model.tension.unit.from_numpy(limits)
+        model.tension.law[1] = 2.0 * float(limits[:, 0].max())
+    if shear:
+        model.shear.law[0] *= _STRONGER
+    if friction:
+        model.friction.law[0] = 0.0
     made.missing_effects.needed = unserved({EFFECTS[name].role for name in names})
     return made
 
 
-def ready(program, names, speed):
-    """The bar at rest in a program, its right end about to move at a speed [m/s]."""
-    made = silenced(again(program).back(STEP), names)
-    motion = made.model.supports[1].motion
-    motion[0], motion[1] = speed, SIDEWAYS * speed
-    return made
-
-
+@engine.remember
 def outcome(names, speed):
     """Move the bar with these effects; the Outcome knows no cost, as others stand silent by."""
     program = ALL if "sphere_contact" in names else WITHOUT_CONTACT
@@ -159,7 +199,9 @@ def measured(names, speed):
 
 def moved(program, names, speed):
     """Outcome of a program with the effects named; the others in it never act."""
-    made = ready(program, names, speed)
+    made = silenced(ready(program), names)
+    motion = made.tables.supports[1].law
+    motion[0], motion[1] = speed, SIDEWAYS * speed
     every, motions, sentence, spent = round(UNTIL / LOOKS / STEP), {}, "", 0.0
     try:
         for k in range(1, LOOKS + 1):
@@ -185,14 +227,12 @@ def moved(program, names, speed):
 
 def answer(names, speed):
     """The Answer to a choice: effects by name, as ``allowed`` gives them, and one of SPEEDS."""
-    wanted = (names, ALL)
-    found = [engine.kept((one, speed), lambda one=one: outcome(one, speed)) for one in wanted]
-    return Answer(speed, *found, again(ALL).simulation.model)
+    return Answer(speed, outcome(names, speed), outcome(ALL, speed), model())
 
 
 def price(names, speed):
-    """What ``answer`` gives, with costs: both programs run one after the other."""
-    again(names)
+    """The Answer with costs: both programs run one after the other."""
+    ready(names)
     chosen, complete = (measured(one, speed) for one in (names, ALL))
     return replace(answer(names, speed), chosen=chosen, complete=complete)
 
@@ -200,22 +240,23 @@ def price(names, speed):
 def compile_all():
     """Compile both programs that answers come from, so that no later answer has to wait."""
     for names in (ALL, WITHOUT_CONTACT):
-        again(names)
+        ready(names)
 
 
 def verdicts(answer):
     """A row for every effect: (words, whether listed, what it did, what the program advises)."""
-    uses = {use.effect: use for use in answer.chosen.advice.uses}
-    missed = {finding.effect: finding for finding in answer.chosen.advice.missing}
-    return [
-        _verdict(name, uses.get(name), missed.get(EFFECTS[name].__name__), answer) for name in ALL
-    ]
-
-
-def _verdict(name, use, missed: Optional[object], answer):
-    if use is not None:
-        advice = "drop it" if name in answer.chosen.advice.droppable else "keep it"
-        return WORDS[name], True, str(use), advice
-    if missed is not None:
-        return WORDS[name], False, f"{missed.what}: up to {missed.most} at a time", "list it"
-    return WORDS[name], False, "left out", "not missed"
+    advice = answer.chosen.advice
+    uses = {use.effect: use for use in advice.uses}
+    missed = {finding.effect: finding for finding in advice.missing}
+    rows = []
+    for name, words in WORDS.items():
+        finding = missed.get(EFFECTS[name].__name__)
+        if name in uses:
+            says = "drop it" if name in advice.droppable else "keep it"
+            rows.append((words, True, str(uses[name]), says))
+        elif finding is not None:
+            did = f"{finding.what}: up to {finding.most} at a time"
+            rows.append((words, False, did, "list it"))
+        else:
+            rows.append((words, False, "left out", "not missed"))
+    return rows

@@ -1,15 +1,13 @@
 """Pictures of the lessons, as PNG in memory, in the common style; drawn on the engine's thread."""
 
-import io
 import textwrap
 
 import numpy as np
 
-from _grains import PICTURES, RATIOS
+from _grains import FILLING, PICTURES, RATIOS
 from _needs import SHOWN as INSTANTS
 from _time_step import METHODS, SHOWN, STEPS, WORDS
-from ca_damper.plot import Box
-from ca_damper.plot.box import DrawnBox, frame_panel
+from ca_damper.plot import Box, DrawnBox, frame_panel
 from taichi_dem.kit.plot_style import (
     BLACK,
     BLUE,
@@ -17,6 +15,7 @@ from taichi_dem.kit.plot_style import (
     GREY,
     RED,
     STYLES,
+    png_of,
     seconds,
     styled,
     styles_of,
@@ -24,15 +23,9 @@ from taichi_dem.kit.plot_style import (
 from taichi_dem.plot.bodies import draw_bodies
 
 _LOOKS = {name: (style.colour, style.marker) for name, style in styles_of(METHODS).items()}
-_FILLING = STYLES["ca_static"].colour
+_COLOUR = STYLES[FILLING.label].colour
 #: Of the displacement of the struck bar.
 _MAGNIFY = 1500.0
-
-
-def _png(figure):
-    made = io.BytesIO()
-    figure.savefig(made, format="png", dpi=110)
-    return made.getvalue()
 
 
 def picture_time_step(answer):
@@ -42,37 +35,36 @@ def picture_time_step(answer):
         _struck(figure, figure.add_subplot(grid[0, :]), answer)
         _far_end(figure.add_subplot(grid[1, 0]), answer)
         _price(figure.add_subplot(grid[1, 1]), answer)
-        return _png(figure)
+        return png_of(figure)
 
 
 def _struck(figure, axes, answer):
     """The bar coloured by velocity when the wave is on its way, or the sentence of its end."""
     motion, truth = answer.chosen.motion, answer.truth.motion
     top = 1e3 * float(np.abs(truth["velocity"][:, 0]).max())
-    shown = truth if motion is None else motion
+    shown, high = motion or truth, answer.model.mesh.points.max(axis=0)
     look = {"magnify": _MAGNIFY, "limits": (-top, top), "colours": "RdBu_r"}
     drawn = draw_bodies(axes, answer.model, shown, 1e3 * shown["velocity"][:, 0], **look)
-    if motion is None:
-        drawn.set_alpha(0.15)
-    high = answer.model.mesh.points.max(axis=0)
+    drawn.set_alpha(None if motion else 0.15)
     axes.set(xlim=(-0.02, high[0] + 0.03), ylim=(-0.02, high[1] + 0.02), xlabel="x [m]", yticks=[])
     axes.spines["left"].set_visible(False)
-    now = f"t = {1e3 * answer.time[SHOWN]:.2f} ms"
-    axes.set_title(f"{now}, displacement × {_MAGNIFY:g}" if motion else "the run did not get there")
     figure.colorbar(drawn, ax=axes, label="velocity\n[mm/s]", aspect=8, pad=0.01)
-    if motion is None:
-        words = textwrap.fill(answer.chosen.sentence.split(";")[0], 60)
-        look = {"ha": "center", "va": "center", "color": RED, "weight": "bold"}
-        axes.text(0.5 * high[0], 0.5 * high[1], words, **look)
+    if motion:
+        now = f"t = {1e3 * answer.time[SHOWN]:.2f} ms"
+        axes.set_title(f"{now}, displacement × {_MAGNIFY:g}")
+        return
+    axes.set_title("the run did not get there")
+    words = textwrap.fill(answer.chosen.sentence.split(";")[0], 60)
+    look = {"ha": "center", "va": "center", "color": RED, "weight": "bold"}
+    axes.text(0.5 * high[0], 0.5 * high[1], words, **look)
 
 
 def _far_end(axes, answer):
     """Displacement of the far end, of the truth and of the chosen run."""
     colour, _ = _LOOKS[answer.method]
-    axes.plot(1e3 * answer.time, 1e6 * answer.truth.moved, color=GREY, lw=4.0, alpha=0.5)
-    axes.plot(1e3 * answer.time, 1e6 * answer.chosen.moved, color=colour)
-    axes.plot([], [], color=GREY, lw=4.0, alpha=0.5, label="truth")
-    axes.plot([], [], color=colour, label=f"{seconds(answer.chosen.step)} a step")
+    time, label = 1e3 * answer.time, f"{seconds(answer.chosen.step)} a step"
+    axes.plot(time, 1e6 * answer.truth.moved, color=GREY, lw=4.0, alpha=0.5, label="truth")
+    axes.plot(time, 1e6 * answer.chosen.moved, color=colour, label=label)
     axes.set(xlabel="time [ms]", ylabel="far end moved by [µm]", title=WORDS[answer.method])
     axes.legend(loc="upper left")
 
@@ -84,28 +76,21 @@ def _price(axes, answer):
     axes.axhline(1e-2, color=GREY, ls=":", lw=1.0, label="error of 1 %")
     for method, strikes in answer.ladders.items():
         colour, mark = _LOOKS[method]
-        good = [made for made in strikes if not made.sentence]
-        cost, error = [m.seconds for m in good], [m.error(answer.truth) for m in good]
-        axes.plot(cost, error, mark, ls="-", color=colour, ms=5, lw=1.2, label=WORDS[method])
-        bad = [made for made in strikes if made.sentence]
-        height = 1.15 * 1.25 ** (3 * list(METHODS).index(method) / 2)
-        cost = [_expected(strikes, made.step) for made in bad]
-        axes.plot(cost, [height] * len(bad), "x", color=colour, ms=5, mew=1.4)
+        good = [(m.seconds, m.error(answer.truth)) for m in strikes if not m.sentence]
+        axes.plot(*zip(*good), mark, ls="-", color=colour, ms=5, lw=1.2, label=WORDS[method])
+        # A run that failed at once would have taken as long as the finest, by its steps.
+        cost = [strikes[0].seconds * STEPS[0] / m.step for m in strikes if m.sentence]
+        height = 1.15 * 1.25 ** (1.5 * list(METHODS).index(method))
+        axes.plot(cost, [height] * len(cost), "x", color=colour, ms=5, mew=1.4)
     chosen = answer.chosen
     if not chosen.sentence:
         place = chosen.seconds, chosen.error(answer.truth)
         axes.plot(*place, "o", ms=14, mfc="none", mec=BLACK, mew=1.5)
-        axes.annotate(
-            seconds(chosen.step), place, (10, 8), textcoords="offset points", weight="bold"
-        )
+        look = {"textcoords": "offset points", "weight": "bold"}
+        axes.annotate(seconds(chosen.step), place, (10, 8), **look)
     axes.set(xlabel="CPU time of one core [s]", ylabel="largest error of the far end [1]")
     axes.set_title("lower left is better")
     axes.legend(loc="lower left")
-
-
-def _expected(strikes, step):
-    """Seconds that a run would have taken that failed at once: those of the finest by its steps."""
-    return strikes[0].seconds * STEPS[0] / step
 
 
 def picture_grains(answer):
@@ -116,7 +101,7 @@ def picture_grains(answer):
         _response(figure.add_subplot(above[0]), answer)
         _energy(figure.add_subplot(above[1]), answer)
         _boxes(figure, grid[1].subgridspec(1, PICTURES), answer)
-        return _png(figure)
+        return png_of(figure)
 
 
 def _response(axes, answer):
@@ -124,7 +109,7 @@ def _response(axes, answer):
     _, rigid = answer.without(answer.share * answer.oscillator.mass)
     axes.plot(fine, 1e3 * empty, color=GREY, ls=":", label=STYLES["empty"].label)
     axes.plot(fine, 1e3 * rigid, color=GREY, ls="--", lw=1.0, label="grains glued to the floor")
-    axes.plot(RATIOS, 1e3 * answer.rms, "o-", color=_FILLING, ms=4, label=f"{answer.grains} grains")
+    axes.plot(RATIOS, 1e3 * answer.rms, "o-", color=_COLOUR, ms=4, label=f"{answer.grains} grains")
     place = answer.ratio, 1e3 * answer.rms[answer.place]
     axes.plot(*place, "o", ms=12, mfc="none", mec=BLACK, mew=1.5)
     axes.set(xlabel="frequency of the base / own frequency of the empty box [1]", ylim=(0.0, None))
@@ -145,23 +130,21 @@ def _energy(axes, answer):
 
 def _boxes(figure, grid, answer):
     """The box at even parts of a cycle."""
-    box = Box(60e-3, 96e-3, 6e-3, True)
+    box = Box.of_automaton(FILLING)
     swing = max(abs(frame.x) for frame in answer.frames)
     fastest = max(0.05, 2.0 * np.pi * answer.frequency * answer.amplitude)
-    for k, frame in enumerate(answer.frames):
-        axes = figure.add_subplot(grid[k])
+    panels = [figure.add_subplot(grid[k]) for k in range(PICTURES)]
+    for k, (axes, frame) in enumerate(zip(panels, answer.frames)):
         frame_panel(axes, box, max(swing, 0.5 * box.diameter))
         drawn = DrawnBox(axes, box, fastest)
         drawn.show(frame)
-        axes.set_title(f"{k}/{len(answer.frames)} of a cycle", loc="center")
-    words = "grains: blue rise, red fall"
-    figure.colorbar(
-        drawn.particles, ax=figure.axes[-PICTURES:], label=f"{words} [m/s]", aspect=18, pad=0.01
-    )
+        axes.set_title(f"{k}/{PICTURES} of a cycle", loc="center")
+    words = "grains: blue rise, red fall [m/s]"
+    figure.colorbar(drawn.particles, ax=panels, label=words, aspect=18, pad=0.01)
 
 
 def picture_needs(answer):
-    """The bar with all effects and with those chosen, and what a step costs; PNG bytes."""
+    """The bar with all effects and with those chosen, and the cost of a step; PNG bytes."""
     with styled(0, size=(10.0, 4.4)) as (figure, _):
         grid = figure.add_gridspec(2, 3, width_ratios=(1.0, 1.0, 0.75))
         bars = []
@@ -175,7 +158,7 @@ def picture_needs(answer):
         figure.colorbar(drawn, ax=bars, label=words, location="bottom", aspect=50, pad=0.02)
         _step_price(figure.add_subplot(grid[0, 2]), answer)
         _broken(figure.add_subplot(grid[1, 2]), answer)
-        return _png(figure)
+        return png_of(figure)
 
 
 def _magnify(answer):
@@ -212,18 +195,11 @@ def _step_price(axes, answer):
 
 
 def _broken(axes, answer):
-    made = (answer.chosen, answer.complete)
-    _pair(axes, [int(outcome.broken.sum()) for outcome in made], "%d")
-    change = answer.change
-    words = (
-        "one of both did not end" if change is None else f"bodies end {percent(change)} elsewhere"
-    )
+    _pair(axes, [int(made.broken.sum()) for made in (answer.chosen, answer.complete)], "%d")
+    words = "one of both did not end"
+    if answer.change is not None:
+        words = f"bodies end {percent(answer.change)} elsewhere"
     axes.set(xlabel="broken bonds [1]", title=words)
-
-
-def percent(share):
-    """A share in words: 0.0123 -> 1.2 %, 1.44 -> 144 %."""
-    return f"{100.0 * share:.0f} %" if share >= 0.1 else f"{100.0 * share:.2g} %"
 
 
 def _pair(axes, values, form):
@@ -232,3 +208,8 @@ def _pair(axes, values, form):
     axes.bar_label(bars, fmt=form, padding=3)
     axes.set_xlim(0.0, 1.25 * max(values) or 1.0)
     axes.grid(False, axis="y")
+
+
+def percent(share):
+    """A share in words: 0.0123 -> 1.2 %, 1.44 -> 144 %."""
+    return f"{100.0 * share:.0f} %" if share >= 0.1 else f"{100.0 * share:.2g} %"

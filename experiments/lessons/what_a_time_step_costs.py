@@ -51,20 +51,11 @@ def _(lesson, mo):
         value=lesson.WORDS["explicit"],
         label="method",
     )
-    step = mo.ui.slider(
-        steps=[round(1e9 * step) for step in lesson.STEPS],
-        value=80,
-        label="step [ns]",
-        show_value=True,
-        debounce=True,
-    )
-    rise = mo.ui.slider(
-        steps=[round(1e6 * rise) for rise in sorted(lesson.RISES)],
-        value=20,
-        label="the blow rises in [µs]",
-        show_value=True,
-        debounce=True,
-    )
+    _look = {"show_value": True, "debounce": True}
+    _steps = [round(1e9 * one) for one in lesson.STEPS]
+    _rises = [round(1e6 * one) for one in sorted(lesson.RISES)]
+    step = mo.ui.slider(steps=_steps, value=80, label="step [ns]", **_look)
+    rise = mo.ui.slider(steps=_rises, value=20, label="the blow rises in [µs]", **_look)
     mo.hstack([method, mo.vstack([step, rise])], justify="start", gap=3)
     return method, rise, step
 
@@ -95,38 +86,8 @@ def _(engine, lesson, method, mo, percent, picture_time_step, rise, seconds, ser
 
 
 @app.cell
-def _(mo):
-    mo.accordion(
-        {
-            "Explicit: go from 80 to 160 ns. Does the error grow, or does something else happen?": (
-                mo.md(
-                    "The run diverges. At 80 ns it was wrong by 0.01 %: what bounds the step is "
-                    "**stability**, not accuracy. You pay for small steps only because a larger "
-                    "one is impossible."
-                )
-            ),
-            "How does each curve fall when the step is halved?": mo.md(
-                "Explicit: the error halves, **first order**. A dashpot takes the velocity of half "
-                "a step ago. Solved together: the error falls to about a quarter, **second "
-                "order**. The dashpots act in the middle of the step."
-            ),
-            "Limited dashpots do not diverge up to 1280 ns. Why not take them?": mo.md(
-                "A dashpot that the step does not bear is weakened until the step bears it. That "
-                "is another material: wrong by 4 % at 80 ns, by about half at 320. **Stable is not "
-                "right.** At 40 ns nothing is weakened, and both explicit runs agree."
-            ),
-            "You want 1 %. Which method, and which step?": mo.md(
-                "Dashpots solved together, with the longest step. One of its steps costs several "
-                "explicit ones, but it is 32 times as long as the longest explicit one here. "
-                "Beyond it the springs end the run: they are explicit in every method."
-            ),
-            "Make the blow gentler, from 10 to 50 µs. Which error falls?": mo.md(
-                "At 80 ns that of the solved dashpots, to a twentieth: what changes slowly needs "
-                "few steps. The explicit error hardly changes. Its dashpots lag by half a step, "
-                "whatever the blow."
-            ),
-        }
-    )
+def _(lesson, mo):
+    mo.accordion({question: mo.md(answer) for question, answer in lesson.QUESTIONS.items()})
     return
 
 

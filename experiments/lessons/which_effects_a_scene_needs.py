@@ -42,13 +42,9 @@ def _(lesson, mo):
     listed = mo.ui.dictionary(
         {name: mo.ui.switch(value=True, label=words) for name, words in lesson.WORDS.items()}
     )
-    speed = mo.ui.slider(
-        steps=list(lesson.SPEEDS),
-        value=2.0,
-        label="the right end starts with [m/s]",
-        show_value=True,
-        debounce=True,
-    )
+    _look = {"show_value": True, "debounce": True}
+    _words = "the right end starts with [m/s]"
+    speed = mo.ui.slider(steps=list(lesson.SPEEDS), value=2.0, label=_words, **_look)
     measure = mo.ui.run_button(label="measure what this choice costs (compiles it, some seconds)")
     _switches = mo.vstack(list(listed.elements.values()))
     mo.hstack([_switches, mo.vstack([speed, measure])], justify="start", gap=3)
@@ -94,44 +90,8 @@ def _(engine, lesson, listed, measure, mo, percent, picture_needs, served, speed
 
 
 @app.cell
-def _(mo):
-    mo.accordion(
-        {
-            "Pull gently, with 0.2 m/s. Which effects can you switch off, and how do you know?": (
-                mo.md(
-                    "All but the dashpots. The table says *never acted*: without an effect that "
-                    "never acted **not a bit** of the answer differs. Switch off fracture, slip, "
-                    "contact and friction, and the change stays zero."
-                )
-            ),
-            "Pull with 2 m/s and switch off the contact. What do you see, what does the program "
-            "say?": mo.md(
-                "The pieces pass through each other when the bar is pressed together. The run ends "
-                "without a word of error: **every figure looks fine**. Only the last row tells: "
-                "bodies overlap, *list it*. A program that stays silent here would be dangerous."
-            ),
-            "Switch off fracture. Why is contact then never missed?": mo.md(
-                "Nothing breaks, so nothing comes loose that could touch. Effects hang together: "
-                "ask for one, and others follow."
-            ),
-            "A hard pull makes the program warn of sphere dashpots. How wrong is it?": (
-                mo.md(
-                    "By 0.2 %: so far do the bodies end elsewhere when the step is halved, and the "
-                    "warning stays. Twice as long a step would be wrong by 2 %. A warning is a "
-                    "reason to try a shorter step, and not yet an error."
-                )
-            ),
-            "Which effect is dear, and is it the one that matters most?": mo.md(
-                "Leave out one at a time and press the button. Dear and important are two "
-                "things: look at the share of the energy in the table, and at where the bodies end."
-            ),
-            "Fracture takes 2 % of the energy. Can it go?": mo.md(
-                "No. It *steers*: it takes little and decides where everything goes. The program "
-                "never drops such an effect because its energy is small, only because it never "
-                "acted."
-            ),
-        }
-    )
+def _(lesson, mo):
+    mo.accordion({question: mo.md(answer) for question, answer in lesson.QUESTIONS.items()})
     return
 
 

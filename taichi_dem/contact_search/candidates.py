@@ -36,7 +36,7 @@ class Candidates:
     def pack(self, one):
         """Put all side by side in the order of their pairs, where too many are out of use."""
         end, used = self.contacts.sphere_end[None], self.contacts.sphere_count[None]
-        if end > 2 * used + SLACK or end > self.contacts.sphere_capacity // 2:
+        if end > 2 * used + SLACK or end > self.contacts.sphere_limit[None] // 2:
             place = 0
             for p in range(self.contacts.pair_count[None]):
                 first, last = self.contacts.pair_first[p], self.contacts.pair_last[p]

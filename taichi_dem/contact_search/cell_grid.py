@@ -15,11 +15,10 @@ class CellGrid:
 
     scratch_fields = ("first", "member", "cell", "counts", "corner", "edge", "largest")
 
-    def __init__(self, model, state, ball, brute_force=False):
-        n = model.body_count
-        self.model, self.state, self.ball, self.brute_force = model, state, ball, brute_force
-        self.capacity = 4 * n + 64
-        self.first = ti.field(ti.i32, shape=self.capacity + 2)
+    def __init__(self, tables, state, ball, brute_force=False):
+        n = tables.capacity.bodies
+        self.tables, self.state, self.ball, self.brute_force = tables, state, ball, brute_force
+        self.first = ti.field(ti.i32, shape=4 * n + 66)
         self.member = ti.field(ti.i32, shape=n)
         self.cell = ti.field(ti.i32, shape=n)
         self.counts = ti.Vector.field(3, ti.i32, shape=())
@@ -32,11 +31,11 @@ class CellGrid:
         """Sort the bodies into cells about as wide as one of their balls."""
         self._size()
         counts = self.counts[None]
-        for i in range(self.model.body_count):
+        for i in range(self.tables.body_count[None]):
             cell = self._cell_of(self.state.position[i])
             self.cell[i] = (cell[2] * counts[1] + cell[1]) * counts[0] + cell[0]
         total = counts[0] * counts[1] * counts[2]
-        group(self.first, self.member, total, self.model.body_count, self._cell_of_member)
+        group(self.first, self.member, total, self.tables.body_count[None], self._cell_of_member)
 
     @ti.func
     def around(self, i):
@@ -60,14 +59,14 @@ class CellGrid:
     def _size(self):
         low, high, mean = self.state.position[0], self.state.position[0], 0.0
         self.largest[None] = 0.0
-        for i in range(self.model.body_count):
+        for i in range(self.tables.body_count[None]):
             low, high = ti.min(low, self.state.position[i]), ti.max(high, self.state.position[i])
-            mean += self.ball[i] / self.model.body_count
+            mean += self.ball[i] / self.tables.body_count[None]
             self.largest[None] = ti.max(self.largest[None], self.ball[i])
         edge = 2.0 * mean
         if ti.static(self.brute_force):
             edge += (high - low).max()
-        while _product(ti.floor((high - low) / edge) + 1.0) > self.capacity:
+        while _product(ti.floor((high - low) / edge) + 1.0) > 4 * self.tables.body_count[None] + 64:
             edge *= 1.25
         self.edge[None], self.corner[None] = edge, low
         self.counts[None] = ti.cast((high - low) / edge, ti.i32) + 1

@@ -5,9 +5,11 @@ Lists are sorted by (first body, second body), so that sums over a body's pairs 
 whoever searched when.
 """
 
+import numpy as np
 import taichi as ti
 
-from taichi_dem.kit.allocation import defer_fill
+from taichi_dem.contact_search.lengths import SPARE_PAIRS, SPARE_SPHERES
+from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.types import real, vec3
 
 #: Largest steps that a fast body makes before the search looks at it again.
@@ -29,17 +31,20 @@ class Contacts:
     second_start, second_pair: pairs whose second body is i. exposed_faces: bit f for a broken face
     f. travel: bound of the way any point of a body went since it was last looked at [m]. body_skin:
     how far that may be before it is looked at again [m]; a pair holds the spheres whose gap is
-    below the body skin of both. steps_ahead: steps of a body by which its contacts are counted
-    before they touch. search_requested: 1 when the list may miss one of them. deepest: overlap of a
-    pair as a share of the distance at which its spheres touch.
+    below the body skin of both. pace: largest step [s], and steps of a body by which its contacts
+    are counted before they touch. pair_limit, sphere_limit: entries that the scene allows to the
+    lists of pairs and of their spheres. search_requested: 1 when the list may miss one of them.
+    deepest: overlap of a pair as a share of the distance at which its spheres touch.
     """
 
-    def __init__(self, model, state, dt0, steps_ahead=0.0):
-        n, effect = model.body_count, model.contact
-        self.model, self.state, self.law, self.friction = model, state, effect, model.friction
-        self.dt0, self.steps_ahead = dt0, steps_ahead
-        self.capacity = n * effect.pairs_per_body + 64
-        self.sphere_capacity = n * effect.spheres_per_body + 4096
+    def __init__(self, tables, state):
+        n, capacity = tables.capacity.bodies, tables.capacity
+        self.tables, self.state = tables, state
+        self.law, self.friction = tables.contact, tables.friction
+        self.capacity, self.sphere_capacity = capacity.pair_entries, capacity.sphere_entries
+        self.pair_limit = ti.field(ti.i32, shape=())
+        self.sphere_limit = ti.field(ti.i32, shape=())
+        self.pace = ti.field(real, shape=2)
         self.pair_count = ti.field(ti.i32, shape=())
         self.pair_body = ti.Vector.field(2, ti.i32, shape=self.capacity)
         self.pair_first = ti.field(ti.i32, shape=self.capacity)
@@ -57,17 +62,24 @@ class Contacts:
         self.travel = ti.field(real, shape=n)
         self.body_skin = ti.field(real, shape=n)
         self.skin = ti.field(real, shape=())
-        defer_fill(self.skin.fill, effect.skin)
         self.search_requested = ti.field(ti.i32, shape=())
         self.deepest = ti.field(real, shape=self.capacity)
+
+    def load(self, model, method):
+        """Take the numbers of a scene and a method; there are no pairs yet."""
+        effect, n = model.contact, model.body_count
+        assign(self.skin, effect.skin)
+        assign(self.pace, np.array([method.dt0, method.steps_ahead]))
+        assign(self.pair_limit, n * effect.pairs_per_body + SPARE_PAIRS)
+        assign(self.sphere_limit, n * effect.spheres_per_body + SPARE_SPHERES)
 
     @ti.func
     def gap(self, i, j, a, b):
         """Distance between the surfaces of spheres a of body i and b of body j [m]."""
-        on_first = self.state.rotation[i] @ self.model.sphere[a].xyz
-        on_second = self.state.rotation[j] @ self.model.sphere[b].xyz
+        on_first = self.state.rotation[i] @ self.tables.sphere[a].xyz
+        on_second = self.state.rotation[j] @ self.tables.sphere[b].xyz
         apart = self.state.position[j] + on_second - self.state.position[i] - on_first
-        return apart.norm() - self.model.sphere[a][3] - self.model.sphere[b][3]
+        return apart.norm() - self.tables.sphere[a][3] - self.tables.sphere[b][3]
 
     @ti.func
     def pair_energy(self, p):
@@ -145,7 +157,7 @@ class Contacts:
             speed = self._speed(i, velocity, spin)
             way = self.travel[i] + speed * elapsed
             self.travel[i] = way
-            if way + self.steps_ahead * elapsed * speed > self.body_skin[i]:
+            if way + self.pace[1] * elapsed * speed > self.body_skin[i]:
                 self.search_requested[None] = 1
 
     @ti.func
@@ -155,20 +167,20 @@ class Contacts:
         A few fragments fly faster than all others: they would ask for most of the searches.
         """
         speed = self._speed(i, self.state.velocity[i], self.state.spin[i])
-        way = ti.min(STEPS * self.dt0 * speed, FARTHEST * self.model.extent[i])
+        way = ti.min(STEPS * self.pace[0] * speed, FARTHEST * self.tables.extent[i])
         self.body_skin[i] = ti.max(0.5 * self.skin[None], way)
 
     @ti.func
     def _speed(self, i, velocity, spin):
         """Bound of the speed of any point on the spheres of body i [m/s]."""
-        return velocity.norm() + spin.norm() * self.model.extent[i]
+        return velocity.norm() + spin.norm() * self.tables.extent[i]
 
     @ti.func
     def approach(self, i, j):
         """Bound of the speed at which spheres of two bodies approach each other [m/s]."""
         between = self.state.velocity[j] - self.state.velocity[i]
         first = self._speed(i, between, self.state.spin[i])
-        return first + self.state.spin[j].norm() * self.model.extent[j]
+        return first + self.state.spin[j].norm() * self.tables.extent[j]
 
     @ti.func
     def margin(self, i, j):

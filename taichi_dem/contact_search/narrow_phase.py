@@ -17,20 +17,19 @@ class NarrowPhase:
     """
 
     def __init__(self, contacts, pair_cache):
-        self.contacts, self.model, self.state = contacts, contacts.model, contacts.state
+        self.contacts, self.tables, self.state = contacts, contacts.tables, contacts.state
         self.pair_cache = pair_cache
-        count = 4 * self.model.body_count * self.model.spheres_per_face
-        self.sphere = ti.Vector.field(4, real, shape=count)
+        self.sphere = ti.Vector.field(4, real, shape=self.tables.capacity.spheres)
 
     @ti.func
     def note_spheres(self, i):
         """Note where the spheres of body i are; computed once for many that ask."""
-        size = ti.static(self.model.spheres_per_face)
+        size = self.tables.face_spheres[None]
         position, rotation = self.state.position[i], self.state.rotation[i]
         for face in range(4 * i, 4 * i + 4):
             if self.state.exposed_tick[face] >= 0:
                 for s in range(size * face, size * face + size):
-                    sphere = self.model.sphere[s]
+                    sphere = self.tables.sphere[s]
                     place = position + rotation @ sphere.xyz
                     self.sphere[s] = vec4(place[0], place[1], place[2], sphere[3])
 
@@ -59,10 +58,10 @@ class NarrowPhase:
     @ti.func
     def _of_faces(self, face_i, face_j, start, margin, least, write):
         count = 0
-        size = ti.static(self.model.spheres_per_face)
+        size = self.tables.face_spheres[None]
         for a in range(size * face_i, size * face_i + size):
             mine = self.sphere[a]
-            whole = mine[3] + self.model.cluster[face_j][3] + least
+            whole = mine[3] + self.tables.cluster[face_j][3] + least
             # A sphere far from the ball around those of the other face is as far from all of them.
             if (self.pair_cache.cluster[face_j] - mine.xyz).norm_sqr() < whole * whole:
                 for b in range(size * face_j, size * face_j + size):

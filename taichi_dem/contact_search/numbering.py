@@ -19,22 +19,22 @@ class Numbering:
         self.contacts, self.neighbours = contacts, neighbours
         self.pair_cache = neighbours.pair_cache
         self.old, self.candidates, self.full = old, candidates, full
-        self.body_count = contacts.model.body_count
+        self.tables = contacts.tables
         self.faces = ti.field(ti.i32, shape=contacts.capacity)
 
     @ti.func
     def number_pairs(self, one):
         """Give the pairs that have spheres near, or an impulse waiting, a place in order."""
-        for i in range(self.body_count + 1):
+        for i in range(self.tables.body_count[None] + 1):
             self.old.first_of[i] = self.contacts.first_of[i]
         self.contacts.pair_count[None] = 0
         self.contacts.sphere_count[None] = 0
-        for i in range(self.body_count):
+        for i in range(self.tables.body_count[None]):
             self.contacts.first_of[i] = self.contacts.pair_count[None]
             # A body without spheres is in no pair, now or before.
             if self.contacts.exposed_faces[i] != 0:
                 self._row(i)
-        self.contacts.first_of[self.body_count] = self.contacts.pair_count[None]
+        self.contacts.first_of[self.tables.body_count[None]] = self.contacts.pair_count[None]
 
     @ti.func
     def _row(self, i):
@@ -62,7 +62,7 @@ class Numbering:
                 old += ti.cast(former >= 0, ti.i32)
                 left -= 1
             k += 1
-        self._waiting(i, old, last, self.body_count)
+        self._waiting(i, old, last, self.tables.body_count[None])
 
     @ti.func
     def _waiting(self, i, old, last, j):
@@ -81,9 +81,9 @@ class Numbering:
             start = self.candidates.take(spheres)
         elif spheres > 0:
             start = self.old.first[former]
-        if p >= self.contacts.capacity:
+        if p >= self.contacts.pair_limit[None]:
             self.full[None] = 1
-        elif start + spheres > self.contacts.sphere_capacity:
+        elif start + spheres > self.contacts.sphere_limit[None]:
             self.full[None] = 2
         else:
             self.contacts.pair_body[p] = [i, j]

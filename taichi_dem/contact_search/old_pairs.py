@@ -17,7 +17,7 @@ class OldPairs:
 
     def __init__(self, contacts):
         self.contacts = contacts
-        n, pairs = contacts.model.body_count, contacts.capacity
+        n, pairs = contacts.tables.capacity.bodies, contacts.capacity
         self.first_of = ti.field(ti.i32, shape=n + 1)
         self.body = ti.Vector.field(2, ti.i32, shape=pairs)
         self.first = ti.field(ti.i32, shape=pairs)

@@ -21,8 +21,8 @@ class PairCache:
     """
 
     def __init__(self, contacts, capacity):
-        n = contacts.model.body_count
-        self.model, self.state, self.contacts = contacts.model, contacts.state, contacts
+        n = contacts.tables.capacity.bodies
+        self.tables, self.state, self.contacts = contacts.tables, contacts.state, contacts
         entry = [*(ti.field(ti.i32) for _ in range(4)), ti.field(real)]
         ti.root.dense(ti.i, capacity).place(*entry)
         self.faces, self.broken, self.spheres, self.new_faces, self.until = entry
@@ -60,7 +60,7 @@ class PairCache:
     @ti.func
     def middle(self, i, face):
         """Centre of a face's cluster now [m]."""
-        return self.state.position[i] + self.state.rotation[i] @ self.model.cluster[face].xyz
+        return self.state.position[i] + self.state.rotation[i] @ self.tables.cluster[face].xyz
 
     @ti.func
     def may_gain_spheres(self, k, i, j, faces):
@@ -113,5 +113,5 @@ class PairCache:
     @ti.func
     def clusters_near(self, face_i, face_j, wide):
         """Whether the balls around the spheres of two faces come nearer than wide [m]."""
-        reach = self.model.cluster[face_i][3] + self.model.cluster[face_j][3] + wide
+        reach = self.tables.cluster[face_i][3] + self.tables.cluster[face_j][3] + wide
         return (self.cluster[face_j] - self.cluster[face_i]).norm_sqr() < reach * reach

@@ -13,6 +13,7 @@ from taichi_dem.contact_search.narrow_phase import NarrowPhase
 from taichi_dem.contact_search.numbering import Numbering
 from taichi_dem.contact_search.old_pairs import OldPairs
 from taichi_dem.contact_search.verlet_list import FAR, VerletList
+from taichi_dem.kit.allocation import assign, values
 from taichi_dem.kit.errors import InputError
 
 _CAPACITIES = ("", "pairs_per_body", "spheres_per_body", "neighbours_per_body")
@@ -32,10 +33,10 @@ class BroadPhase:
     scratch_fields = ("exposed", "exposed_count", "looked")
 
     def __init__(self, contacts, schedule, solver=None, brute_force=False):
-        n = contacts.model.body_count
+        n = contacts.tables.capacity.bodies
         self.contacts, self.schedule = contacts, schedule
         self.solver, self.solves = solver, solver is not None
-        self.model, self.state = contacts.model, contacts.state
+        self.tables, self.state = contacts.tables, contacts.state
         self.exposed = ti.field(ti.i32, shape=n)
         self.exposed_count = ti.field(ti.i32, shape=())
         self.neighbours = VerletList(contacts, brute_force)
@@ -51,14 +52,18 @@ class BroadPhase:
         self.numbering = Numbering(contacts, self.neighbours, self.old, self.candidates, self.full)
         self.searches = ti.field(ti.i32, shape=())
 
+    def load(self, model, method):
+        """Let the first search make all lists."""
+        self.neighbours.load(model, method)
+
     def ask(self, everywhere=False):
         """Let the driver make a search before its next step."""
-        self.everywhere[None] = int(everywhere)
-        self.contacts.search_requested[None] = 1
+        assign(self.everywhere, int(everywhere))
+        assign(self.contacts.search_requested, 1)
 
     def renew(self):
         """Renew the lists, a parallel loop a phase, until no search is due."""
-        while self.contacts.search_requested[None]:
+        while values(self.contacts.search_requested):
             self._search()
 
     def search(self, everywhere=True):
@@ -69,7 +74,7 @@ class BroadPhase:
 
     def check_capacity(self):
         """Raise InputError when lists exceed the capacity that the scene gave them."""
-        option = _CAPACITIES[self.full[None]]
+        option = _CAPACITIES[int(values(self.full))]
         if option:
             raise InputError(f"contact lists are full: give SphereContact a larger {option}")
 
@@ -117,11 +122,11 @@ class BroadPhase:
 
     @ti.func
     def _all_anew(self):
-        return self.neighbours.making() * self.model.body_count
+        return self.neighbours.making() * self.tables.body_count[None]
 
     @ti.func
     def _all_amended(self):
-        return self.neighbours.amending() * self.model.body_count
+        return self.neighbours.amending() * self.tables.body_count[None]
 
     @ti.func
     def _pairs(self):
@@ -162,7 +167,7 @@ class BroadPhase:
         """List the bodies with spheres on some face, in order of their index."""
         count = 0
         newest = ti.cast(0, ti.i64)
-        for i in range(self.model.body_count):
+        for i in range(self.tables.body_count[None]):
             exposed = 0
             for f in range(4):
                 since = self.state.exposed_tick[4 * i + f]
@@ -213,8 +218,8 @@ class BroadPhase:
     def _bonded(self, i, j):
         bonded = False
         for f in range(4):
-            if self.model.neighbour[4 * i + f] == j:
-                bonded = self.state.broken_tick[self.model.face_bond[4 * i + f]] < 0
+            if self.tables.neighbour[4 * i + f] == j:
+                bonded = self.state.broken_tick[self.tables.face_bond[4 * i + f]] < 0
         return bonded
 
     @ti.func
@@ -285,7 +290,7 @@ class BroadPhase:
     def _injected(self, p, i, j):
         """Energy [J] of overlaps that this tick's breaks have brought into being."""
         energy, tick = 0.0, self.state.tick[None]
-        size = ti.static(self.model.spheres_per_face)
+        size = self.tables.face_spheres[None]
         fresh, freed = self.fresh[None] == 1, self._freed_at(i, j, tick)
         for k in range(self.contacts.pair_first[p], self.contacts.pair_last[p]):
             a, b = self.contacts.pair_sphere[k][0], self.contacts.pair_sphere[k][1]
@@ -300,8 +305,8 @@ class BroadPhase:
         """Whether the bond of two bodies was released at a tick."""
         freed = False
         for f in range(4):
-            if self.model.neighbour[4 * i + f] == j:
-                freed = self.state.broken_tick[self.model.face_bond[4 * i + f]] == tick
+            if self.tables.neighbour[4 * i + f] == j:
+                freed = self.state.broken_tick[self.tables.face_bond[4 * i + f]] == tick
         return freed
 
     @ti.func
@@ -310,7 +315,7 @@ class BroadPhase:
         first, touch, pairs = ti.static(
             self.contacts.second_start, self.contacts.second_pair, self.contacts.pair_count
         )
-        group(first, touch, self.model.body_count, pairs[None], self._second_of)
+        group(first, touch, self.tables.body_count[None], pairs[None], self._second_of)
 
     @ti.func
     def _second_of(self, p):

@@ -6,8 +6,9 @@ It reaches several skins and takes in every face, broken or not, so one list ser
 import taichi as ti
 
 from taichi_dem.contact_search.cell_grid import CellGrid
+from taichi_dem.contact_search.lengths import SPARE_NEIGHBOURS
 from taichi_dem.contact_search.pair_cache import PairCache
-from taichi_dem.kit.allocation import defer_fill
+from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.types import real
 
 #: What the list is when it needs to be made anew, and while it is.
@@ -34,16 +35,17 @@ class VerletList:
     clusters [m]. reach: how far it may be from there, its body skin included [m], and ball: radius
     of the ball around it and its reach [m]. escaped: bodies that have left their reach since, left:
     1 for them; they are listed anew, as a few fragments fly faster than all the rest. stale: STALE
-    when all are. full: 1 when there is no room.
+    when all are. limit: entries that the scene allows. full: 1 when there is no room.
     """
 
     def __init__(self, contacts, brute_force=False):
-        n = contacts.model.body_count
-        self.model, self.state, self.contacts = contacts.model, contacts.state, contacts
-        self.capacity = n * contacts.law.neighbours_per_body + 1024
+        n = contacts.tables.capacity.bodies
+        self.tables, self.state, self.contacts = contacts.tables, contacts.state, contacts
+        self.capacity = contacts.tables.capacity.neighbour_entries
+        self.limit = ti.field(ti.i32, shape=())
         self.reach = ti.field(real, shape=n)
         self.ball = ti.field(real, shape=n)
-        self.grid = CellGrid(self.model, self.state, self.ball, brute_force)
+        self.grid = CellGrid(self.tables, self.state, self.ball, brute_force)
         self.first = ti.field(ti.i32, shape=n + 1)
         self.last = ti.field(ti.i32, shape=n)
         self.body = ti.field(ti.i32, shape=self.capacity)
@@ -56,14 +58,19 @@ class VerletList:
         self.left = ti.field(ti.i32, shape=n)
         self.stale = ti.field(ti.i32, shape=())
         self.full = ti.field(ti.i32, shape=())
-        defer_fill(self.stale.fill, STALE)
+
+    def load(self, model, method):
+        """Let the list be made anew."""
+        assign(self.stale, STALE)
+        each = model.contact.neighbours_per_body
+        assign(self.limit, model.body_count * each + SPARE_NEIGHBOURS)
 
     @ti.func
     def notice(self, i):
         """See whether body i, which is looked at, has left the list's reach."""
         # No point of the body went further than this: a norm of a matrix bounds what it does.
         way = (self.state.position[i] - self.placed_at[i]).norm()
-        way += (self.state.rotation[i] - self.turned_to[i]).norm() * self.model.extent[i]
+        way += (self.state.rotation[i] - self.turned_to[i]).norm() * self.tables.extent[i]
         if not way + self.contacts.body_skin[i] < self.reach[i]:
             self.left[i] = 1
             self.escaped[ti.atomic_add(self.escaped_count[None], 1)] = i
@@ -73,8 +80,8 @@ class VerletList:
     def _list(self, i):
         """Note where body i and its clusters are, or will soon be if it goes on like this."""
         self.reach[i] = BODY_SKINS * self.contacts.body_skin[i] + SKINS * self.contacts.skin[None]
-        self.ball[i] = self.model.extent[i] + self.reach[i]
-        ahead = AHEAD * self.contacts.dt0 * self.state.velocity[i]
+        self.ball[i] = self.tables.extent[i] + self.reach[i]
+        ahead = AHEAD * self.contacts.pace[0] * self.state.velocity[i]
         most = SHARE * (self.reach[i] - self.contacts.body_skin[i])
         ahead *= most / ti.max(ahead.norm(), most)
         self.placed_at[i] = self.state.position[i] + ahead
@@ -86,7 +93,7 @@ class VerletList:
     def begin(self):
         """See whether so many bodies have left their reach that the list is made anew."""
         self.full[None] = 0
-        if self.escaped_count[None] > ti.min(self.model.body_count // 16, MOST_ESCAPED):
+        if self.escaped_count[None] > ti.min(self.tables.body_count[None] // 16, MOST_ESCAPED):
             self.stale[None] = STALE
         if self.stale[None] == STALE:
             self.stale[None] = MAKING
@@ -116,13 +123,13 @@ class VerletList:
     def allot(self):
         """Give every body its part of the list."""
         self.first[0] = 0
-        for i in range(self.model.body_count):
+        for i in range(self.tables.body_count[None]):
             self.first[i + 1] = self.first[i + 1] + self.first[i]
-        if self.first[self.model.body_count] > self.capacity:
+        if self.first[self.tables.body_count[None]] > self.limit[None]:
             self.full[None] = 1
-            for i in range(self.model.body_count + 1):
+            for i in range(self.tables.body_count[None] + 1):
                 self.first[i] = 0
-        for i in range(self.model.body_count):
+        for i in range(self.tables.body_count[None]):
             self.last[i] = self.first[i]
 
     @ti.func
@@ -140,7 +147,7 @@ class VerletList:
         without room leaves the list stale.
         """
         if self.left[i] == 1:
-            for j in range(i + 1, self.model.body_count):
+            for j in range(i + 1, self.tables.body_count[None]):
                 self._add(i, j)
         else:
             for a in range(self.escaped_count[None]):
@@ -249,11 +256,11 @@ class VerletList:
     @ti.func
     def _near_face(self, face, j, wide):
         """Which faces of body j, a bit each, come near a face of another."""
-        faces, reach = 0, self.model.cluster[face][3] + wide
-        whole = reach + self.model.extent[j]
+        faces, reach = 0, self.tables.cluster[face][3] + wide
+        whole = reach + self.tables.extent[j]
         if (self.placed_at[j] - self.listed[face]).norm_sqr() < whole * whole:
             for g in range(4):
-                other = reach + self.model.cluster[4 * j + g][3]
+                other = reach + self.tables.cluster[4 * j + g][3]
                 apart = self.listed[4 * j + g] - self.listed[face]
                 faces |= ti.cast(apart.norm_sqr() < other * other, ti.i32) << g
         return faces

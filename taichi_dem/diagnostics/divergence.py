@@ -88,9 +88,8 @@ class DivergenceCheck:
 
     def _rounded_once(self):
         """Energy [J] of springs whose ends are known to a few units in the last place."""
-        count = self.model.bond_count
-        area = 3.0 * self.model.unit_area.to_numpy()[:count]
-        stiffness = self.model.bond_stiffness.to_numpy()[:count].max(axis=1, initial=0.0)
+        area = 3.0 * self.model.bonds["area"]
+        stiffness = self.model.bond_stiffness.max(axis=1, initial=0.0)
         place = 4.0 * np.finfo(float).eps * np.abs(self.model.mesh.points).max()
         return max(0.5 * float(np.sum(area * stiffness)) * place**2, 1e-300)
 
@@ -145,7 +144,7 @@ class DivergenceCheck:
         steps = quality_report(self.model.mesh, self.model.material)
         limits = {"bond springs": steps.spring_step_s}
         tame = self.solves or self.limited
-        if self.model.dashpot.name and not tame:
+        if self.model.by_role["dashpot"] and not tame:
             limits["bond dashpots"] = steps.dashpot_step_s
         if self.contacts is not None:
             rates = self._contact_rates()

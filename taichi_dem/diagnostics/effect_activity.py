@@ -66,8 +66,8 @@ def _bond_rounding(model, state, substeps):
     A (k_n + k_s) (eps X)^2 / 2, which its dashpots then take.
     """
     reach = max(np.abs(model.mesh.points).max(), np.abs(state.position.to_numpy()).max())
-    area = 3.0 * model.unit_area.to_numpy()
-    stiffness = model.bond_stiffness.to_numpy().sum(axis=1)
+    area = 3.0 * model.bonds["area"]
+    stiffness = model.bond_stiffness.sum(axis=1)
     return 0.5 * substeps * area * stiffness * (_EPSILON * reach) ** 2
 
 

@@ -5,7 +5,6 @@ work of loads and supports + energy at the start = kinetic + bond strain + spher
 """
 
 import numpy as np
-import taichi as ti
 
 #: Terms of the account in the order of tables and files, all in J.
 TERMS = (
@@ -25,12 +24,14 @@ TERMS = (
 )
 
 
-@ti.data_oriented
 class EnergyBalance:
-    """Sums what the step has booked; stored energies are computed anew by the step's own laws."""
+    """Sums what the step has booked; stored energies are computed anew by the step's own laws.
 
-    def __init__(self, model, state, advance, contacts):
-        self.model, self.state, self.advance, self.contacts = model, state, advance, contacts
+    readings: the ``Readings`` of a run. contacts: its ``Contacts``, None without.
+    """
+
+    def __init__(self, model, state, readings, contacts):
+        self.model, self.state, self.readings, self.contacts = model, state, readings, contacts
         self.start_energy = 0.0
         first = self.account()
         self.start_energy = first["kinetic"] + first["bond_strain"] + first["sphere_strain"]
@@ -75,12 +76,12 @@ class EnergyBalance:
         injected, so far as its first body has not taken them.
         """
         n, bonds = self.model.body_count, self.model.bond_count
-        body, bond = np.zeros((n, 6)), np.zeros((max(1, bonds), 5))
-        self._read_bodies(body)
-        self._read_bonds(bond)
+        body, bond = np.zeros((n, 6)), np.zeros((bonds, 5))
+        self.readings.bodies(body)
+        self.readings.bonds(bond)
         pair = np.zeros((self._pair_count(), 4))
         if self.contacts is not None:
-            self._read_pairs(pair)
+            self.readings.pairs(pair)
         return body, bond, pair
 
     def _residual(self, terms):
@@ -98,7 +99,7 @@ class EnergyBalance:
     def load_works(self, index):
         """Work of one load on every body [J], (body_count,)."""
         work = np.zeros(self.model.body_count)
-        self._read_load(index, work)
+        self.readings.load_work(index, work)
         return work
 
     def support_works(self, index):
@@ -107,13 +108,13 @@ class EnergyBalance:
         NaN for a body that it does not hold.
         """
         work = np.full(self.model.body_count, np.nan)
-        self._read_support(index, work)
+        self.readings.support_work(index, work)
         return work
 
     def momentum(self):
         """Linear [N s] and angular momentum about the origin [N m s] less what was given, (6,)."""
         rows = np.zeros((self.model.body_count, 12))
-        self._read_momentum(rows)
+        self.readings.momentum(rows)
         return rows[:, :6].sum(axis=0) - rows[:, 6:].sum(axis=0)
 
     def momentum_errors(self):
@@ -122,7 +123,7 @@ class EnergyBalance:
         The scale is the sum over bodies of the size of momentum and of load impulse.
         """
         rows = np.zeros((self.model.body_count, 12))
-        self._read_momentum(rows)
+        self.readings.momentum(rows)
         lost = rows[:, :6].sum(axis=0) - rows[:, 6:].sum(axis=0) - self.start_momentum
         sizes = [np.linalg.norm(rows[:, k : k + 3], axis=1).sum() for k in (0, 3, 6, 9)]
         linear, angular = max(sizes[0], sizes[2], 1e-300), max(sizes[1], sizes[3], 1e-300)
@@ -130,59 +131,3 @@ class EnergyBalance:
 
     def _pair_count(self):
         return self.contacts.pair_count[None] if self.contacts is not None else 0
-
-    @ti.kernel
-    def _read_bodies(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
-        for i in range(self.model.body_count):
-            momentum = self.state.angular_momentum[i]
-            turning = momentum.dot(self.advance.spin(i, momentum))
-            moving = self.model.mass[i] * self.state.velocity[i].norm_sqr()
-            table[i, 0] = 0.5 * (moving + turning)
-            for e in ti.static(range(len(self.model.loads))):
-                table[i, 1] = table[i, 1] + self.state.load_work[i][e]
-            table[i, 2] = self.state.load_work[i][ti.static(len(self.model.loads))]
-            if ti.static(self.model.has_contact):
-                for k in ti.static(range(3)):
-                    table[i, 3 + k] = self.state.contact_heat[i][k]
-
-    @ti.kernel
-    def _read_bonds(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
-        for b in range(self.model.bond_count):
-            table[b, 0] = self.advance.bond_energy(b)
-            if ti.static(self.model.has_bond_heat):
-                for k in ti.static(range(3)):
-                    table[b, 1 + k] = self.state.bond_heat[b][k]
-            for q in range(3):
-                spent = self.model.tension.spent(b, 3 * b + q)
-                table[b, 4] = table[b, 4] + self.model.unit_area[b] * spent
-
-    @ti.kernel
-    def _read_pairs(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
-        for p in range(self.contacts.pair_count[None]):
-            table[p, 0] = self.contacts.pair_energy(p)
-            for k in ti.static(range(3)):
-                table[p, 1 + k] = self.contacts.pair_heat[p][k]
-
-    @ti.kernel
-    def _read_load(self, index: ti.i32, work: ti.types.ndarray(dtype=ti.f64, ndim=1)):
-        for i in range(self.model.body_count):
-            for e in ti.static(range(len(self.model.loads))):
-                if e == index:
-                    work[i] = self.state.load_work[i][e]
-
-    @ti.kernel
-    def _read_support(self, index: ti.i32, work: ti.types.ndarray(dtype=ti.f64, ndim=1)):
-        for i in range(self.model.body_count):
-            for e in ti.static(range(len(self.model.supports))):
-                if e == index and self.model.supports[e].acts_on(i):
-                    work[i] = self.state.load_work[i][ti.static(len(self.model.loads))]
-
-    @ti.kernel
-    def _read_momentum(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
-        for i in range(self.model.body_count):
-            linear = self.model.mass[i] * self.state.velocity[i]
-            angular = self.state.angular_momentum[i] + self.state.position[i].cross(linear)
-            for k in ti.static(range(3)):
-                table[i, k], table[i, 3 + k] = linear[k], angular[k]
-            for k in ti.static(range(6)):
-                table[i, 6 + k] = self.state.load_impulse[i][k]

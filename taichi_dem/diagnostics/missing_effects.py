@@ -3,12 +3,10 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-import taichi as ti
 
 from taichi_dem.diagnostics.outer_faces import OuterFaces
 from taichi_dem.diagnostics.part_overlaps import PartOverlaps
 from taichi_dem.mesh.parts import parts_of
-from taichi_dem.physics.fracture import coulomb_limit
 from taichi_dem.scene import REMEDY
 
 
@@ -62,14 +60,14 @@ _NEEDS = (
 _OVERLAP = "pairs of bodies overlap at outer faces, which carry no contact spheres"
 
 
-def _outer_faces(model, state):
+def _outer_faces(model, state, outer_overlaps):
     """What finds bodies that overlap at outer faces without spheres; None where none can.
 
     Without contact a solid in one piece has nothing to meet but what broke off it: that is found
     at its released bonds.
     """
     if model.has_contact:
-        return None if model.contact.outer_faces else OuterFaces(model, state)
+        return None if model.contact.outer_faces else OuterFaces(model, state, outer_overlaps)
     part = parts_of(model.mesh)
     return PartOverlaps(model, state, part) if part.any() else None
 
@@ -79,22 +77,22 @@ def unserved(roles):
     return {role: MissingEffect(effect, what) for role, effect, what in _NEEDS if role not in roles}
 
 
-@ti.data_oriented
 class MissingEffects:
     """Counts the places where an absent effect would have acted, at recording times.
 
     touching: most pairs of bodies that one of them saw in contact.
     """
 
-    def __init__(self, model, state, advance):
-        self.model, self.state, self.advance = model, state, advance
+    def __init__(self, model, state, readings, contacts, outer_overlaps=None):
+        self.model, self.state, self.readings = model, state, readings
+        self.contacts = contacts
         self.touching = self.looks = 0
         self.last_s = -1.0
         self.needed = unserved({effect.role for effect in model.effects if effect.name})
-        self.outer_faces = _outer_faces(model, state)
+        self.outer_faces = _outer_faces(model, state, outer_overlaps)
         self.outer = MissingEffect(REMEDY, _OVERLAP, unit="body")
         material = model.material
-        self.limits = ti.Vector([material.tensile_strength, material.cohesion, material.friction])
+        self.limits = material.tensile_strength, material.cohesion, material.friction
 
     def sample(self, time_s):
         """Update the findings at a recording time [s]."""
@@ -109,7 +107,7 @@ class MissingEffects:
         if not self.needed or self.model.bond_count == 0:
             return
         marks = np.zeros((self.model.bond_count, 3), dtype=np.int32)
-        self._mark(marks)
+        self.readings.beyond_limits(*self.limits, marks)
         for column, (role, _, _) in enumerate(_NEEDS):
             if role in self.needed:
                 self.needed[role].see(np.flatnonzero(marks[:, column]), time_s, self._middle)
@@ -133,7 +131,7 @@ class MissingEffects:
         self.looks, self.touching = int(looks), int(touching)
 
     def _count_touching(self):
-        contacts = self.advance.contacts
+        contacts = self.contacts
         if contacts is not None:
             deepest = contacts.deepest.to_numpy()[: contacts.pair_count[None]]
             self.touching = max(self.touching, int((deepest > 0.0).sum()))
@@ -155,16 +153,3 @@ class MissingEffects:
         """A ``MissingEffect`` for each effect that was needed, an empty tuple where none was."""
         found = [finding for finding in self._all() if finding.times]
         return tuple(replace(finding, looks=self.looks) for finding in found)
-
-    @ti.kernel
-    def _mark(self, marks: ti.types.ndarray(dtype=ti.i32, ndim=2)):
-        for b in range(self.model.bond_count):
-            opening = self.advance.bond_opening(b)
-            stiffness = self.model.bond_stiffness[b]
-            if self.state.broken_tick[b] < 0:
-                pull = stiffness[0] * opening[0]
-                limit = coulomb_limit(self.limits[1], self.limits[2], -pull)
-                marks[b, 0] = ti.cast(pull > self.limits[0], ti.i32)
-                marks[b, 1] = ti.cast(stiffness[1] * opening[1] > limit, ti.i32)
-            else:
-                marks[b, 2] = ti.cast(opening[0] < 0.0, ti.i32)

@@ -16,7 +16,6 @@ from taichi_dem.timeline import NEVER
 LEAST_OVERLAP = 1e-4
 
 
-@ti.data_oriented
 class OuterFaces:
     """Finds pairs of bodies that overlap where one of them has an outer face without spheres.
 
@@ -24,11 +23,12 @@ class OuterFaces:
     spheres on outer faces would overlap, and if no spheres of broken faces do. So what is bonded,
     or touches as it should, is left alone, and what lay side by side is left to the broken faces
     between. A solid that bends until it meets itself is not seen.
+    outer_overlaps: the ``OuterOverlaps`` of the engine.
     """
 
-    def __init__(self, model, state):
-        self.model, self.state = model, state
-        self.extent = model.extent.to_numpy()
+    def __init__(self, model, state, outer_overlaps):
+        self.model, self.state, self.outer_overlaps = model, state, outer_overlaps
+        self.extent = model.spheres.extent
         self.points = np.ascontiguousarray(model.mesh.tetrahedra, dtype=np.int32)
         self.broken_count, self.part = -1, None
 
@@ -42,7 +42,8 @@ class OuterFaces:
             # Bond -1 stands for an outer face, which is as free as a broken one.
             surface = np.append(broken, True)[self.model.topology.body_bond].any(axis=1)
             marks = loose.astype(np.int32)
-            self._count(*self._candidates(surface, loose), self.part, marks, self.points, found)
+            candidates = self._candidates(surface, loose)
+            self.outer_overlaps.count(*candidates, self.part, marks, self.points, found)
         return found
 
     def _find_parts(self, broken):
@@ -70,8 +71,16 @@ class OuterFaces:
         whole = (array.astype(np.int32) for array in (own, first, last, order))
         return (*whole, ball[order])
 
+
+@ti.data_oriented
+class OuterOverlaps:
+    """Compares the spheres behind outer faces of bodies that may be near each other."""
+
+    def __init__(self, tables, state):
+        self.tables, self.state = tables, state
+
     @ti.kernel
-    def _count(
+    def count(
         self,
         own: ti.types.ndarray(dtype=ti.i32, ndim=1),
         first: ti.types.ndarray(dtype=ti.i32, ndim=1),
@@ -83,9 +92,10 @@ class OuterFaces:
         points: ti.types.ndarray(dtype=ti.i32, ndim=2),
         found: ti.types.ndarray(dtype=ti.i32, ndim=1),
     ):
+        """Add to found how many later bodies each loose body overlaps at bare outer faces."""
         for a in range(own.shape[0]):
             i = own[a]
-            centre, radius = self.state.position[i], self.model.extent[i]
+            centre, radius = self.state.position[i], self.tables.extent[i]
             for k in range(first[a], last[a]):
                 away = vec3(ball[k, 0], ball[k, 1], ball[k, 2]) - centre
                 reach = radius + ball[k, 3]
@@ -128,19 +138,19 @@ class OuterFaces:
     @ti.func
     def _bare(self, face):
         """1 for an outer face without spheres."""
-        outer = self.model.neighbour[face] < 0
+        outer = self.tables.neighbour[face] < 0
         return ti.cast(outer and self.state.exposed_tick[face] < 0, ti.i32)
 
     @ti.func
     def _faces_overlap(self, first, second, turn, offset):
         """1 where spheres behind two faces overlap; turn, offset: second body in the first's."""
         found = 0
-        ball, other = self.model.cluster[first], self.model.cluster[second]
+        ball, other = self.tables.cluster[first], self.tables.cluster[second]
         if (turn @ other.xyz + offset - ball.xyz).norm() < ball[3] + other[3]:
-            count = self.model.spheres_per_face
+            count = self.tables.face_spheres[None]
             for a, b in ti.ndrange(count, count):
-                mine = self.model.sphere[first * count + a]
-                theirs = self.model.sphere[second * count + b]
+                mine = self.tables.sphere[first * count + a]
+                theirs = self.tables.sphere[second * count + b]
                 reach = (1.0 - LEAST_OVERLAP) * (mine[3] + theirs[3])
                 if (turn @ theirs.xyz + offset - mine.xyz).norm_sqr() < reach * reach:
                     found = 1

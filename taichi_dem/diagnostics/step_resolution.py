@@ -1,7 +1,6 @@
 """Bonds and contacts for which the step of a run was too long: stable, but not accurate."""
 
 import numpy as np
-import taichi as ti
 
 from taichi_dem.timeline import NEVER
 
@@ -16,7 +15,6 @@ MOST_TAKEN = 1.0
 _KEPT = ("share", "pair_share", "taken", "step", "lightest")
 
 
-@ti.data_oriented
 class StepResolution:
     """Looks, at recording times, at what steps leave of dashpots; at the end, at how bonds failed.
 
@@ -26,9 +24,10 @@ class StepResolution:
     they take in a step; all (body_count,).
     """
 
-    def __init__(self, model, state, advance):
-        self.model, self.state, self.advance = model, state, advance
-        self.contacts = advance.contacts
+    def __init__(self, model, state, readings, contacts, schedule, advance):
+        self.model, self.state, self.readings, self.contacts = model, state, readings, contacts
+        self.schedule, self.solves, self.limited = schedule, advance.solves, advance.limited
+        self.has_dashpot = advance.has_dashpot
         self.share = np.ones(model.bond_count)
         self.pair_share, self.taken = np.ones(model.body_count), np.zeros(model.body_count)
         self.step = np.full(model.body_count, np.inf)
@@ -45,18 +44,18 @@ class StepResolution:
 
     def sample(self):
         """Update the figures at a recording time. Dashpots that are solved need no look."""
-        if self.advance.solves:
+        if self.solves:
             return
-        if self.advance.limited and self.advance.has_dashpot and self.model.bond_count:
-            self._read_bonds(self.share)
+        if self.limited and self.has_dashpot and self.model.bond_count:
+            self.readings.bond_shares(self.share)
         if self.contacts is not None and self.contacts.pair_count[None]:
-            if self.advance.limited:
+            if self.limited:
                 self._note_partners()
-            self._read_pairs(self.pair_share, self.taken)
+            self.readings.contact_shares(self.pair_share, self.taken)
 
     def _note_partners(self):
         """Remember steps and light partners: few contacts last until a recording."""
-        schedule, mass = self.advance.schedule, self.model.body_mass
+        schedule, mass = self.schedule, self.model.body_mass
         self.step = np.minimum(self.step, schedule.dt0 / 2.0 ** self.state.level.to_numpy())
         pairs = self.contacts.pair_body.to_numpy()[: self.contacts.pair_count[None]]
         for one, other in (pairs.T, pairs.T[::-1]):
@@ -117,7 +116,7 @@ class StepResolution:
         ``step/stability_limits.py``. Where contacts took energy they acted; it is booked to the
         first body of a pair.
         """
-        if self.contacts is None or not self.advance.limited:
+        if self.contacts is None or not self.limited:
             return self.pair_share
         acted = self.state.contact_heat.to_numpy()[:, :2].sum(axis=1) > 0.0
         x = 2.0 * self.model.material.contact_damping * self.step / self.lightest
@@ -126,32 +125,9 @@ class StepResolution:
     def _openings_at_failure(self):
         """Largest opening of the units of every bond that failed over the failure opening, (b,)."""
         bonds = self.model.bond_count
-        units = self.model.tension.state().get("softening_unit")
+        units = self.state.fields().get("softening_unit")
         if units is None:
             return np.zeros(bonds)
         widest = units.to_numpy()[: 3 * bonds, 0].reshape(bonds, 3).max(axis=1)
         failed = self.state.broken_tick.to_numpy()[:bonds] != NEVER
         return np.where(failed, widest / self.model.material.failure_opening, 0.0)
-
-    @ti.kernel
-    def _read_bonds(self, share: ti.types.ndarray(dtype=ti.f64, ndim=1)):
-        for b in range(self.model.bond_count):
-            if self.state.broken_tick[b] < 0:
-                share[b] = ti.min(share[b], self.advance.bond_share(b))
-
-    @ti.kernel
-    def _read_pairs(
-        self,
-        share: ti.types.ndarray(dtype=ti.f64, ndim=1),
-        taken: ti.types.ndarray(dtype=ti.f64, ndim=1),
-    ):
-        for p in range(self.contacts.pair_count[None]):
-            count = self.contacts.touching(p)
-            if count > 0:
-                i, j = self.contacts.pair_body[p][0], self.contacts.pair_body[p][1]
-                if ti.static(self.advance.limited):
-                    ti.atomic_min(share[i], self.advance.contact_share(i, j))
-                else:
-                    rate = count * self.contacts.law.damping()
-                    rate *= 1.0 / self.model.mass[i] + 1.0 / self.model.mass[j]
-                    ti.atomic_max(taken[i], rate * self.advance.schedule.pair_step(i, j))

@@ -1,14 +1,16 @@
 """What an effect is, and the null objects that stand where a scene lists none.
 
-An effect owns its parameters (in fields, so that sweeping them compiles nothing anew) and its
-state. Its ``role`` says where ``step/advance.py`` asks for it:
+A user's effect holds numbers on the host. In an engine stands a bound copy of it, which has its
+fields and kernels, and into which every scene that the engine runs loads its numbers. Its ``role``
+says where ``step/advance.py`` asks for it:
 
 tension   ``traction(stiffness, u, opening)`` [Pa], ``failed(u)``, ``stored(b, u, opening)`` and
           ``spent(b, u)`` [J/m^2], ``damage(b, u)``
 shear     ``traction(stiffness, u, sliding, pressure)`` -> (traction [Pa], energy slipped away
           [J/m^2]), ``stored(b, u, sliding)``
 dashpot   ``traction(velocity)`` [Pa] of a contact unit
-load      ``acts_on(i)``, ``wrench(i, t, rotation)`` -> (force [N], torque about the centre [N m])
+load      ``acts_on(i)``, ``wrench(i, motion)`` -> (force [N], torque about the centre [N m]);
+          motion: a ``body_motion.BodyMotion``
 support   ``acts_on(i)``, ``held(i, t, rotation, velocity, angular_momentum)`` -> both, corrected
 contact   sphere contacts between broken faces      friction  their sliding
 
@@ -16,21 +18,28 @@ b is a bond, u one of its three contact units (3 b, 3 b + 1, 3 b + 2), i a body.
 ``support`` take any number of effects, the others at most one.
 """
 
+import copy
+
 import numpy as np
 import taichi as ti
+from taichi.lang import impl
 
-from taichi_dem.kit.allocation import defer_fill
+from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.display import by_arguments
 from taichi_dem.kit.types import real, vec3
 
 MANY = ("load", "support")
-ROLES = ("tension", "shear", "dashpot", "contact", "friction", *MANY)
+#: Roles that take one effect, in the order in which effects are listed, bound and reported.
+SINGLE = ("tension", "shear", "dashpot", "friction", "contact")
+ROLES = (*SINGLE, *MANY)
 
 
 class Effect:
     """Base of all effects.
 
     role: where the step asks for it. name: the word used in reports and on the command line.
+    Kernels of a bound effect read its numbers in the field ``self.law``, constants of the scene in
+    ``self.tables`` (engine.tables.Tables), and what ``declare`` has declared.
     """
 
     role = ""
@@ -39,8 +48,15 @@ class Effect:
     def __repr__(self):
         return by_arguments(self)
 
-    def bind(self, model):
-        """Check the effect against the model and allocate its parameters and state there."""
+    def numbers(self, material) -> tuple:
+        """Numbers that kernels read as ``self.law[0]`` and on: to change them compiles nothing."""
+        return ()
+
+    def declare(self, capacity):
+        """Declare further fields, with the capacity of an engine; no field may be used here."""
+
+    def load(self, model):
+        """Fill the declared fields for a scene; they are zero before. Raises InputError."""
 
     def state(self):
         """Fields that change in a run, by name; a checkpoint holds them."""
@@ -54,6 +70,60 @@ class Effect:
         """
         return (-np.inf,) * 3, (np.inf,) * 3
 
+    def stand_for(self, given):
+        """Let the attributes of this bound effect be those of a scene's; None changes nothing."""
+        if given is not None:
+            self.__dict__["_given"] = vars(given)
+
+    def load_scene(self, model):
+        """Load the numbers of the effect that this bound one stands for."""
+        if self._count:
+            assign(self.law, np.array(self.numbers(model.material), dtype=np.float64))
+        self.load(model)
+
+    def accepts(self, given) -> bool:
+        """Whether kernels that were compiled for this one serve for a scene's effect ``given``.
+
+        They do unless they have read one of its values where they should have read a field.
+        """
+        return given is None or all(
+            _same(vars(given).get(name), value) for name, value in self._frozen.items()
+        )
+
+    def __getattr__(self, name):
+        given = self.__dict__.get("_given", {})
+        if name not in given:
+            raise AttributeError(f"{type(self).__name__} has no {name}")
+        if impl.inside_kernel():
+            # The compiler takes the value as a constant: kernels serve no other value from now on.
+            self._frozen[name] = copy.copy(given[name])
+        return given[name]
+
+
+def bound(effect, tables):
+    """A copy of an effect with its own fields, which belongs to an engine and serves its scenes."""
+    made = object.__new__(type(effect))
+    made.__dict__.update(_given=vars(effect), _frozen={}, tables=tables)
+    made._count = len(effect.numbers(_AnyMaterial()))
+    if made._count:
+        made.law = ti.field(real, shape=made._count)
+    made.declare(tables.capacity)
+    return made
+
+
+class _AnyMaterial:
+    """Stands for a material where only the number of its constants is asked for."""
+
+    def __getattr__(self, name):
+        return 1.0
+
+
+def _same(first, second):
+    try:
+        return bool(np.array_equal(first, second))
+    except (TypeError, ValueError):
+        return first is second
+
 
 def along(direction):
     """Travel without end in a direction, for ``Effect.travel``."""
@@ -61,22 +131,11 @@ def along(direction):
     return low, tuple(np.inf if x > 0.0 else 0.0 for x in direction)
 
 
-def parameters(**values):
-    """Checked parameters in one field, in the order given; floats that kernels read."""
-    field = ti.field(real, shape=len(values))
-    defer_fill(field.from_numpy, np.array(list(values.values()), dtype=np.float64))
-    return field
-
-
 @ti.data_oriented
 class ElasticTension(Effect):
     """No softening: a unit stays elastic in tension and compression and never fails."""
 
     role = "tension"
-
-    def bind(self, model):
-        """Take the bonds' stiffness from the model."""
-        self.model = model
 
     @ti.func
     def traction(self, stiffness, u, opening):
@@ -91,7 +150,7 @@ class ElasticTension(Effect):
     @ti.func
     def stored(self, b, u, opening):
         """Elastic energy per area [J/m^2]."""
-        return 0.5 * self.model.bond_stiffness[b][0] * opening * opening
+        return 0.5 * self.tables.bond_stiffness[b][0] * opening * opening
 
     @ti.func
     def spent(self, b, u):
@@ -110,10 +169,6 @@ class ElasticShear(Effect):
 
     role = "shear"
 
-    def bind(self, model):
-        """Take the bonds' stiffness from the model."""
-        self.model = model
-
     @ti.func
     def traction(self, stiffness, u, sliding, pressure):
         """Linear shear traction [Pa] (eq. 1) and no energy slipped away."""
@@ -122,7 +177,7 @@ class ElasticShear(Effect):
     @ti.func
     def stored(self, b, u, sliding):
         """Elastic energy per area [J/m^2]."""
-        return 0.5 * self.model.bond_stiffness[b][1] * sliding.dot(sliding)
+        return 0.5 * self.tables.bond_stiffness[b][1] * sliding.dot(sliding)
 
 
 @ti.data_oriented
@@ -154,6 +209,7 @@ ABSENT = {
     "shear": ElasticShear,
     "dashpot": NoDashpot,
     "friction": NoFriction,
+    "contact": None,
 }
 
-__all__ = ["ABSENT", "MANY", "ROLES", "Effect", "along", "parameters"]
+__all__ = ["ABSENT", "MANY", "ROLES", "SINGLE", "Effect", "along", "bound"]

@@ -2,7 +2,7 @@
 
 import taichi as ti
 
-from taichi_dem.effects.base import Effect, parameters
+from taichi_dem.effects.base import Effect
 from taichi_dem.kit.types import vec3
 
 
@@ -13,11 +13,9 @@ class BondDamping(Effect):
     role = "dashpot"
     name = "bond_damping"
 
-    def bind(self, model):
-        """Take the damping coefficients [Pa s/m] from the material."""
-        self.law = parameters(
-            normal=model.material.normal_damping, shear=model.material.shear_damping
-        )
+    def numbers(self, material):
+        """Normal and tangential damping coefficient [Pa s/m]."""
+        return material.normal_damping, material.shear_damping
 
     @ti.func
     def traction(self, velocity):

@@ -2,7 +2,7 @@
 
 import taichi as ti
 
-from taichi_dem.effects.base import Effect, parameters
+from taichi_dem.effects.base import Effect
 from taichi_dem.physics.sphere_pair import friction_force
 
 
@@ -13,9 +13,9 @@ class Friction(Effect):
     role = "friction"
     name = "friction"
 
-    def bind(self, model):
-        """Take the friction coefficient from the material."""
-        self.law = parameters(coefficient=model.material.friction)
+    def numbers(self, material):
+        """Friction coefficient."""
+        return (material.friction,)
 
     @ti.func
     def force(self, damping, force_normal, slide):

@@ -5,9 +5,8 @@ import math
 import numpy as np
 import taichi as ti
 
-from taichi_dem.effects.base import Effect, parameters
-from taichi_dem.kit.allocation import defer_fill
-from taichi_dem.kit.types import vec3
+from taichi_dem.effects.base import Effect
+from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.validation import positive, word
 from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.mesh.topology import face_vertices, faces_of_group
@@ -43,35 +42,25 @@ class GasPressure(Effect):
         self.rise = positive("rise", rise)
         self.decay_ratio = positive("decay_ratio", decay_ratio)
 
-    def bind(self, model):
+    def numbers(self, material):
+        """Peak [Pa], rise [s] and decay ratio."""
+        return self.peak, self.rise, self.decay_ratio
+
+    def declare(self, capacity):
+        """Loaded faces of every body: area vectors [m^2] and arms from the centre [m]."""
+        self.first = ti.field(ti.i32, shape=capacity.bodies + 1)
+        self.area = ti.Vector.field(3, ti.f64, shape=capacity.faces)
+        self.arm = ti.Vector.field(3, ti.f64, shape=capacity.faces)
+
+    def load(self, model):
         """Find the loaded faces; InputError when the mesh has no such group."""
-        self.law = parameters(peak=self.peak, rise=self.rise, decay_ratio=self.decay_ratio)
         body, face = faces_of_group(model.mesh, model.topology, self.group)
         order = np.argsort(body, kind="stable")
-        self.body = body[order]
-        corners = face_vertices(model.mesh, self.body, face[order])
-        arm = model.mesh.points[corners].mean(axis=1) - model.centre[self.body]
-        self._allocate(model.body_count, area_vectors(model.mesh.points, corners), arm)
-
-    def _allocate(self, body_count, area, arm):
-        first = np.searchsorted(self.body, np.arange(body_count + 1))
-        self.first = ti.field(ti.i32, shape=body_count + 1)
-        self.area = ti.Vector.field(3, ti.f64, shape=len(area))
-        self.arm = ti.Vector.field(3, ti.f64, shape=len(area))
-        defer_fill(self._load, first.astype(np.int32), area, arm)
-
-    @ti.kernel
-    def _load(
-        self,
-        first: ti.types.ndarray(dtype=ti.i32, ndim=1),
-        area: ti.types.ndarray(dtype=ti.f64, ndim=2),
-        arm: ti.types.ndarray(dtype=ti.f64, ndim=2),
-    ):
-        for i in range(first.shape[0]):
-            self.first[i] = first[i]
-        for k in range(area.shape[0]):
-            self.area[k] = vec3(area[k, 0], area[k, 1], area[k, 2])
-            self.arm[k] = vec3(arm[k, 0], arm[k, 1], arm[k, 2])
+        body = body[order]
+        corners = face_vertices(model.mesh, body, face[order])
+        assign(self.first, np.searchsorted(body, np.arange(model.body_count + 1)))
+        assign(self.area, area_vectors(model.mesh.points, corners))
+        assign(self.arm, model.mesh.points[corners].mean(axis=1) - model.centre[body])
 
     @ti.func
     def acts_on(self, i):
@@ -79,28 +68,31 @@ class GasPressure(Effect):
         return self.first[i + 1] - self.first[i]
 
     @ti.func
-    def wrench(self, i, t, rotation):
-        """Force [N] and torque about the centre [N m] on body i at time t [s]."""
-        pressure = pulse(self.law[0], self.law[1], self.law[2], t)
+    def wrench(self, i, motion):
+        """Force [N] and torque about the centre [N m] on body i in a motion."""
+        pressure = pulse(self.law[0], self.law[1], self.law[2], motion.time)
         force, torque = zero3(), zero3()
         for k in range(self.first[i], self.first[i + 1]):
             push = -pressure * self.area[k]
             force += push
             torque += self.arm[k].cross(push)
-        return rotation @ force, rotation @ torque
+        return motion.rotation @ force, motion.rotation @ torque
 
     def pressure_at(self, times):
-        """Pressure [Pa] at an array of times [s], for pictures; the effect must be bound."""
+        """Pressure [Pa] at an array of times [s], for pictures."""
         times = np.ascontiguousarray(times, dtype=np.float64)
         pressure = np.zeros_like(times)
-        self._sample(times, pressure)
+        _sample(self.peak, self.rise, self.decay_ratio, times, pressure)
         return pressure
 
-    @ti.kernel
-    def _sample(
-        self,
-        times: ti.types.ndarray(dtype=ti.f64, ndim=1),
-        pressure: ti.types.ndarray(dtype=ti.f64, ndim=1),
-    ):
-        for k in range(times.shape[0]):
-            pressure[k] = pulse(self.law[0], self.law[1], self.law[2], times[k])
+
+@ti.kernel
+def _sample(
+    peak: ti.f64,
+    rise: ti.f64,
+    decay_ratio: ti.f64,
+    times: ti.types.ndarray(dtype=ti.f64, ndim=1),
+    pressure: ti.types.ndarray(dtype=ti.f64, ndim=1),
+):
+    for k in range(times.shape[0]):
+        pressure[k] = pulse(peak, rise, decay_ratio, times[k])

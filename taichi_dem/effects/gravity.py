@@ -3,7 +3,7 @@
 import taichi as ti
 
 from taichi_dem.effects.base import Effect, along
-from taichi_dem.kit.allocation import defer_fill
+from taichi_dem.kit.types import vec3
 from taichi_dem.kit.validation import direction
 from taichi_dem.physics.rotation import zero3
 
@@ -18,11 +18,9 @@ class Gravity(Effect):
     def __init__(self, acceleration=(0.0, -9.81, 0.0)):
         self._acceleration = direction("acceleration", acceleration)
 
-    def bind(self, model):
-        """Put the acceleration where kernels read it."""
-        self.model = model
-        self.acceleration = ti.Vector.field(3, ti.f64, shape=())
-        defer_fill(self.acceleration.fill, ti.Vector(self._acceleration))
+    def numbers(self, material):
+        """Acceleration [m/s^2], three components."""
+        return self._acceleration
 
     def travel(self):
         """Without end along the acceleration."""
@@ -34,6 +32,6 @@ class Gravity(Effect):
         return 1
 
     @ti.func
-    def wrench(self, i, t, rotation):
+    def wrench(self, i, motion):
         """Force [N] and torque about the centre [N m] on body i."""
-        return self.model.mass[i] * self.acceleration[None], zero3()
+        return self.tables.mass[i] * vec3(self.law[0], self.law[1], self.law[2]), zero3()

@@ -2,9 +2,7 @@
 
 import taichi as ti
 
-from taichi_dem.effects.base import Effect, parameters
-from taichi_dem.kit.allocation import defer_fill
-from taichi_dem.kit.types import vec2
+from taichi_dem.effects.base import Effect
 from taichi_dem.physics.fracture import coulomb_limit, slip_beyond
 
 
@@ -19,12 +17,13 @@ class ShearSlip(Effect):
     role = "shear"
     name = "shear_slip"
 
-    def bind(self, model):
-        """Allocate the residual slip of every contact unit."""
-        self.model = model
-        self.law = parameters(cohesion=model.material.cohesion, friction=model.material.friction)
-        self.slip = ti.Vector.field(2, ti.f64, shape=max(1, 3 * model.bond_count))
-        defer_fill(self.slip.fill, vec2(0.0, 0.0))
+    def numbers(self, material):
+        """Cohesion [Pa] and friction coefficient."""
+        return material.cohesion, material.friction
+
+    def declare(self, capacity):
+        """Residual slip of every contact unit."""
+        self.slip = ti.Vector.field(2, ti.f64, shape=capacity.units)
 
     def state(self):
         """Residual slip of every unit in the face frame [m]."""
@@ -49,4 +48,4 @@ class ShearSlip(Effect):
     def stored(self, b, u, sliding):
         """Elastic energy per area [J/m^2]."""
         elastic = sliding - self.slip[u]
-        return 0.5 * self.model.bond_stiffness[b][1] * elastic.dot(elastic)
+        return 0.5 * self.tables.bond_stiffness[b][1] * elastic.dot(elastic)

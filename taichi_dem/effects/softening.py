@@ -1,9 +1,10 @@
 """Softening and fracture of bonds in tension (Konno et al., 2.1, Fig. 4)."""
 
+import numpy as np
 import taichi as ti
 
-from taichi_dem.effects.base import Effect, parameters
-from taichi_dem.kit.allocation import defer_fill
+from taichi_dem.effects.base import Effect
+from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.types import vec2
 from taichi_dem.physics.fracture import envelope_traction, softening_energy
 
@@ -20,27 +21,27 @@ class Softening(Effect):
     role = "tension"
     name = "softening"
 
-    def bind(self, model):
-        """Allocate the elastic limit and secant stiffness of every contact unit."""
-        self.model = model
-        material = model.material
-        self.law = parameters(strength=material.tensile_strength, failure=material.failure_opening)
-        self.unit = ti.Vector.field(2, ti.f64, shape=max(1, 3 * model.bond_count))
-        defer_fill(self._reset)
+    def numbers(self, material):
+        """Tensile strength [Pa] and opening at failure [m]."""
+        return material.tensile_strength, material.failure_opening
+
+    def declare(self, capacity):
+        """Elastic limit and secant stiffness of every contact unit."""
+        self.unit = ti.Vector.field(2, ti.f64, shape=capacity.units)
+
+    def load(self, model):
+        """Let every unit be intact."""
+        stiffness = np.repeat(model.bond_stiffness[:, 0], 3)
+        onset = model.material.tensile_strength / stiffness
+        assign(self.unit, np.stack([onset, stiffness], axis=1))
 
     def state(self):
         """Elastic limit [m] and secant stiffness [Pa/m] of every unit."""
         return {"softening_unit": self.unit}
 
-    @ti.kernel
-    def _reset(self):
-        for b in range(self.model.bond_count):
-            for q in range(3):
-                self.unit[3 * b + q] = vec2(self._onset(b), self.model.bond_stiffness[b][0])
-
     @ti.func
     def _onset(self, b):
-        return self.law[0] / self.model.bond_stiffness[b][0]
+        return self.law[0] / self.tables.bond_stiffness[b][0]
 
     @ti.func
     def traction(self, stiffness, u, opening):
@@ -64,7 +65,7 @@ class Softening(Effect):
     @ti.func
     def stored(self, b, u, opening):
         """Elastic energy per area [J/m^2] at the present stiffness."""
-        stiffness = self.model.bond_stiffness[b][0]
+        stiffness = self.tables.bond_stiffness[b][0]
         if opening > 0.0:
             stiffness = self.unit[u][1]
         return 0.5 * stiffness * opening * opening

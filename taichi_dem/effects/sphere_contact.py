@@ -2,7 +2,7 @@
 
 import taichi as ti
 
-from taichi_dem.effects.base import Effect, parameters
+from taichi_dem.effects.base import Effect
 from taichi_dem.kit.validation import flag, positive, whole
 from taichi_dem.physics.sphere_pair import normal_force
 
@@ -41,11 +41,19 @@ class SphereContact(Effect):
         self.pairs_per_body = whole("pairs_per_body", pairs_per_body, 1, _MOST)
         self.spheres_per_body = whole("spheres_per_body", spheres_per_body, 1, _MOST)
 
-    def bind(self, model):
-        """Take stiffness [N/m] and damping [N s/m] of a contact from the material."""
-        self.law = parameters(
-            stiffness=model.material.contact_stiffness, damping=model.material.contact_damping
-        )
+    @property
+    def face_spheres(self) -> int:
+        """Spheres on a face."""
+        return (self.divisions - 1) * (self.divisions - 2) // 2
+
+    @property
+    def lengths(self) -> tuple:
+        """Entries for each body in the lists of pairs, sphere pairs and neighbours."""
+        return self.pairs_per_body, self.spheres_per_body, self.neighbours_per_body
+
+    def numbers(self, material):
+        """Stiffness [N/m] and damping [N s/m] of a contact."""
+        return material.contact_stiffness, material.contact_damping
 
     @ti.func
     def normal(self, overlap, opening_rate):

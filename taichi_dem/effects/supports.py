@@ -5,8 +5,8 @@ import math
 import numpy as np
 import taichi as ti
 
-from taichi_dem.effects.base import Effect, along, parameters
-from taichi_dem.kit.allocation import defer_fill
+from taichi_dem.effects.base import Effect, along
+from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.types import vec3
 from taichi_dem.kit.validation import direction, positive, shown, word
@@ -27,14 +27,16 @@ class _Support(Effect):
         """None: it holds what it acts on."""
         return (0.0,) * 3, (0.0,) * 3
 
-    def bind(self, model):
+    def declare(self, capacity):
+        """Marks of the supported bodies."""
+        self.marked = ti.field(ti.i32, shape=capacity.bodies)
+
+    def load(self, model):
         """Mark the supported bodies; InputError when the mesh has no such group."""
-        self.model = model
         body, _ = faces_of_group(model.mesh, model.topology, self.group)
         marks = np.zeros(model.body_count, dtype=np.int32)
         marks[body] = 1
-        self.marked = ti.field(ti.i32, shape=model.body_count)
-        defer_fill(self.marked.from_numpy, marks)
+        assign(self.marked, marks)
 
     @ti.func
     def acts_on(self, i):
@@ -70,19 +72,18 @@ class Roller(_Support):
             raise InputError(f"normal must be longer than zero, got {shown(normal)}")
         self._normal = numbers / np.linalg.norm(numbers)
 
-    def bind(self, model):
-        """Mark the supported bodies and keep the unit normal."""
-        _Support.bind(self, model)
-        self.normal = parameters(x=self._normal[0], y=self._normal[1], z=self._normal[2])
+    def numbers(self, material):
+        """Unit normal, three components."""
+        return tuple(self._normal)
 
     @ti.func
     def held(self, i, t, rotation, velocity, angular_momentum):
         """Velocity within the plane, spin about its normal."""
-        normal = vec3(self.normal[0], self.normal[1], self.normal[2])
+        normal = vec3(self.law[0], self.law[1], self.law[2])
         axis = rotation.transpose() @ normal
         # The plane's moment is across the normal: what there is along it stays.
-        spin = angular_momentum.dot(normal) / axis.dot(self.model.inertia[i] @ axis)
-        kept = rotation @ (self.model.inertia[i] @ (spin * axis))
+        spin = angular_momentum.dot(normal) / axis.dot(self.tables.inertia[i] @ axis)
+        kept = rotation @ (self.tables.inertia[i] @ (spin * axis))
         return velocity - velocity.dot(normal) * normal, kept
 
 
@@ -100,11 +101,9 @@ class PrescribedMotion(_Support):
         self._velocity = direction("velocity", velocity)
         self._frequency = positive("frequency", frequency, zero_allowed=True)
 
-    def bind(self, model):
-        """Mark the supported bodies and keep the motion."""
-        _Support.bind(self, model)
-        x, y, z = self._velocity
-        self.motion = parameters(x=x, y=y, z=z, rate=2.0 * math.pi * self._frequency)
+    def numbers(self, material):
+        """Velocity [m/s], three components, and angular frequency [rad/s]."""
+        return (*self._velocity, 2.0 * math.pi * self._frequency)
 
     def travel(self):
         """As far as it swings, or without end along a constant velocity."""
@@ -116,5 +115,5 @@ class PrescribedMotion(_Support):
     @ti.func
     def held(self, i, t, rotation, velocity, angular_momentum):
         """The prescribed velocity at time t [s] and no spin."""
-        amplitude = vec3(self.motion[0], self.motion[1], self.motion[2])
-        return amplitude * ti.cos(self.motion[3] * t), zero3()
+        amplitude = vec3(self.law[0], self.law[1], self.law[2])
+        return amplitude * ti.cos(self.law[3] * t), zero3()

@@ -3,7 +3,7 @@
 import numpy as np
 import taichi as ti
 
-from taichi_dem.kit.allocation import defer_fill
+from taichi_dem.kit.allocation import assign, values
 from taichi_dem.kit.types import real, vec3, vec4
 from taichi_dem.physics.rotation import rotation_matrix, spin_of
 from taichi_dem.timeline import NEVER
@@ -32,9 +32,9 @@ class State:
     lowest body out of bounds, body_count if none.
     """
 
-    def __init__(self, model, max_speed):
-        n, bonds = model.body_count, max(1, model.bond_count)
-        self.model = model
+    def __init__(self, tables):
+        n, bonds = tables.capacity.bodies, tables.capacity.bonds
+        self.tables = tables
         self.position = ti.Vector.field(3, real, shape=n)
         self.orientation = ti.Vector.field(4, real, shape=n)
         self.rotation = ti.Matrix.field(3, 3, real, shape=n)
@@ -44,24 +44,29 @@ class State:
         self.level = ti.field(ti.i32, shape=n)
         self.bound = ti.field(ti.i32, shape=n)
         self.last_tick = ti.field(ti.i64, shape=n)
-        self.slot = ti.Vector.field(6, real, shape=4 * n)
+        self.slot = ti.Vector.field(6, real, shape=tables.capacity.faces)
         self.broken_tick = ti.field(ti.i64, shape=bonds)
-        if model.has_bond_heat:
+        if tables.has_bond_heat:
             self.bond_heat = ti.Vector.field(3, real, shape=bonds)
-        if model.has_contact:
-            self.exposed_tick = ti.field(ti.i64, shape=4 * n)
-            defer_fill(self.exposed_tick.fill, NEVER)
+        if tables.has_contact:
+            self.exposed_tick = ti.field(ti.i64, shape=tables.capacity.faces)
             self.contact_heat = ti.Vector.field(3, real, shape=n)
             self.injected_tick = ti.field(ti.i64, shape=())
-        self.load_work = ti.Vector.field(len(model.loads) + 1, real, shape=n)
+        self.load_work = ti.Vector.field(len(tables.loads) + 1, real, shape=n)
         self.load_impulse = ti.Vector.field(6, real, shape=n)
         self.tick = ti.field(ti.i64, shape=())
         self.bad_body = ti.field(ti.i32, shape=())
         self.max_speed2 = ti.field(real, shape=())
-        defer_fill(self.max_speed2.fill, max_speed**2)
-        defer_fill(self.broken_tick.fill, NEVER)
-        defer_fill(self.bad_body.fill, n)
-        defer_fill(self.set_motion, model.centre, np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)))
+
+    def load(self, model, max_speed):
+        """Put the bodies where the mesh has them, at rest; all fields are zero before."""
+        n = model.body_count
+        if self.tables.has_contact:
+            assign(self.exposed_tick, np.full(4 * n, NEVER))
+        assign(self.max_speed2, max_speed**2)
+        assign(self.broken_tick, np.full(model.bond_count, NEVER))
+        assign(self.bad_body, n)
+        self.set_motion(model.centre, np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)))
 
     def set_motion(self, position, orientation, velocity=None, spin=None):
         """Set the motion of all bodies.
@@ -69,7 +74,7 @@ class State:
         position (n, 3) [m], orientation (n, 4) unit quaternions, velocity (n, 3) [m/s] and spin
         (n, 3) [rad/s] in world axes, zero by default.
         """
-        still = np.zeros((self.model.body_count, 3))
+        still = np.zeros((self.body_count, 3))
         arrays = (position, orientation, still if velocity is None else velocity)
         arrays = (*arrays, still if spin is None else spin)
         self._write_motion(*(np.ascontiguousarray(a, dtype=np.float64) for a in arrays))
@@ -82,7 +87,7 @@ class State:
         velocity: ti.types.ndarray(dtype=ti.f64, ndim=2),
         spin: ti.types.ndarray(dtype=ti.f64, ndim=2),
     ):
-        for i in range(self.model.body_count):
+        for i in range(self.tables.body_count[None]):
             self.position[i] = vec3(position[i, 0], position[i, 1], position[i, 2])
             turn = vec4(0.0)
             for k in ti.static(range(4)):
@@ -94,14 +99,19 @@ class State:
             w = vec3(spin[i, 0], spin[i, 1], spin[i, 2])
             self.spin[i] = w
             self.angular_momentum[i] = rotation @ (
-                self.model.inertia[i] @ (rotation.transpose() @ w)
+                self.tables.inertia[i] @ (rotation.transpose() @ w)
             )
+
+    @property
+    def body_count(self) -> int:
+        """Bodies of the scene."""
+        return int(values(self.tables.body_count))
 
     def expose(self, topology):
         """Let all outer faces carry contact spheres from the start, beside those that do."""
-        marks = self.exposed_tick.to_numpy()
+        marks = values(self.exposed_tick)
         marks[4 * topology.outer_body + topology.outer_face] = 0
-        self.exposed_tick.from_numpy(marks)
+        assign(self.exposed_tick, marks)
 
     def motion(self):
         """Arrays of the bodies' motion by name.
@@ -109,7 +119,7 @@ class State:
         position, velocity, spin, angular_momentum (n, 3), orientation (n, 4), rotation (n, 3, 3)
         and level (n,).
         """
-        table = np.zeros((self.model.body_count, 26))
+        table = np.zeros((self.body_count, 26))
         self._read_motion(table)
         widths = (("position", 3), ("orientation", 4), ("velocity", 3), ("spin", 3))
         parts, start = {}, 0
@@ -122,9 +132,9 @@ class State:
 
     @ti.kernel
     def _read_motion(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
-        for i in range(self.model.body_count):
+        for i in range(self.tables.body_count[None]):
             rotation = self.rotation[i]
-            spin = spin_of(rotation, self.model.inertia_inverse[i], self.angular_momentum[i])
+            spin = spin_of(rotation, self.tables.inertia_inverse[i], self.angular_momentum[i])
             for k in ti.static(range(3)):
                 table[i, k] = self.position[i][k]
                 table[i, 7 + k] = self.velocity[i][k]
@@ -139,6 +149,6 @@ class State:
     def fields(self):
         """Every field that changes, by name, the bound effects' state included."""
         own = {k: v for k, v in vars(self).items() if isinstance(v, (ti.Field,))}
-        for effect in self.model.effects:
+        for effect in self.tables.effects:
             own.update(effect.state())
         return own

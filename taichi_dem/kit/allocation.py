@@ -1,6 +1,6 @@
 """Field trees: fields declared in one block, allocated together, read and written in place.
 
-Taichi crashes beyond 512 field trees a session and never frees one of them by itself. So each engine
+Taichi crashes beyond 512 field trees a session and never frees one by itself. So each engine
 declares all of its fields in the block of one ``FieldTree``, which owns their memory.
 On a CPU an array lies where each field does (``array_of``): reading or writing compiles nothing.
 """
@@ -36,6 +36,8 @@ class FieldTree:
     or the session has no room for another tree.
     """
 
+    scratch_fields = ("_anchor",)
+
     def __init__(self, advice="take a smaller one"):
         self.advice, self.bytes, self._tree = advice, 0, None
 
@@ -57,12 +59,14 @@ class FieldTree:
         impl.get_runtime().initialize_fields_builder(self._builder)
         self._tree = self._builder.finalize(raise_warning=False)
         if impl.current_cfg().arch != ti.cuda:
-            _bases[self._tree.id] = _address(self._anchor) - _offset(self._anchor.snode.ptr)
+            address = _address(self._anchor) - _offset(self._anchor.snode.ptr)[1]
+            _base(self._builder.root.ptr)
+            _bases[self._builder.root.ptr.id] = address
 
     def memory(self) -> np.ndarray:
         """Array of all bytes of the tree, in place; on a CPU only."""
         size = self._builder.root.ptr.cell_size_bytes
-        return _array_at(_bases[self._tree.id], np.uint8, (size,))
+        return _array_at(_base(self._builder.root.ptr), np.uint8, (size,))
 
     def clear(self):
         """Set all fields to zero."""
@@ -71,13 +75,28 @@ class FieldTree:
 
     def destroy(self):
         """Give the memory back; the fields must not be used any more."""
-        _bases.pop(self._tree.id, None)
+        _bases.pop(self._builder.root.ptr.id, None)
         self._tree.destroy()
         self._tree = None
 
 
-#: Addresses of the trees of the session by their numbers.
+#: Addresses of the trees of the session by their roots, and the session's program.
 _bases: dict = {}
+_bases_of = None
+
+
+def _base(root) -> int:
+    """Address of a tree of the present session by its root; 0 for one that is no ``FieldTree``."""
+    global _bases_of
+    if _bases_of is not impl.get_runtime().prog:
+        _bases_of = impl.get_runtime().prog
+        _bases.clear()
+    return _bases.get(root.id, 0)
+
+
+def in_tree(field) -> bool:
+    """Whether a field lies in a ``FieldTree``, on a CPU."""
+    return _base(_offset(_first_scalar(field).snode.ptr)[0]) != 0
 
 
 def array_of(field) -> np.ndarray:
@@ -96,13 +115,13 @@ def array_of(field) -> np.ndarray:
         entry = (field.n,) if field.ndim == 1 else (field.n, field.m)
         steps = (kind.itemsize,) if field.ndim == 1 else (field.m * kind.itemsize, kind.itemsize)
         shape, strides = shape + entry, strides + steps
-    base = _bases[first.get_snode_tree_id()]
-    return _array_at(base + _offset(first), kind, shape, strides)
+    root, offset = _offset(first)
+    return _array_at(_base(root) + offset, kind, shape, strides)
 
 
 def values(field) -> np.ndarray:
     """Copy of all entries of a field."""
-    if impl.current_cfg().arch == ti.cuda:
+    if impl.current_cfg().arch == ti.cuda or not in_tree(field):
         return field.to_numpy()
     ti.sync()
     return array_of(field).copy()
@@ -115,7 +134,7 @@ def assign(field, array):
     """
     if np.ndim(array) == 0 and field.shape:
         array = np.full(values(field).shape, array)
-    if impl.current_cfg().arch == ti.cuda:
+    if impl.current_cfg().arch == ti.cuda or not in_tree(field):
         whole = field.to_numpy()
         whole[slice(len(array)) if whole.ndim else ()] = array
         field.from_numpy(whole)
@@ -174,13 +193,13 @@ def _first_scalar(field):
     return field.get_scalar_field(*((0,) if field.ndim == 1 else (0, 0)))
 
 
-def _offset(node) -> int:
-    """Bytes from the beginning of its tree to a node."""
+def _offset(node) -> tuple:
+    """Root of the tree of a node, and bytes from the tree's beginning to the node."""
     offset = 0
     while node.parent is not None:
         offset += node.offset_bytes_in_parent_cell
         node = node.parent
-    return offset
+    return node, offset
 
 
 def _address(field) -> int:
@@ -237,13 +256,18 @@ def defer_fill(load, *arguments):
 
 def check_capacity():
     """Raise InputError when the session has no room for more fields."""
-    program = impl.get_runtime().prog
-    trees = program.get_snode_tree_size() if program is not None else 0
+    trees = tree_count()
     if trees > MOST_TREES:
         raise InputError(
             f"groups of fields in a Taichi session must stay below {MOST_TREES}, got {trees}: "
-            "call runtime.stop() and runtime.start() after some hundred simulations"
+            "call runtime.clear() after some hundred kinds of scenes"
         )
+
+
+def tree_count() -> int:
+    """Field trees of the session."""
+    program = impl.get_runtime().prog
+    return program.get_snode_tree_size() if program is not None else 0
 
 
 def field_bytes():

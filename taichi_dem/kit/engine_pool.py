@@ -1,8 +1,8 @@
 """Engines of a session: what is compiled once for a structure and then runs any scene of it.
 
 An engine owns the fields and kernels of one structure, with a capacity. A scene that fits is loaded
-into it in milliseconds; a larger one gets a larger engine. Several scenes may be alive on one engine
-at once: they take turns, and the data of those that wait are kept aside, bit for bit.
+into it in milliseconds; a larger one gets a larger engine. Several scenes may be alive on one
+engine at once: they take turns, and the data of those that wait are kept aside, bit for bit.
 
 Each kind of engine has an ``EnginePool``. A simulation borrows an engine from it as a ``Loan`` and
 asks ``loan.activate()`` before it touches a field.
@@ -42,6 +42,9 @@ class Engine:
     def accepts(self, scene) -> bool:
         """Whether a scene of the engine's structure and size can run in it as it is compiled."""
         return True
+
+    def enter(self, scene):
+        """Note on the host whose data are coming to the device."""
 
     def fits(self, size) -> bool:
         """Whether so many of each find room."""
@@ -104,11 +107,12 @@ def _memory_of(engine):
 class Loan:
     """The right to an engine: data of one owner, on the device or kept aside.
 
-    engine: the engine borrowed. what: the owner in words, such as "simulation".
+    engine: the engine borrowed. scene: what runs in it. what: the owner in words, such as
+    "simulation".
     """
 
-    def __init__(self, pool, engine, what):
-        self.pool, self.engine, self.what = pool, engine, what
+    def __init__(self, pool, engine, scene, what):
+        self.pool, self.engine, self.scene, self.what = pool, engine, scene, what
         self.session, self._aside = runtime.session(), None
 
     def activate(self):
@@ -121,6 +125,11 @@ class Loan:
         holder = self.engine._holder() if self.engine._holder is not None else None
         if holder is self:
             return
+        if not self.engine.accepts(self.scene):
+            # Another owner has had the kernels compiled with numbers of its own.
+            self.engine = self.pool.another(self.engine, self.scene)
+            self.activate()
+            return
         memory = _memory_of(self.engine)
         if holder is not None:
             holder._aside = memory.read()
@@ -128,14 +137,30 @@ class Loan:
             memory.write(self._aside)
             self._aside = None
         self.engine._holder = weakref.ref(self)
+        self.engine.enter(self.scene)
 
-    def move(self, engine):
-        """Take the data along to another engine of the same structure and capacity."""
-        self.activate()
-        self._aside = _memory_of(self.engine).read()
-        self.engine._holder = None
-        self.engine = engine
-        self.activate()
+
+class LoanMemory:
+    """All fields of a loan that change in a run, by name, as ``FieldMemory`` reads and writes."""
+
+    def __init__(self, loan):
+        self.loan = loan
+
+    def _memory(self):
+        self.loan.activate()
+        return FieldMemory(self.loan.engine)
+
+    def read(self):
+        """Copies of all fields as arrays by name."""
+        return self._memory().read()
+
+    def misfit(self, arrays):
+        """Name of a field that arrays lack or do not fit; else ""."""
+        return self._memory().misfit(arrays)
+
+    def write(self, arrays):
+        """Give all fields their values back."""
+        self._memory().write(arrays)
 
 
 class EnginePool:
@@ -165,7 +190,16 @@ class EnginePool:
             capacity = [power_of_two(wanted, low) for wanted, low in zip(size, self.least)]
             fitting = [self.kind(structure, capacity)]
             engines += fitting
-        return Loan(self, min(fitting, key=lambda engine: engine.tree.bytes), what)
+        return Loan(self, min(fitting, key=lambda engine: engine.tree.bytes), scene, what)
+
+    def another(self, engine, scene):
+        """An engine like one of those here, of the same capacity, that accepts a scene."""
+        engines = self._engines[engine.structure]
+        for other in engines:
+            if other.capacity == engine.capacity and other.accepts(scene):
+                return other
+        engines.append(self.kind(engine.structure, engine.capacity))
+        return engines[-1]
 
     @property
     def count(self) -> int:

@@ -1,6 +1,5 @@
 """All fields of an object, found by walking through it, and their bits, read and written fast."""
 
-import ctypes
 import types
 from typing import NamedTuple
 
@@ -11,10 +10,10 @@ from taichi.lang.matrix import MatrixField
 from taichi.lang.struct import StructField
 from taichi.lang.util import to_numpy_type
 
+from taichi_dem.kit.allocation import array_of, in_tree
+
 #: What is looked into for fields: all objects but those of these libraries.
 _FOREIGN = ("taichi", "numpy", "builtins")
-#: Members of a static loop beyond which Taichi warns.
-_UNROLLED = 32
 
 
 class FieldOf(NamedTuple):
@@ -69,7 +68,8 @@ def _declared(owner, name):
 class FieldMemory:
     """Reads and writes the fields of an object bit by bit; kind: as in ``FieldOf``.
 
-    On a CPU where they lie: Taichi's own way compiles two kernels a field, 20 s for a block.
+    On a CPU where they lie, if they are in a ``FieldTree``: Taichi's own way compiles two kernels
+    a field.
     """
 
     def __init__(self, root, kind="saved"):
@@ -77,7 +77,8 @@ class FieldMemory:
         self.fields = {one.name: one.field for one in kept}
         self.views = {}
         if impl.current_cfg().arch != ti.cuda:
-            self.views = _views(self.fields)
+            inside = {name: field for name, field in self.fields.items() if in_tree(field)}
+            self.views = {name: array_of(field) for name, field in inside.items()}
 
     def read(self):
         """Copies of all fields as arrays by name, without the zeros at their ends."""
@@ -123,45 +124,3 @@ def _shape(field):
     if isinstance(field, MatrixField):
         entry = (field.n,) if field.ndim == 1 else (field.n, field.m)
     return (*field.shape, *entry)
-
-
-def _views(fields):
-    """Arrays by name that lie where the fields do, of those whose entries lie side by side."""
-    found = {}
-    for (name, field), (first, last) in zip(fields.items(), _addresses(fields.values())):
-        kind, shape = np.dtype(to_numpy_type(field.dtype)), _shape(field)
-        size = int(np.prod(shape, dtype=np.int64)) * kind.itemsize
-        if last - first + kind.itemsize == size:
-            memory = (ctypes.c_char * size).from_address(first)
-            found[name] = np.frombuffer(memory, dtype=kind).reshape(shape)
-    return found
-
-
-def _addresses(fields):
-    """Addresses of the first number of each field and of its last, as a list of pairs."""
-    asked = []
-    for field in fields:
-        ends = [0] * len(field.shape), [length - 1 for length in field.shape]
-        parts = (field, field)
-        if isinstance(field, MatrixField):
-            parts = [field.get_scalar_field(*place) for place in _corners(field)]
-        asked += list(zip(parts, ends))
-    numbered = [(place, *end) for place, end in enumerate(asked)]
-    groups = [tuple(numbered[k : k + _UNROLLED]) for k in range(0, len(asked), _UNROLLED)]
-
-    @ti.kernel
-    def ask(found: ti.types.ndarray(dtype=ti.u64, ndim=1)):
-        """Fill in the addresses."""
-        for _ in range(1):
-            for group in ti.static(tuple(groups)):
-                for place, field, index in ti.static(group):
-                    found[place] = ti.get_addr(field, index)
-
-    found = np.zeros(len(asked), dtype=np.uint64)
-    ask(found)
-    return found.reshape(-1, 2).tolist()
-
-
-def _corners(field):
-    """Places of the first and the last component of a matrix or vector field."""
-    return ((0,), (field.n - 1,)) if field.ndim == 1 else ((0, 0), (field.n - 1, field.m - 1))

@@ -11,22 +11,19 @@ from taichi_dem.kit.checkpoint import (
     write_checkpoint,
 )
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.field_memory import FieldMemory
 from taichi_dem.kit.files import output_folder
 
 
 class RunSnapshot:
     """All of a run that changes: the fields on the device and what its owners hold beside them.
 
-    identity: what two runs must share for one to go on from the other, words by name. root: of
-    which all fields are taken, or what reads and writes them as ``FieldMemory`` does. owners: by
-    name, objects with ``saved()``, which gives arrays by name, and ``resume(arrays)``, which takes
-    them over.
+    identity: what two runs must share for one to go on from the other, words by name. memory: of
+    the fields, as ``FieldMemory`` or ``engine_pool.LoanMemory``. owners: by name, objects with
+    ``saved()``, which gives arrays by name, and ``resume(arrays)``, which takes them over.
     """
 
-    def __init__(self, identity, root, owners):
-        self.identity, self.owners = identity, owners
-        self.memory = root if hasattr(root, "misfit") else FieldMemory(root)
+    def __init__(self, identity, memory, owners):
+        self.identity, self.memory, self.owners = identity, memory, owners
 
     def write(self, path):
         """Save the run as it is, between two steps. Raises InputError."""

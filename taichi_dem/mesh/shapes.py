@@ -69,6 +69,24 @@ def bar(length, width, cells) -> Mesh:
     return checked_mesh(points, tetrahedra, _sides(grid.reshape(-1, 3), cells, tetrahedra))
 
 
+def placed_together(parts) -> Mesh:
+    """Several solids that do not touch as one mesh; bodies in the order of the parts.
+
+    parts: name -> (mesh, shift (3,) [m]). Groups: those of every part as NAME_GROUP, and, under
+    its own name, a group of all parts together. Raises InputError as ``checked_mesh``.
+    """
+    points, tetrahedra, groups, first = [], [], {}, 0
+    for name, (mesh, shift) in parts.items():
+        points.append(mesh.points + np.asarray(shift))
+        tetrahedra.append(mesh.tetrahedra + first)
+        for group, faces in mesh.groups.items():
+            groups[f"{name}_{group}"] = faces + first
+            groups.setdefault(group, []).append(faces + first)
+        first += mesh.point_count
+    joined = {key: np.vstack(faces) for key, faces in groups.items()}
+    return checked_mesh(np.vstack(points), np.vstack(tetrahedra), joined)
+
+
 def _base(edge, height):
     """Equilateral triangle in x = 0 about the origin, normal +x, and the apex height [m]."""
     edge = positive("edge", edge)

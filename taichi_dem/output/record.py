@@ -5,7 +5,6 @@ import re
 from dataclasses import dataclass, fields
 
 import numpy as np
-import taichi as ti
 
 from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.files import output_folder, remove_files, write_csv
@@ -62,7 +61,6 @@ class Frame:
         return np.linalg.norm(self.velocity, axis=1)
 
 
-@ti.data_oriented
 class Recorder:
     """Collects samples and frames of a simulation.
 
@@ -108,20 +106,22 @@ class Recorder:
 
     def snapshot(self):
         """Keep the block as it is now."""
+        self.frames.append(self.frame())
+
+    def frame(self):
+        """The block as it is now, a Frame."""
         motion = self.state.motion()
         damage = np.zeros(max(1, self.model.bond_count))
-        self._read_damage(damage)
-        self.frames.append(
-            Frame(
-                time_s=self.simulation.time_s,
-                position=motion["position"],
-                rotation=motion["rotation"],
-                displacement=motion["position"] - self.model.centre,
-                velocity=motion["velocity"],
-                level=motion["level"],
-                damage=self._body_damage(damage),
-                bound=self.state.bound.to_numpy(),
-            )
+        self.simulation.readings.damage(damage)
+        return Frame(
+            time_s=self.simulation.time_s,
+            position=motion["position"],
+            rotation=motion["rotation"],
+            displacement=motion["position"] - self.model.centre,
+            velocity=motion["velocity"],
+            level=motion["level"],
+            damage=self._body_damage(damage),
+            bound=self.state.bound.to_numpy(),
         )
 
     def saved(self):
@@ -145,15 +145,6 @@ class Recorder:
             Frame(time_s, **dict(zip(stacks, arrays)))
             for time_s, *arrays in zip(times, *stacks.values())
         ]
-
-    @ti.kernel
-    def _read_damage(self, damage: ti.types.ndarray(dtype=ti.f64, ndim=1)):
-        for b in range(self.model.bond_count):
-            damage[b] = 1.0
-            if self.state.broken_tick[b] < 0:
-                damage[b] = 0.0
-                for q in range(3):
-                    damage[b] = damage[b] + self.model.tension.damage(b, 3 * b + q) / 3.0
 
     def _body_damage(self, damage):
         bond = self.model.topology.body_bond

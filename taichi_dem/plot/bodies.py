@@ -3,6 +3,7 @@
 import numpy as np
 from matplotlib.collections import PolyCollection
 
+from taichi_dem.plot.block import displaced
 from taichi_dem.plot.view import View, surface
 
 
@@ -26,3 +27,31 @@ def draw_bodies(axes, model, motion, values, *, magnify, limits, colours, broken
     axes.set_aspect("equal")
     axes.grid(False)
     return drawn
+
+
+class FilmedBodies:
+    """Bodies of a film in a panel of their own, the displacement magnified, coloured by a value.
+
+    margins: beside the bodies, to the left, right, below and above [m]. axis: towards the viewer.
+    look: of the ``PolyCollection`` ``drawn``.
+    """
+
+    def __init__(self, axes, model, magnify, margins, axis=(0.0, 0.0, 1.0), **look):
+        self.axes, self.model, self.magnify, self.view = axes, model, magnify, View(axis)
+        flat = self.view.project(model.mesh.points)
+        low, high = flat.min(axis=0), flat.max(axis=0)
+        left, right, below, above = margins
+        axes.set(xlim=(low[0] - left, high[0] + right), ylim=(low[1] - below, high[1] + above))
+        axes.set_aspect("equal")
+        axes.set_axis_off()
+        self.drawn = PolyCollection([], **look)
+        axes.add_collection(self.drawn)
+
+    def show(self, frame, values, broken=None):
+        """Show a ``Frame``. values: of the bodies. broken: (bond_count,) bool, None for none."""
+        if broken is None:
+            broken = np.zeros(self.model.bond_count, dtype=bool)
+        corners = displaced(self.model, frame, self.magnify)
+        polygons, body, _ = surface(self.model.topology, self.view, corners, broken)
+        self.drawn.set_verts(polygons)
+        self.drawn.set_array(values[body])

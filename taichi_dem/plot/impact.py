@@ -1,19 +1,16 @@
 """A fragment hits a bar: bodies by their step, motion of the ends, evaluations of each method.
 
-An impact has: name (of its method), simulation, frames, time [s], struck and far [m] (displacements
-of the bar's ends), levels
-(frames, bodies), evaluations and broken; one entry a frame.
+An impact has: name (of its method), result, model, frames, time [s], struck and far [m]
+(displacements of the bar's ends), levels (frames, bodies) and evaluations; one entry a frame.
 """
 
 import matplotlib
 import numpy as np
-from matplotlib.collections import PolyCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap
 
 from taichi_dem.kit.plot_style import BLACK, GREY, picture, seconds, styles_of
-from taichi_dem.plot.block import displaced
+from taichi_dem.plot.bodies import FilmedBodies
 from taichi_dem.plot.film import moving_picture
-from taichi_dem.plot.view import View, surface
 
 #: Of the displacement in the film.
 _MAGNIFY = 40.0
@@ -72,7 +69,7 @@ def film_impact(path, base, other, dt0, count):
         way.legend(loc="lower right")
         for row in np.linspace(0, len(base.time) - 1, count).round().astype(int):
             for block, impact, line in zip(blocks, (base, other), lines):
-                block.show(row)
+                block.show_row(row)
                 line.set_data(1e6 * impact.time[: row + 1], 1e6 * impact.struck[: row + 1])
             shoot()
 
@@ -81,36 +78,25 @@ def _shades(count):
     return matplotlib.colormaps["magma_r"](np.linspace(0.04, 0.9, max(2, count)))
 
 
-class _Block:
-    """Bar and fragment from the side, coloured by level, displacement magnified."""
+class _Block(FilmedBodies):
+    """Bar and fragment from the side, coloured by level."""
 
     def __init__(self, axes, impact, top):
-        self.impact, self.model, self.view = impact, impact.simulation.model, View()
-        flat = self.view.project(self.model.mesh.points)
-        low, high = flat.min(axis=0), flat.max(axis=0)
-        axes.set(xlim=(low[0] - 0.08, high[0] + 0.02), ylim=(low[1] - 0.03, high[1] + 0.03))
-        end = self.model.mesh.group_faces("bar_right")
+        points = impact.model.mesh.points
+        self.impact, self.name = impact, styles_of([impact.name])[impact.name].label
+        end = points[impact.model.mesh.group_faces("bar_right")]
+        self.end, self.height = end.mean(axis=(0, 1))[0], (points[:, 1].min(), points[:, 1].max())
         (self.edge,) = axes.plot([], [], color=BLACK, linewidth=1.6)
-        self.end, self.height = self.model.mesh.points[end].mean(axis=(0, 1))[0], (low[1], high[1])
-        axes.set_aspect("equal")
-        axes.set_axis_off()
         norm = BoundaryNorm(np.arange(top + 1) - 0.5, top)
-        shades = ListedColormap(_shades(top)[:top])
-        self.drawn = PolyCollection([], cmap=shades, norm=norm, linewidth=0.25, edgecolor=GREY)
-        axes.add_collection(self.drawn)
-        self.axes, self.name = axes, styles_of([impact.name])[impact.name].label
-        self.broken_tick = impact.simulation.state.broken_tick.to_numpy()[: self.model.bond_count]
-        self.tick = impact.simulation.schedule.tick_seconds
+        look = {"cmap": ListedColormap(_shades(top)[:top]), "norm": norm}
+        look.update(linewidth=0.25, edgecolor=GREY)
+        super().__init__(axes, impact.model, _MAGNIFY, (0.08, 0.02, 0.03, 0.03), **look)
 
-    def show(self, row):
+    def show_row(self, row):
         """Show a frame by its number."""
         frame, impact = self.impact.frames[row], self.impact
-        broken = (self.broken_tick >= 0) & (self.broken_tick * self.tick <= frame.time_s)
-        corners = displaced(self.model, frame, _MAGNIFY)
-        polygons, body, _ = surface(self.model.topology, self.view, corners, broken)
-        self.drawn.set_verts(polygons)
-        self.drawn.set_array(frame.level[body].astype(float))
+        broken = impact.result.broken_time <= frame.time_s
+        self.show(frame, frame.level.astype(float), broken)
         self.edge.set_data([self.end - _MAGNIFY * impact.struck[row]] * 2, self.height)
         count = f"{1e-6 * impact.evaluations[row]:.1f} million evaluations"
-        text = f"{self.name}:\n{count} after {1e6 * frame.time_s:.0f} µs"
-        self.axes.set_title(text)
+        self.axes.set_title(f"{self.name}:\n{count} after {1e6 * frame.time_s:.0f} µs")

@@ -1,19 +1,18 @@
 """Runs with steps that are too large: energy from nowhere, and what a block looks like then.
 
 A run has: limit (what sets it), share (of the limit), step [s], time [s] and residual (over the
-energy put in by then), simulation, frames, speeds (of the bodies' corners [m/s], (frames,
+energy put in by then), model, frames, speeds (of the bodies' corners [m/s], (frames,
 bodies)), sentence (of its end; "" when it ended well).
 """
 
 import textwrap
 
 import numpy as np
-from matplotlib.collections import PolyCollection
 
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, ORANGE, RED, picture, seconds
-from taichi_dem.plot.block import displaced
+from taichi_dem.plot.bodies import FilmedBodies
 from taichi_dem.plot.film import moving_picture
-from taichi_dem.plot.view import View, surface
+from taichi_dem.plot.view import View
 
 #: Of the displacement in the film.
 _MAGNIFY = 6000.0
@@ -80,7 +79,7 @@ def film_shaken(path, safe, bad, count):
         energy.legend(loc="upper left")
         for now in _instants(end, count):
             for block in blocks:
-                block.show(now)
+                block.show_at(now)
             for line, time, values in curves:
                 line.set_data(time[time <= 1e6 * now], values[time <= 1e6 * now])
             said.set_text(textwrap.fill(bad.sentence, 66) if now == end else "")
@@ -100,36 +99,25 @@ def _curve(axes, made, colour):
     return line, 1e6 * made.time, shown
 
 
-class _Block:
-    """The block of a run, magnified and coloured by speed, over the velocities of its bodies."""
+class _Block(FilmedBodies):
+    """The block of a run, coloured by speed, over the velocities of its bodies."""
 
     def __init__(self, figure, place, below, made, fastest):
-        axes, speeds = figure.add_subplot(place), figure.add_subplot(below)
-        self.made, self.model, self.view = made, made.simulation.model, View(_AXIS)
-        self.whole = np.zeros(self.model.bond_count, dtype=bool)
-        flat = self.view.project(self.model.mesh.points)
-        low, high = flat.min(axis=0), flat.max(axis=0)
-        pad = 0.16 * (high - low).max()
-        axes.set(xlim=(low[0] - pad, high[0] + pad), ylim=(low[1] - pad, high[1] + pad))
-        axes.set_aspect("equal")
-        axes.set_axis_off()
-        self.drawn = PolyCollection([], cmap="YlOrRd", linewidth=0.3, edgecolor=BLACK)
+        axes, speeds, self.made = figure.add_subplot(place), figure.add_subplot(below), made
+        points = made.model.mesh.points
+        pad = 0.16 * np.ptp(View(_AXIS).project(points), axis=0).max()
+        look = {"cmap": "YlOrRd", "linewidth": 0.3, "edgecolor": BLACK}
+        super().__init__(axes, made.model, _MAGNIFY, (pad,) * 4, _AXIS, **look)
         self.drawn.set_clim(0.0, fastest)
-        axes.add_collection(self.drawn)
-        self.axes = axes
-        self.along = self.model.centre[:, 0]
         (self.dots,) = speeds.plot([], [], ".", ms=2.5, color=BLUE)
-        speeds.set(xlim=(0.0, self.model.mesh.points[:, 0].max()), xlabel="place [m]")
+        speeds.set(xlim=(0.0, points[:, 0].max()), xlabel="place [m]")
         speeds.set(yscale="log", ylim=(1e-4 * fastest, 1e2 * fastest), ylabel="speed [m/s]")
 
-    def show(self, time):
+    def show_at(self, time):
         """Show the frame at or before a time [s]."""
         row = int(np.searchsorted(self.made.time, time * (1.0 + 1e-9), side="right")) - 1
         frame, speed = self.made.frames[row], self.made.speeds[row]
-        corners = displaced(self.model, frame, _MAGNIFY)
-        polygons, body, _ = surface(self.model.topology, self.view, corners, self.whole)
-        self.drawn.set_verts(polygons)
-        self.drawn.set_array(speed[body])
-        self.dots.set_data(self.along, speed)
+        self.show(frame, speed)
+        self.dots.set_data(self.model.centre[:, 0], speed)
         text = f"{self.made.share:g} × limit, t = {1e6 * frame.time_s:.1f} µs"
         self.axes.set_title(text, loc="center")

@@ -7,7 +7,8 @@ listed, and their rates found anew at the start of the next substep.
 import numpy as np
 import taichi as ti
 
-from taichi_dem.kit.allocation import defer_fill
+from taichi_dem.effects.body_motion import BodyMotion
+from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.types import real
 from taichi_dem.stability.contact_limits import ContactLimits
 from taichi_dem.stability.mesh_limits import dashpots_of, springs_of, subset_rates
@@ -49,7 +50,8 @@ class StabilityLimits:
     limit, limit_level, limit_by: longest stable step [s], its level, and the criterion that sets
     it. displacement, turn, leap: levels for speed, spin and acceleration. listed, listed_count:
     bodies to look at; events: why, as bits. woken: how many were brought to the present between
-    their times. control: a StepControl, None for a method that only limits dashpots.
+    their times. control: a StepControl, None for a method that only limits dashpots. rule: dt0 [s],
+    safety and dashpot floor [s]. jump: levels between neighbours, where they are limited.
 
     Limited dashpots share 1.7 by need. With X = 2 dt rate for bonds (b) and contacts (c) of a body
     at its step, bonds keep min(X_b, 1.7 - min(X_c, 0.5)) of X_b and contacts min(X_c, 1, 1.7 -
@@ -76,34 +78,34 @@ class StabilityLimits:
 
     constant_fields = ("dashpot_table", "spring_table")
 
-    def __init__(self, model, state, contacts, method):
-        self.model, self.state, self.contacts = model, state, contacts
+    def __init__(self, tables, state, contacts, method):
+        self.tables, self.state, self.contacts = tables, state, contacts
         self.control = method.control
         self.controlled = method.control is not None
         self.has_contact = contacts is not None
         self.has_distance = method.distance is not None
         rule = self.control or StepControl()
-        self.dt0, self.safety = method.dt0, rule.safety
         self.limited = method.dashpot == "limited"
-        self.jump, self.floor = rule.level_jump, rule.dashpot_floor
+        self.spreads = rule.level_jump is not None
+        self.jump = ti.field(ti.i32, shape=())
+        self.rule = ti.field(real, shape=3)
         self.counts = {name: name in rule.criteria for name in CRITERIA}
-        self.has_load = self.counts["load"] and self.has_distance and bool(model.loads)
+        self.has_load = self.counts["load"] and self.has_distance and bool(tables.loads)
         if self.has_distance:
-            self.displacement = Displacement(method.distance, method.dt0)
+            self.displacement = Displacement()
         if self.has_load:
-            self.leap = Displacement(method.distance, method.dt0, power=2)
+            self.leap = Displacement(power=2)
         if self.counts["rotation"]:
-            self.turn = Displacement(rule.angle, method.dt0)
+            self.turn = Displacement()
         self.wakes = 0
         if self.control is not None:
             self.wakes = sum(1 << k for k, event in enumerate(EVENTS) if event in rule.wake)
         self.contact_limits = None
         if self.has_contact:
-            self.contact_limits = ContactLimits(model, state, contacts, rule.ahead * method.dt0)
-        n = model.body_count
+            self.contact_limits = ContactLimits(tables, state, contacts)
+        n = tables.capacity.bodies
         self.dashpot_table = ti.field(real, shape=(n, 16))
         self.spring_table = ti.field(real, shape=(n, 16))
-        defer_fill(self._load_tables)
         self.bond_damping = ti.field(real, shape=n)
         self.contact_damping = ti.field(real, shape=n)
         self.limit = ti.field(real, shape=n)
@@ -114,14 +116,23 @@ class StabilityLimits:
         self.listed_count = ti.field(ti.i32, shape=())
         self.woken = ti.field(ti.i32, shape=())
 
-    def _load_tables(self):
-        model, material = self.model, self.model.material
-        shape = model.mesh, model.topology, material.density
-        if model.dashpot.name:
-            self.dashpot_table.from_numpy(subset_rates(*shape, dashpots_of(material)))
-        self.spring_table.from_numpy(
-            np.ascontiguousarray(subset_rates(*shape, springs_of(material)))
-        )
+    def load(self, model, method):
+        """Take the bonds of a model and the numbers of a method."""
+        rule = method.control or StepControl()
+        assign(self.rule, np.array([method.dt0, rule.safety, rule.dashpot_floor]))
+        assign(self.jump, rule.level_jump or 0)
+        if self.has_distance:
+            self.displacement.load(method.distance, method.dt0)
+        if self.has_load:
+            self.leap.load(method.distance, method.dt0)
+        if self.counts["rotation"]:
+            self.turn.load(rule.angle, method.dt0)
+        if self.has_contact:
+            self.contact_limits.load(model, rule.ahead * method.dt0)
+        shape = model.mesh, model.topology, model.material.density
+        if self.tables.dashpot.name:
+            assign(self.dashpot_table, subset_rates(*shape, dashpots_of(model.material)))
+        assign(self.spring_table, subset_rates(*shape, springs_of(model.material)))
 
     @ti.func
     def count(self, low):
@@ -172,7 +183,7 @@ class StabilityLimits:
         """Find the rates of body i, and the longest stable step."""
         intact = 0
         for f in range(4):
-            b = self.model.face_bond[4 * i + f]
+            b = self.tables.face_bond[4 * i + f]
             if b >= 0:
                 if self.state.broken_tick[b] < 0:
                     intact |= 1 << f
@@ -192,7 +203,7 @@ class StabilityLimits:
 
         A criterion that the user left out does not add.
         """
-        step, by = self.dt0, LARGEST
+        step, by = self.rule[0], LARGEST
         if ti.static(not self.counts["bond_dashpot"]):
             bond_c = 0.0
         if ti.static(not self.counts["contact_dashpot"]):
@@ -204,16 +215,16 @@ class StabilityLimits:
         cause = BOND_K
         if contact_k > bond_k:
             cause = CONTACT_K
-        step, by = shorter(step, by, self.safety * spring_limit(bond_k + contact_k), cause)
+        step, by = shorter(step, by, self.rule[1] * spring_limit(bond_k + contact_k), cause)
         cause = BOND_C
         if contact_c > bond_c:
             cause = CONTACT_C
-        borne = self.safety * dashpot_limit(bond_c + contact_c)
+        borne = self.rule[1] * dashpot_limit(bond_c + contact_c)
         if ti.static(self.limited):
-            borne = ti.max(borne, self.floor)
+            borne = ti.max(borne, self.rule[2])
         step, by = shorter(step, by, borne, cause)
         self.limit[i], self.limit_by[i] = step, by
-        self.limit_level[i] = level_of(step, self.dt0)
+        self.limit_level[i] = level_of(step, self.rule[0])
 
     @ti.func
     def wanted(self, i, now):
@@ -240,15 +251,21 @@ class StabilityLimits:
         The larger one of now and a largest step ahead: a body does not leap into a load that sets
         in before its next update.
         """
-        push2 = 0.0
-        for e in ti.static(range(len(self.model.loads))):
-            if self.model.loads[e].acts_on(i):
-                for ahead in ti.static(range(2)):
-                    force, _ = self.model.loads[e].wrench(
-                        i, now + ahead * self.dt0, self.state.rotation[i]
-                    )
+        push2, step = 0.0, self.rule[0]
+        for ahead in ti.static(range(2)):
+            motion = BodyMotion(
+                position=self.state.position[i],
+                rotation=self.state.rotation[i],
+                velocity=self.state.velocity[i],
+                spin=self.state.spin[i],
+                time=now + ahead * step,
+                step=step,
+            )
+            for e in ti.static(range(len(self.tables.loads))):
+                if self.tables.loads[e].acts_on(i):
+                    force, _ = self.tables.loads[e].wrench(i, motion)
                     push2 = ti.max(push2, force.norm_sqr())
-        return push2 * self.model.mass_inverse[i] ** 2
+        return push2 * self.tables.mass_inverse[i] ** 2
 
     @ti.func
     def bond_share(self, i, step):
@@ -269,7 +286,7 @@ class StabilityLimits:
         return ti.min(2.0 * step * self.bond_damping[i], LIMITED - contacts)
 
 
-def limits_for(model, state, contacts, method):
+def limits_for(tables, state, contacts, method):
     """Limits for a method; None where it neither controls steps nor limits dashpots."""
     wanted = getattr(method, "control", None) or getattr(method, "dashpot", "full") == "limited"
-    return StabilityLimits(model, state, contacts, method) if wanted else None
+    return StabilityLimits(tables, state, contacts, method) if wanted else None

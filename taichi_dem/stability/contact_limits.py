@@ -3,7 +3,7 @@
 import numpy as np
 import taichi as ti
 
-from taichi_dem.kit.allocation import defer_fill
+from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.types import mat3, real
 from taichi_dem.physics.rotation import unit3
 from taichi_dem.physics.wrench import cross_matrix
@@ -42,20 +42,23 @@ class ContactLimits:
     constant_fields = ("ahead", "root_mass", "root_inertia")
     scratch_fields = ("old_count", "old_applied_until")
 
-    def __init__(self, model, state, contacts, ahead):
-        self.model, self.state, self.contacts = model, state, contacts
+    def __init__(self, tables, state, contacts):
+        self.tables, self.state, self.contacts = tables, state, contacts
         self.ahead = ti.field(real, shape=MAX_LEVEL + 1)
-        defer_fill(self.ahead.from_numpy, ahead / 2.0 ** np.arange(MAX_LEVEL + 1))
         self.count = ti.field(ti.i32, shape=contacts.capacity)
         self.old_count = ti.field(ti.i32, shape=contacts.capacity)
         self.applied_until = ti.field(ti.i64, shape=contacts.capacity)
         self.old_applied_until = ti.field(ti.i64, shape=contacts.capacity)
         # M^-1/2 as 1 / sqrt(m) and I^-1/2 in the body frame.
-        self.root_mass = ti.field(real, shape=model.body_count)
-        self.root_inertia = ti.Matrix.field(3, 3, real, shape=model.body_count)
+        self.root_mass = ti.field(real, shape=tables.capacity.bodies)
+        self.root_inertia = ti.Matrix.field(3, 3, real, shape=tables.capacity.bodies)
+
+    def load(self, model, ahead):
+        """Take a model, and the time [s] that a step of level 0 looks ahead."""
+        assign(self.ahead, ahead / 2.0 ** np.arange(MAX_LEVEL + 1))
         root = inverse_root(model.body_mass, model.body_inertia)
-        defer_fill(self.root_mass.from_numpy, np.ascontiguousarray(root[:, 0, 0]))
-        defer_fill(self.root_inertia.from_numpy, np.ascontiguousarray(root[:, 3:, 3:]))
+        assign(self.root_mass, root[:, 0, 0])
+        assign(self.root_inertia, root[:, 3:, 3:])
 
     @ti.func
     def margin(self, i, j):
@@ -110,7 +113,7 @@ class ContactLimits:
         offset = back @ (self.state.position[j] - self.state.position[i])
         for k in range(self.contacts.pair_first[p], self.contacts.pair_last[p]):
             spheres = self.contacts.pair_sphere[k]
-            mine, other = self.model.sphere[spheres[0]], self.model.sphere[spheres[1]]
+            mine, other = self.tables.sphere[spheres[0]], self.tables.sphere[spheres[1]]
             if side == 1:
                 mine, other = other, mine
             apart = turn @ other.xyz + offset - mine.xyz
@@ -125,7 +128,7 @@ class ContactLimits:
     def _contact(self, i, arm, normal):
         """Blocks of one contact at an arm from the centre of body i, in its frame."""
         along = normal.outer_product(normal)
-        if ti.static(bool(self.model.friction.name)):
+        if ti.static(bool(self.tables.friction.name)):
             along = unit3()
         root = self.root_mass[i]
         lever = self.root_inertia[i] @ cross_matrix(arm) @ along

@@ -6,7 +6,7 @@ from typing import Optional
 import numpy as np
 import taichi as ti
 
-from taichi_dem.kit.allocation import defer_fill
+from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.types import real
 from taichi_dem.kit.validation import between, choices, whole
 from taichi_dem.timeline import MAX_LEVEL
@@ -84,6 +84,9 @@ def counted_criteria(bound):
 class FixedStep:
     """Every body keeps the largest step."""
 
+    def load(self, distance, dt0):
+        """Nothing to take."""
+
     @ti.func
     def wanted(self, level, speed2, low):
         """Level 0, always."""
@@ -100,10 +103,14 @@ class Displacement:
 
     constant_fields = ("rate2",)
 
-    def __init__(self, distance, dt0, power=1):
-        steps = dt0 / 2.0 ** np.arange(MAX_LEVEL + 1)
+    def __init__(self, power=1):
+        self.power = power
         self.rate2 = ti.field(real, shape=MAX_LEVEL + 2)
-        defer_fill(self.rate2.from_numpy, np.append((distance / steps**power) ** 2, np.inf))
+
+    def load(self, distance, dt0):
+        """Take a distance and the step of level 0 [s]."""
+        steps = dt0 / 2.0 ** np.arange(MAX_LEVEL + 1)
+        assign(self.rate2, np.append((distance / steps**self.power) ** 2, np.inf))
 
     @ti.func
     def finer(self, level, rate2):

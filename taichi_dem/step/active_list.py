@@ -14,10 +14,9 @@ class ActiveList:
     """
 
     def __init__(self, capacity):
-        room = max(1, capacity)
-        self.order = ti.field(ti.i32, shape=room)
-        self.index = ti.field(ti.i32, shape=room)
-        self.key = ti.field(ti.i32, shape=room)
+        self.order = ti.field(ti.i32, shape=capacity)
+        self.index = ti.field(ti.i32, shape=capacity)
+        self.key = ti.field(ti.i32, shape=capacity)
         self.end = ti.field(ti.i32, shape=MAX_LEVEL + 2)
 
     @ti.func

@@ -8,6 +8,7 @@ v += S / m, L += T, then x += dt v and q = exp(dt w) q, with the spin w in the m
 
 import taichi as ti
 
+from taichi_dem.effects.body_motion import BodyMotion
 from taichi_dem.kit.types import real, vec2, vec3
 from taichi_dem.physics.bond import bond_motion, unit_arm, unit_opening, unit_velocity
 from taichi_dem.physics.rotation import mean_spin, rotation_matrix, spin_of, turned, zero3
@@ -19,44 +20,44 @@ from taichi_dem.step.contact_force import ContactForce
 class Advance(ContactForce):
     """The order in which physics and effects act; see the module."""
 
-    def __init__(self, model, state, schedule, contacts, solver=None):
-        self.model, self.state, self.schedule = model, state, schedule
+    def __init__(self, tables, state, schedule, contacts, solver=None):
+        self.tables, self.state, self.schedule = tables, state, schedule
         self.solver, self.solves = solver, solver is not None
         self.solves_bonds = self.solves and solver.has_bonds
         self.contacts = contacts
         self.has_contact = contacts is not None
         # Without fast_math a product with zero is not folded: what is absent must not be written.
-        self.has_dashpot = bool(model.dashpot.name)
+        self.has_dashpot = bool(tables.dashpot.name)
         self.limits, self.retimes = schedule.limits, schedule.retimes
         self.has_limits = schedule.has_limits
         self.limited = self.has_limits and schedule.limits.limited
-        self.has_heat = self.has_dashpot or bool(model.shear.name)
+        self.has_heat = self.has_dashpot or bool(tables.shear.name)
 
     @ti.func
     def bond(self, b):
         """Evaluate the three contact units of a bond; release it when one of them fails."""
         if self._is_pending(b):
-            slots = self.model.bond_slots[b]
+            slots = self.tables.bond_slots[b]
             scale = 1.0
             if ti.static(self.limited):
                 scale = self.bond_share(b)
             motion = self._motion(b, slots)
             if ti.static(self.solves_bonds):
                 motion = self.solver.bonds.mean(b, motion)
-            stiffness = self.model.bond_stiffness[b]
+            stiffness = self.tables.bond_stiffness[b]
             force, torque, failed = zero3(), zero3(), 0
             dragged, slipped = 0.0, 0.0
             for q in range(3):
                 u = 3 * b + q
-                arm = unit_arm(motion, self.model.vertex_slave[u])
-                opening = unit_opening(motion, arm, self.model.vertex_master[u])
-                pull = self.model.tension.traction(stiffness[0], u, opening[0])
+                arm = unit_arm(motion, self.tables.vertex_slave[u])
+                opening = unit_opening(motion, arm, self.tables.vertex_master[u])
+                pull = self.tables.tension.traction(stiffness[0], u, opening[0])
                 sliding = vec2(opening[1], opening[2])
-                shear, spent = self.model.shear.traction(stiffness[1], u, sliding, -pull)
+                shear, spent = self.tables.shear.traction(stiffness[1], u, sliding, -pull)
                 traction = vec3(pull, shear[0], shear[1])
                 if ti.static(self.has_dashpot):
                     velocity = unit_velocity(motion, arm)
-                    drag = self.model.dashpot.traction(velocity)
+                    drag = self.tables.dashpot.traction(velocity)
                     if ti.static(self.limited):
                         drag *= scale
                     traction += drag
@@ -64,16 +65,16 @@ class Advance(ContactForce):
                 force += traction
                 torque += arm.cross(traction)
                 slipped += spent
-                failed |= self.model.tension.failed(u)
+                failed |= self.tables.tension.failed(u)
             dt = self._bond_step(b, slots[0] >> 2, slots[1] >> 2)
-            area = self.model.unit_area[b]
+            area = self.tables.unit_area[b]
             if failed == 0:
                 self._pull_together(slots, motion, force * (area * dt), torque * (area * dt))
                 if ti.static(self.has_heat):
                     heat = area * vec3(dragged * dt, slipped, 0.0)
                     self.state.bond_heat[b] = self.state.bond_heat[b] + heat
             else:
-                if ti.static(self.model.has_bond_heat):
+                if ti.static(self.tables.has_bond_heat):
                     heat = area * vec3(0.0, slipped, self._stored(b, motion))
                     self.state.bond_heat[b] = self.state.bond_heat[b] + heat
                 self._release(b, slots)
@@ -87,7 +88,7 @@ class Advance(ContactForce):
             self.solver.bonds.begin(b, slots[0] >> 2, slots[1] >> 2, motion.branch)
         else:
             self.solver.bonds.end(b)
-            if ti.static(self.model.has_bond_heat):
+            if ti.static(self.tables.has_bond_heat):
                 # Dashpots are booked for the step before: it was full, though a unit fails now.
                 self.state.bond_heat[b][0] = self.state.bond_heat[b][0] + dragged
 
@@ -96,7 +97,7 @@ class Advance(ContactForce):
         """Whether a bond holds, and has not given its impulse for the coming step already."""
         pending = self.state.broken_tick[b] < 0
         if ti.static(self.retimes):
-            slots = self.model.bond_slots[b]
+            slots = self.tables.bond_slots[b]
             pending = pending and self.schedule.applied_until.is_pending(
                 b, slots[0] >> 2, slots[1] >> 2
             )
@@ -115,7 +116,7 @@ class Advance(ContactForce):
     @ti.func
     def bond_share(self, b):
         """Share of its coefficient that a bond's limited dashpot keeps: what both bodies bear."""
-        i, j = self.model.bond_slots[b][0] >> 2, self.model.bond_slots[b][1] >> 2
+        i, j = self.tables.bond_slots[b][0] >> 2, self.tables.bond_slots[b][1] >> 2
         first = self.limits.bond_share(i, self.schedule.own_step(i))
         return ti.min(first, self.limits.bond_share(j, self.schedule.own_step(j)))
 
@@ -123,7 +124,7 @@ class Advance(ContactForce):
     def _motion(self, b, slots):
         i, j = slots[0] >> 2, slots[1] >> 2
         return bond_motion(
-            self.model.bond_frame[b],
+            self.tables.bond_frame[b],
             self.state.position[j] - self.state.position[i],
             self.state.rotation[i],
             self.state.rotation[j],
@@ -152,10 +153,10 @@ class Advance(ContactForce):
         energy = 0.0
         for q in range(3):
             u = 3 * b + q
-            arm = unit_arm(motion, self.model.vertex_slave[u])
-            opening = unit_opening(motion, arm, self.model.vertex_master[u])
-            energy += self.model.tension.stored(b, u, opening[0])
-            energy += self.model.shear.stored(b, u, vec2(opening[1], opening[2]))
+            arm = unit_arm(motion, self.tables.vertex_slave[u])
+            opening = unit_opening(motion, arm, self.tables.vertex_master[u])
+            energy += self.tables.tension.stored(b, u, opening[0])
+            energy += self.tables.shear.stored(b, u, vec2(opening[1], opening[2]))
         return energy
 
     @ti.func
@@ -163,18 +164,18 @@ class Advance(ContactForce):
         """Elastic energy stored in a bond now [J]; zero once it is released."""
         energy = 0.0
         if self.state.broken_tick[b] < 0:
-            motion = self._motion(b, self.model.bond_slots[b])
-            energy = self.model.unit_area[b] * self._stored(b, motion)
+            motion = self._motion(b, self.tables.bond_slots[b])
+            energy = self.tables.unit_area[b] * self._stored(b, motion)
         return energy
 
     @ti.func
     def bond_opening(self, b):
         """Normal and shear opening of a bond's face at its middle [m], released or not."""
-        motion = self._motion(b, self.model.bond_slots[b])
+        motion = self._motion(b, self.tables.bond_slots[b])
         mean = zero3()
         for q in range(3):
-            arm = unit_arm(motion, self.model.vertex_slave[3 * b + q])
-            mean += unit_opening(motion, arm, self.model.vertex_master[3 * b + q]) / 3.0
+            arm = unit_arm(motion, self.tables.vertex_slave[3 * b + q])
+            mean += unit_opening(motion, arm, self.tables.vertex_master[3 * b + q]) / 3.0
         return vec2(mean[0], ti.sqrt(mean[1] ** 2 + mean[2] ** 2))
 
     @ti.func
@@ -221,15 +222,17 @@ class Advance(ContactForce):
             self.contacts.moved(i, velocity, spin, elapsed)
         speed2 = velocity.norm_sqr()
         # One comparison finds runaway, infinity and NaN; "v != v" would be folded away.
-        if not (speed2 + spin.norm_sqr() * self.model.radius[i] ** 2 < self.state.max_speed2[None]):
+        if not (
+            speed2 + spin.norm_sqr() * self.tables.radius[i] ** 2 < self.state.max_speed2[None]
+        ):
             ti.atomic_min(self.state.bad_body[None], i)
 
     @ti.func
     def _turning(self, i, elapsed, momentum, spin):
         """World spin in the middle of the step [rad/s]; a body in supports has what they allow."""
-        inverse = self.model.inertia_inverse[i]
+        inverse = self.tables.inertia_inverse[i]
         turning = mean_spin(self.state.rotation[i], inverse, momentum, spin, elapsed)
-        for effect in ti.static(self.model.supports):
+        for effect in ti.static(self.tables.supports):
             if effect.acts_on(i):
                 turning = spin
         return turning
@@ -253,23 +256,35 @@ class Advance(ContactForce):
     def _kicked(self, i, elapsed, linear, angular):
         """Velocity and angular momentum after all impulses, as the supports allow; books work."""
         linear, angular, kick = self._loaded(i, elapsed, linear, angular)
-        velocity = self.state.velocity[i] + linear * self.model.mass_inverse[i]
+        velocity = self.state.velocity[i] + linear * self.tables.mass_inverse[i]
         momentum = self.state.angular_momentum[i] + angular
         return self._supported(i, elapsed, kick, velocity, momentum)
 
     @ti.func
     def _loaded(self, i, elapsed, linear, angular):
         """Impulse and moment with those of the loads added, and each load's own, a row each."""
-        kick = ti.Matrix.zero(real, ti.static(max(1, len(self.model.loads))), 6)
-        now = self._load_time(elapsed)
-        for e in ti.static(range(len(self.model.loads))):
-            if self.model.loads[e].acts_on(i):
-                force, torque = self.model.loads[e].wrench(i, now, self.state.rotation[i])
+        kick = ti.Matrix.zero(real, ti.static(max(1, len(self.tables.loads))), 6)
+        motion = self.body_motion(i, self._load_time(elapsed), elapsed)
+        for e in ti.static(range(len(self.tables.loads))):
+            if self.tables.loads[e].acts_on(i):
+                force, torque = self.tables.loads[e].wrench(i, motion)
                 linear += force * elapsed
                 angular += torque * elapsed
                 for k in ti.static(range(3)):
                     kick[e, k], kick[e, 3 + k] = force[k] * elapsed, torque[k] * elapsed
         return linear, angular, kick
+
+    @ti.func
+    def body_motion(self, i, time, step):
+        """Present motion of body i, for the loads that act at a time over a step [s]."""
+        return BodyMotion(
+            position=self.state.position[i],
+            rotation=self.state.rotation[i],
+            velocity=self.state.velocity[i],
+            spin=self.state.spin[i],
+            time=time,
+            step=step,
+        )
 
     @ti.func
     def _load_time(self, elapsed):
@@ -284,8 +299,8 @@ class Advance(ContactForce):
     @ti.func
     def _book_loads(self, i, kick, velocity, momentum):
         """Book what the loads gave body i, at a mean velocity and angular momentum."""
-        for e in ti.static(range(len(self.model.loads))):
-            if self.model.loads[e].acts_on(i):
+        for e in ti.static(range(len(self.tables.loads))):
+            if self.tables.loads[e].acts_on(i):
                 push = vec3(kick[e, 0], kick[e, 1], kick[e, 2])
                 twist = vec3(kick[e, 3], kick[e, 4], kick[e, 5])
                 work = push.dot(velocity) + twist.dot(self.spin(i, momentum))
@@ -294,7 +309,7 @@ class Advance(ContactForce):
     @ti.func
     def spin(self, i, momentum):
         """World spin of body i at an angular momentum, in its present orientation."""
-        return spin_of(self.state.rotation[i], self.model.inertia_inverse[i], momentum)
+        return spin_of(self.state.rotation[i], self.tables.inertia_inverse[i], momentum)
 
     @ti.func
     def _supported(self, i, elapsed, kick, velocity, momentum):
@@ -306,7 +321,7 @@ class Advance(ContactForce):
         """
         free, free_momentum, held = velocity, momentum, 0
         half = self.schedule.seconds(self.state.tick[None]) - 0.5 * elapsed
-        for effect in ti.static(self.model.supports):
+        for effect in ti.static(self.tables.supports):
             if effect.acts_on(i):
                 velocity, momentum = effect.held(
                     i, half, self.state.rotation[i], velocity, momentum
@@ -315,11 +330,11 @@ class Advance(ContactForce):
         mean = 0.5 * (self.state.velocity[i] + velocity)
         mean_momentum = 0.5 * (self.state.angular_momentum[i] + momentum)
         self._book_loads(i, kick, mean, mean_momentum)
-        if ti.static(len(self.model.supports) > 0):
+        if ti.static(len(self.tables.supports) > 0):
             if held == 1:
-                push, twist = self.model.mass[i] * (velocity - free), momentum - free_momentum
+                push, twist = self.tables.mass[i] * (velocity - free), momentum - free_momentum
                 work = push.dot(mean) + twist.dot(self.spin(i, mean_momentum))
-                self._book(i, ti.static(len(self.model.loads)), work, push, twist)
+                self._book(i, ti.static(len(self.tables.loads)), work, push, twist)
         return velocity, momentum
 
     @ti.func

@@ -17,9 +17,9 @@ class AppliedUntil:
     through a search. schedule: knows their steps.
     """
 
-    def __init__(self, model, state, schedule, limits):
+    def __init__(self, tables, state, schedule, limits):
         self.state, self.schedule, self.contact_limits = state, schedule, limits.contact_limits
-        self.bond = ti.field(ti.i64, shape=max(1, model.bond_count))
+        self.bond = ti.field(ti.i64, shape=tables.capacity.bonds)
 
     @ti.func
     def is_pending(self, b, i, j):

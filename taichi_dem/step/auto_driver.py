@@ -6,6 +6,7 @@ driver pays for every phase with a launch, and much more where other programs ho
 
 import time
 
+from taichi_dem.kit.allocation import values
 from taichi_dem.step.drivers import Parallel, Resident
 
 #: Substeps of a try, and how often each driver is tried; the better of its tries counts.
@@ -19,12 +20,12 @@ class AutoDriver:
     """Tries both drivers from time to time, a few substeps each.
 
     seconds: for a member that was due, the best of the last tries by name of the driver. clock:
-    gives seconds; tests have their own.
+    gives seconds; tests have their own. drivers: both, by name.
     """
 
-    def __init__(self, step, clock=time.perf_counter):
+    def __init__(self, step, drivers, clock=time.perf_counter):
         self.step, self.clock = step, clock
-        self.drivers = {driver.name: driver(step) for driver in (Parallel, Resident)}
+        self.drivers = {name: drivers[name] for name in (Parallel.name, Resident.name)}
         self.chosen = Resident.name
         self._begin()
 
@@ -66,4 +67,4 @@ class AutoDriver:
 
     def _visited(self):
         """Bodies, bonds and pairs that were due so far."""
-        return int(self.step.schedule.evaluations.to_numpy()[1:4].sum())
+        return int(values(self.step.schedule.evaluations)[1:4].sum())

@@ -30,7 +30,7 @@ class ContactForce:
             margin = self.limits.contact_limits.margin(i, j)
         for k in range(self.contacts.pair_first[p], self.contacts.pair_last[p]):
             a, b = self.contacts.pair_sphere[k][0], self.contacts.pair_sphere[k][1]
-            first, second = self.model.sphere[a], self.model.sphere[b]
+            first, second = self.tables.sphere[a], self.tables.sphere[b]
             apart = turn @ second.xyz + offset - first.xyz
             reach = first[3] + second[3]
             if ti.static(self.has_limits):
@@ -43,7 +43,7 @@ class ContactForce:
                 slide = velocity - rate * normal
                 push = self.contacts.law.normal(overlap, self._limited(rate, scale))
                 drag = self._limited(self.contacts.law.damping(), scale)
-                rub = self.model.friction.force(drag, push, slide)
+                rub = self.tables.friction.force(drag, push, slide)
                 pushed = push * normal + rub
                 force += pushed
                 moment_i -= arm.cross(pushed)

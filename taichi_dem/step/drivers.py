@@ -6,9 +6,10 @@ every item writes its own slots, and every sum has a fixed order.
 
 import time
 
-import numpy as np
 import taichi as ti
 
+from taichi_dem.kit.allocation import values
+from taichi_dem.step.implicit.bonds import BOND_COLOURS
 from taichi_dem.step.implicit.pairs import COLOURS
 from taichi_dem.step.wake_up import WakeUp
 
@@ -94,58 +95,54 @@ class Step:
             self.schedule.low[None] = 0
             self.schedule.wanted[None] = 0
         if ti.static(self.schedule.has_limits):
-            for i in range(self.advance.model.body_count):
+            for i in range(self.advance.tables.body_count[None]):
                 self.schedule.limits.refresh(i)
-        for i in range(self.advance.model.body_count):
+        for i in range(self.advance.tables.body_count[None]):
             self.schedule.choose_level(i, self.state.velocity[i].norm_sqr())
         for _ in range(1):
             self.schedule.start_all()
-        for b in range(self.advance.model.bond_count):
+        for b in range(self.advance.tables.bond_count[None]):
             self.advance.bond(b)
 
     @ti.func
     def halted(self):
         """1 when the host must act: a body left its bounds, or a list its room."""
-        halt = ti.cast(self.state.bad_body[None] < self.advance.model.body_count, ti.i32)
+        halt = ti.cast(self.state.bad_body[None] < self.advance.tables.body_count[None], ti.i32)
         if ti.static(self.has_contact):
             halt |= self.search.overflows()
         return halt
 
 
 @ti.data_oriented
-class Range:
-    """Some places in a row, whatever is due."""
+class Colour:
+    """The members of one colour: those from colour_first[colour] on, in their order."""
 
-    def __init__(self, first, size):
-        self.first, self.size = first, size
+    def __init__(self, colour_first, colour):
+        self.colour_first, self.colour = colour_first, colour
 
     @ti.func
     def count(self, low):
         """How many there are."""
-        return self.size
+        return self.colour_first[self.colour + 1] - self.colour_first[self.colour]
 
     @ti.func
     def pick(self, a):
-        """One of them."""
-        return self.first + a
+        """Place of one of them."""
+        return self.colour_first[self.colour] + a
 
 
 @ti.data_oriented
-class Colour:
+class PairColour(Colour):
     """The contact pairs of one colour."""
 
     def __init__(self, pairs, colour):
-        self.pairs, self.colour = pairs, colour
-
-    @ti.func
-    def count(self, low):
-        """How many there are."""
-        return self.pairs.colour_first[self.colour + 1] - self.pairs.colour_first[self.colour]
+        super().__init__(pairs.colour_first, colour)
+        self.order = pairs.order
 
     @ti.func
     def pick(self, a):
         """One of them."""
-        return self.pairs.order[self.pairs.colour_first[self.colour] + a]
+        return self.order[self.colour_first[self.colour] + a]
 
 
 @ti.data_oriented
@@ -178,17 +175,18 @@ class SolvedStep(Step):
 
     def _sweep(self, solver):
         """One sweep, colour by colour."""
-        ends = np.cumsum([0, *(solver.bonds.colours if solver.has_bonds else ())]).tolist()
-        bonds = tuple((Range(a, b - a), solver.bond) for a, b in zip(ends, ends[1:]))
-        pairs = ()
+        bonds, pairs = (), ()
+        if solver.has_bonds:
+            first = solver.bonds.colour_first
+            bonds = tuple((Colour(first, c), solver.bond) for c in range(BOND_COLOURS))
         if self.has_contact:
-            pairs = tuple((Colour(solver.pairs, c), solver.pair) for c in range(COLOURS))
+            pairs = tuple((PairColour(solver.pairs, c), solver.pair) for c in range(COLOURS))
             pairs += ((Once(), solver.last_pairs),)
         return (*bonds, *pairs, (Once(), solver.check_convergence))
 
     def repeats(self, part):
         """Whether a part, the sweep, is called for once more."""
-        return part == 1 and self.advance.solver.unsolved[None] == 1
+        return part == 1 and values(self.advance.solver.unsolved) == 1
 
     @ti.kernel
     def prime(self):
@@ -196,18 +194,18 @@ class SolvedStep(Step):
         for _ in range(1):
             self.schedule.low[None] = 0
             self.schedule.wanted[None] = 0
-        for i in range(self.advance.model.body_count):
+        for i in range(self.advance.tables.body_count[None]):
             self.schedule.choose_level(i, self.state.velocity[i].norm_sqr())
             self.advance.solver.velocities.update_inertia(i, self.advance)
         for _ in range(1):
             self.schedule.start_all()
         if ti.static(self.advance.solver.has_bonds):
-            for b in range(self.advance.model.bond_count):
+            for b in range(self.advance.tables.bond_count[None]):
                 self.advance.solver.bonds.first(b)
-        for b in range(self.advance.model.bond_count):
+        for b in range(self.advance.tables.bond_count[None]):
             self.advance.bond(b)
             # It booked a step that never was.
-            if ti.static(self.advance.model.has_bond_heat):
+            if ti.static(self.advance.tables.has_bond_heat):
                 self.state.bond_heat[b] = 0.0 * self.state.bond_heat[b]
 
 
@@ -219,6 +217,10 @@ class Resident:
 
     def __init__(self, step):
         self.step = step
+        self.load()
+
+    def load(self):
+        """Begin with short calls: nobody knows yet what a step of the scene costs."""
         self.substeps = 4
 
     def prepare(self):
@@ -268,6 +270,9 @@ class Parallel:
 
     def __init__(self, step):
         self.step = step
+
+    def load(self):
+        """Nothing depends on the scene."""
 
     def prepare(self):
         """Make the search that is due, without a step; compiles the kernels."""

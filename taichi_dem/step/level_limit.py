@@ -13,15 +13,15 @@ class LevelLimit:
     levels at the last ordering of the lists, so that no result depends on the order of bodies.
     """
 
-    def __init__(self, model, state, contacts, limits):
-        self.model, self.state, self.contacts, self.limits = model, state, contacts, limits
-        self.has_contact, self.jump = contacts is not None, limits.jump
-        self.listed_level = ti.field(ti.i32, shape=model.body_count)
+    def __init__(self, tables, state, contacts, limits):
+        self.tables, self.state, self.contacts, self.limits = tables, state, contacts, limits
+        self.has_contact = contacts is not None
+        self.listed_level = ti.field(ti.i32, shape=tables.capacity.bodies)
 
     @ti.func
     def note_all(self):
         """Take the levels of all bodies as known."""
-        for i in range(self.model.body_count):
+        for i in range(self.tables.body_count[None]):
             self.listed_level[i] = self.state.level[i]
 
     @ti.func
@@ -30,7 +30,7 @@ class LevelLimit:
         finest = -1
         for f in range(4):
             if self._bonded(4 * i + f):
-                finest = ti.max(finest, self.listed_level[self.model.neighbour[4 * i + f]])
+                finest = ti.max(finest, self.listed_level[self.tables.neighbour[4 * i + f]])
         if ti.static(self.has_contact):
             for p in range(self.contacts.first_of[i], self.contacts.first_of[i + 1]):
                 if self.limits.contact_limits.count[p] > 0:
@@ -44,7 +44,7 @@ class LevelLimit:
     @ti.func
     def least_beside(self, finest):
         """Coarsest level that a body may have beside one of a level."""
-        return finest - self.jump
+        return finest - self.limits.jump[None]
 
     @ti.func
     def spread(self, i):
@@ -53,7 +53,7 @@ class LevelLimit:
         self.listed_level[i] = level
         for f in range(4):
             if self._bonded(4 * i + f):
-                self._notify(self.model.neighbour[4 * i + f], level)
+                self._notify(self.tables.neighbour[4 * i + f], level)
         if ti.static(self.has_contact):
             for p in range(self.contacts.first_of[i], self.contacts.first_of[i + 1]):
                 if self.limits.contact_limits.count[p] > 0:
@@ -66,11 +66,11 @@ class LevelLimit:
     @ti.func
     def _bonded(self, face):
         bonded = False
-        if self.model.neighbour[face] >= 0:
-            bonded = self.state.broken_tick[self.model.face_bond[face]] < 0
+        if self.tables.neighbour[face] >= 0:
+            bonded = self.state.broken_tick[self.tables.face_bond[face]] < 0
         return bonded
 
     @ti.func
     def _notify(self, j, level):
-        if self.state.level[j] < level - self.jump:
+        if self.state.level[j] < level - self.limits.jump[None]:
             self.limits.notice(j, CLOSE)

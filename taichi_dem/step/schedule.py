@@ -7,7 +7,7 @@ own entries.
 import numpy as np
 import taichi as ti
 
-from taichi_dem.kit.allocation import defer_fill, raise_to
+from taichi_dem.kit.allocation import assign, raise_to, values
 from taichi_dem.kit.types import real
 from taichi_dem.stability.step_control import DISPLACEMENT, LARGEST, NEIGHBOUR
 from taichi_dem.step.active_list import ActiveList
@@ -22,7 +22,7 @@ class Schedule:
 
     criterion: rule from ``step_control``. uniform: all bodies share the finest level wanted.
     drifted: bodies next to a due one are brought to its time too, else only due bodies move.
-    dt0 [s]: step of level 0. finest: finest level present. low: coarsest level now due.
+    finest: finest level present. low: coarsest level now due.
     changed: bodies whose own level or bonds changed since the lists were put in order.
     limits: the ``StabilityLimits`` of the bodies, None where the rule needs none. retimes:
     whether bodies may be brought to the present between their own times; applied_until then holds
@@ -31,34 +31,49 @@ class Schedule:
     and the bonds and pairs that one step for all would have evaluated in the same substeps.
     """
 
-    def __init__(self, model, state, contacts, criterion, dt0, uniform, drifted, limits=None):
-        self.model, self.state, self.contacts, self.limits = model, state, contacts, limits
+    def __init__(self, tables, state, contacts, criterion, uniform, drifted, limits=None):
+        self.tables, self.state, self.contacts, self.limits = tables, state, contacts, limits
         self.has_limits = limits is not None
         self.controlled = self.has_limits and limits.control is not None
         self.retimes = self.controlled and limits.wakes != 0
-        self.applied_until = AppliedUntil(model, state, self, limits) if self.retimes else None
-        self.spreads = self.controlled and not uniform and limits.jump is not None
+        self.applied_until = AppliedUntil(tables, state, self, limits) if self.retimes else None
+        self.spreads = self.controlled and not uniform and limits.spreads
         if self.spreads:
-            self.level_limit = LevelLimit(model, state, contacts, limits)
+            self.level_limit = LevelLimit(tables, state, contacts, limits)
         self.criterion, self.uniform, self.drifted = criterion, uniform, drifted
         self.has_contact = contacts is not None
-        self.dt0 = dt0
-        self.tick_seconds = dt0 / MACRO_TICKS
+        capacity = tables.capacity
         self.step_seconds = ti.field(real, shape=MAX_LEVEL + 1)
-        defer_fill(self.step_seconds.from_numpy, dt0 / 2.0 ** np.arange(MAX_LEVEL + 1))
-        self.bodies = ActiveList(model.body_count)
-        self.bonds = ActiveList(model.bond_count)
+        self.bodies = ActiveList(capacity.bodies)
+        self.bonds = ActiveList(capacity.bonds)
         self.pairs = ActiveList(contacts.capacity if contacts else 1)
         self.low = ti.field(ti.i32, shape=())
         self.finest = ti.field(ti.i32, shape=())
         self.wanted = ti.field(ti.i32, shape=())
-        self.changed = ti.field(ti.i32, shape=2 * model.body_count + 2 * model.bond_count)
+        self.changed = ti.field(ti.i32, shape=2 * capacity.bodies + 2 * capacity.bonds + 1)
         self.changed_count = ti.field(ti.i32, shape=())
         self.evaluations = ti.field(ti.i64, shape=5)
 
+    def load(self, model, method):
+        """Take the steps of a method."""
+        assign(self.step_seconds, method.dt0 / 2.0 ** np.arange(MAX_LEVEL + 1))
+        self.criterion.load(method.distance, method.dt0)
+        if self.has_limits:
+            self.limits.load(model, method)
+
+    @property
+    def dt0(self):
+        """Largest step [s]."""
+        return float(values(self.step_seconds)[0])
+
+    @property
+    def tick_seconds(self):
+        """Seconds of a tick."""
+        return self.dt0 / MACRO_TICKS
+
     def members(self):
         """How many bonds and pairs are evaluated at the step of each level, (MAX_LEVEL + 1,)."""
-        ends = self.bonds.end.to_numpy() + self.pairs.end.to_numpy()
+        ends = values(self.bonds.end) + values(self.pairs.end)
         return ends[:-1] - ends[1:]
 
     @ti.func
@@ -157,12 +172,12 @@ class Schedule:
         """Move body i, its bonds and its pairs to their present keys."""
         self.bodies.move(i, self._body_key(i))
         for f in range(4):
-            b = self.model.face_bond[4 * i + f]
+            b = self.tables.face_bond[4 * i + f]
             if b >= 0:
                 if self.bonds.key[b] >= 0:
                     self.bonds.move(b, self._bond_key(b))
                 if ti.static(self.drifted):
-                    j = self.model.neighbour[4 * i + f]
+                    j = self.tables.neighbour[4 * i + f]
                     self.bodies.move(j, self._body_key(j))
         if ti.static(self.has_contact):
             for p in range(self.contacts.first_of[i], self.contacts.first_of[i + 1]):
@@ -186,8 +201,8 @@ class Schedule:
         self.changed_count[None] = 0
         if ti.static(self.spreads):
             self.level_limit.note_all()
-        self.bodies.fill(self.model.body_count, self._body_key)
-        self.bonds.fill(self.model.bond_count, self._bond_key)
+        self.bodies.fill(self.tables.body_count[None], self._body_key)
+        self.bonds.fill(self.tables.bond_count[None], self._bond_key)
         if ti.static(self.has_contact):
             self.pairs.fill(self.contacts.pair_count[None], self._pair_key)
         self._find_finest()
@@ -201,14 +216,14 @@ class Schedule:
         """
         self.pairs.fill(self.contacts.pair_count[None], self._pair_key)
         if ti.static(not self.uniform):
-            self.bodies.fill(self.model.body_count, self._body_key)
-            self.bonds.fill(self.model.bond_count, self._bond_key)
+            self.bodies.fill(self.tables.body_count[None], self._body_key)
+            self.bonds.fill(self.tables.bond_count[None], self._bond_key)
 
     @ti.func
     def _level_all(self):
         """Give every body the finest level that any of them wants."""
         if self.wanted[None] != self.state.level[0]:
-            for i in range(self.model.body_count):
+            for i in range(self.tables.body_count[None]):
                 self.state.level[i] = self.wanted[None]
 
     @ti.func
@@ -246,7 +261,7 @@ class Schedule:
     def _bond_key(self, b):
         key = -1
         if self.state.broken_tick[b] < 0:
-            slots = self.model.bond_slots[b]
+            slots = self.tables.bond_slots[b]
             key = self._key(slots[0] >> 2, slots[1] >> 2)
         return key
 
@@ -261,9 +276,9 @@ class Schedule:
         key = self._key(i, i)
         if ti.static(self.drifted):
             for f in range(4):
-                j = self.model.neighbour[4 * i + f]
+                j = self.tables.neighbour[4 * i + f]
                 if j >= 0:
-                    if self.state.broken_tick[self.model.face_bond[4 * i + f]] < 0:
+                    if self.state.broken_tick[self.tables.face_bond[4 * i + f]] < 0:
                         key = ti.max(key, self.state.level[j])
             if ti.static(self.has_contact):
                 key = ti.max(key, self.contacts.finest_partner(i))

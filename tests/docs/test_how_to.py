@@ -13,7 +13,7 @@ WANTED = {
     " stiffness=stiffness, deepest=deepest, rebound=rebound, account=account,"
     " unexplained=unexplained)",
     "docs/add_a_damper_accounting.md": "dict(force=force)",
-    "docs/add_a_time_integrator.md": "dict(area=model.unit_area[0], mass=model.body_mass[0],"
+    "docs/add_a_time_integrator.md": "dict(area=model.bonds['area'][0], mass=model.body_mass[0],"
     " step=step, count=count, euler=euler, leapfrog=leapfrog)",
 }
 BLOCKS = [

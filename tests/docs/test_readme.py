@@ -55,7 +55,10 @@ def test_the_damper_runs_and_both_fillings_agree(tmp_path):
 def test_the_long_run_goes_on_from_its_checkpoint(tmp_path):
     """The start, the 200 samples of the first run, and those of the second half of 200."""
     wanted = "list(result.history['time_s']), result.report.needs"
-    times, needs = run_pasted(blocks("README.md")[2], tmp_path, wanted).left
+    ran = run_pasted(blocks("README.md")[2], tmp_path, wanted)
+    times, needs = ran.left
+    # The observer is called in the second half only.
+    assert re.findall(r"^(\S+) s: fastest body", ran.said, re.MULTILINE) == ["1.5e-03", "2.0e-03"]
     assert len(times) == 1 + 200 + 100 and times[-1] == pytest.approx(2e-3)
     assert not needs and (tmp_path / "run.npz").is_file()
 

@@ -78,7 +78,7 @@ def test_skin_changes_no_bit(held):
 
 
 @pytest.mark.slow
-def test_skin_changes_no_bit_where_steps_depend_on_what_is_near(monkeypatch):
+def test_skin_changes_no_bit_where_steps_depend_on_what_is_near(monkeypatch, compiled_anew):
     """A pair is news when it comes near, not when a search lists it: the same limits, and wakes.
 
     The thin run gives fast bodies no body skin by their speed either.

@@ -16,7 +16,13 @@ from _blast_accuracy import (
 
 def outcome(moved=((3.0, 0.0, 0.0), (0.0, 4.0, 0.0)), broken=(1, 2), **energy):
     terms = {**dict.fromkeys(SPLIT, 0.0), "load_work": 10.0, **energy}
-    figures = {"evaluations": 1, "cpu_s": 1.0, "wall_s": 1.0, "compile_s": 0.0, "residual": 0.0}
+    figures = {
+        "evaluations": 1,
+        "cpu_s": 1.0,
+        "wall_s": 1.0,
+        "compile_seconds": 0.0,
+        "residual": 0.0,
+    }
     return Outcome(moved=moved, broken=broken, energy=terms, reached_s=1.0, **figures)
 
 

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 import _cli
+from _multirate import short_steps
+from _step_too_large import ended
 
 
 @pytest.mark.parametrize("blank", ["", None, math.nan, np.float64("nan")])
@@ -50,19 +52,44 @@ def test_a_summary_says_whether_its_run_was_quick_and_is_valid_json(
     assert summary["figures"]["a"]["value"] is None
 
 
+def test_options_left_out_take_the_values_of_the_job_and_others_keep_theirs():
+    options = SimpleNamespace(seeds=3, particles=None)
+    _cli.fill_in(options, {"seeds": 5, "particles": [1], "cycles": 2})
+    assert vars(options) == {"seeds": 3, "particles": [1], "cycles": 2}
+
+
+@pytest.mark.parametrize(
+    ("rows", "text"), [([(1, "a"), (2, "b")], "x,y\n1,a\n2,b\n"), ([], "x,y\n")]
+)
+def test_rows_stand_under_their_names_and_names_without_rows(tmp_path, rows, text):
+    _cli.write_rows(tmp_path / "table.csv", "x y", iter(rows))
+    assert (tmp_path / "table.csv").read_text() == text
+
+
+def test_the_end_of_a_script_adds_up_what_its_runs_took(tmp_path, monkeypatch, capsys):
+    settings = SimpleNamespace(arch="cpu", threads=1)
+    monkeypatch.setattr(_cli.runtime, "settings", lambda: settings)
+    runs = [SimpleNamespace(compile_seconds=1.0, run_seconds=k) for k in (2.0, 3.0)]
+    options = SimpleNamespace(out=str(tmp_path))
+    for given in (runs, (2.0, 5.0)):
+        _cli.finish(options, "x", {"a": _cli.figure(1.5, "s")}, given)
+        summary = json.loads((tmp_path / "summary.json").read_text())
+        assert summary["seconds"] == {"compile": 2.0, "run": 5.0}
+    assert str(tmp_path) in capsys.readouterr().out
+
+
 def blow(levels):
     """A run of demo_multirate whose bar has bodies at 0.1, 0.4 and 0.7 m; the fragment at 0.95."""
     model = SimpleNamespace(centre=np.array([[x, 0.0, 0.0] for x in (0.1, 0.4, 0.7, 0.95)]))
-    return SimpleNamespace(levels=np.array(levels), simulation=SimpleNamespace(model=model))
+    return SimpleNamespace(levels=np.array(levels), model=model)
 
 
-def test_short_steps_of_the_blow_are_told_as_far_as_they_came(script):
-    demo = script("demo_multirate")
+def test_short_steps_of_the_blow_are_told_as_far_as_they_came():
     # From the end at 0.9 m to the body at 0.4 m; that at 0.7 m has gone back by a level.
-    words = demo.short_steps(blow([[0, 0, 0, 4], [0, 0, 3, 4], [0, 1, 2, 4]]))
+    words = short_steps(blow([[0, 0, 0, 4], [0, 0, 3, 4], [0, 1, 2, 4]]), 0.9)
     assert "run 0.50 of 0.9 m into the bar" in words and "50 % of the bodies" in words
     # Nothing is said of short steps where there were none.
-    assert "run" not in demo.short_steps(blow([[0, 0, 0, 4], [0, 0, 0, 2]]))
+    assert "run" not in short_steps(blow([[0, 0, 0, 4], [0, 0, 0, 2]]), 0.9)
 
 
 def ending(residual, sentence):
@@ -73,9 +100,8 @@ def ending(residual, sentence):
 
 
 @pytest.mark.parametrize(("residual", "words"), [(0.0123, "1.2 % of the"), (13.4, "13 times the")])
-def test_a_step_that_did_not_fail_is_not_said_to_have_failed(script, residual, words):
-    demo = script("demo_step_too_large")
-    done, failed = (demo.ended(ending(residual, said)) for said in ("", "diverged there"))
+def test_a_step_that_did_not_fail_is_not_said_to_have_failed(residual, words):
+    done, failed = (ended(ending(residual, said)) for said in ("", "diverged there"))
     assert words in done and words in failed
     assert "20 steps" in done and "20 steps" in failed
     assert '"diverged there"' in failed and '"' not in done and "shake" not in done
@@ -93,4 +119,4 @@ def test_the_bar_is_looked_at_once_the_blow_has_given_energy(script, last):
 def test_grains_give_what_they_do_not_take(script, power, words):
     names = ("apparent_damping_N_s_m", "damping_ratio", "damping_ratio_empty", "apparent_mass_g")
     value = {"power_mW": power, **dict.fromkeys(names, 1.0)}
-    assert words in script("demo_damper").taken(value)[0]
+    assert words in script("_demo_damper_pictures").taken(value)[0]

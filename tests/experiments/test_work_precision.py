@@ -13,11 +13,12 @@ from _work_precision import (
     Point,
     answer_rows,
     answers,
-    cost_of,
+    cheapest,
     percent,
     picture_work_precision,
     write_points,
 )
+from _work_precision_picture import cost_of
 from ca_damper import InputError
 
 
@@ -45,6 +46,12 @@ def test_cheapest_of_what_is_accurate_enough_comes_first():
     assert (other.method, other.point.step) == ("slow", 0.1)
     # At 10 % the coarsest step of the first-order method costs a second, the other's two.
     assert [answer.point.step for answer in answers(ROWS, 0.1, {})] == [1.0, 0.5]
+
+
+def test_cheapest_is_of_all_methods_or_of_one():
+    assert cheapest(ROWS, 0.01, {}) == (4.0, "sharp")
+    assert cheapest(ROWS, 0.01, {}, "slow") == (10.0, "slow")
+    assert cheapest(ROWS, 1e-9, {}) == (None, None)
 
 
 def test_lucky_coarse_step_is_no_answer():

@@ -44,6 +44,18 @@ def test_what_is_kept_is_made_once_and_forgotten_at_the_end(own):
     assert len(made) == 2
 
 
+def test_a_remembered_function_is_called_once_with_the_same_numbers(own):
+    called = []
+
+    @own.remember
+    def double(number):
+        called.append(number)
+        return 2 * number
+
+    assert [own.ask(double, number) for number in (1, 1, 2)] == [2, 2, 4]
+    assert called == [1, 2]
+
+
 def test_a_fault_reaches_who_asked_and_the_next_is_answered(own):
     def fault():
         raise InputError("no")

@@ -8,6 +8,7 @@ import io
 import math
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from PIL import Image
 
 import _grains
 import _needs
+import _page
 import _pictures
 import _time_step
 from ca_damper import Batch, Empty, Oscillator, SceneTable
@@ -108,6 +110,23 @@ def test_grains_that_are_not_thrown_are_a_fixed_mass(engine):
     expected = o.base_amplitude * np.abs(glued) / math.sqrt(2.0)
     assert answer.rms == pytest.approx(expected, rel=0.03)
     assert abs(answer.energy["grains"]) < 0.01 * answer.energy["base"]
+
+
+def test_questions_and_answers_are_read_off_a_text():
+    shown = SimpleNamespace(md=lambda text: f"<{text}>", accordion=dict)
+    text = """
+    Why is
+    it so? :: It is **so**:
+    as it is.
+
+    And then? :: Nothing.
+    """
+    asked = {"Why is it so?": "<It is **so**: as it is.>", "And then?": "<Nothing.>"}
+    assert _page.questions(shown, text) == asked
+
+
+def test_sliders_of_the_grains_begin_at_one_of_their_steps():
+    assert all(first in steps for steps, first, _ in _grains.CHOICES.values())
 
 
 def test_a_heavier_box_keeps_frequency_and_damping():

@@ -35,7 +35,7 @@ def scattered(again, skin, spread):
     broken = random.random(model.bond_count) < 0.5
     state.broken_tick.from_numpy(np.where(broken, 0, -1).astype(np.int64))
     exposed = np.full(4 * model.body_count, -1, dtype=np.int64)
-    exposed[model.bond_slots.to_numpy()[broken].ravel()] = 0
+    exposed[simulation.tables.bond_slots.to_numpy()[broken].ravel()] = 0
     state.exposed_tick.from_numpy(exposed)
     # What has been broken from the start injects nothing.
     state.injected_tick[None] = 0
@@ -60,8 +60,8 @@ def expected(simulation, skin):
     """
     model, motion = simulation.model, simulation.state.motion()
     part = np.broadcast_to(0.5 * skin if np.ndim(skin) == 0 else skin, model.body_count)
-    size = model.spheres_per_face
-    sphere = model.sphere.to_numpy()
+    size = model.spheres.per_face
+    sphere = simulation.tables.sphere.to_numpy()
     body = np.arange(len(sphere)) // (4 * size)
     turned = np.einsum("nij,nj->ni", motion["rotation"][body], sphere[:, :3])
     place = turned + motion["position"][body]
@@ -97,7 +97,7 @@ def test_pairs_stand_in_order_and_are_indexed_from_both_bodies(again):
     assert bodies.tolist() == sorted(bodies.tolist())
     first, second_start = contacts.first_of.to_numpy(), contacts.second_start.to_numpy()
     second_pair = contacts.second_pair.to_numpy()
-    for i in range(contacts.model.body_count):
+    for i in range(contacts.tables.body_count[None]):
         assert list(range(first[i], first[i + 1])) == np.flatnonzero(bodies[:, 0] == i).tolist()
         seconds = second_pair[second_start[i] : second_start[i + 1]].tolist()
         assert seconds == np.flatnonzero(bodies[:, 1] == i).tolist()
@@ -129,7 +129,7 @@ def test_waiting_impulses_survive_a_search(again):
 def overlap_energy(simulation, born_after):
     """Elastic energy [J] of the overlaps of listed spheres of which one is younger than a tick."""
     model, motion = simulation.model, simulation.state.motion()
-    size, sphere = model.spheres_per_face, model.sphere.to_numpy()
+    size, sphere = model.spheres.per_face, simulation.tables.sphere.to_numpy()
     exposed, energy = simulation.state.exposed_tick.to_numpy(), 0.0
     for pair in listed(simulation):
         body = [one // (4 * size) for one in pair]
@@ -178,8 +178,8 @@ def neighbouring_faces(neighbours):
 def near_faces(simulation, wide):
     """Pairs of faces of two bodies of which some spheres are nearer than `wide` [m]."""
     model, motion = simulation.model, simulation.state.motion()
-    size = model.spheres_per_face
-    sphere = model.sphere.to_numpy().reshape(-1, size, 4)
+    size = model.spheres.per_face
+    sphere = simulation.tables.sphere.to_numpy().reshape(-1, size, 4)
     body = np.arange(len(sphere)) // 4
     place = np.einsum("nij,nsj->nsi", motion["rotation"][body], sphere[..., :3])
     place += motion["position"][body][:, None]
@@ -192,7 +192,7 @@ def near_faces(simulation, wide):
 
 def near_balls(simulation, wide):
     """Pairs of faces of two bodies whose balls around the spheres are nearer than `wide` [m]."""
-    motion, ball = simulation.state.motion(), simulation.model.cluster.to_numpy()
+    motion, ball = simulation.state.motion(), simulation.tables.cluster.to_numpy()
     body = np.arange(len(ball)) // 4
     place = np.einsum("nij,nj->ni", motion["rotation"][body], ball[:, :3])
     place += motion["position"][body]
@@ -226,7 +226,7 @@ def test_one_list_of_neighbours_serves_until_a_body_has_left_its_reach(again, dr
     assert 3 <= made <= 40 // 5
 
 
-def test_a_full_row_drops_what_its_body_has_left(monkeypatch):
+def test_a_full_row_drops_what_its_body_has_left(monkeypatch, compiled_anew):
     """Two bodies leap among the others, and rows have room for a few that come.
 
     Whatever is near is in the list all the same, and rooms are seldom allotted anew.
@@ -286,7 +286,7 @@ def test_a_fast_body_has_a_skin_for_some_steps(again):
     simulation = scattered(again, skin, 0.03)
     contacts, model = simulation.contacts, simulation.model
     motion, horizon = simulation.state.motion(), STEPS * simulation.schedule.dt0
-    extent = model.extent.to_numpy()
+    extent = simulation.tables.extent.to_numpy()
     velocity, spin = random.standard_normal((2, model.body_count, 3))
     velocity *= 10.0 ** random.uniform(4, 6.5, (model.body_count, 1))
     spin *= 10.0 ** random.uniform(4, 6.5, (model.body_count, 1))

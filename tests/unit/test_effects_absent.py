@@ -51,7 +51,7 @@ def instructions(kernel):
 def counts(cls, *listed):
     before = field_bytes()
     sim = Simulation(Scene(pair(), CONCRETE, listed), Uniform())
-    kernel = Kernel(cls(sim.model, sim.state, sim.schedule, None))
+    kernel = Kernel(cls(sim.tables, sim.state, sim.schedule, None))
     return {
         "bytes": field_bytes() - before,
         "bond": instructions(kernel.bond),
@@ -144,7 +144,7 @@ def test_an_absent_effect_owns_no_fields(name):
 def needs_after(listed, shift, broken=False):
     """What a run of one step misses when the slave starts displaced by shift in the face frame."""
     simulation = Simulation(Scene(pair(), CONCRETE, listed), Uniform(1e-9))
-    frame = simulation.model.bond_frame[0].to_numpy()
+    frame = simulation.tables.bond_frame[0].to_numpy()
     place = simulation.model.centre.copy()
     place[1] += frame.T @ shift
     simulation.state.set_motion(place, [[1.0, 0, 0, 0]] * 2)

@@ -37,7 +37,7 @@ def test_pulse_has_the_values_of_equation_4(body):
     """cos2(pi/2 (t/a - 1)), then cos(pi/(2b) (t/a - 1)), zero before and after."""
     times = RISE * np.array([-0.1, 0.0, 1 / 3, 0.5, 1.0, 1.0 + RATIO / 2, 1.0 + RATIO, 4.0, 9.0])
     shares = np.array([0.0, 0.0, 0.25, 0.5, 1.0, np.sqrt(0.5), 0.0, 0.0, 0.0])
-    pressure = body.model.loads[0].pressure_at(times)
+    pressure = body.tables.loads[0].pressure_at(times)
     assert np.abs(pressure / PEAK - shares).max() < 8 * EPS
     assert pressure.min() >= 0.0
 
@@ -54,7 +54,7 @@ def test_a_free_body_takes_the_impulse_of_the_pulse(body):
     push, _ = push_of(body)
     exact = PEAK * RISE * (0.5 + 2.0 * RATIO / np.pi)
     quadrature = STEP**2 / 12.0 * PEAK * np.pi / (2.0 * RATIO * RISE)
-    body.model.inertia_inverse.fill(0.0)
+    body.tables.inertia_inverse.fill(0.0)
     body.advance_to(TO_END)
     momentum = body.model.body_mass[0] * body.state.motion()["velocity"][0]
     error = 1.1 * quadrature + TO_END * EPS * exact

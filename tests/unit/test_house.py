@@ -28,7 +28,7 @@ LAYERS = {
         ("diagnostics",),
         ("engine",),
         ("simulation",),
-        ("output", "measured_speedup"),
+        ("output", "measured_speedup", "observers", "run_plan"),
         ("plot",),
         ("result",),
         ("simulate", "needed_effects"),

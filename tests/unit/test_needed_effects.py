@@ -11,6 +11,7 @@ from taichi_dem import (
     CONCRETE,
     InputError,
     Scene,
+    Simulation,
     Uniform,
     checked_mesh,
     effects,
@@ -20,7 +21,6 @@ from taichi_dem import (
 from taichi_dem.diagnostics.effect_activity import effect_activity
 from taichi_dem.diagnostics.energy_balance import TERMS
 from taichi_dem.engine.model import Model
-from taichi_dem.engine.state import State
 from taichi_dem.kit.effect_usage import Advice, EffectUse
 from taichi_dem.mesh.shapes import bar, pair
 from tests.unit.test_outer_faces import beside
@@ -104,11 +104,11 @@ def used(
     exposed: whether faces carry spheres. heat: of each body's contacts, and in each bond [J].
     lacking: recordings that saw bodies overlap where faces carry none.
     """
-    model = Model(mesh or pair(), material, listed)
-    state = State(model, 1e4)
+    simulation = Simulation(Scene(mesh or pair(), material, listed), Uniform())
+    model, state = simulation.model, simulation.state
     if model.has_contact and exposed:
         state.expose(model.topology)
-    bonds = max(1, model.bond_count)
+    bonds = model.bond_count
     tables = np.zeros((model.body_count, 6)), np.full((bonds, 5), heat), np.zeros((0, 4))
     tables[0][:, 3:5] = heat
     none = SimpleNamespace(state=state, start_energy=0.0, support_works=lambda index: works)
@@ -299,7 +299,7 @@ def test_round_off_in_bonds_is_no_damping(listed, away):
 def test_a_vibration_of_a_nanometre_is_damped_and_one_below_the_last_digits_is_not():
     """Energy of a bond that is opened by u: A k u^2 / 2. Own dashpots are kept all the same."""
     model = Model(pair(), CONCRETE, [])
-    spring = 1.5 * float(model.unit_area[0]) * model.bond_stiffness[0][0]
+    spring = 1.5 * model.bonds["area"][0] * model.bond_stiffness[0][0]
     (seen,) = used([effects.BondDamping()], heat=spring * 1e-9**2).values()
     assert seen.is_active and not seen.rounding
     for make, dropped in ((effects.BondDamping, True), (Own, False)):

@@ -2,7 +2,6 @@
 
 import sys
 import warnings
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,8 +9,6 @@ import pytest
 from taichi_dem import CONCRETE, Scene, Uniform, checked_mesh, effects, simulate
 from taichi_dem.diagnostics.missing_effects import MissingEffects
 from taichi_dem.diagnostics.outer_faces import LEAST_OVERLAP, OuterFaces
-from taichi_dem.engine.model import Model
-from taichi_dem.engine.state import State
 from taichi_dem.mesh.shapes import bar, pair, single
 from taichi_dem.scene import outer_faces_warnings
 from taichi_dem.simulation import Simulation
@@ -38,9 +35,11 @@ class Looked:
     """Bodies of a mesh that are put anywhere, and looked at; no step is compiled."""
 
     def __init__(self, mesh, **contact):
-        self.model = Model(mesh, CONCRETE, [effects.SphereContact(3, **contact)])
-        self.state = State(self.model, 1e4)
-        self.outer = OuterFaces(self.model, self.state)
+        listed = [effects.SphereContact(3, **contact)]
+        self.simulation = Simulation(Scene(mesh, CONCRETE, listed), Uniform())
+        self.model, self.state = self.simulation.model, self.simulation.state
+        self.tables = self.simulation.tables
+        self.outer = OuterFaces(self.model, self.state, self.simulation.outer_overlaps)
 
     def pairs(self, position, orientation=None):
         """Pairs that are found with the bodies at a position [m], (n, 3)."""
@@ -114,7 +113,7 @@ def test_face_to_face_counts_from_the_least_overlap_on(share, found):
     mesh = single(EDGE)
     mirrored = checked_mesh(mesh.points * [-1.0, 1.0, 1.0], mesh.tetrahedra, {})
     looked = Looked(beside(mesh, mirrored, [1.0, 0.0, 0.0]))
-    radius = looked.model.sphere.to_numpy()[:, 3].max()
+    radius = looked.model.spheres.radius.max()
     position = looked.model.centre - np.outer([0.0, 1.0], [1.0 + share * 2.0 * radius, 0.0, 0.0])
     assert looked.pairs(position) == found
 
@@ -135,7 +134,8 @@ def quaternions(random, count):
 def overlaps_by_hand(looked, position, rotation, exposed):
     """All pairs of bodies with all their spheres, one by one; exposed: (n, 4), faces with some."""
     model, points = looked.model, looked.model.mesh.tetrahedra
-    sphere = model.sphere.to_numpy().reshape(model.body_count, 4, -1, 4)
+    spheres = model.spheres
+    sphere = np.concatenate([spheres.centre, spheres.radius[..., None]], axis=-1)
     bonded = (model.topology.body_bond >= 0) & ~exposed
     count = 0
     for i in range(model.body_count):
@@ -186,7 +186,8 @@ def test_finding_names_the_remedy_and_survives_a_checkpoint():
     looked = Looked(TWO)
 
     def watching():
-        return MissingEffects(looked.model, looked.state, SimpleNamespace(contacts=None))
+        outer = looked.simulation.outer_overlaps
+        return MissingEffects(looked.model, looked.state, looked.simulation.readings, None, outer)
 
     watch = watching()
     watch.sample(0.0)
@@ -212,8 +213,8 @@ def test_finding_names_the_remedy_and_survives_a_checkpoint():
     ],
 )
 def test_nothing_is_looked_for_where_outer_faces_carry_spheres_or_the_solid_is_one(mesh, listed):
-    model = Model(mesh, CONCRETE, listed)
-    watch = MissingEffects(model, State(model, 1e4), SimpleNamespace(contacts=None))
+    made = Simulation(Scene(mesh, CONCRETE, listed), Uniform())
+    watch = MissingEffects(made.model, made.state, made.readings, None, made.outer_overlaps)
     assert watch.outer_faces is None
 
 

@@ -3,11 +3,9 @@
 import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE, Scene, checked_mesh, effects
+from taichi_dem import CONCRETE, Scene, Simulation, Uniform, checked_mesh, effects
 from taichi_dem.diagnostics.part_overlaps import PartOverlaps
 from taichi_dem.effects.base import Effect
-from taichi_dem.engine.model import Model
-from taichi_dem.engine.state import State
 from taichi_dem.mesh.parts import any_overlap, part_boxes, parts_of
 from taichi_dem.mesh.shapes import bar, single
 from taichi_dem.scene import outer_faces_warnings
@@ -105,8 +103,8 @@ class Parts:
     """Bodies of a mesh without contact, put anywhere and looked at."""
 
     def __init__(self, mesh):
-        self.model = Model(mesh, CONCRETE, [])
-        self.state = State(self.model, 1e4)
+        simulation = Simulation(Scene(mesh, CONCRETE), Uniform())
+        self.model, self.state = simulation.model, simulation.state
         self.looker = PartOverlaps(self.model, self.state, parts_of(mesh))
 
     def found(self, position, orientation=None):

@@ -23,7 +23,7 @@ from taichi_dem.kit.progress import progress_bar
 from taichi_dem.kit.progress.progress import Compiling, Counted, Progress, compiling, listening
 from taichi_dem.kit.progress.progress_bar import ProgressBar, reporting
 from taichi_dem.mesh import shapes as mesh_shapes
-from taichi_dem.simulate import RunProgress
+from taichi_dem.run_plan import RunProgress
 from tests.processes import users_environment
 from tests.terminal import run_in_terminal
 

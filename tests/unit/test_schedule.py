@@ -111,7 +111,9 @@ def test_the_paper_rule_takes_the_largest_step_that_is_short_enough_and_on_the_g
     low = np.array([coarsest_active(int(t)) for t in random.integers(0, 1 << 22, count)])
     low = np.minimum(low, 6).astype(np.int32)
     level = np.maximum(low, random.integers(0, 12, count)).astype(np.int32)
-    Rule(Displacement(distance, dt0)).ask(level, speed, low)
+    rule = Displacement()
+    rule.load(distance, dt0)
+    Rule(rule).ask(level, speed, low)
     step = dt0 / 2.0**level
     assert np.all(step * speed <= distance)
     assert np.all(level >= low)

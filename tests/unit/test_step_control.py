@@ -21,7 +21,7 @@ from taichi_dem import (
     step_report,
 )
 from taichi_dem.mesh.shapes import bar, pair, single
-from taichi_dem.mesh.topology import topology_of
+from taichi_dem.mesh.topology import faces_of_group, topology_of
 from taichi_dem.stability.body_limits import LIMITED
 from taichi_dem.stability.mesh_limits import (
     bond_rates,
@@ -231,7 +231,8 @@ def test_load_criterion_looks_a_largest_step_ahead():
     control = StepControl(level_jump=None)
     simulation = Simulation(scene, Multirate(1e-6, distance, control=control))
     simulation.start()
-    loaded = np.unique(simulation.model.loads[0].body)
+    mesh, topology = simulation.model.mesh, simulation.model.topology
+    loaded = np.unique(faces_of_group(mesh, topology, "left")[0])
     bound = simulation.state.bound.to_numpy()
     assert np.all(bound[loaded] == CRITERIA.index("load"))
     area = 0.1 * 0.1 / 2
@@ -250,7 +251,7 @@ def decay_in_a_step(dt, dashpot):
     velocity = np.array([[-1e-3, 0.0, 0.0], [1e-3, 0.0, 0.0]])
     simulation.state.set_motion(simulation.model.centre, still, velocity)
     simulation.advance_to(1)
-    rate = 2.0 * 3.0 * simulation.model.unit_area[0] * CONCRETE.normal_damping
+    rate = 2.0 * 3.0 * simulation.tables.unit_area[0] * CONCRETE.normal_damping
     fastest = simulation.schedule.limits.bond_damping[0] if dashpot == "limited" else 0.0
     return simulation.state.velocity[0][0] / -1e-3, rate / simulation.model.body_mass[0], fastest
 

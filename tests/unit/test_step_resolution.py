@@ -41,6 +41,6 @@ def test_a_bond_that_failed_a_step_late_is_named(step, named):
     found = simulation.report().needs
     assert bool(found) == named
     if named:
-        widest = simulation.model.tension.unit.to_numpy()[:3, 0].max()
+        widest = simulation.tables.tension.unit.to_numpy()[:3, 0].max()
         assert f"{widest / CONCRETE.failure_opening:.2g} times its failure opening" in found[0]
     assert not simulation.step_resolution.findings(np.array([False, False]))

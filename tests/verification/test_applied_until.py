@@ -46,7 +46,7 @@ class Sleepers:
         self.state.set_motion(place, np.tile([1.0, 0.0, 0.0, 0.0], (3, 1)), velocity)
         self.simulation.start()
         self.mass = model.body_mass[0]
-        self.force_per_opening = 3.0 * model.unit_area[0] * CONCRETE.normal_stiffness
+        self.force_per_opening = 3.0 * model.bonds["area"][0] * CONCRETE.normal_stiffness
         assert self.state.level.to_numpy().tolist() == [0, 0, 2]
 
     def quarters(self, count):
@@ -106,7 +106,7 @@ def test_a_bond_applies_no_impulse_to_a_woken_body_twice():
 @ti.kernel
 def _release(advance: ti.template(), bond: ti.i32):
     for _ in range(1):
-        advance._release(bond, advance.model.bond_slots[bond])
+        advance._release(bond, advance.tables.bond_slots[bond])
 
 
 @pytest.mark.parametrize("wake", [pytest.param((), marks=pytest.mark.slow), ("release",)])

@@ -159,7 +159,7 @@ def test_a_rigidly_moved_block_feels_no_force(damped_bar):
         place, np.tile(turn, (count, 1)), velocity, np.tile(spin, (count, 1))
     )
     simulation.start()
-    area = 3.0 * simulation.model.unit_area.to_numpy().max()
+    area = 3.0 * simulation.tables.unit_area.to_numpy().max()
     opening, rate = 8 * EPS * 0.3, 8 * EPS * 30.0
     force = area * (CONCRETE.normal_stiffness * opening + CONCRETE.normal_damping * rate)
     impulse = simulation.state.slot.to_numpy()[:, :3] / 2e-8

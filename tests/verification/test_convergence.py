@@ -63,7 +63,7 @@ class MovingBar:
         state.level.from_numpy(levels)
         material = simulation.model.material
         for k, value in enumerate((material.normal_damping, material.shear_damping)):
-            simulation.model.dashpot.law[k] = value if damped else 0.0
+            simulation.tables.dashpot.law[k] = value if damped else 0.0
         dt0 = UNTIL / steps
         simulation.schedule.dt0, simulation.schedule.tick_seconds = dt0, dt0 / MACRO_TICKS
         for k in range(MAX_LEVEL + 1):

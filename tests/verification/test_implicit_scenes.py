@@ -77,8 +77,10 @@ def listed_effects():
 
 def closed(model, place, mover, partner, gap):
     """Shift `mover` along x towards `partner` until the smallest gap of their spheres is `gap`."""
-    size = 4 * model.spheres_per_face
-    sphere = model.sphere.to_numpy()
+    size = 4 * model.spheres.per_face
+    spheres = model.spheres
+    ball = np.concatenate([spheres.centre, spheres.radius[..., None]], axis=-1)
+    sphere = ball.reshape(-1, 4)
     centre = sphere[:, :3] + np.repeat(place, size, axis=0)
     own = np.concatenate([np.arange(size * b, size * b + size) for b in mover])
     others = np.concatenate([np.arange(size * b, size * b + size) for b in partner])
@@ -135,7 +137,7 @@ class Parts:
         away = self.again.run(round(UNTIL / step)) - self.place
         simulation = self.again.simulation
         bonds = np.zeros((self.model.bond_count, 5))
-        simulation.energy_balance._read_bonds(bonds)
+        simulation.readings.bonds(bonds)
         return {
             "moved": {name: away[of] for name, of in self.bodies.items()},
             "broken_s": self.state.broken_tick.to_numpy() / MACRO_TICKS * step,
@@ -202,7 +204,7 @@ def test_softening_and_release_inside_a_step(runs, implicit):
     broken = [run["broken_s"][bond] for run in runs]
     assert broken[0] > 30 * STEP
     assert abs(broken[1] - broken[0]) <= STEP
-    area = 3.0 * implicit.model.unit_area[bond]
+    area = 3.0 * implicit.model.bonds["area"][bond]
     fracture = area * CONCRETE.fracture_energy
     for run in runs:
         dashpot, _, release, softening = run["bonds"][bond][1:]

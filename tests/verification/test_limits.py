@@ -203,7 +203,7 @@ def test_sphere_springs_hold_up_to_their_limit(divisions, contacts):
     listed = [effects.SphereContact(divisions, outer_faces=True), gas]
     rig = Rig(facing(GAP, sides=True), listed, material=material)
     model = rig.simulation.model
-    spheres = model.sphere.to_numpy()[:contacts, :3]
+    spheres = model.spheres.centre.reshape(-1, 3)[:contacts]
     rate = CONCRETE.contact_stiffness * contact_eigenvalue(model, spheres)
     exact = 2.0 / np.sqrt(rate)
     push = pressure * 0.05**2 * 3.0**0.5 / 4.0

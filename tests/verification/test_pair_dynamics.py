@@ -37,7 +37,7 @@ def openings(simulation, marks):
 
 def mass_and_area(simulation):
     """Mass of a body [kg], area of the bond [m^2]."""
-    return simulation.model.body_mass[0], 3.0 * simulation.model.unit_area[0]
+    return simulation.model.body_mass[0], 3.0 * simulation.tables.unit_area[0]
 
 
 def test_normal_mode_has_its_frequency():

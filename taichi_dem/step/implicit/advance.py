@@ -44,7 +44,7 @@ class SolvedAdvance(Advance):
     @ti.func
     def allowed(self, i, velocity, momentum):
         """Velocity and angular momentum that the supports of body i allow; nothing is booked."""
-        for effect in ti.static(self.model.supports):
+        for effect in ti.static(self.tables.supports):
             if effect.acts_on(i):
                 now = self.schedule.seconds(self.state.tick[None])
                 half = now - 0.5 * self.schedule.step_seconds[0]

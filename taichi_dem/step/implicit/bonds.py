@@ -3,11 +3,14 @@
 import numpy as np
 import taichi as ti
 
-from taichi_dem.kit.allocation import defer_fill
+from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.types import real, vec3, vec6
 from taichi_dem.physics.wrench import inverse, mobility, plus, point_block, zero_block
 from taichi_dem.step.implicit.colouring import edge_colours
 from taichi_dem.timeline import MACRO_TICKS
+
+#: Colours that links of at most four a body can need: a link meets six others at most.
+BOND_COLOURS = 7
 
 
 @ti.data_oriented
@@ -19,38 +22,48 @@ class BondDashpots:
     s1 + s0 (1 - theta) / theta carries over from step to step: it is the warm start, and y itself
     need not be stored.
 
-    colours: how many bonds there are of each. index: of a bond in the order. bodies: master and
-    slave, -1 once released. branch: master's centre to slave's [m]. a, b, c: the block
-    (C'^-1 + G)^-1, C' = theta C, G the mobility of the pair. start: s0. last: the s1 that the
-    present y satisfies. Velocities in m/s, spins in rad/s, world.
+    theta: where in the step dashpots take their velocity, and (1 - theta) / theta. refresh_every:
+    steps between two renewals of the blocks. colour_first: first place of each colour. index: of a
+    bond in the order. bodies: master and slave, -1 once released. branch: from the master's centre
+    to the slave's [m].
+    a, b, c: the block (C'^-1 + G)^-1, C' = theta C, G the mobility of the pair. start: s0. last:
+    the s1 that the present y satisfies. Velocities in m/s, spins in rad/s, world.
     """
 
-    constant_fields = ("index",)
+    constant_fields = ("theta", "refresh_every", "index", "colour_first")
 
-    def __init__(self, model, state, schedule, velocities, method):
-        self.model, self.state, self.schedule, self.velocities = model, state, schedule, velocities
-        self.theta, self.earlier = method.theta, (1.0 - method.theta) / method.theta
-        self.refresh_every = max(1, round(method.refresh / method.dt))
-        bonds = max(1, model.bond_count)
+    def __init__(self, tables, state, schedule, velocities):
+        self.tables, self.state = tables, state
+        self.schedule, self.velocities = schedule, velocities
+        bonds = tables.capacity.bonds
+        self.theta = ti.field(real, shape=2)
+        self.refresh_every = ti.field(ti.i64, shape=())
         self.index = ti.field(ti.i32, shape=bonds)
         self.bodies = ti.Vector.field(2, ti.i32, shape=bonds)
         self.branch = ti.Vector.field(3, real, shape=bonds)
         self.a, self.b, self.c = (ti.Matrix.field(3, 3, real, shape=bonds) for _ in range(3))
         self.start = ti.Vector.field(6, real, shape=bonds)
         self.last = ti.Vector.field(6, real, shape=bonds)
-        defer_fill(self.bodies.fill, -1)
+        self.colour_first = ti.field(ti.i32, shape=BOND_COLOURS + 1)
+
+    def load(self, model, method):
+        """Colour the bonds of a model and take the numbers of a method."""
+        assign(self.theta, np.array([method.theta, (1.0 - method.theta) / method.theta]))
+        assign(self.refresh_every, max(1, round(method.refresh / method.dt)))
         top = model.topology
         colours = edge_colours(np.stack([top.master, top.slave], axis=1), model.body_count)
-        self.colours = np.bincount(colours, minlength=1).tolist()
-        place = np.empty(bonds, dtype=np.int32)
-        place[np.argsort(colours, kind="stable")] = np.arange(len(colours), dtype=np.int32)
-        defer_fill(self.index.from_numpy, place)
+        place = np.empty(model.bond_count, dtype=np.int32)
+        place[np.argsort(colours, kind="stable")] = np.arange(model.bond_count, dtype=np.int32)
+        assign(self.index, place)
+        assign(self.bodies, np.full((model.bond_count, 2), -1))
+        counts = np.bincount(colours, minlength=BOND_COLOURS)
+        assign(self.colour_first, np.cumsum([0, *counts]))
 
     @ti.func
     def mean(self, b, motion):
         """A bond's motion with the twist that its dashpots answered in the step before."""
         k = self.index[b]
-        twist = self.theta * (self.last[k] + self.earlier * self.start[k])
+        twist = self.theta[0] * (self.last[k] + self.theta[1] * self.start[k])
         motion.velocity = motion.axes @ twist[0:3]
         motion.spin = motion.axes @ twist[3:6]
         return motion
@@ -61,15 +74,15 @@ class BondDashpots:
         k = self.index[b]
         self.bodies[k], self.branch[k] = [i, j], branch
         now = self._twist(i, j, branch)
-        self.last[k] = self.last[k] + self.earlier * (self.start[k] - now)
+        self.last[k] = self.last[k] + self.theta[1] * (self.start[k] - now)
         self.start[k] = now
-        if (self.state.tick[None] // MACRO_TICKS) % self.refresh_every == 0:
+        if (self.state.tick[None] // MACRO_TICKS) % self.refresh_every[None] == 0:
             self._refresh(b, k, i, j)
 
     @ti.func
     def first(self, b):
         """Begin a run with a guess: the twist of the first step does not change."""
-        slots, k = self.model.bond_slots[b], self.index[b]
+        slots, k = self.tables.bond_slots[b], self.index[b]
         i, j = slots[0] >> 2, slots[1] >> 2
         if self.state.broken_tick[b] < 0:
             branch = self.state.position[j] - self.state.position[i]
@@ -111,19 +124,19 @@ class BondDashpots:
     @ti.func
     def _refresh(self, b, k, i, j):
         dt = self.schedule.step_seconds[0]
-        axes = self.model.bond_frame[b] @ self.state.rotation[i].transpose()
-        along = self.model.dashpot.traction(vec3(1.0, 1.0, 1.0))
+        axes = self.tables.bond_frame[b] @ self.state.rotation[i].transpose()
+        along = self.tables.dashpot.traction(vec3(1.0, 1.0, 1.0))
         # A trace of the springs lets the block be inverted where a coefficient is zero.
-        stiffness = self.model.bond_stiffness[b]
+        stiffness = self.tables.bond_stiffness[b]
         along += 1e-9 * dt * vec3(stiffness[0], stiffness[1], stiffness[1])
         scaled = axes
         for r in ti.static(range(3)):
             for c in ti.static(range(3)):
                 scaled[r, c] = axes[r, c] * along[r]
-        law = (self.theta * dt * self.model.unit_area[b]) * (axes.transpose() @ scaled)
+        law = (self.theta[0] * dt * self.tables.unit_area[b]) * (axes.transpose() @ scaled)
         block = zero_block()
         for q in range(3):
-            arm = self.state.rotation[j] @ self.model.vertex_slave[3 * b + q]
+            arm = self.state.rotation[j] @ self.tables.vertex_slave[3 * b + q]
             block = plus(block, point_block(arm, law))
         free = mobility(
             self.velocities.slack(i),

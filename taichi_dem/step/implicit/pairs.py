@@ -32,10 +32,10 @@ class PairDashpots:
         *("active", "order", "colour", "taken", "colour_first"),
     )
 
-    def __init__(self, model, state, schedule, contacts, velocities):
-        self.model, self.state, self.schedule = model, state, schedule
+    def __init__(self, tables, state, schedule, contacts, velocities):
+        self.tables, self.state, self.schedule = tables, state, schedule
         self.contacts, self.velocities = contacts, velocities
-        self.has_friction = bool(model.friction.name)
+        self.has_friction = bool(tables.friction.name)
         pairs, spheres = contacts.capacity, contacts.sphere_capacity
         self.touching = ti.field(ti.i32, shape=pairs)
         self.entry = ti.field(ti.i32, shape=spheres)
@@ -45,7 +45,7 @@ class PairDashpots:
         self.share = ti.Vector.field(2, real, shape=spheres)
         self.impulse = ti.Vector.field(3, real, shape=spheres)
         self.branch = ti.Vector.field(3, real, shape=pairs)
-        n = model.body_count
+        n = tables.capacity.bodies
         self.count = ti.field(ti.i32, shape=())
         self.active = ti.field(ti.i32, shape=pairs)
         self.order = ti.field(ti.i32, shape=pairs)
@@ -116,7 +116,7 @@ class PairDashpots:
         end = start
         for k in range(start, self.contacts.pair_last[p]):
             a, b = self.contacts.pair_sphere[k][0], self.contacts.pair_sphere[k][1]
-            first, second = self.model.sphere[a], self.model.sphere[b]
+            first, second = self.tables.sphere[a], self.tables.sphere[b]
             apart = turn @ second.xyz + offset - first.xyz
             reach = first[3] + second[3]
             if apart.norm_sqr() < (reach + ahead) * (reach + ahead):
@@ -188,7 +188,7 @@ class PairDashpots:
         if ti.static(self.has_friction):
             slide = velocity - rate * normal - share[1] * (held - pressed * normal)
             rub = (-damping / (1.0 + damping * share[1])) * slide
-            bound = self.model.friction.law[0] * found.dot(normal)
+            bound = self.tables.friction.law[0] * found.dot(normal)
             size = rub.norm()
             if size > bound:
                 rub *= bound / size

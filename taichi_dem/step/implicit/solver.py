@@ -1,8 +1,9 @@
 """Sweeps over the dashpots of all bonds and contacts until their impulses agree."""
 
+import numpy as np
 import taichi as ti
 
-from taichi_dem.kit.allocation import raise_to
+from taichi_dem.kit.allocation import assign, raise_to
 from taichi_dem.kit.types import real
 from taichi_dem.step.implicit.bonds import BondDashpots
 from taichi_dem.step.implicit.pairs import COLOURS, PairDashpots
@@ -16,30 +17,38 @@ class Solver:
     Members of one colour share no body: they may be visited side by side, and the order within a
     colour changes no bit. So one core and many cores run the same sweeps to the same bits.
 
-    sweeps: how many the present step has had. change2: largest squared change of a velocity in
-    the present sweep [m2/s2], residual2 that of the last. speed2: largest squared speed of a body
-    at the beginning of the step. unsolved: 1 while another sweep is called for.
+    bounds: fewest and most sweeps of a step. tolerance: of the velocities. sweeps: how many the
+    present step has had. change2: largest squared change of a velocity in the present sweep
+    [m2/s2], residual2 that of the last. speed2: largest squared speed of a body at the beginning of
+    the step. unsolved: 1 while another sweep is called for.
     """
 
-    def __init__(self, model, state, schedule, contacts, method):
-        self.model, self.state, self.schedule, self.contacts = model, state, schedule, contacts
-        self.fewest, self.most = method.sweeps
-        self.velocities = Velocities(model, state)
+    def __init__(self, tables, state, schedule, contacts):
+        self.tables, self.state, self.schedule, self.contacts = tables, state, schedule, contacts
+        self.bounds = ti.field(ti.i32, shape=2)
+        self.tolerance = ti.field(real, shape=())
+        self.velocities = Velocities(tables, state)
         self.bonds = None
-        self.has_bonds = bool(model.dashpot.name)
+        self.has_bonds = bool(tables.dashpot.name)
         if self.has_bonds:
-            self.bonds = BondDashpots(model, state, schedule, self.velocities, method)
+            self.bonds = BondDashpots(tables, state, schedule, self.velocities)
         self.pairs = None
         self.has_contact = contacts is not None
         if self.has_contact:
-            self.pairs = PairDashpots(model, state, schedule, contacts, self.velocities)
+            self.pairs = PairDashpots(tables, state, schedule, contacts, self.velocities)
         self.sweeps = ti.field(ti.i32, shape=())
         self.unsolved = ti.field(ti.i32, shape=())
         self.total_sweeps = ti.field(ti.i64, shape=())
         self.change2 = ti.field(real, shape=())
         self.residual2 = ti.field(real, shape=())
         self.speed2 = ti.field(real, shape=())
-        self.tolerance = method.tolerance
+
+    def load(self, model, method):
+        """Take the numbers of a method, and the bonds of a model."""
+        assign(self.bounds, np.array(method.sweeps))
+        assign(self.tolerance, method.tolerance)
+        if self.has_bonds:
+            self.bonds.load(model, method)
 
     @ti.func
     def begin(self, one):
@@ -53,7 +62,7 @@ class Solver:
         """All sweeps of a step, one member after the other."""
         while self.unsolved[None] == 1:
             if ti.static(self.has_bonds):
-                for k in range(self.model.bond_count):
+                for k in range(self.tables.bond_count[None]):
                     self.bond(k)
             if ti.static(self.has_contact):
                 for a in range(self.pairs.count[None]):
@@ -84,8 +93,8 @@ class Solver:
         self.total_sweeps[None] = self.total_sweeps[None] + 1
         self.residual2[None] = self.change2[None]
         self.change2[None] = 0.0
-        bound = self.tolerance * self.tolerance * self.speed2[None]
-        settled = self.sweeps[None] >= self.fewest and self.residual2[None] <= bound
-        if settled or self.sweeps[None] >= self.most:
+        bound = self.tolerance[None] * self.tolerance[None] * self.speed2[None]
+        settled = self.sweeps[None] >= self.bounds[0] and self.residual2[None] <= bound
+        if settled or self.sweeps[None] >= self.bounds[1]:
             self.unsolved[None] = 0
         self.schedule.count_sweep(self.has_bonds)

@@ -19,13 +19,13 @@ class Velocities:
 
     scratch_fields = ("twist", "given")
 
-    def __init__(self, model, state):
-        n = model.body_count
-        self.model, self.state = model, state
+    def __init__(self, tables, state):
+        n = tables.capacity.bodies
+        self.tables, self.state = tables, state
         self.twist, self.turn = ti.Vector.field(6, real), ti.Matrix.field(3, 3, real)
         self.lightness = ti.field(real)
         ti.root.dense(ti.i, n).place(self.twist, self.turn, self.lightness)
-        self.has_supports = bool(model.supports)
+        self.has_supports = bool(tables.supports)
         if self.has_supports:
             self.hold = ti.Matrix.field(3, 3, real, shape=n)
             self.given = ti.Vector.field(6, real, shape=n)
@@ -33,7 +33,7 @@ class Velocities:
     @ti.func
     def slack(self, i):
         """Velocity of body i per impulse [1/kg], a 3x3 matrix."""
-        slack = self.model.mass_inverse[i] * unit3()
+        slack = self.tables.mass_inverse[i] * unit3()
         if ti.static(self.has_supports):
             slack = self.hold[i]
         return slack
@@ -42,8 +42,8 @@ class Velocities:
     def update_inertia(self, i, advance):
         """Compute the velocity per impulse of body i in its present orientation."""
         rotation = self.state.rotation[i]
-        self.lightness[i] = self.model.mass_inverse[i]
-        self.turn[i] = rotation @ self.model.inertia_inverse[i] @ rotation.transpose()
+        self.lightness[i] = self.tables.mass_inverse[i]
+        self.turn[i] = rotation @ self.tables.inertia_inverse[i] @ rotation.transpose()
         if ti.static(self.has_supports):
             self._support(i, advance)
 
@@ -54,7 +54,7 @@ class Velocities:
         rest, rest_turn = advance.allowed(i, 0.0 * unit[0, :], 0.0 * unit[0, :])
         for k in ti.static(range(3)):
             axis = unit[:, k]
-            velocity, _ = advance.allowed(i, self.model.mass_inverse[i] * axis, 0.0 * axis)
+            velocity, _ = advance.allowed(i, self.tables.mass_inverse[i] * axis, 0.0 * axis)
             _, momentum = advance.allowed(i, 0.0 * axis, axis)
             spin = turn @ (momentum - rest_turn)
             for r in ti.static(range(3)):
@@ -64,7 +64,7 @@ class Velocities:
     @ti.func
     def predict(self, i, advance, linear, angular):
         """Let body i have an impulse [N s] and moment [N m s], as its supports allow."""
-        velocity = self.state.velocity[i] + self.model.mass_inverse[i] * linear
+        velocity = self.state.velocity[i] + self.tables.mass_inverse[i] * linear
         spin = self.state.spin[i] + self.turn[i] @ angular
         if ti.static(self.has_supports):
             momentum = self.state.angular_momentum[i] + angular
@@ -84,10 +84,10 @@ class Velocities:
         twist, rotation = self.twist[i], self.state.rotation[i]
         velocity = twist[0:3]
         change = rotation.transpose() @ (twist[3:6] - self.state.spin[i])
-        momentum = self.state.angular_momentum[i] + rotation @ (self.model.inertia[i] @ change)
+        momentum = self.state.angular_momentum[i] + rotation @ (self.tables.inertia[i] @ change)
         if ti.static(self.has_supports):
             given = self.given[i]
-            velocity = self.state.velocity[i] + self.model.mass_inverse[i] * given[0:3]
+            velocity = self.state.velocity[i] + self.tables.mass_inverse[i] * given[0:3]
             momentum = self.state.angular_momentum[i] + given[3:6]
         return velocity, momentum
 

@@ -1,0 +1,230 @@
+"""Work-precision diagrams as pictures: errors over costs, floors, failures, labels of steps."""
+
+import math
+import os
+
+import numpy as np
+
+from _cli import processor, versions
+from taichi_dem import runtime
+from taichi_dem.kit.plot_style import GREY, picture, styles_of
+
+_SMALL = 6.5
+#: Where a label's centre may stand: right and up in widths and heights of the label, and a gap.
+_PLACES = ((1, 1), (-1, -1), (1, -1), (-1, 1), (1, 0), (-1, 0), (0, 2), (0, -2), (1, 3), (-1, -3))
+WALL = "wall time [s], fastest of the repeats"
+
+
+def machine_words():
+    """Machine, threads, versions and commit in a line, to stand on a picture."""
+    settings, known = runtime.settings(), versions()
+    threads = f"{settings.threads} thread{'s' if settings.threads > 1 else ''}"
+    software = f"taichi {known['taichi']}, python {known['python']}"
+    place = f"{processor()}, {os.cpu_count()} cores, {settings.arch}, {threads}"
+    return f"{place}; {software}, commit {known['commit'] or 'unknown'}"
+
+
+def picture_work_precision(
+    path,
+    points,
+    titles,
+    *,
+    floors,
+    caption,
+    error_name,
+    work_name,
+    time_name=WALL,
+    residual_names=(),
+    step_unit=1.0,
+    order=1,
+):
+    """Error over wall time and over evaluations; the residual of each run over its step.
+
+    titles: of the methods, in the order of the legend. time_name: what the times are. floors:
+    dotted, by method. order: of the line of ideal gain, error ~ cost^-order, drawn through the
+    best buy. residual_names: of a third panel's axes (step, residual), none if empty; step_unit: of
+    its step [s]. Failures are crosses on the top edge, above what they would have cost, with their
+    reason.
+    """
+    panels = 3 if residual_names else 2
+    ratios = {"width_ratios": (1.0, 1.0, 0.62)[:panels]}
+    size = (6.0 * min(panels, 2.62), 6.2)
+    with picture(path, 1, panels, size, gridspec_kw=ratios) as (figure, axes):
+        looks, drawn = _looks(titles), []
+        for axis, cost, name in zip(axes, ("seconds", "evaluations"), (time_name, work_name)):
+            drawn.append(_Panel(axis, points, looks, cost))
+            drawn[-1].draw(floors, order)
+            axis.set(xlabel=name, ylabel=error_name)
+        if residual_names:
+            _draw_residuals(axes[2], points, looks, step_unit)
+            axes[2].set(xlabel=residual_names[0], ylabel=residual_names[1])
+        figure.legend(*_legend(axes[0], titles), loc="outside upper left", ncols=3)
+        marks = "At the points: what is swept. Bars: to the slowest repeat."
+        words = f"{caption}\n{marks} {machine_words()}"
+        figure.supxlabel(words, fontsize=7.5, x=0.01, ha="left")
+        # Where a label has room is known when everything else has its place.
+        figure.draw_without_rendering()
+        for panel in drawn:
+            panel.label_steps()
+
+
+def picture_errors(path, errors, titles, *, time_name, caption):
+    """Several errors over one cost.
+
+    errors: by what they are of, then by method: pairs (cost, error), coarse to fine. An error of
+    zero lies on the bottom edge.
+    """
+    with picture(path, 1, len(errors), (4.6 * len(errors), 5.0)) as (figure, axes):
+        looks = _looks(titles)
+        for axis, (words, by_method) in zip(axes, errors.items()):
+            seen = [error for pairs in by_method.values() for _, error in pairs if error > 0.0]
+            bottom = 0.5 * min(seen, default=1.0)
+            for method, pairs in by_method.items():
+                height = [max(error, bottom) for _, error in pairs]
+                axis.plot([cost for cost, _ in pairs], height, label=method, **looks[method])
+            axis.set(xscale="log", yscale="log", title=words, xlabel=time_name)
+            axis.set_ylabel("error [1]")
+        figure.legend(*_legend(axes[0], titles), loc="outside upper left", ncols=4)
+        figure.supxlabel(f"{caption}\n{machine_words()}", fontsize=7.5, x=0.01, ha="left")
+
+
+def _looks(titles):
+    """Colour and mark of every method."""
+    return {
+        method: {"color": style.colour, "marker": style.marker, "ms": 5, "lw": 1.2}
+        for method, style in styles_of(titles).items()
+    }
+
+
+def _legend(axis, titles):
+    handles, labels = axis.get_legend_handles_labels()
+    return handles, [titles.get(label, label) for label in labels]
+
+
+def cost_of(point, points, cost):
+    """Cost of a point; of one without a time, at the rate of the method's nearest run."""
+    if cost == "evaluations" or point.seconds:
+        return point.evaluations if cost == "evaluations" else point.seconds.low
+    timed = [p for p in points if p.seconds] or [point]
+    own = [p for p in timed if p.method == point.method] or timed
+    near = min(own, key=lambda p: abs(math.log(p.step / point.step)))
+    return near.seconds.low * point.evaluations / near.evaluations if near.seconds else math.nan
+
+
+def _good(points, method):
+    """Points with an error, coarse to fine; an error of zero has no place on a log scale."""
+    own = [p for p in points if p.method == method and p.error > 0.0]
+    return sorted(own, key=lambda p: -p.step)
+
+
+class _Panel:
+    """Errors over one cost. good, failed: (cost, point) by method, coarse to fine."""
+
+    def __init__(self, axis, points, looks, cost):
+        axis.set(xscale="log", yscale="log")
+        self.axis, self.looks, self.timed = axis, looks, cost == "seconds"
+        self.good, self.failed = {}, {}
+        for method in looks:
+            failed = [p for p in points if p.method == method and p.failure]
+            failed.sort(key=lambda p: -p.step)
+            self.good[method] = [(cost_of(p, points, cost), p) for p in _good(points, method)]
+            self.failed[method] = [(cost_of(p, points, cost), p) for p in failed]
+
+    def draw(self, floors, order):
+        """Draw points, floors, the ideal gain and failures."""
+        for method, look in self.looks.items():
+            place = [at for at, _ in self.good[method]]
+            errors = [p.error for _, p in self.good[method]]
+            self.axis.plot(place, errors, label=method, **look)
+            if self.timed and place:
+                slower = [p.seconds.high - p.seconds.low for _, p in self.good[method]]
+                ends = {"ecolor": look["color"], "elinewidth": 1.0, "capsize": 2, "fmt": "none"}
+                self.axis.errorbar(place, errors, xerr=[[0.0] * len(place), slower], **ends)
+            if floors.get(method):
+                self.axis.axhline(floors[method], color=look["color"], ls=":", lw=1.0)
+        if floors:
+            self.axis.plot([], [], ls=":", color=GREY, label="chaos floor of each method")
+        good = [(at, p.error) for own in self.good.values() for at, p in own]
+        if good:
+            self._draw_ideal(good, order)
+        if any(self.failed.values()):
+            self._draw_failures()
+
+    def _draw_ideal(self, good, order):
+        """The line along which twice the cost brings 2^order times the accuracy: the ideal gain."""
+        x, y = min(good, key=lambda at: at[0] * at[1] ** (1.0 / order))
+        (left, right), (bottom, top) = self.axis.get_xlim(), self.axis.get_ylim()
+        # A line that leaves at the bottom first would shift the limits.
+        end = min(right, x * (y / bottom) ** (1.0 / order))
+        start = max(left, x * (y / top) ** (1.0 / order))
+        line = [y * (x / place) ** order for place in (start, end)]
+        label = f"ideal gain, order {order}, from the best buy"
+        self.axis.plot([start, end], line, color=GREY, ls="--", lw=0.9, label=label)
+        self.axis.set(xlim=(left, right), ylim=(bottom, top))
+
+    def _draw_failures(self):
+        """Crosses along the top edge, a row a method; their height is no error."""
+        axis, failed = self.axis, {m: own for m, own in self.failed.items() if own}
+        bottom, top = axis.get_ylim()
+        step = (top / bottom) ** 0.055
+        edge = top * step ** (len(failed) + 0.3)
+        axis.axhspan(top, edge, color="0.94", lw=0, label="× no result: its cost, but no error")
+        costs = [at for own in failed.values() for at, _ in own]
+        left, right = axis.get_xlim()
+        left, right = min(left, 0.8 * min(costs)), max(right, 1.25 * max(costs))
+        axis.set(xlim=(left, right), ylim=(bottom, edge))
+        for k, (method, own) in enumerate(failed.items()):
+            level, colour = top * step ** (k + 0.65), self.looks[method]["color"]
+            place = [at for at, _ in own]
+            axis.plot(place, [level] * len(own), "x", color=colour, ms=6, mew=1.6)
+            words = ", ".join(f"{p.label} {p.failure}" for _, p in own)
+            # On the side where there is room for it.
+            late = place[-1] ** 2 > left * right
+            end, shift, side = (place[0], -7, "right") if late else (place[-1], 7, "left")
+            look = {"fontsize": _SMALL, "color": colour, "ha": side}
+            axis.annotate(words, (end, level), (shift, -2.5), textcoords="offset points", **look)
+
+    def label_steps(self):
+        """Write every point's step beside it, where it covers least of what is there already."""
+        good = [pair for own in self.good.values() for pair in own]
+        places = [(at, p.error) for at, p in good]
+        spots, unit = self.axis.transData.transform(places), self.axis.figure.dpi / 72.0
+        taken = [_box(spot, 8.0 * unit, 8.0 * unit) for spot in spots]
+        frame = self.axis.get_window_extent().get_points().ravel()
+        for spot, place, (_, p) in zip(spots, places, good):
+            wide, high = unit * (0.56 * _SMALL * len(p.label) + 1.0), unit * _SMALL
+            reach = 0.5 * wide + 4.0 * unit, 0.5 * high + 2.0 * unit
+            shifts = [np.multiply(reach, sides) for sides in _PLACES]
+            boxes = [_box(spot + shift, wide, high) for shift in shifts]
+            # The part outside the frame counts twice.
+            hidden = [
+                _shared(box, taken).sum() + 2.0 * (wide * high - _shared(box, [frame])[0]) + 0.5 * k
+                for k, box in enumerate(boxes)
+            ]
+            k = int(np.argmin(hidden))
+            taken.append(boxes[k])
+            look = {"fontsize": _SMALL, "color": self.looks[p.method]["color"], "ha": "center"}
+            look.update(va="center", textcoords="offset points")
+            self.axis.annotate(p.label, place, tuple(shifts[k] / unit), **look)
+
+
+def _box(middle, wide, high):
+    """Left, bottom, right and top of a box."""
+    half = np.array([0.5 * wide, 0.5 * high])
+    return np.concatenate([middle - half, middle + half])
+
+
+def _shared(box, others):
+    """Area that a box shares with each of the others."""
+    others = np.array(others)
+    edges = np.minimum(box[2:], others[:, 2:]) - np.maximum(box[:2], others[:, :2])
+    return np.maximum(edges, 0.0).prod(axis=1)
+
+
+def _draw_residuals(axis, points, looks, unit):
+    axis.set(xscale="log", yscale="log")
+    for method, look in looks.items():
+        own = [p for p in _good(points, method) if p.residual > 0.0]
+        axis.plot([p.step / unit for p in own], [p.residual for p in own], **look)
+    # Within a decade a log axis writes all its minor ticks, wide as they are.
+    axis.xaxis.set_minor_formatter("")

@@ -1,0 +1,119 @@
+"""The engine of a blast: all fields and kernels of one structure, which runs any scene of it."""
+
+from taichi_dem.contact_search.contacts import Contacts
+from taichi_dem.contact_search.search import BroadPhase
+from taichi_dem.diagnostics.outer_faces import OuterOverlaps
+from taichi_dem.diagnostics.readings import Readings
+from taichi_dem.engine.capacity import LEAST, Capacity
+from taichi_dem.engine.state import State
+from taichi_dem.engine.tables import Tables
+from taichi_dem.kit.engine_pool import Engine, EnginePool
+from taichi_dem.methods import structure_of
+from taichi_dem.stability.body_limits import limits_for
+from taichi_dem.step.advance import Advance
+from taichi_dem.step.drivers import DRIVERS, SolvedStep, Step
+from taichi_dem.step.implicit.advance import SolvedAdvance
+from taichi_dem.step.implicit.solver import Solver
+from taichi_dem.step.schedule import Schedule
+
+
+class Structure:
+    """What a compiler sees of a scene and a method: classes of effects, kind of the method.
+
+    Two structures are equal where one's kernels serve the other. effects, method: those of the
+    first scene, of which engines make copies. brute_force: contact search without cells.
+    """
+
+    def __init__(self, effects, method, brute_force=False):
+        self.effects, self.method, self.brute_force = tuple(effects), method, brute_force
+        self.key = tuple(map(type, self.effects)), structure_of(method), brute_force
+
+    def __eq__(self, other):
+        return self.key == other.key
+
+    def __hash__(self):
+        return hash(self.key)
+
+
+class BlastEngine(Engine):
+    """Tables, state, contact search, schedule, step and drivers of one structure.
+
+    model in its methods is a ``Model``, the scene's arrays.
+    """
+
+    advice = (
+        "take a smaller mesh, or shorter lists (SphereContact: pairs_per_body, spheres_per_body, "
+        "neighbours_per_body)"
+    )
+
+    def declare(self):
+        """Build all parts; Taichi allocates their fields afterwards, all at once."""
+        capacity = Capacity(*self.capacity)
+        capacity.check()
+        method = self.structure.method
+        self.tables = Tables(capacity, self.structure.effects)
+        self.state = State(self.tables)
+        self.contacts = Contacts(self.tables, self.state) if self.tables.has_contact else None
+        self.schedule = self._schedule(method)
+        self.advance = self._advance(method)
+        self.broad_phase = None
+        if self.contacts is not None:
+            parts = self.contacts, self.schedule, self.advance.solver
+            self.broad_phase = BroadPhase(*parts, self.structure.brute_force)
+        kind = SolvedStep if method.solves else Step
+        self.step = kind(self.advance, self.schedule, self.broad_phase)
+        self.drivers = {name: driver(self.step) for name, driver in DRIVERS.items()}
+        self.readings = Readings(self.tables, self.state, self.advance)
+        self.outer_overlaps = None
+        if self.tables.has_contact:
+            self.outer_overlaps = OuterOverlaps(self.tables, self.state)
+
+    def _schedule(self, method):
+        limits = limits_for(self.tables, self.state, self.contacts, method)
+        parts = self.tables, self.state, self.contacts
+        drifted = method.neighbour == "drifted"
+        return Schedule(*parts, method.criterion(), method.uniform, drifted, limits)
+
+    def _advance(self, method):
+        parts = self.tables, self.state, self.schedule, self.contacts
+        if method.solves:
+            return SolvedAdvance(*parts, Solver(*parts))
+        # A method may bring an order of its own (docs/add_a_time_integrator.md).
+        return getattr(method, "advance", Advance)(*parts)
+
+    def load(self, model, method, max_speed):
+        """Take over a scene, at rest and at time zero; max_speed [m/s]."""
+        self.clear()
+        self.tables.load(model)
+        self.state.load(model, max_speed)
+        if self.contacts is not None:
+            self.contacts.load(model, method)
+            self.broad_phase.load(model, method)
+        self.schedule.load(model, method)
+        if self.advance.solver is not None:
+            self.advance.solver.load(model, method)
+        for driver in self.drivers.values():
+            driver.load()
+        self.lengths = self._lengths(model)
+
+    def _lengths(self, model):
+        """Entries that a scene uses by those that a field has."""
+        room, n = Capacity(*self.capacity), model.body_count
+        lengths = {room.bodies: n, room.faces: 4 * n}
+        lengths.update({room.bonds: model.bond_count, room.units: 3 * model.bond_count})
+        if model.has_contact:
+            lengths[room.spheres] = 4 * n * model.spheres.per_face
+        return lengths
+
+    def accepts(self, model):
+        """Whether no kernel has read a number of an effect that the scene gives another value."""
+        return all(effect.accepts(given) for effect, given in self.tables.matched(model))
+
+    def enter(self, model):
+        """Let the effects know whose numbers they stand for, as data of a scene come in."""
+        for effect, given in self.tables.matched(model):
+            effect.stand_for(given)
+
+
+#: Engines of the session.
+ENGINES = EnginePool(BlastEngine, LEAST)

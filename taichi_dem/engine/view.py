@@ -1,0 +1,122 @@
+"""Parts of an engine as their simulation sees them: its own data are on the device when asked."""
+
+import taichi as ti
+from taichi.lang import impl
+from taichi.lang.matrix import MatrixField
+
+from taichi_dem.kit.allocation import array_of, assign, values
+from taichi_dem.kit.display import in_brief
+
+_OWN = ("taichi_dem", "ca_damper")
+
+
+class PartView:
+    """A part of an engine on behalf of a simulation, which may share the engine with others.
+
+    Attributes and methods are those of the part; before any of them is reached, the simulation's
+    data are brought to the device. Fields come as ``FieldView``. Kernels see the part itself.
+    """
+
+    def __init__(self, loan, path):
+        self.__dict__.update(_loan=loan, _path=path)
+
+    def _part(self):
+        return _at(self._loan.engine, self._path)
+
+    def __getattr__(self, name):
+        if impl.inside_kernel():
+            return getattr(self._part(), name)
+        self._loan.activate()
+        value = getattr(self._part(), name)
+        if isinstance(value, ti.Field):
+            return FieldView(self._loan, (*self._path, name))
+        if name == "fields":
+            return self._fields
+        if _is_part(value):
+            return PartView(self._loan, (*self._path, name))
+        return value
+
+    def __setattr__(self, name, value):
+        setattr(self._part(), name, value)
+
+    def _fields(self):
+        """Fields of the part by name, as FieldViews."""
+        found = self._part().fields()
+        return {name: FieldView(self._loan, (field,)) for name, field in found.items()}
+
+    def __repr__(self):
+        return in_brief(self._part(), f"part of a {self._loan.what}")
+
+    @property
+    def name(self) -> str:
+        """Name of the part; asked for also after its session has ended."""
+        return self._part().name
+
+
+class FieldView:
+    """A field of an engine on behalf of a simulation: entries of its scene, no room behind them.
+
+    As a NumPy array by ``to_numpy()``; single entries by index, as those of a field.
+    """
+
+    def __init__(self, loan, path):
+        self._loan, self._path = loan, path
+
+    @property
+    def field(self):
+        """The field itself, with the data of the simulation in it."""
+        self._loan.activate()
+        if isinstance(self._path[0], ti.Field):
+            return self._path[0]
+        return _at(self._loan.engine, self._path)
+
+    @property
+    def shape(self) -> tuple:
+        """Entries of the scene."""
+        shape = self.field.shape
+        lengths = self._loan.engine.lengths
+        return (lengths.get(shape[0], shape[0]), *shape[1:]) if shape else shape
+
+    def to_numpy(self):
+        """Copy of the entries."""
+        found = values(self.field)
+        return found[: self.shape[0]] if self.field.shape else found
+
+    def from_numpy(self, array):
+        """Write the first entries."""
+        assign(self.field, array)
+
+    def fill(self, value):
+        """Give all entries of the scene a value."""
+        shape = self.to_numpy().shape
+        if not shape:
+            assign(self.field, value)
+        else:
+            whole = values(self.field)
+            whole[: shape[0]] = value
+            assign(self.field, whole)
+
+    def __repr__(self):
+        return in_brief(self, ".".join(map(str, self._path)), f"field of a {self._loan.what}")
+
+    def __getitem__(self, index):
+        field = self.field
+        if isinstance(field, MatrixField) or impl.current_cfg().arch == ti.cuda:
+            return field[index]
+        return array_of(field)[() if index is None else index].item()
+
+    def __setitem__(self, index, value):
+        self.field[index] = value
+
+    def __getattr__(self, name):
+        return getattr(self.field, name)
+
+
+def _at(part, path):
+    for name in path:
+        part = part[name] if isinstance(part, dict) else getattr(part, name)
+    return part
+
+
+def _is_part(value) -> bool:
+    return type(value).__module__.split(".")[0] in _OWN and hasattr(value, "__dict__")

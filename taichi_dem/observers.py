@@ -1,0 +1,230 @@
+"""Observers of a run: objects that ``simulate`` calls on the way with a read-only view of it."""
+
+import inspect
+import math
+from dataclasses import dataclass
+from typing import Optional, Protocol, Union
+
+import numpy as np
+
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.progress.progress import Pace
+from taichi_dem.kit.validation import positive, shown, whole
+from taichi_dem.timeline import MACRO_TICKS, NEVER
+
+#: Largest steps that can be counted to, and calls of an observer in a run.
+_MOST_STEPS, _MOST_CALLS = 2**42, 1_000_000
+
+
+@dataclass(frozen=True)
+class Every:
+    """Calls at even distances, besides at the start and at the end of the run.
+
+    One of four is given. time_s: simulated time, each call at the nearest largest step [s].
+    steps: number of largest steps. samples: number of rows of the time series. wall_s: wall time
+    [s]; these calls come between two steps of any length, when bodies may stand at different
+    times. Raises InputError.
+    """
+
+    time_s: Optional[float] = None
+    steps: Optional[int] = None
+    samples: Optional[int] = None
+    wall_s: Optional[float] = None
+
+    def __post_init__(self):
+        given = [name for name, value in vars(self).items() if value is not None]
+        if len(given) != 1:
+            words = " and ".join(given) or "none"
+            raise InputError(
+                f"Every must be given one of time_s, steps, samples, wall_s, got {words}"
+            )
+        value = getattr(self, given[0])
+        if given[0] in ("steps", "samples"):
+            whole(given[0], value, 1, _MOST_STEPS)
+        else:
+            positive(given[0], value)
+
+    def marks(self, last: int, dt: float, samples: int = 1) -> set:
+        """Largest steps of dt [s] from 0 to last at which to call; InputError for too many.
+
+        samples: of the run after the one at the start.
+        """
+        if self.wall_s is not None:
+            return {last}
+        if self.samples is not None:
+            return {round(last * k / samples) for k in range(0, samples, self.samples)} | {last}
+        name, value = ("steps", self.steps) if self.time_s is None else ("time_s", self.time_s)
+        distance = self.steps if self.time_s is None else self.time_s / dt
+        if last > _MOST_CALLS * distance:
+            least = last * (1 if self.time_s is None else dt) / _MOST_CALLS
+            raise InputError(
+                f"{name} must be at least {least:.3g} for {_MOST_CALLS} calls, got {value:g}"
+            )
+        count = math.floor(last / distance * (1.0 + 1e-12))
+        return {min(last, round(k * distance)) for k in range(count + 1)} | {last}
+
+
+@dataclass(frozen=True)
+class At:
+    """Calls at chosen times [s], each at the nearest largest step. Raises InputError."""
+
+    times_s: tuple
+
+    def __post_init__(self):
+        times = self.times_s
+        if isinstance(times, (str, bytes)) or not hasattr(times, "__iter__"):
+            raise InputError(f"times_s must be a sequence of times in s, got {shown(times)}")
+        checked = tuple(positive("times_s", time, zero_allowed=True) for time in times)
+        object.__setattr__(self, "times_s", checked)
+
+    def marks(self, last: int, dt: float, samples: int = 1) -> set:
+        """Largest steps of dt [s] at which to call; InputError for a time after the last."""
+        for time in self.times_s:
+            if round(time / dt) > last:
+                raise InputError(f"times_s must lie in [0, {last * dt:.6g}] s, got {time:g}")
+        return {round(time / dt) for time in self.times_s}
+
+
+class Observer(Protocol):
+    """Measures on the way of a run: ``when`` it is called, and ``observe`` to be called."""
+
+    when: Union[Every, At]
+
+    def observe(self, view: "RunView") -> None:
+        """Measure; what it raises ends the run, and no result is written."""
+
+
+class RunView:
+    """Read-only view of a run at its present step; arrays are copies that refuse to be written."""
+
+    def __init__(self, simulation, recorder):
+        object.__setattr__(self, "_parts", (simulation, recorder))
+
+    def __setattr__(self, name, value):
+        raise InputError(f"the view of a run must not be written to, got {name} = {shown(value)}")
+
+    @property
+    def time_s(self) -> float:
+        """Present time [s]."""
+        return self._parts[0].time_s
+
+    @property
+    def step(self) -> int:
+        """Number of largest steps done."""
+        return int(self._parts[0].state.tick[None]) // MACRO_TICKS
+
+    @property
+    def model(self):
+        """Constants of the bodies and bonds, of which kernels know."""
+        return self._parts[0].model
+
+    @property
+    def method(self):
+        """Method that steps."""
+        return self._parts[0].method
+
+    @property
+    def broken(self) -> np.ndarray:
+        """Whether each bond has been released, (bond_count,)."""
+        ticks = self._parts[0].state.broken_tick.to_numpy()[: self.model.bond_count]
+        return _locked(ticks != NEVER)
+
+    @property
+    def evaluations(self) -> int:
+        """Bonds and contact pairs evaluated so far."""
+        return self._parts[0].evaluations()
+
+    @property
+    def cpu_seconds(self) -> float:
+        """CPU time spent stepping so far [s]."""
+        return self._parts[0].cpu_seconds()
+
+    @property
+    def wall_seconds(self) -> float:
+        """Wall time spent stepping so far [s]."""
+        return self._parts[0].running_seconds()
+
+    def motion(self) -> dict:
+        """Arrays of the bodies' motion by name, as ``State.motion`` gives them."""
+        return {name: _locked(array) for name, array in self._parts[0].state.motion().items()}
+
+    def energy_balance(self) -> dict:
+        """Terms of the energy balance by name [J]."""
+        return self._parts[0].energy_balance.account()
+
+    def frame(self):
+        """Snapshot of the block, a ``Frame``."""
+        return self._parts[1].frame()
+
+    def report(self):
+        """Report of the run so far."""
+        return self._parts[0].report()
+
+    def history(self) -> dict:
+        """Samples so far, arrays by column name; one at this step is among them."""
+        return {name: _locked(array) for name, array in self._parts[1].history().items()}
+
+
+def _locked(array):
+    array.flags.writeable = False
+    return array
+
+
+def checked_observers(observers) -> tuple:
+    """Observers as a tuple; InputError for one without a member, or with a wrong one."""
+    if not isinstance(observers, (list, tuple)):
+        raise InputError(f"observers must be a list of observers, got {shown(observers)}")
+    for place, one in enumerate(observers):
+        when = getattr(one, "when", None)
+        if not isinstance(when, (Every, At)):
+            raise InputError(
+                f"observers[{place}] must have a member when, an Every or an At, got {shown(when)}"
+            )
+        if not _takes_one(getattr(one, "observe", None)):
+            got = shown(getattr(one, "observe", None))
+            raise InputError(f"observers[{place}] must have a method observe(view), got {got}")
+    return tuple(observers)
+
+
+def _takes_one(observe):
+    """Whether something can be called with a view; a method without its object cannot."""
+    try:
+        inspect.signature(observe).bind(None)
+    except TypeError:
+        return False
+    except ValueError:
+        # Functions of other languages may hide what they take.
+        return callable(observe)
+    return True
+
+
+class ObserverCalls:
+    """Which observers are called at which of the largest steps, and which by the clock.
+
+    Observers of one step are called in their order. ``when`` is read once.
+    """
+
+    def __init__(self, observers, last, dt, samples):
+        self._at, self._paced = {}, []
+        for observer in observers:
+            when = observer.when
+            for step in when.marks(last, dt, samples):
+                self._at.setdefault(step, []).append(observer)
+            if getattr(when, "wall_s", None) is not None:
+                self._paced.append((observer, Pace(when.wall_s)))
+
+    @property
+    def steps(self):
+        """Largest steps at which somebody is called, a set."""
+        return set(self._at)
+
+    def at_step(self, step, view):
+        """Call those of a step."""
+        for observer in self._at.get(step, ()):
+            observer.observe(view)
+
+    def by_clock(self, view):
+        """Call those whose wall time has passed."""
+        for observer, pace in self._paced:
+            if pace.should_report():
+                observer.observe(view)

@@ -1,0 +1,128 @@
+"""When a run is sampled, photographed, observed and reported; all of these are observers of it."""
+
+from dataclasses import dataclass
+
+from taichi_dem.kit.display import prefixed
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.progress.progress import LEAST_SHARE, Progress
+from taichi_dem.kit.validation import progress_option, shown
+from taichi_dem.observers import Every, ObserverCalls, checked_observers
+
+#: Progress is reported this often [s].
+_REPORT_SECONDS = 0.2
+#: Samples or frames of a run: each costs a look at all bodies.
+_MOST_RECORDS = 1_000_000
+
+
+@dataclass(frozen=True)
+class RunProgress(Progress):
+    """How far a run is: time_s of until_s; bonds and pairs evaluated.
+
+    evaluation_rate: bonds and pairs to evaluate in a simulated second at the present levels [1/s].
+    """
+
+    time_s: float
+    until_s: float
+    evaluations: int
+    evaluation_rate: float
+
+    @property
+    def seconds_left(self):
+        """Time expected until the end [s], each level weighted by its steps; infinite at first.
+
+        Without bonds and pairs to evaluate, as the share of the way tells.
+        """
+        if self.share < LEAST_SHARE or not self.evaluation_rate or not self.evaluations:
+            return super().seconds_left
+        work = max(0.0, self.until_s - self.time_s) * self.evaluation_rate
+        return work * self.seconds / self.evaluations
+
+    @property
+    def speed(self):
+        """Simulated time and evaluations a second."""
+        seconds = max(self.seconds, 1e-9)
+        passed = prefixed(self.time_s / seconds, "s/s")
+        return f"{passed}, {prefixed(self.evaluations / seconds, 'evaluations/s')}"
+
+
+def progress_of(simulation, until):
+    """RunProgress of a simulation towards a time [s]."""
+    done, seconds = simulation.evaluations(), simulation.running_seconds()
+    rate = simulation.evaluation_rate()
+    time_s = simulation.time_s
+    return RunProgress(min(1.0, time_s / until), seconds, time_s, until, done, rate)
+
+
+class RunPlan:
+    """Checked answer to when a run is sampled, photographed, observed and reported.
+
+    last: number of largest steps of dt0 [s]. Raises InputError.
+    """
+
+    def __init__(self, last, dt0, samples, frames, observers, progress):
+        _check_count("samples", samples, 1)
+        _check_count("frames", frames, 0)
+        progress_option("progress", progress)
+        self.last, self.dt0, self.samples, self.frames = last, dt0, samples, frames
+        self.observers = checked_observers(observers)
+        ObserverCalls(self.observers, last, dt0, samples)
+
+    def calls(self, simulation, recorder, report_progress):
+        """ObserverCalls of a run: at a step, samples and frames come before what observes them."""
+        observers = [_Sampler(simulation, recorder)]
+        observers += [_Photographer(recorder, self.frames), *self.observers]
+        if report_progress is not None:
+            until = self.last * self.dt0
+            observers.append(_Reporter(simulation, until, report_progress))
+        return ObserverCalls(observers, self.last, self.dt0, self.samples)
+
+
+class _Sampler:
+    """Adds rows to the time series, and looks for missing effects."""
+
+    when = Every(samples=1)
+
+    def __init__(self, simulation, recorder):
+        self.simulation, self.recorder = simulation, recorder
+
+    def observe(self, view):
+        """Sample."""
+        self.simulation.sample()
+        self.recorder.sample()
+
+
+class _Photographer:
+    """Keeps a number of frames after the one at the start; none for 0."""
+
+    def __init__(self, recorder, count):
+        self.when, self.recorder, self.count = self, recorder, count
+
+    def marks(self, last, dt, samples):
+        """Largest steps at which to call."""
+        return Every(samples=1).marks(last, dt, self.count) if self.count else set()
+
+    def observe(self, view):
+        """Keep a frame."""
+        self.recorder.snapshot()
+
+
+class _Reporter:
+    """Reports progress towards a time [s]."""
+
+    when = Every(wall_s=_REPORT_SECONDS)
+
+    def __init__(self, simulation, until, report_progress):
+        self.simulation, self.until, self.report_progress = simulation, until, report_progress
+
+    def observe(self, view):
+        """Report."""
+        self.report_progress(progress_of(self.simulation, self.until))
+
+
+def _check_count(name, value, least):
+    wanted = isinstance(value, int) and not isinstance(value, bool)
+    if not wanted or not least <= value <= _MOST_RECORDS:
+        raise InputError(
+            f"{name} must be a whole number of at least {least} and at most {_MOST_RECORDS}, "
+            f"got {shown(value)}"
+        )
