@@ -79,7 +79,7 @@ class _Structure:
         return self.key == other.key
 
 
-_POOL = EnginePool(DrivenEngine, (8, 1, *(LEAST_PLACES,) * 8))
+_POOL = EnginePool(DrivenEngine, (8, 1, *(LEAST_PLACES,) * 32))
 
 
 class Driven:

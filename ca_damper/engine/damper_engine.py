@@ -17,7 +17,7 @@ from taichi_dem.kit.engine_pool import Engine, EnginePool, Loan
 from taichi_dem.kit.errors import InputError
 
 #: Least room for scenes, measured cycles, and places of a scene: below, nothing is saved.
-_LEAST = (64, 32, *(LEAST_PLACES,) * 8)
+_LEAST = (64, 32, *(LEAST_PLACES,) * 32)
 
 
 @dataclass(frozen=True)
