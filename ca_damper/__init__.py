@@ -6,15 +6,15 @@ from taichi_dem.kit import runtime  # isort: skip
 from ca_damper.automaton import Automaton
 from ca_damper.batch import Batch
 from ca_damper.errors import InputError, SimulationDiverged
-from ca_damper.filling import Empty, RigidMass
+from ca_damper.fixed_mass import Empty, RigidMass
 from ca_damper.needed_effects import needed_effects
 from ca_damper.oscillator import Oscillator
 from ca_damper.record import film
 from ca_damper.report import Report
 from ca_damper.response import Response, frequency_response
+from ca_damper.scenes.table import SceneTable
 from ca_damper.spheres import Spheres
 from ca_damper.sweep import Sweep, sweep_up_and_down
-from ca_damper.table import SceneTable
 from taichi_dem.kit.progress.progress import Progress
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.kit.version import __version__

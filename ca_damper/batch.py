@@ -1,139 +1,118 @@
 """Many scenes, run together in launches of bounded length.
 
-A launch takes every scene the same share of its way and lasts about a sixth of a second, so that
-Ctrl-C, progress and the look at diverged scenes are prompt.
+A batch compiles nothing where one of the same structure has run before, of whatever size and
+numbers (see ``engine/damper_engine.py``).
 """
 
 import contextlib
 import time
+from collections.abc import Iterator
+from typing import Any, Callable, Optional
 
 import numpy as np
-import taichi as ti
 
 from ca_damper import measures
-from ca_damper.account import MomentumAccount
-from ca_damper.checks import MOST_CYCLES, STARTS, check_record_fits, for_all
-from ca_damper.clock import Clock, steps_per_cycle
-from ca_damper.container import DrivenContainer, SprungContainer
-from ca_damper.coupling import LOST, Coupling
-from ca_damper.errors import SimulationDiverged
-from ca_damper.filling import check_filling
-from ca_damper.oscillator import Oscillator
+from ca_damper.checks import MOST_CYCLES, STARTS, for_all
+from ca_damper.engine.launches import Launches
+from ca_damper.engine.loaded_scenes import LoadedScenes
+from ca_damper.filling import Filling
 from ca_damper.progress import BatchProgress
 from ca_damper.report import RK45_STAGES, Report
-from ca_damper.table import SceneTable, dealt
+from ca_damper.scenes.table import SceneTable, dealt
 from taichi_dem.kit import runtime
-from taichi_dem.kit.allocation import check_capacity
 from taichi_dem.kit.checkpoint import version_text
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.field_memory import FieldMemory
-from taichi_dem.kit.progress.progress import compiling
 from taichi_dem.kit.restart import CheckpointWriter, NoCheckpointWriter, RunSnapshot, opened
-from taichi_dem.kit.validation import choice, instance, positive, whole
+from taichi_dem.kit.validation import choice, whole
 
-MOUNTS = ("spring", "base")
-
-#: A launch is kept near this long [s].
-LAUNCH_SECONDS = 0.15
 _MOST_STEPS = 2**31 - 1
-_LOST_IN_WORDS = "lost its container, whose motion is no finite number"
-_STRUCTURE = ("mass", "stiffness", "damping", "base_amplitude")
 
 
-class Batch:
+class Batch(LoadedScenes):
     """A filling, a table of scenes and the container's mount, ready to run.
 
     table.dt holds the largest step of every scene; it is shortened so that a whole number of steps
-    makes a cycle of the base: ``steps_per_cycle``, (scenes,).
+    makes a cycle of the base: ``steps_per_cycle``, (scenes,). The batch has a table of its own.
     mount: "spring", or "base" for a container that moves like the base whatever the filling does.
     measured_cycles: most cycles that one run may measure. rtol, atol: of RK45, on the spring.
     ``run_seconds`` and ``compile_seconds`` tell what was spent, ``report()`` all of it in short.
     Raises InputError for a scene that the filling refuses or a step out of range.
     """
 
-    def __init__(self, filling, table, *, mount="spring", measured_cycles=1, rtol=1e-9, atol=1e-12):
-        self.generation = runtime.session()
-        check_filling(filling)
-        instance("table", table, SceneTable)
-        check_capacity()
-        choice("mount", mount, MOUNTS)
-        self.measured_cycles = whole("measured_cycles", measured_cycles, 0, 100_000)
-        check_record_fits(table.count, self.measured_cycles)
-        positive("rtol", rtol, zero_allowed=True)
-        positive("atol", atol)
-        compiling("set-up", 0.0)
-        self.filling, self.table, self.count, self.mount = filling, table, table.count, mount
-        self.oscillators = self._structures()
-        self.largest_dt, self.clock = table.column("dt"), Clock(table)
-        frequency = table.column("frequency")
-        dt = self._fit_steps(frequency)
-        container = DrivenContainer(table, self.clock)
-        if mount == "spring":
-            container = SprungContainer(table, self.clock, filling.gravity, rtol, atol)
-        self.device = filling.bind(table)
-        self.account = MomentumAccount(table, filling.particle_mass * filling.gravity)
-        self.coupling = Coupling(
-            *(table, self.clock, container, self.device, self.account),
-            *(filling.gravity, self.measured_cycles),
-        )
-        self._set_pace(frequency, dt)
-        self.time_origin = np.zeros(self.count)
-        self.run_seconds = self.compile_seconds = 0.0
-        self.scene_steps = self.particle_steps = 0
-        # Scene-steps a launch; one each to begin with, as nobody knows yet what a step costs.
-        self._pace = float(self.count)
-        self._compiled = self._started = False
-        # Of the present run: share done and seconds it took; whether it goes on from a checkpoint.
-        self._done, self._seconds, self.going_on = 0.0, 0.0, False
+    def __init__(
+        self,
+        filling: Filling,
+        table: SceneTable,
+        *,
+        mount: str = "spring",
+        measured_cycles: int = 1,
+        rtol: float = 1e-9,
+        atol: float = 1e-12,
+    ):
+        super().__init__(filling, table, mount, measured_cycles, rtol, atol)
+        self.launches, self.compile_seconds = Launches(self.count), 0.0
+        # Whether the present run goes on from a checkpoint.
+        self.going_on = False
         self.writer = NoCheckpointWriter()
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return in_brief(self, self.filling.label, f"{self.count:,} scenes", f"on the {self.mount}")
 
-    def start(self, start="rest"):
+    @property
+    def run_seconds(self) -> float:
+        """Time spent on stepping [s]."""
+        return self.launches.run_seconds
+
+    @property
+    def scene_steps(self) -> int:
+        """Steps of all scenes in all runs."""
+        return self.launches.scene_steps
+
+    def start(self, start: str = "rest") -> None:
         """Place the particles anew and begin at time zero, the base passing upwards through zero.
 
         start: the container begins at "rest", or in the steady state of the "empty" container, or
         in that of a container with the particles as "rigid" mass.
         """
-        self._check_session()
+        coupling = self.engine.coupling
         choice("start", start, STARTS)
-        compiling("placing", 0.2)
-        self.coupling.start(np.ascontiguousarray(self._initial(start)))
+        self._tell_compiling("placing", 0.2)
+        coupling.start(np.ascontiguousarray(self.numbers.initial(start)))
         self._started = True
         self.time_origin[:] = 0.0
         self._check_divergence()
 
-    def change(self, **numbers):
+    def change(self, **numbers: Any) -> None:
         """Give the scenes other numbers, as ``SceneTable.change``; then ``start`` begins anew.
 
         The bits are those of a batch that is made with them, and nothing is compiled.
-        Raises InputError for what that batch would refuse.
+        Raises InputError for what that batch would refuse; this one then stays as it is.
         """
-        self._check_session()
-        self.table.change(**{"dt": self.largest_dt, **numbers})
-        self._started, self.largest_dt = False, self.table.column("dt")
-        self.oscillators = self._structures()
-        frequency = self.table.column("frequency")
-        self._set_pace(frequency, self._fit_steps(frequency))
+        engine = self.engine
+        self.numbers = self.numbers.changed(**numbers)
+        self._started = False
+        engine.table.load(self.table)
+        self._load_pace()
 
-    def _structures(self):
-        """What every scene hangs on; InputError for numbers that cannot be meant."""
-        return [Oscillator(*row) for row in zip(*map(self.table.column, _STRUCTURE))]
-
-    def drive(self, frequency):
+    def drive(self, frequency: Any) -> None:
         """Go on at another frequency [Hz], a scalar or (scenes,), at the end of a cycle.
 
         The base keeps its place and changes its speed. Raises InputError within a cycle.
         """
         self._check_cycle_is_full()
-        before, frequency = self.time_s, for_all("frequency", frequency, self.count)
-        self._set_pace(frequency, self._fit_steps(frequency))
-        self.coupling.renew()
+        before = self.time_s
+        self.numbers.drive(for_all("frequency", frequency, self.count))
+        self._load_pace()
+        self.engine.coupling.renew()
         self.time_origin += before - self.time_s
 
-    def run(self, transient_cycles, measured_cycles, progress=None):
+    def run(
+        self,
+        transient_cycles: int,
+        measured_cycles: int,
+        progress: Optional[Callable[[BatchProgress], None]] = None,
+    ) -> measures.Cycles:
         """Run whole cycles and measure the last of them; returns ``measures.Cycles``.
 
         progress: called with a BatchProgress about six times a second.
@@ -149,10 +128,10 @@ class Batch:
         self._go((transient + measured) * steps, transient * steps, progress)
         record = np.empty((self.count, measured, len(measures.COLUMNS)))
         if measured:
-            self.coupling.read(record)
+            self.engine.coupling.read(record)
         return measures.Cycles(self.table.column("frequency"), self.steps_per_cycle, record)
 
-    def advance(self, steps, progress=None):
+    def advance(self, steps: Any, progress: Optional[Callable[..., None]] = None) -> None:
         """Advance every scene by a number of steps, one for all or (scenes,), without measuring.
 
         Raises InputError unless they are whole numbers from zero, SimulationDiverged.
@@ -161,34 +140,10 @@ class Batch:
         steps = for_all("steps", steps, self.count, _MOST_STEPS).astype(np.int64)
         self._go(steps, steps, progress)
 
-    @property
-    def time_s(self):
-        """Present time of every scene [s], (scenes,)."""
-        return self.time_origin + self._read_status()[0] * self.table.column("dt")
-
-    def sample(self):
-        """The present state: arrays (scenes,) by name.
-
-        time_s; x [m], v [m/s], a [m/s^2] of the container, y [m] of the base; force [N]: mean of
-        the filling on the container in the last step; energy [J], momentum [kg m/s] of the
-        particles.
-        """
-        self._check_started()
-        values = np.empty((len(measures.SAMPLE), self.count))
-        self.coupling.sample(values)
-        return {"time_s": self.time_s, **dict(zip(measures.SAMPLE, values))}
-
-    def snapshot(self, s):
-        """Positions and velocities of the particles of scene s, as the filling gives them."""
-        self._check_started()
-        return self.device.snapshot(whole("s", s, 0, self.count - 1))
-
-    def attempts(self):
-        """Steps that RK45 has tried since the start, (scenes,); one a step unless some failed."""
-        return self.coupling.attempts.to_numpy()
-
     @contextlib.contextmanager
-    def checkpointed(self, checkpoint, resume, identity, owners=()):
+    def checkpointed(
+        self, checkpoint: Any, resume: Any, identity: dict[str, str], owners: Any = ()
+    ) -> Iterator[Any]:
         """Let the runs in its block save themselves; gives what saves them.
 
         checkpoint: a Checkpoint or None. resume: file to go on from, or None: the run that it was
@@ -200,7 +155,7 @@ class Batch:
         own = {"version": version_text(), "filling": repr(self.filling)}
         arrays = opened(checkpoint, resume, lambda: {**own, **identity})
         self._compile()
-        saved = RunSnapshot({**own, **identity}, FieldMemory(self), {"batch": self, **dict(owners)})
+        saved = RunSnapshot({**own, **identity}, self.memory, {"batch": self, **dict(owners)})
         if arrays:
             saved.restore(arrays, resume)
         writer = NoCheckpointWriter()
@@ -212,30 +167,24 @@ class Batch:
             finally:
                 self.writer = NoCheckpointWriter()
 
-    def _now(self):
+    def _now(self) -> tuple[int, float]:
         """Mean step and time [s] of the scenes."""
         return int(self._read_status()[0].mean()), float(self.time_s.mean())
 
-    def saved(self):
+    def saved(self) -> dict[str, np.ndarray]:
         """What a checkpoint holds of it beside the fields, arrays by name."""
-        pace = [self.table.column(name) for name in ("frequency", "dt")]
-        return {
-            "run": np.array([self._done, self._seconds, self.run_seconds]),
-            "steps": np.array([self.scene_steps, self.particle_steps]),
-            "pace": np.stack([*pace, self.time_origin]),
-            "steps_per_cycle": self.steps_per_cycle,
-        }
+        pace = np.stack([*self.numbers.pace(), self.time_origin])
+        return {**self.launches.saved(), "pace": pace, "steps_per_cycle": self.steps_per_cycle}
 
-    def resume(self, saved):
+    def resume(self, saved: dict[str, np.ndarray]) -> None:
         """Take over what ``saved`` gave."""
-        self._done, self._seconds, self.run_seconds = saved["run"].tolist()
-        self.scene_steps, self.particle_steps = saved["steps"].tolist()
-        frequency, dt, self.time_origin = saved["pace"].copy()
-        self.steps_per_cycle = saved["steps_per_cycle"]
-        self._set_pace(frequency, dt)
+        self.launches.resume(saved)
+        *pace, self.time_origin = saved["pace"].copy()
+        self.numbers.take_pace(pace, saved["steps_per_cycle"])
+        self._load_pace()
         self.going_on = True
 
-    def report(self):
+    def report(self) -> Report:
         """What was done and what it cost, as a ``report.Report``."""
         particles, dt = self.table.column("particles"), self.table.column("dt")
         sprung = self.mount == "spring"
@@ -248,8 +197,8 @@ class Batch:
             particles=(int(particles.min()), int(particles.max())),
             dt_s=(float(dt.min()), float(dt.max())),
             simulated_s=float(self.time_s.max()),
-            scene_steps=self.scene_steps,
-            particle_steps=self.particle_steps,
+            scene_steps=self.launches.scene_steps,
+            particle_steps=self.launches.particle_steps,
             step_bound=self.filling.step_bound,
             momentum_error=self._momentum_error(),
             container_evaluations=RK45_STAGES * int(self.attempts().sum()) if sprung else 0,
@@ -257,61 +206,7 @@ class Batch:
             run_seconds=self.run_seconds,
         )
 
-    def _momentum_error(self):
-        return self.account.error(self.sample()["momentum"]) if self._started else 0.0
-
-    def _check_session(self):
-        if self.generation != runtime.session():
-            raise InputError("this batch belongs to a Taichi session that has been stopped")
-
-    def _read_status(self):
-        """Step, position in the cycle, and status of all scenes, (3, scenes)."""
-        seen = np.empty((3, self.count), dtype=np.int32)
-        self.coupling.read_status(seen)
-        return seen
-
-    def _check_started(self):
-        self._check_session()
-        if not self._started:
-            raise InputError("this batch has no state yet: call start() first")
-
-    def _check_cycle_is_full(self):
-        self._check_started()
-        position = self._read_status()[1]
-        if position.any():
-            late = int(position.argmax())
-            raise InputError(
-                f"a cycle must be full here, scene {late} stands at step {position[late]} of "
-                f"{self.steps_per_cycle[late]}: advance it first"
-            )
-
-    def _fit_steps(self, frequency):
-        """Fit the steps to the cycle, have the filling check them, and return them [s]."""
-        scenes = zip(frequency, self.largest_dt)
-        self.steps_per_cycle = np.array(
-            [steps_per_cycle(float(f), float(dt)) for f, dt in scenes], np.int32
-        )
-        dt = 1.0 / (frequency * self.steps_per_cycle)
-        for particles, step in sorted(set(zip(self.table.column("particles").tolist(), dt))):
-            self.filling.check(particles, float(step))
-        return dt
-
-    def _set_pace(self, frequency, dt):
-        self.table.drive(frequency, dt)
-        self.clock.set(self.steps_per_cycle)
-
-    def _initial(self, start):
-        """(x, v) of the container at the beginning, shape (scenes, 2)."""
-        state = np.zeros((self.count, 2))
-        if start == "rest":
-            return state
-        for s, oscillator in enumerate(self.oscillators):
-            row = self.table.row(s)
-            fixed = row["particles"] * self.filling.particle_mass if start == "rigid" else 0.0
-            state[s] = oscillator.steady_state(row["frequency"], fixed, self.filling.gravity)
-        return state
-
-    def _go(self, steps, before_measuring, progress):
+    def _go(self, steps: np.ndarray, before_measuring: np.ndarray, progress: Any) -> None:
         """Take every scene a number of steps on, in launches of bounded length."""
         if not self.going_on:
             self._aim(steps, before_measuring)
@@ -319,80 +214,39 @@ class Batch:
         self._compile()
         self._launch_until_done(steps, progress)
 
-    def _aim(self, steps, before_measuring):
+    def _aim(self, steps: np.ndarray, before_measuring: np.ndarray) -> None:
         """Say how far every scene is to go."""
         begin = self._read_status()[0].astype(np.int64)
         if (begin + steps).max() > _MOST_STEPS:
             raise InputError(f"steps since the start must stay below {_MOST_STEPS}: run fewer")
         order = dealt((1 + self.table.column("particles")) * steps, runtime.settings().threads)
         plan = np.stack([begin, begin + steps, begin + before_measuring, order])
-        self.coupling.aim(plan.astype(np.int32))
-        self._done = self._seconds = 0.0
+        self.engine.coupling.aim(plan.astype(np.int32))
+        self.launches.begin()
 
-    def _compile(self):
-        """Compile the launch without stepping."""
-        if not self._compiled:
+    def _compile(self) -> None:
+        """Compile the launch without stepping, unless a batch on this engine has done so."""
+        engine = self.engine
+        if not engine.is_compiled:
             started = time.perf_counter()
-            compiling("time step", 0.4)
-            self.coupling.advance(0.0)
+            self._tell_compiling("time step", 0.4)
+            engine.coupling.advance(0.0)
             self.compile_seconds += time.perf_counter() - started
-            self._compiled = True
+            engine.is_compiled = True
 
-    def _launch_until_done(self, steps, progress):
+    def _launch_until_done(self, steps: np.ndarray, progress: Any) -> None:
         """Launch, tell and save; a run that was saved at its end is told and saved once more."""
-        total, done = max(1, int(steps.sum())), -1.0
+        launches, total, done = self.launches, max(1, int(steps.sum())), -1.0
         while done < 1.0:
-            done, started = self._done, time.perf_counter()
-            try:
-                self._done = self._launch(done, total)
-            finally:
-                self._seconds += time.perf_counter() - started
-                self.run_seconds += time.perf_counter() - started
-            if done < 1.0 == self._done:
-                self._count(steps)
+            done = launches.done
+            launches.launch(total, self._advance, self._check_divergence)
+            if done < 1.0 == launches.done:
+                launches.count(steps, self.table.column("particles"))
             if progress is not None:
-                progress(BatchProgress(self._done, self._seconds, round(self._done * total)))
+                scene_steps = round(launches.done * total)
+                progress(BatchProgress(launches.done, launches.seconds, scene_steps))
             self.writer.save_if_needed()
-            done = self._done
+            done = launches.done
 
-    def _count(self, steps):
-        self.scene_steps += int(steps.sum())
-        self.particle_steps += int((self.table.column("particles") * steps).sum())
-
-    def _launch(self, done, total):
-        """One launch from a share of the way, total scene-steps long; returns the share reached."""
-        share = min(1.0, done + self._pace / total)
-        started = time.perf_counter()
-        self.coupling.advance(share)
-        ti.sync()
-        seconds = time.perf_counter() - started
-        # What a short way allowed to see says nothing of how fast a long one may go.
-        if share < 1.0:
-            self._pace *= min(4.0, max(0.25, LAUNCH_SECONDS / seconds))
-            self._pace = max(self._pace, float(self.count))
-        self._check_divergence()
-        return share
-
-    def _check_divergence(self):
-        status = self._read_status()[2]
-        if status.any():
-            # Scenes stop where they diverge: the first of them in time speaks for all.
-            self._report_divergence(int(np.argmin(np.where(status != 0, self.time_s, np.inf))))
-
-    def _report_divergence(self, s):
-        row, step, now = self.table.row(s), self.coupling.step[s], float(self.time_s[s])
-        code, dt = self.coupling.status[s], row["dt"]
-        words, allowed = self.filling.divergence(max(code, 1), row["particles"], dt)
-        if code == LOST:
-            # What the filling bears at most is still the best advice.
-            words, allowed = _LOST_IN_WORDS, min(allowed, 0.5 * dt)
-        raise SimulationDiverged(
-            f"the scene of particles = {row['particles']} and seed {row['seed']} at "
-            f"{row['frequency']:.5g} Hz diverged by step {step}, t = {now:.4g} s: it {words}; "
-            f"dt must be at most {allowed:.3g} s, was {dt:.3g} s",
-            scene=row,
-            step=step,
-            time_s=now,
-            dt=dt,
-            dt_allowed=allowed,
-        )
+    def _advance(self, share: float) -> None:
+        self.engine.coupling.advance(share)

@@ -1,43 +1,22 @@
-"""What a filling of the container is, and the two trivial ones: nothing, and a mass that is fixed.
+"""Contract of a filling of the container: what goes in is its motion, what comes out its load.
 
-A filling is a frozen dataclass of a user's options, checked when it is made. It has
-
-``label``          short word for tables and CSV files, such as "ca_static"
-``default_dt``     step to take unless the user asks for another [s]
-``capacity``       most particles that fit
-``particle_mass``  [kg]             ``gravity``  that acts on the particles [m/s^2], downwards
-``effects``        what it computes, in words for the report
-``step_bound``     longest step it allows or advises [s] and why, in words; None where any will do
-``check(particles, dt)``            raises InputError for what the filling cannot do
-``divergence(code, particles, dt)`` what a ``divergence_code`` means, in words that follow "it", and
-                                    a step that would do [s]
-``bind(table)``    the filling on the device, for all scenes of a SceneTable
-
-What ``bind`` returns is data oriented and has the ti.funcs
-
-``reset(s)``               place the particles of scene s anew, from its seed
-``advance(s, step, motion)`` takes the filling over step number ``step`` (i32, counted from the
-                           reset without a gap), in which the container starts with ``motion``;
-                           returns an Action. The container takes the step after this call.
-``energy(s)``              kinetic and potential energy of the particles [J], heights counted from
-                           the container's floor
-``momentum(s)``            momentum of the particles along x [kg m/s]
-``divergence_code(s)``     0, or the code of a divergence, 1 and up; asked every few steps
-
-and in Python ``uses(effects)``, an EffectUse for each of the named effects that can be counted, and
-``snapshot(s)``, a dict with ``position`` [m] and ``velocity`` [m/s], both (particles, 2) as
-(horizontal, vertical), positions from the container's lower left inner corner.
-``table.dt`` may change between two steps, when a sweep goes on to its next frequency.
+A filling is a frozen dataclass of a user's options, checked when it is made (``Filling``). It binds
+itself to the scenes of an engine (``DeviceFilling``), which is compiled once and then runs every
+batch of a filling with the same ``Structure``. ``fixed_mass.py`` has a complete example.
 """
 
-from dataclasses import dataclass
-from typing import ClassVar
+from collections.abc import Hashable
+from dataclasses import dataclass, field
+from typing import Any, Optional, Protocol
 
 import numpy as np
 import taichi as ti
 
+from ca_damper.contracts import check_members, members_of
+from ca_damper.scenes.scene_fields import SceneFields
+from taichi_dem.kit.effect_usage import EffectUse
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import positive, shown, whole
+from taichi_dem.kit.validation import shown
 
 
 @ti.dataclass
@@ -67,24 +46,121 @@ class Action:
     carried: ti.f64
 
 
-#: What a filling must have to be one.
-_MEMBERS = ("label", "default_dt", "capacity", "particle_mass", "gravity", "check", "bind")
-#: Places for particles in all scenes of a batch: a hundred bytes each, and counted in 32 bits.
+#: Places of a scene that an engine has at least.
+LEAST_PLACES = 256
+#: Places for particles in all scenes of a batch: they are counted in 32 bits.
 _MOST_PLACES = 2**25
 
 
-def check_filling(filling):
-    """The filling; InputError unless it is an object that has what a filling must have."""
-    if isinstance(filling, type) or not all(hasattr(filling, name) for name in _MEMBERS):
+@dataclass(frozen=True)
+class Structure:
+    """What the compiler sees of a filling; fillings of equal ``key`` share their compiled kernels.
+
+    key: the options that decide what is compiled. sizes: places that a scene needs, by name, for
+    ``SceneFields.field``, those for particles first; an engine has room for more, so that smaller
+    ones compile nothing.
+    """
+
+    key: Hashable
+    sizes: dict[str, int] = field(default_factory=dict)
+
+
+class Filling(Protocol):
+    """Options of a user, checked when they are made.
+
+    A filling may also have a property ``structure``, a Structure. Its device then has a method
+    ``load(filling)`` that takes over all numbers of a filling of the same structure. Without it the
+    filling itself, which must be hashable, is the structure, and other options compile anew.
+    """
+
+    @property
+    def label(self) -> str:
+        """Short word for tables and CSV files, such as "ca_static"."""
+
+    @property
+    def default_dt(self) -> float:
+        """Step to take unless the user asks for another [s]."""
+
+    @property
+    def capacity(self) -> int:
+        """Most particles that fit."""
+
+    @property
+    def particle_mass(self) -> float:
+        """Mass of a particle [kg]."""
+
+    @property
+    def gravity(self) -> float:
+        """Gravity that acts on the particles, downwards [m/s^2]."""
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """What it computes, in words for the report."""
+
+    @property
+    def step_bound(self) -> Optional[tuple[float, str]]:
+        """Longest step that it allows or advises [s], and why; None where any will do."""
+
+    def check(self, particles: int, dt: float) -> None:
+        """Raise InputError for a number of particles or a step [s] that it cannot do."""
+
+    def divergence(self, code: int, particles: int, dt: float) -> tuple[str, float]:
+        """Say what a code of divergence means, in words that follow "it", and a step that does."""
+
+    def bind(self, table: SceneFields) -> "DeviceFilling":
+        """Declare its fields for all scenes of a table; no field may be used yet."""
+
+
+class DeviceFilling(Protocol):
+    """A filling on the device, for all scenes of a table; data oriented.
+
+    Of its members ``uses`` and ``snapshot`` are Python, the others ti.funcs. ``table.dt`` may
+    change between two steps, when a sweep goes on to its next frequency.
+    """
+
+    def reset(self, s) -> None:
+        """Place the particles of scene s anew, from its seed."""
+
+    def advance(self, s, step, motion) -> Action:
+        """Take the particles of scene s over a step in which the container starts with ``motion``.
+
+        step: its number (i32), counted from the reset without a gap. The container takes the step
+        after this call.
+        """
+
+    def energy(self, s) -> float:
+        """Kinetic and potential energy [J]; heights count from the container's floor."""
+
+    def momentum(self, s) -> float:
+        """Momentum along x [kg m/s]."""
+
+    def divergence_code(self, s) -> int:
+        """Find out whether the scene diverged: 0, or a code from 1 up; asked every few steps."""
+
+    def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:
+        """What each of the named effects did, for those that can be counted."""
+
+    def snapshot(self, s: int) -> dict[str, np.ndarray]:
+        """Positions [m] and velocities [m/s] of the particles, (particles, 2) each, by name.
+
+        (horizontal, vertical); positions count from the container's lower left inner corner.
+        """
+
+
+def check_filling(filling: Any) -> Any:
+    """Return the filling; InputError unless it has all members of the contract."""
+    members = members_of(Filling)
+    if isinstance(filling, type) or not any(hasattr(filling, name) for name in members):
         raise InputError(
             f"filling must be one such as Automaton(), Spheres() or RigidMass(), "
             f"got {shown(filling)}"
         )
+    check_members("filling", filling, members)
     return filling
 
 
-def check_places(scenes, places):
-    """InputError where so many scenes with so many places for particles each find no room."""
+def check_places(scenes: int, places: int) -> None:
+    """InputError where so many scenes with so many places for particles each cannot be counted."""
     if scenes * places > _MOST_PLACES:
         raise InputError(
             f"scenes x places for particles must be at most {_MOST_PLACES} in one batch, got "
@@ -92,112 +168,25 @@ def check_places(scenes, places):
         )
 
 
-@dataclass(frozen=True)
-class Empty:
-    """A container without particles."""
-
-    label: ClassVar[str] = "empty"
-    effects: ClassVar[tuple] = ()
-    step_bound: ClassVar[None] = None
-    default_dt: ClassVar[float] = 1e-4
-    capacity: ClassVar[int] = 0
-    particle_mass: ClassVar[float] = 0.0
-    gravity: ClassVar[float] = 9.8
-
-    def check(self, particles, dt):
-        """InputError unless there are no particles."""
-        if particles != 0:
-            raise InputError(f"particles must be 0 in an empty container, got {shown(particles)}")
-
-    def divergence(self, code, particles, dt):
-        """Nothing that could diverge; named because the protocol asks for it."""
-        return "is empty", dt
-
-    def bind(self, table):
-        """Nothing on the device but the table."""
-        return FixedMass(table, 0.0)
+def check_device(filling: Any, device: Any) -> Any:
+    """Return what a filling bound; InputError unless it has all members of the contract."""
+    members = members_of(DeviceFilling)
+    if hasattr(filling, "structure"):
+        members = {**members, "load": "Take over the numbers of a filling of the same structure."}
+    check_members("what bind of a filling returns", device, members)
+    return device
 
 
-@dataclass(frozen=True)
-class RigidMass:
-    """Particles glued to the container: N m more mass and nothing else, exactly.
-
-    particle_mass [kg], gravity [m/s^2].
-    """
-
-    particle_mass: float = 0.2e-3
-    gravity: float = 9.8
-
-    label: ClassVar[str] = "rigid"
-    effects: ClassVar[tuple] = ("fixed mass",)
-    step_bound: ClassVar[None] = None
-    default_dt: ClassVar[float] = 1e-4
-    capacity: ClassVar[int] = 1_000_000
-
-    def __post_init__(self):
-        positive("particle_mass", self.particle_mass)
-        positive("gravity", self.gravity, zero_allowed=True)
-
-    def check(self, particles, dt):
-        """InputError for more than a million particles."""
-        whole("particles", particles, 0, self.capacity)
-
-    def divergence(self, code, particles, dt):
-        """A fixed mass has no state that could diverge; named because the protocol asks for it."""
-        return "is rigid", dt
-
-    def bind(self, table):
-        """The mass of a particle on the device."""
-        return FixedMass(table, self.particle_mass)
-
-
-@ti.data_oriented
-class FixedMass:
-    """Particles of a mass [kg] each that never leave the container's floor."""
-
-    def __init__(self, table, particle_mass):
-        self.table = table
-        self.particle_mass = ti.field(ti.f64, shape=())
-        self.particle_mass[None] = particle_mass
-        self.velocity = ti.field(ti.f64, shape=table.count)
-
-    @ti.func
-    def mass(self, s):
-        """Mass of all particles of scene s [kg]."""
-        return self.table.particles[s] * self.particle_mass[None]
-
-    @ti.func
-    def reset(self, s):
-        """At rest."""
-        self.velocity[s] = 0.0
-
-    @ti.func
-    def advance(self, s, step, motion):
-        """No blows; the whole mass is carried."""
-        self.velocity[s] = motion.v
-        return Action(0.0, self.mass(s))
-
-    @ti.func
-    def energy(self, s):
-        """Kinetic energy at the start of the last step [J]; the height is zero."""
-        return 0.5 * self.mass(s) * self.velocity[s] * self.velocity[s]
-
-    @ti.func
-    def momentum(self, s):
-        """Momentum at the start of the last step [kg m/s]."""
-        return self.mass(s) * self.velocity[s]
-
-    @ti.func
-    def divergence_code(self, s):
-        """Always fine."""
-        return 0
-
-    def uses(self, effects):
-        """Nothing to count: a fixed mass acts in every step."""
-        return ()
-
-    def snapshot(self, s):
-        """All particles on the floor, in the corner."""
-        count = self.table.particles[s]
-        velocity = np.column_stack([np.zeros(count), np.full(count, self.velocity[s])])
-        return {"position": np.zeros((count, 2)), "velocity": velocity}
+def structure_of(filling: Any) -> Structure:
+    """Structure of a filling; InputError for one that has none and is not hashable."""
+    if hasattr(filling, "structure"):
+        found: Structure = filling.structure
+        return Structure((type(filling), found.key), found.sizes)
+    try:
+        hash(filling)
+    except TypeError:
+        raise InputError(
+            f"filling must be hashable, as a frozen dataclass is, or have a 'structure', "
+            f"got {shown(filling)}"
+        ) from None
+    return Structure((type(filling), filling))

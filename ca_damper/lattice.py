@@ -6,8 +6,12 @@ stand one cell apart, as in the paper (10 particles in 60 mm); the angles are th
 triangular lattice. Cells are counted upwards, column by column: the cell above is the next one.
 """
 
+from typing import Any
+
 import numpy as np
 import taichi as ti
+
+from ca_damper.scenes.scene_fields import SceneFields
 
 #: What stands in a cell: a particle on its way in one of six directions, clockwise from up ...
 UP, UP_RIGHT, DOWN_RIGHT, DOWN, DOWN_LEFT, UP_LEFT = range(6)
@@ -21,12 +25,12 @@ _TABLE = ti.types.ndarray(dtype=ti.i32, ndim=2)
 _COSINES = ti.types.ndarray(dtype=ti.f64, ndim=2)
 
 
-def alignments():
+def alignments() -> np.ndarray:
     """Cosine of the angle between two directions, shape (6, 6), exact."""
     return np.round(2.0 * np.cos(_ANGLE[:, None] - _ANGLE[None, :])) / 2.0
 
 
-def unit_vectors():
+def unit_vectors() -> np.ndarray:
     """Horizontal and vertical part of the six directions, shape (6, 2)."""
     return np.column_stack([np.sin(_ANGLE), alignments()[:, UP]])
 
@@ -34,24 +38,24 @@ def unit_vectors():
 class Geometry:
     """Which cell lies where, in NumPy; columns and rows are counted inside the walls."""
 
-    def __init__(self, columns, rows):
+    def __init__(self, columns: int, rows: int):
         self.columns, self.rows = columns, rows
         self.height = rows + 2
         self.cells = (columns + 2) * self.height
 
-    def cell_of(self, column, row):
+    def cell_of(self, column: Any, row: Any) -> Any:
         """Number of the cell in a column and row, both 0 at the lower left inner corner."""
         return (column + 1) * self.height + row + 1
 
-    def column_and_row(self, cell):
+    def column_and_row(self, cell: Any) -> tuple[Any, Any]:
         """Column and row of a cell, -1 in the lower and left walls; arrays welcome."""
         return cell // self.height - 1, cell % self.height - 1
 
-    def inside(self, column, row):
+    def inside(self, column: Any, row: Any) -> Any:
         """Whether a particle may stand there; arrays welcome."""
         return (0 <= column) & (column < self.columns) & (0 <= row) & (row < self.rows)
 
-    def neighbours(self):
+    def neighbours(self) -> np.ndarray:
         """Cell ahead of what stands in a cell, shape (cells + 1, KINDS).
 
         What does not fly, and all beyond the lattice, looks at cell number ``cells``: nothing ever
@@ -69,13 +73,13 @@ class Geometry:
             table[:-1, direction] = np.where(known, self.cell_of(c, r), self.cells)
         return table
 
-    def blank(self):
+    def blank(self) -> np.ndarray:
         """WALL or EMPTY for each cell and the one beyond the lattice, shape (cells + 1,)."""
         column, row = self.column_and_row(np.arange(self.cells))
         kinds = np.where(self.inside(column, row), EMPTY, WALL)
         return np.append(kinds, EMPTY).astype(np.int32)
 
-    def centres(self, width):
+    def centres(self, width: float) -> np.ndarray:
         """Horizontal and vertical centre of every cell [m], shape (cells, 2).
 
         Counted from the lower left inner corner of the container. width: of a cell [m].
@@ -84,35 +88,90 @@ class Geometry:
         return width * np.column_stack([column + 0.5, row + 0.5 + 0.5 * ((column + 1) % 2)])
 
 
+@ti.dataclass
+class LatticeSize:
+    """Columns and rows inside the walls, and with them: height of a column, cells of all.
+
+    first: cell that a particle can take. end: one past the last.
+    """
+
+    columns: ti.i32
+    rows: ti.i32
+    height: ti.i32
+    cells: ti.i32
+    first: ti.i32
+    end: ti.i32
+
+
 @ti.data_oriented
 class Lattice:
-    """The tables of a geometry on the device."""
+    """The tables of a geometry on the device, with room for others.
 
-    def __init__(self, geometry):
-        self.geometry = geometry
-        self.cells, self.height = geometry.cells, geometry.height
-        self.columns, self.rows = geometry.columns, geometry.rows
-        #: From the first to past the last cell that a particle may take.
-        self.first = geometry.cell_of(0, 0)
-        self.end = geometry.cell_of(self.columns - 1, self.rows - 1) + 1
-        self.neighbour = ti.field(ti.i16, shape=(self.cells + 1, KINDS))
-        self.blank = ti.field(ti.i8, shape=self.cells + 1)
+    size: a LatticeSize, shape ().
+    """
+
+    constant_fields = ("size", "neighbour", "blank", "cosine")
+
+    def __init__(self, table: SceneFields):
+        most = table.length("cells")
+        self.size = LatticeSize.field(shape=())
+        self.neighbour = ti.field(ti.i16, shape=(most, KINDS))
+        self.blank = ti.field(ti.i8, shape=most)
         self.cosine = ti.field(ti.f64, shape=(KINDS, DIRECTIONS))
 
-    def load(self):
-        """Fill the tables; apart from making them, as every first use of new fields is dear."""
+    def load(self, geometry: Geometry) -> None:
+        """Take over the tables of a geometry."""
         cosines = np.zeros((KINDS, DIRECTIONS))
         cosines[:DIRECTIONS] = alignments()
-        self._load(self.geometry.neighbours(), self.geometry.blank()[:, None], cosines)
+        self._load_size(geometry.columns, geometry.rows)
+        self._load(geometry.neighbours(), geometry.blank()[:, None], cosines)
+
+    @property
+    def geometry(self) -> Geometry:
+        """The geometry that is loaded."""
+        size = self.size[None]
+        return Geometry(int(size.columns), int(size.rows))
+
+    @ti.kernel
+    def _load_size(self, columns: ti.i32, rows: ti.i32):
+        height = rows + 2
+        self.size[None] = LatticeSize(
+            columns, rows, height, (columns + 2) * height, height + 1, columns * height + rows + 1
+        )
 
     @ti.kernel
     def _load(self, neighbours: _TABLE, blank: _TABLE, cosines: _COSINES):
-        for cell in range(self.cells + 1):
+        for cell in range(blank.shape[0]):
             self.blank[cell] = ti.cast(blank[cell, 0], ti.i8)
             for kind in range(KINDS):
                 self.neighbour[cell, kind] = ti.cast(neighbours[cell, kind], ti.i16)
         for kind, direction in ti.ndrange(KINDS, DIRECTIONS):
             self.cosine[kind, direction] = cosines[kind, direction]
+
+    @ti.func
+    def cell_count(self):
+        """Number of cells, walls included; that of the cell beyond the lattice."""
+        return self.size[None].cells
+
+    @ti.func
+    def column_count(self):
+        """Number of columns inside the walls."""
+        return self.size[None].columns
+
+    @ti.func
+    def row_count(self):
+        """Number of rows inside the walls."""
+        return self.size[None].rows
+
+    @ti.func
+    def first(self):
+        """First cell that a particle can take."""
+        return self.size[None].first
+
+    @ti.func
+    def end(self):
+        """One past the last cell that a particle can take."""
+        return self.size[None].end
 
     @ti.func
     def cell_ahead(self, cell, kind):
@@ -127,17 +186,19 @@ class Lattice:
     @ti.func
     def cell_of(self, column, row):
         """Number of the cell in a column and row, both counted inside the walls."""
-        return (column + 1) * self.height + row + 1
+        return (column + 1) * self.size[None].height + row + 1
 
     @ti.func
     def height_of(self, cell):
         """Height of a cell's centre above the floor of the lower columns, in cells."""
-        return cell % self.height - 0.5 + 0.5 * ((cell // self.height) % 2)
+        height = self.size[None].height
+        return cell % height - 0.5 + 0.5 * ((cell // height) % 2)
 
     @ti.func
     def in_side_wall(self, cell):
         """Whether a wall cell belongs to a side wall; the corners do."""
-        return cell < self.height or cell >= self.cells - self.height
+        size = self.size[None]
+        return cell < size.height or cell >= size.cells - size.height
 
 
 @ti.func

@@ -8,12 +8,12 @@ import numpy as np
 
 from ca_damper.batch import Batch
 from ca_damper.checks import check_run
-from ca_damper.clock import steps_per_cycle
 from ca_damper.filling import check_filling
 from ca_damper.measures import peak
 from ca_damper.oscillator import Oscillator
 from ca_damper.report import Report
-from ca_damper.table import SceneTable
+from ca_damper.scenes.clock import steps_per_cycle
+from ca_damper.scenes.table import SceneTable
 from taichi_dem.kit.display import counted, embedded, in_brief, listed, table, titled, unfolded
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import write_csv

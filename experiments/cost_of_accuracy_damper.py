@@ -64,7 +64,7 @@ def automaton(accounting):
 
 
 METHODS = {
-    "ca_static": automaton("static"),
+    "ca_static": automaton("all"),
     "ca_ejection": automaton("landing+ejection"),
     "ca_landing": automaton("landing"),
     SPHERES: Method(Spheres(), DEM_STEPS, 5e-6, 3, (1e-4, 3e-5)),

@@ -52,7 +52,7 @@ def options_parser():
     made = parser(NAME, __doc__)
     made.add_argument("--amplitude", type=number(0, 100), default=24.0, help="[mm], 24")
     made.add_argument("--frequency", type=number(0.5, 100), default=6.0, help="[Hz], 6")
-    made.add_argument("--accounting", choices=ACCOUNTINGS, default="static", help="static")
+    made.add_argument("--accounting", choices=ACCOUNTINGS, default="all", help="all")
     made.add_argument("--dt", type=number(0, 1), help="spheres' step [s], 2e-5")
     made.add_argument("--seeds", type=whole(1, 100), help="starts that are averaged, 5")
     return made

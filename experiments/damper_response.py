@@ -89,7 +89,7 @@ class Measured:
 def fillings():
     """The fillings compared, by label."""
     made = [Spheres()]
-    made += [Automaton(accounting=word) for word in ("landing", "landing+ejection", "static")]
+    made += [Automaton(accounting=word) for word in ("landing", "landing+ejection", "all")]
     return {filling.label: filling for filling in made}
 
 

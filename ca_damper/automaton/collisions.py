@@ -5,15 +5,18 @@ a wall, or approach another particle? Events claim the particles they need, so t
 part in two events of a step. Then the winners act; no two of them touch the same particle.
 """
 
+from typing import Any
+
 import taichi as ti
 
 from ca_damper.automaton.collision_laws import deflected, speed_after_pair, speed_after_wall
 from ca_damper.automaton.conflict_resolution import above_others, rank
 from ca_damper.automaton.event_counts import HOLDS, WALLS
 from ca_damper.automaton.event_counts import PAIRS as PAIRS_MET
-from ca_damper.automaton.impulse_balance import PAIRS, quanta
+from ca_damper.automaton.impulse_balance import PAIRS
 from ca_damper.lattice import EMPTY, WALL, mirrored, turned_back
 from ca_damper.random_numbers import DEFLECT, EVENT, bits, unit
+from ca_damper.scenes.scene_fields import SceneFields
 
 NOTHING, JOIN, FLOOR, SIDE, PAIR = range(5)
 _CELL_BITS = 16
@@ -29,17 +32,16 @@ class Collisions:
     both: whether both of a pair are updated. pairs_first: whether pairs come before walls.
     """
 
-    def __init__(self, components, both, pairs_first):
+    def __init__(self, table: SceneFields, components: Any, both: bool, pairs_first: bool):
         self.cells, self.lattice = components.cells, components.lattice
         self.conflict_resolution = components.conflict_resolution
         self.accumulator, self.resting = components.accumulator, components.resting
         self.accounting, self.parameters = components.accounting, components.parameters
         self.event_counts = components.event_counts
         self.both, self.pairs_first = both, pairs_first
-        shape = (self.cells.kind.shape[0], self.lattice.cells)
-        self.contacts = ti.field(ti.i32, shape=shape)
-        self.other = ti.field(ti.f64, shape=shape)
-        self.ranks = ti.field(ti.i64, shape=shape)
+        self.contacts = table.field(ti.i32, "cells")
+        self.other = table.field(ti.f64, "cells")
+        self.ranks = table.field(ti.i64, "cells")
 
     @ti.func
     def resolve(self, s, step, shared, count, velocity, pull, pressed):
@@ -127,7 +129,7 @@ class Collisions:
         elif event == JOIN:
             # The container carries the particle over this whole step, its weight with it.
             self.event_counts.note(s, HOLDS)
-            impulse = quanta(velocity - before - pull)
+            impulse = self.accounting.wall_impulse(s, cell, velocity - before - pull)
             self.resting.hold(s, cell)
         else:
             self.event_counts.note(s, WALLS)

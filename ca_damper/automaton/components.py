@@ -1,10 +1,11 @@
 """Components that the rules of an automaton share."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import taichi as ti
 
-from ca_damper.automaton.accounting import AllImpulses, Landings
+from ca_damper.automaton.accounting import ACCOUNTINGS, Accounting
 from ca_damper.automaton.accumulator import Accumulator
 from ca_damper.automaton.conflict_resolution import ConflictResolution
 from ca_damper.automaton.event_counts import EventCounts
@@ -12,7 +13,8 @@ from ca_damper.automaton.impulse_balance import ImpulseBalance, NoImpulseBalance
 from ca_damper.automaton.state import Cells
 from ca_damper.automaton.static_contact import NoStaticContact, StaticContact
 from ca_damper.automaton.traversal import ParticleList, Scan
-from ca_damper.lattice import Geometry, Lattice
+from ca_damper.lattice import Lattice
+from ca_damper.scenes.scene_fields import SceneFields
 
 
 @ti.data_oriented
@@ -23,14 +25,12 @@ class Parameters:
     threshold of static contact in units of g dt.
     """
 
-    def __init__(self, options):
-        self.options = options
+    def __init__(self):
         for name in ("width", "mass", "gravity", "particle", "wall", "threshold"):
             setattr(self, name, ti.field(ti.f64, shape=()))
 
-    def load(self):
+    def load(self, options: Any) -> None:
         """Take the values from the options."""
-        options = self.options
         self._load(options.width, options.particle_mass, options.gravity)
         self._load_collisions(
             options.restitution, options.wall_restitution, options.static_threshold
@@ -55,37 +55,31 @@ class Components:
     cells: Cells
     conflict_resolution: ConflictResolution
     accumulator: Accumulator
-    accounting: object
+    accounting: Accounting
     resting: object
     impulse_balance: object
     event_counts: EventCounts
 
 
-def assemble(options, table):
+def assemble(options: Any, table: SceneFields) -> Components:
     """Components for a user's options; those left out are neither stored nor evaluated."""
-    scenes = table.count
-    static = options.accounting == "static"
-    lattice = Lattice(Geometry(options.columns, options.rows))
+    lattice, parameters = Lattice(table), Parameters()
     traversal = (Scan if options.traversal == "scan" else ParticleList)(lattice, table)
-    impulse_balance = ImpulseBalance(scenes) if options.ledger else NoImpulseBalance()
-    accounting = AllImpulses()
-    if not static:
-        pushes = options.accounting == "landing+ejection"
-        accounting = Landings(lattice, scenes, impulse_balance, pushes)
-    cells = Cells(lattice, traversal, accounting, scenes)
-    parameters = Parameters(options)
+    impulse_balance = ImpulseBalance(table) if options.ledger else NoImpulseBalance()
+    accounting = ACCOUNTINGS[options.accounting](table, lattice, impulse_balance)
+    cells = Cells(table, lattice, traversal, accounting)
     accumulator = Accumulator(options.accumulator, lattice)
     resting = NoStaticContact()
-    if static:
-        resting = StaticContact(cells, accumulator, parameters)
+    if options.particles_rest:
+        resting = StaticContact(table, cells, accumulator, parameters)
     return Components(
         parameters=parameters,
         lattice=lattice,
         cells=cells,
-        conflict_resolution=ConflictResolution(lattice, scenes),
+        conflict_resolution=ConflictResolution(table, lattice),
         accumulator=accumulator,
         accounting=accounting,
         resting=resting,
         impulse_balance=impulse_balance,
-        event_counts=EventCounts(scenes),
+        event_counts=EventCounts(table),
     )

@@ -4,9 +4,12 @@ The largest of several does not depend on the order in which they are asked. Ran
 step, so that old claims never need to be cleared.
 """
 
+from typing import Any
+
 import taichi as ti
 
 from ca_damper.random_numbers import bits
+from ca_damper.scenes.scene_fields import SceneFields
 
 #: Room for cell numbers in a rank.
 MOST_CELLS = 1 << 12
@@ -32,14 +35,14 @@ def above_others(ranked):
 class ConflictResolution:
     """Largest rank that ever claimed a cell, shape (scenes, cells + 1)."""
 
-    def __init__(self, lattice, scenes):
+    def __init__(self, table: SceneFields, lattice: Any):
         self.lattice = lattice
-        self.claims = ti.field(ti.i64, shape=(scenes, lattice.cells + 1))
+        self.claims = table.field(ti.i64, "cells")
 
     @ti.func
     def clear(self, s):
         """No claims."""
-        for cell in range(self.lattice.cells + 1):
+        for cell in range(self.lattice.cell_count() + 1):
             self.claims[s, cell] = ti.cast(0, ti.i64)
 
     @ti.func

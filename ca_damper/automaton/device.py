@@ -1,5 +1,7 @@
 """Automaton on the device, and the order in which its rules act."""
 
+from typing import Any
+
 import numpy as np
 import taichi as ti
 
@@ -10,30 +12,35 @@ from ca_damper.automaton.impulse_balance import GRAVITY, QUANTUM
 from ca_damper.automaton.placement import DrawnCells, NamedCells
 from ca_damper.automaton.transport import Transport
 from ca_damper.filling import Action
-from ca_damper.lattice import DIRECTIONS, EMPTY, HELD, WALL, unit_vectors
+from ca_damper.lattice import DIRECTIONS, EMPTY, HELD, WALL, Geometry, unit_vectors
 from ca_damper.random_numbers import stream
+from ca_damper.scenes.scene_fields import SceneFields
+from taichi_dem.kit.effect_usage import EffectUse
 
 
 @ti.data_oriented
 class DeviceAutomaton:
     """Automata of all scenes of a table; the protocol is in ``ca_damper.filling``."""
 
-    def __init__(self, options, table):
+    def __init__(self, options: Any, table: SceneFields):
         components = assemble(options, table)
         self.table, self.parameters, self.lattice = table, components.parameters, components.lattice
         self.cells, self.conflict_resolution = components.cells, components.conflict_resolution
         self.accounting = components.accounting
         self.resting, self.impulse_balance = components.resting, components.impulse_balance
         self.event_counts = components.event_counts
-        self.transport, self.ejection = Transport(components), Ejection(components)
+        self.transport, self.ejection = Transport(table, components), Ejection(table, components)
         both, pairs_first = options.pair_rule == "both", options.priority == "pairs_first"
-        self.collisions = Collisions(components, both, pairs_first)
-        self.placement = DrawnCells(self.cells, table)
-        if options.start is not None:
-            self.placement = NamedCells(self.cells, options.start)
-        self.velocity = ti.field(ti.f64, shape=table.count)
-        for loaded in (self.lattice, self.parameters, self.placement):
-            loaded.load()
+        self.collisions = Collisions(table, components, both, pairs_first)
+        placement = DrawnCells if options.start is None else NamedCells
+        self.placement = placement(table, self.cells)
+        self.velocity = table.field(ti.f64)
+
+    def load(self, options: Any) -> None:
+        """Take over the numbers of an automaton of the same structure."""
+        self.lattice.load(Geometry(options.columns, options.rows))
+        self.parameters.load(options)
+        self.placement.load(options.start)
 
     @ti.func
     def reset(self, s):
@@ -70,7 +77,7 @@ class DeviceAutomaton:
     def energy(self, s):
         """Kinetic and potential energy [J]; what is held moves as the container did last."""
         total = 0.0
-        for cell in range(self.lattice.cells):
+        for cell in range(self.lattice.cell_count()):
             kind = self.cells.at(s, cell)
             if kind != EMPTY and kind != WALL:
                 speed = self.velocity[s] if kind == HELD else self.cells.speed[s, cell]
@@ -83,7 +90,7 @@ class DeviceAutomaton:
     def momentum(self, s):
         """Momentum along x [kg m/s]; what is held moves as the container did last."""
         total = self.resting.count(s) * self.velocity[s]
-        for cell in range(self.lattice.cells):
+        for cell in range(self.lattice.cell_count()):
             total += self.cells.vertical_speed(s, cell)
         return self.parameters.mass[None] * total
 
@@ -91,25 +98,26 @@ class DeviceAutomaton:
     def divergence_code(self, s):
         """1 when a particle needs more than one cell a step, which no rule gives it."""
         fastest = 0.0
-        for cell in range(self.lattice.cells):
+        for cell in range(self.lattice.cell_count()):
             fastest = max(fastest, self.cells.speed[s, cell])
         return 0 if fastest * self.table.dt[s] < self.parameters.width[None] else 1
 
-    def uses(self, effects):
+    def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:
         """How often each of the named effects acted."""
         return self.event_counts.uses(effects)
 
-    def snapshot(self, s):
+    def snapshot(self, s: int) -> dict[str, np.ndarray]:
         """Positions and velocities of the particles, by cell (see ``ca_damper.filling``)."""
-        kind = self._row(self.cells.kind, s)
+        geometry = self.lattice.geometry
+        kind, travelled, speed = (
+            self.table.row(field, s)[: geometry.cells]
+            for field in (self.cells.kind, self.cells.travelled, self.cells.speed)
+        )
         flying, present = kind < DIRECTIONS, (kind != EMPTY) & (kind != WALL)
         way = np.zeros((len(kind), 2))
         way[flying] = unit_vectors()[kind[flying]]
-        position = self.lattice.geometry.centres(self.parameters.width[None])
-        position = position + way * self._row(self.cells.travelled, s)[:, None]
-        velocity = way * self._row(self.cells.speed, s)[:, None]
+        position = geometry.centres(self.parameters.width[None])
+        position = position + way * travelled[:, None]
+        velocity = way * speed[:, None]
         velocity[kind == HELD, 1] = self.velocity[s]
         return {"position": position[present], "velocity": velocity[present]}
-
-    def _row(self, field, s):
-        return np.array([field[s, cell] for cell in range(self.lattice.cells)])

@@ -7,28 +7,30 @@ their cell, and those slower than the wall take its velocity. A column always ha
 stays in the room has nothing pushed in its way, or it would touch it and be pushed.
 """
 
+from typing import Any
+
 import taichi as ti
 
 from ca_damper.automaton.event_counts import PUSHES
 from ca_damper.lattice import DIRECTIONS, DOWN, HELD, UP
+from ca_damper.scenes.scene_fields import SceneFields
 
 
 @ti.data_oriented
 class Ejection:
     """Follow the container's staircase.
 
-    pushed: 1 for a cell in the cluster, shape
-    (scenes, cells + 1). border: cells of the cluster still to look around, shape (scenes, cells).
+    pushed: 1 for a cell in the cluster. border: cells of the cluster still to look around. Both of
+    shape (scenes, cells).
     """
 
-    def __init__(self, components):
+    def __init__(self, table: SceneFields, components: Any):
         self.cells, self.lattice = components.cells, components.lattice
         self.parameters = components.parameters
         self.accumulator, self.accounting = components.accumulator, components.accounting
         self.event_counts = components.event_counts
-        scenes, size = self.cells.kind.shape
-        self.pushed = ti.field(ti.i8, shape=(scenes, size))
-        self.border = ti.field(ti.i16, shape=(scenes, size))
+        self.pushed = table.field(ti.i8, "cells")
+        self.border = table.field(ti.i16, "cells")
 
     @ti.func
     def follow(self, s, step, motion):
@@ -54,7 +56,7 @@ class Ejection:
         """One cell up (way 1) or down (-1); returns counted gain of velocity along x [quanta]."""
         self.mark(s, way)
         impulse = ti.cast(0, ti.i64)
-        for k in range(self.cells.traversal.size(s)):
+        for k in range(self.cells.traversal.begin(), self.cells.traversal.end(s)):
             cell = self.cells.traversal.cell(s, k)
             if self.pushed[s, cell] == 1 and self.cells.at(s, cell) != HELD:
                 impulse += self.push(s, cell, way, velocity)
@@ -66,10 +68,10 @@ class Ejection:
     def mark(self, s, way):
         """Mark the particles that touch the wall behind and all that hang together with them."""
         size = 0
-        for cell in range(self.lattice.cells + 1):
+        for cell in range(self.lattice.cell_count() + 1):
             self.pushed[s, cell] = ti.cast(0, ti.i8)
-        for column in range(self.lattice.columns):
-            row = 0 if way > 0 else self.lattice.rows - 1
+        for column in range(self.lattice.column_count()):
+            row = 0 if way > 0 else self.lattice.row_count() - 1
             size = self.reach(s, self.lattice.cell_of(column, row), way, size)
         while size > 0:
             size -= 1
@@ -112,9 +114,9 @@ class Ejection:
     @ti.func
     def shift(self, s, way):
         """Let all others stay in the room: one cell the other way, those in front first."""
-        for column in range(self.lattice.columns):
-            for k in range(self.lattice.rows):
-                row = k if way > 0 else self.lattice.rows - 1 - k
+        for column in range(self.lattice.column_count()):
+            for k in range(self.lattice.row_count()):
+                row = k if way > 0 else self.lattice.row_count() - 1 - k
                 cell = self.lattice.cell_of(column, row)
                 if self.cells.at(s, cell) < DIRECTIONS and self.pushed[s, cell] == 0:
                     self.cells.relocate(s, cell, cell - way, self.cells.travelled[s, cell])

@@ -2,6 +2,7 @@
 
 import taichi as ti
 
+from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.effect_usage import EffectUse
 
 PAIRS, WALLS, PUSHES, HOLDS = range(4)
@@ -18,8 +19,9 @@ _COUNTED = {
 class EventCounts:
     """Events since the reset, shape (scenes, kinds of event)."""
 
-    def __init__(self, scenes):
-        self.events = ti.field(ti.i64, shape=(scenes, HOLDS + 1))
+    def __init__(self, table: SceneFields):
+        self.table = table
+        self.events = table.field(ti.i64, HOLDS + 1)
 
     @ti.func
     def clear(self, s):
@@ -33,11 +35,11 @@ class EventCounts:
         # Not "+=", which would be an atomic addition; a scene is one thread.
         self.events[s, kind] = self.events[s, kind] + 1
 
-    def uses(self, effects):
+    def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:
         """An EffectUse for each named effect that is an event, over all scenes.
 
         The automaton keeps no account of energy: what it does steers.
         """
-        total = self.events.to_numpy().sum(axis=0)
+        total = self.table.in_use(self.events).sum(axis=0)
         found = [(name, *_COUNTED[name]) for name in effects if name in _COUNTED]
         return tuple(EffectUse(name, what, int(total[k]), steers=True) for name, k, what in found)

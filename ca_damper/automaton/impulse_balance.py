@@ -7,6 +7,8 @@ Sums are integers, so that no order of execution reaches their bits.
 
 import taichi as ti
 
+from ca_damper.scenes.scene_fields import SceneFields
+
 #: Unit of sums of velocities [m/s]; 2^-40 leaves room for 8 million m/s in an i64.
 QUANTUM = 2.0**-40
 ITEMS = ("gravity", "pairs", "ejections", "rest")
@@ -26,8 +28,8 @@ class ImpulseBalance:
 
     active = True
 
-    def __init__(self, scenes):
-        self.velocity_gain = ti.field(ti.i64, shape=(scenes, _COUNT))
+    def __init__(self, table: SceneFields):
+        self.velocity_gain = table.field(ti.i64, _COUNT)
 
     @ti.func
     def clear(self, s):

@@ -2,37 +2,43 @@
 
 from dataclasses import dataclass
 from numbers import Integral
+from typing import Any, Optional
 
+from ca_damper.automaton.accounting import ACCOUNTINGS, Accounting
 from ca_damper.automaton.accumulator import READINGS
 from ca_damper.automaton.conflict_resolution import MOST_CELLS
 from ca_damper.automaton.device import DeviceAutomaton
-from ca_damper.filling import check_places
+from ca_damper.contracts import check_members, members_of
+from ca_damper.filling import Structure
+from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import choice, flag, fraction, positive, shown, whole
-
-ACCOUNTINGS = {"landing": "ca_landing", "landing+ejection": "ca_ejection", "static": "ca_static"}
 
 
 @dataclass(frozen=True)
 class Automaton:
     """Particles as a cellular automaton (Komatsuzaki et al., section 5).
 
-    accounting: what acts on the container: "landing" (particles that meet a wall),
-    "landing+ejection" (also those that a wall pushes along), "static" (both, and the heap that
-    lies on the floor). restitution: between particles; wall_restitution: between particle and
-    wall. pair_rule: "both" of a pair change and momentum stays in its line, or "one_sided" as
-    printed: each that looks at another changes alone. priority: of the events of a particle, at
-    "random" or "pairs_first". accumulator: what a turn does to the way travelled, one of
-    accumulator.READINGS. static_threshold: relative speed below which a particle rests on the
-    heap, in units of g dt. width: of a cell, the diameter of a particle [m]. columns, rows: cells
-    inside the walls. particle_mass [kg], gravity [m/s^2]. v_max: fastest particle to expect [m/s];
-    it bounds the step, dt < width / v_max. start: (column, row) of every particle, counted from 0
-    at the lower left; cells are drawn from the seed if None. traversal: "list" of particles or
-    "scan" of all cells, same bits. ledger: write down where uncounted momentum goes.
+    accounting: which impulses act on the container: "landing" (of particles that meet a wall after
+    a change of cell), "landing+ejection" (also of those that a wall pushes along), "all", or
+    another word of ``accounting.ACCOUNTINGS``. static_contact: whether particles come to rest on
+    the floor and on the heap there, move with the container and weigh on it; None: as suits the
+    accounting, True with "all" and False with the others. restitution: between particles;
+    wall_restitution: between particle and wall. pair_rule: "both" of a pair change and momentum
+    stays in its line, or "one_sided" as printed: each that looks at another changes alone.
+    priority: of the events of a particle, at "random" or "pairs_first". accumulator: what a turn
+    does to the way travelled, one of accumulator.READINGS. static_threshold: relative speed below
+    which a particle rests on the heap, in units of g dt. width: of a cell, the diameter of a
+    particle [m]. columns, rows: cells inside the walls. particle_mass [kg], gravity [m/s^2]. v_max:
+    fastest particle to expect [m/s]; it bounds the step, dt < width / v_max. start: (column, row)
+    of every particle, counted from 0 at the lower left; cells are drawn from the seed if None.
+    traversal: "list" of particles or "scan" of all cells, same bits. ledger: write down where
+    uncounted momentum goes.
     Raises InputError for what is not allowed.
     """
 
-    accounting: str = "static"
+    accounting: str = "all"
+    static_contact: Optional[bool] = None
     restitution: float = 0.75
     wall_restitution: float = 0.75
     pair_rule: str = "both"
@@ -49,8 +55,9 @@ class Automaton:
     traversal: str = "list"
     ledger: bool = False
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         choice("accounting", self.accounting, ACCOUNTINGS)
+        check_members(f"accounting {self.accounting!r}", self._accounting, members_of(Accounting))
         choice("pair_rule", self.pair_rule, ("both", "one_sided"))
         choice("priority", self.priority, ("random", "pairs_first"))
         choice("accumulator", self.accumulator, READINGS)
@@ -64,12 +71,14 @@ class Automaton:
         self._check_rules()
         self._check_lattice()
 
-    def _check_rules(self):
+    def _check_rules(self) -> None:
         flag("ledger", self.ledger)
-        if self.ledger and self.accounting == "static":
+        if self.static_contact is not None:
+            flag("static_contact", self.static_contact)
+        if self.ledger and self._accounting.counts_all:
             raise InputError(
-                "ledger must be False with accounting 'static', where everything acts on the "
-                "container and nothing is left to write down, got True"
+                f"ledger must be False with accounting {self.accounting!r}, where everything acts "
+                "on the container and nothing is left to write down, got True"
             )
         if self.pair_rule == "one_sided" and self.priority != "random":
             raise InputError(
@@ -77,7 +86,7 @@ class Automaton:
                 f"alone and no two events compete, got {self.priority!r}"
             )
 
-    def _check_lattice(self):
+    def _check_lattice(self) -> None:
         for name in ("columns", "rows"):
             whole(name, getattr(self, name), 1, MOST_CELLS)
         cells = (self.columns + 2) * (self.rows + 2)
@@ -89,7 +98,7 @@ class Automaton:
         if self.start is not None:
             object.__setattr__(self, "start", self._checked_start())
 
-    def _checked_start(self):
+    def _checked_start(self) -> tuple:
         if not isinstance(self.start, (tuple, list)):
             raise InputError(f"start must be a tuple of (column, row), got {shown(self.start)}")
         cells = [tuple(cell) if isinstance(cell, (tuple, list)) else cell for cell in self.start]
@@ -103,43 +112,53 @@ class Automaton:
             raise InputError(f"start must not name a cell twice, got {shown(self.start)}")
         return tuple(cells)
 
-    def _inside(self, column, row):
+    def _inside(self, column: Any, row: Any) -> bool:
         whole_numbers = isinstance(column, Integral) and isinstance(row, Integral)
         return whole_numbers and 0 <= column < self.columns and 0 <= row < self.rows
 
     @property
-    def label(self):
-        """Short word for tables and files."""
+    def _accounting(self) -> type[Accounting]:
         return ACCOUNTINGS[self.accounting]
 
     @property
-    def effects(self):
-        """What is computed, in words for the report."""
-        counted = {"landing": (), "landing+ejection": ("ejection",)}
-        more = counted.get(self.accounting, ("ejection", "static contact"))
-        return ("pairs", "landing", *more, *(("ledger",) if self.ledger else ()))
+    def particles_rest(self) -> bool:
+        """Whether there is static contact."""
+        asked = self.static_contact
+        return self._accounting.static_contact if asked is None else asked
 
     @property
-    def default_dt(self):
+    def label(self) -> str:
+        """Short word for tables and files."""
+        return self._accounting.labels[self.particles_rest]
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """What is computed, in words for the report."""
+        resting = ("static contact",) if self.particles_rest else ()
+        ledger = ("ledger",) if self.ledger else ()
+        return ("pairs", "landing", *self._accounting.effects, *resting, *ledger)
+
+    @property
+    def default_dt(self) -> float:
         """The paper's step, 1e-4 s."""
         return 1e-4
 
     @property
-    def capacity(self):
+    def capacity(self) -> int:
         """Most particles that fit: one a cell."""
         return self.columns * self.rows
 
     @property
-    def longest_dt(self):
+    def longest_dt(self) -> float:
         """Step that a particle at v_max would need for a whole cell [s]."""
         return self.width / self.v_max
 
     @property
-    def step_bound(self):
+    def step_bound(self) -> tuple[float, str]:
         """Longest step [s], and why."""
         return self.longest_dt, "a cell crossed at v_max"
 
-    def check(self, particles, dt):
+    def check(self, particles: int, dt: float) -> None:
         """InputError unless so many particles fit and the step is shorter than width / v_max."""
         whole("particles", particles, 0, self.capacity)
         if self.start is not None and particles != len(self.start):
@@ -153,11 +172,19 @@ class Automaton:
                 f"of {self.width:g} m at v_max = {self.v_max:g} m/s, got {dt:g}"
             )
 
-    def divergence(self, code, particles, dt):
+    def divergence(self, code: int, particles: int, dt: float) -> tuple[str, float]:
         """What the one code of ``divergence_code`` means, and a step that would do [s]."""
         return "holds a particle faster than one cell a step", 0.2 * dt
 
-    def bind(self, table):
-        """The automaton on the device, for all scenes of a SceneTable."""
-        check_places(table.count, (self.columns + 2) * (self.rows + 2))
+    @property
+    def structure(self) -> Structure:
+        """Rules are compiled; numbers, the size of the lattice and the cells of start are not."""
+        rules = (self.accounting, self._accounting, self.particles_rest, self.accumulator)
+        pairs = self.pair_rule, self.priority
+        key = (*rules, *pairs, self.traversal, self.ledger, self.start is None)
+        # One more for the cell beyond the lattice.
+        return Structure(key, {"cells": (self.columns + 2) * (self.rows + 2) + 1})
+
+    def bind(self, table: SceneFields) -> DeviceAutomaton:
+        """The automaton on the device, for all scenes of a table."""
         return DeviceAutomaton(self, table)

@@ -1,10 +1,13 @@
 """Where the particles of a scene stand at its start."""
 
+from typing import Any
+
 import numpy as np
 import taichi as ti
 
 from ca_damper.lattice import DOWN
 from ca_damper.random_numbers import START, uniform
+from ca_damper.scenes.scene_fields import SceneFields
 
 
 @ti.data_oriented
@@ -15,19 +18,19 @@ class DrawnCells:
     (selection sampling, Knuth, The Art of Computer Programming 2, 3.4.2).
     """
 
-    def __init__(self, cells, table):
+    def __init__(self, table: SceneFields, cells: Any):
         self.cells, self.lattice, self.table = cells, cells.lattice, table
 
-    def load(self):
+    def load(self, named: Any) -> None:
         """Nothing to load."""
 
     @ti.func
     def fill(self, s):
         """Put the particles of scene s into its cells, at rest."""
         placed, count = 0, self.table.particles[s]
-        left = self.lattice.columns * self.lattice.rows
-        for column in range(self.lattice.columns):
-            for row in range(self.lattice.rows):
+        left = self.lattice.column_count() * self.lattice.row_count()
+        for column in range(self.lattice.column_count()):
+            for row in range(self.lattice.row_count()):
                 cell = self.lattice.cell_of(column, row)
                 if left * uniform(self.table.seed[s], 0, cell, START) < count - placed:
                     self.cells.put(s, cell, DOWN, 0.0, 0.0)
@@ -40,24 +43,28 @@ class DrawnCells:
 class NamedCells:
     """Cells named by the user, the same in every scene."""
 
-    def __init__(self, cells, named):
-        self.cells, self.count = cells, len(named)
-        geometry = cells.lattice.geometry
-        self.chosen = np.array([geometry.cell_of(*cell) for cell in named], dtype=np.int32)
-        self.named = ti.field(ti.i32, shape=max(1, self.count))
+    constant_fields = ("named", "count")
 
-    def load(self):
-        """Take over the user's cells."""
-        self._load(self.chosen)
+    def __init__(self, table: SceneFields, cells: Any):
+        self.cells = cells
+        self.count = ti.field(ti.i32, shape=())
+        self.named = ti.field(ti.i32, shape=table.length("cells"))
+
+    def load(self, named: Any) -> None:
+        """Take over the user's cells: (column, row) of each."""
+        geometry = self.cells.lattice.geometry
+        self._load(np.array([geometry.cell_of(*cell) for cell in named], dtype=np.int32))
 
     @ti.kernel
     def _load(self, chosen: ti.types.ndarray(dtype=ti.i32, ndim=1)):
-        for k in range(self.count):
+        for _ in range(1):
+            self.count[None] = chosen.shape[0]
+        for k in range(chosen.shape[0]):
             self.named[k] = chosen[k]
 
     @ti.func
     def fill(self, s):
         """Put the particles of scene s into the cells, at rest."""
-        for k in range(self.count):
+        for k in range(self.count[None]):
             self.cells.put(s, self.named[k], DOWN, 0.0, 0.0)
             self.cells.traversal.placed(s, k, self.named[k])

@@ -1,8 +1,11 @@
 """What stands in the cells of every scene, and who moves it from one cell to another."""
 
+from typing import Any
+
 import taichi as ti
 
 from ca_damper.lattice import EMPTY
+from ca_damper.scenes.scene_fields import SceneFields
 
 
 @ti.data_oriented
@@ -16,20 +19,19 @@ class Cells:
     Velocities are those of the room, not of the container.
     """
 
-    def __init__(self, lattice, traversal, accounting, scenes):
+    def __init__(self, table: SceneFields, lattice: Any, traversal: Any, accounting: Any):
         self.lattice, self.traversal = lattice, traversal
         self.followers = (traversal, accounting)
-        shape = (scenes, lattice.cells + 1)
-        self.kind = ti.field(ti.i8, shape=shape)
-        self.speed = ti.field(ti.f64, shape=shape)
-        self.travelled = ti.field(ti.f64, shape=shape)
-        self.stair = ti.field(ti.i32, shape=scenes)
-        self.offset = ti.field(ti.f64, shape=scenes)
+        self.kind = table.field(ti.i8, "cells")
+        self.speed = table.field(ti.f64, "cells")
+        self.travelled = table.field(ti.f64, "cells")
+        self.stair = table.field(ti.i32)
+        self.offset = table.field(ti.f64)
 
     @ti.func
     def clear(self, s):
         """Walls and nothing else."""
-        for cell in range(self.lattice.cells + 1):
+        for cell in range(self.lattice.cell_count() + 1):
             self.put(s, cell, ti.cast(self.lattice.blank[cell], ti.i32), 0.0, 0.0)
 
     @ti.func

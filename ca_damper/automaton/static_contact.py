@@ -7,9 +7,12 @@ pressed on the floor. When the container's acceleration falls below -g the heap 
 stands. To particles under way the heap is wall.
 """
 
+from typing import Any
+
 import taichi as ti
 
 from ca_damper.lattice import DOWN, HELD, UP, WALL
+from ca_damper.scenes.scene_fields import SceneFields
 
 
 @ti.data_oriented
@@ -19,9 +22,9 @@ class StaticContact:
     held: number of them, shape (scenes,).
     """
 
-    def __init__(self, cells, accumulator, parameters):
+    def __init__(self, table: SceneFields, cells: Any, accumulator: Any, parameters: Any):
         self.cells, self.accumulator, self.parameters = cells, accumulator, parameters
-        self.held = ti.field(ti.i32, shape=cells.kind.shape[0])
+        self.held = table.field(ti.i32)
 
     @ti.func
     def clear(self, s):
@@ -72,7 +75,7 @@ class StaticContact:
         if self.held[s] > 0:
             kind = UP if velocity > 0.0 else DOWN
             travelled = self.accumulator.at_wall(kind, self.cells.offset[s])
-            for k in range(self.cells.traversal.size(s)):
+            for k in range(self.cells.traversal.begin(), self.cells.traversal.end(s)):
                 cell = self.cells.traversal.cell(s, k)
                 if self.cells.at(s, cell) == HELD:
                     self.cells.put(s, cell, kind, abs(velocity), travelled)

@@ -1,10 +1,13 @@
 """Transport: free flight and the change of cell (Komatsuzaki et al., 5.2)."""
 
+from typing import Any
+
 import taichi as ti
 
 from ca_damper.automaton.conflict_resolution import rank
 from ca_damper.lattice import DOWN, EMPTY
 from ca_damper.random_numbers import MOVE
+from ca_damper.scenes.scene_fields import SceneFields
 
 
 @ti.data_oriented
@@ -14,12 +17,12 @@ class Transport:
     crossing: cells of particles that may change their cell, shape (scenes, cells).
     """
 
-    def __init__(self, components):
+    def __init__(self, table: SceneFields, components: Any):
         self.cells, self.lattice = components.cells, components.lattice
         self.conflict_resolution = components.conflict_resolution
         self.accumulator, self.resting = components.accumulator, components.resting
         self.accounting, self.parameters = components.accounting, components.parameters
-        self.crossing = ti.field(ti.i16, shape=(self.cells.kind.shape[0], self.lattice.cells))
+        self.crossing = table.field(ti.i16, "cells")
 
     @ti.func
     def fly_all(self, s, dt, pull, contacts: ti.template()):
@@ -28,7 +31,7 @@ class Transport:
         Returns how many touch something, how many may move on, and how many fly obliquely.
         """
         contact_count, crossing_count, oblique = 0, 0, 0
-        for k in range(self.cells.traversal.size(s)):
+        for k in range(self.cells.traversal.begin(), self.cells.traversal.end(s)):
             cell = self.cells.traversal.cell(s, k)
             touches, free, upward = self.fly(s, cell, dt, pull)
             if touches:

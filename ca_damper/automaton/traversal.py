@@ -4,27 +4,35 @@ Neither order reaches a result: rules read what no other cell writes, rivals are
 apart by their random numbers, and impulses are summed as integers.
 """
 
+from typing import Any
+
 import taichi as ti
 
 from ca_damper.lattice import EMPTY, WALL
+from ca_damper.scenes.scene_fields import SceneFields
 
 
 @ti.data_oriented
 class Scan:
     """Every cell from the first to the last, walls between the columns included."""
 
-    def __init__(self, lattice, table):
+    def __init__(self, lattice: Any, table: SceneFields):
         self.lattice = lattice
 
     @ti.func
-    def size(self, s):
-        """Cells to visit in a step."""
-        return self.lattice.end - self.lattice.first
+    def begin(self):
+        """First of the numbers k of the cells to visit in a step."""
+        return self.lattice.first()
+
+    @ti.func
+    def end(self, s):
+        """One past the last of them."""
+        return self.lattice.end()
 
     @ti.func
     def cell(self, s, k):
-        """The k-th cell to visit."""
-        return self.lattice.first + k
+        """Cell number k to visit."""
+        return k
 
     @ti.func
     def placed(self, s, k, cell):
@@ -43,24 +51,28 @@ class Scan:
 class ParticleList:
     """Only the cells that hold a particle.
 
-    cells: of particle number k, shape (scenes, capacity). number: of the particle in a cell, shape
-    (scenes, cells + 1); meaningless in the other cells.
+    cells: of particle number k. number: of the particle in a cell, meaningless in the other cells.
+    Both of shape (scenes, cells).
     """
 
-    def __init__(self, lattice, table):
+    def __init__(self, lattice: Any, table: SceneFields):
         self.lattice, self.table = lattice, table
-        capacity = lattice.columns * lattice.rows
-        self.cells = ti.field(ti.i16, shape=(table.count, capacity))
-        self.number = ti.field(ti.i16, shape=(table.count, lattice.cells + 1))
+        self.cells = table.field(ti.i16, "cells")
+        self.number = table.field(ti.i16, "cells")
 
     @ti.func
-    def size(self, s):
-        """Cells to visit in a step."""
+    def begin(self):
+        """First of the numbers k of the cells to visit in a step."""
+        return 0
+
+    @ti.func
+    def end(self, s):
+        """One past the last of them."""
         return self.table.particles[s]
 
     @ti.func
     def cell(self, s, k):
-        """The k-th cell to visit."""
+        """Cell number k to visit."""
         return ti.cast(self.cells[s, k], ti.i32)
 
     @ti.func
@@ -78,7 +90,7 @@ class ParticleList:
     def sort(self, s, cells: ti.template()):
         """Number the particles by their cells again: neighbours then mostly do alike, and fast."""
         count = 0
-        for cell in range(self.lattice.first, self.lattice.end):
+        for cell in range(self.lattice.first(), self.lattice.end()):
             kind = cells.at(s, cell)
             if kind != EMPTY and kind != WALL:
                 self.placed(s, count, cell)

@@ -1,9 +1,12 @@
 """The spheres of all scenes: their numbers, places and velocities, and how they start."""
 
+from typing import Any
+
 import numpy as np
 import taichi as ti
 
 from ca_damper.random_numbers import uniform
+from ca_damper.scenes.scene_fields import SceneFields
 
 # Purposes of the random numbers drawn here; the automaton has those before.
 _CHOOSE, _SHIFT, _STIR = 4, 5, 6
@@ -17,13 +20,18 @@ vec2 = ti.types.vector(2, ti.f64)
 
 @ti.dataclass
 class Body:
-    """Numbers that all spheres share: radius [m], mass [kg], box [m] and gravity [m/s^2]."""
+    """Numbers that all spheres share: radius [m], mass [kg], box [m] and gravity [m/s^2].
+
+    columns, rows: of the spheres that fit into the box.
+    """
 
     radius: ti.f64
     mass: ti.f64
     width: ti.f64
     height: ti.f64
     gravity: ti.f64
+    columns: ti.i32
+    rows: ti.i32
 
 
 @ti.data_oriented
@@ -37,29 +45,39 @@ class Bodies:
     at the time of the velocities [m], as foreseen by the last step.
     """
 
-    def __init__(self, options, table):
-        self.options, self.table = options, table
-        self.lattice = options.lattice
-        self.stride = options.capacity
-        self.scenes = table.count
-        self.capacity = self.scenes * self.stride
+    def __init__(self, table: SceneFields, given: bool):
+        self.table, self.given = table, given
+        self.stride = table.length("spheres")
         self.body = Body.field(shape=())
-        self.position = ti.Vector.field(2, ti.f64, shape=self.capacity)
-        self.velocity = ti.Vector.field(2, ti.f64, shape=self.capacity)
-        self.force = ti.Vector.field(2, ti.f64, shape=self.capacity)
-        self.lead = ti.field(ti.f64, shape=self.scenes)
-        self.floor = ti.field(ti.f64, shape=self.scenes)
-        self.given = options.start is not None
-        if self.given:
-            self.start = ti.Vector.field(2, ti.f64, shape=len(options.start))
+        self.position = table.vector(2, ti.f64, "spheres", flat=True)
+        self.velocity = table.vector(2, ti.f64, "spheres", flat=True)
+        self.force = table.vector(2, ti.f64, "spheres", flat=True)
+        self.lead = table.field(ti.f64)
+        self.floor = table.field(ti.f64)
+        if given:
+            self.start = ti.Vector.field(2, ti.f64, shape=self.stride)
 
-    def load(self):
-        """Write the numbers of the options to the device, when all fields are allocated."""
-        for name in ("radius", "width", "height", "gravity"):
-            setattr(self.body[None], name, getattr(self.options, name))
-        self.body[None].mass = self.options.particle_mass
+    def load(self, options: Any) -> None:
+        """Write the numbers of the options to the device."""
+        self._load(options.radius, options.particle_mass, options.gravity)
+        self._load_box(options.width, options.height, *options.lattice)
         if self.given:
-            self.start.from_numpy(np.array(self.options.start))
+            self._load_start(np.array(options.start).reshape(-1, 2))
+
+    @ti.kernel
+    def _load(self, radius: ti.f64, mass: ti.f64, gravity: ti.f64):
+        self.body[None].radius, self.body[None].mass = radius, mass
+        self.body[None].gravity = gravity
+
+    @ti.kernel
+    def _load_box(self, width: ti.f64, height: ti.f64, columns: ti.i32, rows: ti.i32):
+        self.body[None].width, self.body[None].height = width, height
+        self.body[None].columns, self.body[None].rows = columns, rows
+
+    @ti.kernel
+    def _load_start(self, places: ti.types.ndarray(dtype=ti.f64, ndim=2)):
+        for k in range(places.shape[0]):
+            self.start[k] = vec2(places[k, 0], places[k, 1])
 
     @ti.func
     def first(self, s):
@@ -156,7 +174,7 @@ class Bodies:
     def _sites(self, count):
         """Columns and rows of a grid with about twice as many sites as spheres, if so many fit."""
         body = self.body[None]
-        most_columns, most_rows = ti.static(self.lattice)
+        most_columns, most_rows = body.columns, body.rows
         wanted = ti.min(2 * count, most_columns * most_rows)
         across = ti.cast(ti.ceil(ti.sqrt(wanted * body.width / body.height)), ti.i32)
         columns = ti.min(ti.max(across, (wanted + most_rows - 1) // most_rows, 1), most_columns)

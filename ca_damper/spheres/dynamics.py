@@ -11,16 +11,20 @@ contacts and gravity give, to round-off, and the blows on the container are its 
 """
 
 import math
+from typing import Any
 
 import numpy as np
 import taichi as ti
 
 from ca_damper.filling import Action
+from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.bodies import Bodies, vec2
 from ca_damper.spheres.contact_law import Contact, ContactLaw, pair_numbers, wall_numbers
 from ca_damper.spheres.effect_activity import EffectActivity
 from ca_damper.spheres.rotation import NoRotation, Rotation
-from ca_damper.spheres.search import make_search
+from ca_damper.spheres.search import SEARCHES
+from taichi_dem.kit.allocation import values
+from taichi_dem.kit.effect_usage import EffectUse
 
 # Codes of divergence; a speed is a runaway's when it crosses more than a radius in a step.
 FINE, NOT_FINITE, RUNAWAY, OVERLAP, ENERGY_GAINED = range(5)
@@ -52,32 +56,27 @@ class DeviceSpheres:
     of a look.
     """
 
-    def __init__(self, options, table):
+    def __init__(self, options: Any, table: SceneFields):
         self.table = table
-        self.bodies = Bodies(options, table)
+        self.bodies = Bodies(table, options.start is not None)
         self.law, self.rubs = ContactLaw(options.damping), options.rubs
         self.rotation = Rotation() if options.rotation else NoRotation()
-        self.search = make_search(options.search, options.radius)
-        self.crushed = ti.field(ti.i32, shape=table.count)
-        self.effect_activity = EffectActivity(table.count)
-        self.given = ti.field(ti.f64, shape=table.count)
-        self.lost = ti.field(ti.f64, shape=table.count)
-        self.held = ti.field(ti.f64, shape=table.count)
+        self.search = SEARCHES[options.search]()
+        self.crushed = table.field(ti.i32)
+        self.effect_activity = EffectActivity(table)
+        self.given = table.field(ti.f64)
+        self.lost = table.field(ti.f64)
+        self.held = table.field(ti.f64)
         self.rotation.bind(self.bodies)
         self.search.bind(self.bodies)
         self.contact_of_pair = Contact.field(shape=())
         self.contact_of_wall = Contact.field(shape=())
-        self._load(options)
 
-    def _load(self, options):
-        """Write all numbers, after the last field is allocated.
-
-        Taichi puts the fields allocated since the last use of any into one tree, and a session
-        ends in a crash at some 512 trees: a batch should take one and not seven.
-        """
+    def load(self, options: Any) -> None:
+        """Take over the numbers of spheres of the same structure."""
         share = self.rotation.tangential_share
-        self.bodies.load()
-        self.search.load()
+        self.bodies.load(options)
+        self.search.load(options)
         self.law.load(self.contact_of_pair, pair_numbers(options), share)
         self.law.load(self.contact_of_wall, wall_numbers(options), share)
 
@@ -282,15 +281,15 @@ class DeviceSpheres:
             dragged = (push - self.law.elastic(contact, overlap)) * approach
             self.effect_activity.note_contact(s, dragged, rubbed)
 
-    def uses(self, effects):
+    def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:
         """What each of the named effects did."""
         return self.effect_activity.uses(effects)
 
-    def snapshot(self, s):
+    def snapshot(self, s: int) -> dict[str, np.ndarray]:
         """Places and velocities of the spheres of scene s, and their spins [rad/s] if they turn."""
         count = self.table.particles[s]
         rows = slice(s * self.bodies.stride, s * self.bodies.stride + count)
-        velocity = self.bodies.velocity.to_numpy()[rows]
-        position = self.bodies.position.to_numpy()[rows] - self.bodies.lead[s] * velocity
+        velocity = values(self.bodies.velocity)[rows]
+        position = values(self.bodies.position)[rows] - self.bodies.lead[s] * velocity
         shift = np.array([0.5 * self.bodies.body[None].width, -self.bodies.floor[s]])
         return {"position": position + shift, "velocity": velocity, **self.rotation.snapshot(rows)}

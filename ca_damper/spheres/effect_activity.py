@@ -3,8 +3,12 @@
 Those looks are every few steps: to ask in every step would cost a fifth of it.
 """
 
+from typing import Optional
+
+import numpy as np
 import taichi as ti
 
+from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.effect_usage import EffectUse
 
 vec2 = ti.types.vector(2, ti.f64)
@@ -21,10 +25,11 @@ class EffectActivity:
     sphere on sphere [W]. motion: energy of going and of turning [J].
     """
 
-    def __init__(self, scenes):
-        self.touches = ti.field(ti.i64, shape=scenes)
-        self.power = ti.Vector.field(2, ti.f64, shape=scenes)
-        self.motion = ti.Vector.field(2, ti.f64, shape=scenes)
+    def __init__(self, table: SceneFields):
+        self.table = table
+        self.touches = table.field(ti.i64)
+        self.power = table.vector(2, ti.f64)
+        self.motion = table.vector(2, ti.f64)
 
     @ti.func
     def clear(self, s):
@@ -45,10 +50,12 @@ class EffectActivity:
         self.touches[s] = self.touches[s] + at_wall
         self.motion[s] = self.motion[s] + vec2(going, turning)
 
-    def uses(self, effects):
+    def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:
         """An EffectUse for each of the named effects, over all scenes."""
-        power, motion = (field.to_numpy().sum(axis=0) for field in (self.power, self.motion))
-        touches = int(self.touches.to_numpy().sum())
+        power, motion = (
+            self.table.in_use(field).sum(axis=0) for field in (self.power, self.motion)
+        )
+        touches = int(self.table.in_use(self.touches).sum())
         # Spheres keep their spin: where none turns at any look, none has been turned.
         turned = touches if motion[1] > 0.0 else 0
         unseen = "" if touches else _UNSEEN
@@ -63,12 +70,14 @@ class EffectActivity:
         return tuple(_use(name, *found[name]) for name in effects)
 
 
-def _use(name, touches, share, whole, steers, kept):
+def _use(
+    name: str, touches: int, share: Optional[float], whole: str, steers: bool, kept: str
+) -> EffectUse:
     return EffectUse(
         name, "touches seen", touches, share=share, whole=whole, steers=steers, kept=kept
     )
 
 
-def _share(sums, which):
+def _share(sums: np.ndarray, which: int) -> Optional[float]:
     """None for no part at all: spheres may rub on walls alone, which is not seen."""
     return float(sums[which] / sums.sum()) if sums[which] > 0.0 else None

@@ -6,10 +6,12 @@ from typing import ClassVar, Optional
 
 import numpy as np
 
-from ca_damper.filling import check_places
+from ca_damper.filling import LEAST_PLACES, Structure
+from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.contact_law import POWERS, contact_duration, pair_numbers
 from ca_damper.spheres.dynamics import DIVERGENCES, DeviceSpheres
-from ca_damper.spheres.search import SEARCHES
+from ca_damper.spheres.search import SEARCHES, listed_pairs
+from taichi_dem.kit.engine_pool import power_of_two
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import choice, finite, flag, fraction, positive, shown, whole
 
@@ -66,7 +68,7 @@ class Spheres:
     label: ClassVar[str] = "dem"
     default_dt: ClassVar[float] = 2e-5
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         """InputError for a number or word outside its range."""
         choice("damping", self.damping, POWERS)
         choice("search", self.search, SEARCHES)
@@ -86,32 +88,32 @@ class Spheres:
             object.__setattr__(self, "start", self._checked_start())
 
     @property
-    def rubs(self):
+    def rubs(self) -> bool:
         """Whether there is any friction; without it none is compiled."""
         return self.friction > 0.0 or self.wall_friction > 0.0
 
     @property
-    def effects(self):
+    def effects(self) -> tuple[str, ...]:
         """What is computed, in words for the report."""
         asked = {"friction": self.rubs, "rotation": self.rotation}
         return ("normal contact", *(name for name, there in asked.items() if there))
 
     @property
-    def radius(self):
+    def radius(self) -> float:
         """Radius of a sphere [m]."""
         return 0.5 * self.diameter
 
     @property
-    def lattice(self):
+    def lattice(self) -> tuple[int, int]:
         """Columns and rows of the spheres that fit into the box in a square packing."""
         return tuple(int(size / self.diameter + _ROUNDING) for size in (self.width, self.height))
 
     @property
-    def capacity(self):
+    def capacity(self) -> int:
         """Most spheres: those of the square packing."""
         return self.lattice[0] * self.lattice[1]
 
-    def check(self, particles, dt):
+    def check(self, particles: int, dt: float) -> None:
         """InputError for a number of spheres or a step [s] that cannot be meant.
 
         A step too long for the contacts is not refused: how long it may be depends on how fast the
@@ -124,11 +126,11 @@ class Spheres:
                 f"particles must be {len(self.start)}, as many as places in start, got {particles}"
             )
 
-    def divergence(self, code, particles, dt):
+    def divergence(self, code: int, particles: int, dt: float) -> tuple[str, float]:
         """What a code of ``divergence_code`` means, and a step that would do [s]."""
         return DIVERGENCES[code], min(self.safe_step(), 0.5 * dt)
 
-    def safe_step(self):
+    def safe_step(self) -> float:
         """Step [s] that resolves the contact of two spheres that fell through the box."""
         numbers = pair_numbers(self)
         speed = math.sqrt(2.0 * max(self.gravity, 1.0) * self.height)
@@ -136,31 +138,38 @@ class Spheres:
         return float(f"{duration / _STEPS_PER_CONTACT:.1e}")
 
     @property
-    def step_bound(self):
+    def step_bound(self) -> tuple[float, str]:
         """Step [s] to stay at or below, and why; see ``safe_step``."""
         return self.safe_step(), "five steps in a contact"
 
-    def bind(self, table):
-        """The spheres on the device, for all scenes of a SceneTable."""
-        check_places(table.count, self.capacity)
+    @property
+    def structure(self) -> Structure:
+        """Effects, laws and the search are compiled; numbers, box and places of start are not."""
+        key = (self.damping, self.rubs, self.rotation, self.search, self.start is None)
+        # As many as go with the spheres of an engine, so that both find room or neither.
+        pairs = listed_pairs(power_of_two(self.capacity, LEAST_PLACES))
+        return Structure(key, {"spheres": self.capacity, "pairs": pairs})
+
+    def bind(self, table: SceneFields) -> DeviceSpheres:
+        """The spheres on the device, for all scenes of a table."""
         return DeviceSpheres(self, table)
 
-    def _check_restitution(self, name):
+    def _check_restitution(self, name: str) -> None:
         value = fraction(name, getattr(self, name))
         if value < _LEAST_RESTITUTION:
             raise InputError(f"{name} must lie in [{_LEAST_RESTITUTION}, 1], got {value!r}")
 
-    def _check_poisson(self, name):
+    def _check_poisson(self, name: str) -> None:
         value = getattr(self, name)
         if not finite(value) or not -1.0 < value <= 0.5:
             raise InputError(f"{name} must lie above -1 and up to 0.5, got {shown(value)}")
 
-    def _check_size(self, name):
+    def _check_size(self, name: str) -> None:
         value = positive(name, getattr(self, name))
         if value < self.diameter * (1.0 - _ROUNDING):
             raise InputError(f"{name} must be at least the diameter {self.diameter}, got {value!r}")
 
-    def _check_capacity(self):
+    def _check_capacity(self) -> None:
         if self.capacity > _MOST_SPHERES:
             columns, rows = self.lattice
             raise InputError(
@@ -168,7 +177,7 @@ class Spheres:
                 f"{self.diameter}, got {shown(columns)} x {shown(rows)}"
             )
 
-    def _checked_start(self):
+    def _checked_start(self) -> tuple:
         """The places as a tuple of pairs, none in a wall or in another sphere."""
         try:
             places = np.array(self.start, dtype=np.float64).reshape(-1, 2)

@@ -1,6 +1,11 @@
 """Rotation of the spheres, an effect that the paper leaves out: present, or without any trace."""
 
+from typing import Any
+
+import numpy as np
 import taichi as ti
+
+from taichi_dem.kit.allocation import values
 
 
 @ti.data_oriented
@@ -10,7 +15,7 @@ class NoRotation:
     # Share of the effective mass that resists a tangential blow.
     tangential_share = 1.0
 
-    def bind(self, bodies):
+    def bind(self, bodies: Any) -> None:
         """Nothing to allocate."""
 
     @ti.func
@@ -40,7 +45,7 @@ class NoRotation:
         """No energy [J]."""
         return 0.0
 
-    def snapshot(self, rows):
+    def snapshot(self, rows: slice) -> dict[str, np.ndarray]:
         """Nothing to show."""
         return {}
 
@@ -55,11 +60,11 @@ class Rotation:
     # A tangential blow on a solid sphere's surface moves it like 1 / (1 + 5/2) of its mass.
     tangential_share = 2.0 / 7.0
 
-    def bind(self, bodies):
+    def bind(self, bodies: Any) -> None:
         """Allocate spins and torques."""
         self.bodies = bodies
-        self.spin = ti.field(ti.f64, shape=bodies.capacity)
-        self.torque = ti.field(ti.f64, shape=bodies.capacity)
+        self.spin = bodies.table.field(ti.f64, "spheres", flat=True)
+        self.torque = bodies.table.field(ti.f64, "spheres", flat=True)
 
     @ti.func
     def reset(self, i):
@@ -93,9 +98,9 @@ class Rotation:
         """Energy [J] of the turning."""
         return 0.5 * self._inertia() * self.spin[i] * self.spin[i]
 
-    def snapshot(self, rows):
+    def snapshot(self, rows: slice) -> dict[str, np.ndarray]:
         """Spins [rad/s] of some spheres."""
-        return {"spin": self.spin.to_numpy()[rows]}
+        return {"spin": values(self.spin)[rows]}
 
     @ti.func
     def _inertia(self):

@@ -4,6 +4,8 @@ Both name the pairs (i, j), i < j, in the same order, so that the forces on a sp
 ascending partner and both give the same bits.
 """
 
+from typing import Any
+
 import taichi as ti
 
 from ca_damper.spheres.bodies import vec2
@@ -12,17 +14,31 @@ from ca_damper.spheres.bodies import vec2
 _PAIRS_PER_SPHERE = 8
 
 
+@ti.dataclass
+class Grid:
+    """Numbers of the search.
+
+    skin: how far apart spheres are listed [m]; it changes the time taken and no result. columns,
+    rows: of the cells. pairs: places in the list of a scene.
+    """
+
+    skin: ti.f64
+    columns: ti.i32
+    rows: ti.i32
+    pairs: ti.i32
+
+
 @ti.data_oriented
 class AllPairs:
     """Compare every sphere with every other in every step, as the paper does."""
 
     tracks_motion = False
 
-    def bind(self, bodies):
+    def bind(self, bodies: Any) -> None:
         """Nothing to allocate."""
         self.bodies = bodies
 
-    def load(self):
+    def load(self, options: Any) -> None:
         """Nothing to write."""
 
     @ti.func
@@ -51,40 +67,44 @@ class AllPairs:
 class CellList:
     """List the pairs within a skin of touching; search anew, by cells, when the skin is used up.
 
-    skin: how far apart spheres are listed [m]; it changes the time taken and no result.
+    grid: a Grid, shape (). cell_first, next: chains of the spheres in a cell, the first and each
+    one's next. pair: the list; that of a scene fills its places from the end, at ``_list_end``,
+    back to pair_first. travel: by how much two spheres may have come nearer since the search [m].
     """
 
     tracks_motion = True
 
-    def __init__(self, skin):
-        self._skin = skin
+    def bind(self, bodies: Any) -> None:
+        """Allocate cells and list for all scenes."""
+        self.bodies, table = bodies, bodies.table
+        # A cell is larger than a sphere: there are no more of them.
+        self.cell_stride, self.list_stride = table.length("spheres"), table.length("pairs")
+        self.grid = Grid.field(shape=())
+        self.cell_first = table.field(ti.i32, "spheres", flat=True)
+        self.next = table.field(ti.i32, "spheres", flat=True)
+        self.pair = table.vector(2, ti.i32, "pairs", flat=True)
+        self.pair_first = table.field(ti.i32)
+        self.travel = table.field(ti.f64)
+        self.full = table.field(ti.i32)
 
-    def bind(self, bodies):
-        """Allocate cells and list for all scenes, as large as the container needs."""
-        self.bodies = bodies
-        size = bodies.options.diameter + self._skin
-        self.columns = max(1, int(bodies.options.width / size))
-        self.rows = max(1, int(bodies.options.height / size))
-        self.list_capacity = _PAIRS_PER_SPHERE * bodies.stride
-        self.skin = ti.field(ti.f64, shape=())
-        # Cells of a scene hold chains of spheres: the first of a cell, then each one's next.
-        self.cell_first = ti.field(ti.i32, shape=bodies.scenes * self.columns * self.rows)
-        self.next = ti.field(ti.i32, shape=bodies.capacity)
-        # The list of a scene fills its room from the end: pair_first[s] .. (s + 1) * list_capacity.
-        self.pair = ti.Vector.field(2, ti.i32, shape=bodies.scenes * self.list_capacity)
-        self.pair_first = ti.field(ti.i32, shape=bodies.scenes)
-        self.travel = ti.field(ti.f64, shape=bodies.scenes)
-        self.full = ti.field(ti.i32, shape=bodies.scenes)
+    def load(self, options: Any) -> None:
+        """Write the skin and the grid to the device."""
+        self._load(skin_of(options), *grid_of(options), listed_pairs(options.capacity))
 
-    def load(self):
-        """Write the skin to the device."""
-        self.skin[None] = self._skin
+    @ti.kernel
+    def _load(self, skin: ti.f64, columns: ti.i32, rows: ti.i32, pairs: ti.i32):
+        self.grid[None] = Grid(skin, columns, rows, pairs)
+
+    @ti.func
+    def _list_end(self, s):
+        """One past the last place of the list of scene s."""
+        return s * self.list_stride + self.grid[None].pairs
 
     @ti.func
     def forget(self, s):
         """Empty the list of scene s; the next refresh searches anew."""
-        self.travel[s] = self.skin[None]
-        self.pair_first[s] = (s + 1) * self.list_capacity
+        self.travel[s] = self.grid[None].skin
+        self.pair_first[s] = self._list_end(s)
         self.full[s] = 0
 
     @ti.func
@@ -100,31 +120,31 @@ class CellList:
     @ti.func
     def each_pair(self, s, contact, visit: ti.template()):
         """Call visit(i, j, contact) for every pair of scene s that may touch."""
-        for k in range(self.pair_first[s], (s + 1) * self.list_capacity):
+        for k in range(self.pair_first[s], self._list_end(s)):
             near = self.pair[k]
             visit(near[0], near[1], contact)
 
     @ti.func
     def refresh(self, s):
         """Search anew if spheres may have crossed the skin; "not" lets NaN search too."""
-        if not (self.travel[s] < self.skin[None]):
+        if not (self.travel[s] < self.grid[None].skin):
             self._search(s)
             self.travel[s] = 0.0
 
     @ti.func
     def _search(self, s):
         """Go through the spheres backwards: those already in the cells have a higher index."""
-        cells = self.columns * self.rows
-        for c in range(s * cells, (s + 1) * cells):
+        grid, cells = self.grid[None], s * self.cell_stride
+        for c in range(cells, cells + grid.columns * grid.rows):
             self.cell_first[c] = -1
         self.full[s] = 0
-        start = (s + 1) * self.list_capacity
+        start = self._list_end(s)
         first, last = self.bodies.first(s), self.bodies.last(s)
         for back in range(last - first):
             i = last - 1 - back
             column, row = self._cell_of(s, i)
             start = self._list_near(s, i, column, row, start)
-            cell = s * cells + row * self.columns + column
+            cell = cells + row * grid.columns + column
             self.next[i] = self.cell_first[cell]
             self.cell_first[cell] = i
         self.pair_first[s] = start
@@ -132,21 +152,21 @@ class CellList:
     @ti.func
     def _cell_of(self, s, i):
         """Column and row of a sphere; a runaway belongs to the cell on its side."""
-        body = self.bodies.body[None]
+        body, grid = self.bodies.body[None], self.grid[None]
         place = self.bodies.position[i] + vec2(0.5 * body.width, -self.bodies.floor[s])
-        column = ti.cast(place[0] * (self.columns / body.width), ti.i32)
-        row = ti.cast(place[1] * (self.rows / body.height), ti.i32)
-        return ti.max(0, ti.min(column, self.columns - 1)), ti.max(0, ti.min(row, self.rows - 1))
+        column = ti.cast(place[0] * (grid.columns / body.width), ti.i32)
+        row = ti.cast(place[1] * (grid.rows / body.height), ti.i32)
+        return ti.max(0, ti.min(column, grid.columns - 1)), ti.max(0, ti.min(row, grid.rows - 1))
 
     @ti.func
     def _list_near(self, s, i, column, row, start):
         """List the spheres of higher index near i before ``start``; returns the new start."""
-        position = self.bodies.position[i]
-        reach = 2.0 * self.bodies.body[None].radius + self.skin[None]
+        position, grid = self.bodies.position[i], self.grid[None]
+        reach = 2.0 * self.bodies.body[None].radius + grid.skin
         row_end = start
-        for r in range(ti.max(row - 1, 0), ti.min(row + 2, self.rows)):
-            for c in range(ti.max(column - 1, 0), ti.min(column + 2, self.columns)):
-                j = self.cell_first[(s * self.rows + r) * self.columns + c]
+        for r in range(ti.max(row - 1, 0), ti.min(row + 2, grid.rows)):
+            for c in range(ti.max(column - 1, 0), ti.min(column + 2, grid.columns)):
+                j = self.cell_first[s * self.cell_stride + r * grid.columns + c]
                 while j >= 0:
                     if (self.bodies.position[j] - position).norm_sqr() < reach * reach:
                         start = self._insert(s, i, j, start, row_end)
@@ -157,7 +177,7 @@ class CellList:
     def _insert(self, s, i, j, start, row_end):
         """Put the pair (i, j) in its place between start and row_end; returns the new start."""
         new = start
-        if start == s * self.list_capacity:
+        if start == s * self.list_stride:
             self.full[s] = 1
         else:
             new = start - 1
@@ -169,9 +189,20 @@ class CellList:
         return new
 
 
-SEARCHES = ("cells", "all_pairs")
+SEARCHES = {"cells": CellList, "all_pairs": AllPairs}
 
 
-def make_search(name, radius):
-    """The search of a name; from 10 to 160 spheres this skin is the fastest, if by little."""
-    return AllPairs() if name == "all_pairs" else CellList(skin=radius / 3.0)
+def skin_of(options: Any) -> float:
+    """Skin [m]; from 10 to 160 spheres this one is the fastest, if by little."""
+    return options.radius / 3.0
+
+
+def grid_of(options: Any) -> tuple[int, int]:
+    """Columns and rows of the cells."""
+    size = options.diameter + skin_of(options)
+    return max(1, int(options.width / size)), max(1, int(options.height / size))
+
+
+def listed_pairs(capacity: int) -> int:
+    """Places for pairs in the list of a scene that has places for so many spheres."""
+    return _PAIRS_PER_SPHERE * capacity

@@ -4,7 +4,7 @@ from dataclasses import fields, replace
 from typing import Callable, NamedTuple
 
 from ca_damper import Automaton, Batch, Oscillator, RigidMass, SceneTable, Spheres, rk45
-from ca_damper.clock import steps_per_cycle
+from ca_damper.scenes.clock import steps_per_cycle
 from taichi_dem import (
     CONCRETE,
     Checkpoint,
@@ -149,6 +149,7 @@ DAMPER = [
     *taken(Automaton, "zero or positive", ("gravity", "static_threshold")),
     *taken(Automaton, "whole", ("columns", "rows")),
     *taken(Automaton, "flag", ("ledger",)),
+    *taken(Automaton, "flag", ("static_contact",), (None,)),
     *taken(Spheres, "word", ("damping", "search")),
     *taken(Spheres, "share", ("restitution", "wall_restitution")),
     *taken(Spheres, "positive", (*_MODULI, "width", "height")),

@@ -59,7 +59,7 @@ LINES = [
     ("damper_patterns", ("--frequency", "0.1"), ("--frequency", "0.5")),
     ("damper_patterns", ("--amplitude", "-3"), ("--amplitude",)),
     ("damper_patterns", ("--dt", "0.5"), ("dt must lie in", "0.5")),
-    ("damper_patterns", ("--accounting", "all"), ("--accounting", "landing")),
+    ("damper_patterns", ("--accounting", "static"), ("--accounting", "landing")),
     ("damper_rebound", ("--restitution", "0.1"), ("--restitution", "0.3")),
     ("damper_rebound", ("--dt", "0.9"), ("dt", "0.9")),
     ("damper_rebound", ("--ca-dt", "0.9"), ("dt", "0.9")),

@@ -1,6 +1,5 @@
 """Bad meshes, scenes, tables, jobs and calls that no single option is to blame for."""
 
-import functools
 import math
 
 import numpy as np
@@ -183,9 +182,8 @@ def swept(**options):
     return sweep_up_and_down(RigidMass(), **{"particles": 1, "ratios": 1.0, **options})
 
 
-@functools.lru_cache(maxsize=1)
 def started():
-    """A started batch; what it is asked for is refused, and leaves it as it is."""
+    """A started batch."""
     made = batch()
     made.start()
     return made

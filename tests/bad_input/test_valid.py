@@ -141,7 +141,8 @@ def tables(draw, capacity, step):
 
 automata = st.builds(
     Automaton,
-    accounting=st.sampled_from(["landing", "landing+ejection", "static"]),
+    accounting=st.sampled_from(["landing", "landing+ejection", "all"]),
+    static_contact=st.none() | st.booleans(),
     restitution=st.floats(0.0, 1.0),
     wall_restitution=st.floats(0.0, 1.0),
     static_threshold=st.just(0.0) | st.floats(0.1, 10.0),

@@ -47,7 +47,7 @@ def test_order_of_the_particles_changes_nothing():
     draw = np.random.default_rng(1)
     listed = mixed.device.cells.traversal
     for _ in range(12):
-        order = draw.permutation(listed.cells.to_numpy()[0, :60]).astype(np.int32)
+        order = draw.permutation(mixed.in_use(listed.cells)[0, :60]).astype(np.int32)
         shuffle(listed.cells, listed.number, order)
         mixed.run(100)
     assert equal(straight, mixed)

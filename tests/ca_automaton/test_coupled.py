@@ -5,11 +5,11 @@ import pytest
 
 from ca_damper.automaton import Automaton
 from ca_damper.batch import Batch
-from ca_damper.filling import Empty
+from ca_damper.fixed_mass import Empty
 from ca_damper.measures import peak
 from ca_damper.oscillator import Oscillator
+from ca_damper.scenes.table import SceneTable
 from ca_damper.spheres import Spheres
-from ca_damper.table import SceneTable
 
 MASS, GRAVITY = 0.2e-3, 10.0
 OSCILLATOR = Oscillator()
@@ -60,7 +60,7 @@ def test_rigid_limit(particles):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("accounting", ["landing+ejection", "static"])
+@pytest.mark.parametrize("accounting", ["landing+ejection", "all"])
 def test_damping_grows_with_the_particles(accounting):
     """The highest response of five seeds falls from N = 10 to N = 50.
 

@@ -83,7 +83,7 @@ def test_zero_at_the_wall_keeps_the_place():
     assert lowest == pytest.approx(centre, abs=MASS * GRAVITY * GRAVITY * 1e-4 * 1e-4)
 
 
-@pytest.mark.parametrize("accounting", ["landing", "landing+ejection", "static"])
+@pytest.mark.parametrize("accounting", ["landing", "landing+ejection", "all"])
 def test_a_column_falls_to_the_floor_and_stays_a_column(accounting):
     """Ten in a column end in its ten lowest cells, whatever counts."""
     automaton = Automaton(accounting=accounting, start=tuple((4, 6 + k) for k in range(10)))

@@ -5,7 +5,9 @@ import json
 import pytest
 
 from ca_damper import Automaton, Batch, InputError, SceneTable, Spheres, needed_effects
+from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.effect_activity import EffectActivity
+from taichi_dem.kit.allocation import FieldTree
 from taichi_dem.kit.effect_usage import Advice
 
 #: Of a cell, and how high above the floor the one particle begins [cells].
@@ -57,7 +59,10 @@ def test_shares_of_dashpots_and_friction_are_all_that_contacts_take():
 @pytest.mark.parametrize("turning", [0.0, 1e-9])
 def test_what_no_look_saw_of_spheres_is_kept(turning):
     """Looks are 64 steps apart, and a blow takes 5: only a spin, which lasts, would be seen."""
-    acted = EffectActivity(1)
+    with FieldTree():
+        table = SceneFields(1, {})
+        acted = EffectActivity(table)
+    table.load(SceneTable(1, 1, 1e-4))
     acted.motion[0] = [1.0, turning]
     uses = acted.uses(("normal contact", "friction", "rotation"))
     advice = Advice(uses, (), 1e-3)

@@ -8,7 +8,7 @@ from ca_damper.automaton import ACCOUNTINGS, Automaton
 from ca_damper.errors import InputError
 
 BAD = [
-    ("accounting", "force", "landing, landing\\+ejection, static"),
+    ("accounting", "force", "landing, landing\\+ejection, all"),
     ("pair_rule", "none", "both, one_sided"),
     ("priority", "first", "random, pairs_first"),
     ("accumulator", "zero", "signed, signed_through_walls, reset, kept"),
@@ -30,6 +30,7 @@ BAD = [
     ("start", 7, "tuple"),
     ("start", ((0.5, 1),), "hold"),
     ("ledger", "yes", "True or False"),
+    ("static_contact", "yes", "True or False"),
 ]
 
 
@@ -80,3 +81,17 @@ def test_labels():
         "ca_ejection",
         "ca_static",
     ]
+    labels = {Automaton(a, static_contact=c).label for a in ACCOUNTINGS for c in (False, True)}
+    assert len(labels) == 2 * len(ACCOUNTINGS)
+
+
+def test_particles_rest_as_suits_the_accounting_unless_the_user_says_otherwise():
+    assert [Automaton(accounting=name).particles_rest for name in ACCOUNTINGS] == [
+        False,
+        False,
+        True,
+    ]
+    resting = Automaton(accounting="landing", static_contact=True)
+    assert resting.particles_rest
+    assert resting.effects == ("pairs", "landing", "static contact")
+    assert Automaton(static_contact=False).effects == ("pairs", "landing", "ejection")

@@ -27,11 +27,11 @@ def check(accounting, pairs, accumulator):
     listed = shaken(accounting, pairs, accumulator, "list")
     scanned = shaken(accounting, pairs, accumulator, "scan")
     kind = listed.state()[0]
-    blank = listed.device.lattice.blank.to_numpy()
+    blank = listed.geometry.blank()
     assert np.array_equal(kind == WALL, np.broadcast_to(blank == WALL, kind.shape))
     present = (kind != EMPTY) & (kind != WALL)
     assert list(present.sum(axis=1)) == PARTICLES
-    cells = listed.device.cells.traversal.cells.to_numpy()
+    cells = listed.in_use(listed.device.cells.traversal.cells)
     for s, count in enumerate(PARTICLES):
         assert sorted(cells[s, :count]) == list(np.flatnonzero(present[s]))
     for one, other in zip(listed.state(), scanned.state()):
@@ -53,15 +53,15 @@ def test_one_of_two_claimants_moves_and_each_as_often():
     """Fig. 5(b): two particles due for one cell in 2000 seeds; 5 sigma of a fair coin."""
     automaton = Automaton(accounting="landing", start=((3, 9), (5, 9)))
     box = Shaken(automaton, [2] * 2000, seed=np.arange(2000))
-    geometry = box.device.lattice.geometry
+    geometry = box.geometry
     left, right = geometry.cell_of(3, 9), geometry.cell_of(5, 9)
     target = geometry.neighbours()[left, DOWN_RIGHT]
     assert target == geometry.neighbours()[right, DOWN_LEFT]
     kind, _, travelled = box.state()
     kind[:, left], kind[:, right] = DOWN_RIGHT, DOWN_LEFT
     travelled[:, [left, right]] = 6e-3
-    box.device.cells.kind.from_numpy(kind)
-    box.device.cells.travelled.from_numpy(travelled)
+    box.put(box.device.cells.kind, kind)
+    box.put(box.device.cells.travelled, travelled)
     stands = box.run(1).state()[0][:, [left, right, target]] != EMPTY
     assert np.all(stands.sum(axis=1) == 2) and np.all(stands[:, 2])
     assert abs(stands[:, 0].sum() - 1000) < 5 * np.sqrt(2000) / 2
@@ -80,6 +80,6 @@ def test_start_draws_every_number_of_cells():
 def test_start_favours_no_cell():
     """40 of 160 cells: each taken in a quarter of 2000 seeds, within 5 sigma of a binomial."""
     box = Shaken(Automaton(), [40] * 2000, seed=np.arange(2000))
-    kind, inner = box.state()[0], box.device.lattice.geometry.blank() == EMPTY
+    kind, inner = box.state()[0], box.geometry.blank() == EMPTY
     taken = ((kind != EMPTY) & (kind != WALL)).sum(axis=0)[inner][:-1]
     assert abs(taken - 500).max() < 5 * np.sqrt(2000 * 0.25 * 0.75)

@@ -6,7 +6,8 @@ from typing import ClassVar
 import numpy as np
 import taichi as ti
 
-from ca_damper.filling import Action
+from ca_damper.filling import Action, Structure
+from taichi_dem.kit.allocation import assign
 
 #: The seed whose scene diverges.
 BAD_SEED = 13
@@ -29,6 +30,7 @@ class Kicks:
 
     label: ClassVar[str] = "kicks"
     effects: ClassVar[tuple] = ("kicks",)
+    step_bound: ClassVar[None] = None
     default_dt: ClassVar[float] = 1e-4
     capacity: ClassVar[int] = 10
     particle_mass: ClassVar[float] = 0.2e-3
@@ -40,18 +42,30 @@ class Kicks:
     def divergence(self, code, particles, dt):
         return f"went wrong with code {code}", 0.25 * dt
 
+    @property
+    def structure(self):
+        return Structure((), {"traced": self.traced})
+
     def bind(self, table):
-        return BoundKicks(self, table)
+        return DeviceKicks(table)
 
 
 @ti.data_oriented
-class BoundKicks:
-    def __init__(self, kicks, table):
+class DeviceKicks:
+    def __init__(self, table):
         self.table = table
-        self.strength, self.mass = kicks.strength, kicks.mass
-        self.diverges_at, self.lost_at, self.traced = kicks.diverges_at, kicks.lost_at, kicks.traced
-        self.trace = ti.Vector.field(5, ti.f64, shape=(table.count, kicks.traced))
-        self.now = ti.field(ti.i32, shape=table.count)
+        self.numbers = ti.field(ti.f64, shape=2)
+        self.steps = ti.field(ti.i32, shape=3)
+        self.trace = table.vector(5, ti.f64, "traced")
+        self.now = table.field(ti.i32)
+
+    def load(self, kicks):
+        assign(self.numbers, np.array([kicks.strength, kicks.mass]))
+        assign(self.steps, np.array([kicks.diverges_at, kicks.lost_at, kicks.traced]))
+
+    def trace_of(self, s):
+        """Motion and action in the steps that were to be kept, (traced, 5)."""
+        return self.table.row(self.trace, s)[: self.steps[2]]
 
     @ti.func
     def reset(self, s):
@@ -59,13 +73,13 @@ class BoundKicks:
 
     @ti.func
     def advance(self, s, step, motion):
-        impulse = self.strength * ti.sin(1.7 * step + self.table.seed[s])
-        if step == self.lost_at and self.table.seed[s] == BAD_SEED:
+        impulse = self.numbers[0] * ti.sin(1.7 * step + self.table.seed[s])
+        if step == self.steps[1] and self.table.seed[s] == BAD_SEED:
             impulse = ti.math.nan
         carried = 0.0
         if (step // 100) % 2 == 1:
-            carried = self.mass
-        if step < self.traced:
+            carried = self.numbers[1]
+        if step < self.steps[2]:
             self.trace[s, step] = ti.Vector([motion.x, motion.v, motion.a, impulse, carried])
         self.now[s] = step
         return Action(impulse, carried)
@@ -81,7 +95,7 @@ class BoundKicks:
     @ti.func
     def divergence_code(self, s):
         code = 0
-        if self.table.seed[s] == BAD_SEED and 0 <= self.diverges_at <= self.now[s]:
+        if self.table.seed[s] == BAD_SEED and 0 <= self.steps[0] <= self.now[s]:
             code = CODE
         return code
 

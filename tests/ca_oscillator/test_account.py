@@ -17,8 +17,8 @@ def reported(filling, mount):
     batch = Batch(filling, table, mount=mount)
     batch.start()
     batch.run(3, 0)
-    exchanged = batch.account.exchanged.to_numpy()
-    steps = batch.coupling.step.to_numpy()
+    exchanged = batch.engine.table.in_use(batch.engine.account.exchanged)
+    steps = batch.engine.table.in_use(batch.engine.coupling.step)
     mass = table.column("particles") * filling.particle_mass
     # The automaton rounds a particle's blow and its entries to half a quantum, at most three times
     # a step; sums of n terms round by n eps of their magnitude, at most some m/s times the mass.

@@ -21,10 +21,10 @@ from ca_damper import (
     SimulationDiverged,
     runtime,
 )
-from ca_damper import batch as batch_module
-from ca_damper.clock import steps_per_cycle
+from ca_damper.engine import launches
 from ca_damper.progress import BatchProgress, Stages
-from ca_damper.table import dealt
+from ca_damper.scenes.clock import steps_per_cycle
+from ca_damper.scenes.table import dealt
 from taichi_dem.kit.progress.progress import Compiling
 from tests.ca_oscillator.kicks import BAD_SEED, CODE, Kicks
 from tests.scenes import ROOT
@@ -54,10 +54,10 @@ def test_company_and_order_in_a_batch_change_no_bit():
 def test_number_of_launches_changes_no_bit(monkeypatch):
     once = kicked(range(5))
     told = []
-    monkeypatch.setattr(batch_module, "LAUNCH_SECONDS", 1e-9)
+    monkeypatch.setattr(launches, "LAUNCH_SECONDS", 1e-9)
     table = SceneTable(PARTICLES, SEEDS, 5e-4, FREQUENCIES, 0.6e-3)
     batch = Batch(KICKS, table, measured_cycles=2)
-    batch._pace = 100.0
+    batch.launches.pace = 100.0
     batch.start()
     cycles = batch.run(1, 2, told.append)
     assert len(told) > 20
@@ -112,6 +112,30 @@ def test_steps_that_are_none_are_refused(steps):
         batch.advance(steps)
 
 
+def test_a_batch_leaves_the_table_that_it_is_made_with_as_it_is():
+    table = SceneTable([3, 4], 1, 5e-4, 6.0, 0.6e-3)
+    before = {name: table.column(name).tolist() for name in table.COLUMNS}
+    batch = Batch(KICKS, table)
+    batch.start()
+    batch.drive(6.3)
+    batch.change(particles=2)
+    assert {name: table.column(name).tolist() for name in table.COLUMNS} == before
+
+
+def test_a_refused_change_leaves_the_batch_as_it_is():
+    batches = [Batch(KICKS, SceneTable(3, 1, 5e-4, 6.0, 0.6e-3)) for _ in range(2)]
+    for batch in batches:
+        batch.start()
+        batch.run(1, 0)
+    with pytest.raises(InputError, match="mass must be"):
+        batches[0].change(seed=7, mass=-1.0)
+    with pytest.raises(InputError, match="dt must lie"):
+        batches[0].drive(1e5)
+    for batch in batches:
+        batch.run(1, 0)
+    assert batches[0].sample()["x"] == batches[1].sample()["x"]
+
+
 def test_a_new_start_repeats_the_run():
     batch = Batch(KICKS, SceneTable(3, 1, 5e-4, 6.0, 0.6e-3), measured_cycles=1)
     records = []
@@ -136,7 +160,7 @@ def test_a_cycle_ends_exactly_where_it_began():
     batch = Batch(Empty(), SceneTable(0, 1, 1e-4, FREQUENCIES, 0.6e-3))
     batch.start()
     batch.advance(batch.steps_per_cycle)
-    assert (batch.clock.circle.to_numpy() == [0.0, 1.0]).all()
+    assert (batch.engine.table.in_use(batch.engine.clock.circle) == [0.0, 1.0]).all()
     assert (batch.sample()["y"] == 0.0).all()
 
 
@@ -230,7 +254,7 @@ def test_launches_are_bounded_and_progress_is_told():
     assert told[-1].seconds_left == 0.0
     assert told[-1].steps == 40 * 150 * 1667
     # The pace follows the launch before; a crowded machine may stretch one.
-    assert np.median(np.diff(times)) < 2.0 * batch_module.LAUNCH_SECONDS
+    assert np.median(np.diff(times)) < 2.0 * launches.LAUNCH_SECONDS
 
 
 def test_time_left_and_stages():

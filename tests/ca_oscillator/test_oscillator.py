@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from ca_damper import InputError, Oscillator, rk45
-from ca_damper.clock import LEAST_STEPS_PER_CYCLE
 from ca_damper.oscillator import sine_and_cosine
+from ca_damper.scenes.clock import LEAST_STEPS_PER_CYCLE
 
 PAPER = Oscillator()
 

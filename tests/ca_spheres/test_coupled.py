@@ -6,9 +6,9 @@ import pytest
 from ca_damper import SimulationDiverged
 from ca_damper.batch import Batch
 from ca_damper.oscillator import Oscillator
+from ca_damper.scenes.table import SceneTable
 from ca_damper.spheres import Spheres
 from ca_damper.spheres.contact_law import wall_numbers
-from ca_damper.table import SceneTable
 
 G, MASS, STIFFNESS = 9.8, 0.2e-3, 123.4
 

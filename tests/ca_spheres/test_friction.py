@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import taichi as ti
 
+from ca_damper import runtime
 from ca_damper.spheres import Spheres
 from ca_damper.spheres.contact_law import ContactLaw
 from tests.ca_spheres.rig import Rig
@@ -137,19 +138,24 @@ def test_turning_spheres_keep_their_energy_without_friction():
 
 def test_smooth_spheres_compile_no_friction_and_keep_their_bits(monkeypatch):
     """The least coefficient there is computes friction that no place and no speed can feel."""
-    nearly = Rig(Spheres(friction=0.0, wall_friction=1e-60), 40, DT, frequency=8.0, amplitude=0.02)
+    runtime.clear()
+    shaken = {"frequency": 8.0, "amplitude": 0.02}
+    nearly = Rig(Spheres(friction=0.0, wall_friction=1e-60), 40, DT, **shaken)
+    expected_states = nearly.run(5000).state()
 
     @ti.func
     def forbidden(self, contact, push, slip):
         ti.static_assert(False, "friction was compiled")
 
     monkeypatch.setattr(ContactLaw, "friction", forbidden)
-    smooth = Rig(Spheres(friction=0.0, wall_friction=0.0), 40, DT, frequency=8.0, amplitude=0.02)
+    smooth = Rig(Spheres(friction=0.0, wall_friction=0.0), 40, DT, **shaken)
     states = smooth.run(5000).state()
     monkeypatch.undo()
-    for given, expected in zip(states, nearly.run(5000).state()):
+    for given, expected in zip(states, expected_states):
         # Zeros alone may differ: forces of 1e-60 of a push, times dt / m and 5000 steps.
         assert given == pytest.approx(expected, rel=0.0, abs=1e-50)
+    runtime.clear()
     with pytest.raises(ti.TaichiCompilationError, match="friction was compiled"):
         monkeypatch.setattr(ContactLaw, "friction", forbidden)
         Rig(Spheres(), 2, DT).run(1)
+    runtime.clear()

@@ -123,7 +123,7 @@ def test_change_of_step_keeps_places_and_the_motion():
     rig = Rig(Spheres(start=[(0.03, 0.09)]), 1, DT)
     rig.run(1000)
     place, velocity = rig.state()
-    rig.table.drive(6.0, 2.5e-6)
+    rig.drive(6.0, 2.5e-6)
     rig.run(1)
     moved, now = rig.state()
     assert moved[0] - place[0] == pytest.approx(velocity[0] * 2.5e-6, abs=9.8 * DT**2)
@@ -153,7 +153,7 @@ def test_divergence_code_finds(search):
         assert rig.divergence_code(s) == 0
         getattr(bodies, name)[s * bodies.stride] = value
     # Spheres that were put elsewhere are not in the list of pairs; a change of dt makes it anew.
-    rig.table.drive(6.0, 0.5 * DT)
+    rig.drive(6.0, 0.5 * DT)
     rig.run(1)
     for s, (_, _, word) in enumerate(UNWELL):
         code = rig.divergence_code(s)

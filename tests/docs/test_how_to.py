@@ -12,6 +12,7 @@ WANTED = {
     "docs/add_a_contact_law.md": "dict(mass=simulation.model.body_mass[0], speed=speed,"
     " stiffness=stiffness, deepest=deepest, rebound=rebound, account=account,"
     " unexplained=unexplained)",
+    "docs/add_a_damper_accounting.md": "dict(force=force)",
     "docs/add_a_time_integrator.md": "dict(area=model.bonds['area'][0], mass=model.body_mass[0],"
     " step=step, count=count, euler=euler, leapfrog=leapfrog)",
 }
@@ -95,3 +96,10 @@ def test_the_integrator_gains_energy_by_its_factor(left_by):
     # The leapfrog's velocity is half a step old: its energy is off by w dt / 2 at most.
     swing = np.sqrt(rate2) * step
     assert left["leapfrog"] / left["leapfrog"][0] == pytest.approx(1.0, rel=swing)
+
+
+def test_the_accounting_gives_the_container_the_weight_and_landings_do_not(left_by):
+    """m g of a particle at rest, to the momentum of 4 g dt at both ends of two seconds."""
+    force, weight, step, seconds = left_by("add_a_damper_accounting")["force"], 2e-3, 1e-4, 2.0
+    assert force["walls"] == pytest.approx(-weight, rel=8 * step / seconds)
+    assert force["landing"] == 0.0

@@ -293,7 +293,7 @@ BAD_OPTIONS = [
     ("damper_rebound", ("--ca-dt", "2e-3"), ("dt", "0.0012", "0.002")),
     ("damper_rebound", ("--dt", "0.1"), ("dt", "0.1", "10 Hz")),
     ("damper_rebound", ("--driver", "auto"), ("--driver",)),
-    ("damper_patterns", ("--accounting", "magic"), ("--accounting", "magic", "static")),
+    ("damper_patterns", ("--accounting", "magic"), ("--accounting", "magic", "all")),
     ("damper_patterns", ("--amplitude", "-1"), ("--amplitude", "'-1'", "(0, 100)")),
     ("damper_patterns", ("--frequency", "nan"), ("--frequency", "'nan'")),
     ("damper_patterns", ("--seeds", "0"), ("--seeds", "'0'", "1 to")),

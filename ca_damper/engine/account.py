@@ -3,6 +3,8 @@
 import numpy as np
 import taichi as ti
 
+from ca_damper.scenes.scene_fields import SceneFields
+
 
 @ti.data_oriented
 class MomentumAccount:
@@ -15,11 +17,15 @@ class MomentumAccount:
     of what was given [N s].
     """
 
-    def __init__(self, table, weight):
+    def __init__(self, table: SceneFields):
         self.table, self.weight = table, ti.field(ti.f64, shape=())
-        self.weight[None] = weight
         for name in ("expected", "late", "exchanged"):
-            setattr(self, name, ti.field(ti.f64, shape=table.count))
+            setattr(self, name, table.field(ti.f64))
+
+    @ti.kernel
+    def load(self, weight: ti.f64):
+        """Take over the weight of a particle [N]."""
+        self.weight[None] = weight
 
     @ti.func
     def begin(self, s, momentum, late):
@@ -36,11 +42,13 @@ class MomentumAccount:
         self.exchanged[s] = self.exchanged[s] + ti.abs(force) * dt
         self.late[s] = late
 
-    def error(self, momentum):
+    def error(self, momentum: np.ndarray) -> float:
         """Momentum out of nothing as a share of what was exchanged, of the worst scene.
 
         momentum: of the fillings, at the start of the last step for what is carried (scenes,).
         """
-        missing = np.abs(momentum + self.late.to_numpy() - self.expected.to_numpy())
-        exchanged = self.exchanged.to_numpy()
+        late, expected, exchanged = map(
+            self.table.in_use, (self.late, self.expected, self.exchanged)
+        )
+        missing = np.abs(momentum + late - expected)
         return float((missing / np.where(exchanged > 0.0, exchanged, np.inf)).max())

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import taichi as ti
 
+from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import positive
 
@@ -13,7 +14,7 @@ LEAST_STEPS_PER_CYCLE = 40
 MOST_STEPS_PER_CYCLE = 10_000_000
 
 
-def steps_per_cycle(frequency, largest_dt):
+def steps_per_cycle(frequency: float, largest_dt: float) -> int:
     """Least number of equal steps that make a cycle, none longer than largest_dt [s].
 
     frequency [Hz]. Raises InputError for fewer than 40 steps, or more than ten million.
@@ -39,15 +40,14 @@ class Clock:
     rounding stays below steps a cycle x 1e-16 and a cycle ends exactly.
     """
 
-    def __init__(self, table):
+    def __init__(self, table: SceneFields):
         self.table = table
-        self.steps = ti.field(ti.i32, shape=table.count)
-        self.position = ti.field(ti.i32, shape=table.count)
-        self.circle = ti.Vector.field(2, ti.f64, shape=table.count)
-        self.turn = ti.Vector.field(2, ti.f64, shape=table.count)
-        self.half_turn = ti.Vector.field(2, ti.f64, shape=table.count)
+        self.steps, self.position = table.field(ti.i32), table.field(ti.i32)
+        self.circle = table.vector(2, ti.f64)
+        self.turn = table.vector(2, ti.f64)
+        self.half_turn = table.vector(2, ti.f64)
 
-    def set(self, steps):
+    def set(self, steps: np.ndarray) -> None:
         """Give every scene its steps a cycle, (scenes,); the phase stays as it is."""
         angle = 2.0 * np.pi / np.asarray(steps, dtype=np.float64)
         turns = [f(a) for a in (angle, angle / 2) for f in (np.sin, np.cos)]
@@ -59,7 +59,7 @@ class Clock:
         steps: ti.types.ndarray(dtype=ti.i32, ndim=1),
         turns: ti.types.ndarray(dtype=ti.f64, ndim=2),
     ):
-        for s in range(self.table.count):
+        for s in range(steps.shape[0]):
             self.steps[s] = steps[s]
             self.turn[s] = ti.Vector([turns[0, s], turns[1, s]])
             self.half_turn[s] = ti.Vector([turns[2, s], turns[3, s]])

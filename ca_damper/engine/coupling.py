@@ -4,9 +4,14 @@ One scene a thread, the whole time loop inside the kernel. All state lies in fie
 launches, so that neither their number nor what else is in the batch changes a bit.
 """
 
+from typing import Any
+
 import taichi as ti
 
 from ca_damper import measures
+from ca_damper.engine.account import MomentumAccount
+from ca_damper.scenes.clock import Clock
+from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit import runtime
 
 #: Status of a scene whose container has no finite motion any more; fillings use codes above zero.
@@ -27,31 +32,37 @@ _F64 = ti.types.ndarray(dtype=ti.f64, ndim=2)
 class Coupling:
     """Filling, container and clock of all scenes, tied together.
 
-    device: what ``filling.bind`` gave. account: a MomentumAccount. gravity [m/s^2].
-    measured_cycles: room in ``record``, whose shape is (scenes, cycles, columns of
-    ``measures.COLUMNS``).
+    device: what ``filling.bind`` gave. account: a MomentumAccount. gravity [m/s^2]. record: of the
+    measured cycles, shape (scenes, cycles, columns of ``measures.COLUMNS``).
     """
 
-    def __init__(self, table, clock, container, device, account, gravity, measured_cycles):
+    def __init__(
+        self,
+        table: SceneFields,
+        clock: Clock,
+        container: Any,
+        device: Any,
+        account: MomentumAccount,
+    ):
         self.table, self.clock, self.container, self.device = table, clock, container, device
         self.account = account
-        self.count = table.count
         self.padding = _CPU_BLOCK if runtime.settings().arch == "cpu" else 1
         self.gravity = ti.field(ti.f64, shape=())
-        self.gravity[None] = gravity
         for name in ("order", "step", "begin", "goal", "measure_from", "cycle", "status"):
-            setattr(self, name, ti.field(ti.i32, shape=self.count))
-        self.attempts = ti.field(ti.i64, shape=self.count)
-        self.force = ti.field(ti.f64, shape=self.count)
-        self.sums = ti.Vector.field(SUM_COUNT, ti.f64, shape=self.count)
-        self.extremes = ti.Vector.field(2, ti.f64, shape=self.count)
-        shape = (self.count, max(1, measured_cycles), len(measures.COLUMNS))
-        self.record = ti.field(ti.f64, shape=shape)
+            setattr(self, name, table.field(ti.i32))
+        self.attempts, self.force = table.field(ti.i64), table.field(ti.f64)
+        self.sums, self.extremes = table.vector(SUM_COUNT, ti.f64), table.vector(2, ti.f64)
+        self.record = table.field(ti.f64, "cycles", len(measures.COLUMNS))
+
+    @ti.kernel
+    def load(self, gravity: ti.f64):
+        """Take over the gravity that acts on the particles."""
+        self.gravity[None] = gravity
 
     @ti.kernel
     def start(self, initial: _F64):
         """Begin at step 0 with particles placed anew and the container at initial[s] = (x, v)."""
-        for t in range(self.padding * self.count):
+        for t in range(self.padding * self.table.scenes[None]):
             if t % self.padding == 0:
                 s = t // self.padding
                 self.step[s], self.attempts[s], self.force[s] = 0, 0, 0.0
@@ -63,13 +74,13 @@ class Coupling:
     @ti.kernel
     def renew(self):
         """Note that the base changed its motion, at the end of a cycle."""
-        for s in range(self.count):
+        for s in range(self.table.scenes[None]):
             self.container.renew(s)
 
     @ti.kernel
     def aim(self, plan: _I32):
         """Set from plan[:, s]: step to begin at, to end at, to measure from; and the k-th scene."""
-        for s in range(self.count):
+        for s in range(self.table.scenes[None]):
             self.begin[s], self.goal[s], self.measure_from[s] = plan[0, s], plan[1, s], plan[2, s]
             self.order[s] = plan[3, s]
             self.cycle[s] = 0
@@ -78,7 +89,7 @@ class Coupling:
     @ti.kernel
     def advance(self, share: ti.f64):
         """Take every scene to a share of the way from its begin to its goal."""
-        for t in range(self.padding * self.count):
+        for t in range(self.padding * self.table.scenes[None]):
             if t % self.padding == 0:
                 self._advance_scene(self.order[t // self.padding], share)
 
@@ -156,7 +167,7 @@ class Coupling:
     @ti.kernel
     def sample(self, values: _F64):
         """Fill values[k, s] with what ``measures.SAMPLE`` names."""
-        for s in range(self.count):
+        for s in range(self.table.scenes[None]):
             motion = self.container.motion(s)
             y = self.table.base_amplitude[s] * self.clock.circle[s][0]
             values[0, s], values[1, s], values[2, s] = motion.x, motion.v, motion.a
@@ -166,13 +177,13 @@ class Coupling:
     @ti.kernel
     def read_status(self, seen: _I32):
         """Fill seen[:, s] with step, position in the cycle, and status."""
-        for s in range(self.count):
+        for s in range(self.table.scenes[None]):
             seen[0, s], seen[1, s] = self.step[s], self.clock.position[s]
             seen[2, s] = self.status[s]
 
     @ti.kernel
     def read(self, cycles: ti.types.ndarray(dtype=ti.f64, ndim=3)):
         """Copy the first cycles[s, c] of the record, all columns."""
-        for s in range(self.count):
+        for s in range(self.table.scenes[None]):
             for c, k in ti.ndrange(cycles.shape[1], cycles.shape[2]):
                 cycles[s, c, k] = self.record[s, c, k]

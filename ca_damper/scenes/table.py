@@ -1,7 +1,8 @@
 """The numbers of every scene of a batch, one row a scene."""
 
+from typing import Any
+
 import numpy as np
-import taichi as ti
 
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
@@ -10,15 +11,12 @@ from taichi_dem.kit.validation import choice, shown
 #: Scenes of a table, and the largest seed.
 _MOST_SCENES, _MOST_SEED = 2**24, 2**31 - 1
 
-_ROWS = ti.types.ndarray(dtype=ti.f64, ndim=2)
 
-
-@ti.data_oriented
 class SceneTable:
-    """What tells one scene of a batch from another; fields of shape (scenes,).
+    """What tells one scene of a batch from another, one row a scene; plain NumPy.
 
-    particles [-], seed [-] (cast to u32 for hashing), dt [s], frequency [Hz] and base_amplitude [m]
-    of the base motion, and the primary structure: mass [kg], stiffness [N/m], damping [N s/m].
+    particles [-], seed [-], dt [s], frequency [Hz] and base_amplitude [m] of the base motion, and
+    the primary structure: mass [kg], stiffness [N/m], damping [N s/m].
 
     The numbers are given as scalars or sequences and are broadcast against each other. Here they
     are checked to be numbers, whole ones where they count; a Batch checks their ranges. Whatever a
@@ -33,25 +31,25 @@ class SceneTable:
 
     def __init__(
         self,
-        particles,
-        seed,
-        dt,
-        frequency=6.0,
-        base_amplitude=0.0,
-        mass=0.086,
-        stiffness=123.4,
-        damping=0.08,
+        particles: Any,
+        seed: Any,
+        dt: Any,
+        frequency: Any = 6.0,
+        base_amplitude: Any = 0.0,
+        mass: Any = 0.086,
+        stiffness: Any = 123.4,
+        damping: Any = 0.08,
     ):
         values = (particles, seed, dt, frequency, base_amplitude, mass, stiffness, damping)
         rows = _broadcast(dict(zip(self.COLUMNS, values)))
         self.count = len(rows[0])
         self._host = dict(zip(self.COLUMNS, (row.copy() for row in rows)))
-        for name in self.COLUMNS:
-            kind = ti.i32 if name in ("particles", "seed") else ti.f64
-            setattr(self, name, ti.field(kind, shape=self.count))
-        self._load(np.stack(rows).astype(np.float64))
 
-    def __repr__(self):
+    def copy(self) -> "SceneTable":
+        """A table of the same numbers, to be changed without this one."""
+        return SceneTable(**self._host)
+
+    def __repr__(self) -> str:
         ends = {name: (of.min(), of.max()) for name, of in self._host.items()}
         words = (
             f"{name} {low:.6g}" + (f" to {high:.6g}" if high > low else "")
@@ -59,8 +57,8 @@ class SceneTable:
         )
         return in_brief(self, counted(self.count, "scene"), *words)
 
-    def change(self, **numbers):
-        """Give all scenes other numbers by name, each a scalar or (scenes,); compiles nothing.
+    def change(self, **numbers: Any) -> None:
+        """Give all scenes other numbers by name, each a scalar or (scenes,).
 
         Raises InputError for a name that is no column.
         """
@@ -68,38 +66,22 @@ class SceneTable:
             choice("number to change", name, self.COLUMNS)
             kind = np.int64 if name in ("particles", "seed") else np.float64
             self._host[name] = np.broadcast_to(values, self.count).astype(kind)
-        self._load(np.stack([self._host[name] for name in self.COLUMNS]).astype(np.float64))
 
-    def drive(self, frequency, dt):
+    def drive(self, frequency: Any, dt: Any) -> None:
         """Change frequency [Hz] and step [s] of all scenes, each a scalar or (scenes,)."""
         pair = np.stack([np.broadcast_to(x, self.count) for x in (frequency, dt)])
         self._host["frequency"], self._host["dt"] = pair.astype(np.float64)
-        self._drive(np.ascontiguousarray(pair, dtype=np.float64))
 
-    def column(self, name):
-        """What the table says under a name, (scenes,); reads no field."""
+    def column(self, name: str) -> np.ndarray:
+        """What the table says under a name, (scenes,)."""
         return self._host[name]
 
-    def row(self, s):
+    def row(self, s: int) -> dict[str, Any]:
         """Numbers of scene s by name."""
         return {name: self._host[name][s].item() for name in self.COLUMNS}
 
-    @ti.kernel
-    def _load(self, rows: _ROWS):
-        for s in range(self.count):
-            self.particles[s] = ti.cast(rows[0, s], ti.i32)
-            self.seed[s] = ti.cast(rows[1, s], ti.i32)
-            self.dt[s], self.frequency[s] = rows[2, s], rows[3, s]
-            self.base_amplitude[s], self.mass[s] = rows[4, s], rows[5, s]
-            self.stiffness[s], self.damping[s] = rows[6, s], rows[7, s]
 
-    @ti.kernel
-    def _drive(self, pair: _ROWS):
-        for s in range(self.count):
-            self.frequency[s], self.dt[s] = pair[0, s], pair[1, s]
-
-
-def _broadcast(values):
+def _broadcast(values: dict[str, Any]) -> list[np.ndarray]:
     """Numbers by name as arrays of one shape (scenes,); InputError for what is none."""
     columns = {name: _numbers(name, value) for name, value in values.items()}
     for name in ("particles", "seed"):
@@ -115,7 +97,7 @@ def _broadcast(values):
     return [np.broadcast_to(column, count) for column in columns.values()]
 
 
-def _numbers(name, value):
+def _numbers(name: str, value: Any) -> np.ndarray:
     """One number or a sequence as an array (n,) of its own type; InputError for anything else."""
     try:
         column = np.atleast_1d(value)
@@ -126,7 +108,7 @@ def _numbers(name, value):
     return column
 
 
-def _check_whole(name, column):
+def _check_whole(name: str, column: np.ndarray) -> None:
     inside = (column >= 0) & (column <= _MOST_SEED)
     bad = column[~(inside & (column == np.floor(column)))]
     if len(bad):
@@ -135,7 +117,7 @@ def _check_whole(name, column):
         )
 
 
-def dealt(cost, threads):
+def dealt(cost: np.ndarray, threads: int) -> np.ndarray:
     """Scene numbers in an order that gives each thread the same cost, (scenes,) i32.
 
     A thread takes a contiguous part of the loop, so dear and cheap scenes are dealt out like cards.

@@ -1,7 +1,8 @@
 """How the container moves: on its spring, pushed by base and filling, or fixed to the base.
 
-Both have the ti.funcs ``start(s, x, v)``, ``motion(s)`` at the beginning of a step, and
-``advance(s, action)`` over it, which returns the attempts that the integration took, or -1.
+Both have ``load`` for the numbers of a batch, and the ti.funcs ``start(s, x, v)``, ``motion(s)`` at
+the beginning of a step, and ``advance(s, action)`` over it, which returns the attempts that the
+integration took, or -1.
 """
 
 import taichi as ti
@@ -9,6 +10,8 @@ import taichi as ti
 from ca_damper import rk45
 from ca_damper.filling import Action, Motion
 from ca_damper.oscillator import Forcing, slope
+from ca_damper.scenes.clock import Clock
+from ca_damper.scenes.scene_fields import SceneFields
 
 #: Attempts within one step of the filling after which the container counts as lost.
 _MOST_ATTEMPTS = 1000
@@ -18,18 +21,20 @@ _MOST_ATTEMPTS = 1000
 class SprungContainer:
     """The container on its spring, integrated by RK45 within every step of the filling.
 
-    gravity [m/s^2]; rtol, atol: local error allowed; both in m and m/s for atol.
+    gravity [m/s^2]. tolerance: local error allowed, rtol and atol, the latter in m and m/s.
     """
 
-    def __init__(self, table, clock, gravity, rtol, atol):
+    def __init__(self, table: SceneFields, clock: Clock):
         self.table, self.clock = table, clock
-        self.state = ti.Vector.field(2, ti.f64, shape=table.count)
-        self.slope = ti.Vector.field(2, ti.f64, shape=table.count)
-        self.impulse = ti.field(ti.f64, shape=table.count)
-        self.carried = ti.field(ti.f64, shape=table.count)
-        self.impulse_velocity = ti.field(ti.f64, shape=table.count)
+        self.state, self.slope = table.vector(2, ti.f64), table.vector(2, ti.f64)
+        self.impulse, self.carried = table.field(ti.f64), table.field(ti.f64)
+        self.impulse_velocity = table.field(ti.f64)
         self.gravity = ti.field(ti.f64, shape=())
         self.tolerance = ti.field(ti.f64, shape=2)
+
+    @ti.kernel
+    def load(self, gravity: ti.f64, rtol: ti.f64, atol: ti.f64):
+        """Take over the numbers of a batch."""
         self.gravity[None] = gravity
         self.tolerance[0], self.tolerance[1] = rtol, atol
 
@@ -95,8 +100,11 @@ class SprungContainer:
 class DrivenContainer:
     """The container fixed to the base: x = y0 sin(2 pi f t), whatever the filling does."""
 
-    def __init__(self, table, clock):
+    def __init__(self, table: SceneFields, clock: Clock):
         self.table, self.clock = table, clock
+
+    def load(self, gravity: float, rtol: float, atol: float) -> None:
+        """Nothing to load: nothing is integrated."""
 
     @ti.func
     def start(self, s, x, v):
@@ -117,3 +125,7 @@ class DrivenContainer:
     def advance(self, s, action):
         """Nothing to integrate: the clock moves the base."""
         return 1
+
+
+#: Containers by the word for their mount.
+CONTAINERS = {"spring": SprungContainer, "base": DrivenContainer}

@@ -1,0 +1,1 @@
+"""What steps the scenes: container, coupling, account, and the engine that holds them."""

@@ -1,0 +1,69 @@
+"""Launches of bounded length: how long each may be, and what they took."""
+
+import time
+from typing import Callable
+
+import numpy as np
+import taichi as ti
+
+#: A launch is kept near this long [s].
+LAUNCH_SECONDS = 0.15
+
+
+class Launches:
+    """Way of the present run, gone in launches that take every scene the same share.
+
+    A launch lasts about a sixth of a second, so that Ctrl-C, progress and the look at diverged
+    scenes are prompt. done: share of the way that is behind. seconds: spent on it. run_seconds,
+    scene_steps, particle_steps: of all runs. pace: scene-steps that a launch may have.
+    """
+
+    def __init__(self, scenes: int):
+        self.done = self.seconds = self.run_seconds = 0.0
+        self.scene_steps = self.particle_steps = 0
+        # One a scene to begin with, as nobody knows yet what a step costs.
+        self.scenes, self.pace = scenes, float(scenes)
+
+    def begin(self) -> None:
+        """Begin another run."""
+        self.done = self.seconds = 0.0
+
+    def launch(
+        self, total: int, advance: Callable[[float], None], check: Callable[[], None]
+    ) -> None:
+        """Go on by one launch; total: scene-steps of the way. check: what is asked after it."""
+        started = time.perf_counter()
+        try:
+            share = min(1.0, self.done + self.pace / total)
+            advance(share)
+            ti.sync()
+            # What a short way allowed to see says nothing of how fast a long one may go.
+            if share < 1.0:
+                self._adapt(time.perf_counter() - started)
+            check()
+            self.done = share
+        finally:
+            spent = time.perf_counter() - started
+            self.seconds += spent
+            self.run_seconds += spent
+
+    def _adapt(self, seconds: float) -> None:
+        self.pace *= min(4.0, max(0.25, LAUNCH_SECONDS / seconds))
+        self.pace = max(self.pace, float(self.scenes))
+
+    def count(self, steps: np.ndarray, particles: np.ndarray) -> None:
+        """Count the steps of a run that has ended; both (scenes,)."""
+        self.scene_steps += int(steps.sum())
+        self.particle_steps += int((particles * steps).sum())
+
+    def saved(self) -> dict[str, np.ndarray]:
+        """What a checkpoint holds of it, arrays by name."""
+        return {
+            "run": np.array([self.done, self.seconds, self.run_seconds]),
+            "steps": np.array([self.scene_steps, self.particle_steps]),
+        }
+
+    def resume(self, saved: dict[str, np.ndarray]) -> None:
+        """Take over what ``saved`` gave."""
+        self.done, self.seconds, self.run_seconds = saved["run"].tolist()
+        self.scene_steps, self.particle_steps = saved["steps"].tolist()

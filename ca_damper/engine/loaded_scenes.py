@@ -1,0 +1,160 @@
+"""Scenes on an engine: their numbers, and what they can be asked between two steps.
+
+The engine is that of their structure: more or larger scenes, or other numbers, run in the same one
+and compile nothing. Those that are alive at once on one engine take turns.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from ca_damper import measures
+from ca_damper.checks import check_record_fits
+from ca_damper.engine.container import CONTAINERS
+from ca_damper.engine.damper_engine import DamperEngine, borrow
+from ca_damper.engine.divergence import divergence
+from ca_damper.filling import Filling, check_filling, structure_of
+from ca_damper.scenes.scene_memory import SceneMemory
+from ca_damper.scenes.scene_numbers import SceneNumbers
+from ca_damper.scenes.table import SceneTable
+from taichi_dem.kit import runtime
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.progress.progress import compiling
+from taichi_dem.kit.validation import choice, instance, positive, whole
+
+MOUNTS = tuple(CONTAINERS)
+
+
+class LoadedScenes:
+    """A filling and a table of scenes on an engine; the arguments are those of a Batch.
+
+    numbers: of the scenes, as SceneNumbers. loan: of the engine. time_origin: when step 0 would
+    have been at the present step [s], (scenes,).
+    """
+
+    def __init__(
+        self,
+        filling: Filling,
+        table: SceneTable,
+        mount: str,
+        measured_cycles: int,
+        rtol: float,
+        atol: float,
+    ):
+        runtime.session()
+        self.filling = check_filling(filling)
+        self.count = instance("table", table, SceneTable).count
+        self.mount = choice("mount", mount, MOUNTS)
+        self.measured_cycles = whole("measured_cycles", measured_cycles, 0, 100_000)
+        check_record_fits(self.count, self.measured_cycles)
+        rtol = positive("rtol", rtol, zero_allowed=True)
+        atol = positive("atol", atol)
+        self.numbers = SceneNumbers(self.filling, table)
+        self.loan = borrow(self.filling, mount, self.count, self.measured_cycles)
+        engine = self.engine
+        self._tell_compiling("set-up", 0.0)
+        engine.clear()
+        engine.load(self.filling, self.table, rtol, atol)
+        self._load_pace()
+        self.time_origin = np.zeros(self.count)
+        self._started = False
+
+    @property
+    def table(self) -> SceneTable:
+        """Numbers of the scenes."""
+        return self.numbers.table
+
+    @property
+    def steps_per_cycle(self) -> np.ndarray:
+        """Steps in a cycle of the base, (scenes,)."""
+        return self.numbers.steps_per_cycle
+
+    @property
+    def engine(self) -> DamperEngine:
+        """The engine, with the data of this batch on it.
+
+        Raises InputError for a session that has been stopped or cleared, and on another thread.
+        """
+        self.loan.activate()
+        return self.loan.engine
+
+    @property
+    def device(self) -> Any:
+        """The filling on the device."""
+        return self.engine.device
+
+    @property
+    def memory(self) -> SceneMemory:
+        """State of the batch on the device, as arrays."""
+        sizes = {"cycles": max(1, self.measured_cycles), **structure_of(self.filling).sizes}
+        return SceneMemory(self.loan, sizes)
+
+    @property
+    def time_s(self) -> np.ndarray:
+        """Present time of every scene [s], (scenes,)."""
+        return self.time_origin + self._read_status()[0] * self.table.column("dt")
+
+    def sample(self) -> dict[str, np.ndarray]:
+        """The present state: arrays (scenes,) by name.
+
+        time_s; x [m], v [m/s], a [m/s^2] of the container, y [m] of the base; force [N]: mean of
+        the filling on the container in the last step; energy [J], momentum [kg m/s] of the
+        particles.
+        """
+        self._check_started()
+        values = np.empty((len(measures.SAMPLE), self.count))
+        self.engine.coupling.sample(values)
+        return {"time_s": self.time_s, **dict(zip(measures.SAMPLE, values))}
+
+    def snapshot(self, s: int) -> dict[str, np.ndarray]:
+        """Positions and velocities of the particles of scene s, as the filling gives them."""
+        self._check_started()
+        return self.device.snapshot(whole("s", s, 0, self.count - 1))
+
+    def attempts(self) -> np.ndarray:
+        """Steps that RK45 has tried since the start, (scenes,); one a step unless some failed."""
+        engine = self.engine
+        return engine.table.in_use(engine.coupling.attempts)
+
+    def _tell_compiling(self, part: str, share: float) -> None:
+        """Report that a part is compiled next, unless another batch has had it compiled."""
+        if not self.engine.is_compiled:
+            compiling(part, share)
+
+    def _momentum_error(self) -> float:
+        return self.engine.account.error(self.sample()["momentum"]) if self._started else 0.0
+
+    def _read_status(self) -> np.ndarray:
+        """Step, position in the cycle, and status of all scenes, (3, scenes)."""
+        seen = np.empty((3, self.count), dtype=np.int32)
+        self.engine.coupling.read_status(seen)
+        return seen
+
+    def _check_started(self) -> None:
+        self.loan.activate()
+        if not self._started:
+            raise InputError("this batch has no state yet: call start() first")
+
+    def _check_cycle_is_full(self) -> None:
+        self._check_started()
+        position = self._read_status()[1]
+        if position.any():
+            late = int(position.argmax())
+            raise InputError(
+                f"a cycle must be full here, scene {late} stands at step {position[late]} of "
+                f"{self.steps_per_cycle[late]}: advance it first"
+            )
+
+    def _load_pace(self) -> None:
+        engine = self.engine
+        engine.table.drive(np.ascontiguousarray(self.numbers.pace()))
+        engine.clock.set(self.steps_per_cycle)
+
+    def _check_divergence(self) -> None:
+        step, _, status = self._read_status()
+        if status.any():
+            # Scenes stop where they diverge: the first of them in time speaks for all.
+            time_s = self.time_s
+            s = int(np.argmin(np.where(status != 0, time_s, np.inf)))
+            found = int(status[s]), int(step[s]), float(time_s[s])
+            raise divergence(self.filling, self.table.row(s), *found)

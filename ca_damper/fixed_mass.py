@@ -1,0 +1,141 @@
+"""The two trivial fillings: nothing, and a mass that is fixed to the container."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import taichi as ti
+
+from ca_damper.filling import Action, Filling, Structure
+from ca_damper.scenes.scene_fields import SceneFields
+from taichi_dem.kit.effect_usage import EffectUse
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import positive, shown, whole
+
+
+@dataclass(frozen=True)
+class Empty:
+    """A container without particles."""
+
+    label: ClassVar[str] = "empty"
+    effects: ClassVar[tuple] = ()
+    step_bound: ClassVar[None] = None
+    default_dt: ClassVar[float] = 1e-4
+    capacity: ClassVar[int] = 0
+    particle_mass: ClassVar[float] = 0.0
+    gravity: ClassVar[float] = 9.8
+
+    def check(self, particles: int, dt: float) -> None:
+        """InputError unless there are no particles."""
+        if particles != 0:
+            raise InputError(f"particles must be 0 in an empty container, got {shown(particles)}")
+
+    def divergence(self, code: int, particles: int, dt: float) -> tuple[str, float]:
+        """Nothing that could diverge; named because the protocol asks for it."""
+        return "is empty", dt
+
+    @property
+    def structure(self) -> Structure:
+        """Nothing but the class."""
+        return Structure(())
+
+    def bind(self, table: SceneFields) -> "FixedMass":
+        """Nothing on the device but the table."""
+        return FixedMass(table)
+
+
+@dataclass(frozen=True)
+class RigidMass:
+    """Particles glued to the container: N m more mass and nothing else, exactly.
+
+    particle_mass [kg], gravity [m/s^2].
+    """
+
+    particle_mass: float = 0.2e-3
+    gravity: float = 9.8
+
+    label: ClassVar[str] = "rigid"
+    effects: ClassVar[tuple] = ("fixed mass",)
+    step_bound: ClassVar[None] = None
+    default_dt: ClassVar[float] = 1e-4
+    capacity: ClassVar[int] = 1_000_000
+
+    def __post_init__(self) -> None:
+        positive("particle_mass", self.particle_mass)
+        positive("gravity", self.gravity, zero_allowed=True)
+
+    def check(self, particles: int, dt: float) -> None:
+        """InputError for more than a million particles."""
+        whole("particles", particles, 0, self.capacity)
+
+    def divergence(self, code: int, particles: int, dt: float) -> tuple[str, float]:
+        """A fixed mass has no state that could diverge; named because the protocol asks for it."""
+        return "is rigid", dt
+
+    @property
+    def structure(self) -> Structure:
+        """Nothing but the class: mass and gravity are numbers."""
+        return Structure(())
+
+    def bind(self, table: SceneFields) -> "FixedMass":
+        """The mass of a particle on the device."""
+        return FixedMass(table)
+
+
+@ti.data_oriented
+class FixedMass:
+    """Particles of a mass [kg] each that never leave the container's floor."""
+
+    def __init__(self, table: SceneFields):
+        self.table = table
+        self.particle_mass = ti.field(ti.f64, shape=())
+        self.velocity = table.field(ti.f64)
+
+    def load(self, filling: Filling) -> None:
+        """Take over the mass of a particle."""
+        self._load(filling.particle_mass)
+
+    @ti.kernel
+    def _load(self, particle_mass: ti.f64):
+        self.particle_mass[None] = particle_mass
+
+    @ti.func
+    def mass(self, s):
+        """Mass of all particles of scene s [kg]."""
+        return self.table.particles[s] * self.particle_mass[None]
+
+    @ti.func
+    def reset(self, s):
+        """At rest."""
+        self.velocity[s] = 0.0
+
+    @ti.func
+    def advance(self, s, step, motion):
+        """No blows; the whole mass is carried."""
+        self.velocity[s] = motion.v
+        return Action(0.0, self.mass(s))
+
+    @ti.func
+    def energy(self, s):
+        """Kinetic energy at the start of the last step [J]; the height is zero."""
+        return 0.5 * self.mass(s) * self.velocity[s] * self.velocity[s]
+
+    @ti.func
+    def momentum(self, s):
+        """Momentum at the start of the last step [kg m/s]."""
+        return self.mass(s) * self.velocity[s]
+
+    @ti.func
+    def divergence_code(self, s):
+        """Always fine."""
+        return 0
+
+    def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:
+        """Nothing to count: a fixed mass acts in every step."""
+        return ()
+
+    def snapshot(self, s: int) -> dict[str, np.ndarray]:
+        """All particles on the floor, in the corner."""
+        count = self.table.particles[s]
+        velocity = np.column_stack([np.zeros(count), np.full(count, self.velocity[s])])
+        return {"position": np.zeros((count, 2)), "velocity": velocity}

@@ -1,0 +1,113 @@
+"""Numbers and state of the scenes of a batch on the device, with room for batches of other sizes.
+
+Fields are allocated once, with a capacity. How many scenes are in use, and how much of each, is
+read from fields at run time, so that a batch of another size compiles nothing.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Union
+
+import numpy as np
+import taichi as ti
+from taichi.lang import impl
+
+from ca_damper.scenes.table import SceneTable
+from taichi_dem.kit.allocation import array_of, values
+
+_ROWS = ti.types.ndarray(dtype=ti.f64, ndim=2)
+
+#: Length of an axis of a field: a number, or the name of one of the sizes.
+Length = Union[int, str]
+
+
+@dataclass(frozen=True, eq=False)
+class SceneField:
+    """A field of the scenes.
+
+    lengths: of its axes after that of the scenes. flat: whether the first of them and the scenes
+    share one axis, places of a scene side by side.
+    """
+
+    field: ti.Field
+    lengths: tuple[Length, ...]
+    flat: bool
+
+
+@ti.data_oriented
+class SceneFields:
+    """What tells one scene of a batch from another; fields of shape (capacity,).
+
+    particles [-], seed [-] (cast to u32 for hashing), dt [s], frequency [Hz] and base_amplitude [m]
+    of the base motion, and the primary structure: mass [kg], stiffness [N/m], damping [N s/m].
+
+    capacity: most scenes. sizes: most places that a scene can have, by name. scenes: number of
+    scenes in use, shape (); scene_count: the same in Python. Whatever a scene does depends on its
+    own row only (on its seed, not on its index), so that no bit depends on what else is in a batch.
+    """
+
+    def __init__(self, capacity: int, sizes: dict[str, int]):
+        self.capacity, self.sizes = capacity, dict(sizes)
+        self.made: list[SceneField] = []
+        self.scenes = ti.field(ti.i32, shape=())
+        for name in SceneTable.COLUMNS:
+            kind = ti.i32 if name in ("particles", "seed") else ti.f64
+            setattr(self, name, self.field(kind))
+
+    def field(self, dtype: Any, *lengths: Length, flat: bool = False) -> ti.Field:
+        """Declare a field of the scenes; lengths: of its axes after that of the scenes."""
+        return self._noted(ti.field(dtype, shape=self._shape(lengths, flat)), lengths, flat)
+
+    def vector(self, n: int, dtype: Any, *lengths: Length, flat: bool = False) -> ti.Field:
+        """Declare a field of vectors with n components; else as ``field``."""
+        shape = self._shape(lengths, flat)
+        return self._noted(ti.Vector.field(n, dtype, shape=shape), lengths, flat)
+
+    def _shape(self, lengths: tuple[Length, ...], flat: bool) -> tuple[int, ...]:
+        shape = (self.capacity, *(self.length(length) for length in lengths))
+        return (shape[0] * shape[1], *shape[2:]) if flat else shape
+
+    def length(self, length: Length) -> int:
+        """Number of places of a scene along an axis."""
+        return self.sizes[length] if isinstance(length, str) else length
+
+    def _noted(self, field: ti.Field, lengths: tuple[Length, ...], flat: bool) -> ti.Field:
+        self.made.append(SceneField(field, lengths, flat))
+        return field
+
+    def load(self, table: SceneTable) -> None:
+        """Take over the rows of a table that fits."""
+        rows = [table.column(name) for name in SceneTable.COLUMNS]
+        self._load(np.stack(rows).astype(np.float64))
+
+    def in_use(self, field: ti.Field) -> np.ndarray:
+        """Rows of the scenes in use, of a field whose first axis is that of the scenes."""
+        return values(field)[: self.scene_count]
+
+    def row(self, field: ti.Field, s: int) -> np.ndarray:
+        """Entries of scene s of a field whose first axis is that of the scenes."""
+        if impl.current_cfg().arch == ti.cuda:
+            return field.to_numpy()[s]
+        ti.sync()
+        return array_of(field)[s].copy()
+
+    @property
+    def scene_count(self) -> int:
+        """Number of scenes in use, in Python."""
+        return int(values(self.scenes))
+
+    @ti.kernel
+    def _load(self, rows: _ROWS):
+        for _ in range(1):
+            self.scenes[None] = rows.shape[1]
+        for s in range(rows.shape[1]):
+            self.particles[s] = ti.cast(rows[0, s], ti.i32)
+            self.seed[s] = ti.cast(rows[1, s], ti.i32)
+            self.dt[s], self.frequency[s] = rows[2, s], rows[3, s]
+            self.base_amplitude[s], self.mass[s] = rows[4, s], rows[5, s]
+            self.stiffness[s], self.damping[s] = rows[6, s], rows[7, s]
+
+    @ti.kernel
+    def drive(self, pair: _ROWS):
+        """Change frequency [Hz] and step [s] of all scenes: pair[0] and pair[1], (scenes,) each."""
+        for s in range(pair.shape[1]):
+            self.frequency[s], self.dt[s] = pair[0, s], pair[1, s]

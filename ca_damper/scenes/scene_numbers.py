@@ -1,0 +1,63 @@
+"""Numbers of the scenes of a batch, checked against its filling, with steps that fit the cycle."""
+
+from typing import Any
+
+import numpy as np
+
+from ca_damper.oscillator import Oscillator
+from ca_damper.scenes.clock import steps_per_cycle
+from ca_damper.scenes.table import SceneTable
+
+_STRUCTURE = ("mass", "stiffness", "damping", "base_amplitude")
+
+
+class SceneNumbers:
+    """A table of its own, whose steps are shortened so that a whole number of them makes a cycle.
+
+    largest_dt: the steps asked for [s]. steps_per_cycle: of each scene. Both (scenes,).
+    oscillators: what each scene hangs on. Plain NumPy. Raises InputError for a scene that the
+    filling refuses or a step out of range.
+    """
+
+    def __init__(self, filling: Any, table: SceneTable):
+        self.filling, self.table = filling, table.copy()
+        structure = zip(*map(self.table.column, _STRUCTURE))
+        self.oscillators = [Oscillator(*row) for row in structure]
+        self.largest_dt = self.table.column("dt")
+        self.drive(self.table.column("frequency"))
+
+    def changed(self, **numbers: Any) -> "SceneNumbers":
+        """The same with other numbers, as ``SceneTable.change``."""
+        table = self.table.copy()
+        table.change(**{"dt": self.largest_dt, **numbers})
+        return SceneNumbers(self.filling, table)
+
+    def drive(self, frequency: np.ndarray) -> None:
+        """Take other frequencies [Hz], (scenes,), and fit the steps to the cycles."""
+        asked = zip(frequency, self.largest_dt)
+        steps = np.array([steps_per_cycle(float(f), float(dt)) for f, dt in asked], np.int32)
+        dt = 1.0 / (frequency * steps)
+        for particles, step in sorted(set(zip(self.table.column("particles").tolist(), dt))):
+            self.filling.check(particles, float(step))
+        self.table.drive(frequency, dt)
+        self.steps_per_cycle = steps
+
+    def pace(self) -> np.ndarray:
+        """Frequencies [Hz] and steps [s], (2, scenes)."""
+        return np.stack([self.table.column(name) for name in ("frequency", "dt")])
+
+    def take_pace(self, pace: np.ndarray, steps: np.ndarray) -> None:
+        """Take over what ``pace`` gave, with the steps of a cycle."""
+        self.table.drive(*pace)
+        self.steps_per_cycle = steps
+
+    def initial(self, start: str) -> np.ndarray:
+        """(x, v) of the container at the beginning, (scenes, 2); start: one of checks.STARTS."""
+        state = np.zeros((self.table.count, 2))
+        if start == "rest":
+            return state
+        for s, oscillator in enumerate(self.oscillators):
+            row = self.table.row(s)
+            fixed = row["particles"] * self.filling.particle_mass if start == "rigid" else 0.0
+            state[s] = oscillator.steady_state(row["frequency"], fixed, self.filling.gravity)
+        return state
