@@ -13,8 +13,10 @@ from taichi_dem.timeline import NEVER
 #: Substeps to begin with.
 _FIRST = 64
 #: What a twin does not take over: its clock, its steps, impulses on their way, and its account.
-_ANEW = ("level", "bound", "tick", "last_tick", "injected_tick", "slot", "max_speed2", "bad_body")
-_ANEW += ("bond_heat", "contact_heat", "load_work", "load_impulse")
+_ANEW = (
+    *("level", "bound", "tick", "last_tick", "injected_tick", "slot", "max_speed2", "bad_body"),
+    *("bond_heat", "contact_heat", "load_work", "load_impulse"),
+)
 
 
 def measured_speedup(simulation, seconds=0.5):

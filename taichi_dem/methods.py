@@ -1,7 +1,8 @@
 """Time integration methods a user chooses from; each says how the schedule steps."""
 
+from collections.abc import Hashable
 from dataclasses import dataclass
-from typing import Optional
+from typing import Any, Optional, Union
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import between, choice, positive, shown
@@ -11,7 +12,7 @@ NEIGHBOURS = ("held", "drifted")
 DASHPOTS = ("full", "limited")
 
 
-def check_method(method):
+def check_method(method: object) -> None:
     """InputError unless the method is an object that says how to step, one of these or alike."""
     known = ("dt0", "criterion", "uniform", "neighbour", "solves")
     if isinstance(method, type) or not all(hasattr(method, name) for name in known):
@@ -34,7 +35,7 @@ def _steps_ahead(method):
     return rule.ahead if rule is not None else 0.0
 
 
-def structure_of(method):
+def structure_of(method: Any) -> Hashable:
     """What of a method its kernels depend on, hashable: all but its numbers.
 
     A method of one's own says so by a member ``structure``; else any change of its numbers compiles
@@ -81,16 +82,16 @@ class Uniform:
         _check_options(self)
 
     @property
-    def name(self):
+    def name(self) -> str:
         """Short name for tables."""
         return f"uniform{_suffix(self)}"
 
     @property
-    def steps_ahead(self):
+    def steps_ahead(self) -> float:
         """Steps of a body by which its contacts are counted before they touch."""
         return _steps_ahead(self)
 
-    def criterion(self):
+    def criterion(self) -> Union[FixedStep, Displacement]:
         """Step rule for the schedule."""
         return FixedStep() if self.distance is None else Displacement()
 
@@ -122,16 +123,16 @@ class Multirate:
         _check_options(self)
 
     @property
-    def name(self):
+    def name(self) -> str:
         """Short name for tables."""
         return f"multirate_{self.neighbour}{_suffix(self)}"
 
     @property
-    def steps_ahead(self):
+    def steps_ahead(self) -> float:
         """Steps of a body by which its contacts are counted before they touch."""
         return _steps_ahead(self)
 
-    def criterion(self):
+    def criterion(self) -> Displacement:
         """Step rule for the schedule."""
         return Displacement()
 
@@ -152,7 +153,7 @@ class ImplicitDashpots:
     """
 
     dt: float = 4e-7
-    sweeps: tuple = (2, 20)
+    sweeps: tuple[int, int] = (2, 20)
     tolerance: float = 0.05
     theta: float = 0.5
     refresh: float = 3e-5
@@ -175,11 +176,11 @@ class ImplicitDashpots:
         _check_sweeps(self.sweeps)
 
     @property
-    def dt0(self):
+    def dt0(self) -> float:
         """Largest step [s]."""
         return self.dt
 
-    def criterion(self):
+    def criterion(self) -> FixedStep:
         """Step rule for the schedule."""
         return FixedStep()
 
