@@ -6,6 +6,8 @@ stand one cell apart, as in the paper (10 particles in 60 mm); the angles are th
 triangular lattice. Cells are counted upwards, column by column: the cell above is the next one.
 """
 
+from typing import Any
+
 import numpy as np
 import taichi as ti
 
@@ -21,12 +23,12 @@ _TABLE = ti.types.ndarray(dtype=ti.i32, ndim=2)
 _COSINES = ti.types.ndarray(dtype=ti.f64, ndim=2)
 
 
-def alignments():
+def alignments() -> np.ndarray:
     """Cosine of the angle between two directions, shape (6, 6), exact."""
     return np.round(2.0 * np.cos(_ANGLE[:, None] - _ANGLE[None, :])) / 2.0
 
 
-def unit_vectors():
+def unit_vectors() -> np.ndarray:
     """Horizontal and vertical part of the six directions, shape (6, 2)."""
     return np.column_stack([np.sin(_ANGLE), alignments()[:, UP]])
 
@@ -34,24 +36,24 @@ def unit_vectors():
 class Geometry:
     """Which cell lies where, in NumPy; columns and rows are counted inside the walls."""
 
-    def __init__(self, columns, rows):
+    def __init__(self, columns: int, rows: int):
         self.columns, self.rows = columns, rows
         self.height = rows + 2
         self.cells = (columns + 2) * self.height
 
-    def cell_of(self, column, row):
+    def cell_of(self, column: Any, row: Any) -> Any:
         """Number of the cell in a column and row, both 0 at the lower left inner corner."""
         return (column + 1) * self.height + row + 1
 
-    def column_and_row(self, cell):
+    def column_and_row(self, cell: Any) -> tuple[Any, Any]:
         """Column and row of a cell, -1 in the lower and left walls; arrays welcome."""
         return cell // self.height - 1, cell % self.height - 1
 
-    def inside(self, column, row):
+    def inside(self, column: Any, row: Any) -> Any:
         """Whether a particle may stand there; arrays welcome."""
         return (0 <= column) & (column < self.columns) & (0 <= row) & (row < self.rows)
 
-    def neighbours(self):
+    def neighbours(self) -> np.ndarray:
         """Cell ahead of what stands in a cell, shape (cells + 1, KINDS).
 
         What does not fly, and all beyond the lattice, looks at cell number ``cells``: nothing ever
@@ -69,13 +71,13 @@ class Geometry:
             table[:-1, direction] = np.where(known, self.cell_of(c, r), self.cells)
         return table
 
-    def blank(self):
+    def blank(self) -> np.ndarray:
         """WALL or EMPTY for each cell and the one beyond the lattice, shape (cells + 1,)."""
         column, row = self.column_and_row(np.arange(self.cells))
         kinds = np.where(self.inside(column, row), EMPTY, WALL)
         return np.append(kinds, EMPTY).astype(np.int32)
 
-    def centres(self, width):
+    def centres(self, width: float) -> np.ndarray:
         """Horizontal and vertical centre of every cell [m], shape (cells, 2).
 
         Counted from the lower left inner corner of the container. width: of a cell [m].
@@ -88,7 +90,7 @@ class Geometry:
 class Lattice:
     """The tables of a geometry on the device."""
 
-    def __init__(self, geometry):
+    def __init__(self, geometry: Geometry):
         self.geometry = geometry
         self.cells, self.height = geometry.cells, geometry.height
         self.columns, self.rows = geometry.columns, geometry.rows
@@ -99,7 +101,7 @@ class Lattice:
         self.blank = ti.field(ti.i8, shape=self.cells + 1)
         self.cosine = ti.field(ti.f64, shape=(KINDS, DIRECTIONS))
 
-    def load(self):
+    def load(self) -> None:
         """Fill the tables; apart from making them, as every first use of new fields is dear."""
         cosines = np.zeros((KINDS, DIRECTIONS))
         cosines[:DIRECTIONS] = alignments()

@@ -1,7 +1,10 @@
 """The numbers of every scene of a batch, one row a scene."""
 
+from typing import Any
+
 import numpy as np
 import taichi as ti
+from numpy.typing import ArrayLike
 
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
@@ -33,14 +36,14 @@ class SceneTable:
 
     def __init__(
         self,
-        particles,
-        seed,
-        dt,
-        frequency=6.0,
-        base_amplitude=0.0,
-        mass=0.086,
-        stiffness=123.4,
-        damping=0.08,
+        particles: ArrayLike,
+        seed: ArrayLike,
+        dt: ArrayLike,
+        frequency: ArrayLike = 6.0,
+        base_amplitude: ArrayLike = 0.0,
+        mass: ArrayLike = 0.086,
+        stiffness: ArrayLike = 123.4,
+        damping: ArrayLike = 0.08,
     ):
         values = (particles, seed, dt, frequency, base_amplitude, mass, stiffness, damping)
         rows = _broadcast(dict(zip(self.COLUMNS, values)))
@@ -59,7 +62,7 @@ class SceneTable:
         )
         return in_brief(self, counted(self.count, "scene"), *words)
 
-    def change(self, **numbers):
+    def change(self, **numbers: ArrayLike) -> None:
         """Give all scenes other numbers by name, each a scalar or (scenes,); compiles nothing.
 
         Raises InputError for a name that is no column.
@@ -70,17 +73,17 @@ class SceneTable:
             self._host[name] = np.broadcast_to(values, self.count).astype(kind)
         self._load(np.stack([self._host[name] for name in self.COLUMNS]).astype(np.float64))
 
-    def drive(self, frequency, dt):
+    def drive(self, frequency: ArrayLike, dt: ArrayLike) -> None:
         """Change frequency [Hz] and step [s] of all scenes, each a scalar or (scenes,)."""
         pair = np.stack([np.broadcast_to(x, self.count) for x in (frequency, dt)])
         self._host["frequency"], self._host["dt"] = pair.astype(np.float64)
         self._drive(np.ascontiguousarray(pair, dtype=np.float64))
 
-    def column(self, name):
+    def column(self, name: str) -> np.ndarray:
         """What the table says under a name, (scenes,); reads no field."""
         return self._host[name]
 
-    def row(self, s):
+    def row(self, s: int) -> dict[str, Any]:
         """Numbers of scene s by name."""
         return {name: self._host[name][s].item() for name in self.COLUMNS}
 
@@ -135,7 +138,7 @@ def _check_whole(name, column):
         )
 
 
-def dealt(cost, threads):
+def dealt(cost: np.ndarray, threads: int) -> np.ndarray:
     """Scene numbers in an order that gives each thread the same cost, (scenes,) i32.
 
     A thread takes a contiguous part of the loop, so dear and cheap scenes are dealt out like cards.
