@@ -45,9 +45,10 @@ test-slow: $(STAMP) ## run those that take longer
 test-bounds: $(STAMP) ## run small scenes with every access to a field checked (also in test-slow)
 	$(BIN)/python -m pytest -q tests/bad_input/test_bounds.py $(TEST_OPTIONS)
 
-lint: $(STAMP) ## check style and format
+lint: $(STAMP) ## check style, format and types
 	$(BIN)/python -m ruff check .
 	$(BIN)/python -m ruff format --check .
+	$(BIN)/python -m mypy
 
 bench: $(STAMP) ## measure speed
 	$(BIN)/python experiments/bench.py $(BENCH_OPTIONS)
@@ -65,7 +66,7 @@ mesh: $(MESH_STAMP) ## make the meshes again (installs gmsh; the others do not n
 	$(BIN)/python experiments/make_meshes.py $(MESH_OPTIONS)
 
 clean: ## remove .venv, caches and build leftovers; results/ stays
-	rm -rf .venv build dist *.egg-info .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(STAMP): requirements.txt pyproject.toml

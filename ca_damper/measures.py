@@ -12,8 +12,10 @@ complex power F conj(V) / 2 holds both. A mass fixed to the container has c = 0 
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from taichi_dem.kit.display import by_fields
+from taichi_dem.kit.types import FloatOrArray
 
 #: Summed over the steps of a cycle; _cos and _sin: times cos(w t) and sin(w t).
 SUMS = ("x", "x_squared", "x_cos", "x_sin", "v_cos", "v_sin", "f", "f_cos", "f_sin")
@@ -39,74 +41,74 @@ class Cycles:
     def __repr__(self):
         return by_fields(self)
 
-    def mean_of(self, name):
+    def mean_of(self, name: str) -> np.ndarray:
         """Mean of a column over cycles, (scenes,)."""
         return self.record[:, :, COLUMNS.index(name)].mean(axis=1)
 
-    def per_step(self, name):
+    def per_step(self, name: str) -> np.ndarray:
         """Mean of a summed quantity over steps and cycles, (scenes,)."""
         return self.mean_of(name) / self.steps
 
-    def harmonic(self, name):
+    def harmonic(self, name: str) -> np.ndarray:
         """Complex amplitude of x, v or f, (scenes,)."""
         amplitude = 2.0 * (self.per_step(f"{name}_cos") - 1j * self.per_step(f"{name}_sin"))
         return amplitude / np.sinc(1.0 / self.steps) if name == "f" else amplitude
 
     @property
-    def omega(self):
+    def omega(self) -> np.ndarray:
         """Angular frequency [rad/s]."""
         return 2.0 * np.pi * self.frequency
 
     @property
-    def rms(self):
+    def rms(self) -> np.ndarray:
         """Root mean square of x about its mean in each cycle [m]: the response of the paper."""
         totals = [self.record[:, :, COLUMNS.index(name)] for name in ("x_squared", "x")]
         square, mean = (total / self.steps[:, None] for total in totals)
         return np.sqrt(np.maximum(square - mean**2, 0.0).mean(axis=1))
 
     @property
-    def amplitude(self):
+    def amplitude(self) -> np.ndarray:
         """Half the way from lowest to highest x [m], mean over cycles."""
         return 0.5 * (self.mean_of("x_max") - self.mean_of("x_min"))
 
     @property
-    def mean(self):
+    def mean(self) -> np.ndarray:
         """Mean displacement [m]."""
         return self.per_step("x")
 
     @property
-    def mean_force(self):
+    def mean_force(self) -> np.ndarray:
         """Mean force of the filling on the container [N]; -N m g in the long run."""
         return self.per_step("f")
 
     @property
-    def energy(self):
+    def energy(self) -> np.ndarray:
         """Energy of the particles at the ends of cycles [J], mean."""
         return self.mean_of("energy")
 
     @property
-    def impedance(self):
+    def impedance(self) -> np.ndarray:
         """Of the filling, -F / V = c + i w m [N s/m]; NaN where the container does not move."""
         force, speed = self.harmonic("f"), self.harmonic("v")
         still = speed == 0.0
         return np.where(still, _NOT_A_NUMBER, 0.0 - force / np.where(still, 1.0, speed))
 
     @property
-    def apparent_mass(self):
+    def apparent_mass(self) -> np.ndarray:
         """Mass that the container feels at this frequency beside its own [kg]."""
         return self.impedance.imag / self.omega
 
     @property
-    def apparent_damping(self):
+    def apparent_damping(self) -> np.ndarray:
         """Damping coefficient that the filling adds [N s/m]."""
         return self.impedance.real
 
     @property
-    def complex_power(self):
+    def complex_power(self) -> np.ndarray:
         """Mean power that the filling takes [W], and i times its reactive power."""
         return -0.5 * self.harmonic("f") * np.conj(self.harmonic("v"))
 
-    def loss_factor(self, mass):
+    def loss_factor(self, mass: FloatOrArray) -> np.ndarray:
         """Energy that the filling takes a radian per energy in motion, c / (w (M + m)).
 
         mass M [kg] of the container, (scenes,) or one for all. The energy in motion is that of the
@@ -114,7 +116,9 @@ class Cycles:
         """
         return self.apparent_damping / (self.omega * (mass + self.apparent_mass))
 
-    def damping_ratio(self, mass, stiffness, damping):
+    def damping_ratio(
+        self, mass: FloatOrArray, stiffness: FloatOrArray, damping: FloatOrArray
+    ) -> np.ndarray:
         """Effective share of critical damping, (C + c) / (2 sqrt(K (M + m))).
 
         mass M [kg], stiffness K [N/m] and damping C [N s/m] of the primary structure.
@@ -123,7 +127,7 @@ class Cycles:
         return (damping + self.apparent_damping) / critical
 
 
-def peak(frequency_ratio, response):
+def peak(frequency_ratio: ArrayLike, response: ArrayLike) -> tuple[float, float]:
     """Where a response curve peaks and how high it is there: (ratio, response), floats.
 
     By the parabola through the highest point and its neighbours, whatever their spacing; at an end

@@ -6,10 +6,13 @@ y0; 0.6 mm lets the empty container peak at 24.4 mm, near the +-25 mm of its Fig
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import taichi as ti
+from numpy.typing import ArrayLike
 
+from taichi_dem.kit.types import FloatOrArray
 from taichi_dem.kit.validation import positive
 
 
@@ -33,22 +36,22 @@ class Oscillator:
         positive("base_amplitude", self.base_amplitude, zero_allowed=True)
 
     @property
-    def natural_frequency(self):
+    def natural_frequency(self) -> float:
         """Undamped, with the container empty [Hz]."""
         return math.sqrt(self.stiffness / self.mass) / (2.0 * math.pi)
 
     @property
-    def damping_ratio(self):
+    def damping_ratio(self) -> float:
         """Share of critical damping, with the container empty."""
         return self.damping / (2.0 * math.sqrt(self.stiffness * self.mass))
 
-    def transfer(self, frequency, added_mass=0.0):
+    def transfer(self, frequency: ArrayLike, added_mass: FloatOrArray = 0.0) -> Any:
         """Complex x / y of the steady state at a frequency [Hz] with more mass [kg]; or arrays."""
         omega = 2.0 * np.pi * np.asarray(frequency, dtype=np.float64)
         held = self.stiffness + 1j * omega * self.damping
         return held / (held - (self.mass + added_mass) * omega**2)
 
-    def peak(self, added_mass=0.0):
+    def peak(self, added_mass: float = 0.0) -> tuple[float, float]:
         """Where the steady state peaks with more mass [kg], and how high: (ratio, RMS [m]).
 
         The ratio is that of the frequency to the natural one of the empty container. For a
@@ -62,7 +65,9 @@ class Oscillator:
         high = abs(self.transfer(ratio * self.natural_frequency, added_mass))
         return ratio, float(self.base_amplitude * high / math.sqrt(2.0))
 
-    def steady_state(self, frequency, added_mass=0.0, gravity=0.0):
+    def steady_state(
+        self, frequency: ArrayLike, added_mass: FloatOrArray = 0.0, gravity: float = 0.0
+    ) -> tuple[Any, Any]:
         """(x, v) in m and m/s of the steady state when the base passes upwards through zero.
 
         The added mass [kg] hangs on the spring by its weight; the container's own is in x = 0.

@@ -1,12 +1,14 @@
 """What a run leaves behind: time series, frames for pictures, CSV files, whole or not at all."""
 
 from dataclasses import dataclass
+from typing import Any, Optional, Union
 
 import numpy as np
 
 from ca_damper.progress import Stages
 from taichi_dem.kit.display import by_fields, counted, in_brief
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.progress.progress_bar import reporting
 from taichi_dem.kit.validation import AUTO, shown, whole
 
@@ -40,8 +42,8 @@ class Film:
     each scene.
     """
 
-    history: dict
-    frames: tuple
+    history: dict[str, np.ndarray]
+    frames: tuple[tuple[Frame, ...], ...]
 
     def __repr__(self):
         samples, scenes = np.shape(self.history.get("time_s", np.zeros((0, 0))))
@@ -50,7 +52,14 @@ class Film:
         return in_brief(self, counted(samples, "sample"), counted(scenes, "scene"), of_each)
 
 
-def film(batch, steps, *, sample_every=1, frame_every=None, progress=AUTO):
+def film(
+    batch: Any,
+    steps: int,
+    *,
+    sample_every: int = 1,
+    frame_every: Optional[int] = None,
+    progress: Union[Listener, str, None] = AUTO,
+) -> Film:
     """Run a batch of few scenes on by a number of steps and record it; returns a Film.
 
     The present state is recorded first, then every so many steps; frame_every: None for no frames.

@@ -2,10 +2,12 @@
 
 import json
 from dataclasses import asdict, dataclass
-from typing import Optional
+from typing import Any, Optional
 
 from taichi_dem.kit.display import counted, in_brief
+from taichi_dem.kit.effect_usage import EffectUse
 from taichi_dem.kit.files import write_text
+from taichi_dem.kit.validation import FileName
 
 #: Evaluations of the right-hand side in an attempt of RK45; the first slope is the last one's.
 RK45_STAGES = 6
@@ -28,13 +30,13 @@ class Report:
 
     method: str
     mount: str
-    effects: tuple
-    effect_activity: tuple
+    effects: tuple[str, ...]
+    effect_activity: tuple[EffectUse, ...]
     scenes: int
-    particles: tuple
-    dt_s: tuple
+    particles: tuple[int, int]
+    dt_s: tuple[float, float]
     simulated_s: float
-    step_bound: Optional[tuple]
+    step_bound: Optional[tuple[float, str]]
     momentum_error: float
     scene_steps: int
     particle_steps: int
@@ -49,17 +51,17 @@ class Report:
         return in_brief(self, self.method, scenes, *times, "print it for all figures")
 
     @property
-    def particle_steps_per_second(self):
+    def particle_steps_per_second(self) -> float:
         """Speed, without compiling; 0 before anything has run."""
         return self.particle_steps / self.run_seconds if self.run_seconds > 0.0 else 0.0
 
-    def as_dict(self):
+    def as_dict(self) -> dict[str, Any]:
         """All figures, for a JSON file."""
         figures = asdict(self)
         figures["acted"] = figures.pop("effect_activity")
         return {**figures, "particle_steps_per_second": self.particle_steps_per_second}
 
-    def write(self, path):
+    def write(self, path: FileName) -> None:
         """Write all figures as JSON. Raises InputError when the file cannot be written."""
         write_text(path, json.dumps(self.as_dict(), indent=1))
 

@@ -19,8 +19,10 @@ SHARE, MOST_SECONDS = 0.1, 0.5
 #: Shorter runs are not measured [s].
 LEAST_RUN = 0.5
 #: What a twin does not take over: its clock, its steps, impulses on their way, and its account.
-_ANEW = ("level", "bound", "tick", "last_tick", "injected_tick", "slot", "max_speed2", "bad_body")
-_ANEW += ("bond_heat", "contact_heat", "load_work", "load_impulse")
+_ANEW = (
+    *("level", "bound", "tick", "last_tick", "injected_tick", "slot", "max_speed2", "bad_body"),
+    *("bond_heat", "contact_heat", "load_work", "load_impulse"),
+)
 
 
 def speedup_of_run(simulation):

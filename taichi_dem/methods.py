@@ -1,7 +1,8 @@
 """Time integration methods a user chooses from; each says how the schedule steps."""
 
+from collections.abc import Hashable
 from dataclasses import dataclass
-from typing import Optional, Protocol
+from typing import Any, Optional, Protocol, Union
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import between, choice, positive, shown
@@ -32,11 +33,11 @@ class Method(Protocol):
     solves: bool
     steps_ahead: float
 
-    def criterion(self):
+    def criterion(self) -> Any:
         """Rule for the level of a body, as ``step_control.FixedStep`` or ``Displacement``."""
 
 
-def check_method(method):
+def check_method(method: object) -> None:
     """Raise InputError, naming what is missing, unless a method is an object as ``Method`` says."""
     wanted = [*Method.__annotations__, "criterion"]
     missing = [name for name in wanted if not hasattr(method, name)]
@@ -65,7 +66,7 @@ def _steps_ahead(method):
     return rule.ahead if rule is not None else 0.0
 
 
-def structure_of(method):
+def structure_of(method: Any) -> Hashable:
     """What of a method its kernels depend on, hashable: all but its numbers.
 
     A method of one's own says so by a member ``structure``; else any change of its numbers compiles
@@ -112,16 +113,16 @@ class Uniform:
         _check_options(self)
 
     @property
-    def name(self):
+    def name(self) -> str:
         """Short name for tables."""
         return f"uniform{_suffix(self)}"
 
     @property
-    def steps_ahead(self):
+    def steps_ahead(self) -> float:
         """Steps of a body by which its contacts are counted before they touch."""
         return _steps_ahead(self)
 
-    def criterion(self):
+    def criterion(self) -> Union[FixedStep, Displacement]:
         """Step rule for the schedule."""
         return FixedStep() if self.distance is None else Displacement()
 
@@ -153,16 +154,16 @@ class Multirate:
         _check_options(self)
 
     @property
-    def name(self):
+    def name(self) -> str:
         """Short name for tables."""
         return f"multirate_{self.neighbour}{_suffix(self)}"
 
     @property
-    def steps_ahead(self):
+    def steps_ahead(self) -> float:
         """Steps of a body by which its contacts are counted before they touch."""
         return _steps_ahead(self)
 
-    def criterion(self):
+    def criterion(self) -> Displacement:
         """Step rule for the schedule."""
         return Displacement()
 
@@ -183,7 +184,7 @@ class ImplicitDashpots:
     """
 
     dt: float = 4e-7
-    sweeps: tuple = (2, 20)
+    sweeps: tuple[int, int] = (2, 20)
     tolerance: float = 0.05
     theta: float = 0.5
     refresh: float = 3e-5
@@ -206,11 +207,11 @@ class ImplicitDashpots:
         _check_sweeps(self.sweeps)
 
     @property
-    def dt0(self):
+    def dt0(self) -> float:
         """Largest step [s]."""
         return self.dt
 
-    def criterion(self):
+    def criterion(self) -> FixedStep:
         """Step rule for the schedule."""
         return FixedStep()
 

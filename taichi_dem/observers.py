@@ -53,12 +53,13 @@ class Every:
             return {last}
         if self.samples is not None:
             return {round(last * k / samples) for k in range(0, samples, self.samples)} | {last}
-        name, value = ("steps", self.steps) if self.time_s is None else ("time_s", self.time_s)
-        distance = self.steps if self.time_s is None else self.time_s / dt
+        name, unit = ("steps", 1.0) if self.time_s is None else ("time_s", dt)
+        distance = (self.time_s or float(self.steps or 1)) / unit
         if last > _MOST_CALLS * distance:
-            least = last * (1 if self.time_s is None else dt) / _MOST_CALLS
+            least = last * unit / _MOST_CALLS
             raise InputError(
-                f"{name} must be at least {least:.3g} for {_MOST_CALLS} calls, got {value:g}"
+                f"{name} must be at least {least:.3g} for {_MOST_CALLS} calls, "
+                f"got {distance * unit:g}"
             )
         count = math.floor(last / distance * (1.0 + 1e-12))
         return {min(last, round(k * distance)) for k in range(count + 1)} | {last}
@@ -96,6 +97,8 @@ class Observer(Protocol):
 
 class RunView:
     """Read-only view of a run at its present step; arrays are copies that refuse to be written."""
+
+    _parts: tuple
 
     def __init__(self, simulation, recorder):
         object.__setattr__(self, "_parts", (simulation, recorder))

@@ -3,13 +3,18 @@
 import json
 import os
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from taichi_dem.diagnostics.report import Report
+from taichi_dem.engine.model import Model
 from taichi_dem.kit.display import counted, embedded, in_brief, table, titled, unfolded
 from taichi_dem.kit.files import output_folder, write_csv, write_text
+from taichi_dem.kit.validation import FileName
 from taichi_dem.mesh.files import write_mesh
-from taichi_dem.output.record import remove_series, series_name, write_bonds, write_paraview
+from taichi_dem.output.record import Frame, remove_series, series_name, write_bonds, write_paraview
+from taichi_dem.scene import Scene
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,14 +29,14 @@ class Result:
     As the last line of a notebook's cell it shows a picture and a table.
     """
 
-    scene: object
-    method: object
-    model: object
-    history: dict
-    frames: tuple
+    scene: Scene
+    method: Any
+    model: Model
+    history: dict[str, np.ndarray]
+    frames: tuple[Frame, ...]
     broken_time: np.ndarray
     peak_speed: np.ndarray
-    report: object
+    report: Report
     diverged: str = ""
 
     def __repr__(self):
@@ -71,12 +76,12 @@ class Result:
             ("energy not explained", report.unexplained),
             ("time", f"{report.compile_seconds:.1f} s compiling, {report.run_seconds:.1f} s run"),
         ]
-        moved = history.get("hole_radial_displacement_mm", ())
+        moved = history.get("hole_radial_displacement_mm", np.zeros(0))
         if len(moved):
             rows.insert(7, ("hole, mean outward displacement", f"{moved[-1]:.4g} mm"))
         return [*rows, *(("warning", need) for need in report.needs)]
 
-    def write(self, folder):
+    def write(self, folder: FileName) -> None:
         """Write history.csv, bonds.csv, mesh.msh, report.json and a ParaView series to a folder.
 
         The series, in paraview/ of that folder, has the folder's name. These files of an earlier

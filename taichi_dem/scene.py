@@ -1,6 +1,8 @@
 """What a user writes: mesh, material and the effects that the scene calls for."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from taichi_dem.effects.base import MANY, Effect
 from taichi_dem.effects.roles import check_effect
@@ -27,7 +29,7 @@ class Scene:
 
     mesh: Mesh
     material: Material
-    effects: tuple = ()
+    effects: Sequence[Effect] = ()
     max_speed: float = 1e4
 
     def __post_init__(self):
@@ -46,11 +48,11 @@ class Scene:
         words = f"effects {effects}" if effects else "no effects"
         return in_brief(self, counted(self.mesh.body_count, "body"), words)
 
-    def effect(self, role):
+    def effect(self, role: str) -> Any:
         """The effect of a role that takes one, None where none is listed."""
         return next((effect for effect in self.effects if effect.role == role), None)
 
-    def has(self, name):
+    def has(self, name: str) -> bool:
         """Whether an effect of this name is listed."""
         return any(effect.name == name for effect in self.effects)
 
@@ -81,7 +83,7 @@ def _check_roles(effects):
         raise InputError("effect friction acts in sphere contacts: list SphereContact too")
 
 
-def outer_faces_warnings(scene):
+def outer_faces_warnings(scene: Any) -> tuple[str, ...]:
     """Sentences about parts of a scene that may meet where they carry no spheres; before a run.
 
     A solid in one piece has nothing else to meet until it breaks, and what then happens is seen in

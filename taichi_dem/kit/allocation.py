@@ -9,9 +9,12 @@ import contextlib
 import ctypes
 import math
 import os
+from collections.abc import Callable, Iterator
+from typing import Any, Optional
 
 import numpy as np
 import taichi as ti
+from numpy.typing import ArrayLike
 from taichi._snode.fields_builder import FieldsBuilder
 from taichi.lang import impl
 from taichi.lang.matrix import MatrixField
@@ -25,7 +28,7 @@ MOST_TREES = 480
 #: Share of the free memory that a tree may take.
 _SHARE = 0.9
 
-_waiting = None
+_waiting: Optional[list[tuple[Callable[..., object], tuple]]] = None
 
 
 class FieldTree:
@@ -38,10 +41,11 @@ class FieldTree:
 
     scratch_fields = ("_anchor",)
 
-    def __init__(self, advice="take a smaller one"):
-        self.advice, self.bytes, self._tree = advice, 0, None
+    def __init__(self, advice: str = "take a smaller one"):
+        self.advice, self.bytes = advice, 0
+        self._tree: Any = None
 
-    def __enter__(self):
+    def __enter__(self) -> "FieldTree":
         check_capacity()
         self._before, self._builder = impl._root_fb, FieldsBuilder()
         impl._root_fb = self._builder
@@ -68,12 +72,12 @@ class FieldTree:
         size = self._builder.root.ptr.cell_size_bytes
         return _array_at(_base(self._builder.root.ptr), np.uint8, (size,))
 
-    def clear(self):
+    def clear(self) -> None:
         """Set all fields to zero."""
         ti.sync()
         self.memory()[:] = 0
 
-    def destroy(self):
+    def destroy(self) -> None:
         """Give the memory back; the fields must not be used any more."""
         _bases.pop(self._builder.root.ptr.id, None)
         self._tree.destroy()
@@ -94,19 +98,20 @@ def _base(root) -> int:
     return _bases.get(root.id, 0)
 
 
-def in_tree(field) -> bool:
+def in_tree(field: ti.Field) -> bool:
     """Whether a field lies in a ``FieldTree``, on a CPU."""
     return _base(_offset(_first_scalar(field).snode.ptr)[0]) != 0
 
 
-def array_of(field) -> np.ndarray:
+def array_of(field: ti.Field) -> np.ndarray:
     """Array that lies where a field of a ``FieldTree`` does; on a CPU only.
 
     Writing to it writes to the field. It serves as long as the tree exists.
     """
     first = _first_scalar(field).snode.ptr
     kind = np.dtype(to_numpy_type(field.dtype))
-    shape, strides = tuple(field.shape), ()
+    shape: tuple[int, ...] = tuple(field.shape)
+    strides: tuple[int, ...] = ()
     if shape:
         strides = (first.parent.cell_size_bytes,)
         for length in reversed(shape[1:]):
@@ -119,7 +124,7 @@ def array_of(field) -> np.ndarray:
     return _array_at(_base(root) + offset, kind, shape, strides)
 
 
-def values(field) -> np.ndarray:
+def values(field: ti.Field) -> np.ndarray:
     """Copy of all entries of a field."""
     if impl.current_cfg().arch == ti.cuda or not in_tree(field):
         return field.to_numpy()
@@ -127,12 +132,13 @@ def values(field) -> np.ndarray:
     return array_of(field).copy()
 
 
-def assign(field, array):
+def assign(field: ti.Field, array: ArrayLike) -> None:
     """Write an array to the first entries of a field; the others keep their values.
 
     A number fills the whole field.
     """
-    if np.ndim(array) == 0 and field.shape:
+    array = np.asarray(array)
+    if array.ndim == 0 and field.shape:
         array = np.full(values(field).shape, array)
     if impl.current_cfg().arch == ti.cuda or not in_tree(field):
         whole = field.to_numpy()
@@ -141,7 +147,7 @@ def assign(field, array):
         return
     ti.sync()
     place = array_of(field)
-    place[slice(len(array)) if np.ndim(array) else ()] = array
+    place[slice(len(array)) if array.ndim else ()] = array
 
 
 def available_bytes() -> float:
@@ -166,7 +172,7 @@ def _free_memory() -> float:
     return math.inf
 
 
-def check_memory(needed, advice):
+def check_memory(needed: float, advice: str) -> None:
     """Raise InputError, which ends with an advice, where the memory needed [bytes] is not free."""
     free = available_bytes()
     if needed > _SHARE * free:
@@ -226,7 +232,7 @@ def _array_at(address, kind, shape, strides=None) -> np.ndarray:
 
 
 @contextlib.contextmanager
-def batch_allocation():
+def batch_allocation() -> Iterator[None]:
     """Hold back what is given to ``defer_fill`` until the end of the block, in its order.
 
     Blocks may nest; the outermost counts. Raises InputError when the session has no room left.
@@ -246,7 +252,7 @@ def batch_allocation():
         load(*arguments)
 
 
-def defer_fill(load, *arguments):
+def defer_fill(load: Callable[..., object], *arguments: Any) -> None:
     """Call load(*arguments), which uses fields: now, or at the end of ``batch_allocation``."""
     if _waiting is None:
         load(*arguments)
@@ -254,7 +260,7 @@ def defer_fill(load, *arguments):
         _waiting.append((load, arguments))
 
 
-def check_capacity():
+def check_capacity() -> None:
     """Raise InputError when the session has no room for more fields."""
     trees = tree_count()
     if trees > MOST_TREES:
@@ -270,7 +276,7 @@ def tree_count() -> int:
     return program.get_snode_tree_size() if program is not None else 0
 
 
-def field_bytes():
+def field_bytes() -> int:
     """Bytes of all fields that the session has used so far."""
     return sum(root._cell_size_bytes for root in FieldsBuilder._finalized_roots())
 

@@ -13,14 +13,16 @@ import threading
 import time
 import zipfile
 import zlib
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Optional
+from typing import Any, Optional
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import renamed_when_done
-from taichi_dem.kit.validation import path_name, positive, whole
+from taichi_dem.kit.validation import FileName, path_name, positive, whole
 from taichi_dem.kit.version import __version__, taichi_version
 
 #: Of the file; another one cannot be read.
@@ -39,7 +41,7 @@ class Checkpoint:
     Raises InputError for a value out of its range.
     """
 
-    path: str
+    path: FileName
     every_steps: Optional[int] = None
     every_s: Optional[float] = None
     every_wall_s: Optional[float] = None
@@ -52,7 +54,7 @@ class Checkpoint:
             if getattr(self, name) is not None:
                 positive(name, getattr(self, name))
 
-    def marks(self, last, dt):
+    def marks(self, last: int, dt: float) -> set[int]:
         """Steps of dt [s] from 0 to last at which it asks to be saved, a set.
 
         Raises InputError where they are more than a million.
@@ -72,15 +74,15 @@ class Checkpoint:
 class SaveTimer:
     """Whether a checkpoint is due, from what has passed since the last one."""
 
-    def __init__(self, checkpoint):
+    def __init__(self, checkpoint: Checkpoint):
         self.every = (checkpoint.every_steps, checkpoint.every_s, checkpoint.every_wall_s)
         self.saved_at(0, 0.0)
 
-    def saved_at(self, step, time_s):
+    def saved_at(self, step: int, time_s: float) -> None:
         """Count from a step and a time [s] on."""
         self.last = (step, time_s, time.perf_counter())
 
-    def now(self, step, time_s):
+    def now(self, step: int, time_s: float) -> bool:
         """Whether the run, at a step and a time [s], should be saved."""
         passed = zip(self.every, (step, time_s, time.perf_counter()), self.last)
         return any(
@@ -92,7 +94,7 @@ class SaveTimer:
 class Interrupted(KeyboardInterrupt):
     """Ctrl-C, after the run has been saved. path: of the checkpoint."""
 
-    def __init__(self, time_s, path):
+    def __init__(self, time_s: float, path: FileName):
         super().__init__(f"interrupted at t = {time_s:.6g} s, saved in {path}")
         self.path = os.fspath(path)
 
@@ -103,10 +105,10 @@ class CtrlC:
     Python lets the main thread alone listen: in others Ctrl-C is what it was.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.asked = False
 
-    def __enter__(self):
+    def __enter__(self) -> "CtrlC":
         self.listens = threading.current_thread() is threading.main_thread()
         if self.listens:
             self.before = signal.signal(signal.SIGINT, self._note)
@@ -124,7 +126,7 @@ class CtrlC:
         self.asked = True
 
 
-def digest(*arrays):
+def digest(*arrays: ArrayLike) -> str:
     """Twelve letters that change with any bit, type or shape of the arrays."""
     made = hashlib.sha256()
     for array in map(np.ascontiguousarray, arrays):
@@ -133,25 +135,28 @@ def digest(*arrays):
     return made.hexdigest()[:12]
 
 
-def version_text():
+def version_text() -> str:
     """Versions that a checkpoint is bound to."""
     return f"{__version__} on taichi {taichi_version()}"
 
 
-def write_checkpoint(path, identity, arrays):
+def write_checkpoint(
+    path: FileName, identity: Mapping[str, str], arrays: Mapping[str, np.ndarray]
+) -> None:
     """Write arrays by name under an identity, a dict of words; on the disk before it appears.
 
     Raises InputError when the file cannot be written; one that was there stays as it was.
     """
     about = json.dumps({"format": FORMAT, "identity": identity})
+    named: dict[str, Any] = {_ABOUT: np.array(about), **arrays}
     with renamed_when_done(path) as temporary:
         with open(temporary, "wb") as file:
-            np.savez(file, **{_ABOUT: np.array(about)}, **arrays)
+            np.savez(file, **named)
             file.flush()
             os.fsync(file.fileno())
 
 
-def read_checkpoint(path, identity):
+def read_checkpoint(path: FileName, identity: Mapping[str, str]) -> dict[str, np.ndarray]:
     """Arrays by name from a checkpoint of the same identity.
 
     Raises InputError for a file that is absent, damaged or none of ours, and for one of another

@@ -6,8 +6,10 @@ Nothing here reads a field: an object may be shown after its Taichi session has 
 import base64
 import html
 import math
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import fields
 from inspect import signature
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +23,7 @@ _CELL = "text-align:left;padding:2px 12px 2px 0"
 _PICTURE = "max-width:100%"
 
 
-def in_brief(thing, *parts):
+def in_brief(thing: object, *parts: str) -> str:
     """``<Class: part, part>``, the representation of an object; empty parts are left out."""
     text = ", ".join(part for part in parts if part)
     if len(text) > _LONGEST:
@@ -29,7 +31,7 @@ def in_brief(thing, *parts):
     return f"<{type(thing).__name__}: {text}>"
 
 
-def by_fields(thing):
+def by_fields(thing: Any) -> str:
     """Representation of a dataclass that names its fields, arrays by their shape."""
     values = (f"{field.name}={_short(getattr(thing, field.name))}" for field in fields(thing))
     return f"{type(thing).__name__}({', '.join(values)})"
@@ -43,7 +45,7 @@ def _short(value):
     return f"{value:.6g}" if isinstance(value, float) else shown(value)
 
 
-def by_arguments(thing):
+def by_arguments(thing: object) -> str:
     """Representation of an object that keeps what its class was called with, as such a call."""
     names = signature(type(thing)).parameters
     kept = {name: vars(thing).get(f"_{name}", vars(thing).get(name)) for name in names}
@@ -59,13 +61,13 @@ def _argument(value):
     return shown(value) if isinstance(value, (str, bool, int, float, tuple)) else ""
 
 
-def counted(count, what):
+def counted(count: int, what: str) -> str:
     """A number with its noun: "1 frame", "2,898 bodies"."""
     plural = f"{what[:-1]}ies" if what.endswith("y") else f"{what}s"
     return f"{count:,} {what if count == 1 else plural}"
 
 
-def prefixed(value, unit):
+def prefixed(value: float, unit: str) -> str:
     """A number with its unit, from nano to giga: "20 ms", "3.2 M evaluations/s"."""
     power = min(3, max(-3, math.floor(math.log10(value) / 3.0 + 1e-9))) if value > 0.0 else 0
     prefix = ("n", "µ", "m", "", "k", "M", "G")[power + 3]
@@ -73,14 +75,14 @@ def prefixed(value, unit):
     return f"{value / 1e3**power:.3g} {prefix}{gap}{unit}"
 
 
-def listed(values):
+def listed(values: Collection[float]) -> str:
     """Numbers in words: "10, 20, 30", or "10 to 400 (40 values)" where they are many."""
     if len(values) <= _LISTED:
         return ", ".join(f"{value:g}" for value in values)
     return f"{min(values):g} to {max(values):g} ({len(values)} values)"
 
 
-def table(rows, head=()):
+def table(rows: Iterable[Iterable[object]], head: Sequence[object] = ()) -> str:
     """HTML table of rows of text, escaped; head: names of the columns."""
     lines = [_row("th", head)] if head else []
     return f"<table>{''.join([*lines, *(_row('td', row) for row in rows)])}</table>"
@@ -91,14 +93,14 @@ def _row(tag, cells):
     return f"<tr>{''.join(made)}</tr>"
 
 
-def embedded(png, alt):
+def embedded(png: bytes, alt: str) -> str:
     """HTML of a PNG image, bytes, that brings its data along; alt: what it shows in words."""
     data = base64.b64encode(png).decode("ascii")
     source = f"data:image/png;base64,{data}"
     return f'<img style="{_PICTURE}" alt="{html.escape(alt)}" src="{source}">'
 
 
-def titled(title, *sections, warning=""):
+def titled(title: str, *sections: str, warning: str = "") -> str:
     """HTML of a title, a warning in red where there is one, and sections of HTML below them."""
     lines = [f"<p><b>{html.escape(title)}</b></p>"]
     if warning:
@@ -106,7 +108,7 @@ def titled(title, *sections, warning=""):
     return f"<div>{''.join([*lines, *sections])}</div>"
 
 
-def unfolded(title, text):
+def unfolded(title: str, text: str) -> str:
     """HTML of text that appears, as it stands, when its title is clicked on."""
     words, lines = html.escape(title), html.escape(text)
     return f"<details><summary>{words}</summary><pre>{lines}</pre></details>"

@@ -30,21 +30,22 @@ class EffectUse:
     rounding: bool = False
 
     @property
-    def is_active(self):
+    def is_active(self) -> bool:
         """Whether any event was counted."""
         return self.events > 0
 
     @property
-    def idle(self):
+    def idle(self) -> bool:
         """Whether it is known to have had no part in the run, not even in its rounding."""
         return not (self.is_active or self.kept or self.rounding)
 
-    def negligible(self, tolerance):
+    def negligible(self, tolerance: float) -> bool:
         """Whether it acted, and booked less than a share of the energy, or round-off alone."""
         if self.rounding:
             return not self.kept
-        judged = self.is_active and not (self.steers or self.kept) and self.share is not None
-        return judged and self.share < tolerance
+        if self.share is None or self.steers or self.kept:
+            return False
+        return self.is_active and self.share < tolerance
 
     def __str__(self):
         """One line without the name."""
@@ -66,22 +67,22 @@ class Advice:
     often and where. tolerance: share of the energy below which an effect counts as negligible.
     """
 
-    uses: tuple
+    uses: tuple[EffectUse, ...]
     missing: tuple
     tolerance: float
 
     @property
-    def inactive(self):
+    def inactive(self) -> tuple[str, ...]:
         """Names of the effects that had no part; without them not a bit would differ."""
         return tuple(use.effect for use in self.uses if use.idle)
 
     @property
-    def negligible(self):
+    def negligible(self) -> tuple[str, ...]:
         """Names of the effects that booked less than the tolerance, or no more than round-off."""
         return tuple(use.effect for use in self.uses if use.negligible(self.tolerance))
 
     @property
-    def droppable(self):
+    def droppable(self) -> tuple[str, ...]:
         """Names of the effects that the scene could do without."""
         return self.inactive + self.negligible
 

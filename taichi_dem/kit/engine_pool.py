@@ -9,7 +9,10 @@ asks ``loan.activate()`` before it touches a field.
 """
 
 import weakref
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from typing import Any, Optional
 
+import numpy as np
 import taichi as ti
 from taichi.lang import impl
 
@@ -28,29 +31,30 @@ class Engine:
     #: What to do where the machine lacks the memory, as the end of a sentence.
     advice = "take a smaller one"
 
-    def __init__(self, structure, capacity):
+    def __init__(self, structure: Any, capacity: Iterable[int]):
         self.structure, self.capacity = structure, tuple(capacity)
-        self._holder, self._used = None, False
+        self._holder: Optional[weakref.ref[Loan]] = None
+        self._used = False
         self.tree = FieldTree(self.advice)
         with self.tree:
             self.declare()
 
-    def declare(self):
+    def declare(self) -> None:
         """Declare all fields; no field may be used here."""
         raise NotImplementedError
 
-    def accepts(self, scene) -> bool:
+    def accepts(self, scene: Any) -> bool:
         """Whether a scene of the engine's structure and size can run in it as it is compiled."""
         return True
 
-    def enter(self, scene):
+    def enter(self, scene: Any) -> None:
         """Note on the host whose data are coming to the device."""
 
-    def fits(self, size) -> bool:
+    def fits(self, size: Iterable[int]) -> bool:
         """Whether so many of each find room."""
         return all(most >= wanted for most, wanted in zip(self.capacity, size))
 
-    def clear(self):
+    def clear(self) -> None:
         """Set all fields to zero, as they are in a new engine."""
         if self._used:
             _memory_of(self).clear()
@@ -111,11 +115,12 @@ class Loan:
     "simulation".
     """
 
-    def __init__(self, pool, engine, scene, what):
+    def __init__(self, pool: "EnginePool", engine: Engine, scene: Any, what: str):
         self.pool, self.engine, self.scene, self.what = pool, engine, scene, what
-        self.session, self._aside = runtime.session(), None
+        self.session = runtime.session()
+        self._aside: Any = None
 
-    def activate(self):
+    def activate(self) -> None:
         """Bring the owner's data to the device; those of another owner are kept aside.
 
         Raises InputError for a session that has been stopped, restarted or cleared, and on another
@@ -143,22 +148,22 @@ class Loan:
 class LoanMemory:
     """All fields of a loan that change in a run, by name, as ``FieldMemory`` reads and writes."""
 
-    def __init__(self, loan):
+    def __init__(self, loan: Loan):
         self.loan = loan
 
-    def _memory(self):
+    def _memory(self) -> FieldMemory:
         self.loan.activate()
         return FieldMemory(self.loan.engine)
 
-    def read(self):
+    def read(self) -> dict[str, np.ndarray]:
         """Copies of all fields as arrays by name."""
         return self._memory().read()
 
-    def misfit(self, arrays):
+    def misfit(self, arrays: Mapping[str, np.ndarray]) -> str:
         """Name of a field that arrays lack or do not fit; else ""."""
         return self._memory().misfit(arrays)
 
-    def write(self, arrays):
+    def write(self, arrays: Mapping[str, np.ndarray]) -> None:
         """Give all fields their values back."""
         self._memory().write(arrays)
 
@@ -170,12 +175,13 @@ class EnginePool:
     to powers of two from there, so that few of them are ever compiled.
     """
 
-    def __init__(self, kind, least):
+    def __init__(self, kind: type[Engine], least: Iterable[int]):
         self.kind, self.least = kind, tuple(least)
-        self._session, self._engines = None, {}
+        self._session: Optional[runtime.Session] = None
+        self._engines: dict[Hashable, list[Engine]] = {}
         runtime.when_cleared(self._forget)
 
-    def borrow(self, structure, size, scene, what) -> Loan:
+    def borrow(self, structure: Hashable, size: Sequence[int], scene: Any, what: str) -> Loan:
         """A ``Loan`` of an engine of a structure in which a scene of some size fits.
 
         structure: hashable, equal for scenes that compile to the same kernels. size: as many whole
@@ -192,7 +198,7 @@ class EnginePool:
             engines += fitting
         return Loan(self, min(fitting, key=lambda engine: engine.tree.bytes), scene, what)
 
-    def another(self, engine, scene):
+    def another(self, engine: Engine, scene: Any) -> Engine:
         """An engine like one of those here, of the same capacity, that accepts a scene."""
         engines = self._engines[engine.structure]
         for other in engines:
@@ -213,7 +219,7 @@ class EnginePool:
         self._engines = {}
 
 
-def power_of_two(wanted, least=1) -> int:
+def power_of_two(wanted: int, least: int = 1) -> int:
     """Smallest power of two times ``least`` that is no smaller than ``wanted``."""
     size = max(1, int(least))
     while size < wanted:

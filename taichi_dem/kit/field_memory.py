@@ -1,7 +1,8 @@
 """All fields of an object, found by walking through it, and their bits, read and written fast."""
 
 import types
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 import taichi as ti
@@ -20,11 +21,11 @@ class FieldOf(NamedTuple):
     """A field, where it is found, and whether it is "saved", "constant" or "scratch"."""
 
     name: str
-    field: object
+    field: ti.Field
     kind: str
 
 
-def fields_of(root):
+def fields_of(root: object) -> list[FieldOf]:
     """Every field that can be reached from an object, as a list of FieldOf.
 
     Names are ways of attributes from the root. A class may name in ``constant_fields`` what never
@@ -72,7 +73,7 @@ class FieldMemory:
     a field.
     """
 
-    def __init__(self, root, kind="saved"):
+    def __init__(self, root: object, kind: str = "saved"):
         kept = [one for one in fields_of(root) if one.kind == kind]
         self.fields = {one.name: one.field for one in kept}
         self.views = {}
@@ -80,7 +81,7 @@ class FieldMemory:
             inside = {name: field for name, field in self.fields.items() if in_tree(field)}
             self.views = {name: array_of(field) for name, field in inside.items()}
 
-    def read(self):
+    def read(self) -> dict[str, np.ndarray]:
         """Copies of all fields as arrays by name, without the zeros at their ends."""
         ti.sync()
         return {name: without_end(self._whole(name)).copy() for name in self.fields}
@@ -88,7 +89,7 @@ class FieldMemory:
     def _whole(self, name):
         return self.views[name] if name in self.views else self.fields[name].to_numpy()
 
-    def misfit(self, arrays):
+    def misfit(self, arrays: Mapping[str, np.ndarray]) -> str:
         """Name of a field that arrays, as ``read`` gave them, lack or do not fit; else ""."""
         for name, field in self.fields.items():
             shape, array = _shape(field), arrays.get(name)
@@ -98,7 +99,7 @@ class FieldMemory:
                 return name
         return ""
 
-    def write(self, arrays):
+    def write(self, arrays: Mapping[str, np.ndarray]) -> None:
         """Give all fields their values back, from what ``read`` gave and ``misfit`` accepts."""
         ti.sync()
         for name, field in self.fields.items():
@@ -110,17 +111,18 @@ class FieldMemory:
                 field.from_numpy(whole)
 
 
-def without_end(array):
+def without_end(array: np.ndarray) -> np.ndarray:
     """The array without what is zero in all bits at its end; lists have room to spare."""
     if array.ndim == 0 or array.size == 0:
         return array
-    rows = np.ascontiguousarray(array).view(np.uint8).reshape(len(array), -1).any(axis=1)
+    in_bytes = np.ascontiguousarray(array).view(np.uint8).reshape(len(array), -1)
+    rows: Any = in_bytes.any(axis=1)
     return array[: len(array) - int(rows[::-1].argmax()) if rows.any() else 0]
 
 
 def _shape(field):
     """Shape of a field as an array."""
-    entry = ()
+    entry: tuple[int, ...] = ()
     if isinstance(field, MatrixField):
         entry = (field.n,) if field.ndim == 1 else (field.n, field.m)
     return (*field.shape, *entry)

@@ -4,14 +4,16 @@ import contextlib
 import csv
 import os
 import re
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import path_name, shown
+from taichi_dem.kit.validation import FileName, path_name, shown
 
 
-def output_folder(path):
+def output_folder(path: FileName) -> str:
     """Make a folder for output and return its path, with a leading "~" as the user's home.
 
     Raises InputError when it cannot be made or written to.
@@ -33,7 +35,7 @@ def output_folder(path):
 
 
 @contextlib.contextmanager
-def renamed_when_done(path):
+def renamed_when_done(path: FileName) -> Iterator[str]:
     """A temporary name beside ``path`` that becomes ``path`` only after a complete write."""
     path = path_name("file", path)
     folder, name = os.path.split(path)
@@ -51,7 +53,7 @@ def renamed_when_done(path):
             os.remove(temporary)
 
 
-def remove_files(folder, pattern):
+def remove_files(folder: FileName, pattern: str) -> None:
     """Remove the files of a folder, if there is one, whose whole names match a regular expression.
 
     Raises InputError when one of them cannot be removed.
@@ -68,7 +70,7 @@ def remove_files(folder, pattern):
                 raise InputError(f"cannot remove {path} of an earlier run: {reason}") from None
 
 
-def write_whole(path, write):
+def write_whole(path: FileName, write: Callable[[str], object]) -> None:
     """Write a file through ``write(name)``, whole or not at all.
 
     Raises InputError when the file cannot be written.
@@ -77,14 +79,14 @@ def write_whole(path, write):
         write(temporary)
 
 
-def write_text(path, text):
+def write_text(path: FileName, text: str) -> None:
     """Write text as a file. Raises InputError when it cannot be written."""
     with renamed_when_done(path) as temporary:
         with open(temporary, "w", encoding="utf-8", newline="\n") as file:
             file.write(text)
 
 
-def write_csv(path, columns):
+def write_csv(path: FileName, columns: Mapping[str, ArrayLike]) -> None:
     """Write columns of equal length, a dict of name to sequence, as a CSV file.
 
     Raises InputError when it cannot be written.

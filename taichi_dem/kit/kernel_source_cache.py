@@ -8,6 +8,8 @@ time a program starts. What comes of it is kept here.
 
 import functools
 import textwrap
+from collections.abc import Callable
+from typing import Any
 
 from taichi.lang import kernel_impl
 from taichi.lang.ast import ast_transformer_utils
@@ -17,7 +19,7 @@ _MOST = 1 << 16
 
 
 @functools.lru_cache(maxsize=_MOST)
-def broken(text, width):
+def broken(text: str, width: int) -> tuple[str, ...]:
     """A text in lines of at most some characters, a tuple, as ``textwrap.wrap`` breaks it."""
     return tuple(textwrap.wrap(text, width))
 
@@ -25,12 +27,12 @@ def broken(text, width):
 class RememberingWrapper(textwrap.TextWrapper):
     """A ``textwrap.TextWrapper`` with the usual options that looks up what it broke before."""
 
-    def wrap(self, text):
+    def wrap(self, text: str) -> list[str]:
         """Lines of a text, a list."""
         return list(broken(text, self.width))
 
 
-def remembering(find):
+def remembering(find: Callable[[Any], Any]) -> Callable[[Any], Any]:
     """A function's source lines and where they begin, as find gives them, each looked for once."""
     cached = {}
 
@@ -42,11 +44,11 @@ def remembering(find):
             cached[key] = find(function)
         return cached[key]
 
-    lines.cached = cached
+    lines.cached = cached  # type: ignore[attr-defined]
     return lines
 
 
-def remember():
+def remember() -> None:
     """Let Taichi use both, where it has them by the names of Taichi 1.7; once is enough."""
     if hasattr(ast_transformer_utils, "TextWrapper"):
         ast_transformer_utils.TextWrapper = RememberingWrapper

@@ -8,17 +8,26 @@ import argparse
 import ast
 import inspect
 import pkgutil
+from collections.abc import Callable, Iterable, Sequence
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
+from typing import Optional
 
 from taichi_dem.kit.progress.lasting_output import lasting_output
 from taichi_dem.kit.version import __version__
+
+#: Name and line; title and rows.
+Row = tuple[str, str]
+Section = tuple[str, list[Row]]
 
 _ROOT = Path(__file__).resolve().parents[2]
 _PACKAGES = ("taichi_dem", "ca_damper")
 
 
-def run(package, sections, arguments=None):
+def run(
+    package: ModuleType, sections: Iterable[Section], arguments: Optional[Sequence[str]] = None
+) -> None:
     """Print the sections of a package, its experiments and where its documentation is."""
     parser = argparse.ArgumentParser(
         prog=f"python -m {package.__name__}",
@@ -35,17 +44,17 @@ def run(package, sections, arguments=None):
     _show("\n".join([*head, *map(_section, [*sections, *tail])]))
 
 
-def first_line(docstring):
+def first_line(docstring: Optional[str]) -> str:
     """First line of a docstring, "" where there is none."""
     return inspect.cleandoc(docstring or "").partition("\n")[0]
 
 
-def described(prefix, owner, names):
+def described(prefix: str, owner: object, names: Iterable[str]) -> list[Row]:
     """Rows of the members of a module that bear these names, called prefix.name."""
     return [(f"{prefix}.{name}", _line(owner, name)) for name in names]
 
 
-def own(module, kind):
+def own(module: ModuleType, kind: Callable[[object], bool]) -> list[str]:
     """Names of what a module itself defines in public, in order; kind: such as inspect.isclass."""
     return [
         name
@@ -54,7 +63,7 @@ def own(module, kind):
     ]
 
 
-def instances(module, kind):
+def instances(module: ModuleType, kind: type) -> list[str]:
     """Names of the public constants of a class that a module holds."""
     return [
         name
@@ -63,13 +72,13 @@ def instances(module, kind):
     ]
 
 
-def modules(package):
+def modules(package: ModuleType) -> list[ModuleType]:
     """Modules of a package, in order of their names."""
     names = [found.name for found in pkgutil.iter_modules(package.__path__)]
     return [import_module(f"{package.__name__}.{name}") for name in names]
 
 
-def experiments(root):
+def experiments(root: Path) -> list[Row]:
     """Rows of the scripts of a checkout, none elsewhere; they are read, not run."""
     if not _is_checkout(root):
         return []
@@ -77,12 +86,12 @@ def experiments(root):
     return [(f"python experiments/{path.name}", first_line(_docstring(path))) for path in paths]
 
 
-def documentation(root):
+def documentation(root: Path) -> list[Row]:
     """Rows of pages by their first headings: of a checkout, or what an installation has of them."""
     rows = [("python -m pydoc NAME", "all that a name above does: arguments, units, errors")]
     if not _is_checkout(root):
-        pages = root.glob("taichi_dem-*.dist-info/METADATA")
-        return rows + [(str(page), "README, below the lines on the package") for page in pages]
+        about = root.glob("taichi_dem-*.dist-info/METADATA")
+        return rows + [(str(page), "README, below the lines on the package") for page in about]
     pages = [*sorted(root.glob("*.md")), *sorted((root / "docs").glob("*.md"))]
     rows += [(page.relative_to(root).as_posix(), _heading(page)) for page in pages]
     return [*rows, ("make api", "pages of all modules from their docstrings")]

@@ -2,7 +2,9 @@
 
 import contextlib
 import io
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -14,6 +16,7 @@ from matplotlib.ticker import LogFormatterSciNotation
 from PIL import Image
 
 from taichi_dem.kit.files import write_whole
+from taichi_dem.kit.validation import FileName
 
 STYLE = {
     "savefig.dpi": 150,
@@ -84,29 +87,33 @@ _SAME = {
 _SPARE = (BLUE, RED, GREEN, PURPLE, ORANGE, SKY, BROWN, VIOLET)
 
 
-def styles_of(names):
+def styles_of(names: Iterable[str]) -> dict[str, MethodStyle]:
     """MethodStyle of each name: that of ``STYLES``, or else the name itself and a spare colour."""
-    known = {name: STYLES.get(_SAME.get(name, name)) for name in names}
-    taken = {style.colour for style in known.values() if style}
+    found = {name: STYLES.get(_SAME.get(name, name)) for name in names}
+    taken = {style.colour for style in found.values() if style}
     spare = [colour for colour in _SPARE if colour not in taken] or list(_SPARE)
-    others = [name for name, style in known.items() if style is None]
-    for k, name in enumerate(others):
-        known[name] = MethodStyle(name, spare[k % len(spare)], "osD^vPX"[k % 7], ("-", "--")[k % 2])
-    return known
+    others = [name for name, style in found.items() if style is None]
+    made = {
+        name: MethodStyle(name, spare[k % len(spare)], "osD^vPX"[k % 7], ("-", "--")[k % 2])
+        for k, name in enumerate(others)
+    }
+    return {name: style or made[name] for name, style in found.items()}
 
 
-def line_key(label, **look):
+def line_key(label: str, **look: Any) -> Line2D:
     """A line or marker for a legend alone; look: as of ``Axes.plot``."""
     return Line2D([], [], label=label, **look)
 
 
-def area_key(label, **look):
+def area_key(label: str, **look: Any) -> Patch:
     """A coloured area for a legend alone; look: facecolor, edgecolor, alpha."""
     return Patch(label=label, **look)
 
 
 @contextlib.contextmanager
-def styled(rows=1, columns=1, size=(6.4, 4.2), **options):
+def styled(
+    rows: int = 1, columns: int = 1, size: tuple[float, float] = (6.4, 4.2), **options: Any
+) -> Iterator[tuple[Figure, Any]]:
     """A figure and its axes in the common style, which holds to the end of the block.
 
     size: in inches. rows: 0 for no axes, which the block then makes. options: of
@@ -119,7 +126,7 @@ def styled(rows=1, columns=1, size=(6.4, 4.2), **options):
 
 
 @contextlib.contextmanager
-def picture(path, *shape, **options):
+def picture(path: FileName, *shape: Any, **options: Any) -> Iterator[tuple[Figure, Any]]:
     """A figure and its axes, as of ``styled``, written as PNG when the block ends well.
 
     Raises InputError when the file cannot be written.
@@ -150,7 +157,7 @@ def _write_plain_numbers(figure):
                 give(_PlainLogFormatter())
 
 
-def png_of(figure, dpi=110):
+def png_of(figure: Figure, dpi: float = 110) -> bytes:
     """A figure as PNG, in bytes; within the block of ``styled``."""
     content = io.BytesIO()
     figure.savefig(content, format="png", dpi=dpi)
@@ -158,7 +165,9 @@ def png_of(figure, dpi=110):
 
 
 @contextlib.contextmanager
-def filming(size, dpi, style):
+def filming(
+    size: tuple[float, float], dpi: float, style: Mapping[str, Any]
+) -> Iterator[tuple[Figure, Callable[[], None], list[Image.Image]]]:
     """A figure, a function that takes it as the next image, and the RGB images taken so far.
 
     size: in inches, at dpi pixels each. style: of matplotlib. The layout stays that of the first
@@ -166,7 +175,8 @@ def filming(size, dpi, style):
     """
     with matplotlib.rc_context(style):
         figure = Figure(figsize=size, dpi=dpi, layout="constrained")
-        canvas, images = FigureCanvasAgg(figure), []
+        canvas = FigureCanvasAgg(figure)
+        images: list[Image.Image] = []
 
         def shoot():
             """Take the figure as the next image."""
@@ -179,7 +189,7 @@ def filming(size, dpi, style):
         yield figure, shoot, images
 
 
-def seconds(value):
+def seconds(value: float) -> str:
     """A time in words, with a unit that keeps the number readable: 3.125e-10 -> 0.313 ns."""
     for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
         if value >= size:
@@ -187,7 +197,7 @@ def seconds(value):
     return f"{value / 1e-9:.3g} ns"
 
 
-def power(value):
+def power(value: float) -> str:
     """A number with two figures and a power of ten: 3.1e-07 -> 3.1 × 10⁻⁷, 1e-06 -> 10⁻⁶."""
     factor, exponent = f"{value:.1e}".split("e")
     raised = str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
@@ -195,7 +205,13 @@ def power(value):
     return f"10{raised}" if factor == "1" else f"{factor} × 10{raised}"
 
 
-def write_gif(path, images, milliseconds, colours=64, samples=8):
+def write_gif(
+    path: FileName,
+    images: Sequence[Image.Image],
+    milliseconds: float,
+    colours: int = 64,
+    samples: int = 8,
+) -> None:
     """Write RGB images as a GIF with one palette, made from some of them, evenly over the whole.
 
     milliseconds: a frame. Raises InputError when the file cannot be written.

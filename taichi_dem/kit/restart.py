@@ -1,6 +1,10 @@
 """Runs that save themselves: what a run consists of, when it is saved, how one goes on from it."""
 
 import os
+from collections.abc import Callable, Mapping
+from typing import Optional, Protocol
+
+import numpy as np
 
 from taichi_dem.kit.checkpoint import (
     Checkpoint,
@@ -12,27 +16,50 @@ from taichi_dem.kit.checkpoint import (
 )
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import output_folder
+from taichi_dem.kit.validation import FileName
+
+
+class Memory(Protocol):
+    """Fields on the device, such as ``FieldMemory`` or ``engine_pool.LoanMemory``."""
+
+    def read(self) -> dict[str, np.ndarray]:
+        """Copies of all fields as arrays by name."""
+
+    def misfit(self, arrays: Mapping[str, np.ndarray], /) -> str:
+        """Name of a field that arrays lack or do not fit; else ""."""
+
+    def write(self, arrays: Mapping[str, np.ndarray], /) -> None:
+        """Give all fields their values back."""
+
+
+class Owner(Protocol):
+    """Part of a run that holds changing values on the host."""
+
+    def saved(self) -> dict[str, np.ndarray]:
+        """Arrays by name."""
+
+    def resume(self, saved: Mapping[str, np.ndarray], /) -> None:
+        """Take over the arrays that ``saved`` gave."""
 
 
 class RunSnapshot:
     """All of a run that changes: the fields on the device and what its owners hold beside them.
 
     identity: what two runs must share for one to go on from the other, words by name. memory: of
-    the fields, as ``FieldMemory`` or ``engine_pool.LoanMemory``. owners: by name, objects with
-    ``saved()``, which gives arrays by name, and ``resume(arrays)``, which takes them over.
+    the fields. owners: by name.
     """
 
-    def __init__(self, identity, memory, owners):
+    def __init__(self, identity: Mapping[str, str], memory: Memory, owners: Mapping[str, Owner]):
         self.identity, self.memory, self.owners = identity, memory, owners
 
-    def write(self, path):
+    def write(self, path: FileName) -> None:
         """Save the run as it is, between two steps. Raises InputError."""
         arrays = {f"field/{name}": array for name, array in self.memory.read().items()}
         for part, owner in self.owners.items():
             arrays.update({f"{part}/{name}": array for name, array in owner.saved().items()})
         write_checkpoint(path, self.identity, arrays)
 
-    def restore(self, arrays, path):
+    def restore(self, arrays: Mapping[str, np.ndarray], path: FileName) -> None:
         """Put the run where it was saved, with the arrays that ``opened`` gave for a path.
 
         Raises InputError where the fields are not those of this run.
@@ -61,23 +88,26 @@ class CheckpointWriter:
     and time [s]. All methods are called between two steps only.
     """
 
-    def __init__(self, checkpoint, snapshot, now):
+    def __init__(
+        self, checkpoint: Checkpoint, snapshot: RunSnapshot, now: Callable[[], tuple[int, float]]
+    ):
         self.checkpoint, self.snapshot, self.now = checkpoint, snapshot, now
-        self.timer, self.ctrl_c, self.saved_s = SaveTimer(checkpoint), CtrlC(), None
+        self.timer, self.ctrl_c = SaveTimer(checkpoint), CtrlC()
+        self.saved_s: Optional[float] = None
         self.timer.saved_at(*now())
 
-    def __enter__(self):
+    def __enter__(self) -> "CheckpointWriter":
         self.ctrl_c.__enter__()
         return self
 
     def __exit__(self, *error):
         self.ctrl_c.__exit__(*error)
 
-    def marks(self, last, dt):
+    def marks(self, last: int, dt: float) -> set[int]:
         """Steps of dt [s] up to the last at which to look, a set."""
         return self.checkpoint.marks(last, dt)
 
-    def save_if_needed(self):
+    def save_if_needed(self) -> None:
         """Save the run if that is due. Raises Interrupted after Ctrl-C, InputError."""
         step, time_s = self.now()
         if self.ctrl_c.asked or self.timer.now(step, time_s):
@@ -85,16 +115,17 @@ class CheckpointWriter:
         if self.ctrl_c.asked:
             raise Interrupted(time_s, self.checkpoint.path)
 
-    def save(self):
+    def save(self) -> None:
         """Save the run. Raises InputError that tells what the last good checkpoint is."""
         try:
             self.snapshot.write(self.checkpoint.path)
         except InputError as error:
             raise InputError(f"{error}{self.last_good()}") from None
-        step, self.saved_s = self.now()
-        self.timer.saved_at(step, self.saved_s)
+        step, time_s = self.now()
+        self.saved_s = time_s
+        self.timer.saved_at(step, time_s)
 
-    def last_good(self):
+    def last_good(self) -> str:
         """What is left to go on from, as the end of a sentence."""
         if self.saved_s is None:
             return "; this run has saved no checkpoint before"
@@ -105,28 +136,32 @@ class CheckpointWriter:
 class NoCheckpointWriter:
     """Stands where a run is not to be saved."""
 
-    def __enter__(self):
+    def __enter__(self) -> "NoCheckpointWriter":
         return self
 
     def __exit__(self, *error):
         """Nothing to end."""
 
-    def marks(self, last, dt):
+    def marks(self, last: int, dt: float) -> set[int]:
         """None."""
         return set()
 
-    def save_if_needed(self):
+    def save_if_needed(self) -> None:
         """Nothing to do."""
 
-    def save(self):
+    def save(self) -> None:
         """Nothing to save."""
 
-    def last_good(self):
+    def last_good(self) -> str:
         """No words."""
         return ""
 
 
-def opened(checkpoint, resume, identity):
+def opened(
+    checkpoint: Optional[Checkpoint],
+    resume: Optional[FileName],
+    identity: Callable[[], Mapping[str, str]],
+) -> Optional[dict[str, np.ndarray]]:
     """Look, before anything dear is done, whether a run can be saved and gone on with.
 
     checkpoint: a Checkpoint or None. resume: file to go on from, or None. identity: gives that of

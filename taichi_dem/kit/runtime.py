@@ -11,8 +11,10 @@ import os
 import tempfile
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Optional
 
 os.environ.setdefault("TI_SKIP_VERSION_CHECK", "ON")
 os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
@@ -48,9 +50,9 @@ class Settings:
 # Taichi holds the lock of its kernel cache for well under a second.
 _STALE_LOCK_S = 10.0
 
-_current = None
-_session = None
-_on_clear = []
+_current: Optional[Settings] = None
+_session: Optional["Session"] = None
+_on_clear: list[Callable[[], object]] = []
 
 
 class Session:
@@ -65,7 +67,7 @@ class Session:
         self.cleared = False
 
 
-def start(arch="cpu", threads=None, debug=False):
+def start(arch: str = "cpu", threads: Optional[int] = None, debug: bool = False) -> Settings:
     """Start Taichi, or do nothing when it already runs with these settings.
 
     arch: "cpu" or "cuda". threads: number of CPU threads, all cores by default. debug: check
@@ -75,7 +77,7 @@ def start(arch="cpu", threads=None, debug=False):
     """
     global _current, _session
     wanted = _checked(arch, threads, debug)
-    if _current is not None and impl.get_runtime().prog is _session.program:
+    if _current and _session and impl.get_runtime().prog is _session.program:
         if wanted != _current:
             raise InputError(
                 f"Taichi already runs with {_current}, asked for {wanted}: call stop()"
@@ -86,14 +88,14 @@ def start(arch="cpu", threads=None, debug=False):
     return _current
 
 
-def stop():
+def stop() -> None:
     """End the Taichi session; every model, state and result field made in it becomes invalid."""
     global _current, _session
     ti.reset()
     _current = _session = None
 
 
-def clear():
+def clear() -> None:
     """Give back the memory of all engines; simulations and batches made so far become invalid.
 
     Kernels compile anew afterwards; Taichi itself goes on. Does nothing before the first start.
@@ -108,12 +110,12 @@ def clear():
     _session = Session()
 
 
-def when_cleared(forget):
+def when_cleared(forget: Callable[[], object]) -> None:
     """Have forget() called by ``clear``."""
     _on_clear.append(forget)
 
 
-def session():
+def session() -> Session:
     """The running ``Session``; objects that own fields remember the one they were made in.
 
     Raises InputError when Taichi was not started.
@@ -123,7 +125,7 @@ def session():
     return _session
 
 
-def check_session(made_in, what):
+def check_session(made_in: Session, what: str) -> None:
     """Raise InputError unless a session is the present one, unharmed, and asked by its thread.
 
     what: whose session it is, in words, such as "simulation".
@@ -140,7 +142,7 @@ def check_session(made_in, what):
     check_thread(what)
 
 
-def check_thread(what):
+def check_thread(what: str) -> None:
     """Raise InputError on another thread than the one that started Taichi."""
     if threading.get_ident() != session().thread:
         raise InputError(
@@ -149,7 +151,7 @@ def check_thread(what):
         )
 
 
-def settings():
+def settings() -> Optional[Settings]:
     """Settings of the running session, or None before the first start."""
     return _current
 
@@ -205,7 +207,7 @@ def _remove_stale_lock():
             lock.unlink()
 
 
-def cuda_present():
+def cuda_present() -> bool:
     """Whether a CUDA device answers on this machine."""
     # Taichi would say on stderr that it finds no libcuda; the caller says it in a sentence.
     ti.set_logging_level(ti.ERROR)

@@ -1,5 +1,8 @@
 """Number types shared by all kernels: double precision, small vectors and matrices."""
 
+from typing import Union
+
+import numpy as np
 import taichi as ti
 
 real = ti.f64
@@ -8,3 +11,6 @@ vec3 = ti.types.vector(3, ti.f64)
 vec4 = ti.types.vector(4, ti.f64)
 vec6 = ti.types.vector(6, ti.f64)
 mat3 = ti.types.matrix(3, 3, ti.f64)
+
+#: On the host: one number, or an array of them.
+FloatOrArray = Union[float, np.ndarray]

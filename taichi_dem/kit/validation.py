@@ -3,8 +3,15 @@
 import math
 import numbers
 import os
+from collections.abc import Callable, Collection
+from typing import Any, TypeVar, Union
 
 from taichi_dem.kit.errors import InputError
+
+#: Name of a file or folder.
+FileName = Union[str, os.PathLike]
+#: What a check of one value gives.
+Checked = TypeVar("Checked")
 
 #: Positive numbers lie between these, so that products of a few of them stay finite: beyond, one
 #: overflows to infinity or falls to zero, and a run ends in NaN without a reason. In SI units
@@ -16,7 +23,7 @@ AUTO = "auto"
 _QUOTED = 80
 
 
-def shown(value):
+def shown(value: Any) -> str:
     """A value as a sentence quotes it: on one line, and cut where it is long."""
     try:
         text = " ".join(repr(value).split())
@@ -26,7 +33,7 @@ def shown(value):
     return text if len(text) <= _QUOTED else f"{text[: _QUOTED - 3]}..."
 
 
-def finite(value):
+def finite(value: Any) -> bool:
     """Whether a value is a real number, no truth value, and finite as a float."""
     if not isinstance(value, numbers.Real) or isinstance(value, bool):
         return False
@@ -36,7 +43,7 @@ def finite(value):
         return False
 
 
-def positive(name, value, zero_allowed=False):
+def positive(name: str, value: Any, zero_allowed: bool = False) -> float:
     """The value as a float; InputError unless it is a finite number above (or at) zero.
 
     It must lie between SMALLEST and LARGEST, where products of a few numbers stay finite.
@@ -52,21 +59,21 @@ def positive(name, value, zero_allowed=False):
     return float(value)
 
 
-def between(name, value, least, most):
+def between(name: str, value: Any, least: float, most: float) -> float:
     """The value as a float; InputError unless it is a number from least to most."""
     if not finite(value) or not least <= value <= most:
         raise InputError(f"{name} must be a number from {least:g} to {most:g}, got {shown(value)}")
     return float(value)
 
 
-def fraction(name, value):
+def fraction(name: str, value: Any) -> float:
     """The value as a float; InputError unless it lies in [0, 1]."""
     if not finite(value) or not 0.0 <= value <= 1.0:
         raise InputError(f"{name} must lie in [0, 1], got {shown(value)}")
     return float(value)
 
 
-def whole(name, value, least, most):
+def whole(name: str, value: Any, least: int, most: int) -> int:
     """The value as an int; InputError unless it is a whole number from least to most."""
     integral = isinstance(value, numbers.Integral) and not isinstance(value, bool)
     if not integral or not least <= value <= most:
@@ -76,21 +83,21 @@ def whole(name, value, least, most):
     return int(value)
 
 
-def flag(name, value):
+def flag(name: str, value: Any) -> bool:
     """The value; InputError unless it is True or False."""
     if not isinstance(value, bool):
         raise InputError(f"{name} must be True or False, got {shown(value)}")
     return value
 
 
-def choice(name, value, allowed):
+def choice(name: str, value: Any, allowed: Collection[str]) -> str:
     """The value; InputError unless it is one of the words allowed."""
     if not isinstance(value, str) or value not in tuple(allowed):
         raise InputError(f"{name} must be one of {', '.join(allowed)}, got {shown(value)}")
     return value
 
 
-def choices(name, values, allowed):
+def choices(name: str, values: Any, allowed: Collection[str]) -> tuple[str, ...]:
     """Words as a tuple; InputError unless they are a list or tuple of words allowed."""
     several = isinstance(values, (list, tuple))
     if not several or not all(isinstance(v, str) and v in tuple(allowed) for v in values):
@@ -98,7 +105,7 @@ def choices(name, values, allowed):
     return tuple(values)
 
 
-def word(name, value):
+def word(name: str, value: Any) -> str:
     """The value; InputError unless it is text that a mesh file can hold as a name."""
     if not isinstance(value, str) or not value or not value.isprintable() or '"' in value:
         raise InputError(
@@ -108,7 +115,7 @@ def word(name, value):
     return value
 
 
-def instance(name, value, kind):
+def instance(name: str, value: Any, kind: Union[type, tuple[type, ...]]) -> Any:
     """The value; InputError unless it is an object of a class, or of one of several."""
     kinds = kind if isinstance(kind, tuple) else (kind,)
     if not isinstance(value, kinds):
@@ -118,14 +125,14 @@ def instance(name, value, kind):
     return value
 
 
-def progress_option(name, value):
+def progress_option(name: str, value: Any) -> Any:
     """The value; InputError unless it is a function, "auto" (a bar where watched) or None."""
     if value is None or callable(value) or (isinstance(value, str) and value == AUTO):
         return value
     raise InputError(f'{name} must be a function, "{AUTO}" or None, got {shown(value)}')
 
 
-def path_name(name, value):
+def path_name(name: str, value: Any) -> str:
     """The value as text, a leading "~" as the user's home.
 
     InputError unless it can be the name of a file or folder.
@@ -136,7 +143,7 @@ def path_name(name, value):
     return os.path.expanduser(text)
 
 
-def several(name, values, check):
+def several(name: str, values: Any, check: Callable[[str, Any], Checked]) -> tuple[Checked, ...]:
     """One value or a sequence as a tuple, each of them passed through check(name, value).
 
     InputError for an empty sequence, or for what check refuses.
@@ -150,7 +157,7 @@ def several(name, values, check):
     return checked
 
 
-def direction(name, value):
+def direction(name: str, value: Any) -> tuple[float, ...]:
     """Three finite numbers as a tuple of floats; InputError otherwise."""
     try:
         three = tuple(value)

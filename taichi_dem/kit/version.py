@@ -6,7 +6,7 @@ import taichi as ti
 __version__ = "0.1.0"
 
 
-def taichi_version():
+def taichi_version() -> str:
     """Version of Taichi, such as 1.7.4.
 
     From the module: a package that runs from a path has no metadata to ask.

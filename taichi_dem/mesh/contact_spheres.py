@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichi_dem.kit.display import by_fields
+from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.tetrahedra import all_faces, area_vectors
 
 #: Steps towards the centre of a small ball around spheres, and what stands for no distance [m].
@@ -34,19 +35,19 @@ class ContactSpheres:
         return by_fields(self)
 
     @property
-    def per_face(self):
+    def per_face(self) -> int:
         """Number of spheres on a face."""
         return self.radius.shape[2]
 
 
-def interior_crossings(divisions):
+def interior_crossings(divisions: int) -> np.ndarray:
     """Barycentric coordinates (k, 3) of the interior crossings for edges cut in n equal parts."""
     n = divisions
     rows = [(a, b, n - a - b) for a in range(1, n) for b in range(1, n - a)]
     return np.array(rows, dtype=float) / n
 
 
-def spheres_of_faces(mesh, centre, divisions=5):
+def spheres_of_faces(mesh: Mesh, centre: np.ndarray, divisions: int = 5) -> ContactSpheres:
     """Spheres tangent to their own face and as large as the other three faces allow.
 
     centre: centres of the bodies (body_count, 3) [m]. The radius is the smallest of

@@ -3,11 +3,16 @@
 import os
 import re
 import shlex
+from collections.abc import Sequence
+from typing import Any, NoReturn
 
 import numpy as np
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.mesh.split import shape_of
+
+#: Name of a group that is not read, and what it is of.
+Unread = tuple[str, str]
 
 #: Gmsh's groups by their dimension.
 _KINDS = {0: "points", 1: "lines", 3: "volumes"}
@@ -33,7 +38,7 @@ _IN_A_GROUP = (
 )
 
 
-def refuse_without_tetrahedra(raw, path, printed=""):
+def refuse_without_tetrahedra(raw: Any, path: str, printed: str = "") -> NoReturn:
     """Raise InputError for a file that has no tetrahedra, with what to do about it.
 
     printed: what the reader wrote to the terminal.
@@ -65,7 +70,7 @@ def _as_stl(name):
     return f"cp -- {shlex.quote(name)} {_PLAIN} && ", _PLAIN
 
 
-def cells_counted(count, kind):
+def cells_counted(count: int, kind: str) -> str:
     """A number of cells in words: "1 hexahedron", "8 hexahedra", "3 wedge15 cells"."""
     plurals = {"hexahedron": "hexahedra", "wedge": "wedges", "pyramid": "pyramids"}
     if count == 1 or kind not in plurals:
@@ -73,14 +78,14 @@ def cells_counted(count, kind):
     return f"{count} {plurals[kind]}"
 
 
-def cells_dropped(printed):
+def cells_dropped(printed: str) -> str:
     """A sentence about cells that meshio passes over, or ""; printed: what it wrote to say so."""
     if "cells that meshio cannot handle" not in " ".join(printed.split()):
         return ""
     return f"it {_UNKNOWN}, and these are not read: {_SPLIT}"
 
 
-def reason_of(error, printed):
+def reason_of(error: BaseException, printed: str) -> str:
     """Why a reader failed, in words: an exception may hold a number only.
 
     printed: what the reader wrote to the terminal, where meshio explains itself before it exits.
@@ -94,7 +99,7 @@ def reason_of(error, printed):
     return named.strip()
 
 
-def refuse_uncut(raw, path):
+def refuse_uncut(raw: Any, path: str) -> None:
     """Raise InputError for solid cells that cannot be cut: dropped, they would leave holes."""
     others = _held(raw, lambda block: block.dim == 3 and not is_solid(block.type))
     if others:
@@ -103,27 +108,27 @@ def refuse_uncut(raw, path):
         )
 
 
-def is_solid(kind):
+def is_solid(kind: str) -> bool:
     """Whether a cell type of meshio is a tetrahedron or can be cut into some."""
     return is_tetrahedron(kind) or shape_of(kind) is not None
 
 
-def is_tetrahedron(kind):
+def is_tetrahedron(kind: str) -> bool:
     """Whether a cell type of meshio is a tetrahedron of any order."""
     return kind.startswith("tetra") or kind == "VTK_LAGRANGE_TETRAHEDRON"
 
 
-def is_triangle(kind):
+def is_triangle(kind: str) -> bool:
     """Whether a cell type of meshio is a triangle of any order."""
     return kind.startswith("triangle") or kind == "VTK_LAGRANGE_TRIANGLE"
 
 
-def is_quadrangle(kind):
+def is_quadrangle(kind: str) -> bool:
     """Whether a cell type of meshio is a quadrangle of any order."""
     return kind.startswith("quad") or kind == "VTK_LAGRANGE_QUADRILATERAL"
 
 
-def unread_groups(raw):
+def unread_groups(raw: Any) -> tuple[Unread, ...]:
     """Groups that are not of faces, as pairs of name and what they are of."""
     names = {(int(tag), int(dimension)): name for name, (tag, dimension) in raw.field_data.items()}
     found = []
@@ -137,7 +142,7 @@ def unread_groups(raw):
     return tuple(dict.fromkeys(found))
 
 
-def surfaces_of_abaqus(path):
+def surfaces_of_abaqus(path: str) -> tuple[Unread, ...]:
     """Surfaces of an Abaqus file, which meshio passes over, pairs as in ``unread_groups``."""
     if not path.lower().endswith(".inp"):
         return ()
@@ -147,7 +152,7 @@ def surfaces_of_abaqus(path):
     return tuple(dict.fromkeys((name[1].strip(), _SURFACE) for name in names if name))
 
 
-def parts_dropped(raw, groups):
+def parts_dropped(raw: Any, groups: Sequence[Unread]) -> list[str]:
     """Sentences about what is not read and may change a result; groups: from ``unread_groups``.
 
     One group of volumes says nothing that the tetrahedra do not say.
@@ -166,7 +171,7 @@ def parts_dropped(raw, groups):
     return sentences
 
 
-def others_dropped(raw, groups):
+def others_dropped(raw: Any, groups: Sequence[Unread]) -> list[str]:
     """Sentences about groups that are not read and seldom matter; groups: ``unread_groups``."""
     others = [
         f"{name} (of {kind})"

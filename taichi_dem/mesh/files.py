@@ -1,13 +1,13 @@
 """Mesh files: read all that meshio can, write Gmsh, VTU and PVD; the only importer of meshio."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import os
 import warnings
 from collections import defaultdict
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Optional
 from xml.sax.saxutils import quoteattr
 
 import meshio
@@ -16,7 +16,7 @@ import numpy as np
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import renamed_when_done, write_text
 from taichi_dem.kit.timeout import run_with_timeout
-from taichi_dem.kit.validation import path_name, positive
+from taichi_dem.kit.validation import FileName, path_name, positive
 from taichi_dem.mesh.content import (
     cells_counted,
     cells_dropped,
@@ -42,7 +42,7 @@ _PATIENCE_S = 20.0
 _SLOWEST_BYTES_PER_S = 1e5
 
 
-def read_mesh(path, *, scale=1.0, weld_tolerance=0.0) -> Mesh:
+def read_mesh(path: FileName, *, scale: float = 1.0, weld_tolerance: float = 0.0) -> Mesh:
     """Read solid cells and named face groups from a file (Gmsh 2.2 or 4.1, VTK, VTU, ...).
 
     scale: length of one unit of the file [m], e.g. 0.001 for a drawing in mm.
@@ -78,7 +78,7 @@ def read_mesh(path, *, scale=1.0, weld_tolerance=0.0) -> Mesh:
     return replace(mesh, notes=notes, source=path, unread=unread)
 
 
-def write_mesh(path, mesh) -> None:
+def write_mesh(path: FileName, mesh: Mesh) -> None:
     """Write a mesh with its named groups as a Gmsh 2.2 text file (exact: 17 digits)."""
     names = list(mesh.groups)
     lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$PhysicalNames", str(len(names) + 1)]
@@ -93,18 +93,24 @@ def write_mesh(path, mesh) -> None:
     write_text(path, "\n".join([*lines, "$EndElements", ""]))
 
 
-def write_vtu(path, points, tetrahedra, point_data=None, cell_data=None) -> None:
+def write_vtu(
+    path: FileName,
+    points: np.ndarray,
+    tetrahedra: np.ndarray,
+    point_data: Optional[Mapping[str, np.ndarray]] = None,
+    cell_data: Optional[Mapping[str, np.ndarray]] = None,
+) -> None:
     """Write tetrahedra with data as a compressed VTU file, for ParaView.
 
     point_data: name -> (point_count, ...).  cell_data: name -> (body_count, ...).
     """
-    cell_data = {name: [np.asarray(values)] for name, values in (cell_data or {}).items()}
-    content = meshio.Mesh(points, [("tetra", tetrahedra)], point_data or {}, cell_data)
+    of_cells = {name: [np.asarray(values)] for name, values in (cell_data or {}).items()}
+    content = meshio.Mesh(points, [("tetra", tetrahedra)], point_data or {}, of_cells)
     with renamed_when_done(path) as temporary:
         meshio.write(temporary, content, file_format="vtu", compression="zlib")
 
 
-def write_pvd(path, times_s, file_names) -> None:
+def write_pvd(path: FileName, times_s: Sequence[float], file_names: Sequence[str]) -> None:
     """Write the list of VTU files of a time series, which ParaView opens as one.
 
     times_s: time of each file [s].  file_names: relative to the folder of ``path``.
@@ -147,7 +153,8 @@ def _meshio_read(path):
 
 def _mesh(raw, scale, weld_tolerance):
     """The mesh of a file's cells, cut once their points are welded; raw gets the welded numbers."""
-    notes, welding = [], []
+    notes: list[str] = []
+    welding: list[str] = []
     with np.errstate(over="ignore"):  # checked_mesh refuses what is no finite number
         points = scale * np.asarray(raw.points, dtype=np.float64)
     tetrahedra = _tetrahedra(raw, notes)

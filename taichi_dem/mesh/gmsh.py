@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import renamed_when_done
-from taichi_dem.kit.validation import finite, path_name, positive, shown
+from taichi_dem.kit.validation import FileName, finite, path_name, positive, shown
 
 #: Everything that could make two runs of the same Gmsh differ, and what may shape the elements.
 _OPTIONS = {
@@ -75,17 +75,17 @@ class _Block:
 
 
 def block_with_hole(
-    path,
+    path: FileName,
     *,
-    width=2.0,
-    height=2.0,
-    depth=0.2,
-    hole=(1.6, 1.0),
-    hole_diameter=0.05,
-    hole_segments=8,
-    size_hole=0.055,
-    size_far=0.5,
-    distance_far=1.11,
+    width: float = 2.0,
+    height: float = 2.0,
+    depth: float = 0.2,
+    hole: tuple[float, float] = (1.6, 1.0),
+    hole_diameter: float = 0.05,
+    hole_segments: int = 8,
+    size_hole: float = 0.055,
+    size_far: float = 0.5,
+    distance_far: float = 1.11,
 ) -> None:
     """Write a block with a round hole through its depth as a Gmsh 4.1 text file.
 

@@ -3,16 +3,16 @@
 x points to the right, y up, z towards the viewer.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import shown, word
+from taichi_dem.kit.validation import FileName, shown, word
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.parts_in_files import parts_of
 from taichi_dem.mesh.weld import COINCIDENT, weld_labels
@@ -38,10 +38,10 @@ class Mesh:
 
     points: np.ndarray
     tetrahedra: np.ndarray
-    groups: dict
-    notes: tuple = ()
+    groups: dict[str, np.ndarray]
+    notes: tuple[str, ...] = ()
     source: str = ""
-    unread: tuple = ()
+    unread: tuple[tuple[str, str], ...] = ()
 
     def __repr__(self):
         groups = f"groups {', '.join(self.groups)}" if self.groups else "no groups"
@@ -60,7 +60,7 @@ class Mesh:
         """Number of points."""
         return len(self.points)
 
-    def group_faces(self, name) -> np.ndarray:
+    def group_faces(self, name: str) -> np.ndarray:
         """Outer faces of the group ``name``, shape (n, 3); InputError when there is none."""
         if not isinstance(name, str) or name not in self.groups:
             known = ", ".join(sorted(self.groups)) or "none"
@@ -70,18 +70,24 @@ class Mesh:
         return self.groups[name]
 
 
-def volumes(mesh) -> np.ndarray:
+def volumes(mesh: Mesh) -> np.ndarray:
     """Volumes of the bodies [m3], shape (body_count,)."""
     return geometry.signed_volumes(mesh.points, mesh.tetrahedra)
 
 
-def group_area(mesh, name) -> float:
+def group_area(mesh: Mesh, name: str) -> float:
     """Area of the faces of a group [m2]."""
     vectors = geometry.area_vectors(mesh.points, mesh.group_faces(name))
     return float(np.linalg.norm(vectors, axis=1).sum())
 
 
-def checked_mesh(points, tetrahedra, groups, source="", weld_tolerance=0.0) -> Mesh:
+def checked_mesh(
+    points: ArrayLike,
+    tetrahedra: ArrayLike,
+    groups: Mapping[str, ArrayLike],
+    source: FileName = "",
+    weld_tolerance: float = 0.0,
+) -> Mesh:
     """Build a Mesh from arrays, mend what can be mended (and say so), refuse the rest.
 
     points: (n, 3) [m].  tetrahedra: (m, 4) point indices, either orientation.
@@ -91,23 +97,25 @@ def checked_mesh(points, tetrahedra, groups, source="", weld_tolerance=0.0) -> M
     Mended: negative volumes, points without a tetrahedron, faces twice in a group.
     Raises InputError, with the numbers (counted from 0) of what is wrong.
     """
-    points = _checked_points(points)
-    tetrahedra = _checked_indices("tetrahedra", tetrahedra, 4, len(points))
-    groups = _checked_groups(groups, len(points))
-    notes = []
-    label = welded_numbers(points, tetrahedra, weld_tolerance, notes)
-    tetrahedra, groups = label[tetrahedra], {name: label[groups[name]] for name in groups}
-    points, tetrahedra, groups = _without_loose_points(points, tetrahedra, groups, notes)
-    _refuse_extent(points)
-    _refuse_coincident(points)
-    tetrahedra = _positive(points, tetrahedra, notes)
-    _refuse_bad_sharing(tetrahedra)
-    groups = _outer_groups(tetrahedra, groups, notes)
-    _note_parts(tetrahedra, notes)
-    return Mesh(points, tetrahedra, groups, tuple(notes), str(source))
+    places = _checked_points(points)
+    corners = _checked_indices("tetrahedra", tetrahedra, 4, len(places))
+    faces = _checked_groups(groups, len(places))
+    notes: list[str] = []
+    label = welded_numbers(places, corners, weld_tolerance, notes)
+    corners, faces = label[corners], {name: label[faces[name]] for name in faces}
+    places, corners, faces = _without_loose_points(places, corners, faces, notes)
+    _refuse_extent(places)
+    _refuse_coincident(places)
+    corners = _positive(places, corners, notes)
+    _refuse_bad_sharing(corners)
+    faces = _outer_groups(corners, faces, notes)
+    _note_parts(corners, notes)
+    return Mesh(places, corners, faces, tuple(notes), str(source))
 
 
-def welded_numbers(points, tetrahedra, tolerance, notes):
+def welded_numbers(
+    points: ArrayLike, tetrahedra: ArrayLike, tolerance: float, notes: list[str]
+) -> np.ndarray:
     """For every point the first of those that become one with it, (n,) int32.
 
     points, tetrahedra, tolerance: as for ``checked_mesh``, with the same errors. notes: a list to
@@ -122,7 +130,7 @@ def welded_numbers(points, tetrahedra, tolerance, notes):
     return label.astype(np.int32)
 
 
-def _checked_points(points):
+def _checked_points(points: Any) -> np.ndarray:
     """Copy as (n, 3) float64, or InputError."""
     try:
         points = np.array(points)
@@ -142,7 +150,7 @@ def _checked_points(points):
     return points
 
 
-def _checked_groups(groups, point_count):
+def _checked_groups(groups: Any, point_count: int) -> dict[str, np.ndarray]:
     """Groups as a dict of name to (n, 3) int32, or InputError."""
     if not isinstance(groups, Mapping):
         raise InputError(f"groups must be a dict of name to faces, got {shown(groups)}")
@@ -152,7 +160,7 @@ def _checked_groups(groups, point_count):
     }
 
 
-def _checked_indices(what, indices, width, point_count):
+def _checked_indices(what: str, indices: Any, width: int, point_count: int) -> np.ndarray:
     """Copy as (n, width) int32 with all values in range, or InputError."""
     try:
         indices = np.asarray(indices)

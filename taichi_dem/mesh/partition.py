@@ -6,12 +6,13 @@ Source: Konno et al., 3.2, Figs 8 and 9.
 """
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import whole
 
 
-def even_cuts(cost, workers):
+def even_cuts(cost: ArrayLike, workers: int) -> np.ndarray:
     """Cuts that divide the cumulative curve of the cost evenly.
 
     cost: what every item took, (n,), in any unit; at least zero. The share of each worker takes at
@@ -24,7 +25,7 @@ def even_cuts(cost, workers):
     return np.concatenate([[0], np.searchsorted(curve[1:], inner, side="right"), [len(curve) - 1]])
 
 
-def recut(cuts, seconds):
+def recut(cuts: ArrayLike, seconds: ArrayLike) -> np.ndarray:
     """Cuts after an interval in which every worker's share took some time, (workers,) [s].
 
     Only a worker's whole time is known, so that within a share all items count alike: the
@@ -42,19 +43,19 @@ def recut(cuts, seconds):
     return np.concatenate([cuts[:1], np.rint(inner).astype(int), cuts[-1:]])
 
 
-def share_costs(cost, cuts):
+def share_costs(cost: ArrayLike, cuts: ArrayLike) -> np.ndarray:
     """What every share takes, (workers, ...); cost (n, ...)."""
     start = np.zeros((1, *np.shape(cost)[1:]))
-    return np.diff(np.concatenate([start, np.cumsum(cost, axis=0)])[cuts], axis=0)
+    return np.diff(np.concatenate([start, np.cumsum(cost, axis=0)])[np.asarray(cuts)], axis=0)
 
 
-def imbalance(shares):
+def imbalance(shares: ArrayLike) -> float:
     """Time of the slowest worker over that of the fastest, as in Fig 15; infinite if one rests."""
     slowest, fastest = float(np.max(shares)), float(np.min(shares))
     return slowest / fastest if fastest > 0.0 else np.inf
 
 
-def _checked(cost):
+def _checked(cost: ArrayLike) -> np.ndarray:
     cost = np.asarray(cost, dtype=float)
     bad = np.flatnonzero(~(np.isfinite(cost) & (cost >= 0.0)))
     if len(bad):

@@ -3,8 +3,11 @@
 NumPy only: it is asked before a run, and at recording times.
 """
 
+from typing import Any, Union
+
 import numpy as np
 
+from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.tetrahedra import components, shared_faces
 from taichi_dem.mesh.topology import faces_of_group, topology_of
 
@@ -13,13 +16,13 @@ from taichi_dem.mesh.topology import faces_of_group, topology_of
 NEARNESS = 0.5
 
 
-def parts_of(mesh):
+def parts_of(mesh: Mesh) -> np.ndarray:
     """Number of the part of each body, from 0, (body_count,)."""
     bonded = shared_faces(mesh.tetrahedra) // 4
     return np.unique(components(mesh.body_count, bonded), return_inverse=True)[1].reshape(-1)
 
 
-def part_boxes(corners, part):
+def part_boxes(corners: np.ndarray, part: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Boxes around parts: lowest and highest coordinates [m], two arrays (part_count, 3).
 
     corners: of every body [m], (body_count, 4, 3). part: what ``parts_of`` gave.
@@ -30,7 +33,7 @@ def part_boxes(corners, part):
     return low, np.maximum.reduceat(corners.max(axis=1)[order], first)
 
 
-def any_overlap(low, high):
+def any_overlap(low: np.ndarray, high: np.ndarray) -> bool:
     """Whether two boxes overlap; touching is not enough.
 
     Sorted by where they begin along an axis, a box that begins behind the end of another is
@@ -50,7 +53,7 @@ def any_overlap(low, high):
     return False
 
 
-def may_meet(scene, part):
+def may_meet(scene: Any, part: np.ndarray) -> bool:
     """Whether parts of a scene at rest may come to meet, as far as can be known before a run.
 
     Not where nothing moves them, and not where uniform acceleration is all that does. Else every
@@ -78,7 +81,7 @@ def may_meet(scene, part):
 def _parts_under(mesh, effect, part):
     """Whether a load or support acts on each part, (part_count,)."""
     marks = np.zeros(part.max() + 1, dtype=bool)
-    body = slice(None)
+    body: Union[slice, np.ndarray] = slice(None)
     if hasattr(effect, "group"):
         body, _ = faces_of_group(mesh, topology_of(mesh), effect.group)
     marks[part[body]] = True

@@ -6,13 +6,13 @@ from taichi_dem.kit.display import counted
 from taichi_dem.mesh import tetrahedra as geometry
 
 
-def parts_of(tetrahedra):
+def parts_of(tetrahedra: np.ndarray) -> np.ndarray:
     """For every body the first of those it is joined to through shared faces, (body_count,)."""
     pairs = geometry.shared_faces(tetrahedra) // 4
     return geometry.components(len(tetrahedra), pairs)
 
 
-def unbonded_places(points, tetrahedra):
+def unbonded_places(points: np.ndarray, tetrahedra: np.ndarray) -> str:
     """A sentence on bodies that meet without a common face although their points are the same.
 
     "" where there are none. points (n, 3) [m], tetrahedra (m, 4) of positive volume, at most two

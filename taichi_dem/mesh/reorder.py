@@ -15,7 +15,7 @@ from taichi_dem.mesh.mesh import Mesh
 _BITS = 20
 
 
-def in_space_order(mesh) -> Mesh:
+def in_space_order(mesh: Mesh) -> Mesh:
     """The same mesh with its bodies in the order of Morton's curve through their centres.
 
     Bonds follow, as they are sorted by their bodies; points and groups stay as they are. Numbers of

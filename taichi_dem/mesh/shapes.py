@@ -1,8 +1,8 @@
 """Small meshes of known shape, built without a mesh generator: for tests, demos, wave bars."""
 
-from __future__ import annotations
-
 import itertools
+from collections.abc import Sequence
+from typing import Optional
 
 import numpy as np
 
@@ -27,7 +27,7 @@ _MOST_BOXES = 1_666_666
 _EVEN_ORDERS = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
 
 
-def single(edge=0.05, height=None) -> Mesh:
+def single(edge: float = 0.05, height: Optional[float] = None) -> Mesh:
     """One tetrahedron: equilateral base of ``edge`` [m] in the plane x = 0, apex at x = -height.
 
     height: [m]; None makes the tetrahedron regular.  Groups: base, sides.
@@ -38,7 +38,7 @@ def single(edge=0.05, height=None) -> Mesh:
     return checked_mesh(points, [[0, 1, 2, 3]], groups)
 
 
-def pair(edge=0.05, height=None) -> Mesh:
+def pair(edge: float = 0.05, height: Optional[float] = None) -> Mesh:
     """Two equal tetrahedra that share the face in x = 0; body 0 lies at x < 0, body 1 at x > 0.
 
     edge, height: as in ``single``.  Groups: left and right, the free faces of either body.
@@ -53,7 +53,7 @@ def pair(edge=0.05, height=None) -> Mesh:
     return checked_mesh(points, [[3, 0, 1, 2], [4, 0, 2, 1]], groups)
 
 
-def bar(length, width, cells) -> Mesh:
+def bar(length: float, width: float, cells: Sequence[int]) -> Mesh:
     """Square bar along x from the origin, regular boxes cut into six tetrahedra each.
 
     length, width: [m].  cells: boxes along x, y and z.
@@ -61,12 +61,12 @@ def bar(length, width, cells) -> Mesh:
     The cut is Kuhn's: all six share the box's diagonal, and neighbours match without turning.
     Body number = 6 * box + path; boxes run fastest along z.
     """
-    cells = _checked_cells(length, width, cells)
-    index = np.arange(np.prod(cells + 1)).reshape(cells + 1)
-    grid = np.stack(np.meshgrid(*(np.arange(n + 1) for n in cells), indexing="ij"), axis=-1)
-    points = grid.reshape(-1, 3) / cells * np.array([length, width, width], dtype=float)
+    boxes = _checked_cells(length, width, cells)
+    index = np.arange(np.prod(boxes + 1)).reshape(boxes + 1)
+    grid = np.stack(np.meshgrid(*(np.arange(n + 1) for n in boxes), indexing="ij"), axis=-1)
+    points = grid.reshape(-1, 3) / boxes * np.array([length, width, width], dtype=float)
     tetrahedra = _kuhn(index)
-    return checked_mesh(points, tetrahedra, _sides(grid.reshape(-1, 3), cells, tetrahedra))
+    return checked_mesh(points, tetrahedra, _sides(grid.reshape(-1, 3), boxes, tetrahedra))
 
 
 def placed_together(parts) -> Mesh:

@@ -9,7 +9,10 @@ A cell with a corner named twice, such as a prism written as a hexahedron, gives
 Weld points before cells are cut: two numbers of one point would make two sides disagree.
 """
 
+from typing import Optional, cast
+
 import numpy as np
+from numpy.typing import ArrayLike
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.mesh.mesh import FLAT
@@ -31,13 +34,13 @@ _FOLDED = (
 _CORNERS = {"hexahedron": 8, "wedge": 6, "pyramid": 5}
 
 
-def shape_of(kind):
+def shape_of(kind: str) -> Optional[str]:
     """Key of ``_FACES`` for a cell type of meshio of any order, or None: it cannot be cut."""
     name = kind.lower().replace("vtk_lagrange_", "")
     return next((shape for shape in _FACES if name.startswith(shape)), None)
 
 
-def tetrahedra_in(points, kind, cells):
+def tetrahedra_in(points: ArrayLike, kind: str, cells: np.ndarray) -> np.ndarray:
     """Tetrahedra of positive volume that fill cells, (m, 4).
 
     points: (n, 3) [m]. kind: cell type, of which ``shape_of`` gives a shape. cells: (k, corners and
@@ -53,7 +56,7 @@ def tetrahedra_in(points, kind, cells):
     return _positive(np.asarray(points, dtype=np.float64), tetrahedra)
 
 
-def folded_or_flat(points, kind, cells):
+def folded_or_flat(points: np.ndarray, kind: str, cells: np.ndarray) -> str:
     """A sentence on the first cell that folds over itself or is partly flat once cut, or "".
 
     points, kind, cells: as for ``tetrahedra_in``, finite and in range.
@@ -74,19 +77,20 @@ def folded_or_flat(points, kind, cells):
     return ""
 
 
-def _named(kind, cells, bad):
+def _named(kind: str, cells: np.ndarray, bad: np.ndarray) -> str:
     """The first of the cells that are bad, (k,), in words."""
     first = int(np.argmax(bad))
-    corners = np.asarray(cells)[first, : _CORNERS[shape_of(kind)]]
+    corners = np.asarray(cells)[first, : _CORNERS[cast(str, shape_of(kind))]]
     return f"{kind} {first}, with the points {corners.tolist()},"
 
 
-def _cones(kind, cells):
+def _cones(kind: str, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Tetrahedra of cells and the cell of each, (m, 4) and (m,), turned as the cells are."""
-    shape = shape_of(kind)
+    shape = cast(str, shape_of(kind))
     corners = np.asarray(cells)[:, : _CORNERS[shape]]
     lowest = corners.argmin(axis=1)
-    found, owners = [np.empty((0, 4), dtype=np.int64)], [np.empty(0, dtype=np.int64)]
+    found: list[np.ndarray] = [np.empty((0, 4), dtype=np.int64)]
+    owners: list[np.ndarray] = [np.empty(0, dtype=np.int64)]
     for apex in range(_CORNERS[shape]):
         numbers = np.flatnonzero(lowest == apex)
         here = corners[numbers]
@@ -102,7 +106,7 @@ def _cones(kind, cells):
     return tetrahedra[whole], owner[whole]
 
 
-def _positive(points, tetrahedra):
+def _positive(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
     """Turn those of negative volume; numbers or points that make no sense are left as they are."""
     known = (tetrahedra >= 0).all() and tetrahedra.max(initial=-1) < len(points)
     if known and points.ndim == 2 and points.shape[1] == 3:
@@ -112,7 +116,7 @@ def _positive(points, tetrahedra):
     return tetrahedra
 
 
-def triangles_in(faces):
+def triangles_in(faces: ArrayLike) -> np.ndarray:
     """Triangles of faces with three or four corners, (k, 3) or (2 k, 3); two of a face in turn."""
     faces = np.asarray(faces)
     if faces.shape[1] == 3:

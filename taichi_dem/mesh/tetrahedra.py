@@ -16,20 +16,20 @@ LOCAL_FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]], dtype=np.in
 LOCAL_EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]], dtype=np.int32)
 
 
-def signed_volumes(points, tetrahedra):
+def signed_volumes(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
     """Signed volumes det(p1 - p0, p2 - p0, p3 - p0) / 6 [m3], shape (body_count,)."""
     corners = points[tetrahedra]
     a, b, c = (corners[:, k] - corners[:, 0] for k in (1, 2, 3))
     return np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0
 
 
-def edge_lengths(points, tetrahedra):
+def edge_lengths(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
     """Lengths of the six edges [m], shape (body_count, 6)."""
     ends = points[tetrahedra[:, LOCAL_EDGES]]
     return np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=-1)
 
 
-def area_vectors(points, faces):
+def area_vectors(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Right-hand normals times the area of triangles [m2], shape (n, 3).
 
     faces: point indices, shape (n, 3).
@@ -38,18 +38,18 @@ def area_vectors(points, faces):
     return 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
-def all_faces(tetrahedra):
+def all_faces(tetrahedra: np.ndarray) -> np.ndarray:
     """Every face of every body, outward order, shape (4 * body_count, 3); row 4 * body + f."""
     return tetrahedra[:, LOCAL_FACES].reshape(-1, 3)
 
 
-def face_numbers(faces):
+def face_numbers(faces: np.ndarray) -> np.ndarray:
     """Number every distinct vertex set of ``faces``; equal sets get equal numbers, shape (n,)."""
     _, number = np.unique(np.sort(faces, axis=1), axis=0, return_inverse=True)
     return number.reshape(-1)  # NumPy 2.0 returns a column
 
 
-def shared_faces(tetrahedra):
+def shared_faces(tetrahedra: np.ndarray) -> np.ndarray:
     """Rows of ``all_faces`` that are one face of two bodies, shape (n, 2), smaller row first.
 
     Call it only where no face is shared by three bodies.
@@ -60,7 +60,7 @@ def shared_faces(tetrahedra):
     return np.column_stack([order[:-1][same], order[1:][same]])
 
 
-def components(count, pairs):
+def components(count: int, pairs: np.ndarray) -> np.ndarray:
     """Connected components of a graph: the smallest member of each node's part, shape (count,).
 
     count: number of nodes.  pairs: linked nodes, shape (n, 2).
@@ -78,7 +78,7 @@ def components(count, pairs):
         label = merged
 
 
-def close_pairs(points, distance):
+def close_pairs(points: np.ndarray, distance: float) -> np.ndarray:
     """Pairs of points not farther apart than ``distance`` [m], shape (n, 2), first < second.
 
     Two such points lie in one cell of at least one of eight cubic grids of cell size 4 distance,

@@ -11,6 +11,7 @@ import numpy as np
 
 from taichi_dem.kit.display import by_fields
 from taichi_dem.mesh import tetrahedra as geometry
+from taichi_dem.mesh.mesh import Mesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +49,7 @@ class Topology:
         return len(self.outer_body)
 
 
-def topology_of(mesh) -> Topology:
+def topology_of(mesh: Mesh) -> Topology:
     """Match the faces of all bodies."""
     rows = geometry.shared_faces(mesh.tetrahedra)
     rows = rows[np.lexsort((rows[:, 1] // 4, rows[:, 0] // 4))].astype(np.int32)
@@ -69,7 +70,7 @@ def topology_of(mesh) -> Topology:
     )
 
 
-def face_vertices(mesh, body, face) -> np.ndarray:
+def face_vertices(mesh: Mesh, body: np.ndarray, face: np.ndarray) -> np.ndarray:
     """Points of local faces in the order whose right-hand normal points outward, (n, 3) int32.
 
     body, face: body and local face, shape (n,).
@@ -77,7 +78,7 @@ def face_vertices(mesh, body, face) -> np.ndarray:
     return np.take_along_axis(mesh.tetrahedra[body], geometry.LOCAL_FACES[face], axis=1)
 
 
-def faces_of_group(mesh, topology, name):
+def faces_of_group(mesh: Mesh, topology: Topology, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Body and local face of every face of a group, two arrays (n,) int32, in the group's order.
 
     Raises InputError when the mesh has no such group.
@@ -91,7 +92,7 @@ def faces_of_group(mesh, topology, name):
     return topology.outer_body[index], topology.outer_face[index]
 
 
-def body_properties(mesh, density):
+def body_properties(mesh: Mesh, density: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mass [kg] (n,), centre of mass [m] (n, 3), inertia about it [kg m2] (n, 3, 3).
 
     density [kg/m3].  With the vertices x_k taken from the centroid, the second moment of a

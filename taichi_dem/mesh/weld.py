@@ -10,7 +10,7 @@ from taichi_dem.mesh import tetrahedra as geometry
 COINCIDENT = 1e-9
 
 
-def weld_labels(points, tetrahedra, tolerance):
+def weld_labels(points: np.ndarray, tetrahedra: np.ndarray, tolerance: float) -> np.ndarray:
     """For every point the first of those that become one with it, (n,).
 
     points (n, 3) [m], tetrahedra (m, 4). tolerance: distance up to which points become one [m].

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from taichi_dem.engine.model import Model
 from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.mesh.topology import face_vertices, faces_of_group
 
@@ -14,7 +15,7 @@ class HoleMonitor:
     one of these that is nearest to the closest free face, at mid depth.
     """
 
-    def __init__(self, model, group):
+    def __init__(self, model: Model, group: str):
         mesh, topology = model.mesh, model.topology
         body, face = faces_of_group(mesh, topology, group)
         corners = face_vertices(mesh, body, face)
@@ -48,12 +49,12 @@ class HoleMonitor:
         score = (self.first - self.axis_point) @ toward - depth
         return int(self.bodies[score.argmax()])
 
-    def radial_displacement(self, position):
+    def radial_displacement(self, position: np.ndarray) -> float:
         """Mean displacement of the hole's bodies away from its axis [m]; position (n, 3)."""
         moved = position[self.bodies] - self.first
         return float(np.einsum("ij,ij->i", moved, self.outward).mean())
 
-    def monitored_displacement(self, position):
+    def monitored_displacement(self, position: np.ndarray) -> float:
         """Displacement of the monitored body [m]."""
         row = int(np.flatnonzero(self.bodies == self.monitored_body)[0])
         return float(np.linalg.norm(position[self.monitored_body] - self.first[row]))

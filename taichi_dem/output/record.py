@@ -2,15 +2,20 @@
 
 import os
 import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
+from typing import Any, Optional
 
 import numpy as np
 
+from taichi_dem.engine.model import Model
 from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.files import output_folder, remove_files, write_csv
+from taichi_dem.kit.validation import FileName
 from taichi_dem.mesh.files import write_pvd, write_vtu
 from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.output.hole_monitor import HoleMonitor
+from taichi_dem.simulation import Simulation
 from taichi_dem.timeline import MAX_LEVEL, NEVER
 
 #: Energy terms that have a column of their own in the time series, in its order.
@@ -56,7 +61,7 @@ class Frame:
         return by_fields(self)
 
     @property
-    def speed(self):
+    def speed(self) -> np.ndarray:
         """Speed of every body [m/s], (n,)."""
         return np.linalg.norm(self.velocity, axis=1)
 
@@ -68,24 +73,24 @@ class Recorder:
     largest of each body at all samples so far [m/s], (body_count,).
     """
 
-    def __init__(self, simulation, group):
+    def __init__(self, simulation: Simulation, group: Optional[str]):
         self.simulation = simulation
         self.model, self.state = simulation.model, simulation.state
         self.hole = HoleMonitor(self.model, group) if group else None
-        self.rows = []
-        self.frames = []
+        self.rows: list[dict[str, float]] = []
+        self.frames: list[Frame] = []
         self.peak_speed = np.zeros(self.model.body_count)
 
-    def compile(self):
+    def compile(self) -> None:
         """Compile all that recording needs, so that nothing later keeps Ctrl-C waiting."""
         self.sample()
         self.snapshot()
         self.rows, self.frames = [], []
         self.peak_speed = np.zeros(self.model.body_count)
 
-    def sample(self):
+    def sample(self) -> None:
         """Add a row to the time series."""
-        sim = self.simulation
+        sim: Any = self.simulation
         motion = self.state.motion()
         account = sim.energy_balance.account()
         account["gas_work"] = sim.gas_work()
@@ -104,7 +109,7 @@ class Recorder:
         self.peak_speed = np.maximum(self.peak_speed, speed)
         self.rows.append(row)
 
-    def snapshot(self):
+    def snapshot(self) -> None:
         """Keep the block as it is now."""
         self.frames.append(self.frame())
 
@@ -124,7 +129,7 @@ class Recorder:
             bound=self.state.bound.to_numpy(),
         )
 
-    def saved(self):
+    def saved(self) -> dict[str, np.ndarray]:
         """What a checkpoint holds of it, arrays by name: columns of rows, stacks of frames."""
         rows = {f"row.{name}": column for name, column in self.history().items()}
         stacks = {
@@ -134,7 +139,7 @@ class Recorder:
         }
         return {**rows, **stacks, "peak_speed": self.peak_speed}
 
-    def resume(self, saved):
+    def resume(self, saved: Mapping[str, np.ndarray]) -> None:
         """Take over what ``saved`` gave."""
         self.peak_speed = saved.get("peak_speed", self.peak_speed)
         rows = {k[4:]: column.tolist() for k, column in saved.items() if k.startswith("row.")}
@@ -151,25 +156,25 @@ class Recorder:
         own = np.where(bond >= 0, damage[np.maximum(bond, 0)], 0.0)
         return own.sum(axis=1) / np.maximum(1, (bond >= 0).sum(axis=1))
 
-    def history(self):
+    def history(self) -> dict[str, np.ndarray]:
         """Time series as arrays by column name."""
         names = self.rows[0].keys() if self.rows else ()
         return {name: np.array([row[name] for row in self.rows]) for name in names}
 
-    def broken_time(self):
+    def broken_time(self) -> np.ndarray:
         """When each bond was released [s], (bond_count,); NaN while it holds."""
         tick = self.state.broken_tick.to_numpy()[: self.model.bond_count]
         seconds = tick * (self.simulation.method.dt0 / 2.0**MAX_LEVEL)
         return np.where(tick == NEVER, np.nan, seconds)
 
 
-def body_corners(model, frame):
+def body_corners(model: Model, frame: Frame) -> np.ndarray:
     """World positions of the corners of all bodies in a frame [m], (n, 4, 3)."""
     arms = model.mesh.points[model.mesh.tetrahedra] - model.centre[:, None]
     return frame.position[:, None] + np.einsum("nij,nkj->nki", frame.rotation, arms)
 
 
-def write_bonds(path, model, broken_time):
+def write_bonds(path: FileName, model: Model, broken_time: np.ndarray) -> None:
     """Write a CSV row a bond: its bodies, centre and area of its face, and when it broke.
 
     broken_time: (bond_count,) [s], NaN while a bond holds; its cell is then empty.
@@ -190,7 +195,7 @@ def write_bonds(path, model, broken_time):
     write_csv(path, columns)
 
 
-def series_name(folder):
+def series_name(folder: FileName) -> str:
     """Name of a series after its folder, fit for files everywhere; "run" where nothing is left.
 
     Letters and digits of any script, "-", "_" and "." stay; all else becomes "_". At most
@@ -200,12 +205,14 @@ def series_name(folder):
     return re.sub(r"[^\w.-]+", "_", name)[:_LONGEST_NAME].strip("._-") or "run"
 
 
-def remove_series(folder, name):
+def remove_series(folder: FileName, name: str) -> None:
     """Remove a ParaView series of a name, and nothing else, from a folder that may not be there."""
     remove_files(folder, re.escape(name) + r"(\.pvd|_\d{4,}\.vtu)")
 
 
-def write_paraview(folder, model, frames, name=None):
+def write_paraview(
+    folder: FileName, model: Model, frames: Sequence[Frame], name: Optional[str] = None
+) -> None:
     """Write frames as a ParaView series: folder/name.pvd and a VTU file a frame.
 
     name: of the files, that of the folder if None (``series_name``).

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+from numpy.typing import ArrayLike
 
+from taichi_dem.materials import Material
 from taichi_dem.mesh import tetrahedra as geometry
-from taichi_dem.mesh.topology import body_properties, face_vertices
+from taichi_dem.mesh.mesh import Mesh
+from taichi_dem.mesh.topology import Topology, body_properties, face_vertices
 
 
-def dashpot_step(rate):
+def dashpot_step(rate: ArrayLike) -> np.ndarray:
     """Largest step [s] at which dashpots are stable that slow a body at a rate [1/s].
 
     A pair of equal bodies moves against each other at twice the rate of one, and forward Euler
@@ -18,7 +23,7 @@ def dashpot_step(rate):
         return 1.0 / np.asarray(rate)
 
 
-def spring_step(rate2):
+def spring_step(rate2: ArrayLike) -> np.ndarray:
     """Largest step [s] at which springs are stable that hold a body at a squared rate [1/s2].
 
     As for dashpots a pair has twice that of one, and symplectic Euler is stable to
@@ -28,17 +33,19 @@ def spring_step(rate2):
         return 2.0 / np.sqrt(2.0 * np.asarray(rate2))
 
 
-def dashpots_of(material):
+def dashpots_of(material: Material) -> tuple[float, float]:
     """Normal and tangential damping per area of a bond [Pa s/m]."""
     return material.normal_damping, material.shear_damping
 
 
-def springs_of(material):
+def springs_of(material: Material) -> tuple[float, float]:
     """Normal and tangential stiffness per area of a bond [Pa/m]."""
     return material.normal_stiffness, material.shear_stiffness
 
 
-def bond_rates(mesh, topology, density, coefficients) -> np.ndarray:
+def bond_rates(
+    mesh: Mesh, topology: Topology, density: float, coefficients: tuple[float, float]
+) -> np.ndarray:
     """Largest eigenvalue of M^-1/2 G M^-1/2 of every body, shape (body_count,).
 
     G is the 6x6 block with which the bonds of a body resist its velocity and spin when the
@@ -51,7 +58,13 @@ def bond_rates(mesh, topology, density, coefficients) -> np.ndarray:
     return subset_rates(mesh, topology, density, coefficients, subsets=(15,))[:, 0]
 
 
-def subset_rates(mesh, topology, density, coefficients, subsets=range(16)) -> np.ndarray:
+def subset_rates(
+    mesh: Mesh,
+    topology: Topology,
+    density: float,
+    coefficients: tuple[float, float],
+    subsets: Sequence[int] = range(16),
+) -> np.ndarray:
     """``bond_rates`` with only some of a body's bonds intact, shape (body_count, len(subsets)).
 
     subsets: bit f of each stands for the bond at local face f; the default is all sixteen.
@@ -82,7 +95,7 @@ def _face_blocks(mesh, body, face, centre, coefficients):
     return area[:, None, None] / 3.0 * point_blocks(arms, law)
 
 
-def point_blocks(arms, law):
+def point_blocks(arms: np.ndarray, law: np.ndarray) -> np.ndarray:
     """Sum over points of J^T law J, J the map from (velocity, spin) to the point's velocity.
 
     arms: points from the centre [m], shape (n, points, 3). law: what resists their velocity,
@@ -102,7 +115,7 @@ def _cross_matrix(vectors):
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def inverse_root(mass, inertia):
+def inverse_root(mass: np.ndarray, inertia: np.ndarray) -> np.ndarray:
     """M^-1/2 of M = diag(mass, mass, mass, inertia), shape (n, 6, 6)."""
     moments, axes = np.linalg.eigh(inertia)
     root = np.zeros((len(mass), 6, 6))

@@ -54,11 +54,11 @@ class QualityReport:
         """The smaller of both limits of every body [s], shape (body_count,)."""
         return np.minimum(self.dashpot_step_s, self.spring_step_s)
 
-    def worst(self, count=_WORST) -> np.ndarray:
+    def worst(self, count: int = _WORST) -> np.ndarray:
         """The bodies of the smallest critical step, the worst first, shape (count,)."""
         return np.argsort(self.critical_step_s, kind="stable")[:count]
 
-    def price(self, count=_WORST) -> np.ndarray:
+    def price(self, count: int = _WORST) -> np.ndarray:
         """Gain in the step of the whole mesh without the k + 1 worst bodies, k < count.
 
         Factors of at least 1, as many as there are bodies to leave out; infinite where nothing
@@ -113,7 +113,7 @@ class QualityReport:
         return lines
 
 
-def quality_report(mesh, material) -> QualityReport:
+def quality_report(mesh: Mesh, material: Material) -> QualityReport:
     """Shape and explicit step limits of every body of a mesh; infinite for one without bonds.
 
     Raises InputError for what is no mesh or material.
@@ -139,7 +139,7 @@ def quality_report(mesh, material) -> QualityReport:
     )
 
 
-def smallest_altitudes(mesh) -> np.ndarray:
+def smallest_altitudes(mesh: Mesh) -> np.ndarray:
     """Smallest distance of a vertex from the opposite face, 3 V / A [m], shape (body_count,)."""
     vectors = geometry.area_vectors(mesh.points, geometry.all_faces(mesh.tetrahedra))
     area = np.linalg.norm(vectors, axis=1).reshape(-1, 4).max(axis=1)

@@ -1,8 +1,10 @@
 """What limits the step of a mesh and material, by method and element by element, before any run."""
 
 from dataclasses import dataclass
+from typing import Optional, Union
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
@@ -46,11 +48,11 @@ class StepReport:
     whose effect a scene leaves out is missing. warnings: sentences about the scene.
     """
 
-    limits: dict
-    warnings: tuple = ()
+    limits: dict[str, np.ndarray]
+    warnings: tuple[str, ...] = ()
 
     @property
-    def binding(self):
+    def binding(self) -> np.ndarray:
         """Name of the criterion that binds each body's explicit step, array (body_count,).
 
         "nothing" for a body whose step nothing limits.
@@ -60,14 +62,14 @@ class StepReport:
         return np.where(np.isfinite(self.step_s), np.array(names)[place], NOTHING)
 
     @property
-    def step_s(self):
+    def step_s(self) -> np.ndarray:
         """Smallest of the limits of each body [s], (body_count,)."""
         return np.min([self.limits[name] for name in self._names()], axis=0)
 
     def _names(self):
         return [name for name in self.limits if not name.endswith("single")]
 
-    def borne(self, dashpots, link="bond"):
+    def borne(self, dashpots: str, link: str = "bond") -> np.ndarray:
         """Largest stable step of each body under a method [s], (body_count,).
 
         dashpots: how the method takes them, a key of ``METHODS``: "full", "limited" or "solved".
@@ -87,11 +89,11 @@ class StepReport:
         # Of the 2 that an explicit step bears, limited dashpots take LIMITED at most.
         return np.maximum(together, springs * np.sqrt(1.0 - 0.5 * LIMITED))
 
-    def worst(self, count=_WORST):
+    def worst(self, count: int = _WORST) -> np.ndarray:
         """Bodies of the smallest step, the worst first."""
         return np.argsort(self.step_s, kind="stable")[:count]
 
-    def price(self, count=_WORST):
+    def price(self, count: int = _WORST) -> float:
         """Gain in the step of all without the count worst bodies, a factor of at least 1.
 
         Infinite where nothing limits the step of the others, or there are none.
@@ -99,7 +101,7 @@ class StepReport:
         steps = np.append(np.sort(self.step_s), np.inf)
         return float(steps[min(count, len(steps) - 1)] / steps[0]) if steps[0] < np.inf else 1.0
 
-    def work_share(self, count=_WORST):
+    def work_share(self, count: int = _WORST) -> float:
         """Share of the body updates, each at its own step, that the count worst bodies take."""
         updates = 1.0 / self.step_s
         return float(updates[self.worst(count)].sum() / max(updates.sum(), 1e-300))
@@ -183,7 +185,7 @@ def _seconds(step):
     return f"{step:.3g}" if np.isfinite(step) else "unlimited"
 
 
-def stable_together(springs, drags):
+def stable_together(springs: ArrayLike, drags: ArrayLike) -> np.ndarray:
     """Largest explicit step [s] at which springs and dashpots of a body are stable together.
 
     springs, drags: largest steps of each alone [s], ``quality.spring_step`` and ``dashpot_step``.
@@ -195,7 +197,7 @@ def stable_together(springs, drags):
         return 2.0 / (rate + np.sqrt(rate**2 + (2.0 / np.asarray(springs)) ** 2))
 
 
-def step_report(scene, material=None):
+def step_report(scene: Union[Scene, Mesh], material: Optional[Material] = None) -> StepReport:
     """Judge a scene, or a mesh and a material with all effects, before a run.
 
     scene: a Scene, or a Mesh if material is given. Limits hold for a pair of equal bodies that
@@ -231,7 +233,9 @@ def _report(mesh, material, damped, friction, divisions, warnings=()):
     return StepReport(limits, warnings)
 
 
-def contact_eigenvalues(mesh, density, divisions, friction):
+def contact_eigenvalues(
+    mesh: Mesh, density: float, divisions: int, friction: bool
+) -> tuple[np.ndarray, np.ndarray]:
     """Largest eigenvalues of M^-1/2 (J^T D J) M^-1/2 of each body [1/kg], two arrays (n,).
 
     The first is for the worst of its spheres in contact, the second for all of the worst face.

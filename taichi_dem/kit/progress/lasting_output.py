@@ -3,10 +3,11 @@
 import contextlib
 import os
 import sys
+from collections.abc import Iterator
 
 
 @contextlib.contextmanager
-def lasting_output():
+def lasting_output() -> Iterator[None]:
     """Let prints in the block go nowhere, without a word, once nobody reads them."""
     for number, name in ((1, "stdout"), (2, "stderr")):
         if getattr(sys, name) is None:

@@ -3,6 +3,7 @@
 import contextlib
 import math
 import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -22,14 +23,14 @@ class Progress:
     seconds: float
 
     @property
-    def seconds_left(self):
+    def seconds_left(self) -> float:
         """Time expected until the end [s]; infinite while too little is known of it."""
         if self.share < LEAST_SHARE:
             return math.inf
         return max(0.0, self.seconds * (1.0 / self.share - 1.0))
 
     @property
-    def speed(self):
+    def speed(self) -> str:
         """How fast the job goes, in words; empty where there is nothing to tell."""
         return ""
 
@@ -47,7 +48,7 @@ class Counted(Progress):
     total: int
 
     @property
-    def speed(self):
+    def speed(self) -> str:
         """How many runs are done."""
         return f"{self.done} of {self.total} runs"
 
@@ -60,7 +61,7 @@ class Compiling(Progress):
     part: str
 
     @property
-    def seconds_left(self):
+    def seconds_left(self) -> float:
         """Unknown, infinite: a part may come from the cache of kernels or be compiled anew."""
         return math.inf
 
@@ -70,7 +71,7 @@ class Compiling(Progress):
         return f"{share}, compiling {self.part} kernels, the next start is faster"
 
 
-def time_left(seconds):
+def time_left(seconds: float) -> str:
     """A time that is left [s] in words, no finer than it is known; "" when it is unknown."""
     if not math.isfinite(seconds):
         return ""
@@ -84,10 +85,10 @@ def time_left(seconds):
 class Pace:
     """Says when it is time to report again: after some seconds [s]."""
 
-    def __init__(self, seconds):
+    def __init__(self, seconds: float):
         self.seconds, self._last = seconds, -math.inf
 
-    def should_report(self, at_any_rate=False):
+    def should_report(self, at_any_rate: bool = False) -> bool:
         """Whether to report now; the next time is counted from then on."""
         now = time.perf_counter()
         due = at_any_rate or now - self._last >= self.seconds
@@ -96,12 +97,15 @@ class Pace:
         return due
 
 
+#: Function that is told how far a job is.
+Listener = Callable[[Progress], object]
+
 #: Who is told of compiling, the innermost last, and since when each listens [s].
-_listeners = []
+_listeners: list[tuple[Listener, float]] = []
 
 
 @contextlib.contextmanager
-def listening(listener):
+def listening(listener: Listener) -> Iterator[None]:
     """Call listener(Compiling) whenever kernels are compiled in the block; inner blocks win."""
     _listeners.append((listener, time.perf_counter()))
     try:
@@ -110,7 +114,7 @@ def listening(listener):
         _listeners.pop()
 
 
-def compiling(part, share):
+def compiling(part: str, share: float) -> None:
     """Tell the listener that a part of the kernels is compiled next; share: of all of them."""
     if _listeners:
         listener, since = _listeners[-1]

@@ -5,18 +5,20 @@ import html
 import os
 import sys
 import time
+from collections.abc import Iterator
+from typing import Optional, Union
 
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.progress.progress import Counted, Pace, Progress, listening
-from taichi_dem.kit.validation import AUTO, instance, progress_option, shown
+from taichi_dem.kit.progress.progress import Counted, Listener, Pace, Progress, listening
+from taichi_dem.kit.validation import instance, progress_option, shown
 
 #: Least time between two updates of a cell in Jupyter [s].
 _NOTEBOOK_SECONDS = 0.2
 #: Columns of a terminal below which there is no room for the bar beside its words.
 _NARROW = 70
 #: Bars that are shown now; a second one below the first would garble both.
-_open_bars = []
+_open_bars: list["ProgressBar"] = []
 
 
 class ProgressBar:
@@ -27,7 +29,7 @@ class ProgressBar:
     itself. title: what is being done.
     """
 
-    def __init__(self, title):
+    def __init__(self, title: str):
         self.title = instance("title", title, str)
         self._opened = contextlib.ExitStack()
         self._started, self._display = time.perf_counter(), _Nothing()
@@ -35,7 +37,7 @@ class ProgressBar:
     def __repr__(self):
         return in_brief(self, self.title)
 
-    def __enter__(self):
+    def __enter__(self) -> "ProgressBar":
         if self in _open_bars:
             raise InputError(f"the progress bar {self.title!r} is shown already")
         self._started = time.perf_counter()
@@ -44,17 +46,17 @@ class ProgressBar:
         self._opened.enter_context(listening(self))
         return self
 
-    def __call__(self, progress):
+    def __call__(self, progress: Progress) -> None:
         """Show a Progress. Raises TypeError for anything else, watched or not."""
         if not isinstance(progress, Progress):
             raise TypeError(f"a progress bar takes a Progress, got {shown(progress)}")
         self._display.show(progress)
 
-    def at(self, share):
+    def at(self, share: float) -> None:
         """Show a share in [0, 1] of a job that knows no more of itself."""
         self(Progress(share, time.perf_counter() - self._started))
 
-    def count(self, done, total):
+    def count(self, done: int, total: int) -> None:
         """Show how many runs are done of a job that consists of several."""
         self(Counted(done / max(1, total), time.perf_counter() - self._started, done, total))
 
@@ -66,19 +68,19 @@ class ProgressBar:
 
 
 @contextlib.contextmanager
-def reporting(progress, title):
+def reporting(progress: Union[Listener, str, None], title: str) -> Iterator[Optional[Listener]]:
     """What a job is to report its Progress to, given its argument ``progress``; None for nobody.
 
     "auto" gives a bar where somebody watches. A function is also told of compiling.
     """
     if progress_option("progress", progress) is None:
         yield None
-    elif progress == AUTO:
-        with ProgressBar(title) as bar:
-            yield bar
-    else:
+    elif callable(progress):
         with listening(progress):
             yield progress
+    else:
+        with ProgressBar(title) as bar:
+            yield bar
 
 
 class _Nothing:
@@ -122,8 +124,8 @@ class _Terminal:
         """Draw how far the job is, and what it says of itself."""
         # Rich's own thread redraws ten times a second, but not while Taichi compiles a kernel.
         at_once = progress.phase == "compiling"
-        words = str(progress).split(", ")
-        words = ", ".join(words[:2] if self._narrow else words)
+        parts = str(progress).split(", ")
+        words = ", ".join(parts[:2] if self._narrow else parts)
         self._bar.update(self._task, completed=progress.share, words=words, refresh=at_once)
 
     def close(self):
