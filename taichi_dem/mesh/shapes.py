@@ -69,7 +69,7 @@ def bar(length: float, width: float, cells: Sequence[int]) -> Mesh:
     return checked_mesh(points, tetrahedra, _sides(grid.reshape(-1, 3), boxes, tetrahedra))
 
 
-def placed_together(parts) -> Mesh:
+def placed_together(parts: dict) -> Mesh:
     """Several solids that do not touch as one mesh; bodies in the order of the parts.
 
     parts: name -> (mesh, shift (3,) [m]). Groups: those of every part as NAME_GROUP, and, under

@@ -113,7 +113,7 @@ class Recorder:
         """Keep the block as it is now."""
         self.frames.append(self.frame())
 
-    def frame(self):
+    def frame(self) -> Frame:
         """The block as it is now, a Frame."""
         motion = self.state.motion()
         damage = np.zeros(max(1, self.model.bond_count))
