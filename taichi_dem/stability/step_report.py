@@ -204,11 +204,11 @@ def step_report(scene, material=None):
     Raises InputError for anything else.
     """
     if isinstance(scene, Scene) and material is None:
-        effects = {effect.name: effect for effect in scene.effects}
-        contact = effects.get("sphere_contact")
+        by_role = {effect.role: effect for effect in scene.effects}
+        contact = by_role.get("contact")
         divisions = contact.divisions if contact is not None else None
         warnings = outer_faces_warnings(scene)
-        damped, friction = "bond_damping" in effects, "friction" in effects
+        damped, friction = "dashpot" in by_role, "friction" in by_role
         return _report(scene.mesh, scene.material, damped, friction, divisions, warnings)
     if isinstance(scene, Mesh) and isinstance(material, Material):
         return _report(scene, material, True, True, 5)
