@@ -22,6 +22,7 @@ _WITHOUT_WORK = ", and holds without doing work"
 _OWN = "the account need not show what an effect of your own does"
 _UNTOUCHED = "bodies overlap where faces lack the spheres for it"
 _APART = "parts of the mesh may pass through each other unseen, as their outer faces lack spheres"
+_STUCK = "springs between spheres that stick hold without taking energy"
 _NO_TRACE = "without sphere dashpots a touch between two recordings leaves no trace"
 
 
@@ -134,6 +135,8 @@ def _why_kept(model, state, lacking, effect, events):
             return lacking
         if not _spheres(model, state):
             return ""
+    if getattr(effect, "remembers", False) and not reason and not events:
+        return _STUCK
     if effect.role == "contact" and not reason and not events:
         return "" if model.material.contact_damping > 0.0 else _NO_TRACE
     return reason

@@ -119,6 +119,7 @@ BLAST = [
     *taken(effects.GasPressure, "group", ("group",)),
     *taken(effects.Fixed, "group", ("group",)),
     *taken(effects.SphereContact, "positive", ("skin",)),
+    *taken(effects.StickingFriction, "positive", ("stiffness_ratio",)),
     *taken(effects.SphereContact, "whole", ("divisions", *_ROOM)),
     *taken(effects.SphereContact, "flag", ("outer_faces",)),
     *taken(effects.Gravity, "three numbers", ("acceleration",)),

@@ -154,6 +154,13 @@ def test_friction_of_ones_own_is_dropped_only_with_the_contact_it_acts_in(expose
     assert found["sphere_contact"].idle
 
 
+@pytest.mark.parametrize("exposed", [True, False])
+def test_friction_that_sticks_is_kept_where_springs_may_hold(exposed):
+    """They take no energy, so that no account tells; where no face carries spheres, none holds."""
+    found = used([effects.SphereContact(), effects.StickingFriction()], exposed=exposed)
+    assert found["sticking_friction"].idle != exposed
+
+
 def test_contact_is_not_dropped_where_spheres_on_outer_faces_are_missing():
     found = used([effects.SphereContact(), effects.Friction()], exposed=False, lacking=1)
     assert not any(use.idle for use in found.values())

@@ -266,3 +266,25 @@ def test_limited_dashpots_take_the_share_that_the_step_bears():
         assert -1.0 < factor
     full, rate, _ = decay_in_a_step(1e-7, "full")
     assert full == decay_in_a_step(1e-7, "limited")[0]
+
+
+class OwnContact(effects.SphereContact):
+    """A contact law by another name."""
+
+    name = "own_contact"
+
+
+class OwnDamping(effects.BondDamping):
+    """A dashpot by another name."""
+
+    name = "own_damping"
+
+
+def test_the_step_report_asks_for_effects_by_role():
+    """Not by name: laws of one's own lose no criterion."""
+    package = [effects.BondDamping(), effects.SphereContact(), effects.Friction()]
+    own = [OwnDamping(), OwnContact(), effects.StickingFriction()]
+    first, second = (step_report(Scene(pair(), CONCRETE, laws)).limits for laws in (package, own))
+    assert set(first) == set(second) and len(first) == 5
+    for name, limits in first.items():
+        assert np.array_equal(limits, second[name])
