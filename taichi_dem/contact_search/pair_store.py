@@ -23,8 +23,8 @@ class PairStore:
     impulse [N s] and moment about the body's centre [N m s] that wait for that body, zero unless
     waiting says so: most pairs do not touch, and to ask is cheaper than to add zeros. heat: energy
     into dashpots, friction, and injected [J], until the first body takes it. deepest: overlap as a
-    share of the distance at which the spheres touch. is_new: 1 until the search that found the pair
-    ends; sphere_place: new place of its sphere pairs until then.
+    share of the distance at which the spheres touch. is_new: 1 until the limits of a step know
+    the pair; sphere_place: new place of its sphere pairs while a search writes them.
     Of a sphere pair: sphere: the two spheres; owner: slot of the pair, where its places begin.
     slot_limit, sphere_limit: how many the scene allows; fields have room for those of an engine.
     columns, sphere_columns: what others declare. A column is zero when its pair comes near, or its
