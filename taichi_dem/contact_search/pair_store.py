@@ -97,11 +97,12 @@ class PairStore:
             self.used_end[None] = p + 1
         if p >= 0:
             self.body[p] = [i, j]
-            self._clear(p)
+            self.clear_slot(p)
         return p
 
     @ti.func
-    def _clear(self, p):
+    def clear_slot(self, p):
+        """Begin with a pair of which nothing is known."""
         self.first[p], self.last[p], self.waiting[p], self.is_new[p] = 0, 0, [0, 0], 1
         self.heat[p], self.deepest[p] = vec3(0.0), 0.0
         for slot in range(2 * p, 2 * p + 2):
