@@ -25,6 +25,7 @@ class BondProbe:
             simulation.state,
             simulation.advance,
         )
+        self.tables = simulation.tables
         corners = mesh.points[self.model.topology.vertices[0]]
         self.area = 0.5 * np.linalg.norm(np.cross(*(corners[1:] - corners[0])))
         self.frame = self.tables.bond_frame[0].to_numpy()
@@ -120,7 +121,7 @@ class ContactProbe:
             simulation.state,
             simulation.advance,
         )
-        self.store = simulation.contacts.store
+        self.tables, self.store = simulation.tables, simulation.contacts.store
         self.centre = self.model.centre
         self.sphere = self.tables.sphere.to_numpy()
 
@@ -147,13 +148,13 @@ class ContactProbe:
         heat: ti.types.ndarray(dtype=ti.f64, ndim=1),
     ):
         for _ in range(1):
+            self.store.clear_slot(0)
             self.store.body[0] = [0, 1]
             self.store.sphere[0] = [a, b]
             if swap == 1:
                 self.store.body[0] = [1, 0]
                 self.store.sphere[0] = [b, a]
             self.store.first[0], self.store.last[0] = 0, 1
-            self.store.enter(0)
             self.advance.contact(0)
             for side in ti.static(range(2)):
                 place = side if swap == 0 else 1 - side

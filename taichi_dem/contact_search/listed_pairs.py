@@ -16,8 +16,7 @@ class ListedPairs:
     found: number of sphere pairs within the margin; new_faces: faces whose sphere pairs are not
     written yet; until: how far the two have gone, together, when the gap of others may be 0 [m].
     Of a body: travelled: how far any point of it had gone when it was last looked at [m]; surveyed:
-    that and its body skin; changed: 1 when the near pairs of its row, or their entries, may be
-    others.
+    that and its body skin; changed: 1 when the near pairs of its row may be others.
     """
 
     def __init__(self, contacts, capacity):

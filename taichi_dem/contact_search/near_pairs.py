@@ -9,7 +9,7 @@ from taichi_dem.contact_search.cell_grid import group
 class NearPairs:
     """Sorts the near pairs of a ``PairStore``: those with sphere pairs, or an impulse waiting.
 
-    neighbours: the ``VerletList``, whose rows are in order. Of body i: row: entries of its near
+    neighbours: the ``VerletList``, whose rows are in order. Of body i: row: slots of its near
     pairs, from neighbours.first[i] on; row_count: how many there are, row_spheres: number of their
     sphere pairs; row_is_new: 1 where they may be others than before. full: 1 or 2 when there is no
     capacity for pairs or for sphere pairs.
@@ -55,17 +55,16 @@ class NearPairs:
                     self.store.release(p)
                     self.listed.slot[k] = -1
             if stays:
-                self.row[start + count] = k
+                self.row[start + count] = self._slot_of(k, i)
                 count += 1
                 spheres += found
-                self._reserve_spheres(k, i)
         self.row_count[i], self.row_spheres[i] = count, spheres
         # Pairs that merely wait leave at the next search.
         self.listed.changed[i] = waiting
 
     @ti.func
-    def _reserve_spheres(self, k, i):
-        """Give entry k of body i a slot, and places for sphere pairs that have just been found."""
+    def _slot_of(self, k, i):
+        """Slot of entry k of body i, new or not, with places for sphere pairs just found."""
         p = self.listed.slot[k]
         if p < 0:
             p = self.store.allocate(i, self.listed.body[k])
@@ -75,6 +74,7 @@ class NearPairs:
         elif self.listed.new_faces[k] != 0:
             if self.store.reserve_spheres(p, self.listed.found[k]) == 1:
                 self.full[None] = 2
+        return p
 
     @ti.func
     def _count_rows(self):
@@ -95,16 +95,11 @@ class NearPairs:
             self.store.first_of[i] = 0
 
     @ti.func
-    def listed_count(self, i):
-        """Number of near pairs of which body i is the first; 0 where lists are full."""
-        return ti.select(self.full[None] == 0, self.row_count[i], 0)
-
-    @ti.func
-    def put(self, i, k):
-        """Put the slot of the k-th near pair of body i where it is visited; its entry."""
-        entry = self.row[self.neighbours.first[i] + k]
-        self.store.near_slot[self.store.first_of[i] + k] = self.listed.slot[entry]
-        return entry
+    def put_row(self, i):
+        """Put the near pairs of body i where they are visited."""
+        start, first = self.neighbours.first[i], self.store.first_of[i]
+        for k in range(self.row_count[i]):
+            self.store.near_slot[first + k] = self.row[start + k]
 
     @ti.func
     def index_second(self):

@@ -23,8 +23,8 @@ class PairStore:
     impulse [N s] and moment about the body's centre [N m s] that wait for that body, zero unless
     waiting says so: most pairs do not touch, and to ask is cheaper than to add zeros. heat: energy
     into dashpots, friction, and injected [J], until the first body takes it. deepest: overlap as a
-    share of the distance at which the spheres touch. is_new: 1 until the search that found the pair
-    ends; sphere_place: new place of its sphere pairs until then.
+    share of the distance at which the spheres touch. is_new: 1 until the limits of a step know
+    the pair; sphere_place: new place of its sphere pairs while a search writes them.
     Of a sphere pair: sphere: the two spheres; owner: slot of the pair, where its places begin.
     slot_limit, sphere_limit: how many the scene allows; fields have room for those of an engine.
     columns, sphere_columns: what others declare. A column is zero when its pair comes near, or its
@@ -97,11 +97,12 @@ class PairStore:
             self.used_end[None] = p + 1
         if p >= 0:
             self.body[p] = [i, j]
-            self._clear(p)
+            self.clear_slot(p)
         return p
 
     @ti.func
-    def _clear(self, p):
+    def clear_slot(self, p):
+        """Begin with a pair of which nothing is known."""
         self.first[p], self.last[p], self.waiting[p], self.is_new[p] = 0, 0, [0, 0], 1
         self.heat[p], self.deepest[p] = vec3(0.0), 0.0
         for slot in range(2 * p, 2 * p + 2):

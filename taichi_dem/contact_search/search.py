@@ -250,22 +250,29 @@ class BroadPhase:
     def _update_pairs(self, a):
         """Put the near pairs of an exposed body in order, and write what is new in them."""
         i = self.exposed[a]
-        for n in range(self.near_pairs.listed_count(i)):
-            k = self.near_pairs.put(i, n)
-            p, j, entered = self.listed.slot[k], self.listed.body[k], 0
+        if self.full[None] == 0:
             if self.near_pairs.row_is_new[i] == 1:
-                entered = self.store.is_new[p]
-                self._update_pair(k, p, i, j)
+                for k in range(self.neighbours.first[i], self.neighbours.last[i]):
+                    if self.listed.slot[k] >= 0:
+                        self._update_pair(k, self.listed.slot[k], i, self.listed.body[k])
+            self.near_pairs.put_row(i)
             if ti.static(self.schedule.has_limits):
-                now = self.state.tick[None]
-                fresh = self.breaks.exposed_since(i, now) | self.breaks.exposed_since(j, now)
-                self.schedule.limits.notice_listed(p, entered, fresh)
+                for k in range(self.store.first_of[i], self.store.first_of[i + 1]):
+                    self._notice(self.store.near_slot[k])
+
+    @ti.func
+    def _notice(self, p):
+        """Tell the limits of a pair that comes near, or has bodies that a break has exposed."""
+        pair, now = self.store.body[p], self.state.tick[None]
+        fresh = self.breaks.exposed_since(pair[0], now) | self.breaks.exposed_since(pair[1], now)
+        self.schedule.limits.notice_listed(p, self.store.is_new[p], fresh)
+        self.store.is_new[p] = 0
 
     @ti.func
     def _update_pair(self, k, p, i, j):
         """Write the sphere pairs of entry k, and book what their birth injects."""
         faces, count = self.listed.new_faces[k], self.listed.found[k]
-        self.store.is_new[p], self.listed.new_faces[k] = 0, 0
+        self.listed.new_faces[k] = 0
         if faces != 0:
             self.narrow_phase.compare(i, j, faces, self.store.sphere_place[p], True)
             self.store.replace_spheres(p, count)

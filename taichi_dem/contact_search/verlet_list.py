@@ -155,7 +155,6 @@ class VerletList:
                 if self.last[i] < self.first[i + 1]:
                     self._insert(self.first[i], self.last[i], j, faces, -1)
                     self.last[i] = self.last[i] + 1
-                    self.listed.changed[i] = 1
                 else:
                     self.stale[None] = STALE
 
@@ -176,11 +175,11 @@ class VerletList:
                 near = self.reach.faces_near(i, self.listed.body[k]) != 0
                 if not near:
                     self.listed.forget(k)
+                    self.listed.changed[i] = 1
                 if near or self.listed.slot[k] >= 0:
                     self.listed.move(k, place)
                     place += 1
             self.last[i] = place
-            self.listed.changed[i] = 1
 
     @ti.func
     def _find_row_index(self, i, j):
