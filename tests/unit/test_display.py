@@ -39,7 +39,8 @@ IDENTIFYING = (
 UNSHOWN = {Displacement, FixedStep}
 EFFECTS = (
     *(effects.BondDamping(), effects.Softening(), effects.ShearSlip(), effects.SphereContact()),
-    *(effects.Friction(), effects.Gravity(), effects.GasPressure("left"), effects.Fixed("left")),
+    *(effects.Friction(), effects.StickingFriction(), effects.Gravity()),
+    *(effects.GasPressure("left"), effects.Fixed("left")),
     effects.Roller("bottom", (0.0, 2.0, 0.0)),
     effects.PrescribedMotion("right", (1.0, 0.0, 0.0), 50.0),
 )
