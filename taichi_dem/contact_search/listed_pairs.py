@@ -21,10 +21,11 @@ class ListedPairs:
 
     def __init__(self, contacts, capacity):
         self.contacts = contacts
-        self.body = ti.field(ti.i32, shape=capacity)
-        entry = [*(ti.field(ti.i32) for _ in range(5)), ti.field(real)]
-        ti.root.dense(ti.i, capacity).place(*entry)
-        self.slot, self.faces, self.broken, self.found, self.new_faces, self.until = entry
+        self.body, self.slot, self.new_faces = (ti.field(ti.i32, shape=capacity) for _ in range(3))
+        # Side by side, as every search asks many entries for them, which are no more in the cache.
+        asked = [*(ti.field(ti.i32) for _ in range(3)), ti.field(real)]
+        ti.root.dense(ti.i, capacity).place(*asked)
+        self.faces, self.broken, self.found, self.until = asked
         n = contacts.tables.capacity.bodies
         self.travelled, self.surveyed = (ti.field(real, shape=n) for _ in range(2))
         self.changed = ti.field(ti.i32, shape=n)
@@ -91,6 +92,6 @@ class ListedPairs:
 
         faces: those that were broken.
         """
+        self.changed[i] = self.changed[i] | ti.cast(self.found[k] + count > 0, ti.i32)
         self.broken[k], self.found[k], self.new_faces[k] = faces, count, hits
         self.until[k] = self.travelled[i] + self.travelled[j] + gap
-        self.changed[i] = 1

@@ -63,8 +63,9 @@ def test_skin_changes_no_bit(block):
     """
     contacts, found = block.simulation.contacts, []
     for skin in (SKIN, 6e-4, 4e-3):
-        contacts.skin[None] = skin
         block.restart(STEP)
+        contacts.skin[None] = skin
+        block.search_anew()
         before = block.simulation.searches
         block.run(3 * STEPS)
         found.append((fields_of(block.state), block.simulation.searches - before))

@@ -57,7 +57,7 @@ def test_a_run_continues_from_its_state_with_the_same_account(runs):
     _, straight, restarted = runs
     first, second = straight.energy_balance.account(), restarted.energy_balance.account()
     assert first["sphere_dashpot"] > 0.0 and first["friction"] > 0.0 and first["injected"] > 0.0
-    error = straight.contacts.store.near_pairs * np.finfo(float).eps
+    error = straight.contacts.store.slots * np.finfo(float).eps
     off = [
         name
         for name in first

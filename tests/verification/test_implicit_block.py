@@ -81,8 +81,9 @@ def test_touching_pairs_of_a_colour_share_no_body(block):
     """Those listed are just those that touch, each once, in the order of their colours."""
     pairs, contacts, counts = block.simulation.advance.solver.pairs, block.simulation.contacts, []
     skin = contacts.skin[None]
-    contacts.skin[None] = 4e-3
     block.restart(STEP)
+    contacts.skin[None] = 4e-3
+    block.search_anew()
     block.run(50)
     for step in range(50, 250):
         searches = block.simulation.searches
