@@ -7,6 +7,7 @@ from typing import Optional, Protocol, Union
 
 import numpy as np
 
+from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import Pace
 from taichi_dem.kit.validation import positive, shown, whole
@@ -102,6 +103,9 @@ class RunView:
 
     def __init__(self, simulation, recorder):
         object.__setattr__(self, "_parts", (simulation, recorder))
+
+    def __repr__(self):
+        return in_brief(self, repr(self._parts[0]))
 
     def __setattr__(self, name, value):
         raise InputError(f"the view of a run must not be written to, got {name} = {shown(value)}")

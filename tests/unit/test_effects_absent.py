@@ -8,6 +8,7 @@ import sys
 import pytest
 
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects
+from taichi_dem.engine.capacity import LEAST
 from taichi_dem.mesh.shapes import pair
 from tests.scenes import ROOT
 
@@ -58,9 +59,10 @@ def counts(cls, *listed):
         "body": instructions(kernel.body),
     }
 
-# Model, state and schedule of n elastic, free bodies and b bonds, in the order of their making.
-n, b, whole, wide = 2, 1, ti.i32, ti.i64
-model = [(n, 1), (n, 1), (n, 1), (n, 9), (n, 9)]
+# Tables, state and schedule with room for n elastic, free bodies and b bonds, in the order of their
+# making, after the anchor of the tree.
+n, b, whole, wide = 1024, 2048, ti.i32, ti.i64
+model = [(1, 1, wide), (1, 1, whole), (1, 1, whole), (n, 1), (n, 1), (n, 1), (n, 9), (n, 9)]
 model += [(b, 2, whole), (b, 9), (b, 2), (b, 1), (3 * b, 3), (3 * b, 3)]
 model += [(4 * n, 1, whole), (4 * n, 1, whole)]
 state = [(n, 3), (n, 4), (n, 9), (n, 3), (n, 3), (n, 3), (n, 1, whole), (n, 1, whole)]
@@ -68,7 +70,7 @@ state += [(n, 1, wide), (4 * n, 6), (b, 1, wide), (n, 1), (n, 6)]
 state += [(1, 1, wide), (1, 1, whole), (1, 1)]
 # Of three active lists that of contacts has but one place.
 due = [(k, 1, whole) for size in (n, b, 1) for k in (size, size, size, 22)]
-clock = [(21, 1), *due, *[(1, 1, whole)] * 3, (2 * n + 2 * b, 1, whole), (1, 1, whole)]
+clock = [(21, 1), *due, *[(1, 1, whole)] * 3, (2 * n + 2 * b + 1, 1, whole), (1, 1, whole)]
 clock += [(5, 1, wide)]
 
 def bytes_by_hand():
@@ -120,11 +122,13 @@ def test_a_scene_without_effects_allocates_what_is_listed_by_hand(count):
 
 
 @pytest.mark.parametrize(
-    ("effect", "own"), [("bond_damping", 2), ("softening", 2 + 6), ("shear_slip", 2 + 6)]
+    ("effect", "own"), [("bond_damping", (2, 0)), ("softening", (2, 6)), ("shear_slip", (2, 6))]
 )
 def test_an_effect_adds_its_own_fields_and_the_account_of_heat(count, effect, own):
-    """own: numbers of the law, and two for each of three units; three of heat a bond; 8 bytes."""
-    assert count[effect]["bytes"] - count["composed"]["bytes"] == 8 * (own + 3)
+    """own: numbers of the law, and of each bond beside three of heat; 8 bytes; room of an engine."""
+    law, bond = own
+    room = 2 * LEAST.bodies
+    assert count[effect]["bytes"] - count["composed"]["bytes"] == 8 * (law + (bond + 3) * room)
 
 
 OWNED = {"softening_unit": effects.Softening, "shear_slip": effects.ShearSlip}

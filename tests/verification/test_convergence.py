@@ -27,6 +27,7 @@ class FixedLevels:
     """Multirate without a rule: the order of a scheme shows where its steps do not jump."""
 
     name, uniform, solves, steps_ahead = "fixed_levels", False, False, 0.0
+    control, dashpot, distance = None, "full", None
 
     def __init__(self, neighbour):
         self.neighbour, self.dt0 = neighbour, UNTIL / STEPS[0]
