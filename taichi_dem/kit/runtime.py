@@ -5,6 +5,7 @@ before the first ``import taichi``: HOME (Taichi aborts without it), and the swi
 from asking the network for a newer version and from talking.
 """
 
+import atexit
 import contextlib
 import io
 import os
@@ -154,6 +155,18 @@ def check_thread(what: str) -> None:
 def settings() -> Optional[Settings]:
     """Settings of the running session, or None before the first start."""
     return _current
+
+
+@atexit.register
+def _end_session():
+    """End the session while all modules are there, so that Taichi writes its kernel cache.
+
+    Later it is lost wherever something still refers to a class with kernels, as the caches of
+    ``typing`` do for the classes of an annotation.
+    """
+    if _session and _session.thread == threading.get_ident():
+        if impl.get_runtime().prog is _session.program:
+            ti.reset()
 
 
 def _checked(arch, threads, debug):

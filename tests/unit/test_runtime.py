@@ -99,3 +99,10 @@ def test_only_a_lock_left_by_a_killed_process_is_removed(tmp_path, age_s, remove
     assert lock.exists() != removed
     # With the lock free, the next process finds this one's kernels compiled.
     assert bool(list(lock.parent.glob("*.tic"))) == removed
+
+
+def test_kernels_reach_the_cache_though_a_class_that_has_them_is_still_referred_to(tmp_path):
+    held = "from typing import Optional\nfrom taichi_dem.stability.step_control import FixedStep\n"
+    script = held + "kept = Optional[FixedStep]\n" + _SILENT_START
+    answers(tmp_path, script, TI_OFFLINE_CACHE_FILE_PATH=str(tmp_path))
+    assert list(tmp_path.glob("*.tic"))
