@@ -83,7 +83,7 @@ def test_whole_searches_give_the_same_bits(block, reference):
 
 
 @pytest.mark.slow
-def test_packing_what_pairs_list_changes_no_bit(block, reference, monkeypatch):
+def test_packing_what_pairs_list_changes_no_bit(block, reference, monkeypatch, compiled_anew):
     """At every search, impulses that the sweeps begin with included; the others left gaps."""
     monkeypatch.setattr(pair_store, "SLACK", -(1 << 30))
     packed = Simulation(brisk_scene(), ImplicitDashpots(STEP))

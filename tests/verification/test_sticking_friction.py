@@ -23,6 +23,7 @@ from taichi_dem import (
     checked_mesh,
     effects,
 )
+from taichi_dem.effects.base import Effect
 from taichi_dem.mesh.shapes import single
 
 EPS = np.finfo(float).eps
@@ -210,3 +211,14 @@ def test_two_kinds_of_friction_are_refused():
     both = [effects.SphereContact(), effects.Friction(), effects.StickingFriction()]
     with pytest.raises(InputError, match="friction and sticking_friction both take the role"):
         Scene(single(), CONCRETE, both)
+
+
+class Unbounded(Effect):
+    """A friction law of one's own that names no limit."""
+
+    role, name = "friction", "unbounded"
+
+
+def test_friction_without_a_limit_is_refused_where_dashpots_are_solved():
+    with pytest.raises(InputError, match=r"must have limit\(force_normal\), got unbounded without"):
+        Simulation(slope(0.2, Unbounded()), METHODS["implicit"])
