@@ -125,7 +125,7 @@ def test_a_scene_without_effects_allocates_what_is_listed_by_hand(count):
     ("effect", "own"), [("bond_damping", (2, 0)), ("softening", (2, 6)), ("shear_slip", (2, 6))]
 )
 def test_an_effect_adds_its_own_fields_and_the_account_of_heat(count, effect, own):
-    """own: numbers of the law, and of each bond beside three of heat; 8 bytes; room of an engine."""
+    """own: numbers of the law, and of each bond beside three of heat; 8 bytes, for all room."""
     law, bond = own
     room = 2 * LEAST.bodies
     assert count[effect]["bytes"] - count["composed"]["bytes"] == 8 * (law + (bond + 3) * room)

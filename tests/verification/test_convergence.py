@@ -6,7 +6,7 @@ import taichi as ti
 
 from taichi_dem import CONCRETE, Scene, Simulation, effects, quality_report
 from taichi_dem.mesh.shapes import bar
-from taichi_dem.timeline import MACRO_TICKS, MAX_LEVEL
+from taichi_dem.timeline import MAX_LEVEL
 
 UNTIL = 1e-5
 #: Macro steps in a run; the step halves from one to the next.
@@ -66,7 +66,6 @@ class MovingBar:
         for k, value in enumerate((material.normal_damping, material.shear_damping)):
             simulation.tables.dashpot.law[k] = value if damped else 0.0
         dt0 = UNTIL / steps
-        simulation.schedule.dt0, simulation.schedule.tick_seconds = dt0, dt0 / MACRO_TICKS
         for k in range(MAX_LEVEL + 1):
             simulation.schedule.step_seconds[k] = dt0 / 2.0**k
         simulation.step.prime()
