@@ -5,6 +5,7 @@
 
 import pytest
 
+from ca_damper.engine import damper_engine
 from taichi_dem import InputError, runtime
 from taichi_dem.engine.engine import ENGINES
 from taichi_dem.kit.allocation import field_bytes, tree_count
@@ -49,7 +50,8 @@ def _is_full():
 @pytest.fixture
 def compiled_anew(monkeypatch):
     """Engines of this test alone: for constants of kernels that a test changes."""
-    monkeypatch.setattr(ENGINES, "_engines", {})
+    for pool in (ENGINES, damper_engine._POOL):
+        monkeypatch.setattr(pool, "_engines", {})
 
 
 def _skipping():

@@ -80,6 +80,7 @@ class FieldTree:
     def destroy(self) -> None:
         """Give the memory back; the fields must not be used any more."""
         _bases.pop(self._builder.root.ptr.id, None)
+        _destroyed.add(self._builder.root.ptr.id)
         self._tree.destroy()
         self._tree = None
 
@@ -87,15 +88,23 @@ class FieldTree:
 #: Addresses of the trees of the session by their roots, and the session's program.
 _bases: dict = {}
 _bases_of = None
+#: Roots whose memory has been given back; Taichi goes on to list them.
+_destroyed: set = set()
 
 
 def _base(root) -> int:
     """Address of a tree of the present session by its root; 0 for one that is no ``FieldTree``."""
+    _forget_other_sessions()
+    return _bases.get(root.id, 0)
+
+
+def _forget_other_sessions() -> None:
+    """Numbers of roots begin anew in each session."""
     global _bases_of
     if _bases_of is not impl.get_runtime().prog:
         _bases_of = impl.get_runtime().prog
         _bases.clear()
-    return _bases.get(root.id, 0)
+        _destroyed.clear()
 
 
 def in_tree(field: ti.Field) -> bool:
@@ -278,7 +287,9 @@ def tree_count() -> int:
 
 def field_bytes() -> int:
     """Bytes of all fields that the session has used so far."""
-    return sum(root._cell_size_bytes for root in FieldsBuilder._finalized_roots())
+    _forget_other_sessions()
+    roots = FieldsBuilder._finalized_roots()
+    return sum(root._cell_size_bytes for root in roots if root.ptr.id not in _destroyed)
 
 
 @ti.func

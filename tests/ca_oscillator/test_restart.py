@@ -59,7 +59,7 @@ class Shaken:
     ],
     ids=["automaton", "spheres"],
 )
-def shaken(request):
+def shaken(request, compiled_anew):
     return Shaken(*request.param)
 
 

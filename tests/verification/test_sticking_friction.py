@@ -219,6 +219,6 @@ class Unbounded(Effect):
     role, name = "friction", "unbounded"
 
 
-def test_friction_without_a_limit_is_refused_where_dashpots_are_solved():
-    with pytest.raises(InputError, match=r"must have limit\(force_normal\), got unbounded without"):
-        Simulation(slope(0.2, Unbounded()), METHODS["implicit"])
+def test_friction_without_a_limit_is_refused():
+    with pytest.raises(InputError, match="effect Unbounded must have a member limit, as its role"):
+        slope(0.2, Unbounded())

@@ -3,7 +3,6 @@
 import taichi as ti
 
 from taichi_dem.contact_search.cell_grid import group
-from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.physics.rotation import unit3, zero3
 from taichi_dem.physics.sphere_pair import add_within, cut_to, meeting
@@ -41,11 +40,6 @@ class PairDashpots:
         self.tables, self.state, self.schedule = tables, state, schedule
         self.contacts, self.velocities = contacts, velocities
         self.has_friction = bool(tables.friction.name)
-        if self.has_friction and not hasattr(tables.friction, "limit"):
-            raise InputError(
-                "friction that solved dashpots bound must have limit(force_normal), "
-                f"got {tables.friction.name} without: see docs/add_a_contact_law.md"
-            )
         self.store = contacts.store
         self.springs = TangentialSprings(tables, state, schedule, contacts)
         if self.springs.present:
