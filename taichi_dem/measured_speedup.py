@@ -4,10 +4,13 @@ The gains of a ``Report`` count evaluations. Lists that change, looks at who is 
 memory of which a part is used cost time beside them.
 """
 
+import contextlib
 from dataclasses import is_dataclass, replace
 
 import numpy as np
 
+from taichi_dem.kit.errors import SimulationDiverged
+from taichi_dem.kit.progress.progress import listening
 from taichi_dem.kit.validation import LARGEST
 from taichi_dem.simulation import Simulation
 from taichi_dem.timeline import NEVER
@@ -26,11 +29,17 @@ _ANEW = (
 
 
 def speedup_of_run(simulation):
-    """``measured_speedup`` for a share of the run's own time; None where it was too short."""
+    """``measured_speedup`` for a share of the run's own time; None where it cannot be measured.
+
+    That is where the run was too short, or its twin leaves its bounds: the run itself did not.
+    """
     spent = simulation.run_cpu_seconds
     if simulation.method.uniform or spent < LEAST_RUN or not is_dataclass(simulation.method):
         return None
-    return measured_speedup(simulation, min(MOST_SECONDS, SHARE * spent))
+    # The run is over: who watched it is told nothing of a twin.
+    with contextlib.suppress(SimulationDiverged), listening(lambda _: None):
+        return measured_speedup(simulation, min(MOST_SECONDS, SHARE * spent))
+    return None
 
 
 def measured_speedup(simulation, seconds=MOST_SECONDS):

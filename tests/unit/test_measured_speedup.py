@@ -5,8 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from taichi_dem import Multirate, Simulation, Uniform
+from taichi_dem import Multirate, Simulation, SimulationDiverged, Uniform, simulate
+from taichi_dem import measured_speedup as speedup
 from taichi_dem.measured_speedup import _twin, measured_speedup
+from taichi_dem.run_plan import RunProgress
 from taichi_dem.timeline import NEVER
 from tests.scenes import brisk_scene
 
@@ -32,6 +34,22 @@ def test_a_twin_stands_where_the_run_does_and_takes_its_smallest_step(broken):
     twin.advance_to(50)
     assert np.all(twin.state.level.to_numpy() == 0)
     assert twin.loan.engine is broken.loan.engine
+
+
+def test_a_measured_run_ends_its_progress_at_the_end_and_is_not_lost_by_its_twin(monkeypatch):
+    """What the twin compiles is not told, and where it diverges nothing was measured."""
+    monkeypatch.setattr(speedup, "LEAST_RUN", 0.0)
+    told, scene, method = [], brisk_scene(), Multirate(1e-8, 2e-7)
+    result = simulate(scene, method=method, until=1e-6, samples=1, progress=told.append)
+    assert result.report.measured_speedup > 0.0
+    assert isinstance(told[-1], RunProgress) and told[-1].share == 1.0
+
+    def diverging(*_):
+        raise SimulationDiverged("the twin ran away")
+
+    monkeypatch.setattr(speedup, "measured_speedup", diverging)
+    result = simulate(scene, method=method, until=1e-6, samples=1)
+    assert result.report.measured_speedup is None and not result.diverged
 
 
 @pytest.mark.slow
