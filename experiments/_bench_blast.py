@@ -3,8 +3,8 @@
 import numpy as np
 
 from _blast import METHODS, paper_scene
-from _timing import on_device, seconds_of
 from taichi_dem import Multirate, Simulation, Uniform
+from taichi_dem.kit.study import on_device, seconds_of
 from taichi_dem.simulation import macro_steps
 
 

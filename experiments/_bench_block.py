@@ -2,7 +2,7 @@
 
 from _blast import METHODS
 from _scaling_threads import ROUNDS, thread_gain, thread_job
-from _timing import on_device
+from taichi_dem.kit.study import on_device
 
 #: Boxes along the edges of the block; six tetrahedra each.
 SMALL, LARGE, LARGEST = (20, 10, 10), (40, 20, 20), (112, 39, 39)

@@ -3,9 +3,9 @@
 import time
 
 from _bench_start import in_new_process
-from _timing import on_device
 from ca_damper import Automaton, Spheres, frequency_response
 from damper_cost import cycle_seconds, scenes
+from taichi_dem.kit.study import on_device
 
 CELLS = 18 * 12
 NUMBERS = (1, 10, 20, 30, 40, 50, 60, 80, 100, 120)

@@ -9,9 +9,9 @@ import time
 import numpy as np
 
 from _blast import paper_effects, paper_scene
-from _timing import clock
 from taichi_dem import CONCRETE, ImplicitDashpots, Multirate, Scene, Simulation, effects, runtime
 from taichi_dem import simulate as run_scene
+from taichi_dem.kit.study import clock
 from taichi_dem.mesh.shapes import bar
 
 #: Code of a new process: prints the seconds that MODULE.FUNCTION(begun, *arguments) returns.

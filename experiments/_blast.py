@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from _cli import BLAST_DRIVERS, PAPER_BLOCK, parser
 from taichi_dem import (
     CONCRETE,
+    PAPER_BLOCK,
     Every,
     ImplicitDashpots,
     Multirate,
@@ -15,7 +15,10 @@ from taichi_dem import (
     quality_report,
     read_mesh,
 )
+from taichi_dem.kit.study import parser
 
+#: Drivers of a blast, the first the default.
+BLAST_DRIVERS = ("auto", "resident", "parallel")
 #: Metres that a body may go in a second's worth of the paper's largest step: l = 1e-7 m at 1e-8 s.
 WAY_PER_STEP = 10.0
 EFFECTS = {

@@ -6,9 +6,9 @@ import numpy as np
 
 from _cost_rk45 import WAYS as RK45_WAYS
 from _damper_response import OSCILLATOR
-from _work_precision_picture import picture_work_precision
 from taichi_dem.kit.plot_style import GREY, STYLES, picture, styles_of
 from taichi_dem.kit.plot_style import seconds as seconds_in_words
+from taichi_dem.kit.study.work_precision_picture import picture_work_precision
 
 
 def titles_of(names):

@@ -5,10 +5,10 @@ import time
 import numpy as np
 
 from _damper_response import OSCILLATOR
-from _timing import Timing
-from _work_precision import Point
 from ca_damper import Batch, Empty, SceneTable, rk45
 from taichi_dem.kit.plot_style import power
+from taichi_dem.kit.study import Timing
+from taichi_dem.kit.study.work_precision import Point
 
 WAYS = ("rk45_tolerance", "rk45_step", "rk45_python")
 TOLERANCES = (1e-6, 1e-8, 1e-10, 1e-12)

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from _timing import Timing
 from ca_damper import Batch, Oscillator, SceneTable
+from taichi_dem.kit.study import Timing
 
 OSCILLATOR = Oscillator()
 

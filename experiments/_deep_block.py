@@ -5,8 +5,7 @@ import os
 
 import numpy as np
 
-from _cli import PAPER_BLOCK
-from taichi_dem import read_mesh
+from taichi_dem import PAPER_BLOCK, read_mesh
 from taichi_dem.mesh.gmsh import block_with_hole
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.reorder import in_space_order

@@ -6,8 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from _timing import Timing
-from _worker import ask_worker
+from taichi_dem.kit.study import Timing, ask_worker
 
 
 @dataclass
@@ -66,6 +65,7 @@ def _measure(job, place, arch):
     place.mkdir(exist_ok=True)
     cache = {"TI_OFFLINE_CACHE": "1", "TI_OFFLINE_CACHE_FILE_PATH": str(place)}
     task = {"kind": job.kind, "arch": arch, "arguments": job.arguments}
-    job.results.append(ask_worker("_effects_worker", task, f"of {job.label}", **cache))
+    worker = Path(__file__).with_name("_effects_worker.py")
+    job.results.append(ask_worker(worker, task, f"of {job.label}", **cache))
     if not job.compiled_kB:
         job.compiled_kB = 1e-3 * sum(p.stat().st_size for p in place.rglob("*.tic"))

@@ -11,14 +11,13 @@ import time
 import numpy as np
 
 from _blast import EFFECTS
-from _cli import PAPER_BLOCK
 from _damper_response import OSCILLATOR
 from _demo import set_moving
 from _stripped import ByHand
-from _worker import read_job
 from ca_damper import Automaton, Batch, SceneTable, Spheres
 from taichi_dem import (
     CONCRETE,
+    PAPER_BLOCK,
     ImplicitDashpots,
     Scene,
     Simulation,
@@ -29,6 +28,7 @@ from taichi_dem import (
 )
 from taichi_dem.kit.allocation import field_bytes
 from taichi_dem.kit.errors import SimulationDiverged
+from taichi_dem.kit.study import read_job
 from taichi_dem.step.drivers import Resident, Step
 
 FILLINGS = {"spheres": Spheres, "automaton": Automaton}

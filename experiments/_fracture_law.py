@@ -4,9 +4,9 @@ import os
 
 import numpy as np
 
-from _cli import figure
 from taichi_dem import CONCRETE
 from taichi_dem.kit.files import write_csv
+from taichi_dem.kit.study import figure
 from taichi_dem.plot.law import film_law, picture_law
 
 #: Way of the specimen in tension [m]: beyond the strength, back into compression, to the break.

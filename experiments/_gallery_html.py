@@ -10,8 +10,8 @@ from urllib.parse import quote
 
 from jinja2 import Environment, FileSystemLoader
 
-from _cli import value_in_words
 from taichi_dem.kit.files import write_text
+from taichi_dem.kit.study import value_in_words
 
 HERE = Path(__file__).resolve().parent
 #: Notes of ``gallery.py`` on a run, beside the output of the experiment.

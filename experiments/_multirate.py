@@ -5,9 +5,9 @@ import os
 import numpy as np
 
 from _blast import level_shares
-from _report import figures_from
 from taichi_dem import InputError
 from taichi_dem.kit.files import write_csv
+from taichi_dem.kit.study import figures_from
 from taichi_dem.mesh.topology import faces_of_group
 
 TABLE = {

@@ -1,9 +1,11 @@
 """What a second thread, or a device, does for whole steps of a large block."""
 
+from pathlib import Path
+
 import numpy as np
 
-from _worker import ask_worker
 from taichi_dem import InputError
+from taichi_dem.kit.study import ask_worker
 
 #: How often runs on one and on two threads take turns.
 ROUNDS = 2
@@ -13,7 +15,7 @@ def thread_job(mesh, cells, method, threads, steps, repeats, arch="cpu"):
     """What ``_scaling_worker`` says of whole steps by the parallel driver."""
     job = {"mesh": mesh, "cells": cells, "method": method, "threads": threads, "arch": arch}
     job.update(driver="parallel", warm=2, steps=steps, repeats=repeats)
-    return ask_worker("_scaling_worker", job, f"on {threads} threads")
+    return ask_worker(Path(__file__).with_name("_scaling_worker.py"), job, f"on {threads} threads")
 
 
 def thread_gain(mesh, cells, method, steps, rounds, repeats):

@@ -15,10 +15,10 @@ import numpy as np
 import taichi as ti
 
 from _blast import METHODS, paper_effects
-from _worker import read_job
 from taichi_dem import CONCRETE, Scene, Simulation, effects, read_mesh, runtime
 from taichi_dem.kit.checkpoint import digest
 from taichi_dem.kit.field_memory import FieldMemory
+from taichi_dem.kit.study import read_job
 from taichi_dem.mesh.reorder import in_space_order
 from taichi_dem.mesh.shapes import bar
 

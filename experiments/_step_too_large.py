@@ -4,10 +4,9 @@ import os
 
 import numpy as np
 
-from _cli import figure
-from _report import show_rows, write_rows
 from taichi_dem import CONCRETE, quality_report
 from taichi_dem.kit.files import write_csv
+from taichi_dem.kit.study import figure, show_rows, write_rows
 
 TABLE = {
     "limited by": ("limited_by", ""),
@@ -130,4 +129,4 @@ def write(runs, folder):
     rows = [{**row_of(made), "sentence": made.sentence} for made in runs]
     for row in rows:
         del row["unexplained"], row["end"]
-    write_rows(folder, "steps.csv", rows)
+    write_rows(os.path.join(folder, "steps.csv"), rows)

@@ -4,10 +4,9 @@ import os
 
 import numpy as np
 
-from _cli import figure
-from _report import figures_from, write_rows
 from taichi_dem import CONCRETE, Every
 from taichi_dem.kit.files import write_csv
+from taichi_dem.kit.study import figure, figures_from, write_rows
 from taichi_dem.plot.wave import film_spall, picture_spall, picture_wave
 from taichi_dem.simulate import run_simulation
 
@@ -155,7 +154,7 @@ def write(wave, made, rows, speed, folder):
     names = [f"at_{LENGTH * (k + 0.5) / wave.shape[1]:g}_m" for k in places]
     columns = dict(zip([*names, "free_end"], velocity[:, [*places, -1]].T))
     write_csv(at("wave.csv"), {"time_s": wave.time, **columns})
-    write_rows(folder, "spall.csv", rows)
+    write_rows(os.path.join(folder, "spall.csv"), rows)
     picture_wave(at("wave.png"), LENGTH, wave.time, velocity, places)
     picture_spall(at("spall.png"), LENGTH, made, stress, rows)
     strength = CONCRETE.tensile_strength

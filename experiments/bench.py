@@ -18,9 +18,9 @@ import _bench_blast
 import _bench_block
 import _bench_damper
 import _bench_start
-from _cli import main, parser, print_table, processor, versions
 from taichi_dem import runtime
 from taichi_dem.kit.files import output_folder, write_text
+from taichi_dem.kit.study import main, parser, print_table, processor, versions
 
 NAME = "bench"
 

@@ -27,15 +27,23 @@ import time
 import numpy as np
 
 from _blast import blast_parser, paper_effects, print_quality
-from _cli import add_checkpoints, checkpoint_of, figure, main, number, whole
 from _deep_block import has_gmsh, made_block, stacked_block
-from _report import finish, take_defaults
 from taichi_dem import CONCRETE, Every, ImplicitDashpots, Scene, plot, read_mesh, simulate
 from taichi_dem.kit.allocation import field_bytes
 from taichi_dem.kit.files import output_folder, write_csv
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREY, picture
 from taichi_dem.kit.progress.progress import time_left
 from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.study import (
+    add_checkpoints,
+    checkpoint_of,
+    figure,
+    finish,
+    main,
+    number,
+    take_defaults,
+    whole,
+)
 from taichi_dem.mesh.reorder import in_space_order
 from taichi_dem.output.hole_monitor import HoleMonitor
 from taichi_dem.plot.deep import plot_deep_cracks

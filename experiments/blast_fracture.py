@@ -30,8 +30,6 @@ from _blast import (
     multirate_controlled,
     print_quality,
 )
-from _cli import add_checkpoints, checkpoint_of, figure, main, number, whole
-from _report import finish, take_defaults
 from taichi_dem import (
     CONCRETE,
     ImplicitDashpots,
@@ -46,6 +44,16 @@ from taichi_dem import (
 )
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.study import (
+    add_checkpoints,
+    checkpoint_of,
+    figure,
+    finish,
+    main,
+    number,
+    take_defaults,
+    whole,
+)
 
 NAME = "blast_fracture"
 #: Method by name: how it is made of the largest step and the displacement limit l; its largest step

@@ -22,8 +22,6 @@ import sys
 import numpy as np
 
 from _blast import METHODS, Costs, blast_parser, paper_scene
-from _cli import figure, main, number, several, whole
-from _report import figures_from, finish, show_rows, take_defaults, write_rows
 from taichi_dem import (
     ImplicitDashpots,
     InputError,
@@ -33,6 +31,18 @@ from taichi_dem import (
     simulate,
 )
 from taichi_dem.kit.files import output_folder, write_csv
+from taichi_dem.kit.study import (
+    figure,
+    figures_from,
+    finish,
+    main,
+    number,
+    several,
+    show_rows,
+    take_defaults,
+    whole,
+    write_rows,
+)
 
 NAME = "blast_methods"
 REFERENCE = ImplicitDashpots(2.5e-8, sweeps=(6, 40))
@@ -158,7 +168,7 @@ def run(options):
         stable = largest_stable_step(scene, make, step, exact, options)
         rows.append(row_of(name, report, histories[name], wanted, stable, step))
         reports.append(report)
-    write_rows(options.out, "methods.csv", rows)
+    write_rows(os.path.join(options.out, "methods.csv"), rows)
     plot.plot_methods(os.path.join(options.out, "methods.png"), histories, MOVED)
     figures = {
         "reference_displacement_mm": figure(wanted, "mm"),

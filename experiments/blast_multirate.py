@@ -18,9 +18,6 @@ import os
 import sys
 
 from _blast import Costs, blast_parser, level_shares, paper_scene
-from _cli import figure, main, number, whole
-from _report import finish, show_rows, take_defaults, write_rows
-from _timing import Timing
 from taichi_dem import (
     At,
     InputError,
@@ -32,6 +29,17 @@ from taichi_dem import (
 )
 from taichi_dem.kit.files import output_folder, write_csv
 from taichi_dem.kit.plot_style import styles_of
+from taichi_dem.kit.study import (
+    Timing,
+    figure,
+    finish,
+    main,
+    number,
+    show_rows,
+    take_defaults,
+    whole,
+    write_rows,
+)
 from taichi_dem.output.hole_monitor import HoleMonitor
 
 NAME = "blast_multirate"
@@ -125,7 +133,7 @@ def run(options):
         name: [follow(name, options, scene) for _ in range(options.repeats)] for name in METHODS
     }
     rows = table_of(runs)
-    write_rows(options.out, "comparison.csv", rows)
+    write_rows(os.path.join(options.out, "comparison.csv"), rows)
     picture(runs, options)
     print(f"One step for all against a step for each, all at l = {options.l:g} m\n")
     show_rows(rows, TABLE)

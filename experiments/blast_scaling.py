@@ -27,8 +27,6 @@ import time
 import numpy as np
 
 from _blast import blast_parser, paper_scene
-from _cli import figure, main, number, whole
-from _report import finish, show_rows, take_defaults, write_rows
 from _scaling_picture import picture_scaling
 from _scaling_record import record
 from _scaling_simulate import WAYS, Workers, acceleration
@@ -36,6 +34,16 @@ from _scaling_threads import ROUNDS, thread_gain
 from taichi_dem import Multirate
 from taichi_dem.kit.files import output_folder, write_csv
 from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.study import (
+    figure,
+    finish,
+    main,
+    number,
+    show_rows,
+    take_defaults,
+    whole,
+    write_rows,
+)
 from taichi_dem.mesh.partition import imbalance
 
 NAME = "blast_scaling"
@@ -116,7 +124,7 @@ def run(options):
     shared = {way: {count: workers.share(way, count) for count in counts} for way in WAYS}
     gains = measured(options)
     rows = [row_of(workers, way, *one) for way in WAYS for one in shared[way].items()]
-    write_rows(options.out, "scaling.csv", rows)
+    write_rows(os.path.join(options.out, "scaling.csv"), rows)
     each = {f"{way}_s": shared[way][PAPER_WORKERS].seconds for way in WAYS}
     numbers = np.arange(1, PAPER_WORKERS + 1)
     write_csv(os.path.join(options.out, "shares.csv"), {"worker": numbers, **each})
@@ -127,7 +135,7 @@ def run(options):
     shown = [row for row in rows if row["workers"] in (2, 4, PAPER_WORKERS, 256)]
     show_rows([{**row, "way": WAYS[row["way"]]} for row in shown], TABLE)
     seconds = simulation.compile_seconds, time.perf_counter() - started
-    finish(options, NAME, figures_of(workers, shared, gains), [], seconds=seconds)
+    finish(options, NAME, figures_of(workers, shared, gains), seconds)
 
 
 def measured(options):

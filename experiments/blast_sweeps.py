@@ -21,13 +21,12 @@ import sys
 import numpy as np
 
 from _blast import blast_parser, paper_scene
-from _cli import figure, main
 from _dashpot_system import DashpotSystem
-from _report import finish, show_rows, write_rows
 from taichi_dem import At, ImplicitDashpots, Simulation
 from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.plot_style import BROWN, GREY, STYLES, VIOLET, picture
 from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.study import figure, finish, main, show_rows, write_rows
 from taichi_dem.simulate import run_simulation
 
 NAME = "blast_sweeps"
@@ -118,7 +117,7 @@ def run(options):
         for time_s, errors in found.items()
         for k in range(SWEEPS + 1)
     ]
-    write_rows(options.out, "sweeps.csv", rows)
+    write_rows(os.path.join(options.out, "sweeps.csv"), rows)
     draw(os.path.join(options.out, "sweeps.png"), found)
     rows = [
         {"t": 1e6 * time_s, "way": way, **{t: sweeps_to(errors[way], t) for t in TOLERANCES}}

@@ -23,26 +23,22 @@ from typing import Callable
 
 from _blast import blast_parser
 from _blast_accuracy import MEASURES, SPLIT, Outcome, blast, displacement_error
-from _cache import cached
-from _cli import figure, main, print_table
-from _report import finish, write_rows
-from _timing import Timing
-from _work_precision import (
-    ANSWER_HEADER,
-    Point,
-    answer_rows,
-    answers,
-    percent,
-    picture_errors,
-    picture_work_precision,
-    write_answers,
-    write_points,
-)
 from taichi_dem import ImplicitDashpots, Multirate, StepControl, Uniform, read_mesh
 from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.plot_style import power, styles_of
 from taichi_dem.kit.plot_style import seconds as seconds_in_words
 from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.study import Timing, cached, figure, finish, main, print_table, write_rows
+from taichi_dem.kit.study.work_precision import (
+    ANSWER_HEADER,
+    Point,
+    answer_rows,
+    answers,
+    percent,
+    write_answers,
+    write_points,
+)
+from taichi_dem.kit.study.work_precision_picture import picture_errors, picture_work_precision
 
 NAME = "cost_of_accuracy_blast"
 PAPER_DT0 = 1e-8
@@ -132,7 +128,7 @@ def run(options):
     print()
     figures = figures_of(made, points, floors, reference)
     spent = time.perf_counter() - started
-    finish(options, NAME, figures, [], seconds=(compiling, spent - compiling))
+    finish(options, NAME, figures, (compiling, spent - compiling))
 
 
 def reference_of(mesh, sizes, options, bar):
@@ -220,7 +216,7 @@ def write_all(folder, made, points, floors, rows, reference):
     for name, sweep in made.items():
         for runs, again in ((sweep.runs, False), (sweep.twins, True)):
             table += [_row(name, step, one, reference, again) for step, one in runs.items()]
-    write_rows(folder, "runs.csv", table)
+    write_rows(os.path.join(folder, "runs.csv"), table)
 
 
 def _row(name, step, run, reference, again):

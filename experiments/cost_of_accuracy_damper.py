@@ -19,11 +19,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import _cost_damper_pictures as pictures
-from _cache import cached
-from _cli import figure, finish, main, parser, print_table, write_rows
 from _cost_rk45 import rk45_points
 from _damper_response import OSCILLATOR, Job, distance, scene_steps, seed_variance, simulate
-from _work_precision import (
+from ca_damper import Automaton, SimulationDiverged, Spheres
+from taichi_dem import InputError
+from taichi_dem.kit.files import output_folder
+from taichi_dem.kit.plot_style import seconds as seconds_in_words
+from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.study import cached, figure, finish, main, parser, print_table, write_rows
+from taichi_dem.kit.study.work_precision import (
     ANSWER_HEADER,
     Point,
     answer_rows,
@@ -32,11 +36,6 @@ from _work_precision import (
     write_answers,
     write_points,
 )
-from ca_damper import Automaton, SimulationDiverged, Spheres
-from taichi_dem import InputError
-from taichi_dem.kit.files import output_folder
-from taichi_dem.kit.plot_style import seconds as seconds_in_words
-from taichi_dem.kit.progress.progress_bar import ProgressBar
 
 NAME = "cost_of_accuracy_damper"
 SPHERES = "dem_tsuji"
@@ -221,7 +220,7 @@ def write_curves(path, made):
             for k, j in np.ndindex(*rms.shape):
                 seed = j + (1001 if is_reference else 1)
                 rows.append((label, sweep.job.ratios[k], dt, seed, rms[k, j], is_reference))
-    write_rows(path, "method ratio step_s seed rms_m reference", rows)
+    write_rows(path, rows, "method ratio step_s seed rms_m reference")
 
 
 def figures_of(made, own, toward, empty, floors):

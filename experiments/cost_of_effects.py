@@ -19,13 +19,22 @@ import sys
 
 import numpy as np
 
-from _cli import figure, main, number, parser, whole
 from _damper_response import distance
 from _effects_jobs import Job, run_all
 from _effects_picture import picture_effects
-from _report import finish, show_rows, take_defaults, write_rows
 from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.study import (
+    figure,
+    finish,
+    main,
+    number,
+    parser,
+    show_rows,
+    take_defaults,
+    whole,
+    write_rows,
+)
 
 NAME = "cost_of_effects"
 #: Effects in the order in which they are added; the load is always there.
@@ -95,13 +104,13 @@ def run(options):
     with ProgressBar("measuring") as bar:
         seconds = run_all(jobs, options.repeats, workers, options.arch, bar)
     blast, damper = blast_rows(jobs), damper_rows(jobs)
-    write_rows(options.out, "blast.csv", blast)
-    write_rows(options.out, "damper.csv", damper)
+    write_rows(os.path.join(options.out, "blast.csv"), blast)
+    write_rows(os.path.join(options.out, "damper.csv"), damper)
     picture(blast, damper, os.path.join(options.out, "effects.png"))
     show(blast, "The blast: hole's displacement [mm] and broken faces")
     show(damper, "The damper: peak of the response [mm]; first rows: what two seeds may differ by")
     compiling = sum(job.first.get("compile_s", 0.0) for job in jobs)
-    finish(options, NAME, figures_of(jobs, blast, damper), [], seconds=(compiling, seconds))
+    finish(options, NAME, figures_of(jobs, blast, damper), (compiling, seconds))
 
 
 def picture(blast, damper, path):

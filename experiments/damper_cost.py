@@ -15,13 +15,24 @@ import time
 
 import numpy as np
 
-from _cli import figure, fill_in, finish, main, parser, print_table, several, whole, write_rows
-from _timing import Timing, seconds_of
 from ca_damper import Automaton, Batch, SceneTable, SimulationDiverged, Spheres
 from taichi_dem import InputError
 from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.plot_style import BLACK, STYLES, picture, styles_of
 from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.study import (
+    Timing,
+    figure,
+    finish,
+    main,
+    parser,
+    print_table,
+    seconds_of,
+    several,
+    take_defaults,
+    whole,
+    write_rows,
+)
 
 NAME = "damper_cost"
 FREQUENCY, BASE_AMPLITUDE = 6.0, 0.6e-3
@@ -73,7 +84,7 @@ def options_parser():
 
 def run(options):
     """Time all variants, find their longest steps, write tables and pictures."""
-    fill_in(options, QUICK if options.quick else FULL)
+    take_defaults(options, FULL, QUICK)
     folder = output_folder(options.out)
     started = time.perf_counter()
     with ProgressBar("timing") as bar:
@@ -156,9 +167,9 @@ def write_tables(costs, borne, options):
         for particles, timing in zip(options.particles, cost["timings"])
     ]
     names = "variant particles steps cpu_s low_s high_s"
-    write_rows(os.path.join(options.out, "cost.csv"), names, timed)
+    write_rows(os.path.join(options.out, "cost.csv"), timed, names)
     tried = [(label, dt, word) for label, found in borne.items() for dt, word in found]
-    write_rows(os.path.join(options.out, "steps.csv"), "filling dt_s outcome", tried)
+    write_rows(os.path.join(options.out, "steps.csv"), tried, "filling dt_s outcome")
 
 
 def figures_of(costs, borne, options):

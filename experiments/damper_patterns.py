@@ -19,13 +19,22 @@ import sys
 import numpy as np
 
 import _patterns_pictures as pictures
-from _cli import figure, finish, main, number, parser, print_table, whole, write_rows
 from ca_damper import Automaton, Batch, SceneTable, Spheres, film
 from ca_damper.automaton import ACCOUNTINGS
 from ca_damper.plot import Box
 from ca_damper.progress import Stages
 from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.study import (
+    figure,
+    finish,
+    main,
+    number,
+    parser,
+    print_table,
+    whole,
+    write_rows,
+)
 
 NAME = "damper_patterns"
 QUICK = {"transient": 5, "cycles": 1, "seeds": 2}
@@ -168,9 +177,9 @@ def write_tables(films, measures, phase, seeds, folder):
             for place, velocity in zip(1e3 * frame.position, frame.velocity):
                 places.append((*key, phase[k], *place, *velocity))
     names = f"particles filling seed cycle phase container_mm {' '.join(one)}"
-    write_rows(os.path.join(folder, "cycles.csv"), names, frames)
+    write_rows(os.path.join(folder, "cycles.csv"), frames, names)
     names = "particles filling phase across_mm up_mm across_m_s up_m_s"
-    write_rows(os.path.join(folder, "particles.csv"), names, places)
+    write_rows(os.path.join(folder, "particles.csv"), places, names)
 
 
 def print_heights(figures):

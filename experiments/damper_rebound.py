@@ -20,12 +20,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from _cli import figure, finish, main, number, parser, print_table, write_rows
 from ca_damper import Automaton, Batch, SceneTable, Spheres, film
 from ca_damper.automaton.accumulator import READINGS
 from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.plot_style import BLACK, VIOLET, picture, styles_of
 from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.study import figure, finish, main, number, parser, print_table, write_rows
 
 NAME = "damper_rebound"
 QUICK, FULL = {"impacts": 4, "every_s": 1e-3}, {"impacts": 6, "every_s": 4e-4}
@@ -190,14 +190,14 @@ def write_tables(runs, folder):
         for row in zip(made.time_s, made.height_m, made.fall.heights(made.time_s))
     ]
     names = "filling time_s height_m closed_form_m"
-    write_rows(os.path.join(folder, "heights.csv"), names, samples)
+    write_rows(os.path.join(folder, "heights.csv"), samples, names)
     impacts = [
         (title, k, time, made.fall.impact_s(k), apex, made.fall.apex_m(k))
         for title, made in runs.items()
         for k, (time, apex) in enumerate(zip(made.impacts_s, made.apexes_m), start=1)
     ]
     names = "filling impact time_s closed_form_s apex_m closed_form_apex_m"
-    write_rows(os.path.join(folder, "impacts.csv"), names, impacts)
+    write_rows(os.path.join(folder, "impacts.csv"), impacts, names)
 
 
 def picture_rebound(path, runs):

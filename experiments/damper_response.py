@@ -22,26 +22,26 @@ from pathlib import Path
 
 import numpy as np
 
-from _cli import (
-    add_checkpoints,
-    checkpoint_of,
-    figure,
-    fill_in,
-    finish,
-    main,
-    number,
-    parser,
-    print_table,
-    several,
-    whole,
-    write_rows,
-)
 from ca_damper import Automaton, Response, Spheres, Sweep, frequency_response, sweep_up_and_down
 from ca_damper.plot import picture_hysteresis, picture_measures, picture_responses
 from ca_damper.response import Grid
 from taichi_dem import InputError
 from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.study import (
+    add_checkpoints,
+    checkpoint_of,
+    figure,
+    finish,
+    main,
+    number,
+    parser,
+    print_table,
+    several,
+    take_defaults,
+    whole,
+    write_rows,
+)
 
 NAME = "damper_response"
 #: 33 ratios f/f0, every 0.005 where the peaks of 0 to 50 particles lie.
@@ -112,7 +112,7 @@ def options_parser():
 
 def run(options):
     """Measure all fillings, write tables and pictures."""
-    fill_in(options, QUICK if options.quick else FULL)
+    take_defaults(options, FULL, QUICK)
     known = fillings()
     for label in options.fillings:
         if label not in known:
@@ -192,7 +192,7 @@ def write_tables(measured, folder):
             by_seed = zip(one.response.seeds, ratio, 1e3 * rms)
             rows += [(label, particles, *row) for row in by_seed]
     names = "filling particles seed peak_ratio peak_rms_mm"
-    write_rows(os.path.join(folder, "peaks.csv"), names, rows)
+    write_rows(os.path.join(folder, "peaks.csv"), rows, names)
 
 
 def figures_of(measured):

@@ -18,11 +18,11 @@ import sys
 import numpy as np
 
 import _demo_damper_pictures as pictures
-from _cli import figure, finish, main, number, parser, whole
 from ca_damper import Automaton, Batch, Empty, Oscillator, SceneTable, Spheres, film
 from ca_damper.progress import Stages
 from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.study import figure, finish, main, number, parser, whole
 
 NAME = "demo_damper"
 QUICK, FULL = {"begin": 10, "measured": 5}, {"begin": 40, "measured": 20}

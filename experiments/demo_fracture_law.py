@@ -18,11 +18,10 @@ import sys
 import numpy as np
 
 import _fracture_law as law
-from _cli import main, parser, whole
-from _report import finish, show_rows
 from taichi_dem import CONCRETE, Every, Scene, Simulation, Uniform, effects
 from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.study import finish, main, parser, show_rows, whole
 from taichi_dem.mesh.mesh import group_area
 from taichi_dem.mesh.shapes import pair, placed_together, single
 from taichi_dem.simulate import run_simulation
@@ -92,7 +91,7 @@ def run(options):
     rows = law.comparison(made)
     law.write(made, pair(EDGE).points, folder)
     show_rows(rows, law.TABLE)
-    finish(options, NAME, law.figures_of(rows), [report], law.caption(rows, steps))
+    finish(options, NAME, law.figures_of(rows), [report], caption=law.caption(rows, steps))
 
 
 if __name__ == "__main__":

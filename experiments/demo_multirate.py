@@ -21,15 +21,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from _blast import Costs
-from _cli import BLAST_DRIVERS, main, number, parser
+from _blast import BLAST_DRIVERS, Costs
 from _demo import set_moving
 from _multirate import TABLE, Impact, caption, check_speed, compared, figures_of, write
-from _report import finish, show_rows
 from taichi_dem import CONCRETE, Multirate, Scene, Simulation, Uniform, effects
 from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.plot_style import styles_of
 from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.study import finish, main, number, parser, show_rows
 from taichi_dem.mesh.shapes import bar, placed_together
 from taichi_dem.plot.impact import film_impact, picture_impact
 from taichi_dem.simulate import run_simulation
@@ -93,7 +92,7 @@ def run(options):
     picture_impact(os.path.join(options.out, "blow.png"), impacts, DT0)
     film_impact(os.path.join(options.out, "blow.gif"), impacts[0], impacts[1], DT0, FRAMES)
     reports = [impact.result.report for impact in impacts]
-    finish(options, NAME, figures_of(rows), reports, caption(rows, impacts[1], LENGTH))
+    finish(options, NAME, figures_of(rows), reports, caption=caption(rows, impacts[1], LENGTH))
 
 
 if __name__ == "__main__":

@@ -17,11 +17,10 @@ import os
 import sys
 
 import _step_too_large as shown
-from _cli import main, number, parser
-from _report import finish
 from taichi_dem import CONCRETE, At, Scene, SimulationDiverged, Uniform, effects, simulate
 from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.study import finish, main, number, parser
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.plot.shaken import film_shaken, picture_energy
 from taichi_dem.simulation import macro_steps
@@ -84,7 +83,7 @@ def run(options):
     picture_energy(os.path.join(options.out, "energy.png"), runs)
     film_shaken(os.path.join(options.out, "shaken.gif"), runs[0], runs[1], FRAMES)
     reports = [made.report for made in runs]
-    finish(options, NAME, shown.figures_of(runs, limits), reports, shown.caption(runs))
+    finish(options, NAME, shown.figures_of(runs, limits), reports, caption=shown.caption(runs))
 
 
 if __name__ == "__main__":

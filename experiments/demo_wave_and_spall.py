@@ -19,13 +19,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from _cli import main, parser, whole
 from _demo import set_moving
-from _report import finish, show_rows
 from _wave_and_spall import CELL, LENGTH, TABLE, Bars, caption, figures_of, wave_speed, write
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects
 from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.study import finish, main, parser, show_rows, whole
 from taichi_dem.mesh.shapes import bar, placed_together
 
 NAME = "demo_wave_and_spall"
@@ -93,7 +92,9 @@ def run(options):
     rows = made.spalled(ratios, speed, TAIL)
     show_rows(rows, TABLE)
     write(wave, made, rows, speed, options.out)
-    finish(options, NAME, figures_of(wave, rows, speed), [first, second], caption(rows, wave))
+    finish(
+        options, NAME, figures_of(wave, rows, speed), [first, second], caption=caption(rows, wave)
+    )
 
 
 if __name__ == "__main__":

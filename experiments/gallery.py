@@ -19,11 +19,11 @@ from pathlib import Path
 
 from PIL import Image
 
-from _cli import bare_parser, exit_code, several
 from _gallery_html import CAPTION, RUN, THUMBNAILS, shown, write_page
 from _gallery_pages import SMALL_PICTURES, TOOLS, pages, readme_table
 from taichi_dem import InputError
 from taichi_dem.kit.files import output_folder, write_text, write_whole
+from taichi_dem.kit.study import bare_parser, exit_code, several
 
 HERE = Path(__file__).resolve().parent
 #: Small pictures for the repository and for the page's list: widest side [pixels] and colours.

@@ -16,14 +16,13 @@ import sys
 import textwrap
 import time
 
-from _cli import figure, main, parser, several, whole
 from _hard_cases import judge, named, registry
 from _hard_cases._case import FAILED, PASSED, REFUSED
 from _hard_cases._margins import case_title, method_styles, picture_margins, with_powers
-from _report import finish, show_rows, write_rows
 from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.plot_style import GREY, RED, picture, power
 from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.study import figure, finish, main, parser, several, show_rows, whole, write_rows
 
 NAME = "hard_cases"
 #: Cases of a quick run, one of each kind; the tests ask all, at quick size.
@@ -52,7 +51,7 @@ def run(options):
     started = time.perf_counter()
     results = ask(cases, options.quick)
     compiling = sum(result.compile_s for result in results)
-    write_rows(options.out, "hard_cases.csv", [row_of(result) for result in results])
+    write_rows(os.path.join(options.out, "hard_cases.csv"), [row_of(result) for result in results])
     for case in cases:
         picture_case(os.path.join(options.out, f"{case.name}.png"), case, results)
     for package in dict.fromkeys(case.package for case in cases):
@@ -64,7 +63,7 @@ def run(options):
     print_results(results)
     spent = time.perf_counter() - started
     seconds = compiling, spent - compiling
-    finish(options, NAME, figures_of(cases, results), [], seconds=seconds)
+    finish(options, NAME, figures_of(cases, results), seconds)
 
 
 def ask(cases, quick):

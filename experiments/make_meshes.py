@@ -13,9 +13,9 @@ Needs gmsh: ``make mesh`` installs it and runs this script. Takes two seconds.
 import os
 import sys
 
-from _cli import bare_parser, exit_code
 from taichi_dem import CONCRETE, PAPER_BLOCK, quality_report, read_mesh
 from taichi_dem.kit.files import output_folder
+from taichi_dem.kit.study import bare_parser, exit_code
 from taichi_dem.mesh.gmsh import block_with_hole
 
 

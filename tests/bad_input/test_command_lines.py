@@ -122,7 +122,7 @@ def called(word):
 def test_a_bad_line_is_one_sentence_and_writes_nothing(
     scripts, capsys, tmp_path, monkeypatch, places, name, line, words
 ):
-    import _cli
+    from taichi_dem.kit import study
 
     names = {"folder": places["folder"], "file": places["file.msh"], "pipe": places["pipe.msh"]}
     line = [word.format(**names) for word in line]
@@ -130,7 +130,7 @@ def test_a_bad_line_is_one_sentence_and_writes_nothing(
     module, before = scripts(name), everything(tmp_path)
     with ends_within(20.0):
         given = ["--threads", "2", "--out", str(tmp_path / "out"), *line]
-        code = _cli.main(module.run, module.options_parser(), given)
+        code = study.main(module.run, module.options_parser(), given)
     said = capsys.readouterr().err
     assert code == 2, said
     assert said.endswith("\n") and said.count("\n") == 1

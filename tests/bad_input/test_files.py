@@ -207,12 +207,12 @@ def test_a_damaged_checkpoint_is_refused_or_unharmed(tmp_path_factory, share, bi
 )
 def test_a_kept_result_that_is_none_is_refused_and_left_alone(tmp_path, monkeypatch, content):
     monkeypatch.syspath_prepend(os.path.join(ROOT, "experiments"))
-    import _cache
     from _gallery_html import read_json
+    from taichi_dem.kit import study
 
-    path = tmp_path / f"job-{_cache.digest((), ())}.json"
+    path = tmp_path / f"job-{study.digest((), ())}.json"
     path.write_bytes(content)
-    call = lambda: _cache.cached(tmp_path, "job", (), (), dict)  # noqa: E731
+    call = lambda: study.cached(tmp_path, "job", (), (), dict)  # noqa: E731
     assert_refused(call, str(path), "delete it")
     assert path.read_bytes() == content
     assert read_json(path) == {}

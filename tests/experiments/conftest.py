@@ -48,9 +48,9 @@ def main(script):
 
     def run(name, arguments):
         module = script(name)
-        import _cli
+        from taichi_dem.kit import study
 
         given = ["--threads", "2", "--arch", arch.chosen(), *map(str, arguments)]
-        return _cli.main(module.run, module.options_parser(), given)
+        return study.main(module.run, module.options_parser(), given)
 
     return run

@@ -8,20 +8,20 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-import _cli
 from _multirate import short_steps
 from _step_too_large import ended
+from taichi_dem.kit import study
 
 
 @pytest.mark.parametrize("blank", ["", None, math.nan, np.float64("nan")])
 def test_a_blank_cell_of_a_table_is_a_dash(capsys, blank):
-    _cli.print_table([("a", blank, 0), ("b", 1, "c")], ["one", "two", "three"])
+    study.print_table([("a", blank, 0), ("b", 1, "c")], ["one", "two", "three"])
     assert capsys.readouterr().out.split("\n")[1].split() == ["a", "-", "0"]
 
 
 def test_a_figure_that_was_not_found_says_so_in_words(capsys):
-    figures = {"a": _cli.figure(None, "s"), "b": _cli.figure(math.inf, "1", 2)}
-    _cli.print_figures(figures)
+    figures = {"a": study.figure(None, "s"), "b": study.figure(math.inf, "1", 2)}
+    study.print_figures(figures)
     lines = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert lines == [
         ["figure", "value", "unit", "paper"],
@@ -31,7 +31,7 @@ def test_a_figure_that_was_not_found_says_so_in_words(capsys):
 
 
 def test_figures_without_a_papers_value_have_no_column_for_it(capsys):
-    _cli.print_figures({"a": _cli.figure(0.0, "s"), "b": _cli.figure("it", "")})
+    study.print_figures({"a": study.figure(0.0, "s"), "b": study.figure("it", "")})
     lines = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert lines == [["figure", "value", "unit"], ["a", "0", "s"], ["b", "it", "-"]]
 
@@ -44,8 +44,8 @@ def test_a_summary_says_whether_its_run_was_quick_and_is_valid_json(
     tmp_path, monkeypatch, line, quick
 ):
     monkeypatch.setattr(sys, "argv", ["x.py", *line])
-    figures = {"a": _cli.figure(np.float64("nan"), "s"), "b": _cli.figure(-math.inf, "1")}
-    _cli.write_summary(tmp_path, "x", figures, compile_seconds=1.0, run_seconds=1.0)
+    figures = {"a": study.figure(np.float64("nan"), "s"), "b": study.figure(-math.inf, "1")}
+    study.write_summary(tmp_path, "x", figures, compile_seconds=1.0, run_seconds=1.0)
     text = (tmp_path / "summary.json").read_text()
     summary = json.loads(text, parse_constant=pytest.fail)
     assert summary["quick"] is quick
@@ -53,26 +53,28 @@ def test_a_summary_says_whether_its_run_was_quick_and_is_valid_json(
 
 
 def test_options_left_out_take_the_values_of_the_job_and_others_keep_theirs():
-    options = SimpleNamespace(seeds=3, particles=None)
-    _cli.fill_in(options, {"seeds": 5, "particles": [1], "cycles": 2})
-    assert vars(options) == {"seeds": 3, "particles": [1], "cycles": 2}
+    full, quick = {"seeds": 5, "particles": [1], "cycles": 2}, {"seeds": 7, "cycles": 1}
+    for job, given in ((full, False), (quick, True)):
+        options = SimpleNamespace(quick=given, seeds=3, particles=None)
+        study.take_defaults(options, full, quick)
+        assert vars(options) == {"quick": given, "particles": None, **job, "seeds": 3}
 
 
 @pytest.mark.parametrize(
     ("rows", "text"), [([(1, "a"), (2, "b")], "x,y\n1,a\n2,b\n"), ([], "x,y\n")]
 )
 def test_rows_stand_under_their_names_and_names_without_rows(tmp_path, rows, text):
-    _cli.write_rows(tmp_path / "table.csv", "x y", iter(rows))
+    study.write_rows(tmp_path / "table.csv", iter(rows), "x y")
     assert (tmp_path / "table.csv").read_text() == text
 
 
 def test_the_end_of_a_script_adds_up_what_its_runs_took(tmp_path, monkeypatch, capsys):
     settings = SimpleNamespace(arch="cpu", threads=1)
-    monkeypatch.setattr(_cli.runtime, "settings", lambda: settings)
+    monkeypatch.setattr(study.summary.runtime, "settings", lambda: settings)
     runs = [SimpleNamespace(compile_seconds=1.0, run_seconds=k) for k in (2.0, 3.0)]
     options = SimpleNamespace(out=str(tmp_path))
     for given in (runs, (2.0, 5.0)):
-        _cli.finish(options, "x", {"a": _cli.figure(1.5, "s")}, given)
+        study.finish(options, "x", {"a": study.figure(1.5, "s")}, given)
         summary = json.loads((tmp_path / "summary.json").read_text())
         assert summary["seconds"] == {"compile": 2.0, "run": 5.0}
     assert str(tmp_path) in capsys.readouterr().out

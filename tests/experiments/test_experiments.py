@@ -282,7 +282,7 @@ class CtrlC:
 @pytest.mark.slow
 def test_interrupted_blast_goes_on_to_the_same_files(script, monkeypatch, capsys, tmp_path):
     module = script("blast_fracture")
-    import _cli
+    from taichi_dem.kit import study
 
     monkeypatch.setattr(module, "picture", lambda result, folder: None)
     quick = ["--quick", "--threads", "2", "--method", "fixed", "--until", "4e-5"]
@@ -290,7 +290,7 @@ def test_interrupted_blast_goes_on_to_the_same_files(script, monkeypatch, capsys
 
     def run(folder, *more):
         given = [*quick, "--out", str(tmp_path / folder), *more]
-        return _cli.main(module.run, module.options_parser(), given), capsys.readouterr().err
+        return study.main(module.run, module.options_parser(), given), capsys.readouterr().err
 
     assert run("straight") == (0, "")
     with monkeypatch.context() as patched:

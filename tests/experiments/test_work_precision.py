@@ -7,19 +7,17 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from _cache import cached, digest
-from _timing import Timing
-from _work_precision import (
+from ca_damper import InputError
+from taichi_dem.kit.study import Timing, cached, digest
+from taichi_dem.kit.study.work_precision import (
     Point,
     answer_rows,
     answers,
     cheapest,
     percent,
-    picture_work_precision,
     write_points,
 )
-from _work_precision_picture import cost_of
-from ca_damper import InputError
+from taichi_dem.kit.study.work_precision_picture import cost_of, picture_work_precision
 
 
 def row(method, step, error, seconds=None, failure=""):

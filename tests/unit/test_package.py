@@ -9,10 +9,10 @@ import zipfile
 
 import pytest
 
-import _cli
 import ca_damper
 import taichi_dem
 from taichi_dem import PAPER_BLOCK
+from taichi_dem.kit import study
 from taichi_dem.kit.checkpoint import version_text
 from tests.docs.pages import FOLDER
 from tests.processes import users_environment
@@ -104,7 +104,7 @@ def test_what_is_unpacked_lists_no_experiments_and_says_where_the_first_page_is(
 
 def test_versions_need_no_metadata(monkeypatch):
     """What runs from a path is known to no installer; the words are those of one that is."""
-    words, versions = version_text(), _cli.versions()
+    words, versions = version_text(), study.versions()
     assert words == f"{taichi_dem.__version__} on taichi {importlib.metadata.version('taichi')}"
     for name in ("taichi", "numpy"):
         assert versions[name] == importlib.metadata.version(name)
@@ -114,4 +114,4 @@ def test_versions_need_no_metadata(monkeypatch):
         raise importlib.metadata.PackageNotFoundError(name)
 
     monkeypatch.setattr(importlib.metadata.Distribution, "from_name", absent)
-    assert version_text() == words and _cli.versions() == versions
+    assert version_text() == words and study.versions() == versions

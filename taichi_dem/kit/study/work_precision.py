@@ -7,15 +7,12 @@ it: a single lucky run answers nothing.
 
 import itertools
 import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Optional
 
-from _cli import write_rows
-from _timing import Timing
-
-# The experiments import the pictures from here too.
-from _work_precision_picture import picture_errors as picture_errors
-from _work_precision_picture import picture_work_precision as picture_work_precision
+from taichi_dem.kit.study.tables import write_rows
+from taichi_dem.kit.study.timing import Timing
 
 
 @dataclass(frozen=True)
@@ -37,6 +34,11 @@ class Point:
     residual: float = math.nan
     failure: str = ""
 
+    @property
+    def low(self) -> float:
+        """Seconds of the fastest repeat, NaN for a failure."""
+        return self.seconds.low if self.seconds else math.nan
+
 
 @dataclass(frozen=True)
 class Answer:
@@ -47,14 +49,14 @@ class Answer:
     reason: str = ""
 
 
-def answers(points, target, floors):
+def answers(points: Sequence[Point], target: float, floors: Mapping[str, float]) -> list[Answer]:
     """An Answer for every method, cheapest first, then those that do not reach the error.
 
     target: largest error. floors: error by method that no step can take away.
     """
     methods = list(dict.fromkeys(point.method for point in points))
     found = [_answer(method, points, target, floors.get(method, 0.0)) for method in methods]
-    return sorted(found, key=lambda one: one.point.seconds.low if one.point else math.inf)
+    return sorted(found, key=lambda one: one.point.low if one.point else math.inf)
 
 
 def _answer(method, points, target, floor):
@@ -65,22 +67,32 @@ def _answer(method, points, target, floor):
     reached = list(itertools.takewhile(lambda point: point.error <= target, own))
     if not reached:
         return Answer(method, None, f"{percent(own[0].error)} at its finest, {own[0].label}")
-    return Answer(method, min(reached, key=lambda point: point.seconds.low))
+    return Answer(method, min(reached, key=lambda point: point.low))
 
 
-def cheapest(points, target, floors, method=None):
+def cheapest(
+    points: Sequence[Point],
+    target: float,
+    floors: Mapping[str, float],
+    method: Optional[str] = None,
+) -> tuple[Optional[float], Optional[str]]:
     """Seconds and name of the cheapest method for an error, or of one method; None for neither."""
     found = [a for a in answers(points, target, floors) if method in (None, a.method)]
     point = found[0].point
-    return (point.seconds.low, point.method) if point else (None, None)
+    return (point.low, point.method) if point else (None, None)
 
 
-def percent(share):
+def percent(share: float) -> str:
     """A share in words: 0.0123 -> 1.2 %."""
     return f"{100.0 * share:.2g} %"
 
 
-def answer_rows(points, targets, floors, titles):
+def answer_rows(
+    points: Sequence[Point],
+    targets: Iterable[float],
+    floors: Mapping[str, float],
+    titles: Mapping[str, str],
+) -> list[tuple]:
     """Rows for a table: wanted error, method, step, seconds, evaluations, error had."""
     rows = []
     for target in targets:
@@ -89,7 +101,7 @@ def answer_rows(points, targets, floors, titles):
             if point is None:
                 rows.append((percent(target), title, f"not reached: {answer.reason}", "", "", ""))
             else:
-                cost = (f"{point.seconds.low:.3g}", f"{point.evaluations:.3g}")
+                cost = (f"{point.low:.3g}", f"{point.evaluations:.3g}")
                 rows.append((percent(target), title, point.label, *cost, percent(point.error)))
     return rows
 
@@ -97,7 +109,7 @@ def answer_rows(points, targets, floors, titles):
 ANSWER_HEADER = ["I want", "take", "at a step of", "seconds", "evaluations", "error"]
 
 
-def write_points(path, points, floors):
+def write_points(path: str, points: Iterable[Point], floors: Mapping[str, float]) -> None:
     """CSV of everything a diagram shows; cells of what does not exist are empty."""
     names = "method step label error floor evaluations seconds_low seconds_median seconds_high"
     rows = []
@@ -107,9 +119,9 @@ def write_points(path, points, floors):
         row = (point.method, point.step, point.label, point.error, floors.get(point.method, 0.0))
         row = (*row, point.evaluations, *seconds, point.residual, point.failure)
         rows.append(["" if cell != cell else str(cell) for cell in row])
-    write_rows(path, f"{names} repeats residual failure", rows)
+    write_rows(path, rows, f"{names} repeats residual failure")
 
 
-def write_answers(path, rows):
+def write_answers(path: str, rows: Sequence[tuple]) -> None:
     """The table of ``answer_rows`` as CSV."""
-    write_rows(path, ANSWER_HEADER, rows)
+    write_rows(path, rows, ANSWER_HEADER)

@@ -2,12 +2,15 @@
 
 import math
 import os
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
-from _cli import processor, versions
-from taichi_dem import runtime
+from taichi_dem.kit import runtime
 from taichi_dem.kit.plot_style import GREY, picture, styles_of
+from taichi_dem.kit.study.summary import processor, versions
+from taichi_dem.kit.study.work_precision import Point
 
 _SMALL = 6.5
 #: Where a label's centre may stand: right and up in widths and heights of the label, and a gap.
@@ -15,9 +18,10 @@ _PLACES = ((1, 1), (-1, -1), (1, -1), (-1, 1), (1, 0), (-1, 0), (0, 2), (0, -2),
 WALL = "wall time [s], fastest of the repeats"
 
 
-def machine_words():
+def machine_words() -> str:
     """Machine, threads, versions and commit in a line, to stand on a picture."""
-    settings, known = runtime.settings(), versions()
+    settings: Any = runtime.settings()
+    known = versions()
     threads = f"{settings.threads} thread{'s' if settings.threads > 1 else ''}"
     software = f"taichi {known['taichi']}, python {known['python']}"
     place = f"{processor()}, {os.cpu_count()} cores, {settings.arch}, {threads}"
@@ -25,19 +29,19 @@ def machine_words():
 
 
 def picture_work_precision(
-    path,
-    points,
-    titles,
+    path: str,
+    points: Sequence[Point],
+    titles: Mapping[str, str],
     *,
-    floors,
-    caption,
-    error_name,
-    work_name,
-    time_name=WALL,
-    residual_names=(),
-    step_unit=1.0,
-    order=1,
-):
+    floors: Mapping[str, float],
+    caption: str,
+    error_name: str,
+    work_name: str,
+    time_name: str = WALL,
+    residual_names: Sequence[str] = (),
+    step_unit: float = 1.0,
+    order: int = 1,
+) -> None:
     """Error over wall time and over evaluations; the residual of each run over its step.
 
     titles: of the methods, in the order of the legend. time_name: what the times are. floors:
@@ -68,7 +72,14 @@ def picture_work_precision(
             panel.label_steps()
 
 
-def picture_errors(path, errors, titles, *, time_name, caption):
+def picture_errors(
+    path: str,
+    errors: Mapping[str, Mapping[str, Sequence[tuple[float, float]]]],
+    titles: Mapping[str, str],
+    *,
+    time_name: str,
+    caption: str,
+) -> None:
     """Several errors over one cost.
 
     errors: by what they are of, then by method: pairs (cost, error), coarse to fine. An error of
@@ -101,14 +112,14 @@ def _legend(axis, titles):
     return handles, [titles.get(label, label) for label in labels]
 
 
-def cost_of(point, points, cost):
+def cost_of(point: Point, points: Sequence[Point], cost: str) -> float:
     """Cost of a point; of one without a time, at the rate of the method's nearest run."""
     if cost == "evaluations" or point.seconds:
-        return point.evaluations if cost == "evaluations" else point.seconds.low
+        return point.evaluations if cost == "evaluations" else point.low
     timed = [p for p in points if p.seconds] or [point]
     own = [p for p in timed if p.method == point.method] or timed
     near = min(own, key=lambda p: abs(math.log(p.step / point.step)))
-    return near.seconds.low * point.evaluations / near.evaluations if near.seconds else math.nan
+    return near.low * point.evaluations / near.evaluations if near.seconds else math.nan
 
 
 def _good(points, method):
@@ -130,7 +141,7 @@ class _Panel:
             self.good[method] = [(cost_of(p, points, cost), p) for p in _good(points, method)]
             self.failed[method] = [(cost_of(p, points, cost), p) for p in failed]
 
-    def draw(self, floors, order):
+    def draw(self, floors: Mapping[str, float], order: int) -> None:
         """Draw points, floors, the ideal gain and failures."""
         for method, look in self.looks.items():
             place = [at for at, _ in self.good[method]]
@@ -184,7 +195,7 @@ class _Panel:
             look = {"fontsize": _SMALL, "color": colour, "ha": side}
             axis.annotate(words, (end, level), (shift, -2.5), textcoords="offset points", **look)
 
-    def label_steps(self):
+    def label_steps(self) -> None:
         """Write every point's step beside it, where it covers least of what is there already."""
         good = [pair for own in self.good.values() for pair in own]
         places = [(at, p.error) for at, p in good]

@@ -5,14 +5,14 @@ import os
 import subprocess
 import sys
 import tempfile
+from os import PathLike
+from typing import Any, Union
 
-from taichi_dem import InputError
-
-_FOLDER = os.path.dirname(os.path.abspath(__file__))
+from taichi_dem.kit.errors import InputError
 
 
-def ask_worker(name, job, title, **environment):
-    """What a worker, a script beside this one, prints last of a job: JSON in, JSON out.
+def ask_worker(script: Union[str, PathLike], job: dict, title: str, **environment: str) -> Any:
+    """Answer of a worker, a script, to a job: JSON in; JSON out, on the last line it prints.
 
     Raises InputError with the end of what it said, where it failed. title: of the job.
     """
@@ -20,15 +20,15 @@ def ask_worker(name, job, title, **environment):
         path = os.path.join(folder, "job.json")
         with open(path, "w", encoding="utf-8") as handle:
             json.dump(job, handle)
-        line = [sys.executable, os.path.join(_FOLDER, f"{name}.py"), path]
-        options = {"capture_output": True, "text": True, "env": {**os.environ, **environment}}
+        line = [sys.executable, str(script), path]
+        options: Any = {"capture_output": True, "text": True, "env": {**os.environ, **environment}}
         done = subprocess.run(line, **options)
     if done.returncode != 0:
         raise InputError(f"the run {title} ended with: {done.stderr.strip()[-300:]}")
     return json.loads(done.stdout.splitlines()[-1])
 
 
-def read_job():
+def read_job() -> dict:
     """The job of this worker."""
     with open(sys.argv[1], encoding="utf-8") as handle:
         return json.load(handle)

@@ -1,20 +1,23 @@
 """Costly results, kept beside the output under a digest of everything they depend on."""
 
 import hashlib
+import importlib.util
 import json
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any, Callable
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import output_folder, write_text
 
-_ROOT = Path(__file__).resolve().parents[1]
 
-
-def cached(folder, name, settings, packages, compute):
+def cached(
+    folder: str, name: str, settings: Any, packages: Iterable[str], compute: Callable[[], dict]
+) -> tuple[dict, bool]:
     """Result of ``compute()``, a JSON-like dict, from a file if it was computed before.
 
-    settings: everything else the result depends on, by its repr. packages: folders whose sources
-    it depends on. The file's name holds a digest of both, so that a change of either computes
+    settings: everything else the result depends on, by its repr. packages: names of those whose
+    sources it depends on. The file's name holds a digest of both: a change of either computes
     anew. Returns (result, whether it came from the file).
     """
     path = Path(output_folder(folder), f"{name}-{digest(settings, packages)}.json")
@@ -32,12 +35,13 @@ def cached(folder, name, settings, packages, compute):
     return result, False
 
 
-def digest(settings, packages):
+def digest(settings: Any, packages: Iterable[str]) -> str:
     """Twelve letters that change with the settings and with any source of the packages."""
     made = hashlib.sha256(repr(settings).encode())
     for package in packages:
-        for path in sorted((_ROOT / package).rglob("*.py")):
+        root = Path(str(importlib.util.find_spec(package).origin)).parent  # type: ignore[union-attr]
+        for path in sorted(root.rglob("*.py")):
             # Pictures change no number.
-            if "plot" not in path.relative_to(_ROOT).parts:
+            if "plot" not in path.relative_to(root).parts:
                 made.update(path.read_bytes())
     return made.hexdigest()[:12]

@@ -2,9 +2,12 @@
 
 import statistics
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any, Callable
 
-from taichi_dem import InputError, runtime
+from taichi_dem.kit import runtime
+from taichi_dem.kit.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -17,7 +20,7 @@ class Timing:
     count: int
 
     @classmethod
-    def of(cls, seconds):
+    def of(cls, seconds: Iterable[float]) -> "Timing":
         """Timing of a sequence of measured times [s]; InputError for an empty one."""
         values = sorted(seconds)
         if not values:
@@ -25,23 +28,24 @@ class Timing:
         return cls(statistics.median(values), values[0], values[-1], len(values))
 
     @property
-    def spread(self):
+    def spread(self) -> float:
         """Width of the measurements as a share of their median."""
         return (self.high - self.low) / self.median if self.median > 0.0 else 0.0
 
-    def __str__(self):
+    def __str__(self) -> str:
         """Median, and the extremes where there is more than one run."""
         if self.count == 1:
             return f"{self.median:.3g} s"
         return f"{self.median:.3g} s ({self.low:.3g} to {self.high:.3g}, {self.count} runs)"
 
 
-def on_device():
+def on_device() -> bool:
     """Tell whether kernels run beside the CPU, which then only waits for them."""
-    return runtime.settings().arch != "cpu"
+    settings = runtime.settings()
+    return settings is not None and settings.arch != "cpu"
 
 
-def clock():
+def clock() -> float:
     """CPU seconds of this process so far, or the wall clock where a device works [s]."""
     if on_device():
         # Imported before the package it would print its version.
@@ -52,7 +56,7 @@ def clock():
     return time.process_time()
 
 
-def seconds_of(work, *arguments):
+def seconds_of(work: Callable, *arguments: Any) -> float:
     """Seconds that work(*arguments) takes by ``clock``."""
     started = clock()
     work(*arguments)

@@ -1,0 +1,65 @@
+"""Tools of a study: options, tables, figures of a summary, timings, kept results, workers."""
+
+from taichi_dem.kit.study.cached_result import cached, digest
+from taichi_dem.kit.study.command_line import (
+    Parser,
+    add_checkpoints,
+    bare_parser,
+    checkpoint_of,
+    exit_code,
+    interval,
+    main,
+    number,
+    parser,
+    several,
+    take_defaults,
+    whole,
+)
+from taichi_dem.kit.study.summary import (
+    figure,
+    figures_from,
+    finish,
+    print_figures,
+    processor,
+    value_in_words,
+    versions,
+    write_summary,
+)
+from taichi_dem.kit.study.tables import columns_of, print_table, show_rows, write_rows
+from taichi_dem.kit.study.timing import Timing, clock, on_device, seconds_of
+from taichi_dem.kit.study.worker import ask_worker, read_job
+
+__all__ = [
+    "Parser",
+    "Timing",
+    "add_checkpoints",
+    "ask_worker",
+    "bare_parser",
+    "cached",
+    "checkpoint_of",
+    "clock",
+    "columns_of",
+    "digest",
+    "exit_code",
+    "figure",
+    "figures_from",
+    "finish",
+    "interval",
+    "main",
+    "number",
+    "on_device",
+    "parser",
+    "print_figures",
+    "print_table",
+    "processor",
+    "read_job",
+    "seconds_of",
+    "several",
+    "show_rows",
+    "take_defaults",
+    "value_in_words",
+    "versions",
+    "whole",
+    "write_rows",
+    "write_summary",
+]

@@ -1,0 +1,157 @@
+"""Options, endings and exit codes of a study that is run as a program."""
+
+import argparse
+import os
+import re
+import sys
+from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
+from typing import Any, Callable, NoReturn, Optional
+
+from taichi_dem.kit import runtime
+from taichi_dem.kit.checkpoint import Checkpoint, Interrupted
+from taichi_dem.kit.errors import InputError, SimulationDiverged
+from taichi_dem.kit.progress.lasting_output import lasting_output
+from taichi_dem.kit.validation import shown
+
+_INTERVALS = {None: "every_wall_s", "s": "every_wall_s", "steps": "every_steps", "sim": "every_s"}
+
+
+class Parser(argparse.ArgumentParser):
+    """An argument parser whose complaints are one sentence."""
+
+    def error(self, message: str) -> NoReturn:
+        """Turn a wrong command line into an InputError."""
+        raise InputError(message)
+
+
+def number(low: float, high: float, *, open_low: bool = True) -> Callable[[str], float]:
+    """Type of an option that is a number in a range; the complaint names the range."""
+    words = f"a number in {'(' if open_low else '['}{low:g}, {high:g})"
+    return _checked(float, words, lambda x: low < x < high or (x == low and not open_low))
+
+
+def whole(low: int, high: int) -> Callable[[str], int]:
+    """Type of an option that is a whole number in a range."""
+    return _checked(int, f"a whole number from {low} to {high}", lambda x: low <= x <= high)
+
+
+def _checked(kind, words, allowed):
+    def parse(text):
+        try:
+            value = kind(text)
+        except ValueError:
+            value = None
+        if value is None or not allowed(value):
+            raise argparse.ArgumentTypeError(f"must be {words}, got {shown(text)}")
+        return value
+
+    return parse
+
+
+def interval(text: str) -> dict:
+    """Type of an option that says how often: 600s on the wall, 5000steps, or 1e-5sim seconds."""
+    found: Any = re.fullmatch(r"([0-9.]+(?:[eE][-+]?[0-9]+)?)(s|steps|sim)?", text)
+    try:
+        unit = _INTERVALS[found[2]]
+        value: Any = int(found[1]) if unit == "every_steps" else float(found[1])
+        Checkpoint("any", **{unit: value})
+    except (TypeError, ValueError, InputError):
+        raise argparse.ArgumentTypeError(
+            f"must be like 600s (on the wall), 5000steps or 1e-5sim, got {shown(text)}"
+        ) from None
+    return {unit: value}
+
+
+def several(kind: Callable[[str], Any]) -> Callable[[str], list]:
+    """Type of an option that is a comma-separated list of a type, without repetitions."""
+
+    def parse(text):
+        try:
+            values = [kind(part) for part in text.split(",")]
+        except InputError as error:
+            # Argparse would put words of its own in its place.
+            raise argparse.ArgumentTypeError(str(error)) from None
+        if len(set(values)) < len(values):
+            raise argparse.ArgumentTypeError(f"must not name a value twice, got {shown(text)}")
+        return values
+
+    return parse
+
+
+def parser(name: str, description: Optional[str], drivers: Sequence[str] = ()) -> Parser:
+    """Parser with the options every experiment has; drivers: to choose from, where there are."""
+    made = bare_parser(name, description)
+    made.add_argument("--quick", action="store_true", help="a smaller job of under a minute")
+    place: Any = {"type": os.path.expanduser, "default": os.path.join("results", name)}
+    made.add_argument("--out", help="folder for the output", **place)
+    made.add_argument("--arch", default="cpu", choices=runtime.ARCHITECTURES)
+    if drivers:
+        made.add_argument("--driver", default=drivers[0], choices=drivers)
+    made.add_argument("--threads", type=whole(1, 1024), default=None, help="CPU threads")
+    return made
+
+
+def bare_parser(name: str, description: Optional[str]) -> Parser:
+    """Parser of a script without options."""
+    plain: Any = {"formatter_class": argparse.RawDescriptionHelpFormatter, "allow_abbrev": False}
+    return Parser(prog=f"python experiments/{name}.py", description=description, **plain)
+
+
+def take_defaults(options: Namespace, full: dict, quick: dict) -> None:
+    """Give options that are not set the value of the full or of the quick job."""
+    for name, value in (quick if options.quick else full).items():
+        if getattr(options, name, None) is None:
+            setattr(options, name, value)
+
+
+def add_checkpoints(made: ArgumentParser) -> None:
+    """Add the options of a job that saves itself; see ``checkpoint_of``."""
+    words = "save the run every 600s on the wall, 5000steps or 1e-5sim simulated seconds"
+    made.add_argument("--checkpoint-every", type=interval, default={}, help=words)
+    words = "go on from what a run has saved in the same --out"
+    made.add_argument("--resume", action="store_true", help=words)
+
+
+def checkpoint_of(options: Namespace, name: str = "checkpoint") -> dict:
+    """Arguments checkpoint and resume of a job: its file is out/name.npz.
+
+    A job saves itself on Ctrl-C and at its end in any case.
+    """
+    path = os.path.join(options.out, f"{name}.npz")
+    checkpoint = Checkpoint(**{**options.checkpoint_every, "path": path})
+    return {"checkpoint": checkpoint, "resume": path if options.resume else None}
+
+
+def main(
+    run: Callable[[Namespace], None],
+    made: ArgumentParser,
+    arguments: Optional[Sequence[str]] = None,
+) -> int:
+    """Parse, start Taichi, run; returns the exit code of ``exit_code``."""
+
+    def work():
+        options = made.parse_args(arguments)
+        runtime.start(options.arch, options.threads)
+        run(options)
+
+    return exit_code(work)
+
+
+def exit_code(work: Callable[[], Optional[int]]) -> int:
+    """Exit code of a program that does work(): 0 done, or what work returns.
+
+    2 bad input, 3 diverged, 130 interrupted: each with one line on stderr. The reader of the output
+    may leave before its end (``| head -1``): the files are still written.
+    """
+    with lasting_output():
+        try:
+            return work() or 0
+        except (InputError, SimulationDiverged) as error:
+            code, words = (2 if isinstance(error, InputError) else 3), str(error)
+        except Interrupted as error:
+            code, words = 130, f"{error}: go on with --resume"
+        except KeyboardInterrupt:
+            code, words = 130, "interrupted"
+        print(" ".join(words.split()), file=sys.stderr)
+        return code

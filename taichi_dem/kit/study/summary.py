@@ -1,0 +1,131 @@
+"""Figures of a study, and the file summary.json that holds them with what made them."""
+
+import json
+import math
+import os
+import platform
+import shlex
+import subprocess
+import sys
+import textwrap
+from argparse import Namespace
+from collections.abc import Iterable, Mapping
+from typing import Any, Union
+
+import numpy as np
+
+from taichi_dem.kit import runtime
+from taichi_dem.kit.files import write_text
+from taichi_dem.kit.study.tables import print_table
+from taichi_dem.kit.version import __version__, taichi_version
+
+#: A figure by its name.
+Figures = Mapping[str, dict]
+_HERE = os.path.dirname(os.path.abspath(__file__))
+
+
+def figure(value: Any, unit: str, paper: Any = None) -> dict:
+    """One figure of summary.json; what was not measured is left out instead.
+
+    value: None where it was looked for in vain; NaN and infinity, which JSON lacks, count as None.
+    """
+    if isinstance(value, float) and not math.isfinite(value):
+        value = None
+    return {"value": value, "unit": unit, "paper": paper}
+
+
+def figures_from(row: Mapping[str, Any], units: Mapping[str, str], name: str = "{}") -> dict:
+    """Figures of summary.json from a row; units: by key. name: of a figure, by the key."""
+    return {name.format(key): figure(row[key], unit) for key, unit in units.items()}
+
+
+def finish(
+    options: Namespace,
+    name: str,
+    figures: Figures,
+    runs: Union[Iterable, tuple[float, float]],
+    *,
+    caption: str = "",
+    see: str = "",
+    show: bool = True,
+) -> None:
+    """Write summary.json, and caption.txt where there is a caption; print them, and the folder.
+
+    runs: objects with compile_seconds and run_seconds, or both sums as a pair of numbers. see: the
+    picture to look at first. show: whether the figures are printed too.
+    """
+    compiling, running = runs if isinstance(runs, tuple) else _seconds_of(runs)
+    write_summary(options.out, name, figures, compile_seconds=compiling, run_seconds=running)
+    if show:
+        print_figures(figures)
+    if caption:
+        write_text(os.path.join(options.out, "caption.txt"), caption + "\n")
+        print("\n" + textwrap.fill(caption, 100))
+    see = f": see {see} first" if see else ""
+    print(f"\nPictures and tables are in {options.out}{see}")
+
+
+def _seconds_of(runs):
+    pairs = [(made.compile_seconds, made.run_seconds) for made in runs]
+    return sum(pair[0] for pair in pairs), sum(pair[1] for pair in pairs)
+
+
+def write_summary(
+    folder: str, name: str, figures: Figures, *, compile_seconds: float, run_seconds: float
+) -> None:
+    """Write summary.json: figures, machine, versions, seconds, command; see ``figure``.
+
+    quick: whether the command asked for the smaller job, which the gallery's texts do not describe.
+    """
+    settings: Any = runtime.settings()
+    arguments = sys.argv[1:]
+    machine = {"processor": processor(), "cores": os.cpu_count(), "arch": settings.arch}
+    content = {
+        "experiment": name,
+        "figures": figures,
+        "machine": {**machine, "threads": settings.threads, "system": platform.platform()},
+        "versions": versions(),
+        "seconds": {"compile": compile_seconds, "run": run_seconds},
+        "command": shlex.join([f"experiments/{name}.py", *arguments]),
+        "quick": "--quick" in arguments,
+    }
+    write_text(os.path.join(folder, "summary.json"), json.dumps(content, indent=1))
+
+
+def processor() -> str:
+    """Name of the processor, as the system gives it."""
+    try:
+        with open("/proc/cpuinfo") as lines:
+            names = [line.split(":", 1)[1].strip() for line in lines if "model name" in line]
+    except OSError:
+        names = []
+    return names[0] if names else platform.processor() or platform.machine()
+
+
+def versions() -> dict[str, str]:
+    """Versions of what computes, and the commit where there is one."""
+    found = {"taichi": taichi_version(), "numpy": np.__version__, "taichi-dem": __version__}
+    found["python"] = platform.python_version()
+    git = ["git", "-C", _HERE, "rev-parse", "--short", "HEAD"]
+    try:
+        found["commit"] = subprocess.run(git, capture_output=True, text=True).stdout.strip()
+    except OSError:
+        found["commit"] = ""
+    return found
+
+
+def print_figures(figures: Figures) -> None:
+    """Print the figures of summary.json, beside the paper's values where it gives any."""
+    header, rows = ["figure", "value", "unit", "paper"], []
+    for name, one in figures.items():
+        paper = "" if one["paper"] is None else value_in_words(one["paper"])
+        rows.append([name, value_in_words(one["value"]), one["unit"], paper])
+    shown = 4 if any(row[3] for row in rows) else 3
+    print_table([row[:shown] for row in rows], header[:shown])
+
+
+def value_in_words(value: Any) -> str:
+    """A figure's value: four digits, or "not found" where the run looked for one in vain."""
+    if value is None or isinstance(value, str):
+        return value or "not found"
+    return f"{value:,}" if isinstance(value, int) else f"{value:.4g}"

@@ -1,0 +1,56 @@
+"""Tables of a study: printed, and written as CSV."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Optional, Union
+
+from taichi_dem.kit.files import write_csv
+
+#: Cells of a table that say nothing.
+BLANK = ("", "None", "nan")
+
+
+def columns_of(rows: Sequence[Mapping[str, Any]]) -> dict[str, list]:
+    """Rows, dicts with the same keys, as columns."""
+    return {name: [row[name] for row in rows] for name in rows[0]}
+
+
+def write_rows(
+    path: str, rows: Sequence, names: Optional[Union[str, Sequence[str]]] = None
+) -> None:
+    """Write rows as CSV.
+
+    rows: dicts with the same keys, or cells under names of columns, a sequence or words.
+    """
+    if names is None:
+        write_csv(path, columns_of(rows))
+        return
+    names = names.split() if isinstance(names, str) else names
+    columns: list[Any] = list(zip(*rows)) or [()] * len(names)
+    write_csv(path, dict(zip(names, columns)))
+
+
+def print_table(rows: Sequence[Sequence], header: Sequence[str]) -> None:
+    """Print rows of cells under a header, columns as wide as they need to be; blanks as a dash."""
+    cells = [header, *[["-" if str(cell) in BLANK else str(cell) for cell in row] for row in rows]]
+    widths = [max(len(row[k]) for row in cells) for k in range(len(header))]
+    for row in cells:
+        print("  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip())
+
+
+def show_rows(rows: Sequence[Mapping[str, Any]], formats: Mapping[str, tuple[str, str]]) -> None:
+    """Print rows; formats: header -> (key, format of the value as in an f-string).
+
+    A format that ends with % is of a share in percent.
+    """
+    print_table(
+        [[_cell(row[key], form) for key, form in formats.values()] for row in rows], [*formats]
+    )
+    print()
+
+
+def _cell(value, form):
+    if value is None:
+        return ""
+    if form.endswith("%"):
+        return f"{100.0 * value:{form[:-1]}} %"
+    return format(value, form)
