@@ -5,8 +5,9 @@ import time
 import numpy as np
 
 from taichi_dem.kit.errors import SimulationDiverged
-from taichi_dem.stability.mesh_limits import dashpot_step, spring_step
+from taichi_dem.stability.contact_limits import contact_rates
 from taichi_dem.stability.quality import quality_report
+from taichi_dem.stability.stable_step import dashpot_step, spring_step
 from taichi_dem.step.drivers import CALL_SECONDS
 
 #: Energy that may appear from nowhere before a run counts as diverged, as a share of what is there.
@@ -147,21 +148,13 @@ class DivergenceCheck:
         if self.model.by_role["dashpot"] and not tame:
             limits["bond dashpots"] = steps.dashpot_step_s
         if self.contacts is not None:
-            rates = self._contact_rates()
-            limits["contact springs"] = spring_step(self.model.material.contact_stiffness * rates)
+            material = self.model.material
+            pairs, counts, _ = self.contacts.store.near_table()
+            rates = contact_rates(pairs, counts, self.model.body_mass)
+            limits["contact springs"] = spring_step(material.contact_stiffness * rates)
             if not tame:
-                limits["sphere dashpots"] = dashpot_step(
-                    self.model.material.contact_damping * rates
-                )
+                limits["sphere dashpots"] = dashpot_step(material.contact_damping * rates)
         return limits
-
-    def _contact_rates(self):
-        """Sphere pairs near every body over its mass [1/kg], (body_count,)."""
-        pairs, counts, _ = self.contacts.store.near_table()
-        rates = np.zeros(self.model.body_count)
-        for bodies, count in zip(pairs, np.maximum(1, counts)):
-            rates[bodies] = np.maximum(rates[bodies], count / self.model.body_mass[bodies])
-        return rates
 
 
 def _partner(body, motion, links):

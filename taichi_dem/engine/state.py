@@ -3,6 +3,7 @@
 import numpy as np
 import taichi as ti
 
+from taichi_dem.effects.body_motion import BodyMotion
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.kit.types import real, vec3, vec4
 from taichi_dem.physics.rotation import rotation_matrix, spin_of
@@ -78,6 +79,18 @@ class State:
         arrays = (position, orientation, still if velocity is None else velocity)
         arrays = (*arrays, still if spin is None else spin)
         self._write_motion(*(np.ascontiguousarray(a, dtype=np.float64) for a in arrays))
+
+    @ti.func
+    def body_motion(self, i, time, step):
+        """Present motion of body i, for loads that act at a time over a step [s]."""
+        return BodyMotion(
+            position=self.position[i],
+            rotation=self.rotation[i],
+            velocity=self.velocity[i],
+            spin=self.spin[i],
+            time=time,
+            step=step,
+        )
 
     @ti.kernel
     def _write_motion(

@@ -88,13 +88,9 @@ class FieldView:
 
     def fill(self, value):
         """Give all entries of the scene a value."""
-        shape = self.to_numpy().shape
-        if not shape:
-            assign(self.field, value)
-        else:
-            whole = values(self.field)
-            whole[: shape[0]] = value
-            assign(self.field, whole)
+        whole = self.to_numpy()
+        whole[...] = value
+        assign(self.field, whole)
 
     def __repr__(self):
         return in_brief(self, ".".join(map(str, self._path)), f"field of a {self._loan.what}")

@@ -9,8 +9,7 @@ import contextlib
 import ctypes
 import math
 import os
-from collections.abc import Callable, Iterator
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 import taichi as ti
@@ -27,8 +26,6 @@ from taichi_dem.kit.errors import InputError
 MOST_TREES = 480
 #: Share of the free memory that a tree may take.
 _SHARE = 0.9
-
-_waiting: Optional[list[tuple[Callable[..., object], tuple]]] = None
 
 
 class FieldTree:
@@ -238,35 +235,6 @@ def _array_at(address, kind, shape, strides=None) -> np.ndarray:
         size = sum((n - 1) * step for n, step in zip(shape, strides)) + kind.itemsize
     memory = (ctypes.c_char * size).from_address(address)
     return np.ndarray(shape, kind, memory, strides=strides)
-
-
-@contextlib.contextmanager
-def batch_allocation() -> Iterator[None]:
-    """Hold back what is given to ``defer_fill`` until the end of the block, in its order.
-
-    Blocks may nest; the outermost counts. Raises InputError when the session has no room left.
-    """
-    global _waiting
-    if _waiting is not None:
-        yield
-        return
-    check_capacity()
-    _waiting = []
-    try:
-        yield
-        loads = _waiting
-    finally:
-        _waiting = None
-    for load, arguments in loads:
-        load(*arguments)
-
-
-def defer_fill(load: Callable[..., object], *arguments: Any) -> None:
-    """Call load(*arguments), which uses fields: now, or at the end of ``batch_allocation``."""
-    if _waiting is None:
-        load(*arguments)
-    else:
-        _waiting.append((load, arguments))
 
 
 def check_capacity() -> None:

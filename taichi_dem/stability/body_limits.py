@@ -7,11 +7,11 @@ listed, and their rates found anew at the start of the next substep.
 import numpy as np
 import taichi as ti
 
-from taichi_dem.effects.body_motion import BodyMotion
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.types import real
 from taichi_dem.stability.contact_limits import ContactLimits
 from taichi_dem.stability.mesh_limits import dashpots_of, springs_of, subset_rates
+from taichi_dem.stability.stable_step import dashpot_limit, spring_limit
 from taichi_dem.stability.step_control import (
     BOND_C,
     BOND_K,
@@ -25,11 +25,9 @@ from taichi_dem.stability.step_control import (
     ROTATION,
     Displacement,
     StepControl,
-    dashpot_limit,
     finer,
     level_of,
     shorter,
-    spring_limit,
 )
 
 HIT, RELEASE, CLOSE = (1 << k for k in range(len(EVENTS)))
@@ -252,14 +250,7 @@ class StabilityLimits:
         """
         push2, step = 0.0, self.rule[0]
         for ahead in ti.static(range(2)):
-            motion = BodyMotion(
-                position=self.state.position[i],
-                rotation=self.state.rotation[i],
-                velocity=self.state.velocity[i],
-                spin=self.state.spin[i],
-                time=now + ahead * step,
-                step=step,
-            )
+            motion = self.state.body_motion(i, now + ahead * step, step)
             for e in ti.static(range(len(self.tables.loads))):
                 if self.tables.loads[e].acts_on(i):
                     force, _ = self.tables.loads[e].wrench(i, motion)

@@ -15,6 +15,18 @@ from taichi_dem.timeline import MAX_LEVEL
 SQUARINGS = 5
 
 
+def contact_rates(pairs, counts, mass):
+    """Most sphere pairs that a body has with another, over its mass [1/kg], (body_count,).
+
+    pairs: bodies that are near each other, (n, 2). counts: their sphere pairs, at least 1 counts.
+    mass: of the bodies [kg]. What one such pair allows, for a sentence; ``StepReport`` has bounds.
+    """
+    rates = np.zeros(len(mass))
+    for bodies, count in zip(pairs, np.maximum(1, counts)):
+        rates[bodies] = np.maximum(rates[bodies], count / mass[bodies])
+    return rates
+
+
 @ti.func
 def largest_eigenvalue(a, b, c):
     """Bound from above, by 6 % at most, of the symmetric 6x6 matrix [[a, b^T], [b, c]] >= 0."""

@@ -5,32 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from taichi_dem.materials import Material
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.topology import Topology, body_properties, face_vertices
-
-
-def dashpot_step(rate: ArrayLike) -> np.ndarray:
-    """Largest step [s] at which dashpots are stable that slow a body at a rate [1/s].
-
-    A pair of equal bodies moves against each other at twice the rate of one, and forward Euler
-    is stable to 2 / (2 rate). Infinite where the rate is zero.
-    """
-    with np.errstate(divide="ignore"):
-        return 1.0 / np.asarray(rate)
-
-
-def spring_step(rate2: ArrayLike) -> np.ndarray:
-    """Largest step [s] at which springs are stable that hold a body at a squared rate [1/s2].
-
-    As for dashpots a pair has twice that of one, and symplectic Euler is stable to
-    2 / sqrt(2 omega^2). Infinite where it is zero.
-    """
-    with np.errstate(divide="ignore"):
-        return 2.0 / np.sqrt(2.0 * np.asarray(rate2))
 
 
 def dashpots_of(material: Material) -> tuple[float, float]:

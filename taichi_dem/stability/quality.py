@@ -14,11 +14,10 @@ from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.topology import body_properties, topology_of
 from taichi_dem.stability.mesh_limits import (
     bond_rates,
-    dashpot_step,
     dashpots_of,
-    spring_step,
     springs_of,
 )
+from taichi_dem.stability.stable_step import dashpot_step, spring_step
 
 #: Elements listed in the printed table.
 _WORST = 10

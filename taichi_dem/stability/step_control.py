@@ -154,15 +154,3 @@ def finer(level, bound, other, criterion):
     if other > level:
         level, bound = other, criterion
     return level, bound
-
-
-@ti.func
-def dashpot_limit(rate):
-    """``quality.dashpot_step`` for kernels: seconds, huge where the rate [1/s] is zero."""
-    return 1.0 / ti.max(rate, 1e-200)
-
-
-@ti.func
-def spring_limit(rate2):
-    """``quality.spring_step`` for kernels: seconds, huge where the squared rate is zero."""
-    return 2.0 / ti.sqrt(2.0 * ti.max(rate2, 1e-200))

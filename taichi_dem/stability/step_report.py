@@ -17,13 +17,12 @@ from taichi_dem.scene import Scene, outer_faces_warnings
 from taichi_dem.stability.body_limits import LIMITED
 from taichi_dem.stability.mesh_limits import (
     bond_rates,
-    dashpot_step,
     dashpots_of,
     inverse_root,
     point_blocks,
-    spring_step,
     springs_of,
 )
+from taichi_dem.stability.stable_step import dashpot_step, spring_step
 from taichi_dem.stability.step_control import StepControl
 
 #: Elements listed in the printed table.
@@ -188,7 +187,7 @@ def _seconds(step):
 def stable_together(springs: ArrayLike, drags: ArrayLike) -> np.ndarray:
     """Largest explicit step [s] at which springs and dashpots of a body are stable together.
 
-    springs, drags: largest steps of each alone [s], ``quality.spring_step`` and ``dashpot_step``.
+    springs, drags: largest steps of each alone [s], ``spring_step`` and ``dashpot_step``.
     The leapfrog whose dashpots take the velocity of half a step ago, v += -dt (w^2 x + c v), is
     stable while c dt + (w dt)^2 / 2 <= 2, which is dt / drags + (dt / springs)^2 <= 1.
     """
@@ -201,7 +200,7 @@ def step_report(scene: Union[Scene, Mesh], material: Optional[Material] = None) 
     """Judge a scene, or a mesh and a material with all effects, before a run.
 
     scene: a Scene, or a Mesh if material is given. Limits hold for a pair of equal bodies that
-    move against each other (``quality.dashpot_step``, ``quality.spring_step``): a mesh bears no
+    move against each other (``dashpot_step``, ``spring_step``): a mesh bears no
     less, and at most twice as much.
     Raises InputError for anything else.
     """

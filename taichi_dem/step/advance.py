@@ -8,7 +8,6 @@ v += S / m, L += T, then x += dt v and q = exp(dt w) q, with the spin w in the m
 
 import taichi as ti
 
-from taichi_dem.effects.body_motion import BodyMotion
 from taichi_dem.kit.types import real, vec2, vec3
 from taichi_dem.physics.bond import bond_motion, unit_arm, unit_opening, unit_velocity
 from taichi_dem.physics.rotation import mean_spin, rotation_matrix, spin_of, turned, zero3
@@ -267,7 +266,7 @@ class Advance(ContactForce):
     def _loaded(self, i, elapsed, linear, angular):
         """Impulse and moment with those of the loads added, and each load's own, a row each."""
         kick = ti.Matrix.zero(real, ti.static(max(1, len(self.tables.loads))), 6)
-        motion = self.body_motion(i, self._load_time(elapsed), elapsed)
+        motion = self.state.body_motion(i, self._load_time(elapsed), elapsed)
         for e in ti.static(range(len(self.tables.loads))):
             if self.tables.loads[e].acts_on(i):
                 force, torque = self.tables.loads[e].wrench(i, motion)
@@ -276,18 +275,6 @@ class Advance(ContactForce):
                 for k in ti.static(range(3)):
                     kick[e, k], kick[e, 3 + k] = force[k] * elapsed, torque[k] * elapsed
         return linear, angular, kick
-
-    @ti.func
-    def body_motion(self, i, time, step):
-        """Present motion of body i, for the loads that act at a time over a step [s]."""
-        return BodyMotion(
-            position=self.state.position[i],
-            rotation=self.state.rotation[i],
-            velocity=self.state.velocity[i],
-            spin=self.state.spin[i],
-            time=time,
-            step=step,
-        )
 
     @ti.func
     def _load_time(self, elapsed):

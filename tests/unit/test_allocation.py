@@ -1,4 +1,4 @@
-"""Values wait until all fields are made, so that a simulation takes one group of Taichi's."""
+"""How many groups of Taichi's fields a session takes."""
 
 import pytest
 from taichi.lang import impl
@@ -11,27 +11,6 @@ from tests.scenes import brisk_scene
 def groups():
     """Groups of fields that the session holds."""
     return impl.get_runtime().prog.get_snode_tree_size()
-
-
-def test_values_wait_until_the_outermost_block_ends():
-    """And come in the order in which they were given; without a block they come at once."""
-    seen = []
-    allocation.defer_fill(seen.append, "at once")
-    with allocation.batch_allocation():
-        allocation.defer_fill(seen.append, "first")
-        with allocation.batch_allocation():
-            allocation.defer_fill(seen.append, "second")
-        assert seen == ["at once"]
-    assert seen == ["at once", "first", "second"]
-
-
-def test_what_an_error_leaves_waiting_is_forgotten():
-    seen = []
-    with pytest.raises(ZeroDivisionError), allocation.batch_allocation():
-        allocation.defer_fill(seen.append, "never")
-        raise ZeroDivisionError
-    allocation.defer_fill(seen.append, "at once")
-    assert seen == ["at once"]
 
 
 def test_an_engine_takes_one_group_of_fields(compiled_anew):

@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+import taichi as ti
 
 from taichi_dem import (
     CONCRETE,
@@ -25,10 +26,14 @@ from taichi_dem.mesh.topology import faces_of_group, topology_of
 from taichi_dem.stability.body_limits import LIMITED
 from taichi_dem.stability.mesh_limits import (
     bond_rates,
-    dashpot_step,
     dashpots_of,
-    spring_step,
     subset_rates,
+)
+from taichi_dem.stability.stable_step import (
+    dashpot_limit,
+    dashpot_step,
+    spring_limit,
+    spring_step,
 )
 from taichi_dem.stability.step_control import CRITERIA
 from taichi_dem.stability.step_report import StepReport, stable_together
@@ -288,3 +293,19 @@ def test_the_step_report_asks_for_effects_by_role():
     assert set(first) == set(second) and len(first) == 5
     for name, limits in first.items():
         assert np.array_equal(limits, second[name])
+
+
+def test_kernels_and_arrays_share_the_formulas_of_the_stable_step():
+    """Bit for bit, and both without a limit where nothing limits."""
+    rates = np.concatenate([np.random.default_rng(4).uniform(0.0, 1e9, 200), [1e-30, 1e30]])
+    found = np.zeros((len(rates), 2))
+
+    @ti.kernel
+    def limits(rates: ti.types.ndarray(ti.f64, 1), found: ti.types.ndarray(ti.f64, 2)):
+        for k in range(rates.shape[0]):
+            found[k, 0], found[k, 1] = dashpot_limit(rates[k]), spring_limit(rates[k])
+
+    limits(rates, found)
+    assert np.array_equal(found, np.column_stack([dashpot_step(rates), spring_step(rates)]))
+    limits(np.zeros(len(rates)), found)
+    assert found.min() > 1e90 and np.isinf([dashpot_step(0.0), spring_step(0.0)]).all()

@@ -20,11 +20,10 @@ from taichi_dem.mesh.topology import topology_of
 from taichi_dem.stability.body_limits import LIMITED
 from taichi_dem.stability.mesh_limits import (
     bond_rates,
-    dashpot_step,
     dashpots_of,
-    spring_step,
     springs_of,
 )
+from taichi_dem.stability.stable_step import dashpot_step, spring_step
 from taichi_dem.stability.step_report import contact_eigenvalues
 from taichi_dem.timeline import MACRO_TICKS, MAX_LEVEL
 
