@@ -15,6 +15,7 @@ from taichi_dem.kit.study.command_line import (
     take_defaults,
     whole,
 )
+from taichi_dem.kit.study.settings import add_settings, take_settings
 from taichi_dem.kit.study.summary import (
     figure,
     figures_from,
@@ -25,14 +26,17 @@ from taichi_dem.kit.study.summary import (
     versions,
     write_summary,
 )
+from taichi_dem.kit.study.table import Table
 from taichi_dem.kit.study.tables import columns_of, print_table, show_rows, write_rows
 from taichi_dem.kit.study.timing import Timing, clock, on_device, seconds_of
 from taichi_dem.kit.study.worker import ask_worker, read_job
 
 __all__ = [
     "Parser",
+    "Table",
     "Timing",
     "add_checkpoints",
+    "add_settings",
     "ask_worker",
     "bare_parser",
     "cached",
@@ -57,6 +61,7 @@ __all__ = [
     "several",
     "show_rows",
     "take_defaults",
+    "take_settings",
     "value_in_words",
     "versions",
     "whole",
