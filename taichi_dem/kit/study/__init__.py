@@ -15,6 +15,7 @@ from taichi_dem.kit.study.command_line import (
     take_defaults,
     whole,
 )
+from taichi_dem.kit.study.settings import add_settings, take_settings
 from taichi_dem.kit.study.summary import (
     figure,
     figures_from,
@@ -33,6 +34,7 @@ __all__ = [
     "Parser",
     "Timing",
     "add_checkpoints",
+    "add_settings",
     "ask_worker",
     "bare_parser",
     "cached",
@@ -57,6 +59,7 @@ __all__ = [
     "several",
     "show_rows",
     "take_defaults",
+    "take_settings",
     "value_in_words",
     "versions",
     "whole",

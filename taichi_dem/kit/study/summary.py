@@ -8,6 +8,7 @@ import shlex
 import subprocess
 import sys
 import textwrap
+import time
 from argparse import Namespace
 from collections.abc import Iterable, Mapping
 from typing import Any, Union
@@ -43,7 +44,7 @@ def finish(
     options: Namespace,
     name: str,
     figures: Figures,
-    runs: Union[Iterable, tuple[float, float]],
+    runs: Union[Iterable, tuple[float, float], float],
     *,
     caption: str = "",
     see: str = "",
@@ -51,9 +52,12 @@ def finish(
 ) -> None:
     """Write summary.json, and caption.txt where there is a caption; print them, and the folder.
 
-    runs: objects with compile_seconds and run_seconds, or both sums as a pair of numbers. see: the
-    picture to look at first. show: whether the figures are printed too.
+    runs: objects with compile_seconds and run_seconds, or both sums as a pair of numbers; or those
+    of compiling alone: all else since ``main`` began counts as running. see: the picture to look
+    at first. show: whether the figures are printed too.
     """
+    if isinstance(runs, float):
+        runs = runs, time.perf_counter() - options.started - runs
     compiling, running = runs if isinstance(runs, tuple) else _seconds_of(runs)
     write_summary(options.out, name, figures, compile_seconds=compiling, run_seconds=running)
     if show:
