@@ -22,8 +22,8 @@ from functools import partial
 import numpy as np
 
 from _blast import blast_parser, paper_scene
-from _dashpot_system import DashpotSystem
 from taichi_dem import At, ImplicitDashpots, Simulation
+from taichi_dem.diagnostics.dashpot_system import DashpotSystem
 from taichi_dem.kit import study
 from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.plot_style import BROWN, GREY, STYLES, VIOLET, picture

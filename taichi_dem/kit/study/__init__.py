@@ -15,6 +15,7 @@ from taichi_dem.kit.study.command_line import (
     take_defaults,
     whole,
 )
+from taichi_dem.kit.study.new_process import call_in_process, call_rounds
 from taichi_dem.kit.study.settings import add_settings, take_settings
 from taichi_dem.kit.study.summary import (
     figure,
@@ -40,6 +41,8 @@ __all__ = [
     "ask_worker",
     "bare_parser",
     "cached",
+    "call_in_process",
+    "call_rounds",
     "checkpoint_of",
     "clock",
     "columns_of",

@@ -4,6 +4,7 @@ import argparse
 import os
 import re
 import sys
+import time
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from typing import Any, Callable, NoReturn, Optional
@@ -128,10 +129,14 @@ def main(
     made: ArgumentParser,
     arguments: Optional[Sequence[str]] = None,
 ) -> int:
-    """Parse, start Taichi, run; returns the exit code of ``exit_code``."""
+    """Parse, start Taichi, run; returns the exit code of ``exit_code``.
+
+    options.started: when, on ``time.perf_counter``.
+    """
 
     def work():
         options = made.parse_args(arguments)
+        options.started = time.perf_counter()
         runtime.start(options.arch, options.threads)
         run(options)
 

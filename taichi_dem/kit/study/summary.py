@@ -8,6 +8,7 @@ import shlex
 import subprocess
 import sys
 import textwrap
+import time
 from argparse import Namespace
 from collections.abc import Iterable, Mapping
 from typing import Any, Union
@@ -43,7 +44,7 @@ def finish(
     options: Namespace,
     name: str,
     figures: Mapping[str, Union[dict, tuple]],
-    runs: Union[Iterable, tuple[float, float]],
+    runs: Union[Iterable, tuple[float, float], float],
     *,
     caption: str = "",
     see: str = "",
@@ -52,9 +53,12 @@ def finish(
     """Write summary.json, and caption.txt where there is a caption; print them, and the folder.
 
     figures: by name, as of ``figure``, or tuples of its arguments.
-    runs: objects with compile_seconds and run_seconds, or both sums as a pair of numbers. see: the
-    picture to look at first. show: whether the figures are printed too.
+    runs: objects with compile_seconds and run_seconds, or both sums as a pair of numbers; or those
+    of compiling alone: all else since ``main`` began counts as running. see: the picture to look
+    at first. show: whether the figures are printed too.
     """
+    if isinstance(runs, float):
+        runs = runs, time.perf_counter() - options.started - runs
     compiling, running = runs if isinstance(runs, tuple) else _seconds_of(runs)
     made = {key: figure(*one) if isinstance(one, tuple) else one for key, one in figures.items()}
     write_summary(options.out, name, made, compile_seconds=compiling, run_seconds=running)
