@@ -1,21 +1,14 @@
-"""What a second thread, or a device, does for whole steps of a large block.
+"""What a second thread, or a device, does for whole steps of a large block."""
 
-    python _scaling_threads.py JOB.json
-
-is a process of its own, as threads cannot change within one: it prints seconds a step, one a
-repeat, what the busiest thread took of the cores, and a digest of where bodies end, as JSON.
-"""
-
-import json
 import time
 
 import numpy as np
 
 from _blast import METHODS, paper_effects
-from taichi_dem import CONCRETE, InputError, Scene, Simulation, effects, read_mesh, runtime
-from taichi_dem.kit import study
+from taichi_dem import CONCRETE, InputError, Scene, Simulation, effects, read_mesh
 from taichi_dem.kit.checkpoint import digest
 from taichi_dem.kit.field_memory import FieldMemory
+from taichi_dem.kit.study import call_in_process
 from taichi_dem.kit.study.machine import busiest_seconds, memory_bandwidth, thread_seconds
 from taichi_dem.mesh.reorder import in_space_order
 from taichi_dem.mesh.shapes import bar
@@ -26,11 +19,10 @@ ROUNDS = 2
 BAR = (2.0, 1.0)
 
 
-def thread_job(mesh, cells, method, threads, steps, repeats, arch="cpu"):
-    """Measurement of whole steps by the parallel driver, see ``main``; mesh: "" for a bar."""
-    job = {"mesh": mesh, "cells": cells, "method": method, "threads": threads, "arch": arch}
-    job.update(steps=steps, repeats=repeats)
-    return study.ask_worker(__file__, job, f"on {threads} threads")
+def thread_job(mesh, cells, method, threads, steps, repeats):
+    """What ``whole_steps`` measures in a process of its own: threads cannot change within one."""
+    job = {"mesh": mesh, "cells": cells, "method": method, "steps": steps, "repeats": repeats}
+    return call_in_process(whole_steps, threads=threads, title=f"on {threads} threads", **job)
 
 
 def thread_gain(mesh, cells, method, steps, rounds, repeats):
@@ -66,35 +58,24 @@ def scene_of(mesh, cells):
     return Scene(in_space_order(bar(*BAR, cells)), CONCRETE, [*blown, gas])
 
 
-def timed(simulation, warm, steps, repeats):
-    """Seconds a step, and those of the busiest thread, of some steps after warm ones, two lists."""
-    simulation.advance_to(warm)
+def whole_steps(mesh, cells, method, steps, repeats):
+    """Seconds of whole steps by the parallel driver, two of them to warm up; for a JSON file.
+
+    seconds: of a step, one a repeat. busy: the same of what the busiest thread took of the cores.
+    digest: of where bodies end.
+    """
+    make, step = METHODS[method]
+    simulation = Simulation(scene_of(mesh, cells), make(step), "parallel")
+    simulation.advance_to(2)
     seconds, busy = [], []
     for k in range(repeats):
         started, before = time.perf_counter(), thread_seconds()
-        simulation.advance_to(warm + (k + 1) * steps)
+        simulation.advance_to(2 + (k + 1) * steps)
         seconds.append((time.perf_counter() - started) / steps)
         spent = busiest_seconds(before, thread_seconds())
         busy.append(None if spent is None else spent / steps)
-    return seconds, busy
-
-
-def bytes_a_step(engine):
-    """Bytes that a step of all bodies must move at least: the model read, the state written too."""
-    kept = FieldMemory(engine.tables, "constant"), FieldMemory(engine.state, "saved")
-    read, written = (sum(array.nbytes for array in part.read().values()) for part in kept)
-    return read + 2 * written
-
-
-def main():
-    """Do a job and print what it measured."""
-    job = study.read_job()
-    runtime.start(job["arch"], job["threads"])
-    make, step = METHODS[job["method"]]
-    simulation = Simulation(scene_of(job["mesh"], job["cells"]), make(step), "parallel")
-    seconds, busy = timed(simulation, 2, job["steps"], job["repeats"])
     motion = simulation.state.motion()
-    found = {
+    return {
         "seconds": seconds,
         "busy": busy,
         "bodies": simulation.model.body_count,
@@ -102,8 +83,10 @@ def main():
         "bandwidth": memory_bandwidth(),
         "digest": digest(*(np.ascontiguousarray(motion[key]) for key in ("position", "velocity"))),
     }
-    print(json.dumps(found))
 
 
-if __name__ == "__main__":
-    main()
+def bytes_a_step(engine):
+    """Bytes that a step of all bodies must move at least: the model read, the state written too."""
+    kept = FieldMemory(engine.tables, "constant"), FieldMemory(engine.state, "saved")
+    read, written = (sum(array.nbytes for array in part.read().values()) for part in kept)
+    return read + 2 * written

@@ -175,7 +175,7 @@ def block(quick):
 def of_method(method, cells, rounds):
     """Yield steps a second by a method, on one thread and on two or on the device."""
     if on_device():
-        found = thread_job("", cells, method, 1, STEPS, REPEATS, "cuda")
+        found = thread_job("", cells, method, 1, STEPS, REPEATS)
     else:
         found = thread_gain("", cells, method, STEPS, rounds, REPEATS)
     title = f"block of {found['bodies']}, {method}"

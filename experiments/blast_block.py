@@ -23,7 +23,6 @@ import importlib.util
 import os
 import sys
 import time
-from functools import partial
 
 import numpy as np
 
@@ -31,7 +30,7 @@ from _blast import blast_parser, paper_effects, print_quality, run_options
 from taichi_dem import CONCRETE, PAPER_BLOCK, ImplicitDashpots, Scene, plot, read_mesh, simulate
 from taichi_dem.kit import study
 from taichi_dem.kit.allocation import field_bytes
-from taichi_dem.kit.files import output_folder, write_csv
+from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.process_memory import peak_memory_mb
 from taichi_dem.mesh.gmsh import block_with_hole
 from taichi_dem.mesh.reorder import in_space_order
@@ -75,13 +74,13 @@ def mesh_of(options):
         print(f"{words}; --tetrahedra N asks Gmsh for a mesh")
         mesh = mirrored_copies(read_mesh(PAPER_BLOCK), options.copies)
     else:
-        mesh = made_block(output_folder(options.out), options.tetrahedra or 20000)
+        mesh = made_block(study.output_paths(options.out), options.tetrahedra or 20000)
     return in_space_order(mesh)
 
 
-def made_block(folder, tetrahedra):
+def made_block(at, tetrahedra):
     """The block by Gmsh with about this many tetrahedra; from its file where that is there."""
-    path = os.path.join(folder, f"block_{tetrahedra}.msh")
+    path = at(f"block_{tetrahedra}.msh")
     if not os.path.exists(path):
         scale = scale_for(tetrahedra)
         block_with_hole(path, depth=3.0, size_hole=scale * SIZE_HOLE, size_far=scale * SIZE_FAR)
@@ -124,7 +123,7 @@ def run(options):
     result = simulate(scene, method=method, **run_options(options), **looks, **kept)
     started = time.perf_counter()
     fall = Attenuation.of(result.model, result.peak_speed, RADIUS)
-    draw(result, fall, partial(os.path.join, options.out))
+    draw(result, fall, study.output_paths(options.out))
     figures = figures_of(result, fall.power_law(FROM_RADII)[0])
     figures["picture_seconds"] = (time.perf_counter() - started, "s")
     print(f"\n{result.report}\n")

@@ -17,7 +17,6 @@ all that is plotted, summary.json and a ParaView series (paraview/blast_fracture
 results/blast_fracture/.
 """
 
-import os
 import sys
 from functools import partial
 
@@ -131,7 +130,7 @@ def figures_of(result):
 
 def picture(result, folder):
     """Draw and write everything that is plotted."""
-    at = partial(os.path.join, folder)
+    at = study.output_paths(folder)
     frames, model, history = result.frames, result.model, result.history
     dt0, broken_time = result.method.dt0, result.broken_time
     write_bodies(at("bodies.csv"), frames)

@@ -16,7 +16,6 @@ Times are CPU seconds of stepping alone. Writes methods.png, the table as CSV, t
 method and summary.json to results/blast_methods/.
 """
 
-import os
 import sys
 from functools import partial
 from operator import itemgetter
@@ -27,7 +26,7 @@ import numpy as np
 from _blast import METHODS, Costs, blast_parser, paper_scene, run_options
 from taichi_dem import ImplicitDashpots, ProgressBar, SimulationDiverged, plot, simulate
 from taichi_dem.kit import study
-from taichi_dem.kit.files import output_folder, write_csv
+from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.validation import choice
 
 NAME = "blast_methods"
@@ -69,7 +68,7 @@ def follow(scene, method, options, name):
     costs = Costs()
     result = simulate(scene, method=method, title=name, observers=[costs], **run_options(options))
     series = {**result.history, **costs.columns}
-    write_csv(os.path.join(options.out, f"history_{name}.csv"), series)
+    write_csv(f"{options.out}/history_{name}.csv", series)
     return result.report, series
 
 
@@ -98,7 +97,7 @@ def largest_stable_step(scene, make, step, exact, options):
 def run(options):
     """Run the reference and all methods, compare, picture."""
     study.take_settings(options, SETTINGS)
-    scene, at = paper_scene(options.mesh), partial(os.path.join, output_folder(options.out))
+    scene, at = paper_scene(options.mesh), study.output_paths(options.out)
     best, exact = follow(scene, REFERENCE, options, "reference")
     wanted, runs, histories = float(exact[MOVED][-1]), [], {"reference": exact}
     for name in options.methods:

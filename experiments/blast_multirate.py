@@ -13,7 +13,6 @@ Times are CPU seconds of stepping alone, without compiling. Writes pictures, CSV
 plotted and summary.json to results/blast_multirate/.
 """
 
-import os
 import sys
 from functools import partial
 from types import SimpleNamespace
@@ -21,7 +20,7 @@ from types import SimpleNamespace
 from _blast import Costs, blast_parser, level_columns, level_shares, paper_scene, run_options
 from taichi_dem import At, InputError, Multirate, Uniform, plot, simulate
 from taichi_dem.kit import study
-from taichi_dem.kit.files import output_folder, write_csv
+from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.plot_style import styles_of
 from taichi_dem.output.hole_monitor import HoleMonitor
 
@@ -99,7 +98,7 @@ def follow(name, options, scene):
         # Also what a run that diverged, or was interrupted, had reached.
         if costs.view is not None:
             history = costs.view.history()
-            write_csv(os.path.join(options.out, f"history_{name}.csv"), history)
+            write_csv(f"{options.out}/history_{name}.csv", history)
     return SimpleNamespace(**made, series={**result.history, **costs.columns}, levels=costs.levels)
 
 
@@ -110,7 +109,7 @@ def run(options):
     if asked and options.early > options.until:
         raise InputError(f"early must be at most until, {options.until:g} s, got {options.early:g}")
     options.early = min(options.early, options.until)
-    scene, at = paper_scene(options.mesh), partial(os.path.join, output_folder(options.out))
+    scene, at = paper_scene(options.mesh), study.output_paths(options.out)
     runs = {
         name: [follow(name, options, scene) for _ in range(options.repeats)] for name in METHODS
     }

@@ -20,9 +20,7 @@ cores busy, look at what the busiest thread took of the cores instead (..._busy)
 Writes scaling.png, scaling.csv, shares.csv and summary.json to results/blast_scaling/.
 """
 
-import os
 import sys
-import time
 from functools import partial
 
 import numpy as np
@@ -31,7 +29,7 @@ from _blast import blast_parser, paper_scene
 from _scaling_threads import ROUNDS, thread_gain
 from taichi_dem import Multirate, ProgressBar
 from taichi_dem.kit import study
-from taichi_dem.kit.files import output_folder, write_csv
+from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, PURPLE, RED, picture
 from taichi_dem.workload import WAYS, Workers, record_workload
 
@@ -67,8 +65,7 @@ options_parser = partial(blast_parser, NAME, __doc__, (), SETTINGS)
 def run(options):
     """Record, simulate, measure, picture."""
     study.take_settings(options, SETTINGS)
-    scene, at = paper_scene(options.mesh), partial(os.path.join, output_folder(options.out))
-    started = time.perf_counter()
+    scene, at = paper_scene(options.mesh), study.output_paths(options.out)
     counting = {"until": options.until, "every": options.every, "title": "blast"}
     workload, simulation = record_workload(scene, Multirate(DT0, options.l), **counting)
     workers = Workers(workload)
@@ -82,8 +79,8 @@ def run(options):
     draw(at("scaling.png"), shared, chosen, workload, {"bar": bar["gain"], "block": block["gain"]})
     shown = [row for row in rows if row["workers"] in (2, 4, PAPER_WORKERS, 256)]
     TABLE.show([{**row, "way": WAYS[row["way"]]} for row in shown])
-    seconds = simulation.compile_seconds, time.perf_counter() - started
-    study.finish(options, NAME, figures_of(chosen, workers.prices, *gains), seconds)
+    figures = figures_of(chosen, workers.prices, *gains)
+    study.finish(options, NAME, figures, simulation.compile_seconds)
 
 
 def measured(options):

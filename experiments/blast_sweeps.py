@@ -15,7 +15,6 @@ sweeps.png, sweeps.csv and summary.json to results/blast_sweeps/.
 """
 
 import itertools
-import os
 import sys
 from functools import partial
 
@@ -25,7 +24,6 @@ from _blast import blast_parser, paper_scene
 from taichi_dem import At, ImplicitDashpots, Simulation
 from taichi_dem.diagnostics.dashpot_system import DashpotSystem
 from taichi_dem.kit import study
-from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.plot_style import BROWN, GREY, STYLES, VIOLET, picture
 from taichi_dem.simulate import run_simulation
 
@@ -92,7 +90,7 @@ def draw(path, found):
 
 def run(options):
     """Go from time to time, solve in every way, compare."""
-    scene, at = paper_scene(options.mesh), partial(os.path.join, output_folder(options.out))
+    scene, at = paper_scene(options.mesh), study.output_paths(options.out)
     times = QUICK_TIMES if options.quick else TIMES
     simulation = Simulation(scene, ImplicitDashpots(refresh=4e-7))
     solving = Solving(simulation, times)

@@ -1,6 +1,7 @@
 """Options, endings and exit codes of a study that is run as a program."""
 
 import argparse
+import functools
 import os
 import re
 import sys
@@ -12,6 +13,7 @@ from typing import Any, Callable, NoReturn, Optional
 from taichi_dem.kit import runtime
 from taichi_dem.kit.checkpoint import Checkpoint, Interrupted
 from taichi_dem.kit.errors import InputError, SimulationDiverged
+from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.progress.lasting_output import lasting_output
 from taichi_dem.kit.validation import shown
 
@@ -104,6 +106,14 @@ def take_defaults(options: Namespace, full: dict, quick: dict) -> None:
     for name, value in (quick if options.quick else full).items():
         if getattr(options, name, None) is None:
             setattr(options, name, value)
+
+
+def output_paths(folder: str) -> Callable[[str], str]:
+    """Make the folder of the output; returns a function: path of a file in it, by its name.
+
+    Raises InputError when it cannot be made or written to.
+    """
+    return functools.partial(os.path.join, output_folder(folder))
 
 
 def add_checkpoints(made: ArgumentParser) -> None:
