@@ -3,7 +3,7 @@
 import numpy as np
 
 from taichi_dem import CONCRETE, PAPER_BLOCK, Scene, effects, quality_report, read_mesh
-from taichi_dem.kit.study import add_settings, parser
+from taichi_dem.kit.study import add_checkpoints, add_settings, checkpoint_of, parser
 from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
 from taichi_dem.observers import Every
 from taichi_dem.stability.step_control import StepControl
@@ -21,17 +21,25 @@ EFFECTS = {
 }
 
 
-def blast_parser(name, description, drivers=BLAST_DRIVERS, settings=(), mesh=PAPER_BLOCK):
-    """Parser of an experiment on a mesh, the paper's block; settings: as of ``add_settings``."""
+def blast_parser(
+    name, description, drivers=BLAST_DRIVERS, settings=(), mesh=PAPER_BLOCK, saves=False
+):
+    """Parser of an experiment on a mesh; settings: as of ``add_settings``.
+
+    saves: whether its run is written whole, and saves itself on the way.
+    """
     made = parser(name, description, drivers)
     made.add_argument("--mesh", default=mesh, help="tetrahedra with a face group hole")
+    if saves:
+        add_checkpoints(made)
     return add_settings(made, dict(settings))
 
 
 def run_options(options):
     """Those arguments of ``simulate`` that options give."""
     names = ("until", "driver", "samples", "frames")
-    return {name: value for name, value in vars(options).items() if name in names}
+    kept = {"output": options.out, **checkpoint_of(options)} if "resume" in options else {}
+    return {**kept, **{name: value for name, value in vars(options).items() if name in names}}
 
 
 class Costs:

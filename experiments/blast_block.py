@@ -19,10 +19,11 @@ Writes cracks.png, peaks.png, energy.png, history.csv, peaks.csv, mesh, ParaView
 summary.json to results/blast_block/; a run saves itself as blast_fracture.py does.
 """
 
-import importlib.util
 import os
 import sys
 import time
+from functools import partial
+from importlib.util import find_spec
 
 import numpy as np
 
@@ -41,6 +42,7 @@ from taichi_dem.output.progress_lines import ProgressLines
 
 NAME = "blast_block"
 SETTINGS = {
+    "tetrahedra": (None, None, study.whole(2000, 2000000), "about how many, 20000"),
     "until": (1e-3, 1e-4, study.number(0, 1), "simulated time [s], 1e-3"),
     "samples": (200, 20, study.whole(1, 1000000), "rows of the time series, 200"),
     "frames": (10, 1, study.whole(1, 10000), "snapshots, 10"),
@@ -54,22 +56,14 @@ RADIUS, FROM_RADII = 0.025, 4.0
 SIZE_HOLE, SIZE_FAR = 0.055, 0.22
 #: Scales of both, and the tetrahedra that Gmsh then makes of a block 3 m deep: measured.
 SCALES, COUNTS = (1.9, 1.0, 0.585), (4537, 21038, 93490)
-
-
-def options_parser():
-    """Options of this experiment; without --mesh, Gmsh makes one."""
-    made = blast_parser(NAME, __doc__, settings=SETTINGS, mesh=None)
-    made.add_argument("--tetrahedra", type=study.whole(2000, 2000000), help="about how many, 20000")
-    study.add_checkpoints(made)
-    return made
+options_parser = partial(blast_parser, NAME, __doc__, settings=SETTINGS, mesh=None, saves=True)
 
 
 def mesh_of(options):
     """The mesh asked for; says so where mirrored copies stand in for one by Gmsh."""
-    has_gmsh = importlib.util.find_spec("gmsh") is not None
     if options.mesh:
         mesh = read_mesh(options.mesh)
-    elif options.tetrahedra is None and (options.quick or not has_gmsh):
+    elif options.tetrahedra is None and (options.quick or not find_spec("gmsh")):
         words = f"{options.copies} mirrored copies of the paper's block"
         print(f"{words}; --tetrahedra N asks Gmsh for a mesh")
         mesh = mirrored_copies(read_mesh(PAPER_BLOCK), options.copies)
@@ -118,9 +112,7 @@ def run(options):
     scene = Scene(mesh_of(options), CONCRETE, paper_effects())
     print_quality(scene)
     looks = {"title": "blasting", "observers": [ProgressLines(options.until)]}
-    kept = {"output": options.out, **study.checkpoint_of(options)}
-    method = ImplicitDashpots(STEP)
-    result = simulate(scene, method=method, **run_options(options), **looks, **kept)
+    result = simulate(scene, method=ImplicitDashpots(STEP), **run_options(options), **looks)
     started = time.perf_counter()
     fall = Attenuation.of(result.model, result.peak_speed, RADIUS)
     draw(result, fall, study.output_paths(options.out))

@@ -46,6 +46,9 @@ METHODS = {
 }
 PAPER_DT0, PAPER_L = 1e-8, 1e-7
 SETTINGS = {
+    "dt0": (None, None, study.number(0, 1), "largest step [s], by method"),
+    "l": (None, None, study.number(0, 1), "the paper's way of a body in a step [m], 1e-7"),
+    "without": ("", "", str, "effects to leave out, by comma"),
     "until": (5e-4, 8e-5, study.number(0, 1), "simulated time [s], 5e-4"),
     "frames": (40, 6, study.whole(1, 10000), "snapshots, 40"),
     "samples": (200, 20, study.whole(1, 1000000), "rows of the time series, 200"),
@@ -54,14 +57,9 @@ SETTINGS = {
 
 def options_parser():
     """Options of this experiment."""
-    made = blast_parser(NAME, __doc__, settings=SETTINGS)
-    length = study.number(0, 1)
+    made = blast_parser(NAME, __doc__, settings=SETTINGS, saves=True)
     made.add_argument("--method", choices=(*METHODS, *PAPER_METHODS), default="implicit")
-    made.add_argument("--dt0", type=length, help="largest step [s], by method")
-    made.add_argument("--l", type=length, help="the paper's way of a body in a step [m], 1e-7")
     made.add_argument("--with", dest="added", default="", help="effects to add, by comma")
-    made.add_argument("--without", default="", help="effects to leave out, by comma")
-    study.add_checkpoints(made)
     return made
 
 
@@ -71,7 +69,7 @@ def chosen_effects(added, without):
     for name in (*added, *without):
         if name not in EFFECTS:
             raise InputError(f"effect must be one of {', '.join(EFFECTS)}, got {name!r}")
-    names = dict.fromkeys(name for name in EFFECTS if name != "gravity" or name in added)
+    names = (name for name in EFFECTS if name != "gravity" or name in added)
     return [EFFECTS[name]() for name in names if name not in without]
 
 
@@ -93,9 +91,8 @@ def run(options):
     acting = chosen_effects(options.added, options.without)
     scene = Scene(read_mesh(options.mesh), CONCRETE, acting)
     print_quality(scene)
-    kept = {"output": options.out, **study.checkpoint_of(options)}
     try:
-        result = simulate(scene, method=method, title="blasting", **run_options(options), **kept)
+        result = simulate(scene, method=method, title="blasting", **run_options(options))
     except SimulationDiverged as error:
         if error.result.frames:
             picture(error.result, options.out)

@@ -31,7 +31,9 @@ from taichi_dem.kit.validation import choice
 
 NAME = "blast_methods"
 REFERENCE = ImplicitDashpots(2.5e-8, sweeps=(6, 40))
+named = partial(choice, "method", allowed=METHODS)
 SETTINGS = {
+    "methods": ([*METHODS], [*METHODS], study.several(named), "by comma; all"),
     "until": (5e-4, 1e-5, study.number(0, 1), "simulated time [s], 5e-4"),
     "stable_until": (1e-4, 1e-5, study.number(0, 1), "for the stable step [s], 1e-4"),
     "samples": (100, 10, study.whole(1, 100000), "rows of the time series, 100"),
@@ -53,14 +55,7 @@ TABLE = study.Table(
     largest_stable_step_s=("stable", "stable to", ".2g", "s"),
     bound_by=(lambda one: max(one.report.bound_by.items(), key=itemgetter(1))[0], "most bound by"),
 )
-
-
-def options_parser():
-    """Options of this experiment."""
-    made = blast_parser(NAME, __doc__, settings=SETTINGS)
-    named = study.several(partial(choice, "method", allowed=tuple(METHODS)))
-    made.add_argument("--methods", type=named, default=list(METHODS), help="by comma; all")
-    return made
+options_parser = partial(blast_parser, NAME, __doc__, settings=SETTINGS)
 
 
 def follow(scene, method, options, name):

@@ -67,11 +67,7 @@ TABLE = study.Table(
         *(lambda one: one.moved_mm / one.base.moved_mm - 1.0, "difference", "+.2f%", "1"),
     ),
 )
-
-
-def options_parser():
-    """Options of this experiment."""
-    return blast_parser(NAME, __doc__, settings=SETTINGS)
+options_parser = partial(blast_parser, NAME, __doc__, settings=SETTINGS)
 
 
 class Instant:
