@@ -1,34 +1,25 @@
-"""One measurement of ``cost_of_effects.py`` in a process of its own.
+"""Runs that ``cost_of_effects.py`` makes in processes of their own, and what they cost."""
 
-    python _effects_worker.py JOB.json
-
-The job names a function of this file and its arguments; what it measured is printed as JSON.
-"""
-
-import json
 import time
 
 import numpy as np
 
 from _blast import EFFECTS
-from _damper_response import OSCILLATOR
 from _demo import set_moving
 from _stripped import ByHand
-from ca_damper import Automaton, Batch, SceneTable, Spheres
+from ca_damper import Automaton, Batch, Oscillator, SceneTable, Spheres
 from taichi_dem import (
     CONCRETE,
     PAPER_BLOCK,
     ImplicitDashpots,
     Scene,
     Simulation,
+    SimulationDiverged,
     Uniform,
     read_mesh,
-    runtime,
     simulate,
 )
 from taichi_dem.kit.allocation import field_bytes
-from taichi_dem.kit.errors import SimulationDiverged
-from taichi_dem.kit.study import read_job
 from taichi_dem.step.drivers import Resident, Step
 
 FILLINGS = {"spheres": Spheres, "automaton": Automaton}
@@ -55,19 +46,19 @@ def blast(names, until, step, ulps):
         "steps": report.substeps,
         "memory_MB": 1e-6 * field_bytes(),
         "hole_mm": float(result.history["hole_radial_displacement_mm"][-1]),
-        "broken": report.broken_faces,
+        "broken_faces": report.broken_faces,
         "shares": {use.effect: use.share for use in report.effect_activity},
-        "missed": report.needs,
     }
 
 
 def damper(filling, options, particles, step, ratios, seeds, cycles):
     """A response curve; cycles: before measuring, and measured."""
-    frequency, seed = np.meshgrid(np.array(ratios) * OSCILLATOR.natural_frequency, seeds)
+    oscillator = Oscillator()
+    frequency, seed = np.meshgrid(np.array(ratios) * oscillator.natural_frequency, seeds)
+    scenes = particles, seed.ravel(), step, frequency.ravel(), oscillator.base_amplitude
     made = FILLINGS[filling](**options)
-    table = SceneTable(particles, seed.ravel(), step, frequency.ravel(), OSCILLATOR.base_amplitude)
     started = time.process_time()
-    batch = Batch(made, table, measured_cycles=cycles[1])
+    batch = Batch(made, SceneTable(*scenes), measured_cycles=cycles[1])
     batch.start("rigid")
     batch.advance(0)
     ready = time.process_time()
@@ -75,14 +66,12 @@ def damper(filling, options, particles, step, ratios, seeds, cycles):
         measured = batch.run(*cycles)
     except SimulationDiverged as error:
         return {"failed": str(error)}
-    report = batch.report()
     return {
         "compile_s": ready - started,
         "run_s": time.process_time() - ready,
-        "steps": report.scene_steps,
+        "steps": batch.report().scene_steps,
         "memory_MB": 1e-6 * field_bytes(),
         "rms_mm": (1e3 * measured.rms).reshape(len(seeds), len(ratios)).tolist(),
-        "shares": {use.effect: use.share for use in report.effect_activity},
     }
 
 
@@ -100,8 +89,8 @@ def absent(substeps, repeats):
 
 def _elastic(cls):
     """A function that takes an elastic block, its bodies shaken, some substeps on."""
-    step = 1e-8
-    simulation = Simulation(Scene(read_mesh(PAPER_BLOCK), CONCRETE, []), Uniform(step), "resident")
+    scene = Scene(read_mesh(PAPER_BLOCK), CONCRETE, [])
+    simulation = Simulation(scene, Uniform(1e-8), "resident")
     set_moving(simulation, np.random.default_rng(1).normal(size=simulation.model.centre.shape))
     simulation.start()
     driver = simulation.driver
@@ -111,15 +100,3 @@ def _elastic(cls):
         driver = Resident(Step(advance, engine.schedule, None))
     driver.prepare()
     return lambda substeps: driver._run(1 << 60, substeps)
-
-
-def main():
-    """Do a job and print what it measured."""
-    job = read_job()
-    runtime.start(job["arch"], 1)
-    work = {"blast": blast, "damper": damper, "absent": absent}[job["kind"]]
-    print(json.dumps(work(**job["arguments"])))
-
-
-if __name__ == "__main__":
-    main()
