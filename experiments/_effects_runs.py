@@ -5,22 +5,18 @@ import time
 import numpy as np
 
 from _blast import EFFECTS
-from _demo import set_moving
-from _stripped import ByHand
 from ca_damper import Automaton, Batch, Oscillator, SceneTable, Spheres
 from taichi_dem import (
     CONCRETE,
     PAPER_BLOCK,
     ImplicitDashpots,
     Scene,
-    Simulation,
     SimulationDiverged,
-    Uniform,
     read_mesh,
     simulate,
 )
 from taichi_dem.kit.allocation import field_bytes
-from taichi_dem.step.drivers import Resident, Step
+from taichi_dem.measured_overhead import elastic_step_seconds
 
 FILLINGS = {"spheres": Spheres, "automaton": Automaton}
 PEAK = 575e6
@@ -77,26 +73,4 @@ def damper(filling, options, particles, step, ratios, seeds, cycles):
 
 def absent(substeps, repeats):
     """Seconds of some substeps of an elastic block: as composed, and with what is by hand."""
-    runs = {"composed": _elastic(None), "by_hand": _elastic(ByHand)}
-    seconds = {name: [] for name in runs}
-    for _ in range(repeats):
-        for name, run in runs.items():
-            started = time.process_time()
-            run(substeps)
-            seconds[name].append(time.process_time() - started)
-    return seconds
-
-
-def _elastic(cls):
-    """A function that takes an elastic block, its bodies shaken, some substeps on."""
-    scene = Scene(read_mesh(PAPER_BLOCK), CONCRETE, [])
-    simulation = Simulation(scene, Uniform(1e-8), "resident")
-    set_moving(simulation, np.random.default_rng(1).normal(size=simulation.model.centre.shape))
-    simulation.start()
-    driver = simulation.driver
-    if cls is not None:
-        engine = simulation.loan.engine
-        advance = cls(engine.tables, engine.state, engine.schedule, None)
-        driver = Resident(Step(advance, engine.schedule, None))
-    driver.prepare()
-    return lambda substeps: driver._run(1 << 60, substeps)
+    return elastic_step_seconds(read_mesh(PAPER_BLOCK), substeps, repeats)
