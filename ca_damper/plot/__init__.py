@@ -2,13 +2,19 @@
 
 from ca_damper.plot.animation import moving_picture
 from ca_damper.plot.box import Box, DrawnBox, frame_panel
-from ca_damper.plot.response import picture_hysteresis, picture_measures, picture_responses
+from ca_damper.plot.response import (
+    picture_compared,
+    picture_hysteresis,
+    picture_measures,
+    picture_responses,
+)
 
 __all__ = [
     "Box",
     "DrawnBox",
     "frame_panel",
     "moving_picture",
+    "picture_compared",
     "picture_hysteresis",
     "picture_measures",
     "picture_responses",

@@ -1,5 +1,6 @@
 """Tools of a study: options, tables, figures of a summary, timings, kept results, workers."""
 
+from taichi_dem.kit.study.answers import cheapest_figures, figures_by_method, give_answers
 from taichi_dem.kit.study.cached_result import cached, digest
 from taichi_dem.kit.study.command_line import (
     Parser,
@@ -10,11 +11,14 @@ from taichi_dem.kit.study.command_line import (
     interval,
     main,
     number,
+    output_paths,
     parser,
     several,
     take_defaults,
     whole,
 )
+from taichi_dem.kit.study.new_process import call_in_process, call_rounds
+from taichi_dem.kit.study.settings import add_settings, take_settings
 from taichi_dem.kit.study.summary import (
     figure,
     figures_from,
@@ -25,29 +29,38 @@ from taichi_dem.kit.study.summary import (
     versions,
     write_summary,
 )
+from taichi_dem.kit.study.table import Table
 from taichi_dem.kit.study.tables import columns_of, print_table, show_rows, write_rows
 from taichi_dem.kit.study.timing import Timing, clock, on_device, seconds_of
 from taichi_dem.kit.study.worker import ask_worker, read_job
 
 __all__ = [
     "Parser",
+    "Table",
     "Timing",
     "add_checkpoints",
+    "add_settings",
     "ask_worker",
     "bare_parser",
     "cached",
+    "call_in_process",
+    "call_rounds",
+    "cheapest_figures",
     "checkpoint_of",
     "clock",
     "columns_of",
     "digest",
     "exit_code",
     "figure",
+    "figures_by_method",
     "figures_from",
     "finish",
+    "give_answers",
     "interval",
     "main",
     "number",
     "on_device",
+    "output_paths",
     "parser",
     "print_figures",
     "print_table",
@@ -57,6 +70,7 @@ __all__ = [
     "several",
     "show_rows",
     "take_defaults",
+    "take_settings",
     "value_in_words",
     "versions",
     "whole",
