@@ -4,7 +4,7 @@ import ca_damper
 from taichi_dem.kit import listing
 
 
-def sections():
+def sections() -> list[tuple[str, list]]:
     """(Title, rows) of what the package offers; each name of ``__all__`` stands in one of them."""
     names = [name for name in ca_damper.__all__ if not name.startswith("__")]
     fillings = [name for name in names if hasattr(getattr(ca_damper, name), "bind")]

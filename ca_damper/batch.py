@@ -7,7 +7,7 @@ numbers (see ``engine/damper_engine.py``).
 import contextlib
 import time
 from collections.abc import Iterator
-from typing import Any, Callable, Optional
+from typing import Any, Optional
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from taichi_dem.kit import runtime
 from taichi_dem.kit.checkpoint import version_text
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.restart import CheckpointWriter, NoCheckpointWriter, RunSnapshot, opened
 from taichi_dem.kit.validation import choice, whole
 
@@ -111,7 +112,7 @@ class Batch(LoadedScenes):
         self,
         transient_cycles: int,
         measured_cycles: int,
-        progress: Optional[Callable[[BatchProgress], None]] = None,
+        progress: Optional[Listener] = None,
     ) -> measures.Cycles:
         """Run whole cycles and measure the last of them; returns ``measures.Cycles``.
 
@@ -131,7 +132,7 @@ class Batch(LoadedScenes):
             self.engine.coupling.read(record)
         return measures.Cycles(self.table.column("frequency"), self.steps_per_cycle, record)
 
-    def advance(self, steps: Any, progress: Optional[Callable[..., None]] = None) -> None:
+    def advance(self, steps: Any, progress: Optional[Listener] = None) -> None:
         """Advance every scene by a number of steps, one for all or (scenes,), without measuring.
 
         Raises InputError unless they are whole numbers from zero, SimulationDiverged.

@@ -122,23 +122,23 @@ class DeviceFilling(Protocol):
     change between two steps, when a sweep goes on to its next frequency.
     """
 
-    def reset(self, s) -> None:
+    def reset(self, s: int) -> None:
         """Place the particles of scene s anew, from its seed."""
 
-    def advance(self, s, step, motion) -> Action:
+    def advance(self, s: int, step: int, motion: Motion) -> Action:
         """Take the particles of scene s over a step in which the container starts with ``motion``.
 
         step: its number (i32), counted from the reset without a gap. The container takes the step
         after this call.
         """
 
-    def energy(self, s) -> float:
+    def energy(self, s: int) -> float:
         """Kinetic and potential energy [J]; heights count from the container's floor."""
 
-    def momentum(self, s) -> float:
+    def momentum(self, s: int) -> float:
         """Momentum along x [kg m/s]."""
 
-    def divergence_code(self, s) -> int:
+    def divergence_code(self, s: int) -> int:
         """Find out whether the scene diverged: 0, or a code from 1 up; asked every few steps."""
 
     def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:

@@ -6,7 +6,7 @@ from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import fraction
 
 
-def needed_effects(result, tolerance=1e-3):
+def needed_effects(result: object, tolerance: float = 1e-3) -> Advice:
     """Advice about the effects of a run; print it, or ask for its ``droppable``.
 
     result: a Response, or the Report of a Batch. tolerance: share of the energy taken (friction)

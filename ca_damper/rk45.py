@@ -10,10 +10,13 @@ Source: Dormand and Prince, J. Comput. Appl. Math. 6 (1980) 19-26; step sizes af
 and Wanner, Solving Ordinary Differential Equations I, section II.4.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Optional
 
 import numpy as np
 import taichi as ti
+from numpy.typing import ArrayLike
 
 from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.errors import InputError
@@ -154,7 +157,17 @@ class Solution:
         return by_fields(self)
 
 
-def solve(rhs, span, y0, *, rtol=1e-6, atol=1e-9, at=None, first=None, most_attempts=MOST_ATTEMPTS):
+def solve(
+    rhs: Callable[[float, np.ndarray], ArrayLike],
+    span: tuple[float, float],
+    y0: ArrayLike,
+    *,
+    rtol: float = 1e-6,
+    atol: float = 1e-9,
+    at: Optional[ArrayLike] = None,
+    first: Optional[float] = None,
+    most_attempts: int = MOST_ATTEMPTS,
+) -> Solution:
     """Solve dy/dt = rhs(t, y) from y(span[0]) = y0 to span[1] in Python.
 
     y0: (k,) numbers. rtol, atol: local error allowed, |error| <= atol + rtol |y| in the Euclidean

@@ -4,16 +4,22 @@ The frequency changes at the end of a cycle, when the base passes its middle: it
 takes up its new speed at once.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Optional, Union
 
 import numpy as np
 
 from ca_damper.checks import check_run
+from ca_damper.filling import Filling
+from ca_damper.oscillator import Oscillator
 from ca_damper.progress import Stages
 from ca_damper.response import UNITS, Grid, Response
+from taichi_dem.kit.checkpoint import Checkpoint
 from taichi_dem.kit.display import in_brief
+from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.progress.progress_bar import reporting
-from taichi_dem.kit.validation import AUTO
+from taichi_dem.kit.validation import AUTO, FileName
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,26 +33,26 @@ class Sweep:
         return in_brief(self, self.up.axes_in_words(), "up and down")
 
     @property
-    def hysteresis(self):
+    def hysteresis(self) -> np.ndarray:
         """By how much the RMS differs, (down - up) / larger of both; (particles, ratios, seeds)."""
         return (self.down.rms - self.up.rms) / np.maximum(self.down.rms, self.up.rms)
 
 
 def sweep_up_and_down(
-    filling,
+    filling: Filling,
     *,
-    particles,
-    ratios,
-    seeds=5,
-    oscillator=None,
-    dt=None,
-    transient_cycles=60,
-    measured_cycles=20,
-    start="rest",
-    progress=AUTO,
-    checkpoint=None,
-    resume=None,
-):
+    particles: Union[int, Sequence[int]],
+    ratios: Union[float, Sequence[float], np.ndarray],
+    seeds: Union[int, Sequence[int]] = 5,
+    oscillator: Optional[Oscillator] = None,
+    dt: Optional[float] = None,
+    transient_cycles: int = 60,
+    measured_cycles: int = 20,
+    start: str = "rest",
+    progress: Union[Listener, str, None] = AUTO,
+    checkpoint: Optional[Checkpoint] = None,
+    resume: Optional[FileName] = None,
+) -> Sweep:
     """Go up through the ratios and down again without a new start; returns a Sweep.
 
     transient_cycles: at each frequency, before the measured ones. The other arguments and errors

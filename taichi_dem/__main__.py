@@ -13,7 +13,7 @@ _MESH_MODULES = tuple(
 )
 
 
-def sections():
+def sections() -> list[tuple[str, list]]:
     """(Title, rows) of what the package offers; each name of ``__all__`` stands in one of them."""
     made = [
         ("Effects", listing.described("taichi_dem.effects", effects, effects.__all__)),

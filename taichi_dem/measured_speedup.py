@@ -6,6 +6,7 @@ memory of which a part is used cost time beside them.
 
 import contextlib
 from dataclasses import is_dataclass, replace
+from typing import Optional
 
 import numpy as np
 
@@ -28,7 +29,7 @@ _ANEW = (
 )
 
 
-def speedup_of_run(simulation):
+def speedup_of_run(simulation: Simulation) -> Optional[float]:
     """``measured_speedup`` for a share of the run's own time; None where it cannot be measured.
 
     That is where the run was too short, or its twin leaves its bounds: the run itself did not.
@@ -42,7 +43,7 @@ def speedup_of_run(simulation):
     return None
 
 
-def measured_speedup(simulation, seconds=MOST_SECONDS):
+def measured_speedup(simulation: Simulation, seconds: float = MOST_SECONDS) -> float:
     """CPU time that one step for all would have taken, over what the run took; 1 where it had one.
 
     How many evaluations that is is counted during the run. What one takes is measured for a number

@@ -4,6 +4,7 @@ from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import Any, Optional, Protocol, Union
 
+from taichi_dem.effects.roles import members_of
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import between, choice, positive, shown
 from taichi_dem.stability.step_control import Displacement, FixedStep, StepControl
@@ -13,25 +14,47 @@ DASHPOTS = ("full", "limited")
 
 
 class Method(Protocol):
-    """How bodies step; every member that the package asks for.
+    """How bodies step; every member that the package reads.
 
-    dt0: largest step [s]. name: short word for tables. uniform: whether all bodies share one step.
-    neighbour: one of NEIGHBOURS. control: a StepControl or None. dashpot: one of DASHPOTS.
-    distance: largest way in a step [m], or None. solves: whether dashpots are solved together.
-    steps_ahead: steps of a body by which its contacts are counted before they touch.
     A method may also have ``advance``, a class derived from ``step.advance.Advance``, and
     ``structure``, what its kernels depend on beside its class (``structure_of``).
     """
 
-    dt0: float
-    name: str
-    uniform: bool
-    neighbour: str
-    control: Optional[StepControl]
-    dashpot: str
-    distance: Optional[float]
-    solves: bool
-    steps_ahead: float
+    @property
+    def dt0(self) -> float:
+        """Largest step [s]."""
+
+    @property
+    def name(self) -> str:
+        """Short word for tables."""
+
+    @property
+    def uniform(self) -> bool:
+        """Whether all bodies share one step."""
+
+    @property
+    def neighbour(self) -> str:
+        """One of NEIGHBOURS."""
+
+    @property
+    def control(self) -> Optional[StepControl]:
+        """Further limits of the step."""
+
+    @property
+    def dashpot(self) -> str:
+        """One of DASHPOTS."""
+
+    @property
+    def distance(self) -> Optional[float]:
+        """Largest displacement of a body in a step [m]; None for no limit."""
+
+    @property
+    def solves(self) -> bool:
+        """Whether dashpots are solved together."""
+
+    @property
+    def steps_ahead(self) -> float:
+        """Steps of a body by which its contacts are counted before they touch."""
 
     def criterion(self) -> Any:
         """Rule for the level of a body, as ``step_control.FixedStep`` or ``Displacement``."""
@@ -39,7 +62,7 @@ class Method(Protocol):
 
 def check_method(method: object) -> None:
     """Raise InputError, naming what is missing, unless a method is an object as ``Method`` says."""
-    wanted = [*Method.__annotations__, "criterion"]
+    wanted = members_of(Method)
     missing = [name for name in wanted if not hasattr(method, name)]
     if isinstance(method, type) or len(missing) > len(wanted) // 2:
         raise InputError(f"method must be one such as ImplicitDashpots(), got {shown(method)}")

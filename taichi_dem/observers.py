@@ -2,15 +2,21 @@
 
 import inspect
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Optional, Protocol, Union
+from typing import Any, Optional, Protocol, Union
 
 import numpy as np
 
+from taichi_dem.diagnostics.report import Report
+from taichi_dem.engine.model import Model
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import Pace
 from taichi_dem.kit.validation import positive, shown, whole
+from taichi_dem.methods import Method
+from taichi_dem.output.record import Frame, Recorder
+from taichi_dem.simulation import Simulation
 from taichi_dem.timeline import MACRO_TICKS, NEVER
 
 #: Largest steps that can be counted to, and calls of an observer in a run.
@@ -90,7 +96,9 @@ class At:
 class Observer(Protocol):
     """Measures on the way of a run: ``when`` it is called, and ``observe`` to be called."""
 
-    when: Union[Every, At]
+    @property
+    def when(self) -> Union[Every, At]:
+        """Times of the calls."""
 
     def observe(self, view: "RunView") -> None:
         """Measure; what it raises ends the run, and no result is written."""
@@ -101,7 +109,7 @@ class RunView:
 
     _parts: tuple
 
-    def __init__(self, simulation, recorder):
+    def __init__(self, simulation: Simulation, recorder: Recorder):
         object.__setattr__(self, "_parts", (simulation, recorder))
 
     def __repr__(self):
@@ -121,12 +129,12 @@ class RunView:
         return int(self._parts[0].state.tick[None]) // MACRO_TICKS
 
     @property
-    def model(self):
+    def model(self) -> Model:
         """Constants of the bodies and bonds, of which kernels know."""
         return self._parts[0].model
 
     @property
-    def method(self):
+    def method(self) -> Method:
         """Method that steps."""
         return self._parts[0].method
 
@@ -159,11 +167,11 @@ class RunView:
         """Terms of the energy balance by name [J]."""
         return self._parts[0].energy_balance.account()
 
-    def frame(self):
+    def frame(self) -> Frame:
         """Snapshot of the block, a ``Frame``."""
         return self._parts[1].frame()
 
-    def report(self):
+    def report(self) -> Report:
         """Report of the run so far."""
         return self._parts[0].report()
 
@@ -177,7 +185,7 @@ def _locked(array):
     return array
 
 
-def checked_observers(observers) -> tuple:
+def checked_observers(observers: Any) -> tuple:
     """Observers as a tuple; InputError for one without a member, or with a wrong one."""
     if not isinstance(observers, (list, tuple)):
         raise InputError(f"observers must be a list of observers, got {shown(observers)}")
@@ -211,8 +219,9 @@ class ObserverCalls:
     Observers of one step are called in their order. ``when`` is read once.
     """
 
-    def __init__(self, observers, last, dt, samples):
-        self._at, self._paced = {}, []
+    def __init__(self, observers: Iterable[Any], last: int, dt: float, samples: int):
+        self._at: dict[int, list[Any]] = {}
+        self._paced: list[tuple[Any, Pace]] = []
         for observer in observers:
             when = observer.when
             for step in when.marks(last, dt, samples):
@@ -221,16 +230,16 @@ class ObserverCalls:
                 self._paced.append((observer, Pace(when.wall_s)))
 
     @property
-    def steps(self):
+    def steps(self) -> set[int]:
         """Largest steps at which somebody is called, a set."""
         return set(self._at)
 
-    def at_step(self, step, view):
+    def at_step(self, step: int, view: RunView) -> None:
         """Call those of a step."""
         for observer in self._at.get(step, ()):
             observer.observe(view)
 
-    def by_clock(self, view):
+    def by_clock(self, view: RunView) -> None:
         """Call those whose wall time has passed."""
         for observer, pace in self._paced:
             if pace.should_report():

@@ -1,7 +1,9 @@
 """The loop a user calls: step, sample, keep frames, and hand everything back as one result."""
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Optional, Union
 
 import numpy as np
 
@@ -10,13 +12,13 @@ from taichi_dem.kit.checkpoint import Checkpoint, digest, version_text
 from taichi_dem.kit.engine_pool import LoanMemory
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.files import output_folder
-from taichi_dem.kit.progress.progress import compiling
+from taichi_dem.kit.progress.progress import Listener, compiling
 from taichi_dem.kit.progress.progress_bar import reporting
-from taichi_dem.kit.restart import CheckpointWriter, NoCheckpointWriter, RunSnapshot, opened
-from taichi_dem.kit.validation import AUTO, instance
+from taichi_dem.kit.restart import CheckpointWriter, NoCheckpointWriter, Owner, RunSnapshot, opened
+from taichi_dem.kit.validation import AUTO, FileName, instance
 from taichi_dem.measured_speedup import speedup_of_run
-from taichi_dem.methods import check_method
-from taichi_dem.observers import RunView
+from taichi_dem.methods import Method, check_method
+from taichi_dem.observers import Observer, RunView
 from taichi_dem.output.record import Recorder
 from taichi_dem.result import Result
 from taichi_dem.run_plan import RunPlan
@@ -26,19 +28,19 @@ from taichi_dem.timeline import MACRO_TICKS
 
 
 def simulate(
-    scene,
+    scene: Scene,
     *,
-    method,
-    until,
-    driver="auto",
-    samples=200,
-    frames=0,
-    progress=AUTO,
-    output=None,
-    checkpoint=None,
-    resume=None,
-    observers=(),
-):
+    method: Method,
+    until: float,
+    driver: str = "auto",
+    samples: int = 200,
+    frames: int = 0,
+    progress: Union[Listener, str, None] = AUTO,
+    output: Optional[FileName] = None,
+    checkpoint: Optional[Checkpoint] = None,
+    resume: Optional[FileName] = None,
+    observers: Sequence[Observer] = (),
+) -> Result:
     """Run a scene to a time and return the result.
 
     method: from ``taichi_dem.methods``. until: simulated time [s], rounded up to whole largest
@@ -82,8 +84,15 @@ def simulate(
 
 
 def run_simulation(
-    simulation, *, until, samples=200, frames=0, progress=AUTO, title="simulating", observers=()
-):
+    simulation: Simulation,
+    *,
+    until: float,
+    samples: int = 200,
+    frames: int = 0,
+    progress: Union[Listener, str, None] = AUTO,
+    title: str = "simulating",
+    observers: Sequence[Observer] = (),
+) -> Result:
     """Run a Simulation, whose motion may have been set, to a time; otherwise as ``simulate``.
 
     title: of the progress bar.
@@ -144,9 +153,9 @@ def _checkpoint_writer(simulation, recorder, checkpoint, resume, arrays):
     return CheckpointWriter(checkpoint, saved, now)
 
 
-def saved_run(simulation, recorder):
+def saved_run(simulation: Simulation, recorder: Recorder) -> RunSnapshot:
     """All that a checkpoint holds of a started simulation, a ``restart.RunSnapshot``."""
-    parts = {
+    parts: dict[str, Owner] = {
         "simulation": simulation,
         "energy balance": simulation.energy_balance,
         "missing effects": simulation.missing_effects,
@@ -158,7 +167,7 @@ def saved_run(simulation, recorder):
     )
 
 
-def identity_of(scene, method):
+def identity_of(scene: Scene, method: Method) -> dict[str, str]:
     """What two runs must share for one to go on from the other, in words.
 
     Driver, threads, and how long a run goes and what it records may differ.

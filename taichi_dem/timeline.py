@@ -15,18 +15,18 @@ MACRO_TICKS = 1 << MAX_LEVEL
 NEVER = -1
 
 
-def ticks_of(level):
+def ticks_of(level: int) -> int:
     """Ticks in a step of a level."""
     return 1 << (MAX_LEVEL - level)
 
 
-def coarsest_active(tick):
+def coarsest_active(tick: int) -> int:
     """Lowest level that is due at a tick; all finer levels are due too."""
     rest = tick % MACRO_TICKS
     return 0 if rest == 0 else MAX_LEVEL - ((rest & -rest).bit_length() - 1)
 
 
-def next_level(wanted, tick):
+def next_level(wanted: int, tick: int) -> int:
     """Level a body that is due at a tick may take: what it wants, or the coarsest the grid has."""
     return max(wanted, coarsest_active(tick))
 

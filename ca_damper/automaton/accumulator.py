@@ -10,6 +10,8 @@ takes the sum over as it is.
 
 import taichi as ti
 
+from ca_damper.lattice import Lattice
+
 READINGS = ("signed", "signed_through_walls", "reset", "kept")
 
 
@@ -17,7 +19,7 @@ READINGS = ("signed", "signed_through_walls", "reset", "kept")
 class Accumulator:
     """One of the readings."""
 
-    def __init__(self, reading, lattice):
+    def __init__(self, reading: str, lattice: Lattice):
         self.reading, self.lattice = reading, lattice
 
     @ti.func

@@ -1,6 +1,11 @@
 """Bonds between the bodies of a pair, and what a break at this tick brings into being."""
 
+from typing import TYPE_CHECKING
+
 import taichi as ti
+
+if TYPE_CHECKING:
+    from taichi_dem.contact_search.contacts import Contacts
 
 
 @ti.data_oriented
@@ -13,7 +18,7 @@ class Breaks:
 
     scratch_fields = ("newest",)
 
-    def __init__(self, contacts):
+    def __init__(self, contacts: "Contacts"):
         self.contacts, self.store = contacts, contacts.store
         self.tables, self.state = contacts.tables, contacts.state
         self.fresh = ti.field(ti.i32, shape=())

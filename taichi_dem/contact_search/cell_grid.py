@@ -1,8 +1,14 @@
 """Cell grid over the centres of bodies, and the counting sort that fills it."""
 
+from typing import TYPE_CHECKING
+
 import taichi as ti
 
 from taichi_dem.kit.types import real
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.state import State
+    from taichi_dem.engine.tables import Tables
 
 
 @ti.data_oriented
@@ -15,7 +21,7 @@ class CellGrid:
 
     scratch_fields = ("first", "member", "cell", "counts", "corner", "edge", "largest")
 
-    def __init__(self, tables, state, ball, brute_force=False):
+    def __init__(self, tables: "Tables", state: "State", ball: ti.Field, brute_force: bool = False):
         n = tables.capacity.bodies
         self.tables, self.state, self.ball, self.brute_force = tables, state, ball, brute_force
         self.first = ti.field(ti.i32, shape=4 * n + 66)

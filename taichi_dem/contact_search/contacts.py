@@ -3,6 +3,8 @@
 A pair holds the sphere pairs that were nearer than the body skin of its bodies at the last search.
 """
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import taichi as ti
 
@@ -10,6 +12,12 @@ from taichi_dem.contact_search.lengths import SPARE_PAIRS, SPARE_SPHERES
 from taichi_dem.contact_search.pair_store import PairStore
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.types import real, vec3
+from taichi_dem.methods import Method
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.model import Model
+    from taichi_dem.engine.state import State
+    from taichi_dem.engine.tables import Tables
 
 #: Largest steps that a fast body makes before the search looks at it again.
 STEPS = 16.0
@@ -28,7 +36,7 @@ class Contacts:
     when the list may miss one of them.
     """
 
-    def __init__(self, tables, state):
+    def __init__(self, tables: "Tables", state: "State"):
         n, capacity = tables.capacity.bodies, tables.capacity
         self.tables, self.state = tables, state
         self.law, self.friction = tables.contact, tables.friction
@@ -43,7 +51,7 @@ class Contacts:
         self.skin = ti.field(real, shape=())
         self.search_requested = ti.field(ti.i32, shape=())
 
-    def load(self, model, method):
+    def load(self, model: "Model", method: Method) -> None:
         """Take the numbers of a scene and a method; there are no pairs yet."""
         effect, n = model.contact, model.body_count
         assign(self.skin, effect.skin)

@@ -2,6 +2,7 @@
 
 import taichi as ti
 
+from taichi_dem.contact_search.contacts import Contacts
 from taichi_dem.kit.types import real
 
 
@@ -19,7 +20,7 @@ class ListedPairs:
     that and its body skin; changed: 1 when the near pairs of its row may be others.
     """
 
-    def __init__(self, contacts, capacity):
+    def __init__(self, contacts: Contacts, capacity: int):
         self.contacts = contacts
         self.body, self.slot, self.new_faces = (ti.field(ti.i32, shape=capacity) for _ in range(3))
         # Side by side, as every search asks many entries for them, which are no more in the cache.

@@ -2,6 +2,7 @@
 
 import taichi as ti
 
+from taichi_dem.contact_search.contacts import Contacts
 from taichi_dem.kit.types import real, vec4
 
 #: Skins beyond their margin within which the gap of two spheres is found; others count as farther.
@@ -16,7 +17,7 @@ class NarrowPhase:
     a face [m].
     """
 
-    def __init__(self, contacts):
+    def __init__(self, contacts: Contacts):
         self.contacts, self.tables, self.state = contacts, contacts.tables, contacts.state
         self.store = contacts.store
         capacity = self.tables.capacity

@@ -3,6 +3,8 @@
 import taichi as ti
 
 from taichi_dem.contact_search.cell_grid import group
+from taichi_dem.contact_search.contacts import Contacts
+from taichi_dem.contact_search.verlet_list import VerletList
 
 
 @ti.data_oriented
@@ -17,7 +19,7 @@ class NearPairs:
 
     scratch_fields = ("row_is_new",)
 
-    def __init__(self, contacts, neighbours):
+    def __init__(self, contacts: Contacts, neighbours: VerletList):
         self.tables, self.contacts, self.store = contacts.tables, contacts, contacts.store
         self.neighbours, self.listed = neighbours, neighbours.listed
         n = self.tables.capacity.bodies

@@ -4,6 +4,9 @@ A pair gets a slot when its first sphere pair comes near, and keeps it until the
 no impulse waits. Only the functions here allocate and free slots and the places of sphere pairs.
 """
 
+from typing import Any
+
+import numpy as np
 import taichi as ti
 
 from taichi_dem.contact_search.pair_columns import Columns
@@ -38,7 +41,7 @@ class PairStore:
 
     scratch_fields = ("sphere_place",)
 
-    def __init__(self, bodies, slots, spheres):
+    def __init__(self, bodies: int, slots: int, spheres: int):
         self.slots, self.spheres = slots, spheres
         self.slot_limit, self.sphere_limit = (ti.field(ti.i32, shape=()) for _ in range(2))
         self._allocate_slots(slots)
@@ -61,25 +64,25 @@ class PairStore:
         self.deepest = ti.field(real, shape=slots)
         self.free_count, self.used_end = (ti.field(ti.i32, shape=()) for _ in range(2))
 
-    def column(self, name, kind, width=0):
+    def column(self, name: str, kind: Any, width: int = 0) -> ti.Field:
         """Field with an entry a slot; kind: data type, width: components, 0 for a number.
 
         Raises InputError for a name that is in use.
         """
         return self.columns.declare(name, kind, width)
 
-    def sphere_column(self, name, kind, width=0):
+    def sphere_column(self, name: str, kind: Any, width: int = 0) -> ti.Field:
         """The same with an entry a sphere pair."""
         return self.sphere_columns.declare(name, kind, width)
 
-    def clear(self):
+    def clear(self) -> None:
         """Free all slots; for a run that begins again."""
         for field in (self.first, self.last, self.first_of, self.second_start, self.free_count):
             assign(field, 0)
         for field in (self.used_end, self.sphere_count, self.sphere_end, self.near_count):
             assign(field, 0)
 
-    def near_table(self):
+    def near_table(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Near pairs in order: both bodies (n, 2), number of sphere pairs (n,) and deepest (n,)."""
         slots = values(self.near_slot)[: int(values(self.near_count))]
         counts = values(self.last) - values(self.first)

@@ -2,6 +2,7 @@
 
 import taichi as ti
 
+from taichi_dem.contact_search.contacts import Contacts
 from taichi_dem.kit.types import real
 
 #: Reach of the list around a body, in body skins and in skins: a longer list against fewer of them.
@@ -22,7 +23,7 @@ class Reach:
     than all the rest.
     """
 
-    def __init__(self, contacts):
+    def __init__(self, contacts: Contacts):
         n = contacts.tables.capacity.bodies
         self.tables, self.state, self.contacts = contacts.tables, contacts.state, contacts
         self.reach = ti.field(real, shape=n)

@@ -5,15 +5,24 @@ search looks at the bodies that moved or broke, and keeps what it knows of the o
 its slot of the store, so results do not depend on when a search is made.
 """
 
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
 import taichi as ti
 
 from taichi_dem.contact_search.breaks import Breaks
+from taichi_dem.contact_search.contacts import Contacts
 from taichi_dem.contact_search.narrow_phase import NarrowPhase
 from taichi_dem.contact_search.near_pairs import NearPairs
 from taichi_dem.contact_search.verlet_list import FAR, VerletList
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.types import vec3
+from taichi_dem.methods import Method
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.model import Model
+    from taichi_dem.step.schedule import Schedule
 
 #: Marks of a body: it has spheres, and the last search looked at it.
 EXPOSED, LOOKED = 1, 2
@@ -32,7 +41,7 @@ class BroadPhase:
 
     scratch_fields = ("exposed", "exposed_count", "looked")
 
-    def __init__(self, contacts, schedule, brute_force=False):
+    def __init__(self, contacts: Contacts, schedule: "Schedule", brute_force: bool = False):
         n = contacts.tables.capacity.bodies
         self.contacts, self.schedule, self.store = contacts, schedule, contacts.store
         self.tables, self.state = contacts.tables, contacts.state
@@ -49,40 +58,40 @@ class BroadPhase:
         self.full = self.near_pairs.full
         self.searches = ti.field(ti.i32, shape=())
 
-    def load(self, model, method):
+    def load(self, model: "Model", method: Method) -> None:
         """Let the first search make all lists."""
         self.neighbours.load(model, method)
 
-    def clear(self):
+    def clear(self) -> None:
         """Forget all pairs; the next search finds those that there are then."""
         self.store.clear()
         self.neighbours.clear()
         assign(self.contacts.search_requested, 0)
 
-    def ask(self, everywhere=False):
+    def ask(self, everywhere: bool = False) -> None:
         """Let the driver make a search before its next step."""
         assign(self.everywhere, int(everywhere))
         assign(self.contacts.search_requested, 1)
 
-    def renew(self):
+    def renew(self) -> None:
         """Renew the lists, a parallel loop a phase, until no search is due."""
         while values(self.contacts.search_requested):
             self._search()
 
-    def search(self, everywhere=True):
+    def search(self, everywhere: bool = True) -> None:
         """Renew the lists now. Raises InputError when they exceed their capacity."""
         self.ask(everywhere)
         self.renew()
         self.check_capacity()
 
-    def check_capacity(self):
+    def check_capacity(self) -> None:
         """Raise InputError when lists exceed the capacity that the scene gave them."""
         option = _CAPACITIES[int(values(self.full))]
         if option:
             raise InputError(f"contact lists are full: give SphereContact a larger {option}")
 
     @property
-    def phases(self):
+    def phases(self) -> tuple[tuple[Callable[..., Any], Callable[..., Any]], ...]:
         """What a search does, as pairs of how often and what, in order."""
         return (
             (self._once, self._list_exposed),

@@ -3,13 +3,20 @@
 It reaches several skins and takes in every face, broken or not, so one list serves many searches.
 """
 
+from typing import TYPE_CHECKING
+
 import taichi as ti
 
 from taichi_dem.contact_search.cell_grid import CellGrid
+from taichi_dem.contact_search.contacts import Contacts
 from taichi_dem.contact_search.lengths import SPARE_NEIGHBOURS
 from taichi_dem.contact_search.listed_pairs import ListedPairs
 from taichi_dem.contact_search.reach import Reach
 from taichi_dem.kit.allocation import assign
+from taichi_dem.methods import Method
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.model import Model
 
 #: What the list is when it needs to be made anew, and while it is.
 STALE, MAKING = 1, 2
@@ -30,7 +37,7 @@ class VerletList:
     limit: entries that the scene allows. full: 1 when there are no more.
     """
 
-    def __init__(self, contacts, brute_force=False):
+    def __init__(self, contacts: Contacts, brute_force: bool = False):
         n = contacts.tables.capacity.bodies
         self.tables, self.state, self.contacts = contacts.tables, contacts.state, contacts
         self.store, self.capacity = contacts.store, contacts.tables.capacity.neighbour_entries
@@ -43,13 +50,13 @@ class VerletList:
         self.stale = ti.field(ti.i32, shape=())
         self.full = ti.field(ti.i32, shape=())
 
-    def load(self, model, method):
+    def load(self, model: "Model", method: Method) -> None:
         """Let the list be made anew."""
         assign(self.stale, STALE)
         each = model.contact.neighbours_per_body
         assign(self.limit, model.body_count * each + SPARE_NEIGHBOURS)
 
-    def clear(self):
+    def clear(self) -> None:
         """Forget all neighbours; the next search lists them anew."""
         for field in (self.first, self.last):
             assign(field, 0)

@@ -1,14 +1,22 @@
 """Detect diverged runs, and describe where and why."""
 
 import time
+from typing import TYPE_CHECKING, Optional
 
 import numpy as np
 
+from taichi_dem.contact_search.contacts import Contacts
+from taichi_dem.diagnostics.energy_balance import EnergyBalance
 from taichi_dem.kit.errors import SimulationDiverged
 from taichi_dem.stability.contact_limits import contact_rates
 from taichi_dem.stability.quality import quality_report
 from taichi_dem.stability.stable_step import dashpot_step, spring_step
 from taichi_dem.step.drivers import CALL_SECONDS
+from taichi_dem.step.schedule import Schedule
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.model import Model
+    from taichi_dem.engine.state import State
 
 #: Energy that may appear from nowhere before a run counts as diverged, as a share of what is there.
 ENERGY_FROM_NOWHERE = 0.5
@@ -26,14 +34,22 @@ class DivergenceCheck:
     solves: whether the method solves dashpots implicitly, so that only springs limit the step.
     """
 
-    def __init__(self, model, state, schedule, contacts, energy_balance, solves=False):
+    def __init__(
+        self,
+        model: "Model",
+        state: "State",
+        schedule: Schedule,
+        contacts: Optional[Contacts],
+        energy_balance: EnergyBalance,
+        solves: bool = False,
+    ):
         self.model, self.state, self.schedule, self.solves = model, state, schedule, solves
         self.limited = schedule.has_limits and schedule.limits.limited
         self.contacts, self.energy_balance = contacts, energy_balance
         self.rounded_once = self._rounded_once()
         self.rest_until = 0.0
 
-    def check(self, hurried=False):
+    def check(self, hurried: bool = False) -> None:
         """Raise SimulationDiverged when a body ran away, spheres swallowed, or energy appeared.
 
         hurried: look for runaways alone while all the rest would take more than SHARE of the time.
@@ -83,7 +99,7 @@ class DivergenceCheck:
             what = f"is the fastest while {-account['residual']:.3g} J came from nowhere"
             raise SimulationDiverged(self._sentence(body, motion, what))
 
-    def round_off(self):
+    def round_off(self) -> float:
         """Energy [J] that rounded positions may have given the bonds so far, once a substep."""
         return max(1, int(self.schedule.evaluations[0])) * self.rounded_once
 

@@ -1,11 +1,17 @@
 """Activity of each effect in a run, from the energy balance at its end."""
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from taichi_dem.diagnostics.energy_balance import EnergyBalance, EnergyTables
+from taichi_dem.diagnostics.missing_effects import MissingEffects
 from taichi_dem.kit.effect_usage import EffectUse
 from taichi_dem.scene import outer_faces_warnings
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.model import Model
 
 _EPSILON = np.finfo(np.float64).eps
 #: Terms of the account that pass through bonds: what their dashpots took is a share of these.
@@ -26,7 +32,14 @@ _STUCK = "springs between spheres that stick hold without taking energy"
 _NO_TRACE = "without sphere dashpots a touch between two recordings leaves no trace"
 
 
-def effect_activity(model, energy_balance, tables, account, missing_effects, substeps):
+def effect_activity(
+    model: "Model",
+    energy_balance: EnergyBalance,
+    tables: EnergyTables,
+    account: Mapping[str, float],
+    missing_effects: MissingEffects,
+    substeps: int,
+) -> tuple[EffectUse, ...]:
     """An EffectUse for every listed effect, in the model's order.
 
     tables, account: what the energy balance's methods of that name gave. missing_effects: the

@@ -4,8 +4,20 @@ work of loads and supports + energy at the start = kinetic + bond strain + spher
 + bond dashpots + slip + softening + release + friction + sphere dashpots - injected + residual.
 """
 
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Optional
+
 import numpy as np
 
+from taichi_dem.contact_search.contacts import Contacts
+from taichi_dem.diagnostics.readings import Readings
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.model import Model
+    from taichi_dem.engine.state import State
+
+#: Tables of bodies, bonds and pairs that the terms are summed from.
+EnergyTables = tuple[np.ndarray, np.ndarray, np.ndarray]
 #: Terms of the account in the order of tables and files, all in J.
 TERMS = (
     "kinetic",
@@ -30,22 +42,24 @@ class EnergyBalance:
     readings: the ``Readings`` of a run. contacts: its ``Contacts``, None without.
     """
 
-    def __init__(self, model, state, readings, contacts):
+    def __init__(
+        self, model: "Model", state: "State", readings: Readings, contacts: Optional[Contacts]
+    ):
         self.model, self.state, self.readings, self.contacts = model, state, readings, contacts
         self.start_energy = 0.0
         first = self.account()
         self.start_energy = first["kinetic"] + first["bond_strain"] + first["sphere_strain"]
         self.start_momentum = self.momentum()
 
-    def saved(self):
+    def saved(self) -> dict[str, np.ndarray]:
         """What a checkpoint holds of it, arrays by name."""
         return {"start": np.array([self.start_energy, *self.start_momentum])}
 
-    def resume(self, saved):
+    def resume(self, saved: Mapping[str, np.ndarray]) -> None:
         """Take over what ``saved`` gave."""
         self.start_energy, self.start_momentum = float(saved["start"][0]), saved["start"][1:]
 
-    def account(self, tables=None):
+    def account(self, tables: Optional[EnergyTables] = None) -> dict[str, float]:
         """All terms in J by name; residual is what the account cannot explain.
 
         tables: what ``tables`` gave, where it has been read already.
@@ -68,7 +82,7 @@ class EnergyBalance:
         terms["residual"] = self._residual(terms)
         return {name: float(value) for name, value in terms.items()}
 
-    def tables(self):
+    def tables(self) -> EnergyTables:
         """What the terms are summed of [J].
 
         A row a body: kinetic, loads, supports, sphere dashpots, friction, injected. A row a bond:
@@ -92,17 +106,17 @@ class EnergyBalance:
             if name not in ("load_work", "support_work", "injected", "residual")
         )
 
-    def load_work(self, index):
+    def load_work(self, index: int) -> float:
         """Work of one load [J], by its place in the scene's list of loads."""
         return float(self.load_works(index).sum())
 
-    def load_works(self, index):
+    def load_works(self, index: int) -> np.ndarray:
         """Work of one load on every body [J], (body_count,)."""
         work = np.zeros(self.model.body_count)
         self.readings.load_work(index, work)
         return work
 
-    def support_works(self, index):
+    def support_works(self, index: int) -> np.ndarray:
         """Work [J] of all supports on the bodies that one of them holds, (body_count,).
 
         NaN for a body that it does not hold.
@@ -111,13 +125,13 @@ class EnergyBalance:
         self.readings.support_work(index, work)
         return work
 
-    def momentum(self):
+    def momentum(self) -> np.ndarray:
         """Linear [N s] and angular momentum about the origin [N m s] less what was given, (6,)."""
         rows = np.zeros((self.model.body_count, 12))
         self.readings.momentum(rows)
         return rows[:, :6].sum(axis=0) - rows[:, 6:].sum(axis=0)
 
-    def momentum_errors(self):
+    def momentum_errors(self) -> tuple[float, float]:
         """Linear and angular momentum out of nothing, as shares of what the bodies exchanged.
 
         The scale is the sum over bodies of the size of momentum and of load impulse.

@@ -1,13 +1,21 @@
 """Effects that a scene left out and the run needs, found at recording times."""
 
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Optional, Union
 
 import numpy as np
 
-from taichi_dem.diagnostics.outer_faces import OuterFaces
+from taichi_dem.contact_search.contacts import Contacts
+from taichi_dem.diagnostics.outer_faces import OuterFaces, OuterOverlaps
 from taichi_dem.diagnostics.part_overlaps import PartOverlaps
+from taichi_dem.diagnostics.readings import Readings
 from taichi_dem.mesh.parts import parts_of
 from taichi_dem.scene import REMEDY
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.model import Model
+    from taichi_dem.engine.state import State
 
 
 @dataclass
@@ -29,7 +37,12 @@ class MissingEffect:
     first_s: float = 0.0
     unit: str = "bond"
 
-    def see(self, places, time_s, middle):
+    def see(
+        self,
+        places: Union[Sequence[int], np.ndarray],
+        time_s: float,
+        middle: Callable[[int], tuple[float, ...]],
+    ) -> None:
         """Take in what a recording at a time [s] saw.
 
         places: numbers of the bonds or bodies, one for every sight. middle: function of such a
@@ -72,7 +85,7 @@ def _outer_faces(model, state, outer_overlaps):
     return PartOverlaps(model, state, part) if part.any() else None
 
 
-def unserved(roles):
+def unserved(roles: Container[str]) -> dict[str, MissingEffect]:
     """An empty ``MissingEffect`` by role, for every need that no effect of these roles serves."""
     return {role: MissingEffect(effect, what) for role, effect, what in _NEEDS if role not in roles}
 
@@ -83,7 +96,14 @@ class MissingEffects:
     touching: most pairs of bodies that one of them saw in contact.
     """
 
-    def __init__(self, model, state, readings, contacts, outer_overlaps=None):
+    def __init__(
+        self,
+        model: "Model",
+        state: "State",
+        readings: Readings,
+        contacts: Optional[Contacts],
+        outer_overlaps: Optional[OuterOverlaps] = None,
+    ):
         self.model, self.state, self.readings = model, state, readings
         self.contacts = contacts
         self.touching = self.looks = 0
@@ -94,7 +114,7 @@ class MissingEffects:
         material = model.material
         self.limits = material.tensile_strength, material.cohesion, material.friction
 
-    def sample(self, time_s):
+    def sample(self, time_s: float) -> None:
         """Update the findings at a recording time [s]."""
         if time_s == self.last_s:
             return
@@ -112,7 +132,7 @@ class MissingEffects:
             if role in self.needed:
                 self.needed[role].see(np.flatnonzero(marks[:, column]), time_s, self._middle)
 
-    def saved(self):
+    def saved(self) -> dict[str, np.ndarray]:
         """What a checkpoint holds of it, arrays by name."""
         rows = [[m.times, m.most, m.where, m.first_s] for m in self._all()]
         return {
@@ -120,7 +140,7 @@ class MissingEffects:
             "looks": np.array([self.looks, self.touching, self.last_s]),
         }
 
-    def resume(self, saved):
+    def resume(self, saved: Mapping[str, np.ndarray]) -> None:
         """Take over what ``saved`` gave."""
         for finding, row in zip(self._all(), saved["needed"].tolist()):
             finding.times, finding.most, finding.where = (int(value) for value in row[:3])
@@ -149,7 +169,7 @@ class MissingEffects:
         corners = self.model.topology.vertices[bond]
         return tuple(self.model.mesh.points[corners].mean(axis=0).tolist())
 
-    def findings(self):
+    def findings(self) -> tuple[MissingEffect, ...]:
         """A ``MissingEffect`` for each effect that was needed, an empty tuple where none was."""
         found = [finding for finding in self._all() if finding.times]
         return tuple(replace(finding, looks=self.looks) for finding in found)

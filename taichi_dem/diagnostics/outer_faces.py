@@ -4,12 +4,19 @@ Faces carry spheres once they break, and outer faces only if ``SphereContact`` i
 Bodies that meet elsewhere pass through each other.
 """
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import taichi as ti
 
 from taichi_dem.kit.types import vec3
 from taichi_dem.mesh.tetrahedra import components
 from taichi_dem.timeline import NEVER
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.model import Model
+    from taichi_dem.engine.state import State
+    from taichi_dem.engine.tables import Tables
 
 #: Overlap of two spheres, as a share of the distance at which they touch, below which they count
 #: as apart: coordinates of a mesh file may be rounded to seven digits.
@@ -26,13 +33,13 @@ class OuterFaces:
     outer_overlaps: the ``OuterOverlaps`` of the engine.
     """
 
-    def __init__(self, model, state, outer_overlaps):
+    def __init__(self, model: "Model", state: "State", outer_overlaps: "OuterOverlaps"):
         self.model, self.state, self.outer_overlaps = model, state, outer_overlaps
         self.extent = model.spheres.extent
         self.points = np.ascontiguousarray(model.mesh.tetrahedra, dtype=np.int32)
         self.broken_count, self.part = -1, None
 
-    def overlaps(self):
+    def overlaps(self) -> np.ndarray:
         """How many later bodies each body overlaps in this way now, (body_count,)."""
         found = np.zeros(self.model.body_count, dtype=np.int32)
         broken = self.state.broken_tick.to_numpy()[: self.model.bond_count] != NEVER
@@ -76,7 +83,7 @@ class OuterFaces:
 class OuterOverlaps:
     """Compares the spheres behind outer faces of bodies that may be near each other."""
 
-    def __init__(self, tables, state):
+    def __init__(self, tables: "Tables", state: "State"):
         self.tables, self.state = tables, state
 
     @ti.kernel

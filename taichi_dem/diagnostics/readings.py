@@ -1,8 +1,15 @@
 """Readings of a run: tables of energy, momentum and shares that kernels fill for the host."""
 
+from typing import TYPE_CHECKING
+
 import taichi as ti
 
 from taichi_dem.physics.fracture import coulomb_limit
+from taichi_dem.step.advance import Advance
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.state import State
+    from taichi_dem.engine.tables import Tables
 
 
 @ti.data_oriented
@@ -12,7 +19,7 @@ class Readings:
     Every method fills arrays of the counts of the scene.
     """
 
-    def __init__(self, tables, state, advance):
+    def __init__(self, tables: "Tables", state: "State", advance: Advance):
         self.tables, self.state, self.advance = tables, state, advance
         self.contacts = advance.contacts
 

@@ -1,7 +1,7 @@
 """The short report at the end of a run."""
 
 from dataclasses import asdict, dataclass
-from typing import Optional
+from typing import Any, Optional
 
 from taichi_dem.kit.display import in_brief
 
@@ -64,33 +64,33 @@ class Report:
         return in_brief(self, self.outcome, took, "print it for all figures")
 
     @property
-    def outcome(self):
+    def outcome(self) -> str:
         """Method, simulated time and broken bonds in words."""
         broken = f"{self.broken_faces:,} of {self.bond_count:,} bonds broken"
         return f"{self.method}, {self.until_s:.4g} s simulated, {broken}"
 
     @property
-    def needs(self):
+    def needs(self) -> tuple[str, ...]:
         """Sentences about effects that were missed, and about a step that was too long."""
         return (*(str(missing) for missing in self.missing_effects), *self.unresolved)
 
     @property
-    def contact_evaluations(self):
+    def contact_evaluations(self) -> int:
         """Bonds and contact pairs evaluated."""
         return self.bond_evaluations + self.pair_evaluations
 
     @property
-    def ideal_gain(self):
+    def ideal_gain(self) -> float:
         """Bodies times substeps over body updates."""
         return self.body_count * self.substeps / max(1, self.body_updates)
 
     @property
-    def boundary_gain(self):
+    def boundary_gain(self) -> float:
         """Evaluations of one step for all over those made."""
         return self.uniform_evaluations / max(1, self.contact_evaluations)
 
     @property
-    def energy_residual_fraction(self):
+    def energy_residual_fraction(self) -> float:
         """Energy that the account cannot explain, over the work put in or the energy held."""
         return abs(self.energy_balance["residual"]) / max(*self._given_and_held(), 1e-300)
 
@@ -100,7 +100,7 @@ class Report:
         return given, self.energy_balance["kinetic"] + self.energy_balance["bond_strain"]
 
     @property
-    def unexplained(self):
+    def unexplained(self) -> str:
         """The residual in words: a share of the work put in, unless all energies are round-off."""
         given, held = self._given_and_held()
         if max(given, held) <= self.round_off_J:
@@ -108,7 +108,7 @@ class Report:
         whole = "the energy held" if held > given else "it"
         return f"{100.0 * self.energy_residual_fraction:.3g} % of {whole}"
 
-    def as_dict(self):
+    def as_dict(self) -> dict[str, Any]:
         """All figures, for a JSON file."""
         derived = ("contact_evaluations", "ideal_gain", "boundary_gain", "energy_residual_fraction")
         derived += ("needs",)

@@ -1,8 +1,19 @@
 """Bonds and contacts for which the step of a run was too long: stable, but not accurate."""
 
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Optional
+
 import numpy as np
 
+from taichi_dem.contact_search.contacts import Contacts
+from taichi_dem.diagnostics.readings import Readings
+from taichi_dem.step.advance import Advance
+from taichi_dem.step.schedule import Schedule
 from taichi_dem.timeline import NEVER
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.model import Model
+    from taichi_dem.engine.state import State
 
 #: A limited dashpot below this share of its coefficient is another material's.
 LEAST_SHARE = 0.5
@@ -24,7 +35,15 @@ class StepResolution:
     they take in a step; all (body_count,).
     """
 
-    def __init__(self, model, state, readings, contacts, schedule, advance):
+    def __init__(
+        self,
+        model: "Model",
+        state: "State",
+        readings: Readings,
+        contacts: Optional[Contacts],
+        schedule: Schedule,
+        advance: Advance,
+    ):
         self.model, self.state, self.readings, self.contacts = model, state, readings, contacts
         self.schedule, self.solves, self.limited = schedule, advance.solves, advance.limited
         self.has_dashpot = advance.has_dashpot
@@ -33,16 +52,16 @@ class StepResolution:
         self.step = np.full(model.body_count, np.inf)
         self.lightest = model.body_mass.copy()
 
-    def saved(self):
+    def saved(self) -> dict[str, np.ndarray]:
         """What a checkpoint holds of it, arrays by name."""
         return {name: getattr(self, name) for name in _KEPT}
 
-    def resume(self, saved):
+    def resume(self, saved: Mapping[str, np.ndarray]) -> None:
         """Take over what ``saved`` gave."""
         for name in _KEPT:
             setattr(self, name, saved[name].copy())
 
-    def sample(self):
+    def sample(self) -> None:
         """Update the figures at a recording time. Dashpots that are solved need no look."""
         if self.solves:
             return
@@ -61,7 +80,7 @@ class StepResolution:
         for one, other in (pairs.T, pairs.T[::-1]):
             np.minimum.at(self.lightest, one, mass[other])
 
-    def findings(self, bodies=None):
+    def findings(self, bodies: Optional[np.ndarray] = None) -> tuple[str, ...]:
         """Sentences about what the step did not resolve, an empty tuple where it did all.
 
         bodies: which to judge, booleans (body_count,), all by default.

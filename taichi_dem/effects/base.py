@@ -9,6 +9,8 @@ number of effects, the others at most one.
 """
 
 import copy
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Optional
 
 import numpy as np
 import taichi as ti
@@ -17,8 +19,17 @@ from taichi.lang import impl
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.display import by_arguments
 from taichi_dem.kit.types import real, vec3
+from taichi_dem.materials import Material
+
+if TYPE_CHECKING:
+    from taichi_dem.contact_search.pair_store import PairStore
+    from taichi_dem.engine.capacity import Capacity
+    from taichi_dem.engine.model import Model
+    from taichi_dem.engine.tables import Tables
 
 MANY = ("load", "support")
+#: Lowest and highest displacement along x, y and z [m].
+Travel = tuple[tuple[float, ...], tuple[float, ...]]
 #: Roles that take one effect, in the order in which effects are listed, bound and reported.
 SINGLE = ("tension", "shear", "dashpot", "friction", "contact")
 ROLES = (*SINGLE, *MANY)
@@ -40,27 +51,27 @@ class Effect:
     def __repr__(self):
         return by_arguments(self)
 
-    def numbers(self, material) -> tuple:
+    def numbers(self, material: Material) -> tuple:
         """Numbers that kernels read as ``self.law[0]`` and on: to change them compiles nothing."""
         return ()
 
-    def declare(self, capacity):
+    def declare(self, capacity: "Capacity") -> None:
         """Declare further fields, with the capacity of an engine; no field may be used here."""
 
-    def declare_columns(self, store):
+    def declare_columns(self, store: "PairStore") -> None:
         """Declare what it keeps of a pair of bodies, or of two spheres, in a ``PairStore``.
 
         ``store.column`` and ``store.sphere_column`` give fields. Asked in scenes with contact.
         """
 
-    def load(self, model):
+    def load(self, model: "Model") -> None:
         """Fill the declared fields for a scene; they are zero before. Raises InputError."""
 
-    def state(self):
+    def state(self) -> dict[str, ti.Field]:
         """Fields that change in a run, by name; a checkpoint holds them."""
         return {}
 
-    def travel(self):
+    def travel(self) -> Travel:
         """How far it may carry bodies along x, y and z [m]: lowest and highest, two rows.
 
         Asked of loads and supports, whether parts of a mesh may meet: without bounds unless an
@@ -68,18 +79,18 @@ class Effect:
         """
         return (-np.inf,) * 3, (np.inf,) * 3
 
-    def stand_for(self, given):
+    def stand_for(self, given: Optional["Effect"]) -> None:
         """Let the attributes of this bound effect be those of a scene's; None changes nothing."""
         if given is not None:
             self.__dict__["_given"] = vars(given)
 
-    def load_scene(self, model):
+    def load_scene(self, model: "Model") -> None:
         """Load the numbers of the effect that this bound one stands for."""
         if self._count:
             assign(self.law, np.array(self.numbers(model.material), dtype=np.float64))
         self.load(model)
 
-    def accepts(self, given) -> bool:
+    def accepts(self, given: Optional["Effect"]) -> bool:
         """Whether kernels that were compiled for this one serve for a scene's effect ``given``.
 
         They do unless they have read one of its values where they should have read a field.
@@ -98,7 +109,7 @@ class Effect:
         return given[name]
 
 
-def bound(effect, tables):
+def bound(effect: Effect, tables: "Tables") -> Any:
     """A copy of an effect with its own fields, which belongs to an engine and serves its scenes."""
     made = object.__new__(type(effect))
     made.__dict__.update(_given=vars(effect), _frozen={}, tables=tables)
@@ -123,7 +134,7 @@ def _same(first, second):
         return first is second
 
 
-def along(direction):
+def along(direction: Sequence[float]) -> Travel:
     """Travel without end in a direction, for ``Effect.travel``."""
     low = tuple(-np.inf if x < 0.0 else 0.0 for x in direction)
     return low, tuple(np.inf if x > 0.0 else 0.0 for x in direction)
@@ -215,4 +226,4 @@ ABSENT = {
     "contact": None,
 }
 
-__all__ = ["ABSENT", "MANY", "ROLES", "SINGLE", "Effect", "along", "bound"]
+__all__ = ["ABSENT", "MANY", "ROLES", "SINGLE", "Effect", "Travel", "along", "bound"]

@@ -1,10 +1,16 @@
 """Friction of contact spheres that stick until they slip (Cundall and Strack 1979)."""
 
+from typing import TYPE_CHECKING
+
 import taichi as ti
 
 from taichi_dem.effects.friction import Friction
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.kit.validation import between
+from taichi_dem.materials import Material
+
+if TYPE_CHECKING:
+    from taichi_dem.contact_search.pair_store import PairStore
 
 
 @ti.data_oriented
@@ -22,14 +28,14 @@ class StickingFriction(Friction):
     name = "sticking_friction"
     remembers = True
 
-    def __init__(self, stiffness_ratio=0.8):
+    def __init__(self, stiffness_ratio: float = 0.8):
         self.stiffness_ratio = between("stiffness_ratio", stiffness_ratio, 1e-6, 1.0)
 
-    def numbers(self, material):
+    def numbers(self, material: Material) -> tuple[float, ...]:
         """Friction coefficient, and stiffness of the spring [N/m]."""
         return material.friction, self.stiffness_ratio * material.contact_stiffness
 
-    def declare_columns(self, store):
+    def declare_columns(self, store: "PairStore") -> None:
         """Keep the stretch [m] of the spring of each sphere pair, in the first body's frame."""
         self.stretch = store.sphere_column("tangential_stretch", real, 3)
 

@@ -1,14 +1,18 @@
 """The engine of a blast: all fields and kernels of one structure, which runs any scene of it."""
 
+from collections.abc import Iterable
+
 from taichi_dem.contact_search.contacts import Contacts
 from taichi_dem.contact_search.search import BroadPhase
 from taichi_dem.diagnostics.outer_faces import OuterOverlaps
 from taichi_dem.diagnostics.readings import Readings
+from taichi_dem.effects.base import Effect
 from taichi_dem.engine.capacity import LEAST, Capacity
+from taichi_dem.engine.model import Model
 from taichi_dem.engine.state import State
 from taichi_dem.engine.tables import Tables
 from taichi_dem.kit.engine_pool import Engine, EnginePool
-from taichi_dem.methods import structure_of
+from taichi_dem.methods import Method, structure_of
 from taichi_dem.stability.body_limits import limits_for
 from taichi_dem.step.advance import Advance
 from taichi_dem.step.drivers import DRIVERS, SolvedStep, Step
@@ -24,7 +28,7 @@ class Structure:
     first scene, of which engines make copies. brute_force: contact search without cells.
     """
 
-    def __init__(self, effects, method, brute_force=False):
+    def __init__(self, effects: Iterable[Effect], method: Method, brute_force: bool = False):
         self.effects, self.method, self.brute_force = tuple(effects), method, brute_force
         self.key = tuple(map(type, self.effects)), structure_of(method), brute_force
 
@@ -46,7 +50,7 @@ class BlastEngine(Engine):
         "neighbours_per_body)"
     )
 
-    def declare(self):
+    def declare(self) -> None:
         """Build all parts; Taichi allocates their fields afterwards, all at once."""
         capacity = Capacity(*self.capacity)
         capacity.check()
@@ -81,7 +85,7 @@ class BlastEngine(Engine):
         # A method may bring an order of its own (docs/add_a_time_integrator.md).
         return getattr(method, "advance", Advance)(*parts)
 
-    def load(self, model, method, max_speed):
+    def load(self, model: Model, method: Method, max_speed: float) -> None:
         """Take over a scene, at rest and at time zero; max_speed [m/s]."""
         self.clear()
         self.enter(model)
@@ -105,11 +109,11 @@ class BlastEngine(Engine):
             lengths[room.spheres] = 4 * n * model.spheres.per_face
         return lengths
 
-    def accepts(self, model):
+    def accepts(self, model: Model) -> bool:
         """Whether no kernel has read a number of an effect that the scene gives another value."""
         return all(effect.accepts(given) for effect, given in self.tables.matched(model))
 
-    def enter(self, model):
+    def enter(self, model: Model) -> None:
         """Note the counts of a scene whose data come in, and the numbers of its effects."""
         self.lengths = self._lengths(model)
         for effect, given in self.tables.matched(model):

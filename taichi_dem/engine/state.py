@@ -1,11 +1,17 @@
 """Everything that changes in a run; with the effects' own state this is what a checkpoint holds."""
 
+from typing import Optional
+
 import numpy as np
 import taichi as ti
+from numpy.typing import ArrayLike
 
 from taichi_dem.effects.body_motion import BodyMotion
+from taichi_dem.engine.model import Model
+from taichi_dem.engine.tables import Tables
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.kit.types import real, vec3, vec4
+from taichi_dem.mesh.topology import Topology
 from taichi_dem.physics.rotation import rotation_matrix, spin_of
 from taichi_dem.timeline import NEVER
 
@@ -33,7 +39,7 @@ class State:
     lowest body out of bounds, body_count if none.
     """
 
-    def __init__(self, tables):
+    def __init__(self, tables: Tables):
         n, bonds = tables.capacity.bodies, tables.capacity.bonds
         self.tables = tables
         self.position = ti.Vector.field(3, real, shape=n)
@@ -59,7 +65,7 @@ class State:
         self.bad_body = ti.field(ti.i32, shape=())
         self.max_speed2 = ti.field(real, shape=())
 
-    def load(self, model, max_speed):
+    def load(self, model: Model, max_speed: float) -> None:
         """Put the bodies where the mesh has them, at rest; all fields are zero before."""
         n = model.body_count
         if self.tables.has_contact:
@@ -69,7 +75,13 @@ class State:
         assign(self.bad_body, n)
         self.set_motion(model.centre, np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)))
 
-    def set_motion(self, position, orientation, velocity=None, spin=None):
+    def set_motion(
+        self,
+        position: ArrayLike,
+        orientation: ArrayLike,
+        velocity: Optional[ArrayLike] = None,
+        spin: Optional[ArrayLike] = None,
+    ) -> None:
         """Set the motion of all bodies.
 
         position (n, 3) [m], orientation (n, 4) unit quaternions, velocity (n, 3) [m/s] and spin
@@ -120,13 +132,13 @@ class State:
         """Bodies of the scene."""
         return int(values(self.tables.body_count))
 
-    def expose(self, topology):
+    def expose(self, topology: Topology) -> None:
         """Let all outer faces carry contact spheres from the start, beside those that do."""
         marks = values(self.exposed_tick)
         marks[4 * topology.outer_body + topology.outer_face] = 0
         assign(self.exposed_tick, marks)
 
-    def motion(self):
+    def motion(self) -> dict[str, np.ndarray]:
         """Arrays of the bodies' motion by name.
 
         position, velocity, spin, angular_momentum (n, 3), orientation (n, 4), rotation (n, 3, 3)
@@ -159,7 +171,7 @@ class State:
                 table[i, 16 + 3 * r + c] = rotation[r, c]
             table[i, 25] = ti.cast(self.level[i], ti.f64)
 
-    def fields(self):
+    def fields(self) -> dict[str, ti.Field]:
         """Every field that changes, by name, the bound effects' state included."""
         own = {k: v for k, v in vars(self).items() if isinstance(v, (ti.Field,))}
         for effect in self.tables.effects:

@@ -4,6 +4,8 @@ A body's rates change only where a bond breaks or a contact comes near or leaves
 listed, and their rates found anew at the start of the next substep.
 """
 
+from typing import TYPE_CHECKING, Optional
+
 import numpy as np
 import taichi as ti
 
@@ -29,6 +31,13 @@ from taichi_dem.stability.step_control import (
     level_of,
     shorter,
 )
+
+if TYPE_CHECKING:
+    from taichi_dem.contact_search.contacts import Contacts
+    from taichi_dem.engine.model import Model
+    from taichi_dem.engine.state import State
+    from taichi_dem.engine.tables import Tables
+    from taichi_dem.methods import Method
 
 HIT, RELEASE, CLOSE = (1 << k for k in range(len(EVENTS)))
 #: With c min(1, LIMITED / X) no dashpot takes more than this in a step (X = 2 is unstable).
@@ -76,7 +85,9 @@ class StabilityLimits:
 
     constant_fields = ("dashpot_table", "spring_table")
 
-    def __init__(self, tables, state, contacts, method):
+    def __init__(
+        self, tables: "Tables", state: "State", contacts: Optional["Contacts"], method: "Method"
+    ):
         self.tables, self.state, self.contacts = tables, state, contacts
         self.control = method.control
         self.controlled = method.control is not None
@@ -114,7 +125,7 @@ class StabilityLimits:
         self.listed_count = ti.field(ti.i32, shape=())
         self.woken = ti.field(ti.i32, shape=())
 
-    def load(self, model, method):
+    def load(self, model: "Model", method: "Method") -> None:
         """Take the bonds of a model and the numbers of a method."""
         rule = method.control or StepControl()
         assign(self.rule, np.array([method.dt0, rule.safety, rule.dashpot_floor]))
@@ -276,7 +287,9 @@ class StabilityLimits:
         return ti.min(2.0 * step * self.bond_damping[i], LIMITED - contacts)
 
 
-def limits_for(tables, state, contacts, method):
+def limits_for(
+    tables: "Tables", state: "State", contacts: Optional["Contacts"], method: "Method"
+) -> Optional[StabilityLimits]:
     """Limits for a method; None where it neither controls steps nor limits dashpots."""
     wanted = getattr(method, "control", None) or getattr(method, "dashpot", "full") == "limited"
     return StabilityLimits(tables, state, contacts, method) if wanted else None

@@ -71,7 +71,7 @@ class StepControl:
             whole("level_jump", self.level_jump, 0, MAX_LEVEL)
 
 
-def counted_criteria(bound):
+def counted_criteria(bound: np.ndarray) -> dict[str, int]:
     """Number of bodies by the name of what bounds their step, for those that occur.
 
     bound: places in CRITERIA, shape (body_count,).
@@ -84,7 +84,7 @@ def counted_criteria(bound):
 class FixedStep:
     """Every body keeps the largest step."""
 
-    def load(self, distance, dt0):
+    def load(self, distance: Optional[float], dt0: float) -> None:
         """Nothing to take."""
 
     @ti.func
@@ -103,11 +103,11 @@ class Displacement:
 
     constant_fields = ("rate2",)
 
-    def __init__(self, power=1):
+    def __init__(self, power: int = 1):
         self.power = power
         self.rate2 = ti.field(real, shape=MAX_LEVEL + 2)
 
-    def load(self, distance, dt0):
+    def load(self, distance: float, dt0: float) -> None:
         """Take a distance and the step of level 0 [s]."""
         steps = dt0 / 2.0 ** np.arange(MAX_LEVEL + 1)
         assign(self.rate2, np.append((distance / steps**self.power) ** 2, np.inf))

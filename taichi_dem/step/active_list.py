@@ -19,7 +19,7 @@ class ActiveList:
     not listed. The order within a key does not matter: nothing that is computed depends on it.
     """
 
-    def __init__(self, capacity):
+    def __init__(self, capacity: int):
         self.order = ti.field(ti.i32, shape=capacity)
         self.index = ti.field(ti.i32, shape=capacity)
         self.key = ti.field(ti.i32, shape=capacity)

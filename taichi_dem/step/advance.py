@@ -6,8 +6,11 @@ opposite signs; a body takes what has gathered at its own time (Konno et al., 3.
 v += S / m, L += T, then x += dt v and q = exp(dt w) q, with the spin w in the middle of the turn.
 """
 
+from typing import TYPE_CHECKING, Optional
+
 import taichi as ti
 
+from taichi_dem.contact_search.contacts import Contacts
 from taichi_dem.kit.types import real, vec2, vec3
 from taichi_dem.physics.bond import bond_motion, unit_arm, unit_opening, unit_velocity
 from taichi_dem.physics.rotation import mean_spin, rotation_matrix, spin_of, turned, zero3
@@ -15,12 +18,25 @@ from taichi_dem.stability.body_limits import RELEASE
 from taichi_dem.step.contact_force import ContactForce
 from taichi_dem.step.tangential_springs import TangentialSprings
 
+if TYPE_CHECKING:
+    from taichi_dem.engine.state import State
+    from taichi_dem.engine.tables import Tables
+    from taichi_dem.step.implicit.solver import Solver
+    from taichi_dem.step.schedule import Schedule
+
 
 @ti.data_oriented
 class Advance(ContactForce):
     """The order in which physics and effects act; see the module."""
 
-    def __init__(self, tables, state, schedule, contacts, solver=None):
+    def __init__(
+        self,
+        tables: "Tables",
+        state: "State",
+        schedule: "Schedule",
+        contacts: Optional[Contacts],
+        solver: Optional["Solver"] = None,
+    ):
         self.tables, self.state, self.schedule = tables, state, schedule
         self.solver, self.solves = solver, solver is not None
         self.solves_bonds = self.solves and solver.has_bonds

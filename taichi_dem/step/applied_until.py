@@ -1,8 +1,16 @@
 """Time up to which each bond or pair has applied its impulse."""
 
+from typing import TYPE_CHECKING, Optional
+
 import taichi as ti
 
+from taichi_dem.contact_search.contacts import Contacts
 from taichi_dem.timeline import device_ticks_of
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.state import State
+    from taichi_dem.engine.tables import Tables
+    from taichi_dem.step.schedule import Schedule
 
 
 @ti.data_oriented
@@ -17,7 +25,9 @@ class AppliedUntil:
     their steps.
     """
 
-    def __init__(self, tables, state, schedule, contacts):
+    def __init__(
+        self, tables: "Tables", state: "State", schedule: "Schedule", contacts: Optional[Contacts]
+    ):
         self.state, self.schedule = state, schedule
         self.bond = ti.field(ti.i64, shape=tables.capacity.bonds)
         if contacts is not None:

@@ -5,9 +5,10 @@ driver pays for every phase with a launch, and much more where other programs ho
 """
 
 import time
+from collections.abc import Callable, Mapping
 
 from taichi_dem.kit.allocation import values
-from taichi_dem.step.drivers import Parallel, Resident
+from taichi_dem.step.drivers import Driver, Parallel, Resident, Step
 
 #: Substeps of a try, and how often each driver is tried; the better of its tries counts.
 _SUBSTEPS = 8
@@ -23,7 +24,12 @@ class AutoDriver:
     gives seconds; tests have their own. drivers: both, by name.
     """
 
-    def __init__(self, step, drivers, clock=time.perf_counter):
+    def __init__(
+        self,
+        step: Step,
+        drivers: Mapping[str, Driver],
+        clock: Callable[[], float] = time.perf_counter,
+    ):
         self.step, self.clock = step, clock
         self.drivers = {name: drivers[name] for name in (Parallel.name, Resident.name)}
         self.chosen = Resident.name
@@ -35,16 +41,16 @@ class AutoDriver:
         self.seconds, self.spent, self.since = {}, 0.0, 0.0
 
     @property
-    def name(self):
+    def name(self) -> str:
         """Name of the driver that goes on, and that this was measured."""
         return f"{self.chosen} (measured)"
 
-    def prepare(self):
+    def prepare(self) -> None:
         """Make the search that is due, without a step; compiles both drivers."""
         for driver in self.drivers.values():
             driver.prepare()
 
-    def run(self, end_tick):
+    def run(self, end_tick: int) -> None:
         """Advance to a tick, to the next halt, for a try, or for about as long as the driver."""
         started = self.clock()
         if self.pending_tries:

@@ -5,12 +5,17 @@ every item writes its own slots, and every sum has a fixed order.
 """
 
 import time
+from collections.abc import Callable
+from typing import Optional, Protocol
 
 import taichi as ti
 
+from taichi_dem.contact_search.search import BroadPhase
 from taichi_dem.kit.allocation import values
+from taichi_dem.step.advance import Advance
 from taichi_dem.step.implicit.bonds import BOND_COLOURS
-from taichi_dem.step.implicit.pairs import COLOURS
+from taichi_dem.step.implicit.pairs import COLOURS, PairDashpots
+from taichi_dem.step.schedule import Schedule
 from taichi_dem.step.wake_up import WakeUp
 
 #: The parallel driver is called for about this long [s] between two checks of divergence, progress
@@ -48,7 +53,7 @@ class Step:
     search: the ``BroadPhase`` that does so, None for a scene without contact.
     """
 
-    def __init__(self, advance, schedule, search):
+    def __init__(self, advance: Advance, schedule: Schedule, search: Optional[BroadPhase]):
         self.advance, self.schedule, self.search = advance, schedule, search
         self.has_contact = search is not None
         self.state = advance.state
@@ -74,7 +79,7 @@ class Step:
             ),
         )
 
-    def repeats(self, part):
+    def repeats(self, part: int) -> bool:
         """Whether a part of the phases is called for once more: never here."""
         return False
 
@@ -117,7 +122,7 @@ class Step:
 class Colour:
     """The members of one colour: those from colour_first[colour] on, in their order."""
 
-    def __init__(self, colour_first, colour):
+    def __init__(self, colour_first: ti.Field, colour: int):
         self.colour_first, self.colour = colour_first, colour
 
     @ti.func
@@ -135,7 +140,7 @@ class Colour:
 class PairColour(Colour):
     """The contact pairs of one colour."""
 
-    def __init__(self, pairs, colour):
+    def __init__(self, pairs: PairDashpots, colour: int):
         super().__init__(pairs.colour_first, colour)
         self.order = pairs.order
 
@@ -184,7 +189,7 @@ class SolvedStep(Step):
             pairs += ((Once(), solver.last_pairs),)
         return (*bonds, *pairs, (Once(), solver.check_convergence))
 
-    def repeats(self, part):
+    def repeats(self, part: int) -> bool:
         """Whether a part, the sweep, is called for once more."""
         return part == 1 and values(self.advance.solver.unsolved) == 1
 
@@ -209,29 +214,47 @@ class SolvedStep(Step):
                 self.state.bond_heat[b] = 0.0 * self.state.bond_heat[b]
 
 
+class Driver(Protocol):
+    """One way to run the phases of a ``Step``; all ways give the same bits."""
+
+    name: str
+
+    def load(self) -> None:
+        """Begin with another scene."""
+
+    def prepare(self) -> None:
+        """Make the search that is due, without a step; compiles the kernels."""
+
+    def few(self, end_tick: int, substeps: int) -> None:
+        """Advance some substeps, or to a tick or the next halt."""
+
+    def run(self, end_tick: int) -> None:
+        """Advance to a tick, to the next halt, or for about the time of a call."""
+
+
 @ti.data_oriented
 class Resident:
     """Many substeps in one serial kernel: the choice for small systems on a CPU."""
 
     name = "resident"
 
-    def __init__(self, step):
+    def __init__(self, step: Step):
         self.step = step
         self.load()
 
-    def load(self):
+    def load(self) -> None:
         """Begin with short calls: nobody knows yet what a step of the scene costs."""
         self.substeps = 4
 
-    def prepare(self):
+    def prepare(self) -> None:
         """Make the search that is due, without a step; compiles the kernel."""
         self._run(0, 0)
 
-    def few(self, end_tick, substeps):
+    def few(self, end_tick: int, substeps: int) -> None:
         """Advance some substeps, or to a tick or the next halt."""
         self._run(end_tick, substeps)
 
-    def run(self, end_tick):
+    def run(self, end_tick: int) -> None:
         """Advance to a tick, to the next halt, or for about _KERNEL_SECONDS."""
         start = time.perf_counter()
         done = self._run(end_tick, self.substeps)
@@ -268,26 +291,26 @@ class Parallel:
 
     name = "parallel"
 
-    def __init__(self, step):
+    def __init__(self, step: Step):
         self.step = step
 
-    def load(self):
+    def load(self) -> None:
         """Nothing depends on the scene."""
 
-    def prepare(self):
+    def prepare(self) -> None:
         """Make the search that is due, without a step; compiles the kernels."""
         for part in range(len(self.step.parts)):
             self._run(part, 0, 0)
         if self.step.has_contact:
             self.step.search.renew()
 
-    def few(self, end_tick, substeps):
+    def few(self, end_tick: int, substeps: int) -> None:
         """Advance some substeps, or to a tick or the next halt."""
         for _ in range(substeps):
             if self._substep(end_tick):
                 break
 
-    def run(self, end_tick):
+    def run(self, end_tick: int) -> None:
         """Advance to a tick, to the next halt, or for about CALL_SECONDS."""
         start = time.perf_counter()
         while self._substep(end_tick) == 0 and time.perf_counter() - start < CALL_SECONDS:
@@ -319,4 +342,6 @@ class Parallel:
 
 
 #: Drivers by the name that users give.
-DRIVERS = {driver.name: driver for driver in (Resident, Parallel)}
+DRIVERS: dict[str, Callable[[Step], Driver]] = {
+    driver.name: driver for driver in (Resident, Parallel)
+}

@@ -4,16 +4,26 @@ Levels change seldom against how often they are used, so a body that changes its
 own entries.
 """
 
+from typing import TYPE_CHECKING, Any, Optional
+
 import numpy as np
 import taichi as ti
 
+from taichi_dem.contact_search.contacts import Contacts
 from taichi_dem.kit.allocation import assign, raise_to, values
 from taichi_dem.kit.types import real
+from taichi_dem.methods import Method
+from taichi_dem.stability.body_limits import StabilityLimits
 from taichi_dem.stability.step_control import DISPLACEMENT, LARGEST, NEIGHBOUR
 from taichi_dem.step.active_list import ActiveList, itself
 from taichi_dem.step.applied_until import AppliedUntil
 from taichi_dem.step.level_limit import LevelLimit
 from taichi_dem.timeline import MACRO_TICKS, MAX_LEVEL, device_coarsest_active, device_ticks_of
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.model import Model
+    from taichi_dem.engine.state import State
+    from taichi_dem.engine.tables import Tables
 
 
 @ti.data_oriented
@@ -31,7 +41,16 @@ class Schedule:
     and the bonds and pairs that one step for all would have evaluated in the same substeps.
     """
 
-    def __init__(self, tables, state, contacts, criterion, uniform, drifted, limits=None):
+    def __init__(
+        self,
+        tables: "Tables",
+        state: "State",
+        contacts: Optional[Contacts],
+        criterion: Any,
+        uniform: bool,
+        drifted: bool,
+        limits: Optional[StabilityLimits] = None,
+    ):
         self.tables, self.state, self.contacts, self.limits = tables, state, contacts, limits
         self.has_limits = limits is not None
         self.controlled = self.has_limits and limits.control is not None
@@ -55,7 +74,7 @@ class Schedule:
         self.changed_count = ti.field(ti.i32, shape=())
         self.evaluations = ti.field(ti.i64, shape=5)
 
-    def load(self, model, method):
+    def load(self, model: "Model", method: Method) -> None:
         """Take the steps of a method."""
         assign(self.step_seconds, method.dt0 / 2.0 ** np.arange(MAX_LEVEL + 1))
         # A rule of one's own may have no numbers to load.
@@ -64,16 +83,16 @@ class Schedule:
             self.limits.load(model, method)
 
     @property
-    def dt0(self):
+    def dt0(self) -> float:
         """Largest step [s]."""
         return float(values(self.step_seconds)[0])
 
     @property
-    def tick_seconds(self):
+    def tick_seconds(self) -> float:
         """Seconds of a tick."""
         return self.dt0 / MACRO_TICKS
 
-    def members(self):
+    def members(self) -> np.ndarray:
         """How many bonds and pairs are evaluated at the step of each level, (MAX_LEVEL + 1,)."""
         ends = values(self.bonds.end) + values(self.pairs.end)
         return ends[:-1] - ends[1:]

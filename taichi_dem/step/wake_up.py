@@ -2,6 +2,9 @@
 
 import taichi as ti
 
+from taichi_dem.step.advance import Advance
+from taichi_dem.step.schedule import Schedule
+
 
 @ti.data_oriented
 class WakeUp:
@@ -12,7 +15,7 @@ class WakeUp:
     then.
     """
 
-    def __init__(self, advance, schedule):
+    def __init__(self, advance: Advance, schedule: Schedule):
         self.advance, self.schedule, self.limits = advance, schedule, schedule.limits
         self.state = schedule.state
 

@@ -1,13 +1,23 @@
 """Dashpots of bonds: one 6x6 block each, visited in the order of a fixed edge colouring."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import taichi as ti
 
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.types import real, vec3, vec6
+from taichi_dem.methods import ImplicitDashpots
 from taichi_dem.physics.wrench import inverse, mobility, plus, point_block, zero_block
 from taichi_dem.step.implicit.colouring import edge_colours
+from taichi_dem.step.implicit.velocities import Velocities
 from taichi_dem.timeline import MACRO_TICKS
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.model import Model
+    from taichi_dem.engine.state import State
+    from taichi_dem.engine.tables import Tables
+    from taichi_dem.step.schedule import Schedule
 
 #: Colours that links of at most four a body can need: a link meets six others at most.
 BOND_COLOURS = 7
@@ -32,7 +42,9 @@ class BondDashpots:
 
     constant_fields = ("theta", "refresh_every", "index", "colour_first")
 
-    def __init__(self, tables, state, schedule, velocities):
+    def __init__(
+        self, tables: "Tables", state: "State", schedule: "Schedule", velocities: Velocities
+    ):
         self.tables, self.state = tables, state
         self.schedule, self.velocities = schedule, velocities
         bonds = tables.capacity.bonds
@@ -46,7 +58,7 @@ class BondDashpots:
         self.last = ti.Vector.field(6, real, shape=bonds)
         self.colour_first = ti.field(ti.i32, shape=BOND_COLOURS + 1)
 
-    def load(self, model, method):
+    def load(self, model: "Model", method: ImplicitDashpots) -> None:
         """Colour the bonds of a model and take the numbers of a method."""
         assign(self.theta, np.array([method.theta, (1.0 - method.theta) / method.theta]))
         assign(self.refresh_every, max(1, round(method.refresh / method.dt)))

@@ -3,7 +3,7 @@
 import numpy as np
 
 
-def edge_colours(links, body_count):
+def edge_colours(links: np.ndarray, body_count: int) -> np.ndarray:
     """Colour of every link, (n,) from 0 on; links that share a body differ.
 
     links: the two bodies of each, shape (n, 2). Greedy; where that would take a new colour, one

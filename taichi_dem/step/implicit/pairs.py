@@ -1,12 +1,21 @@
 """Dashpots and friction of contacts, sphere by sphere: they push, within the bound of friction."""
 
+from typing import TYPE_CHECKING
+
 import taichi as ti
 
 from taichi_dem.contact_search.cell_grid import group
+from taichi_dem.contact_search.contacts import Contacts
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.physics.rotation import unit3, zero3
 from taichi_dem.physics.sphere_pair import add_within, cut_to, meeting
+from taichi_dem.step.implicit.velocities import Velocities
 from taichi_dem.step.tangential_springs import TangentialSprings
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.state import State
+    from taichi_dem.engine.tables import Tables
+    from taichi_dem.step.schedule import Schedule
 
 #: Colours of pairs that share no body; what finds no free one is visited last, in turn.
 COLOURS = 16
@@ -36,7 +45,14 @@ class PairDashpots:
         *("active", "order", "colour", "taken", "colour_first"),
     )
 
-    def __init__(self, tables, state, schedule, contacts, velocities):
+    def __init__(
+        self,
+        tables: "Tables",
+        state: "State",
+        schedule: "Schedule",
+        contacts: Contacts,
+        velocities: Velocities,
+    ):
         self.tables, self.state, self.schedule = tables, state, schedule
         self.contacts, self.velocities = contacts, velocities
         self.has_friction = bool(tables.friction.name)

@@ -1,13 +1,23 @@
 """Sweeps over the dashpots of all bonds and contacts until their impulses agree."""
 
+from typing import TYPE_CHECKING, Optional
+
 import numpy as np
 import taichi as ti
 
+from taichi_dem.contact_search.contacts import Contacts
 from taichi_dem.kit.allocation import assign, raise_to
 from taichi_dem.kit.types import real
+from taichi_dem.methods import ImplicitDashpots
 from taichi_dem.step.implicit.bonds import BondDashpots
 from taichi_dem.step.implicit.pairs import COLOURS, PairDashpots
 from taichi_dem.step.implicit.velocities import Velocities
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.model import Model
+    from taichi_dem.engine.state import State
+    from taichi_dem.engine.tables import Tables
+    from taichi_dem.step.schedule import Schedule
 
 
 @ti.data_oriented
@@ -23,7 +33,9 @@ class Solver:
     the step. unsolved: 1 while another sweep is called for.
     """
 
-    def __init__(self, tables, state, schedule, contacts):
+    def __init__(
+        self, tables: "Tables", state: "State", schedule: "Schedule", contacts: Optional[Contacts]
+    ):
         self.tables, self.state, self.schedule, self.contacts = tables, state, schedule, contacts
         self.bounds = ti.field(ti.i32, shape=2)
         self.tolerance = ti.field(real, shape=())
@@ -43,7 +55,7 @@ class Solver:
         self.residual2 = ti.field(real, shape=())
         self.speed2 = ti.field(real, shape=())
 
-    def load(self, model, method):
+    def load(self, model: "Model", method: ImplicitDashpots) -> None:
         """Take the numbers of a method, and the bonds of a model."""
         assign(self.bounds, np.array(method.sweeps))
         assign(self.tolerance, method.tolerance)

@@ -1,9 +1,15 @@
 """Velocities while a step is being solved, and their change per impulse."""
 
+from typing import TYPE_CHECKING
+
 import taichi as ti
 
 from taichi_dem.kit.types import real
 from taichi_dem.physics.rotation import unit3
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.state import State
+    from taichi_dem.engine.tables import Tables
 
 
 @ti.data_oriented
@@ -19,7 +25,7 @@ class Velocities:
 
     scratch_fields = ("twist", "given")
 
-    def __init__(self, tables, state):
+    def __init__(self, tables: "Tables", state: "State"):
         n = tables.capacity.bodies
         self.tables, self.state = tables, state
         self.twist, self.turn = ti.Vector.field(6, real), ti.Matrix.field(3, 3, real)
