@@ -6,8 +6,8 @@ numbers (see ``engine/damper_engine.py``).
 
 import contextlib
 import time
-from collections.abc import Iterator
-from typing import Any, Optional
+from collections.abc import Iterator, Mapping
+from typing import Any, Optional, Union
 
 import numpy as np
 
@@ -55,7 +55,7 @@ class Batch(LoadedScenes):
         self.launches, self.compile_seconds = Launches(self.count), 0.0
         # Whether the present run goes on from a checkpoint.
         self.going_on = False
-        self.writer = NoCheckpointWriter()
+        self.writer: Union[CheckpointWriter, NoCheckpointWriter] = NoCheckpointWriter()
 
     def __repr__(self) -> str:
         return in_brief(self, self.filling.label, f"{self.count:,} scenes", f"on the {self.mount}")
@@ -159,7 +159,7 @@ class Batch(LoadedScenes):
         saved = RunSnapshot({**own, **identity}, self.memory, {"batch": self, **dict(owners)})
         if arrays:
             saved.restore(arrays, resume)
-        writer = NoCheckpointWriter()
+        writer: Union[CheckpointWriter, NoCheckpointWriter] = NoCheckpointWriter()
         if checkpoint:
             writer = CheckpointWriter(checkpoint, saved, self._now)
         with writer as self.writer:
@@ -177,7 +177,7 @@ class Batch(LoadedScenes):
         pace = np.stack([*self.numbers.pace(), self.time_origin])
         return {**self.launches.saved(), "pace": pace, "steps_per_cycle": self.steps_per_cycle}
 
-    def resume(self, saved: dict[str, np.ndarray]) -> None:
+    def resume(self, saved: Mapping[str, np.ndarray]) -> None:
         """Take over what ``saved`` gave."""
         self.launches.resume(saved)
         *pace, self.time_origin = saved["pace"].copy()

@@ -69,7 +69,7 @@ def assemble(options: Any, table: SceneFields) -> Components:
     accounting = ACCOUNTINGS[options.accounting](table, lattice, impulse_balance)
     cells = Cells(table, lattice, traversal, accounting)
     accumulator = Accumulator(options.accumulator, lattice)
-    resting = NoStaticContact()
+    resting: Any = NoStaticContact()
     if options.particles_rest:
         resting = StaticContact(table, cells, accumulator, parameters)
     return Components(

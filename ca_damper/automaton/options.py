@@ -51,7 +51,7 @@ class Automaton:
     particle_mass: float = 0.2e-3
     gravity: float = 10.0
     v_max: float = 5.0
-    start: tuple = None
+    start: Optional[tuple] = None
     traversal: str = "list"
     ledger: bool = False
 

@@ -1,7 +1,7 @@
 """Launches of bounded length: how long each may be, and what they took."""
 
 import time
-from typing import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import taichi as ti
@@ -63,7 +63,7 @@ class Launches:
             "steps": np.array([self.scene_steps, self.particle_steps]),
         }
 
-    def resume(self, saved: dict[str, np.ndarray]) -> None:
+    def resume(self, saved: Mapping[str, np.ndarray]) -> None:
         """Take over what ``saved`` gave."""
         self.done, self.seconds, self.run_seconds = saved["run"].tolist()
         self.scene_steps, self.particle_steps = saved["steps"].tolist()

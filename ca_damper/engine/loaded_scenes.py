@@ -76,7 +76,8 @@ class LoadedScenes:
         Raises InputError for a session that has been stopped or cleared, and on another thread.
         """
         self.loan.activate()
-        return self.loan.engine
+        engine: Any = self.loan.engine
+        return engine
 
     @property
     def device(self) -> Any:

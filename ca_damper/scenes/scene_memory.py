@@ -1,5 +1,6 @@
 """The state of a batch as arrays: what its scenes use of the fields of an engine."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,7 @@ class SceneMemory:
         scenes = {f"scenes/{k}": self._cut(one) for k, one in enumerate(self._made())}
         return {**scenes, **{name: values(field) for name, field in self._others().items()}}
 
-    def misfit(self, arrays: dict[str, np.ndarray]) -> str:
+    def misfit(self, arrays: Mapping[str, np.ndarray]) -> str:
         """Name of a field that arrays, as ``read`` gave them, lack or do not fit; else ""."""
         for name, mine in self.read().items():
             array = arrays.get(name)
@@ -40,7 +41,7 @@ class SceneMemory:
                 return name
         return ""
 
-    def write(self, arrays: dict[str, np.ndarray]) -> None:
+    def write(self, arrays: Mapping[str, np.ndarray]) -> None:
         """Give the fields their values back, from what ``read`` gave and ``misfit`` accepts."""
         for k, one in enumerate(self._made()):
             whole = values(one.field)

@@ -106,7 +106,8 @@ class Spheres:
     @property
     def lattice(self) -> tuple[int, int]:
         """Columns and rows of the spheres that fit into the box in a square packing."""
-        return tuple(int(size / self.diameter + _ROUNDING) for size in (self.width, self.height))
+        columns, rows = (int(x / self.diameter + _ROUNDING) for x in (self.width, self.height))
+        return columns, rows
 
     @property
     def capacity(self) -> int:

@@ -40,7 +40,9 @@ class Columns:
     """Columns of one length, by name."""
 
     def __init__(self, entries: int):
-        self.entries, self.by_name, self.members = entries, {}, ()
+        self.entries = entries
+        self.by_name: dict[str, ti.Field] = {}
+        self.members: tuple[Column, ...] = ()
 
     def __len__(self):
         return len(self.members)

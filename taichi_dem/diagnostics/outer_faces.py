@@ -37,7 +37,7 @@ class OuterFaces:
         self.model, self.state, self.outer_overlaps = model, state, outer_overlaps
         self.extent = model.spheres.extent
         self.points = np.ascontiguousarray(model.mesh.tetrahedra, dtype=np.int32)
-        self.broken_count, self.part = -1, None
+        self.broken_count, self.part = -1, np.zeros(0, dtype=np.int32)
 
     def overlaps(self) -> np.ndarray:
         """How many later bodies each body overlaps in this way now, (body_count,)."""

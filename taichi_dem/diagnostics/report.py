@@ -110,8 +110,8 @@ class Report:
 
     def as_dict(self) -> dict[str, Any]:
         """All figures, for a JSON file."""
-        derived = ("contact_evaluations", "ideal_gain", "boundary_gain", "energy_residual_fraction")
-        derived += ("needs",)
+        gains = "ideal_gain", "boundary_gain"
+        derived = ("contact_evaluations", *gains, "energy_residual_fraction", "needs")
         figures = {_JSON_KEYS.get(name, name): value for name, value in asdict(self).items()}
         return {**figures, **{name: getattr(self, name) for name in derived}}
 

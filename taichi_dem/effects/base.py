@@ -47,6 +47,9 @@ class Effect:
     name = ""
     #: Whether a friction law keeps a spring for each sphere pair (``roles.FrictionMemory``).
     remembers = False
+    law: ti.Field
+    tables: "Tables"
+    _count: int
 
     def __repr__(self):
         return by_arguments(self)
@@ -113,7 +116,8 @@ def bound(effect: Effect, tables: "Tables") -> Any:
     """A copy of an effect with its own fields, which belongs to an engine and serves its scenes."""
     made = object.__new__(type(effect))
     made.__dict__.update(_given=vars(effect), _frozen={}, tables=tables)
-    made._count = len(effect.numbers(_AnyMaterial()))
+    material: Any = _AnyMaterial()
+    made._count = len(effect.numbers(material))
     if made._count:
         made.law = ti.field(real, shape=made._count)
     made.declare(tables.capacity)
@@ -218,7 +222,8 @@ class NoFriction(Effect):
         return vec3(0.0, 0.0, 0.0)
 
 
-ABSENT = {
+#: Classes of the null objects by role; None where there is none.
+ABSENT: dict[str, Any] = {
     "tension": ElasticTension,
     "shear": ElasticShear,
     "dashpot": NoDashpot,

@@ -88,8 +88,9 @@ class State:
         (n, 3) [rad/s] in world axes, zero by default.
         """
         still = np.zeros((self.body_count, 3))
-        arrays = (position, orientation, still if velocity is None else velocity)
-        arrays = (*arrays, still if spin is None else spin)
+        velocity = still if velocity is None else velocity
+        spin = still if spin is None else spin
+        arrays = (position, orientation, velocity, spin)
         self._write_motion(*(np.ascontiguousarray(a, dtype=np.float64) for a in arrays))
 
     @ti.func

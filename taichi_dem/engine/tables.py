@@ -36,6 +36,13 @@ class Tables:
         "face_spheres",
     )
 
+    # Bound effects by role; null objects where the scene lists none, contact is None then.
+    tension: Any
+    shear: Any
+    dashpot: Any
+    friction: Any
+    contact: Any
+
     def __init__(self, capacity: Capacity, effects: Iterable[Effect]):
         self.capacity = capacity
         self.body_count, self.bond_count = ti.field(ti.i32, shape=()), ti.field(ti.i32, shape=())

@@ -4,7 +4,7 @@ A body's rates change only where a bond breaks or a contact comes near or leaves
 listed, and their rates found anew at the start of the next substep.
 """
 
-from typing import TYPE_CHECKING, Optional
+from typing import TYPE_CHECKING, Any, Optional
 
 import numpy as np
 import taichi as ti
@@ -110,7 +110,7 @@ class StabilityLimits:
         if self.control is not None:
             self.wakes = sum(1 << k for k, event in enumerate(EVENTS) if event in rule.wake)
         self.contact_limits = None
-        if self.has_contact:
+        if contacts is not None:
             self.contact_limits = ContactLimits(tables, state, contacts)
         n = tables.capacity.bodies
         self.dashpot_table = ti.field(real, shape=(n, 16))
@@ -130,10 +130,11 @@ class StabilityLimits:
         rule = method.control or StepControl()
         assign(self.rule, np.array([method.dt0, rule.safety, rule.dashpot_floor]))
         assign(self.jump, rule.level_jump or 0)
+        distance: Any = method.distance
         if self.has_distance:
-            self.displacement.load(method.distance, method.dt0)
+            self.displacement.load(distance, method.dt0)
         if self.has_load:
-            self.leap.load(method.distance, method.dt0)
+            self.leap.load(distance, method.dt0)
         if self.counts["rotation"]:
             self.turn.load(rule.angle, method.dt0)
         if self.has_contact:

@@ -69,7 +69,7 @@ class AutoDriver:
         seconds = (self.clock() - started) / max(1, self._visited() - before)
         self.seconds[name] = min(seconds, self.seconds.get(name, seconds))
         if not self.pending_tries:
-            self.chosen = min(self.seconds, key=self.seconds.get)
+            self.chosen = min(self.seconds, key=lambda name: self.seconds[name])
 
     def _visited(self):
         """Bodies, bonds and pairs that were due so far."""

@@ -6,7 +6,7 @@ every item writes its own slots, and every sum has a fixed order.
 
 import time
 from collections.abc import Callable
-from typing import Optional, Protocol
+from typing import Any, Optional, Protocol
 
 import taichi as ti
 
@@ -24,6 +24,8 @@ CALL_SECONDS = 0.2
 #: The resident one is kept near this long [s]: its kernel cannot be interrupted.
 _KERNEL_SECONDS = 0.1
 _MAX_SUBSTEPS = 1 << 24
+#: Pairs of an active list and the function that is called with each active member.
+Phases = tuple[tuple[Any, Callable[..., Any]], ...]
 #: Bit that a parallel substep adds to what it returns when a search is due.
 _SEARCH = 2
 
@@ -88,7 +90,7 @@ class Step:
         limits = self.schedule.limits
         if limits is None:
             return ()
-        phases = ((limits, limits.refresh),)
+        phases: Phases = ((limits, limits.refresh),)
         if self.schedule.retimes:
             phases += ((limits, WakeUp(self.advance, self.schedule).wake_up),)
         return (*phases, (Once(), self.schedule.apply_changes))
@@ -160,7 +162,8 @@ class SolvedStep(Step):
 
     def _parts(self):
         advance, schedule, solver = self.advance, self.schedule, self.advance.solver
-        touching, booked = (), ()
+        touching: Phases = ()
+        booked: Phases = ()
         if self.has_contact:
             touching = ((schedule.pairs, solver.pairs.begin), (Once(), solver.pairs.sort))
             booked = ((schedule.pairs, solver.pairs.book),)
@@ -180,7 +183,8 @@ class SolvedStep(Step):
 
     def _sweep(self, solver):
         """One sweep, colour by colour."""
-        bonds, pairs = (), ()
+        bonds: Phases = ()
+        pairs: Phases = ()
         if solver.has_bonds:
             first = solver.bonds.colour_first
             bonds = tuple((Colour(first, c), solver.bond) for c in range(BOND_COLOURS))

@@ -57,7 +57,7 @@ class Schedule:
         self.retimes = self.controlled and limits.wakes != 0
         self.applied_until = AppliedUntil(tables, state, self, contacts) if self.retimes else None
         self.spreads = self.controlled and not uniform and limits.spreads
-        if self.spreads:
+        if limits is not None and self.spreads:
             self.level_limit = LevelLimit(tables, state, contacts, limits)
         self.criterion, self.uniform, self.drifted = criterion, uniform, drifted
         self.has_contact = contacts is not None

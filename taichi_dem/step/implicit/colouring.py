@@ -11,7 +11,7 @@ def edge_colours(links: np.ndarray, body_count: int) -> np.ndarray:
     bonds, for which five colours always suffice and four or five come out.
     """
     colours = np.full(len(links), -1, dtype=np.int32)
-    at = [{} for _ in range(body_count)]
+    at: list[dict[int, int]] = [{} for _ in range(body_count)]
     for link, (i, j) in enumerate(np.asarray(links).tolist()):
         most = max(max(at[i], default=-1), max(at[j], default=-1)) + 1
         used = max(most, 1 + int(colours.max(initial=-1)))

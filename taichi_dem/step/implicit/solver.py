@@ -46,7 +46,7 @@ class Solver:
             self.bonds = BondDashpots(tables, state, schedule, self.velocities)
         self.pairs = None
         self.has_contact = contacts is not None
-        if self.has_contact:
+        if contacts is not None:
             self.pairs = PairDashpots(tables, state, schedule, contacts, self.velocities)
         self.sweeps = ti.field(ti.i32, shape=())
         self.unsolved = ti.field(ti.i32, shape=())
