@@ -145,7 +145,7 @@ class Batch(LoadedScenes):
     def checkpointed(
         self, checkpoint: Any, resume: Any, identity: dict[str, str], owners: Any = ()
     ) -> Iterator[Any]:
-        """Let the runs in its block save themselves; gives what saves them.
+        """Save the runs in its block as a checkpoint asks; yields the writer.
 
         checkpoint: a Checkpoint or None. resume: file to go on from, or None: the run that it was
         saved in is then to be called for again, and goes on. identity: words by name that a file
@@ -173,12 +173,12 @@ class Batch(LoadedScenes):
         return int(self._read_status()[0].mean()), float(self.time_s.mean())
 
     def saved(self) -> dict[str, np.ndarray]:
-        """What a checkpoint holds of it beside the fields, arrays by name."""
+        """Data for a checkpoint beside the fields, arrays by name."""
         pace = np.stack([*self.numbers.pace(), self.time_origin])
         return {**self.launches.saved(), "pace": pace, "steps_per_cycle": self.steps_per_cycle}
 
     def resume(self, saved: Mapping[str, np.ndarray]) -> None:
-        """Take over what ``saved`` gave."""
+        """Restore the data that ``saved`` returned."""
         self.launches.resume(saved)
         *pace, self.time_origin = saved["pace"].copy()
         self.numbers.take_pace(pace, saved["steps_per_cycle"])
@@ -186,7 +186,7 @@ class Batch(LoadedScenes):
         self.going_on = True
 
     def report(self) -> Report:
-        """What was done and what it cost, as a ``report.Report``."""
+        """Figures and cost of the run, a ``report.Report``."""
         particles, dt = self.table.column("particles"), self.table.column("dt")
         sprung = self.mount == "spring"
         return Report(

@@ -1,4 +1,4 @@
-"""What a run of a batch refuses, asked before its kernels are compiled."""
+"""Checks of the input of a batch, before its kernels are compiled."""
 
 from typing import Any, Optional
 
@@ -16,14 +16,14 @@ _MOST_NUMBERS = 2**27
 
 
 def check_run(transient_cycles: Any, start: Any, progress: Any) -> None:
-    """InputError for a number of cycles, a start or a progress that cannot be meant."""
+    """Raise InputError for an invalid number of cycles, start or progress."""
     whole("transient_cycles", transient_cycles, 0, MOST_CYCLES)
     choice("start", start, STARTS)
     progress_option("progress", progress)
 
 
 def check_record_fits(scenes: int, measured_cycles: int) -> None:
-    """InputError where so many scenes and cycles leave no room for what is measured."""
+    """Raise InputError where so many scenes and cycles exceed the record of measures."""
     cycles = scenes * max(1, measured_cycles)
     most = _MOST_NUMBERS // len(measures.COLUMNS)
     if cycles > most:

@@ -92,7 +92,7 @@ class Response:
         return f"{self.label}, {axes}, {counted(len(self.seeds), 'seed')}"
 
     def _repr_html_(self):
-        # Whoever never looks at a picture need not wait for matplotlib.
+        # Imported here, so that matplotlib loads only where a picture is shown.
         from ca_damper.plot.response import picture_of_response
 
         count = len(self.particles)

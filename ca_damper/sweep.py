@@ -86,7 +86,7 @@ class _Way:
         self.count = len(grid.ratios)
 
     def checkpoint_owners(self):
-        """What a checkpoint holds of it."""
+        """Data for a checkpoint, (name, owner) pairs."""
         return ("way", self), ("up", self.up), ("down", self.down)
 
     def ends(self):
@@ -104,11 +104,11 @@ class _Way:
         self.done += 1
 
     def saved(self):
-        """What a checkpoint holds of it, arrays by name."""
+        """Data for a checkpoint, arrays by name."""
         return {"done": np.array(self.done)}
 
     def resume(self, saved):
-        """Take over what ``saved`` gave."""
+        """Restore the data that ``saved`` returned."""
         self.done = int(saved["done"])
 
 
@@ -128,11 +128,11 @@ class _Collected:
             self.values[name][:, k] = value.reshape(particles, seeds)
 
     def saved(self):
-        """What a checkpoint holds of it, arrays by name."""
+        """Data for a checkpoint, arrays by name."""
         return {"steps": self.steps, **self.values}
 
     def resume(self, saved):
-        """Take over what ``saved`` gave."""
+        """Restore the data that ``saved`` returned."""
         self.steps = saved["steps"]
         self.values = {name: saved[name] for name in UNITS}
 

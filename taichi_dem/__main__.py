@@ -14,7 +14,7 @@ _MESH_MODULES = tuple(
 
 
 def sections() -> list[tuple[str, list]]:
-    """(Title, rows) of what the package offers; each name of ``__all__`` stands in one of them."""
+    """Contents of the package by section, (title, rows); each name of ``__all__`` is in one."""
     made = [
         ("Effects", listing.described("taichi_dem.effects", effects, effects.__all__)),
         ("Methods", _rows([(methods, listing.own(methods, inspect.isclass))])),

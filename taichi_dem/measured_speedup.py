@@ -22,7 +22,7 @@ _FIRST = 64
 SHARE, MOST_SECONDS = 0.1, 0.5
 #: Shorter runs are not measured [s].
 LEAST_RUN = 0.5
-#: What a twin does not take over: its clock, its steps, impulses on their way, and its account.
+#: Fields that a twin does not copy: clock, steps, pending impulses, and account.
 _ANEW = (
     *("level", "bound", "tick", "last_tick", "injected_tick", "slot", "max_speed2", "bad_body"),
     *("bond_heat", "contact_heat", "load_work", "load_impulse"),
@@ -37,7 +37,7 @@ def speedup_of_run(simulation: Simulation) -> Optional[float]:
     spent = simulation.run_cpu_seconds
     if simulation.method.uniform or spent < LEAST_RUN or not is_dataclass(simulation.method):
         return None
-    # The run is over: who watched it is told nothing of a twin.
+    # The run is over: its listeners are told nothing of a twin.
     with contextlib.suppress(SimulationDiverged), listening(lambda _: None):
         return measured_speedup(simulation, min(MOST_SECONDS, SHARE * spent))
     return None
@@ -60,7 +60,7 @@ def measured_speedup(simulation: Simulation, seconds: float = MOST_SECONDS) -> f
         spent, done = -twin.run_cpu_seconds, -twin.evaluations()
         twin.advance_to(substeps)
         spent, done = spent + twin.run_cpu_seconds, done + twin.evaluations()
-        # A call costs time of its own: only a long one tells what a substep takes.
+        # A call costs time of its own: only a long one measures a substep.
         substeps *= 2
     return report.uniform_evaluations * spent / max(1, done) / report.run_cpu_seconds
 
@@ -77,7 +77,7 @@ def _twin(simulation, step):
         if name not in _ANEW:
             values = given[name]
             if name.endswith("_tick"):
-                # Ticks of another length: what has been, has been since the start.
+                # Ticks have another length: all past events count as at the start.
                 values = np.where(values == NEVER, NEVER, 0)
             field.from_numpy(values)
     twin.start()

@@ -90,7 +90,7 @@ def _steps_ahead(method):
 
 
 def structure_of(method: Any) -> Hashable:
-    """What of a method its kernels depend on, hashable: all but its numbers.
+    """Parts of a method on which its kernels depend, hashable: all but its numbers.
 
     A method of one's own says so by a member ``structure``; else any change of its numbers compiles
     anew, as kernels may have read them.
@@ -104,7 +104,7 @@ def structure_of(method: Any) -> Hashable:
 
 
 def _suffix(method):
-    """What a name adds for control and limited dashpots."""
+    """Suffix of a name for control and limited dashpots."""
     controlled = "_controlled" if method.control is not None else ""
     return controlled + ("_limited" if method.dashpot == "limited" else "")
 
@@ -218,7 +218,7 @@ class ImplicitDashpots:
     dashpot = "full"
     distance = None
     solves = True
-    # What may touch within the step is solved with it; a little more, as a spin is rounded.
+    # Spheres that may touch within the step are solved in it; slightly more, as a spin is rounded.
     steps_ahead = 1.01
     name = "implicit"
 

@@ -101,7 +101,7 @@ class Observer(Protocol):
         """Times of the calls."""
 
     def observe(self, view: "RunView") -> None:
-        """Measure; what it raises ends the run, and no result is written."""
+        """Measure; an exception here ends the run, and no result is written."""
 
 
 class RunView:
@@ -208,7 +208,7 @@ def _takes_one(observe):
     except TypeError:
         return False
     except ValueError:
-        # Functions of other languages may hide what they take.
+        # Functions of other languages may hide their signature.
         return callable(observe)
     return True
 
@@ -231,16 +231,16 @@ class ObserverCalls:
 
     @property
     def steps(self) -> set[int]:
-        """Largest steps at which somebody is called, a set."""
+        """Largest steps at which an observer is called, a set."""
         return set(self._at)
 
     def at_step(self, step: int, view: RunView) -> None:
-        """Call those of a step."""
+        """Call the observers of a step."""
         for observer in self._at.get(step, ()):
             observer.observe(view)
 
     def by_clock(self, view: RunView) -> None:
-        """Call those whose wall time has passed."""
+        """Call the observers whose wall time has passed."""
         for observer, pace in self._paced:
             if pace.should_report():
                 observer.observe(view)

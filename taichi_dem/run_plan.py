@@ -82,7 +82,7 @@ class RunPlan:
     def calls(
         self, simulation: Simulation, recorder: Recorder, report_progress: Optional[Listener]
     ) -> ObserverCalls:
-        """ObserverCalls of a run: at a step, samples and frames come before what observes them."""
+        """ObserverCalls of a run: samples and frames come before the user's observers."""
         observers: list[Any] = [_Sampler(simulation, recorder)]
         observers += [_Photographer(recorder, self.frames), *self.observers]
         if report_progress is not None:

@@ -1,4 +1,4 @@
-"""What a user writes: mesh, material and the effects that the scene calls for."""
+"""Scene: mesh, material and the effects that act in it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,13 +13,13 @@ from taichi_dem.materials import Material
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.parts import may_meet, parts_of
 
-#: What lets bodies touch at outer faces.
+#: Option that lets bodies touch at outer faces.
 REMEDY = "SphereContact(outer_faces=True)"
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A block of bonded bodies and what acts in it; checked once, here.
+    """A block of bonded bodies and the effects that act in it; checked once, here.
 
     mesh: tetrahedra and face groups. material: its constants. effects: the effects that act; what
     is not listed is not computed. max_speed: bound [m/s] beyond which a run counts as diverged.

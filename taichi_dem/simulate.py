@@ -121,7 +121,7 @@ def _started(simulation):
 
 
 def _opened(scene, method, checkpoint, resume, last):
-    """What a run goes on from, arrays by name, or None; InputError for what it cannot."""
+    """Arrays by name to resume from, or None. Raises InputError for an unusable checkpoint."""
     if isinstance(checkpoint, Checkpoint):
         # Refuses too many of them, before anything is done.
         checkpoint.marks(last, method.dt0)
@@ -137,7 +137,7 @@ def _opened(scene, method, checkpoint, resume, last):
 
 
 def _checkpoint_writer(simulation, recorder, checkpoint, resume, arrays):
-    """What saves the run, after the run has been put where it was saved."""
+    """Writer of checkpoints, after a resumed run has been restored."""
     if checkpoint is None and resume is None:
         return NoCheckpointWriter()
     saved = saved_run(simulation, recorder)
@@ -168,7 +168,7 @@ def saved_run(simulation: Simulation, recorder: Recorder) -> RunSnapshot:
 
 
 def identity_of(scene: Scene, method: Method) -> dict[str, str]:
-    """What two runs must share for one to go on from the other, in words.
+    """Properties that a resumed run must share with the saved one, in words by name.
 
     Driver, threads, and how long a run goes and what it records may differ.
     """

@@ -37,12 +37,12 @@ from taichi_dem.timeline import MACRO_TICKS, NEVER
 
 #: Largest steps of a run, of which the ticks are counted in 64 bits.
 MOST_STEPS = 2**42
-#: What is said of the resident driver where its kernel cannot run.
+#: Reason why the resident driver cannot run, for a sentence.
 CPU_ONLY = "runs on a CPU only"
 #: Bonds below which the resident driver is the quicker one, and above which the parallel one is,
-#: on a CPU with several threads whose cores are free; between them both are tried.
+#: on a CPU with several threads and free cores; between them both are tried.
 RESIDENT_BELOW, PARALLEL_FROM = 4000, 100000
-#: What stands for the driver until it has been measured.
+#: Name of the driver that is chosen by measurement.
 _MEASURED = "measured"
 
 
@@ -229,11 +229,11 @@ class Simulation:
         return int(self.broad_phase.searches[None]) if self.contacts is not None else 0
 
     def saved(self) -> dict[str, np.ndarray]:
-        """What a checkpoint holds of it beside the fields, arrays by name."""
+        """Data for a checkpoint beside the fields, arrays by name."""
         return {"cost": np.array([self.running_seconds(), self.cpu_seconds()])}
 
     def resume(self, saved: Mapping[str, np.ndarray]) -> None:
-        """Take over what ``saved`` gave."""
+        """Restore the data that ``saved`` returned."""
         self.run_seconds, self.run_cpu_seconds = saved["cost"].tolist()
 
     def evaluations(self) -> int:

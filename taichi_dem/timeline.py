@@ -27,7 +27,7 @@ def coarsest_active(tick: int) -> int:
 
 
 def next_level(wanted: int, tick: int) -> int:
-    """Level a body that is due at a tick may take: what it wants, or the coarsest the grid has."""
+    """Level that a body active at a tick takes: the wanted one, or the coarsest allowed then."""
     return max(wanted, coarsest_active(tick))
 
 

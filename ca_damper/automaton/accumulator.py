@@ -1,4 +1,4 @@
-"""What becomes of the way travelled when a particle turns: four readings of a rule left open.
+"""Distance travelled after a turn: four readings of a rule that the paper leaves open.
 
 The paper says that way is summed up to a cell's width (eq. 8), not what a turn does to the sum.
 ``signed`` takes the sum for a place: the way on along the new direction is what the old way has

@@ -79,7 +79,7 @@ class Collisions:
 
     @ti.func
     def find_event(self, s, cell, velocity, pull, pressed):
-        """What happens to a particle, and the speed of what it meets."""
+        """Event of a particle, and the speed of its obstacle."""
         kind = self.cells.at(s, cell)
         ahead = self.lattice.cell_ahead(cell, kind)
         met = self.cells.at(s, ahead)
@@ -154,7 +154,7 @@ class Collisions:
 
     @ti.func
     def collide(self, s, shared, cell, other):
-        """Two particles meet along the line from ``cell`` to what is ahead of it (eq. 9).
+        """Collide two particles along the line from ``cell`` to the one ahead (eq. 9).
 
         Returns the gain of velocity along x that is not theirs: of the deflections, and of what one
         that came from aside had across the line [m/s].

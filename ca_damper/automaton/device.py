@@ -75,7 +75,7 @@ class DeviceAutomaton:
 
     @ti.func
     def energy(self, s):
-        """Kinetic and potential energy [J]; what is held moves as the container did last."""
+        """Kinetic and potential energy [J]; held particles move as the container did last."""
         total = 0.0
         for cell in range(self.lattice.cell_count()):
             kind = self.cells.at(s, cell)
@@ -88,7 +88,7 @@ class DeviceAutomaton:
 
     @ti.func
     def momentum(self, s):
-        """Momentum along x [kg m/s]; what is held moves as the container did last."""
+        """Momentum along x [kg m/s]; held particles move as the container did last."""
         total = self.resting.count(s) * self.velocity[s]
         for cell in range(self.lattice.cell_count()):
             total += self.cells.vertical_speed(s, cell)

@@ -1,4 +1,4 @@
-"""Static contact: what lies on the floor moves with it and weighs on it.
+"""Static contact: particles at rest on the floor move with it and load it.
 
 The paper names the absence of it as the reason why its response peak moves the wrong way (6.2).
 A particle that stands on the floor, or on one that is held already, and has almost its velocity is
@@ -28,7 +28,7 @@ class StaticContact:
 
     @ti.func
     def clear(self, s):
-        """Nobody is held."""
+        """No particle is held."""
         self.held[s] = 0
 
     @ti.func
@@ -92,7 +92,7 @@ class NoStaticContact:
 
     @ti.func
     def count(self, s):
-        """Nobody."""
+        """No particle."""
         return 0
 
     @ti.func
@@ -102,7 +102,7 @@ class NoStaticContact:
 
     @ti.func
     def joins(self, s, cell, velocity, pull, pressed):
-        """Nobody joins."""
+        """No particle joins."""
         return False
 
     @ti.func

@@ -47,7 +47,7 @@ class Transport:
 
     @ti.func
     def fly(self, s, cell, dt, pull):
-        """One step of what stands in a cell.
+        """Advance the content of a cell by a step.
 
         Gravity acts by its projection. A particle that has risen as far as it can turns straight
         down. Empty cells and walls go the same way: their speed and their pull are zero.

@@ -57,13 +57,13 @@ class Launches:
         self.particle_steps += int((particles * steps).sum())
 
     def saved(self) -> dict[str, np.ndarray]:
-        """What a checkpoint holds of it, arrays by name."""
+        """Data for a checkpoint, arrays by name."""
         return {
             "run": np.array([self.done, self.seconds, self.run_seconds]),
             "steps": np.array([self.scene_steps, self.particle_steps]),
         }
 
     def resume(self, saved: Mapping[str, np.ndarray]) -> None:
-        """Take over what ``saved`` gave."""
+        """Restore the data that ``saved`` returned."""
         self.done, self.seconds, self.run_seconds = saved["run"].tolist()
         self.scene_steps, self.particle_steps = saved["steps"].tolist()

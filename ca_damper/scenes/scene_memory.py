@@ -42,7 +42,7 @@ class SceneMemory:
         return ""
 
     def write(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """Give the fields their values back, from what ``read`` gave and ``misfit`` accepts."""
+        """Restore the fields from arrays that ``read`` returned and ``misfit`` accepts."""
         for k, one in enumerate(self._made()):
             whole = values(one.field)
             self._window(one, whole)[...] = arrays[f"scenes/{k}"]

@@ -94,7 +94,7 @@ class Spheres:
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """What is computed, in words for the report."""
+        """Effects that are computed, in words for the report."""
         asked = {"friction": self.rubs, "rotation": self.rotation}
         return ("normal contact", *(name for name, there in asked.items() if there))
 

@@ -1,4 +1,4 @@
-"""Bonds between the bodies of a pair, and what a break at this tick brings into being."""
+"""Bonds between the bodies of a pair, and overlaps that a break at this tick creates."""
 
 from typing import TYPE_CHECKING
 
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 @ti.data_oriented
 class Breaks:
-    """Tells the contact search which pairs are bonded, and which overlaps are new.
+    """Which pairs are bonded, and which overlaps are new, for the contact search.
 
     fresh: 1 when a face has got its spheres since the last search, whose injection is booked.
     newest: last tick at which a face of a body got its spheres, negative for none.

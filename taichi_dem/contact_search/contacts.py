@@ -102,7 +102,7 @@ class Contacts:
 
     @ti.func
     def add_impulse(self, p, side: ti.template(), linear, angular):
-        """Add an impulse [N s] and its moment [N m s] to what waits for a body of a pair."""
+        """Add an impulse [N s] and its moment [N m s] to the pending ones of a body of a pair."""
         slot = 2 * p + side
         self.store.waiting[p][side] = 1
         for k in ti.static(range(3)):

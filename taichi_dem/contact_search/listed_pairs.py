@@ -1,4 +1,4 @@
-"""Entries of the Verlet list: what only the search asks of a pair."""
+"""Entries of the Verlet list: data of a pair that only the search reads."""
 
 import taichi as ti
 

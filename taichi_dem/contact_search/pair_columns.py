@@ -1,4 +1,4 @@
-"""Columns of the pair store: what effects and methods keep of a pair, or of two of its spheres."""
+"""Columns of the pair store: data of effects and methods for a pair, or for two of its spheres."""
 
 from typing import Any
 

@@ -38,7 +38,7 @@ class Reach:
     @ti.func
     def notice(self, i):
         """See whether body i, which is looked at, has left its reach."""
-        # No point of the body went further than this: a norm of a matrix bounds what it does.
+        # Upper bound on the displacement of any point: a matrix norm bounds that of its product.
         way = (self.state.position[i] - self.placed_at[i]).norm()
         way += (self.state.rotation[i] - self.turned_to[i]).norm() * self.tables.extent[i]
         if not way + self.contacts.body_skin[i] < self.reach[i]:

@@ -92,7 +92,7 @@ class BroadPhase:
 
     @property
     def phases(self) -> tuple[tuple[Callable[..., Any], Callable[..., Any]], ...]:
-        """What a search does, as pairs of how often and what, in order."""
+        """Phases of a search in order, as pairs of a count and a function of an index."""
         return (
             (self._once, self._list_exposed),
             (self._exposed_bodies, self._choose),
@@ -257,7 +257,7 @@ class BroadPhase:
 
     @ti.func
     def _update_pairs(self, a):
-        """Put the near pairs of an exposed body in order, and write what is new in them."""
+        """Put the near pairs of an exposed body in order, and write their new sphere pairs."""
         i = self.exposed[a]
         if self.full[None] == 0:
             if self.near_pairs.row_is_new[i] == 1:
@@ -279,7 +279,7 @@ class BroadPhase:
 
     @ti.func
     def _update_pair(self, k, p, i, j):
-        """Write the sphere pairs of entry k, and book what their birth injects."""
+        """Write the sphere pairs of entry k, and book the energy that new overlaps inject."""
         faces, count = self.listed.new_faces[k], self.listed.found[k]
         self.listed.new_faces[k] = 0
         if faces != 0:

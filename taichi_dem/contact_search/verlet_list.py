@@ -18,7 +18,7 @@ from taichi_dem.methods import Method
 if TYPE_CHECKING:
     from taichi_dem.engine.model import Model
 
-#: What the list is when it needs to be made anew, and while it is.
+#: State of the list when it must be rebuilt, and while it is being rebuilt.
 STALE, MAKING = 1, 2
 #: Room left behind the neighbours of each body, for fast ones that come.
 SPARE = 16
@@ -190,7 +190,7 @@ class VerletList:
 
     @ti.func
     def _find_row_index(self, i, j):
-        """First place among the neighbours of body i whose body is not before j."""
+        """First place among the neighbours of body i with an index of at least j."""
         low, high = self.first[i], self.last[i]
         while low < high:
             middle = (low + high) // 2

@@ -62,8 +62,8 @@ class DivergenceCheck:
         self._check_energy()
         now = time.process_time()
         if hurried:
-            # The first check, which is not, compiles: that says nothing of what one takes. What
-            # takes no more than its share of a call does not rest, so small scenes never do.
+            # The first check, which is not hurried, compiles: its time is no measure. A check that
+            # takes no more than its share of a call is never skipped, so not in small scenes.
             self.rest_until = now + (now - started) / SHARE - CALL_SECONDS
 
     def _check_speed(self):
@@ -141,7 +141,7 @@ class DivergenceCheck:
         return self.contacts.store.near_table()[0]
 
     def _advice(self, body, links):
-        """What limits the step around a body, and a step that would do.
+        """Criterion that limits the step near a body, and a step that meets it.
 
         What runs away is often thrown by a neighbour of a shorter step: the tightest one counts.
         """
@@ -154,7 +154,7 @@ class DivergenceCheck:
         return f"{whose} allow {limit:.3g} s: try a step of {0.5 * limit:.2g} s"
 
     def _limits(self):
-        """Largest stable explicit steps by what sets them [s], arrays (body_count,).
+        """Largest stable explicit steps [s] by criterion, arrays (body_count,).
 
         Dashpots that are solved or limited set none.
         """

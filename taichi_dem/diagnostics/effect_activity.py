@@ -14,12 +14,12 @@ if TYPE_CHECKING:
     from taichi_dem.engine.model import Model
 
 _EPSILON = np.finfo(np.float64).eps
-#: Terms of the account that pass through bonds: what their dashpots took is a share of these.
+#: Terms of the account that pass through bonds; dashpots are compared with their sum.
 _THROUGH_BONDS = ("bond_strain", "bond_dashpot", "softening", "release", "slip")
-#: Roles judged by whether they acted: a crack, a slip, a wall or what sticks decides much and
-#: takes little.
+#: Roles judged by whether they acted: a crack, slip, wall or sticking contact can decide the
+#: outcome at little energy.
 _STEERING = ("tension", "shear", "contact", "friction", "support")
-#: Roles whose absence poses another question, whatever work they did.
+#: Roles that define the problem, so that they are kept whatever work they did.
 _POSED = {
     "load": "a load is part of the question",
     "support": "a support is part of the question",
@@ -66,7 +66,7 @@ def _unseen(model):
 
 
 class _Rounding(NamedTuple):
-    """What rounding alone may leave in the account [J]: of a support, and of each bond."""
+    """Bounds of rounding errors in the account [J]: of a support, and of each bond."""
 
     work: float
     heat: np.ndarray
@@ -90,7 +90,7 @@ def _listed(model):
 
 
 def _by_role(model, energy_balance, tables, touching, rounding, effect):
-    """(effect, what, events, energy): terms of the account, or a number [J]."""
+    """The effect, its counted events in words, their number, and terms of the account or [J]."""
     body, bond, pair = tables
     if effect.role == "load":
         work = energy_balance.load_works(model.loads.index(effect))

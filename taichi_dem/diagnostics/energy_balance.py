@@ -37,7 +37,7 @@ TERMS = (
 
 
 class EnergyBalance:
-    """Sums what the step has booked; stored energies are computed anew by the step's own laws.
+    """Energy balance: sums of booked terms, and stored energies computed by the laws of the step.
 
     readings: the ``Readings`` of a run. contacts: its ``Contacts``, None without.
     """
@@ -52,17 +52,17 @@ class EnergyBalance:
         self.start_momentum = self.momentum()
 
     def saved(self) -> dict[str, np.ndarray]:
-        """What a checkpoint holds of it, arrays by name."""
+        """Data for a checkpoint, arrays by name."""
         return {"start": np.array([self.start_energy, *self.start_momentum])}
 
     def resume(self, saved: Mapping[str, np.ndarray]) -> None:
-        """Take over what ``saved`` gave."""
+        """Restore the data that ``saved`` returned."""
         self.start_energy, self.start_momentum = float(saved["start"][0]), saved["start"][1:]
 
     def account(self, tables: Optional[EnergyTables] = None) -> dict[str, float]:
-        """All terms in J by name; residual is what the account cannot explain.
+        """All terms in J by name; residual is the unexplained remainder.
 
-        tables: what ``tables`` gave, where it has been read already.
+        tables: those of ``tables``, if they have been read already.
         """
         body, bond, pair = self.tables() if tables is None else tables
         terms = {
@@ -83,7 +83,7 @@ class EnergyBalance:
         return {name: float(value) for name, value in terms.items()}
 
     def tables(self) -> EnergyTables:
-        """What the terms are summed of [J].
+        """Tables that the terms are summed from [J].
 
         A row a body: kinetic, loads, supports, sphere dashpots, friction, injected. A row a bond:
         strain, dashpot, slip, release, softening. A row a pair: strain, dashpots, friction,
@@ -126,13 +126,13 @@ class EnergyBalance:
         return work
 
     def momentum(self) -> np.ndarray:
-        """Linear [N s] and angular momentum about the origin [N m s] less what was given, (6,)."""
+        """Linear [N s] and angular momentum about the origin [N m s], less external impulses."""
         rows = np.zeros((self.model.body_count, 12))
         self.readings.momentum(rows)
         return rows[:, :6].sum(axis=0) - rows[:, 6:].sum(axis=0)
 
     def momentum_errors(self) -> tuple[float, float]:
-        """Linear and angular momentum out of nothing, as shares of what the bodies exchanged.
+        """Errors of linear and angular momentum, relative to the momentum exchanged.
 
         The scale is the sum over bodies of the size of momentum and of load impulse.
         """

@@ -43,7 +43,7 @@ class MissingEffect:
         time_s: float,
         middle: Callable[[int], tuple[float, ...]],
     ) -> None:
-        """Take in what a recording at a time [s] saw.
+        """Add the findings of a recording at a time [s].
 
         places: numbers of the bonds or bodies, one for every sight. middle: function of such a
         number, its place in the mesh [m].
@@ -74,7 +74,7 @@ _OVERLAP = "pairs of bodies overlap at outer faces, which carry no contact spher
 
 
 def _outer_faces(model, state, outer_overlaps):
-    """What finds bodies that overlap at outer faces without spheres; None where none can.
+    """Detector of bodies that overlap at outer faces without spheres; None where none can.
 
     Without contact a solid in one piece has nothing to meet but what broke off it: that is found
     at its released bonds.
@@ -133,7 +133,7 @@ class MissingEffects:
                 self.needed[role].see(np.flatnonzero(marks[:, column]), time_s, self._middle)
 
     def saved(self) -> dict[str, np.ndarray]:
-        """What a checkpoint holds of it, arrays by name."""
+        """Data for a checkpoint, arrays by name."""
         rows = [[m.times, m.most, m.where, m.first_s] for m in self._all()]
         return {
             "needed": np.array(rows, dtype=np.float64),
@@ -141,7 +141,7 @@ class MissingEffects:
         }
 
     def resume(self, saved: Mapping[str, np.ndarray]) -> None:
-        """Take over what ``saved`` gave."""
+        """Restore the data that ``saved`` returned."""
         for finding, row in zip(self._all(), saved["needed"].tolist()):
             finding.times, finding.most, finding.where = (int(value) for value in row[:3])
             finding.first_s = row[3]

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @ti.data_oriented
 class Readings:
-    """Kernels that read what the step has booked, or compute anew by the step's own laws.
+    """Kernels that read booked terms, or compute others by the laws of the step.
 
     Every method fills arrays of the counts of the scene.
     """
@@ -77,7 +77,7 @@ class Readings:
 
     @ti.kernel
     def momentum(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
-        """Linear and angular momentum of every body, and what loads and supports have given it."""
+        """Linear and angular momentum of every body, and impulses from loads and supports."""
         for i in range(self.tables.body_count[None]):
             linear = self.tables.mass[i] * self.state.velocity[i]
             angular = self.state.angular_momentum[i] + self.state.position[i].cross(linear)
@@ -132,7 +132,7 @@ class Readings:
         share: ti.types.ndarray(dtype=ti.f64, ndim=1),
         taken: ti.types.ndarray(dtype=ti.f64, ndim=1),
     ):
-        """Note, for the bodies of touching pairs, what their steps leave of sphere dashpots.
+        """Note how far the steps of touching bodies limit their sphere dashpots.
 
         share: least share, where dashpots are limited; else taken: largest part of a speed that
         they take in a step.

@@ -11,7 +11,7 @@ _JSON_KEYS = {"effect_activity": "acted", "missing_effects": "missed"}
 
 @dataclass(frozen=True)
 class Report:
-    """What a run did and what it cost.
+    """Figures and cost of a run.
 
     method, driver, effects: what was run. until_s: simulated time. substeps: ticks at which
     something was due. body_updates, bond_evaluations, pair_evaluations: work done.
@@ -116,19 +116,19 @@ class Report:
         return {**figures, **{name: getattr(self, name) for name in derived}}
 
     def _effect_rows(self):
-        """What each effect did."""
+        """Rows with the activity of each effect."""
         if not self.effect_activity:
             return (("effects", "none"),)
         rows = [f"{use.effect}: {use}" for use in self.effect_activity]
         return (("effects", rows[0]), *(("", row) for row in rows[1:]))
 
     def _bound_words(self):
-        """What bounds the steps of how many bodies."""
+        """Criteria that bound the steps, with the number of bodies."""
         words = ((name.replace("_", " "), n) for name, n in self.bound_by.items())
         return ", ".join(f"{name} ({n} bodies)" for name, n in words)
 
     def _gain_row(self):
-        """What steps of different length save, where there are some."""
+        """Row with the gain from steps of different length, where there are any."""
         if self.body_updates == self.body_count * self.substeps:
             return ()
         ideal, reached = f"{self.ideal_gain:.2f}", f"{self.boundary_gain:.2f}"
@@ -138,7 +138,7 @@ class Report:
         return (("gain over uniform", words),)
 
     def _sweeps_row(self):
-        """What solving all dashpots took, for the methods that do."""
+        """Row with the sweeps over all dashpots, for methods that solve them."""
         if not self.sweeps:
             return ()
         return (("sweeps", f"{self.sweeps:,}, {self.sweeps / self.substeps:.2f} a substep"),)

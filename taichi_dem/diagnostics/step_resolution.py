@@ -27,7 +27,7 @@ _KEPT = ("share", "pair_share", "taken", "step", "lightest")
 
 
 class StepResolution:
-    """Looks, at recording times, at what steps leave of dashpots; at the end, at how bonds failed.
+    """Checks of the time step: shares of dashpots at recording times, bond failures at the end.
 
     share: least share of its dashpots that each bond was left with while it held, (bond_count,).
     step: shortest step of each body [s]; lightest: mass of the lightest it came near [kg];
@@ -53,11 +53,11 @@ class StepResolution:
         self.lightest = model.body_mass.copy()
 
     def saved(self) -> dict[str, np.ndarray]:
-        """What a checkpoint holds of it, arrays by name."""
+        """Data for a checkpoint, arrays by name."""
         return {name: getattr(self, name) for name in _KEPT}
 
     def resume(self, saved: Mapping[str, np.ndarray]) -> None:
-        """Take over what ``saved`` gave."""
+        """Restore the data that ``saved`` returned."""
         for name in _KEPT:
             setattr(self, name, saved[name].copy())
 
@@ -81,7 +81,7 @@ class StepResolution:
             np.minimum.at(self.lightest, one, mass[other])
 
     def findings(self, bodies: Optional[np.ndarray] = None) -> tuple[str, ...]:
-        """Sentences about what the step did not resolve, an empty tuple where it did all.
+        """Sentences about dashpots and failures that the step did not resolve; may be empty.
 
         bodies: which to judge, booleans (body_count,), all by default.
         """

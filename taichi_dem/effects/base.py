@@ -1,4 +1,4 @@
-"""What an effect is, and the null objects that stand where a scene lists none.
+"""Base class of effects, and null objects for roles in which a scene lists none.
 
 A user's effect holds numbers on the host. In an engine stands a bound copy of it, which has its
 fields and kernels, and into which every scene that the engine runs loads its numbers. Its ``role``
@@ -62,7 +62,7 @@ class Effect:
         """Declare further fields, with the capacity of an engine; no field may be used here."""
 
     def declare_columns(self, store: "PairStore") -> None:
-        """Declare what it keeps of a pair of bodies, or of two spheres, in a ``PairStore``.
+        """Declare its data for each pair of bodies, or of spheres, in a ``PairStore``.
 
         ``store.column`` and ``store.sphere_column`` give fields. Asked in scenes with contact.
         """

@@ -52,7 +52,7 @@ class StickingFriction(Friction):
 
     @ti.func
     def slip(self, k, limit, way):
-        """Shorten the spring of sphere pair k to what a limit [N] can hold; energy it takes [J].
+        """Shorten the spring of sphere pair k to a limit [N]; return the energy dissipated [J].
 
         way: by which it has just been stretched [m]. The work of the way, by the mean of the forces
         before and after, is what the spring stores and what slipping takes.
@@ -78,7 +78,7 @@ class StickingFriction(Friction):
 
     @ti.func
     def part(self, k):
-        """Lose the spring of sphere pair k, whose spheres touch no more; its energy [J]."""
+        """Reset the spring of sphere pair k, whose spheres have parted; return its energy [J]."""
         energy = self.stored(k)
         self.stretch[k] = vec3(0.0)
         return energy

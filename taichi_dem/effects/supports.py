@@ -31,7 +31,7 @@ class _Support(Effect):
         self.group = word("group", group)
 
     def travel(self) -> Travel:
-        """None: it holds what it acts on."""
+        """No displacement: the bodies are held."""
         return (0.0,) * 3, (0.0,) * 3
 
     def declare(self, capacity: "Capacity") -> None:
@@ -88,7 +88,7 @@ class Roller(_Support):
         """Velocity within the plane, spin about its normal."""
         normal = vec3(self.law[0], self.law[1], self.law[2])
         axis = rotation.transpose() @ normal
-        # The plane's moment is across the normal: what there is along it stays.
+        # The plane's moment is normal to its normal, so the component along it is unchanged.
         spin = angular_momentum.dot(normal) / axis.dot(self.tables.inertia[i] @ axis)
         kept = rotation @ (self.tables.inertia[i] @ (spin * axis))
         return velocity - velocity.dot(normal) * normal, kept

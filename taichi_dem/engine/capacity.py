@@ -71,7 +71,7 @@ class Capacity(NamedTuple):
 
 
 def capacity_of(model: "Model") -> Capacity:
-    """What a ``Model`` needs."""
+    """Capacity that a ``Model`` needs."""
     if not model.has_contact:
         return Capacity(model.body_count)
     return Capacity(model.body_count, model.contact.face_spheres, *model.contact.lengths)

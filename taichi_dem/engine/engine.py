@@ -22,7 +22,7 @@ from taichi_dem.step.schedule import Schedule
 
 
 class Structure:
-    """What a compiler sees of a scene and a method: classes of effects, kind of the method.
+    """Compiled structure of a scene and a method: classes of effects, kind of method.
 
     Two structures are equal where one's kernels serve the other. effects, method: those of the
     first scene, of which engines make copies. brute_force: contact search without cells.
@@ -114,7 +114,7 @@ class BlastEngine(Engine):
         return all(effect.accepts(given) for effect, given in self.tables.matched(model))
 
     def enter(self, model: Model) -> None:
-        """Note the counts of a scene whose data come in, and the numbers of its effects."""
+        """Set the counts and effects of the scene whose data are loaded."""
         self.lengths = self._lengths(model)
         for effect, given in self.tables.matched(model):
             effect.stand_for(given)

@@ -1,4 +1,4 @@
-"""What never changes in a run, as arrays: bodies, bonds and contact spheres of a scene."""
+"""Constants of a scene as arrays: bodies, bonds and contact spheres."""
 
 from collections.abc import Iterable
 from functools import cached_property

@@ -1,4 +1,4 @@
-"""Everything that changes in a run; with the effects' own state this is what a checkpoint holds."""
+"""Everything that changes in a run; checkpoints hold this and the effects' own state."""
 
 from typing import Optional
 

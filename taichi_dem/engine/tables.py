@@ -15,7 +15,7 @@ from taichi_dem.kit.types import real
 
 @ti.data_oriented
 class Tables:
-    """Device side of a ``Model``: what kernels read and never write.
+    """Device side of a ``Model``, which kernels only read.
 
     body_count, bond_count: of the scene; fields have the capacity of the engine.
     mass [kg] and inertia [kg m^2] with their inverses, radius (of the ball around the body, [m])

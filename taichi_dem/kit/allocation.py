@@ -22,7 +22,7 @@ from taichi.lang.util import to_numpy_type
 
 from taichi_dem.kit.errors import InputError
 
-#: Trees after which nothing new is begun; what has begun needs some more.
+#: Trees beyond which no new one is begun; a few more complete those begun.
 MOST_TREES = 480
 #: Share of the free memory that a tree may take.
 _SHARE = 0.9

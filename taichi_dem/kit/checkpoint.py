@@ -1,7 +1,7 @@
-"""Runs that are saved on their way and gone on with: when, into what file, and for whom it is.
+"""Checkpoints: when a run is saved, the file, and the identity that a resumed run must share.
 
-A file holds arrays by name and an identity: what a run has to share with it to go on from it.
-Nothing here knows what is simulated.
+A file holds arrays by name and an identity, words by name.
+Nothing here depends on the physics.
 """
 
 import hashlib
@@ -72,7 +72,7 @@ class Checkpoint:
 
 
 class SaveTimer:
-    """Whether a checkpoint is due, from what has passed since the last one."""
+    """Timer that tells whether a checkpoint is due."""
 
     def __init__(self, checkpoint: Checkpoint):
         self.every = (checkpoint.every_steps, checkpoint.every_s, checkpoint.every_wall_s)
@@ -176,7 +176,7 @@ def read_checkpoint(path: FileName, identity: Mapping[str, str]) -> dict[str, np
 
 
 def _read(path):
-    """What the file says of itself, and its arrays; every part is checked against its sum."""
+    """Header of a file, and its arrays; every part is checked against its checksum."""
     path = path_name("checkpoint", path)
     if os.path.exists(path) and not os.path.isfile(path):
         what = "it is a folder" if os.path.isdir(path) else "it is no file"

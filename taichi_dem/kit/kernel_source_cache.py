@@ -25,7 +25,7 @@ def broken(text: str, width: int) -> tuple[str, ...]:
 
 
 class RememberingWrapper(textwrap.TextWrapper):
-    """A ``textwrap.TextWrapper`` with the usual options that looks up what it broke before."""
+    """A ``textwrap.TextWrapper`` with the usual options that caches its results."""
 
     def wrap(self, text: str) -> list[str]:
         """Lines of a text, a list."""
@@ -38,7 +38,7 @@ def remembering(find: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
     def lines(function):
         """Source lines of a function and the number of the first."""
-        # Equal code of two files may differ in what is no code: annotations.
+        # Equal code of two files may differ in annotations, which are not part of it.
         key = (function.__code__.co_filename, function.__code__)
         if key not in cached:
             cached[key] = find(function)

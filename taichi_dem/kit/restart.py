@@ -1,4 +1,4 @@
-"""Runs that save themselves: what a run consists of, when it is saved, how one goes on from it."""
+"""Saving and resuming runs: the parts of a run, the times of saving, and how a run is resumed."""
 
 import os
 from collections.abc import Callable, Mapping
@@ -29,7 +29,7 @@ class Memory(Protocol):
         """Name of a field that arrays lack or do not fit; else ""."""
 
     def write(self, arrays: Mapping[str, np.ndarray], /) -> None:
-        """Give all fields their values back."""
+        """Restore all fields."""
 
 
 class Owner(Protocol):
@@ -43,7 +43,7 @@ class Owner(Protocol):
 
 
 class RunSnapshot:
-    """All of a run that changes: the fields on the device and what its owners hold beside them.
+    """All changing data of a run: fields on the device, and data of its owners on the host.
 
     identity: what two runs must share for one to go on from the other, words by name. memory: of
     the fields. owners: by name.
@@ -116,7 +116,7 @@ class CheckpointWriter:
             raise Interrupted(time_s, self.checkpoint.path)
 
     def save(self) -> None:
-        """Save the run. Raises InputError that tells what the last good checkpoint is."""
+        """Save the run. Raises InputError that names the last good checkpoint."""
         try:
             self.snapshot.write(self.checkpoint.path)
         except InputError as error:
@@ -126,7 +126,7 @@ class CheckpointWriter:
         self.timer.saved_at(step, time_s)
 
     def last_good(self) -> str:
-        """What is left to go on from, as the end of a sentence."""
+        """The last good checkpoint, as the end of a sentence."""
         if self.saved_s is None:
             return "; this run has saved no checkpoint before"
         path = os.fspath(self.checkpoint.path)

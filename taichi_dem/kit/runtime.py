@@ -38,7 +38,7 @@ ARCHITECTURES = ("cpu", "cuda")
 
 @dataclass(frozen=True)
 class Settings:
-    """What Taichi was started with.
+    """Settings with which Taichi was started.
 
     arch: "cpu" or "cuda". threads: CPU threads of parallel loops. debug: bounds checks in kernels.
     """
@@ -57,7 +57,7 @@ _on_clear: list[Callable[[], object]] = []
 
 
 class Session:
-    """What one start of Taichi brought about; objects that own fields remember theirs.
+    """One start of Taichi; objects that own fields remember theirs.
 
     program: Taichi's own object of it. thread: the one that started it, the only one that may use
     it. cleared: whether its engines have been given back since.

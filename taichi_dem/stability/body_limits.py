@@ -50,7 +50,7 @@ STOPS = 1.0
 
 @ti.data_oriented
 class StabilityLimits:
-    """Rates of every body, and the list of those whose rates must be found anew.
+    """Rates of every body, and the list of bodies whose rates must be updated.
 
     dashpot_table, spring_table: largest eigenvalue of the bonds' block by the set of intact
     bonds, [1/s] and [1/s^2]. bond_damping, contact_damping: rates of a body's dashpots [1/s].
@@ -146,7 +146,7 @@ class StabilityLimits:
 
     @ti.func
     def count(self, low):
-        """Bodies whose rates must be found anew."""
+        """Number of bodies whose rates must be updated."""
         return self.listed_count[None]
 
     @ti.func
@@ -156,7 +156,7 @@ class StabilityLimits:
 
     @ti.func
     def notice(self, i, event):
-        """List body i, once, and remember what happened to it."""
+        """List body i, once, and note the event."""
         if ti.atomic_or(self.events[i], event) == 0:
             self.listed[ti.atomic_add(self.listed_count[None], 1)] = i
 
@@ -283,7 +283,7 @@ class StabilityLimits:
 
     @ti.func
     def _bonds_get(self, i, step):
-        """What the bonds take of LIMITED."""
+        """Part of LIMITED that the bonds take."""
         contacts = ti.min(FOR_CONTACTS, 2.0 * step * self.contact_damping[i])
         return ti.min(2.0 * step * self.bond_damping[i], LIMITED - contacts)
 

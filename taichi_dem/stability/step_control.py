@@ -11,7 +11,7 @@ from taichi_dem.kit.types import real
 from taichi_dem.kit.validation import between, choices, whole
 from taichi_dem.timeline import MAX_LEVEL
 
-#: What may bound the step of a body; the state holds a place in this tuple for each of them.
+#: Criteria that may bound the step of a body; the state holds an index into this tuple for each.
 CRITERIA = (
     "largest_step",
     "displacement",
@@ -24,7 +24,7 @@ CRITERIA = (
     "neighbour",
 )
 LARGEST, DISPLACEMENT, ROTATION, BOND_K, BOND_C, CONTACT_K, CONTACT_C, LOAD, NEIGHBOUR = range(9)
-#: The criteria that a user may leave out, to see what happens then.
+#: Criteria that a user may leave out, for comparison.
 OPTIONAL = CRITERIA[2:8]
 #: Events that bring a body to the present time and let it choose its step anew.
 EVENTS = ("hit", "release", "neighbour")
@@ -72,7 +72,7 @@ class StepControl:
 
 
 def counted_criteria(bound: np.ndarray) -> dict[str, int]:
-    """Number of bodies by the name of what bounds their step, for those that occur.
+    """Number of bodies by the criterion that bounds their step, for those that occur.
 
     bound: places in CRITERIA, shape (body_count,).
     """
@@ -142,7 +142,7 @@ def level_of(step, dt0):
 
 @ti.func
 def shorter(step, bound, other, criterion):
-    """The shorter of two steps [s] with what bounds it."""
+    """The shorter of two steps [s], with its criterion."""
     if other < step:
         step, bound = other, criterion
     return step, bound
@@ -150,7 +150,7 @@ def shorter(step, bound, other, criterion):
 
 @ti.func
 def finer(level, bound, other, criterion):
-    """The finer of two levels with what bounds it."""
+    """The finer of two levels, with its criterion."""
     if other > level:
         level, bound = other, criterion
     return level, bound

@@ -1,4 +1,4 @@
-"""What limits the step of a mesh and material, by method and element by element, before any run."""
+"""Limits of the step for a mesh and material, by method and element, before any run."""
 
 from dataclasses import dataclass
 from typing import Optional, Union
@@ -27,9 +27,9 @@ from taichi_dem.stability.step_control import StepControl
 
 #: Elements listed in the printed table.
 _WORST = 10
-#: What binds a body without bonds and contacts.
+#: Criterion of a body without bonds and contacts.
 NOTHING = "nothing"
-#: The methods by what they do with dashpots.
+#: Methods by their treatment of dashpots.
 METHODS = {
     "full": "Uniform, Multirate",
     "limited": 'the same with dashpot="limited"',
@@ -114,7 +114,7 @@ class StepReport:
         return in_brief(self, bodies, step, "print it for the table")
 
     def __str__(self):
-        """What each method bears, what binds how many bodies, the worst, and what they cost."""
+        """Steps by method, numbers of bodies by criterion, the worst bodies and their cost."""
         lines = [*self._method_lines(), "", *self._criterion_lines(), *self._worst_lines()]
         if self._free:
             lines = ["nothing limits the step: no body has a bond, and no contact is listed"]
@@ -168,7 +168,7 @@ class StepReport:
         return [*lines, *self._price_lines()]
 
     def _price_lines(self):
-        """What the worst bodies cost, where others are left whose step is limited too."""
+        """Cost of the worst bodies, where the step of others is limited too."""
         price = self.price()
         if not np.isfinite(price):
             return []

@@ -1,4 +1,4 @@
-"""What happens to one bond, one contact pair, one body: the only place that composes the physics.
+"""Advance one bond, one contact pair, one body: the only place that composes the physics.
 
 Drivers choose who is next and call these functions; no other file applies a force or moves a body.
 A bond or pair evaluated at a tick gives both bodies the impulse F * (smaller of their steps), with
@@ -44,7 +44,7 @@ class Advance(ContactForce):
         self.has_contact = contacts is not None
         if not self.solves:
             self.springs = TangentialSprings(tables, state, schedule, contacts)
-        # Without fast_math a product with zero is not folded: what is absent must not be written.
+        # Without fast_math a product with zero is not folded: absent terms must not be written.
         self.has_dashpot = bool(tables.dashpot.name)
         self.limits, self.retimes = schedule.limits, schedule.retimes
         self.has_limits = schedule.has_limits
@@ -133,7 +133,7 @@ class Advance(ContactForce):
 
     @ti.func
     def bond_share(self, b):
-        """Share of its coefficient that a bond's limited dashpot keeps: what both bodies bear."""
+        """Share of its coefficient that a bond's limited dashpot keeps: the smaller of two."""
         i, j = self.tables.bond_slots[b][0] >> 2, self.tables.bond_slots[b][1] >> 2
         first = self.limits.bond_share(i, self.schedule.own_step(i))
         return ti.min(first, self.limits.bond_share(j, self.schedule.own_step(j)))
@@ -247,7 +247,7 @@ class Advance(ContactForce):
 
     @ti.func
     def _turning(self, i, elapsed, momentum, spin):
-        """World spin in the middle of the step [rad/s]; a body in supports has what they allow."""
+        """World spin in the middle of the step [rad/s], as supports allow."""
         inverse = self.tables.inertia_inverse[i]
         turning = mean_spin(self.state.rotation[i], inverse, momentum, spin, elapsed)
         for effect in ti.static(self.tables.supports):
@@ -304,7 +304,7 @@ class Advance(ContactForce):
 
     @ti.func
     def _book_loads(self, i, kick, velocity, momentum):
-        """Book what the loads gave body i, at a mean velocity and angular momentum."""
+        """Book work and impulse of the loads on body i, at a mean velocity and angular momentum."""
         for e in ti.static(range(len(self.tables.loads))):
             if self.tables.loads[e].acts_on(i):
                 push = vec3(kick[e, 0], kick[e, 1], kick[e, 2])

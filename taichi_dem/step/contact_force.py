@@ -14,7 +14,7 @@ class ContactForce:
 
     @ti.func
     def contact(self, p):
-        """Evaluate the spheres of a pair of bodies: repulsion, and friction of what slides."""
+        """Evaluate the sphere contacts of a pair of bodies: repulsion and friction."""
         pair = self.contacts.store.body[p]
         i, j = pair[0], pair[1]
         branch = self.state.position[j] - self.state.position[i]
@@ -71,7 +71,7 @@ class ContactForce:
 
     @ti.func
     def _rub(self, k, i, normal, push, drag, slide, elapsed):
-        """Friction on the second sphere and the spring's part of it [N]; what slipping took [J]."""
+        """Friction on the second sphere and the spring's part of it [N]; energy of slipping [J]."""
         rub, stuck, spent = zero3(), zero3(), 0.0
         if ti.static(self.springs.present):
             rotation, bound = self.state.rotation[i], self.tables.friction.limit(push)

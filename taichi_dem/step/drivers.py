@@ -41,13 +41,13 @@ class Once:
 
     @ti.func
     def pick(self, a):
-        """The place itself; nobody looks at it."""
+        """The place itself, which is not used."""
         return a
 
 
 @ti.data_oriented
 class Step:
-    """The phases of a substep, as (active list, what happens to one member) pairs.
+    """Phases of a substep, pairs of an active list and a function of a member.
 
     A substep begins with the contacts of the present tick, whose bonds are evaluated already, and
     ends with the bonds of the next: between substeps the contact lists can be renewed.
@@ -247,7 +247,7 @@ class Resident:
         self.load()
 
     def load(self) -> None:
-        """Begin with short calls: nobody knows yet what a step of the scene costs."""
+        """Begin with short calls, as the cost of a step is not known yet."""
         self.substeps = 4
 
     def prepare(self) -> None:

@@ -1,4 +1,4 @@
-"""Who is due: levels of bodies, and lists of bodies, bonds and pairs in order of falling level.
+"""Schedule: levels of bodies, and lists of active bodies, bonds and pairs by falling level.
 
 Levels change seldom against how often they are used, so a body that changes its own moves just its
 own entries.
@@ -166,7 +166,7 @@ class Schedule:
 
     @ti.func
     def reorder(self, one):
-        """Move the entries of the bodies that changed, and count what this tick evaluates."""
+        """Move the entries of changed bodies, and count the evaluations of this tick."""
         self._rearrange()
         self._count()
 
@@ -267,7 +267,7 @@ class Schedule:
 
     @ti.func
     def _count(self):
-        """Count what this tick evaluates: substeps, bodies, bonds, contact pairs."""
+        """Count the evaluations of this tick: substeps, bodies, bonds, contact pairs."""
         low = self.low[None]
         self.evaluations[0] = self.evaluations[0] + 1
         self.evaluations[1] = self.evaluations[1] + self.bodies.count(low)
@@ -276,7 +276,7 @@ class Schedule:
 
     @ti.func
     def count_sweep(self, with_bonds: ti.template()):
-        """Count what a sweep over all dashpots visits as evaluations."""
+        """Count the visits of a sweep over all dashpots as evaluations."""
         visits = ti.cast(0, ti.i64)
         if ti.static(with_bonds):
             visits += self.bonds.end[0]

@@ -10,7 +10,7 @@ from ca_damper.automaton.impulse_balance import quanta
 
 @ti.data_oriented
 class AllImpulses(Uncounted):
-    """Every blow and push counts, and what the six directions take from the particles.
+    """Every impact and push counts, and so do losses to the six directions of the lattice.
 
     The container holds the lattice, so it feels what the lattice causes. Momentum is then kept, and
     the mean force is the weight.

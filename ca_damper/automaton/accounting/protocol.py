@@ -15,7 +15,7 @@ class Accounting(Protocol):
 
     #: Labels of an automaton without and with static contact, for tables and files.
     labels: ClassVar[tuple[str, str]]
-    #: What is counted beside "landing", in words for the report.
+    #: Effects counted beside "landing", in words for the report.
     effects: ClassVar[tuple[str, ...]]
     #: Whether particles rest on the floor unless the user says otherwise.
     static_contact: ClassVar[bool]
@@ -27,7 +27,7 @@ class Accounting(Protocol):
         """Whether ``lattice_impulse`` has any effect; if not, gains in flight are not summed."""
 
     def __init__(self, table: SceneFields, lattice: Any, impulse_balance: Any) -> None:
-        """Allocate what has to be remembered, with ``table.field``."""
+        """Allocate its fields, with ``table.field``."""
 
     def clear(self, s: int) -> None:
         """Start scene s anew, the impulse balance included."""

@@ -22,7 +22,7 @@ class Uncounted:
 
     @property
     def needs_lattice_impulse(self) -> bool:
-        """Whether anybody asks what the lattice causes."""
+        """Whether impulses of the lattice are counted or balanced."""
         return self.counts_all or self.impulse_balance.active
 
     @ti.func

@@ -66,7 +66,7 @@ class Compiling(Progress):
         return math.inf
 
     def __str__(self):
-        """What is being compiled, how far it is, and why the user will wait less next time."""
+        """Share done and part being compiled, in one line."""
         share = f"{100.0 * self.share:3.0f} %"
         return f"{share}, compiling {self.part} kernels, the next start is faster"
 
@@ -100,7 +100,7 @@ class Pace:
 #: Function that is told how far a job is.
 Listener = Callable[[Progress], object]
 
-#: Who is told of compiling, the innermost last, and since when each listens [s].
+#: Listeners to compiling, the innermost last, and since when each listens [s].
 _listeners: list[tuple[Listener, float]] = []
 
 

@@ -1,4 +1,4 @@
-"""What happens to a body in a step whose dashpots are solved together; bonds are as ever."""
+"""Advance a body in a step whose dashpots are solved together; bonds are as in ``Advance``."""
 
 import taichi as ti
 
@@ -28,7 +28,7 @@ class SolvedAdvance(Advance):
 
     @ti.func
     def body(self, i):
-        """Bring a body to the present tick with what the sweeps found."""
+        """Bring a body to the present tick with the velocities found by the sweeps."""
         elapsed = self.schedule.elapsed(i)
         velocity, momentum = self.solver.velocities.found(i)
         _, _, kick = self._loaded(i, elapsed, zero3(), zero3())

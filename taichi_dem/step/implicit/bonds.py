@@ -25,7 +25,7 @@ BOND_COLOURS = 7
 
 @ti.data_oriented
 class BondDashpots:
-    """What the sweeps read of a bond, packed in the order in which they visit.
+    """Per-bond data used in sweeps, packed in the order of visits.
 
     A bond answers the twist in a step (slave against master, at the slave's centre) with the
     wrench impulse y = C (theta s1 + (1 - theta) s0), s0 and s1 at both ends of the step. The sum

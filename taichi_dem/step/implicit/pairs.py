@@ -17,13 +17,13 @@ if TYPE_CHECKING:
     from taichi_dem.engine.tables import Tables
     from taichi_dem.step.schedule import Schedule
 
-#: Colours of pairs that share no body; what finds no free one is visited last, in turn.
+#: Colours of pairs that share no body; pairs without a free one are visited last, in turn.
 COLOURS = 16
 
 
 @ti.data_oriented
 class PairDashpots:
-    """What the sweeps read of the spheres that touch.
+    """Data of touching spheres used in sweeps.
 
     One block for all spheres of a pair would let those that part hold on to each other while the
     others push: a pair that rocks would stick. So each sphere has its own impulse.
@@ -116,7 +116,7 @@ class PairDashpots:
 
     @ti.func
     def begin(self, p):
-        """Find what touches and its springs' impulse; start from the impulses of the last step."""
+        """Find touching spheres and their spring impulses; start from the last impulses."""
         pair = self.store.body[p]
         i, j = pair[0], pair[1]
         dt = self.schedule.step_seconds[0]
@@ -236,7 +236,7 @@ class PairDashpots:
 
     @ti.func
     def book(self, p):
-        """Book what the dashpots and friction of a pair took, with its mean motion in the step."""
+        """Book the energy taken by dashpots and friction of a pair, at its mean motion."""
         if self.touching[p] > 0:
             pair = self.store.body[p]
             i, j, branch = pair[0], pair[1], self.branch[p]
