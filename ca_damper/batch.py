@@ -71,7 +71,7 @@ class Batch(LoadedScenes):
         return self.launches.scene_steps
 
     def start(self, start: str = "rest") -> None:
-        """Place the particles anew and begin at time zero, the base passing upwards through zero.
+        """Place the particles at their start and begin at time zero, the base passing zero upwards.
 
         start: the container begins at "rest", or in the steady state of the "empty" container, or
         in that of a container with the particles as "rigid" mass.
@@ -85,7 +85,7 @@ class Batch(LoadedScenes):
         self._check_divergence()
 
     def change(self, **numbers: Any) -> None:
-        """Give the scenes other numbers, as ``SceneTable.change``; then ``start`` begins anew.
+        """Replace numbers of the scenes, as ``SceneTable.change``; ``start`` must follow.
 
         The bits are those of a batch that is made with them, and nothing is compiled.
         Raises InputError for what that batch would refuse; this one then stays as it is.
@@ -236,7 +236,7 @@ class Batch(LoadedScenes):
             engine.is_compiled = True
 
     def _launch_until_done(self, steps: np.ndarray, progress: Any) -> None:
-        """Launch, tell and save; a run that was saved at its end is told and saved once more."""
+        """Launch, report and save; one saved at its end is reported and saved once more."""
         launches, total, done = self.launches, max(1, int(steps.sum())), -1.0
         while done < 1.0:
             done = launches.done

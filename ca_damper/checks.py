@@ -11,7 +11,7 @@ from taichi_dem.kit.validation import choice, progress_option, shown, whole
 #: Motion of the container at the beginning of a run.
 STARTS = ("rest", "empty", "rigid")
 MOST_CYCLES = 10_000_000
-#: Largest field of measured sums: 1 GiB, half of what Taichi can count.
+#: Largest field of measured sums: 1 GiB, half of the most that Taichi can index.
 _MOST_NUMBERS = 2**27
 
 

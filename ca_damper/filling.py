@@ -1,4 +1,4 @@
-"""Contract of a filling of the container: what goes in is its motion, what comes out its load.
+"""Contract of a filling of the container: its input is the motion, its output the load.
 
 A filling is a frozen dataclass of a user's options, checked when it is made (``Filling``). It binds
 itself to the scenes of an engine (``DeviceFilling``), which is compiled once and then runs every
@@ -35,7 +35,7 @@ class Motion:
 
 @ti.dataclass
 class Action:
-    """What a filling does to the container during a step.
+    """Action of a filling on the container during a step.
 
     impulse: of the blows, along x [N s]. carried: mass that moves as one with the container [kg].
     Over the step the container obeys
@@ -55,7 +55,7 @@ _MOST_PLACES = 2**25
 
 @dataclass(frozen=True)
 class Structure:
-    """What the compiler sees of a filling; fillings of equal ``key`` share their compiled kernels.
+    """Compiled structure of a filling; fillings of equal ``key`` share their compiled kernels.
 
     key: the options that decide what is compiled. sizes: places that a scene needs, by name, for
     ``SceneFields.field``, those for particles first; an engine has room for more, so that smaller
@@ -83,7 +83,7 @@ class Filling(Protocol):
 
     @property
     def default_dt(self) -> float:
-        """Step to take unless the user asks for another [s]."""
+        """Default step [s]."""
 
     @property
     def capacity(self) -> int:
@@ -99,7 +99,7 @@ class Filling(Protocol):
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """What it computes, in words for the report."""
+        """Effects that it computes, in words for the report."""
 
     @property
     def step_bound(self) -> Optional[tuple[float, str]]:
@@ -109,7 +109,7 @@ class Filling(Protocol):
         """Raise InputError for a number of particles or a step [s] that it cannot do."""
 
     def divergence(self, code: int, particles: int, dt: float) -> tuple[str, float]:
-        """Say what a code of divergence means, in words that follow "it", and a step that does."""
+        """Meaning of a code of divergence, in words that follow "it", and a step that avoids it."""
 
     def bind(self, table: SceneFields) -> "DeviceFilling":
         """Declare its fields for all scenes of a table; no field may be used yet."""
@@ -123,7 +123,7 @@ class DeviceFilling(Protocol):
     """
 
     def reset(self, s: int) -> None:
-        """Place the particles of scene s anew, from its seed."""
+        """Place the particles of scene s at their start, from its seed."""
 
     def advance(self, s: int, step: int, motion: Motion) -> Action:
         """Take the particles of scene s over a step in which the container starts with ``motion``.
@@ -139,10 +139,10 @@ class DeviceFilling(Protocol):
         """Momentum along x [kg m/s]."""
 
     def divergence_code(self, s: int) -> int:
-        """Find out whether the scene diverged: 0, or a code from 1 up; asked every few steps."""
+        """Code of divergence of a scene, from 1 up, or 0; evaluated every few steps."""
 
     def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:
-        """What each of the named effects did, for those that can be counted."""
+        """Activity of each of the named effects, for those that can be counted."""
 
     def snapshot(self, s: int) -> dict[str, np.ndarray]:
         """Positions [m] and velocities [m/s] of the particles, (particles, 2) each, by name.
@@ -173,7 +173,7 @@ def check_places(scenes: int, places: int) -> None:
 
 
 def check_device(filling: Any, device: Any) -> Any:
-    """Return what a filling bound; InputError unless it has all members of the contract."""
+    """Return the device of a filling; InputError unless it has all members of the contract."""
     members = members_of(DeviceFilling)
     if hasattr(filling, "structure"):
         members = {**members, "load": "Take over the numbers of a filling of the same structure."}

@@ -1,4 +1,4 @@
-"""Which effects of a filling a run had need of."""
+"""Effects of a filling that a run needed."""
 
 from ca_damper.report import Report
 from taichi_dem.kit.effect_usage import Advice
@@ -7,7 +7,7 @@ from taichi_dem.kit.validation import fraction
 
 
 def needed_effects(result: object, tolerance: float = 1e-3) -> Advice:
-    """Advice about the effects of a run; print it, or ask for its ``droppable``.
+    """Advice on the effects of a run; print it, or read its ``droppable``.
 
     result: a Response, or the Report of a Batch. tolerance: share of the energy taken (friction)
     or in motion (rotation) below which an effect counts as nothing, in [0, 1]. Spheres are looked

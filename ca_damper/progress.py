@@ -1,4 +1,4 @@
-"""How far a batch is, and runs in several stages told as one."""
+"""Progress of a batch, and of runs in several stages as a whole."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ _LEAST_SECONDS = 0.1
 
 @dataclass(frozen=True)
 class BatchProgress(Progress):
-    """How far a batch is. steps: scene-steps done."""
+    """Progress of a batch. steps: scene-steps done."""
 
     steps: int
 

@@ -223,7 +223,7 @@ class Grid:
         return whole(name, value, 0, self.filling.capacity)
 
     def words(self) -> str:
-        """What is run, but for the filling, in words."""
+        """The run without the filling, in words."""
         ratios = self.ratios.tolist()
         return (
             f"particles {self.particles}, ratios {ratios}, seeds {self.seeds}, dt {self.dt}, "

@@ -92,7 +92,7 @@ def first_step(rhs: ti.template(), context, t, y, slope, rtol, atol):
 
 @ti.pyfunc
 def attempt(rhs: ti.template(), context, t, t_end, y, slope, h, rtol, atol):
-    """Try a step of length h, or what is left to t_end.
+    """Try a step of length h, or the rest up to t_end.
 
     Returns (t, y, dy/dt, length tried, error in units of the tolerance): where the step leads when
     its error is at most 1, where it began when it is not.
@@ -203,7 +203,7 @@ def solve(
 
 
 class _Path:
-    """Accepted times and states on the way."""
+    """Accepted times and states of an integration."""
 
     def __init__(self, derivative, t, y, slope, h, most_attempts):
         self.derivative, self.slope, self.h = derivative, slope, h

@@ -1,4 +1,4 @@
-"""Sweeps up through the frequencies and down again, the state carried on, to show hysteresis.
+"""Sweeps up through the frequencies and down again with continued state, to show hysteresis.
 
 The frequency changes at the end of a cycle, when the base passes its middle: it keeps its place and
 takes up its new speed at once.
@@ -24,7 +24,7 @@ from taichi_dem.kit.validation import AUTO, FileName
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """Responses on the way up and on the way down, both with ascending ratios."""
+    """Responses of the upward and the downward sweep, both with ascending ratios."""
 
     up: Response
     down: Response
@@ -90,7 +90,7 @@ class _Way:
         return ("way", self), ("up", self.up), ("down", self.down)
 
     def ends(self):
-        """Shares of what was ahead at which each ratio that was not done ends."""
+        """Shares of the remaining run at which each of the remaining ratios ends."""
         ahead = 2 * self.count - self.done
         return (np.arange(ahead) + 1.0) / max(1, ahead)
 
@@ -99,7 +99,7 @@ class _Way:
         return [*range(self.count), *reversed(range(self.count))][self.done :]
 
     def record(self, k, batch, cycles):
-        """Take what was measured at ratio number k."""
+        """Record the measures at ratio number k."""
         (self.up if self.done < self.count else self.down).record(k, batch, cycles)
         self.done += 1
 
@@ -113,7 +113,7 @@ class _Way:
 
 
 class _Collected:
-    """Measures of one way, frequency by frequency."""
+    """Measures of one direction, frequency by frequency."""
 
     def __init__(self, grid):
         self.grid = grid
@@ -121,7 +121,7 @@ class _Collected:
         self.values = {name: np.empty(grid.shape) for name in UNITS}
 
     def record(self, k, batch, cycles):
-        """Take what was measured at ratio number k."""
+        """Record the measures at ratio number k."""
         particles, _, seeds = self.grid.shape
         self.steps[k] = batch.steps_per_cycle[0]
         for name, value in self.grid.measures(cycles).items():

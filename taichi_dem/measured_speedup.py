@@ -44,7 +44,7 @@ def speedup_of_run(simulation: Simulation) -> Optional[float]:
 
 
 def measured_speedup(simulation: Simulation, seconds: float = MOST_SECONDS) -> float:
-    """CPU time that one step for all would have taken, over what the run took; 1 where it had one.
+    """CPU time that one step for all would have taken, over that of the run; 1 if it had one step.
 
     How many evaluations that is is counted during the run. What one takes is measured for a number
     of CPU seconds on a twin in the same engine: it begins where the simulation stands, and all of

@@ -61,7 +61,7 @@ class Method(Protocol):
 
 
 def check_method(method: object) -> None:
-    """Raise InputError, naming what is missing, unless a method is an object as ``Method`` says."""
+    """Raise InputError, naming a missing member, unless a method keeps the contract ``Method``."""
     wanted = members_of(Method)
     missing = [name for name in wanted if not hasattr(method, name)]
     if isinstance(method, type) or len(missing) > len(wanted) // 2:

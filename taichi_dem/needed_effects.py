@@ -1,4 +1,4 @@
-"""Which effects a run had need of: those to keep, those to drop, those that were missed."""
+"""Effects that a run needed: those to keep, to drop, and to add."""
 
 from taichi_dem.diagnostics.report import Report
 from taichi_dem.kit.effect_usage import Advice
@@ -7,7 +7,7 @@ from taichi_dem.kit.validation import fraction
 
 
 def needed_effects(result: object, tolerance: float = 1e-3) -> Advice:
-    """Advice about the effects of a run; print it, or ask for its ``droppable`` and ``missing``.
+    """Advice on the effects of a run; print it, or read its ``droppable`` and ``missing``.
 
     result: what ``simulate`` gave, or its report. tolerance: share of the energy that passed
     through bonds below which their damping counts as nothing, in [0, 1]. Effects that steer

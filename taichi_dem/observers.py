@@ -1,4 +1,4 @@
-"""Observers of a run: objects that ``simulate`` calls on the way with a read-only view of it."""
+"""Observers of a run: objects that ``simulate`` calls with a read-only view of it."""
 
 import inspect
 import math
@@ -94,7 +94,7 @@ class At:
 
 
 class Observer(Protocol):
-    """Measures on the way of a run: ``when`` it is called, and ``observe`` to be called."""
+    """Measurement during a run: ``when`` it is called, and the method ``observe``."""
 
     @property
     def when(self) -> Union[Every, At]:
@@ -160,7 +160,7 @@ class RunView:
         return self._parts[0].running_seconds()
 
     def motion(self) -> dict:
-        """Arrays of the bodies' motion by name, as ``State.motion`` gives them."""
+        """Arrays of the bodies' motion by name, as in ``State.motion``."""
         return {name: _locked(array) for name, array in self._parts[0].state.motion().items()}
 
     def energy_balance(self) -> dict:

@@ -14,7 +14,7 @@ from taichi_dem.simulation import Simulation
 
 #: Progress is reported this often [s].
 _REPORT_SECONDS = 0.2
-#: Samples or frames of a run: each costs a look at all bodies.
+#: Most samples or frames of a run: each reads all bodies.
 _MOST_RECORDS = 1_000_000
 
 
@@ -92,7 +92,7 @@ class RunPlan:
 
 
 class _Sampler:
-    """Adds rows to the time series, and looks for missing effects."""
+    """Adds rows to the time series, and samples missing effects."""
 
     when = Every(samples=1)
 

@@ -122,7 +122,7 @@ class Simulation:
         return PartView(self.loan, ("drivers", name))
 
     def reset(self, scene: Optional[Scene] = None, method: Optional[Method] = None) -> None:
-        """Begin again at time zero and at rest, with another scene or method if one is given.
+        """Begin again at time zero and at rest, optionally with another scene or method.
 
         They must be of the present structure: the same kinds of effects, the same kind of method;
         then nothing is compiled. Raises InputError where they are not, or find no room.
@@ -181,7 +181,7 @@ class Simulation:
         self.compile_seconds += time.perf_counter() - started
 
     def _open_balance(self):
-        """Begin the energy balance and all that looks at the run."""
+        """Begin the energy balance and the other diagnostics."""
         read = self.model, self.state, self.readings, self.contacts
         self.energy_balance = EnergyBalance(*read)
         self.divergence_check = DivergenceCheck(
@@ -191,7 +191,7 @@ class Simulation:
         self.step_resolution = StepResolution(*read, self.schedule, self.advance)
 
     def sample(self) -> None:
-        """Look for effects that are missed, and for bonds that the step does not resolve.
+        """Sample missing effects, and bonds that the step does not resolve.
 
         Called at recording times, so that the step stays bare.
         """

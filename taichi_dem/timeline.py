@@ -1,4 +1,4 @@
-"""Time as an integer: ticks, levels, and which level is due at a tick.
+"""Time as an integer: ticks, levels, and the levels active at a tick.
 
 Level k steps by dt0 / 2^k; one tick is the step of the finest level allowed. A level is due at
 the multiples of its own step, so a body may refine at any of its own times and coarsen only where
@@ -21,7 +21,7 @@ def ticks_of(level: int) -> int:
 
 
 def coarsest_active(tick: int) -> int:
-    """Lowest level that is due at a tick; all finer levels are due too."""
+    """Lowest level active at a tick; all finer levels are active too."""
     rest = tick % MACRO_TICKS
     return 0 if rest == 0 else MAX_LEVEL - ((rest & -rest).bit_length() - 1)
 

@@ -24,7 +24,7 @@ class Accumulator:
 
     @ti.func
     def turned(self, travelled, old, new):
-        """Way travelled [m] after a turn from direction old to new."""
+        """Distance travelled [m] after a turn from direction old to new."""
         result = travelled
         if ti.static(self.reading.startswith("signed")):
             result = travelled * self.lattice.cosine[old, new]
@@ -35,7 +35,7 @@ class Accumulator:
 
     @ti.func
     def after_wall(self, travelled, old, new, place):
-        """Way travelled [m] after meeting a wall that stands ``place`` [m] above its cells."""
+        """Distance travelled [m] after meeting a wall that stands ``place`` [m] above its cells."""
         result = self.at_wall(new, place)
         if ti.static(self.reading != "signed"):
             result = self.turned(travelled, old, new)
@@ -43,7 +43,7 @@ class Accumulator:
 
     @ti.func
     def at_wall(self, kind, place):
-        """Way travelled [m] of a particle that leaves a wall."""
+        """Distance travelled [m] of a particle that leaves a wall."""
         result = 0.0
         if ti.static(self.reading == "signed"):
             result = place * self.lattice.upward(kind)
@@ -51,9 +51,9 @@ class Accumulator:
 
     @ti.func
     def distance_to_wall(self, travelled, kind, way, width):
-        """Way travelled [m] of a particle that flies ahead of a wall that pushes its cell along.
+        """Distance travelled [m] of a particle ahead of a wall that pushes its cell along.
 
-        Whoever flies straight (up for way 1, down for -1) keeps its place in the room.
+        A particle that flies straight (up for way 1, down for -1) keeps its place in the room.
         """
         result = 0.0
         if ti.static(self.reading == "signed"):

@@ -45,7 +45,7 @@ class Collisions:
 
     @ti.func
     def resolve(self, s, step, shared, count, velocity, pull, pressed):
-        """All events of a step; returns velocity along x that counted blows gave [quanta].
+        """All events of a step; returns velocity along x from counted impacts [quanta].
 
         velocity: of the container [m/s]. pull: g dt [m/s].
         """
@@ -172,7 +172,7 @@ class Collisions:
 
     @ti.func
     def go_on(self, s, shared, cell, line, speed):
-        """Give a particle its speed along a line; one that came along it is deflected if sent back.
+        """Set a particle's speed along a line; one that came along it is deflected if sent back.
 
         One that came from aside leaves along the line, which keeps the momentum in it.
         """

@@ -113,7 +113,7 @@ class Ejection:
 
     @ti.func
     def shift(self, s, way):
-        """Let all others stay in the room: one cell the other way, those in front first."""
+        """Keep all others in place in the room: one cell the other way, those in front first."""
         for column in range(self.lattice.column_count()):
             for k in range(self.lattice.row_count()):
                 row = k if way > 0 else self.lattice.row_count() - 1 - k

@@ -41,7 +41,7 @@ class Cells:
 
     @ti.func
     def put(self, s, cell, kind, speed, travelled):
-        """Let this stand in a cell."""
+        """Set the content of a cell."""
         self.kind[s, cell] = ti.cast(kind, ti.i8)
         self.speed[s, cell] = speed
         self.travelled[s, cell] = travelled

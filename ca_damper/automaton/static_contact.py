@@ -71,7 +71,7 @@ class StaticContact:
 
     @ti.func
     def release(self, s, velocity):
-        """Let the heap go from where it is, with the velocity of the container [m/s]."""
+        """Release the heap where it is, with the velocity of the container [m/s]."""
         if self.held[s] > 0:
             kind = UP if velocity > 0.0 else DOWN
             travelled = self.accumulator.at_wall(kind, self.cells.offset[s])

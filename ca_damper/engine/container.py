@@ -108,7 +108,7 @@ class DrivenContainer:
 
     @ti.func
     def start(self, s, x, v):
-        """Where the base is; x and v are not asked for."""
+        """Position of the base; x and v are not used."""
 
     @ti.func
     def renew(self, s):

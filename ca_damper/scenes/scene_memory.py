@@ -1,4 +1,4 @@
-"""The state of a batch as arrays: what its scenes use of the fields of an engine."""
+"""The state of a batch as arrays: the parts of an engine's fields that its scenes use."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -34,7 +34,7 @@ class SceneMemory:
         return {**scenes, **{name: values(field) for name, field in self._others().items()}}
 
     def misfit(self, arrays: Mapping[str, np.ndarray]) -> str:
-        """Name of a field that arrays, as ``read`` gave them, lack or do not fit; else ""."""
+        """Name of a field that the arrays of ``read`` lack or do not fit; else ""."""
         for name, mine in self.read().items():
             array = arrays.get(name)
             if array is None or array.dtype != mine.dtype or array.shape != mine.shape:

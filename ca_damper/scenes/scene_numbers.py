@@ -48,7 +48,7 @@ class SceneNumbers:
         return np.stack([self.table.column(name) for name in ("frequency", "dt")])
 
     def take_pace(self, pace: Sequence[np.ndarray], steps: np.ndarray) -> None:
-        """Take over what ``pace`` gave, with the steps of a cycle."""
+        """Restore the arrays of ``pace``, with the steps of a cycle."""
         self.table.drive(*pace)
         self.steps_per_cycle = steps
 

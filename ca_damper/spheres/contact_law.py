@@ -1,4 +1,4 @@
-"""What two touching spheres, or a sphere and a wall, do to each other (paper, eqs 3 to 6)."""
+"""Contact forces between two spheres, or a sphere and a wall (paper, eqs 3 to 6)."""
 
 import math
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""One step of the spheres: contacts, walls, motion; and what is asked of them between steps.
+"""One step of the spheres: contacts, walls, motion; and readings between steps.
 
 Time integration is the leapfrog, with velocities at the times t_n that the container's motion is
 given for, and positions half a step ahead. In a step, forces are taken at the positions of its
@@ -38,11 +38,11 @@ DIVERGENCES = {
 # Share of their energy that spheres may gain from contacts. Measured over 5 to 20 cycles: 2e-4 at
 # 20 us, 6e-3 with restitution 1; at 40 us, three steps a contact, 0.06 to 0.6 where it goes wrong.
 MOST_GAIN = 0.03
-# What a single sphere may gain beside: the leapfrog's energy is off by (w dt)^2 / 4 in a contact,
-# half a period of w, that has six steps.
+# Further gain allowed to a single sphere: the leapfrog's energy is off by (w dt)^2 / 4 in a
+# contact, half a period of w, of six steps.
 _WALL_IMPULSE_SHARE = (math.pi / 6.0) ** 2 / 4.0
-# Share of a gain that is forgotten from look to look: errors of many blows that go up and down add
-# up to a gain that means nothing, while what makes a run diverge does so within some 100 looks.
+# Share of a gain that is forgotten at each check: errors of many impacts of either sign add
+# up to a spurious gain, while a diverging run shows within some 100 checks.
 _FORGOTTEN = 1.0 / 256.0
 
 
@@ -248,7 +248,7 @@ class DeviceSpheres:
 
     @ti.func
     def _gains(self, s):
-        """Whether contacts gave back a good part of the energy there is, which none ever can."""
+        """Whether contacts have created a good part of the energy present, which is impossible."""
         body = self.bodies.body[None]
         weight = self.table.particles[s] * body.mass * body.gravity
         energy, highest = self.held[s], 0.0
@@ -263,7 +263,7 @@ class DeviceSpheres:
 
     @ti.func
     def _note_pair(self, i, j, contact):
-        """Note what spheres hold, those that touch, and those that overlap by half their reach."""
+        """Note the energy of a pair, and whether it touches or overlaps by half its reach."""
         s = i // self.bodies.stride
         self.held[s] = self.held[s] + self._pair_energy(s, i, j)
         branch = self.bodies.position[j] - self.bodies.position[i]
@@ -282,7 +282,7 @@ class DeviceSpheres:
             self.effect_activity.note_contact(s, dragged, rubbed)
 
     def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:
-        """What each of the named effects did."""
+        """Activity of each of the named effects."""
         return self.effect_activity.uses(effects)
 
     def snapshot(self, s: int) -> dict[str, np.ndarray]:

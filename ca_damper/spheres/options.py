@@ -1,4 +1,4 @@
-"""What a user chooses of the spheres, and what follows from it before anything runs."""
+"""Options of the spheres, and quantities that follow from them."""
 
 import math
 from dataclasses import dataclass
@@ -115,7 +115,7 @@ class Spheres:
         return self.lattice[0] * self.lattice[1]
 
     def check(self, particles: int, dt: float) -> None:
-        """InputError for a number of spheres or a step [s] that cannot be meant.
+        """Raise InputError for an invalid number of spheres or step [s].
 
         A step too long for the contacts is not refused: how long it may be depends on how fast the
         spheres come to move. Such a run ends as diverged.
@@ -128,7 +128,7 @@ class Spheres:
             )
 
     def divergence(self, code: int, particles: int, dt: float) -> tuple[str, float]:
-        """What a code of ``divergence_code`` means, and a step that would do [s]."""
+        """Meaning of a code of ``divergence_code``, and a step that avoids it [s]."""
         return DIVERGENCES[code], min(self.safe_step(), 0.5 * dt)
 
     def safe_step(self) -> float:

@@ -1,4 +1,4 @@
-"""How strong a dashpot gives a wanted coefficient of restitution.
+"""Coefficient of a dashpot for a wanted coefficient of restitution.
 
 Two spheres meet head on: m d'' = -max(0, k d^(3/2) + c d^p d'); d: overlap, m: effective mass.
 In units of the overlap D = (m v^2 / k)^(2/5) and of the impact speed v, c becomes the number

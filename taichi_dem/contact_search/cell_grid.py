@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @ti.data_oriented
 class CellGrid:
-    """Sorts all bodies by cell, so that a body asks only the cells that others near it may be in.
+    """Sorts all bodies by cell, so that neighbours are sought in the cells nearby only.
 
     ball: radius of the ball around a body within which others are near whose balls it meets [m].
     member: bodies, cell by cell. brute_force: a single cell.

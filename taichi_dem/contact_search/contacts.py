@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from taichi_dem.engine.state import State
     from taichi_dem.engine.tables import Tables
 
-#: Largest steps that a fast body makes before the search looks at it again.
+#: Largest steps that a fast body makes before it is searched again.
 STEPS = 16.0
 #: Share of its extent beyond which it is looked at whatever its speed.
 FARTHEST = 0.25
@@ -118,7 +118,7 @@ class Contacts:
 
     @ti.func
     def gather(self, i):
-        """Impulse and moment that contacts have given to body i; they wait no more.
+        """Collect the pending impulse and moment of the contacts of body i.
 
         The heat of the pairs in which it is first is booked to it.
         """
@@ -154,7 +154,7 @@ class Contacts:
 
     @ti.func
     def moved(self, i, velocity, spin, elapsed):
-        """Add to the way of body i and ask for a search once it may have used up its body skin."""
+        """Add to the displacement of body i; request a search once it may exceed the body skin."""
         if self.exposed_faces[i] != 0:
             speed = self._speed(i, velocity, spin)
             way = self.travel[i] + speed * elapsed

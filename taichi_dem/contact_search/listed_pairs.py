@@ -23,7 +23,7 @@ class ListedPairs:
     def __init__(self, contacts: Contacts, capacity: int):
         self.contacts = contacts
         self.body, self.slot, self.new_faces = (ti.field(ti.i32, shape=capacity) for _ in range(3))
-        # Side by side, as every search asks many entries for them, which are no more in the cache.
+        # Stored contiguously: every search reads many entries that are no longer in the cache.
         asked = [*(ti.field(ti.i32) for _ in range(3)), ti.field(real)]
         ti.root.dense(ti.i, capacity).place(*asked)
         self.faces, self.broken, self.found, self.until = asked
@@ -55,7 +55,7 @@ class ListedPairs:
 
     @ti.func
     def note_travel(self, i, way):
-        """Note that body i, which is looked at, has come a way [m] since the last time."""
+        """Add the displacement [m] of body i since it was last searched."""
         self.travelled[i] = self.travelled[i] + way
         self.surveyed[i] = self.travelled[i] + self.contacts.body_skin[i]
 

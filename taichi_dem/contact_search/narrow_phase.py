@@ -26,7 +26,7 @@ class NarrowPhase:
 
     @ti.func
     def note_places(self, i):
-        """Note where the spheres of body i are; computed once for many that ask."""
+        """Compute the positions of the spheres of body i, once for all comparisons."""
         size = self.tables.face_spheres[None]
         position, rotation = self.state.position[i], self.state.rotation[i]
         for face in range(4 * i, 4 * i + 4):
@@ -61,7 +61,7 @@ class NarrowPhase:
 
     @ti.func
     def _clusters_near(self, face_i, face_j, wide):
-        """Whether the balls around the spheres of two faces come nearer than wide [m]."""
+        """Whether the balls around the spheres of two faces are nearer than wide [m]."""
         reach = self.tables.cluster[face_i][3] + self.tables.cluster[face_j][3] + wide
         return (self.cluster[face_j] - self.cluster[face_i]).norm_sqr() < reach * reach
 

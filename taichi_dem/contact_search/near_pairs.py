@@ -30,7 +30,7 @@ class NearPairs:
 
     @ti.func
     def number(self, exposed: ti.template(), count):
-        """Number the near pairs in order; those that come or leave get or lose their slots.
+        """Number the near pairs in order; new ones get slots, others lose theirs.
 
         exposed: the bodies with spheres, count of them: others are in no pair, now or before.
         """
@@ -61,7 +61,7 @@ class NearPairs:
                 count += 1
                 spheres += found
         self.row_count[i], self.row_spheres[i] = count, spheres
-        # Pairs that merely wait leave at the next search.
+        # Pairs that only hold a pending impulse leave at the next search.
         self.listed.changed[i] = waiting
 
     @ti.func

@@ -141,7 +141,7 @@ class PairStore:
 
     @ti.func
     def replace_spheres(self, p, count):
-        """Let the sphere pairs at a pair's new places follow its present ones.
+        """Replace the sphere pairs of a pair by those at its new places.
 
         Those that stay keep their columns, those of the others are zero.
         """

@@ -61,7 +61,7 @@ class Reach:
 
     @ti.func
     def end(self):
-        """All that have left their reach are listed anew."""
+        """Clear the list of escaped bodies, which have been listed again."""
         for a in range(self.escaped_count[None]):
             self.left[self.escaped[a]] = 0
         self.escaped_count[None] = 0
@@ -77,7 +77,7 @@ class Reach:
 
     @ti.func
     def faces_near(self, i, j):
-        """Which faces of two bodies are near: bit 4 f + g for faces f and g."""
+        """Pairs of faces of two bodies that are near: bit 4 f + g for faces f and g."""
         wide, faces = self.reach[i] + self.reach[j], 0
         for f in range(4):
             faces |= self._near_face(4 * i + f, j, wide) << (4 * f)
@@ -85,7 +85,7 @@ class Reach:
 
     @ti.func
     def _near_face(self, face, j, wide):
-        """Which faces of body j, a bit each, come near a face of another."""
+        """Faces of body j, a bit each, that are near a face of another body."""
         faces, reach = 0, self.tables.cluster[face][3] + wide
         whole = reach + self.tables.extent[j]
         if (self.placed_at[j] - self.cluster[face]).norm_sqr() < whole * whole:

@@ -59,7 +59,7 @@ class BroadPhase:
         self.searches = ti.field(ti.i32, shape=())
 
     def load(self, model: "Model", method: Method) -> None:
-        """Let the first search make all lists."""
+        """Load the limits of the lists; the first search makes all of them."""
         self.neighbours.load(model, method)
 
     def clear(self) -> None:
@@ -69,12 +69,12 @@ class BroadPhase:
         assign(self.contacts.search_requested, 0)
 
     def ask(self, everywhere: bool = False) -> None:
-        """Let the driver make a search before its next step."""
+        """Request a search before the next step."""
         assign(self.everywhere, int(everywhere))
         assign(self.contacts.search_requested, 1)
 
     def renew(self) -> None:
-        """Renew the lists, a parallel loop a phase, until no search is due."""
+        """Update the lists, a parallel loop a phase, until no search is requested."""
         while values(self.contacts.search_requested):
             self._search()
 
@@ -169,7 +169,7 @@ class BroadPhase:
         self.schedule.start_pairs()
         self.everywhere[None] = 0
         self.searches[None] = self.searches[None] + 1
-        # A row of neighbours without room calls for another search, which makes the list anew.
+        # A full row of neighbours requires another search, which rebuilds the list.
         again = self.neighbours.stale[None] != 0 and self.full[None] == 0
         self.contacts.search_requested[None] = ti.cast(again, ti.i32)
 
@@ -192,7 +192,7 @@ class BroadPhase:
 
     @ti.func
     def _choose(self, a):
-        """Look at an exposed body if it used up much of its skin, or if a break exposed it."""
+        """Mark an exposed body that used up much of its skin, or that a break has exposed."""
         i = self.exposed[a]
         far = self.contacts.travel[i] > FAR * self.contacts.body_skin[i]
         looked = self.everywhere[None] | ti.cast(far, ti.i32)
@@ -271,7 +271,7 @@ class BroadPhase:
 
     @ti.func
     def _notice(self, p):
-        """Tell the limits of a pair that comes near, or has bodies that a break has exposed."""
+        """Notify the limits of a pair that is new, or has bodies that a break has exposed."""
         pair, now = self.store.body[p], self.state.tick[None]
         fresh = self.breaks.exposed_since(pair[0], now) | self.breaks.exposed_since(pair[1], now)
         self.schedule.limits.notice_listed(p, self.store.is_new[p], fresh)

@@ -1,6 +1,6 @@
-"""Verlet list of the contact search: faces that come near each other while the block hardly moves.
+"""Verlet list of the contact search: faces that are near each other, within several skins.
 
-It reaches several skins and takes in every face, broken or not, so one list serves many searches.
+It contains every face, broken or not, so one list serves many searches.
 """
 
 from typing import TYPE_CHECKING
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 
 #: State of the list when it must be rebuilt, and while it is being rebuilt.
 STALE, MAKING = 1, 2
-#: Room left behind the neighbours of each body, for fast ones that come.
+#: Spare entries in the row of each body, for fast bodies that come near.
 SPARE = 16
-#: Bodies that leave their reach at once, at most, to be listed anew one by one.
+#: Most escaped bodies that are listed again one by one.
 MOST_ESCAPED = 1024
-#: Share of its body skin that a body may use up before a search looks at it.
+#: Share of its body skin that a body may use up before it is searched again.
 FAR = 0.6
 
 
@@ -51,20 +51,20 @@ class VerletList:
         self.full = ti.field(ti.i32, shape=())
 
     def load(self, model: "Model", method: Method) -> None:
-        """Let the list be made anew."""
+        """Set the limit of a scene; the next search rebuilds the list."""
         assign(self.stale, STALE)
         each = model.contact.neighbours_per_body
         assign(self.limit, model.body_count * each + SPARE_NEIGHBOURS)
 
     def clear(self) -> None:
-        """Forget all neighbours; the next search lists them anew."""
+        """Forget all neighbours; the next search rebuilds the list."""
         for field in (self.first, self.last):
             assign(field, 0)
         assign(self.stale, STALE)
 
     @ti.func
     def begin(self):
-        """See whether so many bodies have left their reach that the list is made anew."""
+        """Decide whether so many bodies have left their reach that the list is rebuilt."""
         self.full[None] = 0
         if self.reach.escaped_count[None] > ti.min(
             self.tables.body_count[None] // 16, MOST_ESCAPED
@@ -75,12 +75,12 @@ class VerletList:
 
     @ti.func
     def making(self):
-        """1 while the list is made anew."""
+        """1 while the list is being rebuilt."""
         return ti.cast(self.stale[None] == MAKING, ti.i32)
 
     @ti.func
     def amending(self):
-        """1 while bodies that have escaped are listed anew."""
+        """1 while escaped bodies are being listed again."""
         return ti.cast(self.stale[None] != MAKING and self.reach.escaped_count[None] > 0, ti.i32)
 
     @ti.func
@@ -97,7 +97,7 @@ class VerletList:
 
     @ti.func
     def allot(self):
-        """Give every body its part of the list."""
+        """Allot a row of the list to every body."""
         self.first[0] = 0
         for i in range(self.tables.body_count[None]):
             self.first[i + 1] = self.first[i + 1] + self.first[i]
@@ -119,7 +119,7 @@ class VerletList:
 
     @ti.func
     def _list_near(self, i, p):
-        """Let the row of body i know the slot of a pair that was near."""
+        """Enter the slot of a pair that was near into the row of body i."""
         j = self.store.body[p][1]
         place = self._find_row_index(i, j)
         if self._is_listed(i, place, j):

@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from taichi_dem.engine.model import Model
     from taichi_dem.engine.state import State
 
-#: Energy that may appear from nowhere before a run counts as diverged, as a share of what is there.
+#: Unexplained energy beyond which a run counts as diverged, as a share of the energy present.
 ENERGY_FROM_NOWHERE = 0.5
-#: Overlap of two contact spheres that no contact recovers from, as a share of the distance at which
-#: they touch: their centres are about to pass each other. A small one may be inside a large one.
+#: Overlap of two contact spheres beyond recovery, as a share of the distance at which they touch:
+#: their centres are about to pass each other. A small sphere may be inside a large one.
 DEEPEST_OVERLAP = 0.95
 #: Share of the time that a hurried check may take: it reads every bond, a tenth of a call of the
 #: driver at 100,000 bodies.
@@ -29,7 +29,7 @@ SHARE = 0.02
 
 
 class DivergenceCheck:
-    """Looks at a run after every resident call; raises SimulationDiverged with the place.
+    """Checks a run after every call of the driver; raises SimulationDiverged with the place.
 
     solves: whether the method solves dashpots implicitly, so that only springs limit the step.
     """
@@ -100,7 +100,7 @@ class DivergenceCheck:
             raise SimulationDiverged(self._sentence(body, motion, what))
 
     def round_off(self) -> float:
-        """Energy [J] that rounded positions may have given the bonds so far, once a substep."""
+        """Bound of the energy [J] that rounding of positions has put into the bonds so far."""
         return max(1, int(self.schedule.evaluations[0])) * self.rounded_once
 
     def _rounded_once(self):

@@ -138,7 +138,7 @@ def _use(account, given, model, state, lacking, rounding, effect, what, events, 
 
 
 def _why_kept(model, state, lacking, effect, events):
-    """Why an effect cannot be left out whatever was counted, in words; "" where the count tells.
+    """Reason to keep an effect whatever was counted, in words; "" where the count decides.
 
     lacking: why a count of touches tells nothing, as faces carry no spheres; "" where it does tell.
     """
@@ -156,7 +156,7 @@ def _why_kept(model, state, lacking, effect, events):
 
 
 def _of_the_package(effect):
-    """Whether the class itself is the package's: one derived from it may act in other ways."""
+    """Whether the class itself is the package's; derived classes may act differently."""
     return type(effect).__module__.startswith("taichi_dem.effects.")
 
 

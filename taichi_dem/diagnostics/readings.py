@@ -69,7 +69,7 @@ class Readings:
 
     @ti.kernel
     def support_work(self, index: ti.i32, work: ti.types.ndarray(dtype=ti.f64, ndim=1)):
-        """Work [J] of all supports on the bodies that one of them holds; others stay as given."""
+        """Work [J] of all supports on the bodies that one of them holds; other entries stay."""
         for i in range(self.tables.body_count[None]):
             for e in ti.static(range(len(self.tables.supports))):
                 if e == index and self.tables.supports[e].acts_on(i):

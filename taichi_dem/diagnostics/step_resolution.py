@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from taichi_dem.engine.model import Model
     from taichi_dem.engine.state import State
 
-#: A limited dashpot below this share of its coefficient is another material's.
+#: Least share of its coefficient at which a limited dashpot still represents the material.
 LEAST_SHARE = 0.5
-#: A bond that is open by this many failure openings when it fails has failed too late: up to then
-#: its dashpots, far the stronger part of it, have pulled for as much too long.
+#: A bond that is open by this many failure openings when it fails has failed too late: its dashpots,
+#: far stronger than its springs, have acted too long.
 MOST_OPENING = 1.25
 #: Sphere dashpots of a pair take c n dt / m of the speed at which the bodies part or meet; above 1
-#: they turn it round, and what the springs should ease apart is thrown apart.
+#: they reverse it, and throw apart bodies that the springs should part gently.
 MOST_TAKEN = 1.0
 _KEPT = ("share", "pair_share", "taken", "step", "lightest")
 
@@ -62,7 +62,7 @@ class StepResolution:
             setattr(self, name, saved[name].copy())
 
     def sample(self) -> None:
-        """Update the figures at a recording time. Dashpots that are solved need no look."""
+        """Update the figures at a recording time; not for dashpots that are solved."""
         if self.solves:
             return
         if self.limited and self.has_dashpot and self.model.bond_count:

@@ -83,7 +83,7 @@ class Effect:
         return (-np.inf,) * 3, (np.inf,) * 3
 
     def stand_for(self, given: Optional["Effect"]) -> None:
-        """Let the attributes of this bound effect be those of a scene's; None changes nothing."""
+        """Take the attributes of this bound effect from a scene's effect; None changes nothing."""
         if given is not None:
             self.__dict__["_given"] = vars(given)
 
@@ -94,7 +94,7 @@ class Effect:
         self.load(model)
 
     def accepts(self, given: Optional["Effect"]) -> bool:
-        """Whether kernels that were compiled for this one serve for a scene's effect ``given``.
+        """Whether kernels compiled for this effect are valid for a scene's effect ``given``.
 
         They do unless they have read one of its values where they should have read a field.
         """
@@ -125,7 +125,7 @@ def bound(effect: Effect, tables: "Tables") -> Any:
 
 
 class _AnyMaterial:
-    """Stands for a material where only the number of its constants is asked for."""
+    """Substitute for a material where only the number of constants matters."""
 
     def __getattr__(self, name):
         return 1.0

@@ -1,4 +1,4 @@
-"""Roles of effects as typed contracts: the members that the step asks of each.
+"""Roles of effects as typed contracts: the members that each must have.
 
 All members are ``ti.func`` methods of the bound effect. b is a bond, u one of its three contact
 units (3 b, 3 b + 1, 3 b + 2), i a body, k a sphere pair.
@@ -86,10 +86,10 @@ class FrictionMemory(Protocol):
     """
 
     def follow(self, k: int, normal: ti.Vector, way: ti.Vector) -> None:
-        """Turn the spring of pair k into the present contact plane and stretch it by a way [m]."""
+        """Turn the spring of pair k into the plane of contact and stretch it by ``way`` [m]."""
 
     def slip(self, k: int, limit: float, way: ti.Vector) -> float:
-        """Let the spring slip beyond a limit [N]; energy [J] that this takes."""
+        """Shorten the spring to a limit [N]; return the energy dissipated [J]."""
 
     def spring(self, k: int) -> ti.Vector:
         """Force [N] on the second sphere."""
@@ -141,7 +141,7 @@ CONTRACTS = {
 
 
 def members_of(contract: type) -> tuple:
-    """Names of the members that a Protocol asks for."""
+    """Names of the members of a Protocol."""
     return tuple(name for name in vars(contract) if not name.startswith("_"))
 
 

@@ -37,7 +37,7 @@ class Softening(Effect):
         self.unit = ti.Vector.field(2, ti.f64, shape=capacity.units)
 
     def load(self, model: "Model") -> None:
-        """Let every unit be intact."""
+        """Set every unit intact."""
         stiffness = np.repeat(model.bond_stiffness[:, 0], 3)
         onset = model.material.tensile_strength / stiffness
         assign(self.unit, np.stack([onset, stiffness], axis=1))
@@ -52,7 +52,7 @@ class Softening(Effect):
 
     @ti.func
     def traction(self, stiffness, u, opening):
-        """Traction [Pa] at a normal opening [m]; moves the elastic limit on the way out."""
+        """Traction [Pa] at a normal opening [m]; raises the elastic limit beyond it."""
         traction = stiffness * opening
         if opening > 0.0:
             unit = self.unit[u]

@@ -41,7 +41,7 @@ class StickingFriction(Friction):
 
     @ti.func
     def follow(self, k, normal, way):
-        """Turn the spring of sphere pair k into the plane of contact and stretch it by a way [m].
+        """Turn the spring of sphere pair k into the plane of contact and stretch it by ``way`` [m].
 
         normal: of the contact; way: of the second sphere against the first across the normal.
         """

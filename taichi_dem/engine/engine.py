@@ -110,7 +110,7 @@ class BlastEngine(Engine):
         return lengths
 
     def accepts(self, model: Model) -> bool:
-        """Whether no kernel has read a number of an effect that the scene gives another value."""
+        """Whether effect parameters compiled into kernels have the values of the scene."""
         return all(effect.accepts(given) for effect, given in self.tables.matched(model))
 
     def enter(self, model: Model) -> None:

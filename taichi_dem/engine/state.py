@@ -134,7 +134,7 @@ class State:
         return int(values(self.tables.body_count))
 
     def expose(self, topology: Topology) -> None:
-        """Let all outer faces carry contact spheres from the start, beside those that do."""
+        """Put contact spheres on all outer faces from the start."""
         marks = values(self.exposed_tick)
         marks[4 * topology.outer_body + topology.outer_face] = 0
         assign(self.exposed_tick, marks)

@@ -1,4 +1,4 @@
-"""Parts of an engine as their simulation sees them: its own data are on the device when asked."""
+"""Views of the parts of an engine: the data of their simulation are loaded before each access."""
 
 from typing import Any
 
@@ -54,7 +54,7 @@ class PartView:
 
     @property
     def name(self) -> str:
-        """Name of the part; asked for also after its session has ended."""
+        """Name of the part; available also after its session has ended."""
         return self._part().name
 
 
@@ -92,7 +92,7 @@ class FieldView:
         assign(self.field, array)
 
     def fill(self, value: float) -> None:
-        """Give all entries of the scene a value."""
+        """Set all entries of the scene to a value."""
         whole = self.to_numpy()
         whole[...] = value
         assign(self.field, whole)

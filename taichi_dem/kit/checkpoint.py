@@ -55,7 +55,7 @@ class Checkpoint:
                 positive(name, getattr(self, name))
 
     def marks(self, last: int, dt: float) -> set[int]:
-        """Steps of dt [s] from 0 to last at which it asks to be saved, a set.
+        """Steps of dt [s] from 0 to last at which the run is to be saved, a set.
 
         Raises InputError where they are more than a million.
         """

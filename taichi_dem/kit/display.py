@@ -17,7 +17,7 @@ from taichi_dem.kit.validation import shown
 
 #: Letters of a representation at a prompt.
 _LONGEST = 400
-#: Numbers of a sequence that are listed; longer ones are given by their ends.
+#: Longest sequence of numbers that is listed; longer ones are shown by their ends.
 _LISTED = 6
 _CELL = "text-align:left;padding:2px 12px 2px 0"
 _PICTURE = "max-width:100%"

@@ -90,7 +90,7 @@ class FieldMemory:
         return self.views[name] if name in self.views else self.fields[name].to_numpy()
 
     def misfit(self, arrays: Mapping[str, np.ndarray]) -> str:
-        """Name of a field that arrays, as ``read`` gave them, lack or do not fit; else ""."""
+        """Name of a field that the arrays of ``read`` lack or do not fit; else ""."""
         for name, field in self.fields.items():
             shape, array = _shape(field), arrays.get(name)
             if array is None or array.dtype != to_numpy_type(field.dtype):

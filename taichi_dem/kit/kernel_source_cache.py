@@ -33,7 +33,7 @@ class RememberingWrapper(textwrap.TextWrapper):
 
 
 def remembering(find: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """A function's source lines and where they begin, as find gives them, each looked for once."""
+    """Source lines of a function and their first number, as find returns them; cached."""
     cached = {}
 
     def lines(function):
@@ -49,7 +49,7 @@ def remembering(find: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
 
 def remember() -> None:
-    """Let Taichi use both, where it has them by the names of Taichi 1.7; once is enough."""
+    """Install both caches in Taichi, where it has the names of Taichi 1.7."""
     if hasattr(ast_transformer_utils, "TextWrapper"):
         ast_transformer_utils.TextWrapper = RememberingWrapper
     find = getattr(kernel_impl, "getsourcelines", None)

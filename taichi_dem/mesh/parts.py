@@ -54,7 +54,7 @@ def any_overlap(low: np.ndarray, high: np.ndarray) -> bool:
 
 
 def may_meet(scene: Any, part: np.ndarray) -> bool:
-    """Whether parts of a scene at rest may come to meet, as far as can be known before a run.
+    """Whether parts of a scene at rest may meet, as far as can be known before a run.
 
     Not where nothing moves them, and not where uniform acceleration is all that does. Else every
     part may come as far from its box as ``NEARNESS`` says and as its loads and supports may carry

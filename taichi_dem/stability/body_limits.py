@@ -170,7 +170,7 @@ class StabilityLimits:
 
     @ti.func
     def notice_listed(self, p, entered, fresh):
-        """Count the contacts of a pair that a search lists: entered and fresh tell why, if not 0.
+        """Count the contacts of a pair that a search lists; entered, fresh: nonzero for the reason.
 
         Entering the list does not change a body's limits: a search lists what may come near, and
         how far it looks must not matter. Spheres that a break has just set free may touch already.
@@ -237,7 +237,7 @@ class StabilityLimits:
 
     @ti.func
     def wanted(self, i, now):
-        """Level that body i wants at a time [s], and the criterion that asks for it.
+        """Wanted level of body i at a time [s], and its criterion.
 
         A body asks at every step: squares and tables spare it roots and quotients.
         """
@@ -255,7 +255,7 @@ class StabilityLimits:
 
     @ti.func
     def _push2(self, i, now):
-        """Square of the acceleration that the loads alone give body i [m^2/s^4].
+        """Square of the acceleration of body i by the loads alone [m^2/s^4].
 
         The larger one of now and a largest step ahead: a body does not leap into a load that sets
         in before its next update.
@@ -271,12 +271,12 @@ class StabilityLimits:
 
     @ti.func
     def bond_share(self, i, step):
-        """Share of its bonds' dashpots that a step [s] of body i bears."""
+        """Share of its bonds' dashpots that is stable at a step [s] of body i."""
         return self._bonds_get(i, step) / ti.max(2.0 * step * self.bond_damping[i], 1e-200)
 
     @ti.func
     def contact_share(self, i, step):
-        """Share of its contacts' dashpots that a step [s] of body i bears, beside its bonds."""
+        """Share of its contacts' dashpots that is stable, beside its bonds, at a step [s]."""
         x = 2.0 * step * self.contact_damping[i]
         left = ti.min(STOPS, LIMITED - self._bonds_get(i, step))
         return ti.min(1.0, left / ti.max(x, 1e-200))

@@ -71,7 +71,7 @@ class ContactLimits:
         self.root_inertia = ti.Matrix.field(3, 3, real, shape=tables.capacity.bodies)
 
     def load(self, model: "Model", ahead: float) -> None:
-        """Take a model, and the time [s] that a step of level 0 looks ahead."""
+        """Load a model, and the time [s] that a step of level 0 looks ahead."""
         assign(self.ahead, ahead / 2.0 ** np.arange(MAX_LEVEL + 1))
         root = inverse_root(model.body_mass, model.body_inertia)
         assign(self.root_mass, root[:, 0, 0])

@@ -1,4 +1,4 @@
-"""Which step a body may take: one object a rule, asked by the schedule at the body's own times."""
+"""Rules for the step of a body, evaluated by the schedule at the body's own times."""
 
 from dataclasses import dataclass
 from typing import Optional
@@ -26,13 +26,13 @@ CRITERIA = (
 LARGEST, DISPLACEMENT, ROTATION, BOND_K, BOND_C, CONTACT_K, CONTACT_C, LOAD, NEIGHBOUR = range(9)
 #: Criteria that a user may leave out, for comparison.
 OPTIONAL = CRITERIA[2:8]
-#: Events that bring a body to the present time and let it choose its step anew.
+#: Events at which a body is brought to the present time and chooses a new step.
 EVENTS = ("hit", "release", "neighbour")
 
 
 @dataclass(frozen=True)
 class StepControl:
-    """Limits of a body's step beside the way that it may go.
+    """Limits of a body's step beside its displacement in it.
 
     safety: share of each stability limit that a step may take, in (0, 1]. angle: largest turn
     in a step [rad]. criteria: names out of ``OPTIONAL`` that count. wake: events out of ``EVENTS``
@@ -114,7 +114,7 @@ class Displacement:
 
     @ti.func
     def finer(self, level, rate2):
-        """Lowest level from a given one on for a squared rate, [m^2/s^2] for a speed."""
+        """Lowest level, from ``level`` on, for a squared rate, [m^2/s^2] for a speed."""
         k = level
         while rate2 > self.rate2[k] and k < MAX_LEVEL:
             k += 1

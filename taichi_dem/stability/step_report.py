@@ -85,7 +85,7 @@ class StepReport:
         together = stable_together(springs, drags)
         if dashpots == "full":
             return together
-        # Of the 2 that an explicit step bears, limited dashpots take LIMITED at most.
+        # Of the stability limit 2 of an explicit step, limited dashpots take at most LIMITED.
         return np.maximum(together, springs * np.sqrt(1.0 - 0.5 * LIMITED))
 
     def worst(self, count: int = _WORST) -> np.ndarray:
@@ -126,7 +126,7 @@ class StepReport:
         return not np.isfinite(self.step_s).any()
 
     def _method_lines(self):
-        """A line for every way of taking dashpots, then how to read it."""
+        """A line for every treatment of dashpots, then an explanation."""
         lines = [f"{'largest stable step':32s}{'in bonds s':>12s}{'':10s}{'in contact s':>14s}"]
         for dashpots, words in METHODS.items():
             bonds, contact = (self._smallest(dashpots, link) for link in ("bond", "contact"))
@@ -141,7 +141,7 @@ class StepReport:
         return lines
 
     def _smallest(self, dashpots, link):
-        """Smallest step that a method bears [s], and whether springs or dashpots limit it."""
+        """Largest stable step of a method [s], and whether springs or dashpots limit it."""
         steps = self.borne(dashpots, link)
         body = int(np.argmin(steps))
         if not np.isfinite(steps[body]):

@@ -1,4 +1,4 @@
-"""List in order of falling level; the members that are active at a tick come first."""
+"""List by falling level, in which the members active at a tick come first."""
 
 import taichi as ti
 
@@ -64,7 +64,7 @@ class ActiveList:
 
     @ti.func
     def move(self, m, key):
-        """Give a listed member another key; a negative one takes it off the list.
+        """Change the key of a listed member; a negative one removes it.
 
         It changes places with the first, or last, of each key that it passes.
         """

@@ -101,7 +101,7 @@ class Advance(ContactForce):
 
     @ti.func
     def _renew(self, b, slots, motion, failed, dragged):
-        """Let the solver take in the twist a bond has now, or forget it; dragged [J]."""
+        """Pass the present twist of a bond to the solver, or remove the bond; dragged [J]."""
         if failed == 0:
             self.solver.bonds.begin(b, slots[0] >> 2, slots[1] >> 2, motion.branch)
         else:
@@ -112,7 +112,7 @@ class Advance(ContactForce):
 
     @ti.func
     def _is_pending(self, b):
-        """Whether a bond holds, and has not given its impulse for the coming step already."""
+        """Whether a bond holds and has not applied its impulse for the coming step already."""
         pending = self.state.broken_tick[b] < 0
         if ti.static(self.retimes):
             slots = self.tables.bond_slots[b]
@@ -123,7 +123,7 @@ class Advance(ContactForce):
 
     @ti.func
     def _bond_step(self, b, i, j):
-        """Seconds for which a bond gives its impulse now."""
+        """Time [s] for which a bond applies its force now."""
         dt = 0.0
         if ti.static(self.retimes):
             dt = self.schedule.applied_until.apply_bond(b, i, j)
@@ -153,7 +153,7 @@ class Advance(ContactForce):
 
     @ti.func
     def _pull_together(self, slots, motion, impulse, moment):
-        """Give master and slave opposite impulses; moment is about the slave's centre."""
+        """Add opposite impulses to master and slave; moment is about the slave's centre."""
         turn_back = motion.axes.transpose()
         linear, angular = turn_back @ impulse, turn_back @ moment
         self._add(slots[0], linear, angular + motion.branch.cross(linear))
@@ -212,7 +212,7 @@ class Advance(ContactForce):
 
     @ti.func
     def body(self, i):
-        """Bring a body to the present tick and let it choose its next step."""
+        """Bring a body to the present tick and choose its next step."""
         elapsed = self.schedule.elapsed(i)
         linear, angular = self._gathered(i)
         velocity, momentum = self._kicked(i, elapsed, linear, angular)
@@ -220,7 +220,7 @@ class Advance(ContactForce):
 
     @ti.func
     def _moved(self, i, elapsed, velocity, momentum):
-        """Let body i go on for elapsed [s] and choose its next step."""
+        """Move body i for elapsed [s] and choose its next step."""
         spin = self.spin(i, momentum)
         self._drift(i, elapsed, velocity, momentum, spin)
         self.state.velocity[i], self.state.angular_momentum[i] = velocity, momentum
@@ -229,7 +229,7 @@ class Advance(ContactForce):
 
     @ti.func
     def _drift(self, i, elapsed, velocity, momentum, spin):
-        """Move and turn body i, which begins with a spin; note the way it went, and a runaway."""
+        """Move and turn body i from a spin; note its displacement, and a runaway."""
         turning = self._turning(i, elapsed, momentum, spin)
         orientation = turned(self.state.orientation[i], turning, elapsed)
         self.state.orientation[i] = orientation
@@ -257,7 +257,7 @@ class Advance(ContactForce):
 
     @ti.func
     def _gathered(self, i):
-        """Impulse and moment waiting in the slots of a body, always summed in one order."""
+        """Collect the impulse and moment in the slots of a body, always summed in one order."""
         linear, angular = zero3(), zero3()
         for f in range(4):
             taken = self.state.slot[4 * i + f]
@@ -294,7 +294,7 @@ class Advance(ContactForce):
 
     @ti.func
     def _load_time(self, elapsed):
-        """Time at which loads are asked for their force: the beginning of the step [s].
+        """Time at which loads are evaluated: the beginning of the step [s].
 
         Forces that change velocities there, and positions that follow from the new ones, are the
         leapfrog whose velocities live half a step earlier: of second order without dashpots. The

@@ -1,4 +1,4 @@
-"""Driver chosen by measurement: continues with the faster one; both give the same bits.
+"""Driver chosen by measurement: it continues with the faster one; both give the same bits.
 
 Which one it is depends on how much is due in a step and on how free the cores are: the parallel
 driver pays for every phase with a launch, and much more where other programs hold a core.
@@ -46,7 +46,7 @@ class AutoDriver:
         return f"{self.chosen} (measured)"
 
     def prepare(self) -> None:
-        """Make the search that is due, without a step; compiles both drivers."""
+        """Make a requested search, without a step; compiles both drivers."""
         for driver in self.drivers.values():
             driver.prepare()
 
@@ -72,5 +72,5 @@ class AutoDriver:
             self.chosen = min(self.seconds, key=lambda name: self.seconds[name])
 
     def _visited(self):
-        """Bodies, bonds and pairs that were due so far."""
+        """Number of bodies, bonds and pairs evaluated so far."""
         return int(values(self.step.schedule.evaluations)[1:4].sum())

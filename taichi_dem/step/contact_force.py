@@ -92,7 +92,7 @@ class ContactForce:
 
     @ti.func
     def _pair_step(self, p, i, j):
-        """Seconds for which a touching pair gives its impulse now; 0 when it has given it."""
+        """Time [s] for which a touching pair applies its force now; 0 if done already."""
         dt = 0.0
         if ti.static(self.retimes):
             dt = self.schedule.applied_until.apply_pair(p, i, j)

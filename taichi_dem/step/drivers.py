@@ -26,7 +26,7 @@ _KERNEL_SECONDS = 0.1
 _MAX_SUBSTEPS = 1 << 24
 #: Pairs of an active list and the function that is called with each active member.
 Phases = tuple[tuple[Any, Callable[..., Any]], ...]
-#: Bit that a parallel substep adds to what it returns when a search is due.
+#: Bit that a parallel substep sets in its result when a search is requested.
 _SEARCH = 2
 
 
@@ -86,7 +86,7 @@ class Step:
         return False
 
     def _retimed(self):
-        """Phases in which bodies take new rates, and are woken, where the method asks for it."""
+        """Phases that update rates and wake bodies, where the method requires it."""
         limits = self.schedule.limits
         if limits is None:
             return ()
@@ -227,7 +227,7 @@ class Driver(Protocol):
         """Begin with another scene."""
 
     def prepare(self) -> None:
-        """Make the search that is due, without a step; compiles the kernels."""
+        """Make a requested search, without a step; compiles the kernels."""
 
     def few(self, end_tick: int, substeps: int) -> None:
         """Advance some substeps, or to a tick or the next halt."""
@@ -251,7 +251,7 @@ class Resident:
         self.substeps = 4
 
     def prepare(self) -> None:
-        """Make the search that is due, without a step; compiles the kernel."""
+        """Make a requested search, without a step; compiles the kernel."""
         self._run(0, 0)
 
     def few(self, end_tick: int, substeps: int) -> None:
@@ -302,7 +302,7 @@ class Parallel:
         """Nothing depends on the scene."""
 
     def prepare(self) -> None:
-        """Make the search that is due, without a step; compiles the kernels."""
+        """Make a requested search, without a step; compiles the kernels."""
         for part in range(len(self.step.parts)):
             self._run(part, 0, 0)
         if self.step.has_contact:
@@ -321,7 +321,7 @@ class Parallel:
             pass
 
     def _substep(self, end_tick):
-        """All parts of a substep, and the search that is due; nonzero at the end or a halt."""
+        """Run all parts of a substep, and a requested search; nonzero at the end or a halt."""
         state = 0
         for part in range(len(self.step.parts)):
             state = self._run(part, end_tick, 1)
@@ -345,7 +345,7 @@ class Parallel:
         return finished
 
 
-#: Drivers by the name that users give.
+#: Drivers by name.
 DRIVERS: dict[str, Callable[[Step], Driver]] = {
     driver.name: driver for driver in (Resident, Parallel)
 }

@@ -120,7 +120,7 @@ class Schedule:
 
     @ti.func
     def advance_clock(self, one):
-        """Move the clock to the next tick at which a body is due."""
+        """Move the clock to the next tick at which a body is active."""
         if ti.static(self.has_contact):
             self.evaluations[3] = self.evaluations[3] + self.pairs.end[self.low[None]]
             self.evaluations[4] = self.evaluations[4] + self.pairs.end[0]
@@ -130,7 +130,7 @@ class Schedule:
 
     @ti.func
     def choose_level(self, i, speed2):
-        """Let body i, if it is its own time, take the step it wants."""
+        """Choose the level of body i, if the present is one of its own times."""
         low, level = self.low[None], self.state.level[i]
         if level >= low:
             wanted = low
@@ -149,7 +149,7 @@ class Schedule:
 
     @ti.func
     def controlled_level(self, i):
-        """Level that the rates and the neighbours of body i ask for, and which criterion does."""
+        """Level that the rates and the neighbours of body i require, and its criterion."""
         wanted, bound = self.limits.wanted(i, self.seconds(self.state.tick[None]))
         if ti.static(self.spreads):
             # Its neighbours, many to visit, step no finer than the finest of all.
@@ -216,7 +216,7 @@ class Schedule:
 
     @ti.func
     def start_all(self):
-        """Fill all lists anew."""
+        """Fill all lists."""
         if ti.static(self.uniform):
             self._level_all()
         self.changed_count[None] = 0
@@ -250,7 +250,7 @@ class Schedule:
 
     @ti.func
     def _level_all(self):
-        """Give every body the finest level that any of them wants."""
+        """Set every body to the finest level that any of them wants."""
         if self.wanted[None] != self.state.level[0]:
             for i in range(self.tables.body_count[None]):
                 self.state.level[i] = self.wanted[None]
@@ -315,7 +315,7 @@ class Schedule:
 
     @ti.func
     def _key(self, i, j):
-        """Finer level of two bodies; where all step alike, all are due at every tick."""
+        """Finer level of two bodies; where all step alike, all are active at every tick."""
         key = MAX_LEVEL
         if ti.static(not self.uniform):
             key = ti.max(self.state.level[i], self.state.level[j])

@@ -39,13 +39,13 @@ class TangentialSprings:
 
     @ti.func
     def follow(self, k, rotation, normal, way):
-        """Stretch the spring of sphere pair k by a way [m]."""
+        """Stretch the spring of sphere pair k by ``way`` [m]."""
         back = rotation.transpose()
         self.friction.follow(k, back @ normal, back @ way)
 
     @ti.func
     def slip(self, k, rotation, bound, way):
-        """Shorten the spring of sphere pair k to a bound [N] after a way [m]; energy spent [J]."""
+        """Shorten the spring of sphere pair k to a bound [N] after ``way`` [m]; energy [J]."""
         return self.friction.slip(k, bound, rotation.transpose() @ way)
 
     @ti.func

@@ -30,7 +30,7 @@ class Accounting(Protocol):
         """Allocate its fields, with ``table.field``."""
 
     def clear(self, s: int) -> None:
-        """Start scene s anew, the impulse balance included."""
+        """Reset scene s, the impulse balance included."""
 
     def moved(self, s: int, origin: int, target: int) -> None:
         """Follow a particle from one cell to another."""

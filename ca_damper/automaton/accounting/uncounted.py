@@ -27,7 +27,7 @@ class Uncounted:
 
     @ti.func
     def clear(self, s):
-        """Start the balance of scene s anew."""
+        """Reset the balance of scene s."""
         self.impulse_balance.clear(s)
 
     @ti.func

@@ -109,7 +109,7 @@ class _Terminal:
         spinner = SpinnerColumn("dots" if console.encoding.startswith("utf") else "line")
         self._narrow = console.width < _NARROW
         bars = () if self._narrow else (BarColumn(None),)
-        # The bar takes what the words leave of a line. Prints go where they would go without it.
+        # The bar takes the rest of a line. Prints go where they would go without it.
         self._bar = Progress(
             *(spinner, texts[0], *bars, texts[1]),
             console=console,
@@ -148,7 +148,7 @@ class _PlainTerminal:
             print(f"{self._title}: {progress}", file=sys.stderr, flush=True)
 
     def close(self):
-        """Leave what was written."""
+        """Leave the text as written."""
 
 
 class _Notebook:

@@ -166,7 +166,7 @@ class PairDashpots:
 
     @ti.func
     def _way(self, i, j, branch, arm, normal, elapsed):
-        """Way of a contact's second sphere against the first across the normal in a time [m]."""
+        """Tangential displacement of a contact's second sphere against the first in a time [m]."""
         spin = self.state.spin[i]
         velocity = self.state.velocity[j] + self.state.spin[j].cross(arm)
         velocity -= self.state.velocity[i] + spin.cross(arm + branch)
@@ -193,7 +193,7 @@ class PairDashpots:
 
     @ti.func
     def _deposit(self, p, branch, force, moment):
-        """Let both bodies have the first guess: force on the second, moment about its centre."""
+        """Add the first guess to both bodies: impulse on the second, moment about its centre."""
         around = moment + branch.cross(force)
         self.contacts.add_impulse(p, 0, -force, -around)
         self.contacts.add_impulse(p, 1, force, moment)
@@ -262,7 +262,7 @@ class PairDashpots:
 
     @ti.func
     def _slip(self, p, c, i, j, pressed):
-        """Let a spring slip in a step; its impulse [N s], and the energy that slipping took [J]."""
+        """Limit a spring in a step; return its impulse [N s] and the energy of slipping [J]."""
         k, normal, rotation = self.entry[c], self.normal[c], self.state.rotation[i]
         dt = self.schedule.step_seconds[0]
         bound = self.tables.friction.limit(pressed) / dt

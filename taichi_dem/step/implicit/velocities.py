@@ -55,7 +55,7 @@ class Velocities:
 
     @ti.func
     def _support(self, i, advance):
-        """Supports change velocities linearly: ask them for the unit impulses and moments."""
+        """Apply the supports, which are linear, to the unit impulses and moments."""
         unit, turn = unit3(), self.turn[i]
         rest, rest_turn = advance.allowed(i, 0.0 * unit[0, :], 0.0 * unit[0, :])
         for k in ti.static(range(3)):
@@ -69,7 +69,7 @@ class Velocities:
 
     @ti.func
     def predict(self, i, advance, linear, angular):
-        """Let body i have an impulse [N s] and moment [N m s], as its supports allow."""
+        """Apply an impulse [N s] and a moment [N m s] to body i, as its supports allow."""
         velocity = self.state.velocity[i] + self.tables.mass_inverse[i] * linear
         spin = self.state.spin[i] + self.turn[i] @ angular
         if ti.static(self.has_supports):
@@ -106,7 +106,7 @@ class Velocities:
 
     @ti.func
     def pull(self, i, j, branch, force, moment):
-        """Give i an impulse and a moment at j's centre, and j the opposite."""
+        """Apply an impulse and a moment at j's centre to body i, and the opposite to j."""
         turned = self.turn[i] @ (moment + branch.cross(force))
         back = self.turn[j] @ moment
         first, second = force, force
