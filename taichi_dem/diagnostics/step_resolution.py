@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 #: Least share of its coefficient at which a limited dashpot still represents the material.
 LEAST_SHARE = 0.5
-#: A bond that is open by this many failure openings when it fails has failed too late: its dashpots,
+#: A bond open by this many failure openings when it fails has failed too late: its dashpots,
 #: far stronger than its springs, have acted too long.
 MOST_OPENING = 1.25
 #: Sphere dashpots of a pair take c n dt / m of the speed at which the bodies part or meet; above 1
