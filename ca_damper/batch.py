@@ -147,9 +147,9 @@ class Batch(LoadedScenes):
     ) -> Iterator[Any]:
         """Save the runs in its block as a checkpoint asks; yields the writer.
 
-        checkpoint: a Checkpoint or None. resume: file to go on from, or None: the run that it was
-        saved in is then to be called for again, and goes on. identity: words by name that a file
-        must share; owners: (name, object) of what else goes into it, as in ``restart.RunSnapshot``.
+        checkpoint: a Checkpoint or None. resume: file to go on from, or None; the saved run must be
+        called again, and is continued. identity: words by name that a file must share; owners:
+        (name, object) of further data in it, as in ``restart.RunSnapshot``.
         Raises InputError.
         """
         self._check_started()

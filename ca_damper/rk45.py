@@ -33,8 +33,8 @@ def step(rhs: ti.template(), context, t, y, slope, h):
     """One step of length h from y at t, where dy/dt is ``slope``.
 
     Returns y at t + h (fifth order), dy/dt there (the next step's slope: six new evaluations a
-    step) and the difference to the embedded fourth-order result. A caller that has no use for the
-    last two pays nothing for them in a kernel, where what nobody reads is not computed.
+    step) and the difference to the embedded fourth-order result. In a kernel, unused results cost
+    nothing, as they are not computed.
     """
     k1 = slope
     k2 = rhs(context, t + h * (1 / 5), y + h * (1 / 5 * k1))
@@ -94,8 +94,8 @@ def first_step(rhs: ti.template(), context, t, y, slope, rtol, atol):
 def attempt(rhs: ti.template(), context, t, t_end, y, slope, h, rtol, atol):
     """Try a step of length h, or the rest up to t_end.
 
-    Returns (t, y, dy/dt, length tried, error in units of the tolerance): where the step leads when
-    its error is at most 1, where it began when it is not.
+    Returns (t, y, dy/dt, length tried, error in units of the tolerance): at the end of the step
+    when its error is at most 1, at its beginning otherwise.
     """
     left = t_end - t
     size = min(h, left)

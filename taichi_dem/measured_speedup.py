@@ -1,7 +1,7 @@
 """Measured speed-up of multirate stepping over the same bodies with one step for all.
 
-The gains of a ``Report`` count evaluations. Lists that change, looks at who is due, and lines of
-memory of which a part is used cost time beside them.
+The gains of a ``Report`` count evaluations. Changes of lists, tests for active bodies, and cache
+lines that are used in part cost time beside them.
 """
 
 import contextlib
@@ -30,9 +30,9 @@ _ANEW = (
 
 
 def speedup_of_run(simulation: Simulation) -> Optional[float]:
-    """``measured_speedup`` for a share of the run's own time; None where it cannot be measured.
+    """Call ``measured_speedup`` for a share of the run's own time; None if not measurable.
 
-    That is where the run was too short, or its twin leaves its bounds: the run itself did not.
+    That is where the run was too short, or where its twin diverges, although the run did not.
     """
     spent = simulation.run_cpu_seconds
     if simulation.method.uniform or spent < LEAST_RUN or not is_dataclass(simulation.method):
@@ -46,9 +46,9 @@ def speedup_of_run(simulation: Simulation) -> Optional[float]:
 def measured_speedup(simulation: Simulation, seconds: float = MOST_SECONDS) -> float:
     """CPU time that one step for all would have taken, over that of the run; 1 if it had one step.
 
-    How many evaluations that is is counted during the run. What one takes is measured for a number
-    of CPU seconds on a twin in the same engine: it begins where the simulation stands, and all of
-    its bodies take the smallest step that there is then.
+    The number of evaluations with one step is counted during the run. Their cost is measured for a
+    number of CPU seconds on a twin in the same engine: it begins at the present state, and all of
+    its bodies take the smallest step present.
     Raises SimulationDiverged when the twin leaves its bounds.
     """
     if simulation.method.uniform or simulation.run_cpu_seconds == 0.0:
@@ -68,7 +68,7 @@ def measured_speedup(simulation: Simulation, seconds: float = MOST_SECONDS) -> f
 def _twin(simulation, step):
     """A simulation at the same state with one step [s] for all, at time zero.
 
-    Its largest step is the one that all take: no body goes far enough in it to ask for less.
+    Its largest step is that of all bodies, as none moves far enough in it to require less.
     """
     given = {name: field.to_numpy() for name, field in simulation.state.fields().items()}
     method = replace(simulation.method, dt0=step, distance=LARGEST)

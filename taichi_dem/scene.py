@@ -86,10 +86,10 @@ def _check_roles(effects):
 def outer_faces_warnings(scene: Any) -> tuple[str, ...]:
     """Sentences about parts of a scene that may meet where they carry no spheres; before a run.
 
-    A solid in one piece has nothing else to meet until it breaks, and what then happens is seen in
-    the run. Who lists contact expects bodies to meet: then all that has several parts is told. Who
-    lists none may have put independent solids into one scene: then nothing is said where they
-    stay at rest, fall alike, or are too far from each other (``parts.may_meet``).
+    A solid in one piece meets nothing until it breaks, which is detected in the run. Scenes with
+    contact are expected to have meeting bodies: any with several parts is reported. Scenes without
+    contact may hold independent solids: they are not reported where they stay at rest, fall alike,
+    or are too far from each other (``parts.may_meet``).
     scene: a Scene, or a Model, which has the same mesh and effects.
     """
     contact = [effect for effect in scene.effects if effect.role == "contact"]

@@ -199,7 +199,7 @@ def _run_saved(simulation, recorder, writer, plan, report_progress):
 def _run(simulation, recorder, writer, plan, calls):
     """Step from mark to mark, and call the observers at each.
 
-    Those marks up to which a resumed run has come have been seen to.
+    A resumed run skips the marks that it has passed already.
     """
     view = RunView(simulation, recorder)
     seen = simulation.state.tick[None] if recorder.rows else -1

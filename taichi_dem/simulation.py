@@ -49,14 +49,14 @@ _MEASURED = "measured"
 class Simulation:
     """One scene, one method, one driver, on an engine of the session.
 
-    driver: "resident", "parallel", or "auto": parallel on a GPU and for large scenes, for those of
-    middle size on several threads whichever proves the quicker.
+    driver: "resident", "parallel", or "auto": parallel on a GPU and for large scenes; for those of
+    middle size on several threads, the faster one by measurement.
     brute_force: contact search without cells, for tests.
     model: the scene's arrays. tables, state, schedule, contacts, broad_phase, advance, step: parts
     of the engine, with the data of this simulation (``engine.view``); contacts and broad_phase are
     None without contact.
-    Raises InputError for what is no scene or method, an unknown driver, "resident" on a GPU, or a
-    scene that finds no room in the machine's memory.
+    Raises InputError for a wrong scene or method, an unknown driver, "resident" on a GPU, or a
+    scene that exceeds the machine's memory.
     """
 
     # Views of these parts, with the data of this simulation.
@@ -159,7 +159,7 @@ class Simulation:
     def start(self) -> None:
         """Choose the first steps, evaluate the bonds and open the account; done once.
 
-        Compiles everything, so that stepping afterwards is all that is timed as the run.
+        Compiles everything, so that the time of the run is that of stepping alone.
         """
         if self.energy_balance is not None:
             return
@@ -193,7 +193,7 @@ class Simulation:
     def sample(self) -> None:
         """Sample missing effects, and bonds that the step does not resolve.
 
-        Called at recording times, so that the step stays bare.
+        Called at recording times, as the step itself does not check them.
         """
         self.missing_effects.sample(self.time_s)
         self.step_resolution.sample()

@@ -1,8 +1,8 @@
 """Time as an integer: ticks, levels, and the levels active at a tick.
 
-Level k steps by dt0 / 2^k; one tick is the step of the finest level allowed. A level is due at
-the multiples of its own step, so a body may refine at any of its own times and coarsen only where
-the coarser grid passes (Konno et al., 3.1). Plain integers here, mirrored for kernels below.
+Level k steps by dt0 / 2^k; one tick is the step of the finest level allowed. A level is active at
+the multiples of its own step, so a body may refine at any of its own times and coarsen only at
+times of the coarser grid (Konno et al., 3.1). Plain integers here, mirrored for kernels below.
 """
 
 import taichi as ti

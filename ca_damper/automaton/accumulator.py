@@ -1,11 +1,10 @@
 """Distance travelled after a turn: four readings of a rule that the paper leaves open.
 
-The paper says that way is summed up to a cell's width (eq. 8), not what a turn does to the sum.
-``signed`` takes the sum for a place: the way on along the new direction is what the old way has
-along it, so that a turn straight back changes its sign, and a wall sets it to where the wall
-stands, which is zero while the container does not move.
-``signed_through_walls`` leaves walls out, ``reset`` starts from zero at every turn, and ``kept``
-takes the sum over as it is.
+The paper says that the distance is summed up to a cell's width (eq. 8), but not how a turn changes
+the sum. ``signed`` takes the sum for a position: the distance along the new direction is the
+component of the old one, so that a turn straight back changes its sign, and a wall sets it to the
+wall's position, which is zero while the container does not move. ``signed_through_walls`` leaves
+walls out, ``reset`` starts from zero at every turn, and ``kept`` keeps the sum.
 """
 
 import taichi as ti

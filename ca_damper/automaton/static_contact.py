@@ -1,10 +1,10 @@
 """Static contact: particles at rest on the floor move with it and load it.
 
-The paper names the absence of it as the reason why its response peak moves the wrong way (6.2).
-A particle that stands on the floor, or on one that is held already, and has almost its velocity is
-held: it moves as one with the container and its mass is carried by it. That lasts while the heap is
-pressed on the floor. When the container's acceleration falls below -g the heap lifts off as it
-stands. To particles under way the heap is wall.
+The paper names its absence as the reason why the response peak moves the wrong way (6.2). A
+particle that stands on the floor, or on a held one, and has almost its velocity is held: it moves
+as one with the container, which carries its mass. That lasts while the heap is pressed on the
+floor. When the container's acceleration falls below -g the heap lifts off as it stands. For moving
+particles the heap is a wall.
 """
 
 from typing import Any

@@ -1,11 +1,11 @@
 """Coefficient of a dashpot for a wanted coefficient of restitution.
 
-Two spheres meet head on: m d'' = -max(0, k d^(3/2) + c d^p d'); d: overlap, m: effective mass.
-In units of the overlap D = (m v^2 / k)^(2/5) and of the impact speed v, c becomes the number
-alpha = c D^(p+1) / (m v): independent of v for p = 1/4, so that restitution is one number, and
-growing with v for p = 1/2, so that it holds at one speed only.
+Two spheres meet head on: m d'' = -max(0, k d^(3/2) + c d^p d'); d: overlap, m: effective mass. In
+units of the overlap D = (m v^2 / k)^(2/5) and of the impact speed v, c becomes the number alpha = c
+D^(p+1) / (m v): independent of v for p = 1/4, so that restitution is one number, and growing with v
+for p = 1/2, so that it holds at one speed only.
 
-The contact ends where the force has fallen to zero, not where the overlap has: spheres do not pull.
+The contact ends where the force has fallen to zero, before the overlap has: spheres do not pull.
 """
 
 from functools import lru_cache

@@ -1,6 +1,6 @@
 """Pairs of bodies in contact: the impulses they exchange, and how far bodies may go unsearched.
 
-A pair holds the sphere pairs that were nearer than the body skin of its bodies at the last search.
+A pair holds the sphere pairs whose gap was below the body skin of its bodies at the last search.
 """
 
 from typing import TYPE_CHECKING
@@ -29,11 +29,11 @@ FARTHEST = 0.25
 class Contacts:
     """Candidate pairs of bodies with broken faces; p: a slot of the ``PairStore``, called store.
 
-    exposed_faces: bit f for a broken face f. travel: bound of the way any point of a body went
-    since it was last looked at [m]. body_skin: how far that may be before it is looked at again
-    [m]; a pair holds the spheres whose gap is below the body skin of both. pace: largest step [s],
-    and steps of a body by which its contacts are counted before they touch. search_requested: 1
-    when the list may miss one of them.
+    exposed_faces: bit f for a broken face f. travel: bound of the displacement of any point of a
+    body since it was last searched [m]. body_skin: travel at which it is searched again [m]; a pair
+    holds the spheres whose gap is below the body skin of both. pace: largest step [s], and steps of
+    a body by which its contacts are counted before they touch. search_requested: 1 when the list
+    may miss one of them.
     """
 
     def __init__(self, tables: "Tables", state: "State"):
@@ -166,7 +166,7 @@ class Contacts:
     def set_body_skin(self, i):
         """Set the body skin of body i: half the skin, or more where it is fast.
 
-        A few fragments fly faster than all others: they would ask for most of the searches.
+        A few fragments are faster than all others, and would cause most of the searches.
         """
         speed = self._speed(i, self.state.velocity[i], self.state.spin[i])
         way = ti.min(STEPS * self.pace[0] * speed, FARTHEST * self.tables.extent[i])

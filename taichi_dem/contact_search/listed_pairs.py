@@ -10,14 +10,15 @@ from taichi_dem.kit.types import real
 class ListedPairs:
     """The pair of each entry of the Verlet list, with the results of its last search.
 
-    A block lists forty pairs for one that is near: what only a search asks lies here, in the order
-    in which it asks; the slot in the ``PairStore`` holds all else.
+    A block lists forty pairs for one that is near. Data that only a search reads are stored here,
+    in the order of its visits; all else is in the slot of the ``PairStore``.
     Of an entry: body: the second of the two; slot: of the pair, -1 while it is not near; faces:
-    which of their faces are near, bit 4 f + g for faces f and g; broken: faces that were compared;
-    found: number of sphere pairs within the margin; new_faces: faces whose sphere pairs are not
-    written yet; until: how far the two have gone, together, when the gap of others may be 0 [m].
-    Of a body: travelled: how far any point of it had gone when it was last looked at [m]; surveyed:
-    that and its body skin; changed: 1 when the near pairs of its row may be others.
+    pairs of their faces that are near, bit 4 f + g for faces f and g; broken: faces that were
+    compared; found: number of sphere pairs within the margin; new_faces: faces whose sphere pairs
+    are not written yet; until: sum of the two bodies' travel at which the gap of others may be 0
+    [m].
+    Of a body: travelled: travel of any point when the body was last searched [m]; surveyed: that
+    plus its body skin; changed: 1 when the near pairs of its row may have changed.
     """
 
     def __init__(self, contacts: Contacts, capacity: int):
@@ -69,9 +70,9 @@ class ListedPairs:
 
     @ti.func
     def faces_to_compare(self, k, i, j, faces):
-        """Those of the faces that are broken now which may bring entry k sphere pairs.
+        """Broken faces that may bring entry k new sphere pairs.
 
-        They are the fresh ones, where it has none so far and cannot have got any else.
+        Only newly broken ones, where it has no sphere pairs and cannot have gained any else.
         """
         if self.found[k] == 0 and not self._may_be_closer(k, i, j):
             faces &= ~self.broken[k]

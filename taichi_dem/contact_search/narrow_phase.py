@@ -11,7 +11,7 @@ OUTLOOK = 7.0
 
 @ti.data_oriented
 class NarrowPhase:
-    """Compares the spheres on the faces of two bodies, where these were last looked at.
+    """Compares the spheres on the faces of two bodies, at the positions of their last search.
 
     sphere: centre and radius of every sphere there [m]. cluster: centre of the ball around those of
     a face [m].
@@ -39,11 +39,11 @@ class NarrowPhase:
 
     @ti.func
     def compare(self, i, j, faces, start, write):
-        """Sphere pairs of two bodies within their margin: how many, and on which faces.
+        """Find the sphere pairs of two bodies within their margin: number, and bits of their faces.
 
-        Besides the smallest gap of others [m], no more than OUTLOOK skins beyond the margin. faces:
-        bit 4 f + g for faces f and g to compare. write: enter them in the store, from start on;
-        then other gaps are of no interest.
+        Returns also the smallest gap of others [m], at most OUTLOOK skins beyond the margin. faces:
+        bit 4 f + g for faces f and g to compare. write: enter the pairs in the store, from start
+        on; the gap of others is not found then.
         """
         margin = self.contacts.margin(i, j)
         count, hits, least = 0, 0, margin

@@ -9,12 +9,12 @@ from taichi_dem.contact_search.verlet_list import VerletList
 
 @ti.data_oriented
 class NearPairs:
-    """Sorts the near pairs of a ``PairStore``: those with sphere pairs, or an impulse waiting.
+    """Sorts the near pairs of a ``PairStore``: those with sphere pairs, or with a pending impulse.
 
     neighbours: the ``VerletList``, whose rows are in order. Of body i: row: slots of its near
-    pairs, from neighbours.first[i] on; row_count: how many there are, row_spheres: number of their
-    sphere pairs; row_is_new: 1 where they may be others than before. full: 1 or 2 when there is no
-    capacity for pairs or for sphere pairs.
+    pairs, from neighbours.first[i] on; row_count: their number; row_spheres: number of their sphere
+    pairs; row_is_new: 1 where they may have changed. full: 1 or 2 when there is no capacity for
+    pairs or for sphere pairs.
     """
 
     scratch_fields = ("row_is_new",)
@@ -32,7 +32,7 @@ class NearPairs:
     def number(self, exposed: ti.template(), count):
         """Number the near pairs in order; new ones get slots, others lose theirs.
 
-        exposed: the bodies with spheres, count of them: others are in no pair, now or before.
+        exposed: the bodies with spheres, count of them; others are in no pair.
         """
         for a in range(count):
             i = exposed[a]

@@ -1,7 +1,7 @@
 """The pair store: everything that belongs to a pair of bodies that are near, in a slot of its own.
 
-A pair gets a slot when its first sphere pair comes near, and keeps it until the last has left and
-no impulse waits. Only the functions here allocate and free slots and the places of sphere pairs.
+A pair keeps its slot from its first near sphere pair until the last has left and no impulse is
+pending. Only the functions here allocate and free slots and places of sphere pairs.
 """
 
 from typing import Any
@@ -21,22 +21,22 @@ SLACK = 4096
 class PairStore:
     """Slots of near pairs of bodies, their sphere pairs, and the order in which pairs are visited.
 
-    Of a slot: body: the two bodies, first < second; first .. last: where the sphere pairs that a
-    search has found lie in sphere; waiting: 1 for a side whose impulse waits; impulse[2 p + side]:
-    impulse [N s] and moment about the body's centre [N m s] that wait for that body, zero unless
-    waiting says so: most pairs do not touch, and to ask is cheaper than to add zeros. heat: energy
-    into dashpots, friction, and injected [J], until the first body takes it. deepest: overlap as a
-    share of the distance at which the spheres touch. is_new: 1 until the limits of a step know
-    the pair; sphere_place: new place of its sphere pairs while a search writes them.
+    Of a slot: body: the two bodies, first < second; first .. last: places in sphere of the sphere
+    pairs that a search has found; waiting: 1 for a side with a pending impulse; impulse[2 p +
+    side]: pending impulse [N s] and moment about the body's centre [N m s], read only if waiting is
+    1, as most pairs do not touch. heat: energy into dashpots, friction, and injected [J], until the
+    first body takes it. deepest: overlap as a share of the distance at which the spheres touch.
+    is_new: 1 until the limits of a step include the pair; sphere_place: new place of its sphere
+    pairs while a search writes them.
     Of a sphere pair: sphere: the two spheres; owner: slot of the pair, where its places begin.
-    slot_limit, sphere_limit: how many the scene allows; fields have room for those of an engine.
-    columns, sphere_columns: what others declare. A column is zero when its pair comes near, or its
+    slot_limit, sphere_limit: largest numbers for the scene; fields have the capacity of the engine.
+    columns, sphere_columns: declared by others. A column is zero when its pair comes near, or its
     sphere pair is found, and keeps its value as long as that lasts.
 
-    Pairs are visited by (first body, second body), whatever the order of slots: sums have one
-    order, whoever searched when. near_count: how many there are. near_slot: their slots, in order.
-    first_of[i]: place there of the first pair whose first body is i; second_slot: from
-    second_start[i] on, slots of the pairs whose second body is i.
+    Pairs are visited by (first body, second body), whatever the order of slots, so sums have one
+    order that does not depend on the history of searches. near_count: number of near pairs.
+    near_slot: their slots, in order. first_of[i]: place there of the first pair whose first body is
+    i; second_slot: from second_start[i] on, slots of the pairs whose second body is i.
     """
 
     scratch_fields = ("sphere_place",)
@@ -143,7 +143,7 @@ class PairStore:
     def replace_spheres(self, p, count):
         """Replace the sphere pairs of a pair by those at its new places.
 
-        Those that stay keep their columns, those of the others are zero.
+        Those that were present before keep their columns; those of the others are zero.
         """
         start = self.sphere_place[p]
         end = start + count

@@ -1,4 +1,4 @@
-"""Where bodies were listed as neighbours, and how far they may be from there."""
+"""Positions at which bodies were listed as neighbours, and allowed distances from there."""
 
 import taichi as ti
 
@@ -14,13 +14,13 @@ AHEAD, SHARE = 256.0, 0.8
 
 @ti.data_oriented
 class Reach:
-    """The place for which the Verlet list knows the neighbours of each body.
+    """The positions for which the Verlet list knows the neighbours of each body.
 
-    placed_at, turned_to, cluster: where a body was listed, and the balls around the spheres of its
-    faces [m]. reach: how far it may be from there, its body skin included [m], and ball: radius of
-    the ball around it and its reach [m]. escaped: bodies that have left their reach since,
-    escaped_count of them; left: 1 for them. They are listed anew, as a few fragments fly faster
-    than all the rest.
+    placed_at, turned_to, cluster: position and rotation at which a body was listed, and centres of
+    the balls around the spheres of its faces [m]. reach: distance that it may move from there, its
+    body skin included [m]; ball: radius of the ball around it and its reach [m]. escaped: bodies
+    that have left their reach since, escaped_count of them; left: 1 for them. They are listed again
+    one by one, as a few fragments are faster than all others.
     """
 
     def __init__(self, contacts: Contacts):
@@ -37,7 +37,7 @@ class Reach:
 
     @ti.func
     def notice(self, i):
-        """See whether body i, which is looked at, has left its reach."""
+        """Note whether body i, which is being searched, has left its reach."""
         # Upper bound on the displacement of any point: a matrix norm bounds that of its product.
         way = (self.state.position[i] - self.placed_at[i]).norm()
         way += (self.state.rotation[i] - self.turned_to[i]).norm() * self.tables.extent[i]
@@ -48,7 +48,7 @@ class Reach:
 
     @ti.func
     def note_place(self, i):
-        """Note where body i and its clusters are, or will soon be if it goes on like this."""
+        """Note the position of body i and its clusters, extrapolated at its present velocity."""
         self.reach[i] = BODY_SKINS * self.contacts.body_skin[i] + SKINS * self.contacts.skin[None]
         self.ball[i] = self.tables.extent[i] + self.reach[i]
         ahead = AHEAD * self.contacts.pace[0] * self.state.velocity[i]

@@ -1,8 +1,8 @@
 """Search for contact pairs: the broken ones among the neighbouring faces, then their spheres.
 
-The list is renewed when a body may have used up its body skin, or at once when a bond breaks: a
-search looks at the bodies that moved or broke, and keeps what it knows of the others. A pair keeps
-its slot of the store, so results do not depend on when a search is made.
+The lists are updated when a body may have used up its body skin, or at once when a bond breaks: a
+search visits the bodies that moved or broke, and keeps the results of the others. A pair keeps its
+slot of the store, so results do not depend on the times of searches.
 """
 
 from collections.abc import Callable
@@ -34,9 +34,9 @@ class BroadPhase:
     """Finds the pairs that are near and their spheres, for the store of a ``Contacts``.
 
     brute_force: compare all bodies with broken faces, for tests. everywhere: 1 when the next search
-    looks at all bodies, as is needed once they have been moved by hand. looked: LOOKED for those at
-    which the last one looked, EXPOSED for others with spheres; searched: its tick. searches: how
-    many there were. full: which list has no capacity left, an index into ``_CAPACITIES``.
+    visits all bodies, as is needed once they have been moved by hand. looked: LOOKED for bodies
+    that the last search visited, EXPOSED for others with spheres; searched: its tick. searches:
+    their number. full: the list without capacity, an index into ``_CAPACITIES``.
     """
 
     scratch_fields = ("exposed", "exposed_count", "looked")
@@ -204,11 +204,10 @@ class BroadPhase:
 
     @ti.func
     def _note_places(self, a):
-        """Note where a body is that is looked at.
+        """Note the position of a body that is being searched.
 
-        The others count as lying where they were when they were last looked at: they have used up
-        that much of their body skin since. All are looked at while the list of neighbours is made
-        anew.
+        The others are compared at the positions of their last search, from which they have used up
+        part of their body skin. All are searched while the list of neighbours is being rebuilt.
         """
         i = self.exposed[a]
         if self.neighbours.making() == 1:

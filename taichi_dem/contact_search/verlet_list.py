@@ -32,9 +32,9 @@ FAR = 0.6
 class VerletList:
     """For each body the bodies of higher index near it, in order.
 
-    first[i] .. last[i]: row of body i in listed, the ``ListedPairs``, with some room behind.
-    reach: the ``Reach`` that bodies may not leave. stale: STALE when all rows are to be made anew.
-    limit: entries that the scene allows. full: 1 when there are no more.
+    first[i] .. last[i]: row of body i in listed, the ``ListedPairs``, followed by spare entries.
+    reach: the ``Reach`` that bodies may not leave. stale: STALE when all rows are to be rebuilt.
+    limit: entries that the scene allows. full: 1 when they are exceeded.
     """
 
     def __init__(self, contacts: Contacts, brute_force: bool = False):
@@ -130,10 +130,10 @@ class VerletList:
 
     @ti.func
     def amend(self, i):
-        """List those that have escaped where they are now, among the neighbours of body i.
+        """List the escaped bodies at their present positions, among the neighbours of body i.
 
-        Entries where they were stay while there is room: nothing comes of them but a look. A row
-        without room leaves the list stale.
+        Outdated entries stay while there is room: they cost a comparison only. A full row leaves
+        the list stale.
         """
         place, ball = self.reach.placed_at[i], self.reach.ball[i]
         escaped, count = self.reach.left[i] == 1, self.reach.escaped_count[None]
@@ -172,7 +172,7 @@ class VerletList:
 
     @ti.func
     def _drop_far(self, i):
-        """Drop those that are near body i no more when its row is full.
+        """Drop entries that are no longer near body i when its row is full.
 
         Pairs that were near stay until they have lost their slot.
         """

@@ -50,9 +50,10 @@ class DivergenceCheck:
         self.rest_until = 0.0
 
     def check(self, hurried: bool = False) -> None:
-        """Raise SimulationDiverged when a body ran away, spheres swallowed, or energy appeared.
+        """Raise SimulationDiverged for a runaway body, extreme overlap, or unexplained energy.
 
-        hurried: look for runaways alone while all the rest would take more than SHARE of the time.
+        hurried: check for runaways only, as long as the rest would take more than SHARE of the
+        time.
         """
         self._check_speed()
         started = time.process_time()
@@ -143,7 +144,7 @@ class DivergenceCheck:
     def _advice(self, body, links):
         """Criterion that limits the step near a body, and a step that meets it.
 
-        What runs away is often thrown by a neighbour of a shorter step: the tightest one counts.
+        Runaways are often thrown by a neighbour of a shorter step, so the tightest limit counts.
         """
         limits = self._limits()
         near = [body, *(other for other, _ in links)]

@@ -42,10 +42,10 @@ def effect_activity(
 ) -> tuple[EffectUse, ...]:
     """An EffectUse for every listed effect, in the model's order.
 
-    tables, account: what the energy balance's methods of that name gave. missing_effects: the
-    ``MissingEffects`` of the run. substeps: of the run, each of which rounds. Judged by role, so
-    that an effect of one's own is judged like those of the package; but it is never called idle
-    where only its own code could tell.
+    tables, account: from the methods of that name of the energy balance. missing_effects: the
+    ``MissingEffects`` of the run. substeps: of the run, each of which rounds. Effects are judged by
+    role, so that user-defined ones are judged like those of the package; they are never called idle
+    where only their own code could tell.
     """
     given = abs(account["load_work"]) + abs(account["support_work"]) + energy_balance.start_energy
     rounding = _Rounding(
@@ -140,7 +140,8 @@ def _use(account, given, model, state, lacking, rounding, effect, what, events, 
 def _why_kept(model, state, lacking, effect, events):
     """Reason to keep an effect whatever was counted, in words; "" where the count decides.
 
-    lacking: why a count of touches tells nothing, as faces carry no spheres; "" where it does tell.
+    lacking: reason why a count of contacts is incomplete, as faces carry no spheres; "" if
+    complete.
     """
     reason = _POSED.get(effect.role, "" if _of_the_package(effect) else _OWN)
     if effect.role in ("contact", "friction"):

@@ -22,9 +22,10 @@ if TYPE_CHECKING:
 class MissingEffect:
     """A need that no listed effect serves.
 
-    effect: what to list. what: the finding in words. times: recordings that saw it, of ``looks``.
-    most: the largest number of places in one of them. where: first such bond or body, as unit
-    says; place_m: the middle of its face, or of the body, in the mesh [m]. first_s: when first [s].
+    effect: the effect to list. what: the finding in words. times: recordings with the finding, of
+    ``looks``. most: largest number of places in one of them. where: first such bond or body, as
+    unit says; place_m: the middle of its face, or of the body, in the mesh [m]. first_s: time of
+    the first [s].
     """
 
     effect: str
@@ -76,8 +77,8 @@ _OVERLAP = "pairs of bodies overlap at outer faces, which carry no contact spher
 def _outer_faces(model, state, outer_overlaps):
     """Detector of bodies that overlap at outer faces without spheres; None where none can.
 
-    Without contact a solid in one piece has nothing to meet but what broke off it: that is found
-    at its released bonds.
+    Without contact a solid in one piece can only meet its own fragments, which is found at its
+    released bonds.
     """
     if model.has_contact:
         return None if model.contact.outer_faces else OuterFaces(model, state, outer_overlaps)
@@ -93,7 +94,7 @@ def unserved(roles: Container[str]) -> dict[str, MissingEffect]:
 class MissingEffects:
     """Counts the places where an absent effect would have acted, at recording times.
 
-    touching: most pairs of bodies that one of them saw in contact.
+    touching: most pairs of bodies in contact at one of them.
     """
 
     def __init__(

@@ -1,7 +1,7 @@
-"""Outer faces without contact spheres: whether bodies can, and do, overlap there unnoticed.
+"""Outer faces without contact spheres: detection of bodies that can, and do, overlap there.
 
-Faces carry spheres once they break, and outer faces only if ``SphereContact`` is asked for that.
-Bodies that meet elsewhere pass through each other.
+Faces carry spheres once they break, outer faces only with the option of ``SphereContact``. Bodies
+that meet elsewhere pass through each other.
 """
 
 from typing import TYPE_CHECKING
@@ -26,10 +26,10 @@ LEAST_OVERLAP = 1e-4
 class OuterFaces:
     """Finds pairs of bodies that overlap where one of them has an outer face without spheres.
 
-    A pair counts if its bodies belong to different fragments and shared no point in the mesh, if
-    spheres on outer faces would overlap, and if no spheres of broken faces do. So what is bonded,
-    or touches as it should, is left alone, and what lay side by side is left to the broken faces
-    between. A solid that bends until it meets itself is not seen.
+    A pair counts if its bodies belong to different fragments and share no point of the mesh, if
+    spheres on outer faces would overlap, and if no spheres of broken faces do. This excludes bonded
+    bodies, regular contacts, and former neighbours, which meet at broken faces. A solid that bends
+    until it meets itself is not detected.
     outer_overlaps: the ``OuterOverlaps`` of the engine.
     """
 

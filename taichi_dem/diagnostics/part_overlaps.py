@@ -23,8 +23,8 @@ _PARALLEL = 1e-12
 class PartOverlaps:
     """Finds pairs of bodies of different parts that overlap; inner bodies are left out.
 
-    As long as the boxes around the parts are apart, nothing more is looked at. part: number of
-    each body's part, ``parts.parts_of``.
+    Bodies are compared only where the boxes around the parts overlap. part: number of each body's
+    part, ``parts.parts_of``.
     """
 
     def __init__(self, model: "Model", state: "State", part: np.ndarray):

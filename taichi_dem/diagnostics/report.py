@@ -13,20 +13,20 @@ _JSON_KEYS = {"effect_activity": "acted", "missing_effects": "missed"}
 class Report:
     """Figures and cost of a run.
 
-    method, driver, effects: what was run. until_s: simulated time. substeps: ticks at which
-    something was due. body_updates, bond_evaluations, pair_evaluations: work done.
-    uniform_evaluations: bonds and pairs that one step for all would have evaluated in the same
-    substeps. sweeps: over all dashpots where they are solved, else 0. ideal_gain: bodies times
-    substeps over body updates, what the different steps would save if a pair cost nothing;
-    boundary_gain: uniform over actual evaluations, what they save with every pair evaluated at
-    the finer body's step. searches: rebuilt contact lists.
+    method, driver, effects: of the run. until_s: simulated time. substeps: ticks at which a body
+    was active. body_updates, bond_evaluations, pair_evaluations: work done. uniform_evaluations:
+    bonds and pairs that one step for all would have evaluated in the same substeps. sweeps: over
+    all dashpots where they are solved, else 0. ideal_gain: bodies times substeps over body updates,
+    the saving by different steps if a pair cost nothing; boundary_gain: uniform over actual
+    evaluations, the saving with every pair evaluated at the finer body's step. searches: updates of
+    the contact lists.
     energy_balance: energy terms [J]; energy_residual_fraction: residual over the work put in.
-    linear_momentum_error, angular_momentum_error: out of nothing, as shares of what was
+    linear_momentum_error, angular_momentum_error: unexplained momentum, as shares of that
     exchanged. compile_seconds, run_seconds, run_cpu_seconds: cost. effect_activity: an
     ``EffectUse`` for each effect. missing_effects: a ``missing_effects.MissingEffect`` for each
     effect that was left out and needed. unresolved: sentences about bonds and contacts for which
-    the step was too long. bound_by: bodies at the end by what bounds their step, see
-    ``step_control.CRITERIA``. round_off_J: energies below this may be round-off
+    the step was too long. bound_by: number of bodies at the end by the criterion that bounds their
+    step, see ``step_control.CRITERIA``. round_off_J: energies below this may be round-off
     (``DivergenceCheck.round_off``). measured_speedup: CPU time of one step for all over that of the
     run, where it was measured.
     """

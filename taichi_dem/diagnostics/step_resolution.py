@@ -29,10 +29,10 @@ _KEPT = ("share", "pair_share", "taken", "step", "lightest")
 class StepResolution:
     """Checks of the time step: shares of dashpots at recording times, bond failures at the end.
 
-    share: least share of its dashpots that each bond was left with while it held, (bond_count,).
-    step: shortest step of each body [s]; lightest: mass of the lightest it came near [kg];
-    pair_share: least share that its contacts were seen with; taken: largest part of a speed that
-    they take in a step; all (body_count,).
+    share: least share of its dashpots that each bond kept while it held, (bond_count,). step:
+    shortest step of each body [s]; lightest: mass of the lightest body near it [kg]; pair_share:
+    least recorded share of its contacts; taken: largest part of a speed that they take in a step;
+    all (body_count,).
     """
 
     def __init__(
@@ -131,8 +131,8 @@ class StepResolution:
     def _contact_shares(self):
         """Largest share that limited sphere dashpots can have had where they acted, (body_count,).
 
-        What was seen of them, or that of a single contact, 1 / X with X = 2 c dt / m; see
-        ``step/stability_limits.py``. Where contacts took energy they acted; it is booked to the
+        The recorded share, or that of a single contact, 1 / X with X = 2 c dt / m; see
+        ``stability/body_limits.py``. Contacts that took energy have acted; it is booked to the
         first body of a pair.
         """
         if self.contacts is None or not self.limited:

@@ -1,11 +1,11 @@
 """Base class of effects, and null objects for roles in which a scene lists none.
 
-A user's effect holds numbers on the host. In an engine stands a bound copy of it, which has its
-fields and kernels, and into which every scene that the engine runs loads its numbers. Its ``role``
-says where ``step/advance.py`` asks for it, and which members it must have (``effects.roles``):
-tension, shear and dashpot are laws of the contact units of bonds, contact and friction those of
-contact spheres, loads push bodies, supports hold them. Roles ``load`` and ``support`` take any
-number of effects, the others at most one.
+A user's effect holds numbers on the host. An engine holds a bound copy of it with fields and
+kernels, into which each scene of the engine loads its numbers. The ``role`` determines where
+``step/advance.py`` calls it, and the members that it must have (``effects.roles``): tension, shear
+and dashpot are laws of the contact units of bonds, contact and friction those of contact spheres,
+loads push bodies, supports hold them. Roles ``load`` and ``support`` take any number of effects,
+the others at most one.
 """
 
 import copy
@@ -38,9 +38,9 @@ ROLES = (*SINGLE, *MANY)
 class Effect:
     """Base of all effects.
 
-    role: where the step asks for it. name: the word used in reports and on the command line.
-    Kernels of a bound effect read its numbers in the field ``self.law``, constants of the scene in
-    ``self.tables`` (engine.tables.Tables), and what ``declare`` has declared.
+    role: its place in the step. name: the word used in reports and on the command line. Kernels of
+    a bound effect read its numbers in the field ``self.law``, constants of the scene in
+    ``self.tables`` (engine.tables.Tables), and the fields that ``declare`` has declared.
     """
 
     role = ""
@@ -64,7 +64,7 @@ class Effect:
     def declare_columns(self, store: "PairStore") -> None:
         """Declare its data for each pair of bodies, or of spheres, in a ``PairStore``.
 
-        ``store.column`` and ``store.sphere_column`` give fields. Asked in scenes with contact.
+        ``store.column`` and ``store.sphere_column`` return fields. Called in scenes with contact.
         """
 
     def load(self, model: "Model") -> None:
@@ -75,10 +75,9 @@ class Effect:
         return {}
 
     def travel(self) -> Travel:
-        """How far it may carry bodies along x, y and z [m]: lowest and highest, two rows.
+        """Bounds of the displacement that it may cause along x, y and z [m]: lowest and highest.
 
-        Asked of loads and supports, whether parts of a mesh may meet: without bounds unless an
-        effect knows better.
+        Used of loads and supports, to decide whether parts of a mesh may meet. Infinite by default.
         """
         return (-np.inf,) * 3, (np.inf,) * 3
 
@@ -96,7 +95,7 @@ class Effect:
     def accepts(self, given: Optional["Effect"]) -> bool:
         """Whether kernels compiled for this effect are valid for a scene's effect ``given``.
 
-        They do unless they have read one of its values where they should have read a field.
+        They are, unless they contain an attribute of it, read in a kernel, that has another value.
         """
         return given is None or all(
             _same(vars(given).get(name), value) for name, value in self._frozen.items()

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 class StickingFriction(Friction):
     """Friction with a tangential spring in each contact of two spheres, up to Coulomb's limit.
 
-    What rests on a slope below the friction angle stays, where ``Friction`` lets it creep. The
+    A body at rest on a slope below the friction angle stays there; with ``Friction`` it creeps. The
     spring's stretch turns with the first body and is lost when the spheres part.
     stiffness_ratio: stiffness of the spring over the material's contact stiffness; spheres of a
     Poisson's ratio nu have 2 (1 - nu) / (2 - nu) (Mindlin 1949).
@@ -54,8 +54,8 @@ class StickingFriction(Friction):
     def slip(self, k, limit, way):
         """Shorten the spring of sphere pair k to a limit [N]; return the energy dissipated [J].
 
-        way: by which it has just been stretched [m]. The work of the way, by the mean of the forces
-        before and after, is what the spring stores and what slipping takes.
+        way: its stretch in this step [m]. The work of the stretch, at the mean of the forces before
+        and after, is the energy stored plus that dissipated by slipping.
         """
         trial = self.stretch[k]
         longest = limit / self.law[1]

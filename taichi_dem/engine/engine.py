@@ -24,8 +24,8 @@ from taichi_dem.step.schedule import Schedule
 class Structure:
     """Compiled structure of a scene and a method: classes of effects, kind of method.
 
-    Two structures are equal where one's kernels serve the other. effects, method: those of the
-    first scene, of which engines make copies. brute_force: contact search without cells.
+    Scenes of equal structures share kernels. effects, method: those of the first scene, of which
+    engines make copies. brute_force: contact search without cells.
     """
 
     def __init__(self, effects: Iterable[Effect], method: Method, brute_force: bool = False):

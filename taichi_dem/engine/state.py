@@ -20,23 +20,22 @@ from taichi_dem.timeline import NEVER
 class State:
     """Motion of the bodies, pending impulses, fracture and the energy account.
 
-    position [m], velocity [m/s], orientation (unit quaternion, scalar first), angular_momentum
-    [kg m^2/s] in world axes; rotation (matrix) and spin [rad/s] follow from them and are kept so
-    that neighbours need not compute them. A body's motion is that of its own last tick.
-    level: step dt0 / 2^level. bound: what asked for it, a place in ``step_control.CRITERIA``.
+    position [m], velocity [m/s], orientation (unit quaternion, scalar first), angular_momentum [kg
+    m^2/s] in world axes; rotation (matrix) and spin [rad/s] follow from them and are stored so that
+    neighbours need not compute them. A body's motion is that of its own last tick.
+    level: step dt0 / 2^level. bound: its criterion, an index into ``step_control.CRITERIA``.
     last_tick: when the body was last advanced.
     slot: impulse [N s] and its moment about the body's centre [N m s] that face f of body i has
     gathered since then, entry 4 i + f.
     broken_tick: when a bond was released, NEVER while it holds. exposed_tick: since when a face
     carries contact spheres; with contact only.
-    bond_heat: energy that dashpots, slip and release have taken from each bond [J]; not for bonds
-    that are merely elastic.
-    contact_heat: energy that sphere dashpots and friction have taken, and energy that releases
-    have injected [J], booked to the first body of a pair; with contact only.
-    injected_tick: last tick whose releases have been booked there.
-    load_work: work [J], one component a load and a last one for supports; load_impulse: what all
-    of them gave a body (linear, and angular about the origin). tick: present time. bad_body:
-    lowest body out of bounds, body_count if none.
+    bond_heat: energy taken from each bond by dashpots, slip and release [J]; not for elastic bonds.
+    contact_heat: energy taken by sphere dashpots and by friction, and energy injected by releases
+    [J], booked to the first body of a pair; with contact only. injected_tick: last tick whose
+    releases have been booked there.
+    load_work: work [J], one component a load and a last one for supports; load_impulse: total
+    impulse of all of them on a body (linear, and angular about the origin). tick: present time.
+    bad_body: lowest body out of bounds, body_count if none.
     """
 
     def __init__(self, tables: Tables):

@@ -18,8 +18,8 @@ _OWN = ("taichi_dem", "ca_damper")
 class PartView:
     """A part of an engine on behalf of a simulation, which may share the engine with others.
 
-    Attributes and methods are those of the part; before any of them is reached, the simulation's
-    data are brought to the device. Fields come as ``FieldView``. Kernels see the part itself.
+    Attributes and methods are those of the part; before each access the simulation's data are
+    brought to the device. Fields are returned as ``FieldView``. Kernels see the part itself.
     """
 
     def __init__(self, loan: Loan, path: tuple[str, ...]):
@@ -59,7 +59,7 @@ class PartView:
 
 
 class FieldView:
-    """A field of an engine on behalf of a simulation: entries of its scene, no room behind them.
+    """A field of an engine on behalf of a simulation: only the entries of its scene.
 
     As a NumPy array by ``to_numpy()``; single entries by index, as those of a field.
     """

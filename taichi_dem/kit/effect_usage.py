@@ -10,12 +10,12 @@ from taichi_dem.kit.display import in_brief
 class EffectUse:
     """Activity of one effect.
 
-    effect: its name. what: the events in words. events: how many, of at most ``of`` (0 where there
-    is no most). energy_J: taken or given, None where it is not booked. share: of ``whole``, in
-    words; None where there is nothing to compare with. steers: whether it directs the rest even
-    where it takes little, as a crack does: then only one that never acted can be left out. kept:
-    why it cannot be left out whatever was counted, in words, or "". rounding: whether all that was
-    booked is no more than the rounding of numbers may leave; then no event is counted.
+    effect: its name. what: the events in words. events: their number, of at most ``of`` (0 for no
+    limit). energy_J: taken or given, None where it is not booked. share: of ``whole``, in words;
+    None where there is nothing to compare with. steers: whether it directs the rest even where it
+    takes little, as a crack does: then only one that never acted can be left out. kept: reason to
+    keep it whatever was counted, in words, or "". rounding: whether the booked energy is no more
+    than rounding errors; then no event is counted.
     """
 
     effect: str

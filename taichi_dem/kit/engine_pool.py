@@ -2,10 +2,10 @@
 
 An engine owns the fields and kernels of one structure, with a capacity. A scene that fits is loaded
 into it in milliseconds; a larger one gets a larger engine. Several scenes may be alive on one
-engine at once: they take turns, and the data of those that wait are kept aside, bit for bit.
+engine at once: they take turns, and the data of inactive ones are kept aside, bit for bit.
 
 Each kind of engine has an ``EnginePool``. A simulation borrows an engine from it as a ``Loan`` and
-asks ``loan.activate()`` before it touches a field.
+calls ``loan.activate()`` before it touches a field.
 """
 
 import weakref

@@ -1,9 +1,9 @@
 """Cache of source lines, so that Taichi reads kernels in half the time.
 
-For the message of an error that may come it notes, at every name and operator, the line and a mark
-below it, broken at 80 characters; and wherever a function is called it takes its source apart to
-find where it ends. Together that is half of the time in which it reads the kernels of a step, each
-time a program starts. What comes of it is kept here.
+For a possible error message Taichi notes, at every name and operator, the source line and a mark
+below it, broken at 80 characters; and wherever a function is called it parses its source to find
+its end. Together that is half of the time in which it reads the kernels of a step, at each start of
+a program. The results are cached here.
 """
 
 import functools

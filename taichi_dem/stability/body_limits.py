@@ -172,8 +172,8 @@ class StabilityLimits:
     def notice_listed(self, p, entered, fresh):
         """Count the contacts of a pair that a search lists; entered, fresh: nonzero for the reason.
 
-        Entering the list does not change a body's limits: a search lists what may come near, and
-        how far it looks must not matter. Spheres that a break has just set free may touch already.
+        Entering the list does not change a body's limits, as results must not depend on the reach
+        of a search. Spheres that a break has just exposed may touch already.
         """
         if fresh != 0:
             self.notice_pair(p, self.contact_limits.count_within_margin(p), RELEASE)
@@ -257,8 +257,8 @@ class StabilityLimits:
     def _push2(self, i, now):
         """Square of the acceleration of body i by the loads alone [m^2/s^4].
 
-        The larger one of now and a largest step ahead: a body does not leap into a load that sets
-        in before its next update.
+        The larger one of now and a largest step ahead, for loads that set in before its next
+        update.
         """
         push2, step = 0.0, self.rule[0]
         for ahead in ti.static(range(2)):

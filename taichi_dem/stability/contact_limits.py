@@ -28,7 +28,8 @@ def contact_rates(pairs: np.ndarray, counts: ArrayLike, mass: np.ndarray) -> np.
     """Most sphere pairs that a body has with another, over its mass [1/kg], (body_count,).
 
     pairs: bodies that are near each other, (n, 2). counts: their sphere pairs, at least 1 counts.
-    mass: of the bodies [kg]. What one such pair allows, for a sentence; ``StepReport`` has bounds.
+    mass: of the bodies [kg]. An estimate from single pairs, for a sentence; ``StepReport`` has
+    bounds.
     """
     rates = np.zeros(len(mass))
     for bodies, count in zip(pairs, np.maximum(1, counts)):
@@ -52,11 +53,11 @@ def largest_eigenvalue(a, b, c):
 
 @ti.data_oriented
 class ContactLimits:
-    """Which sphere pairs count as contacts, and the block they form on each body.
+    """Sphere pairs that count as contacts, and the block they form on each body.
 
-    A sphere pair counts from the moment at which it could touch within some steps of the finer of
-    its bodies: it is evaluated once a step, and the coarser body is woken before the next time.
-    count: how many of the sphere pairs of a body pair count.
+    A sphere pair counts once it could touch within some steps of the finer of its bodies: it is
+    evaluated once a step, and the coarser body is woken before the next time. count: number of the
+    sphere pairs of a body pair that count.
     """
 
     constant_fields = ("ahead", "root_mass", "root_inertia")

@@ -237,9 +237,9 @@ def contact_eigenvalues(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Largest eigenvalues of M^-1/2 (J^T D J) M^-1/2 of each body [1/kg], two arrays (n,).
 
-    The first is for the worst of its spheres in contact, the second for all of the worst face.
-    D is the identity with friction, n n^T without; contacts act where a sphere touches its face.
-    The step finds the same from the contacts that are near (``step/contact_limits.py``).
+    The first is for the worst of its spheres in contact, the second for all of the worst face. D is
+    the identity with friction, n n^T without; contacts act where a sphere touches its face. The
+    step finds the same from the near contacts (``stability/contact_limits.py``).
     """
     mass, centre, inertia = body_properties(mesh, density)
     spheres = spheres_of_faces(mesh, centre, divisions)

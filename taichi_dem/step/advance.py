@@ -1,9 +1,9 @@
 """Advance one bond, one contact pair, one body: the only place that composes the physics.
 
-Drivers choose who is next and call these functions; no other file applies a force or moves a body.
-A bond or pair evaluated at a tick gives both bodies the impulse F * (smaller of their steps), with
-opposite signs; a body takes what has gathered at its own time (Konno et al., 3.1, eq. 3):
-v += S / m, L += T, then x += dt v and q = exp(dt w) q, with the spin w in the middle of the turn.
+Drivers choose the active members and call these functions; no other file applies a force or moves a
+body. A bond or pair evaluated at a tick applies the impulse F * (smaller of their steps) to both
+bodies, with opposite signs; a body takes the sum at its own time (Konno et al., 3.1, eq. 3): v += S
+/ m, L += T, then x += dt v and q = exp(dt w) q, with the spin w in the middle of the turn.
 """
 
 from typing import TYPE_CHECKING, Optional
@@ -296,9 +296,9 @@ class Advance(ContactForce):
     def _load_time(self, elapsed):
         """Time at which loads are evaluated: the beginning of the step [s].
 
-        Forces that change velocities there, and positions that follow from the new ones, are the
-        leapfrog whose velocities live half a step earlier: of second order without dashpots. The
-        middle of the step would be half a step ahead of the springs, an error of first order.
+        Velocities change by the forces there, and positions by the new velocities: the leapfrog,
+        whose velocities are half a step earlier, of second order without dashpots. The middle of
+        the step would be half a step ahead of the springs, an error of first order.
         """
         return self.schedule.seconds(self.state.tick[None]) - elapsed
 
@@ -322,8 +322,8 @@ class Advance(ContactForce):
         """Velocity and angular momentum that the supports allow; books their work and the loads'.
 
         With the means of velocity and angular momentum before and after all impulses of the step,
-        bonds, loads and supports together, the change of kinetic energy is exact: what holds a body
-        still does no work.
+        bonds, loads and supports together, the change of kinetic energy is exact: a support that
+        holds a body still does no work.
         """
         free, free_momentum, held = velocity, momentum, 0
         half = self.schedule.seconds(self.state.tick[None]) - 0.5 * elapsed

@@ -18,11 +18,11 @@ class AppliedUntil:
     """Tick up to which each bond and pair has applied its impulse, where bodies may be woken early.
 
     A bond applies its impulse for the coming step of the finer body at once. When that body is
-    woken and takes a shorter step, the bond is due again although its impulse is still ahead of the
-    clock: it applies no more until the tick up to which it has. That is a time of the coarser
-    step and so of any finer one: no impulse is ever applied in part.
-    bond, pair: that tick for every bond, and for every slot of the pair store. schedule: knows
-    their steps.
+    woken and takes a shorter step, the bond becomes active although its impulse reaches ahead of
+    the clock: it applies no more until that tick. This is a time of the coarser step and so of any
+    finer one: no impulse is ever applied in part.
+    bond, pair: that tick for every bond, and for every slot of the pair store. schedule: their
+    steps.
     """
 
     def __init__(

@@ -1,7 +1,7 @@
 """Driver chosen by measurement: it continues with the faster one; both give the same bits.
 
-Which one it is depends on how much is due in a step and on how free the cores are: the parallel
-driver pays for every phase with a launch, and much more where other programs hold a core.
+The choice depends on the work in a step and on free cores: the parallel driver pays a launch for
+every phase, and much more where other programs occupy a core.
 """
 
 import time
@@ -20,8 +20,8 @@ _SHARE = 0.05
 class AutoDriver:
     """Tries both drivers from time to time, a few substeps each.
 
-    seconds: for a member that was due, the best of the last tries by name of the driver. clock:
-    gives seconds; tests have their own. drivers: both, by name.
+    seconds: time for an evaluated member, the best of the last tries, by name of the driver. clock:
+    returns seconds; replaced in tests. drivers: both, by name.
     """
 
     def __init__(
@@ -42,7 +42,7 @@ class AutoDriver:
 
     @property
     def name(self) -> str:
-        """Name of the driver that goes on, and that this was measured."""
+        """Name of the chosen driver, marked as measured."""
         return f"{self.chosen} (measured)"
 
     def prepare(self) -> None:
@@ -63,7 +63,7 @@ class AutoDriver:
                 self._begin()
 
     def _try(self, name, end_tick):
-        """Time some substeps by a driver; after the last try the quicker one goes on."""
+        """Time some substeps by a driver; after the last try choose the faster one."""
         before, started = self._visited(), self.clock()
         self.drivers[name].few(end_tick, _SUBSTEPS)
         seconds = (self.clock() - started) / max(1, self._visited() - before)

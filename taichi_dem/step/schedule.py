@@ -1,7 +1,7 @@
 """Schedule: levels of bodies, and lists of active bodies, bonds and pairs by falling level.
 
-Levels change seldom against how often they are used, so a body that changes its own moves just its
-own entries.
+Levels change seldom compared with their use, so a change of a body's level moves only its own
+entries.
 """
 
 from typing import TYPE_CHECKING, Any, Optional
@@ -31,13 +31,13 @@ class Schedule:
     """Clock and active lists of a run.
 
     criterion: rule from ``step_control``. uniform: all bodies share the finest level wanted.
-    drifted: bodies next to a due one are brought to its time too, else only due bodies move.
-    finest: finest level present. low: coarsest level now due.
-    changed: bodies whose own level or bonds changed since the lists were put in order.
-    limits: the ``StabilityLimits`` of the bodies, None where the rule needs none. retimes:
-    whether bodies may be brought to the present between their own times; applied_until then holds
-    the time up to which what bonds and pairs have given ahead. level_limit: how much coarser than
-    its neighbours a body may be. evaluations: substeps, bodies advanced, bonds and pairs evaluated,
+    drifted: neighbours of an active body are brought to its time too, else only active bodies move.
+    finest: finest level present. low: coarsest level active now. changed: bodies whose own level or
+    bonds changed since the lists were ordered.
+    limits: the ``StabilityLimits`` of the bodies, None where the rule needs none. retimes: whether
+    bodies may be brought to the present between their own times; applied_until then holds the time
+    up to which bonds and pairs have applied their impulses. level_limit: largest difference of
+    levels between neighbours. evaluations: substeps, bodies advanced, bonds and pairs evaluated,
     and the bonds and pairs that one step for all would have evaluated in the same substeps.
     """
 
@@ -232,8 +232,8 @@ class Schedule:
     def start_pairs(self):
         """Take in the pairs of a new contact search; neighbours may now reach further.
 
-        All lists are filled anew on the occasion: what lies side by side is then visited in turn,
-        which moving entries undoes with time (5 % of the time of a run).
+        All lists are filled again, which restores contiguous visits; moving entries destroys them
+        with time (5 % of the time of a run).
         """
         self._list_pairs()
         if ti.static(not self.uniform):

@@ -11,7 +11,7 @@ class WakeUp:
     """Updates the bodies that ``StabilityLimits`` has listed, at the start of a substep.
 
     A body waits for its own time with a step chosen before a contact came near, a bond broke or a
-    neighbour went to shorter steps. Bonds that have applied their impulse ahead apply no more until
+    neighbour refined its step. Bonds that have applied their impulse ahead apply no more until
     then.
     """
 

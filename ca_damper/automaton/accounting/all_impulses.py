@@ -12,8 +12,8 @@ from ca_damper.automaton.impulse_balance import quanta
 class AllImpulses(Uncounted):
     """Every impact and push counts, and so do losses to the six directions of the lattice.
 
-    The container holds the lattice, so it feels what the lattice causes. Momentum is then kept, and
-    the mean force is the weight.
+    The container holds the lattice, so impulses of the lattice act on it. Momentum is then
+    conserved, and the mean force is the weight.
     """
 
     labels: ClassVar[tuple[str, str]] = ("ca_all", "ca_static")

@@ -11,10 +11,10 @@ from taichi_dem.step.advance import Advance
 class SolvedAdvance(Advance):
     """``Advance`` with bodies that take their new velocities from a ``Solver``.
 
-    Velocities are found first for the end of the step, with the impulses of springs and loads at
-    its beginning and of the dashpots as in the step before; the sweeps mend them. Springs and
-    loads at the time of the positions, dashpots with the mean of the velocities before and after:
-    the scheme is of second order, and the velocities are those in the middle of the next step.
+    Velocities at the end of the step are predicted with the impulses of springs and loads at its
+    beginning and of the dashpots as in the step before; the sweeps correct them. Springs and loads
+    act at the time of the positions, dashpots with the mean of the velocities before and after: the
+    scheme is of second order, and the velocities are those in the middle of the next step.
     """
 
     @ti.func

@@ -25,16 +25,16 @@ COLOURS = 16
 class PairDashpots:
     """Data of touching spheres used in sweeps.
 
-    One block for all spheres of a pair would let those that part hold on to each other while the
-    others push: a pair that rocks would stick. So each sphere has its own impulse.
+    One block for all spheres of a pair would let parting spheres pull on each other while others
+    push: a rocking pair would stick. So each sphere has its own impulse.
 
-    touching: how many spheres of a pair touch, or may within the step; they come first among the
-    pair's candidates. entry: which candidate. normal: from first to second. arm: from the second's
-    centre to the contact [m]. push: impulse of the spring, or what the gap still lets through
-    [N s]. share: velocity per impulse along the normal, and across at most [1/kg]. impulse: on the
-    second, of spring, dashpot and friction, as found [N s]; entries as in ``PairStore.sphere``.
-    Where friction sticks, pull: impulse of the spring across the contact [N s]; elapsed: time since
-    a pair was last evaluated [s].
+    touching: number of spheres of a pair that touch, or may within the step; they come first among
+    the pair's candidates. entry: index of the candidate. normal: from first to second. arm: from
+    the second's centre to the contact [m]. push: impulse of the spring, or of the remaining gap [N
+    s]. share: velocity per impulse along the normal, and largest across it [1/kg]. impulse: on the
+    second, of spring, dashpot and friction [N s]; entries as in ``PairStore.sphere``. Where
+    friction sticks, pull: impulse of the spring across the contact [N s]; elapsed: time since a
+    pair was last evaluated [s].
     active: the pairs that touch, count of them. order: places in it by colour, those of colour c
     from colour_first[c] on.
     """
@@ -82,8 +82,8 @@ class PairDashpots:
     def sort(self, one):
         """List and colour the pairs that touch: those of one colour share no body.
 
-        Each takes the lowest colour that is free at both bodies; what finds none comes last.
-        Candidates that do not touch are left out, so that no skin changes the order.
+        Each takes the lowest colour that is free at both bodies; those without a free one come
+        last. Candidates that do not touch are left out, so that no skin changes the order.
         """
         count = 0
         for k in range(self.store.near_count[None]):

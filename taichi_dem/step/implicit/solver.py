@@ -24,13 +24,13 @@ if TYPE_CHECKING:
 class Solver:
     """Gauss-Seidel over bonds with dashpots, then touching pairs, in the order of their colours.
 
-    Members of one colour share no body: they may be visited side by side, and the order within a
-    colour changes no bit. So one core and many cores run the same sweeps to the same bits.
+    Members of one colour share no body: they may be visited in parallel, and their order changes no
+    bit. So one core and many cores run the same sweeps to the same bits.
 
-    bounds: fewest and most sweeps of a step. tolerance: of the velocities. sweeps: how many the
-    present step has had. change2: largest squared change of a velocity in the present sweep
-    [m2/s2], residual2 that of the last. speed2: largest squared speed of a body at the beginning of
-    the step. unsolved: 1 while another sweep is called for.
+    bounds: fewest and most sweeps of a step. tolerance: of the velocities. sweeps: number in the
+    present step. change2: largest squared change of a velocity in the present sweep [m2/s2],
+    residual2 that of the last. speed2: largest squared speed of a body at the beginning of the
+    step. unsolved: 1 while another sweep is required.
     """
 
     def __init__(

@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 class Velocities:
     """Velocity and spin of every body at the end of the step, as far as it is known.
 
-    twist: velocity [m/s] and spin [rad/s], world. turn: spin per moment, R I^-1 R^T
-    [1/(kg m^2)], as supports allow. lightness: velocity per impulse without them [1/kg]. These lie
-    side by side, 128 bytes a body: a sweep visits bodies out of order, and large blocks wait for
-    memory. Where there are supports, hold: velocity per impulse [1/kg],
-    and given: all that a body was given in the step [N s, N m s].
+    twist: velocity [m/s] and spin [rad/s], world. turn: spin per moment, R I^-1 R^T [1/(kg m^2)],
+    as supports allow. lightness: velocity per impulse without them [1/kg]. These are stored
+    contiguously, 128 bytes a body: a sweep visits bodies out of order, and large blocks wait for
+    memory. With supports, hold: velocity per impulse [1/kg], and given: total impulse and moment on
+    a body in the step [N s, N m s].
     """
 
     scratch_fields = ("twist", "given")
@@ -85,7 +85,7 @@ class Velocities:
     def found(self, i):
         """Velocity and angular momentum at the end of the step, before supports act.
 
-        The momentum is found from the change of the spin: where nothing acts it stays, to the bit.
+        The momentum follows from the change of the spin: without impulses it stays, to the bit.
         """
         twist, rotation = self.twist[i], self.state.rotation[i]
         velocity = twist[0:3]
