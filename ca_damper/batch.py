@@ -87,8 +87,8 @@ class Batch(LoadedScenes):
     def change(self, **numbers: Any) -> None:
         """Replace numbers of the scenes, as ``SceneTable.change``; ``start`` must follow.
 
-        The bits are those of a batch that is made with them, and nothing is compiled.
-        Raises InputError for what that batch would refuse; this one then stays as it is.
+        The bits are those of a batch made with these numbers, and nothing is compiled. Raises
+        InputError where that batch would be refused; this one then stays unchanged.
         """
         engine = self.engine
         self.numbers = self.numbers.changed(**numbers)

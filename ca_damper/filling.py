@@ -24,8 +24,8 @@ from taichi_dem.kit.validation import shown
 class Motion:
     """The container at the beginning of a step, along x (up positive).
 
-    x: displacement [m]. v: velocity [m/s]. a: acceleration [m/s^2] by spring, dashpot, base and
-    the mass carried in the step before, without the blows of that step: they lasted an instant.
+    x: displacement [m]. v: velocity [m/s]. a: acceleration [m/s^2] by spring, dashpot, base and the
+    mass carried in the step before, without the impacts of that step, which are instantaneous.
     """
 
     x: ti.f64
@@ -37,10 +37,11 @@ class Motion:
 class Action:
     """Action of a filling on the container during a step.
 
-    impulse: of the blows, along x [N s]. carried: mass that moves as one with the container [kg].
+    impulse: of the impacts, along x [N s]. carried: mass that moves as one with the container [kg].
     Over the step the container obeys
     (M + carried) x'' + C x' + K x = K y + C y' + impulse / dt - carried g.
-    A mass and not the force of a step ago: a force that lags by dt damps like N m w^2 dt.
+    The mass is carried in place of the force of the last step, as a force that lags by dt damps
+    like N m w^2 dt.
     """
 
     impulse: ti.f64

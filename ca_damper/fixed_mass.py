@@ -111,7 +111,7 @@ class FixedMass:
 
     @ti.func
     def advance(self, s, step, motion):
-        """No blows; the whole mass is carried."""
+        """No impacts; the whole mass is carried."""
         self.velocity[s] = motion.v
         return Action(0.0, self.mass(s))
 

@@ -81,9 +81,9 @@ class Oscillator:
 class Forcing:
     """Acceleration terms of the container in a step; time counts from the step's beginning.
 
-    stiffness [1/s^2], damping [1/s]. The base pushes with drive cos(omega t) + quadrature
-    sin(omega t) [m/s^2], omega [rad/s]; constant [m/s^2] is the rest. Per mass, so that the right
-    hand side divides by nothing.
+    stiffness [1/s^2], damping [1/s]. The base contributes drive cos(omega t) + quadrature sin(omega
+    t) [m/s^2], omega [rad/s]; constant [m/s^2] is the rest. Terms are per mass, so that the
+    right-hand side needs no division.
     """
 
     stiffness: ti.f64

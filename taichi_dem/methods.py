@@ -92,7 +92,7 @@ def _steps_ahead(method):
 def structure_of(method: Any) -> Hashable:
     """Parts of a method on which its kernels depend, hashable: all but its numbers.
 
-    A method of one's own says so by a member ``structure``; else any change of its numbers compiles
+    A user-defined method may have a member ``structure``; else any change of its numbers compiles
     anew, as kernels may have read them.
     """
     if type(method).__module__ != __name__:
@@ -113,10 +113,10 @@ def _suffix(method):
 class Uniform:
     """One step for all bodies, explicit.
 
-    dt0: largest step [s]. distance: l [m]; no body may move further in a step, so the step of
-    all falls to that of the fastest body. Without it the step is dt0 throughout.
-    control: further limits of the step, a ``StepControl``. dashpot: "full", or "limited": a
-    dashpot keeps the share of its coefficient that the steps of its bodies bear.
+    dt0: largest step [s]. distance: l [m]; no body may move further in a step, so the step of all
+    falls to that of the fastest body. Without it the step is dt0 throughout. control: further
+    limits of the step, a ``StepControl``. dashpot: "full", or "limited": a dashpot keeps the share
+    of its coefficient that is stable at the steps of its bodies.
     Source: Konno et al., 3.1 and 4.3 ("same time increment for all elements").
     """
 
@@ -198,10 +198,10 @@ class ImplicitDashpots:
     Springs and loads are explicit; their stability bounds the step, not that of the dashpots.
     dt: step [s]. sweeps: fewest and most sweeps over all dashpots in a step. tolerance: sweeps end
     once none changes a velocity by more than this share of the largest speed in the whole scene;
-    what creeps beside something very fast needs a smaller one. theta: where in the step bond
+    slow motion beside very fast bodies needs a smaller one. theta: time in the step at which bond
     dashpots take their velocity, from 0.5 (mean of both ends, second order) to 1 (the end, first
-    order, for steps so long that the mean would ring). refresh: how long the solved blocks of
-    bonds serve [s].
+    order, for steps so long that the mean would ring). refresh: interval between updates of the
+    solved blocks of bonds [s].
     Raises InputError for a value out of its range.
     Source: specification, section 6; not in the paper.
     """

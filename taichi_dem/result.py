@@ -21,10 +21,10 @@ from taichi_dem.scene import Scene
 class Result:
     """Result of a run.
 
-    history: arrays by column name, one row a sample. frames: snapshots. broken_time: when each
-    bond was released [s], NaN while it holds. peak_speed: largest speed of each body at the
-    samples [m/s]. report: figures of the run. diverged: the sentence of a run that left its bounds
-    (all else then ends before that), else "".
+    history: arrays by column name, one row a sample. frames: snapshots. broken_time: when each bond
+    was released [s], NaN while it holds. peak_speed: largest speed of each body at the samples
+    [m/s]. report: figures of the run. diverged: the error sentence of a run that left its bounds,
+    whose data end before that, else "".
 
     As the last line of a notebook's cell it shows a picture and a table.
     """

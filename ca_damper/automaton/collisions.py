@@ -1,8 +1,9 @@
 """Collisions of particles with each other and with walls (Komatsuzaki et al., 5.3 and 5.4).
 
-First every touching particle is judged by the state after the flight: does it join the heap, meet
-a wall, or approach another particle? Events claim the particles they need, so that no particle has
-part in two events of a step. Then the winners act; no two of them touch the same particle.
+First the event of every touching particle is found from the state after the flight: it joins the
+heap, meets a wall, or approaches another particle. Events claim the particles they need, so that no
+particle takes part in two events of a step. Then the winners are carried out; no two of them
+involve the same particle.
 """
 
 from typing import Any

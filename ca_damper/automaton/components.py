@@ -19,7 +19,7 @@ from ca_damper.scenes.scene_fields import SceneFields
 
 @ti.data_oriented
 class Parameters:
-    """Parameters that kernels read; in fields, so that another value compiles nothing anew.
+    """Parameters that kernels read; in fields, so that another value compiles nothing.
 
     width of a cell [m], mass of a particle [kg], gravity [m/s^2], restitution of particle and wall;
     threshold of static contact in units of g dt.

@@ -43,7 +43,7 @@ class StaticContact:
 
     @ti.func
     def noticed(self, s, cell, kind):
-        """Whether a rising particle has its support below; a falling one looks at it anyway."""
+        """Whether a rising particle has support below; a falling one has it in the cell ahead."""
         return kind == UP and self.supported(s, cell)
 
     @ti.func
@@ -97,7 +97,7 @@ class NoStaticContact:
 
     @ti.func
     def noticed(self, s, cell, kind):
-        """Support is not looked at."""
+        """Support is not considered."""
         return False
 
     @ti.func

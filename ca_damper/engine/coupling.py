@@ -1,7 +1,7 @@
 """The step of a coupled scene: filling, container, measures, clock; and the loop over all scenes.
 
-One scene a thread, the whole time loop inside the kernel. All state lies in fields between
-launches, so that neither their number nor what else is in the batch changes a bit.
+One scene a thread, the whole time loop inside the kernel. All state is stored in fields between
+launches, so that neither their number nor other scenes in the batch change a bit.
 """
 
 from typing import Any

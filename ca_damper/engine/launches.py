@@ -37,7 +37,7 @@ class Launches:
             share = min(1.0, self.done + self.pace / total)
             advance(share)
             ti.sync()
-            # A short run tells nothing of the pace of a long one.
+            # A short run does not determine the pace of a long one.
             if share < 1.0:
                 self._adapt(time.perf_counter() - started)
             check()

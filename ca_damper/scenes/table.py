@@ -120,7 +120,7 @@ def _check_whole(name: str, column: np.ndarray) -> None:
 def dealt(cost: np.ndarray, threads: int) -> np.ndarray:
     """Scene numbers in an order that gives each thread the same cost, (scenes,) i32.
 
-    A thread takes a contiguous part of the loop, so dear and cheap scenes are dealt out like cards.
+    A thread takes a contiguous part of the loop, so scenes are dealt out in turn by falling cost.
     """
     dear_first = np.argsort(-cost, kind="stable")
     hands = [dear_first[k::threads] for k in range(threads)]

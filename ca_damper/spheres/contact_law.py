@@ -106,7 +106,7 @@ class ContactLaw:
     def load(self, field: ti.Field, numbers: Mapping[str, float], tangential_share: float) -> None:
         """Write the numbers of a contact, before a step is known, to a Contact field of shape ().
 
-        tangential_share: part of the effective mass that resists a tangential blow.
+        tangential_share: part of the effective mass that resists a tangential impulse.
         """
         for name in ("stiffness", "damping", "friction", "reach"):
             setattr(field[None], name, numbers[name])

@@ -1,13 +1,13 @@
 """One step of the spheres: contacts, walls, motion; and readings between steps.
 
-Time integration is the leapfrog, with velocities at the times t_n that the container's motion is
-given for, and positions half a step ahead. In a step, forces are taken at the positions of its
+Time integration is the leapfrog, with velocities at the times t_n of the given motion of the
+container, and positions half a step ahead. In a step, forces are evaluated at the positions of its
 middle, change the velocities over the whole step, and these move the positions on. It is of second
-order, symplectic where nothing dissipates, and needs one evaluation of the contacts. As the
-forces belong to the middle of the step over which the container feels them, they do not lag.
+order, symplectic without dissipation, and needs one evaluation of the contacts. As the forces
+belong to the middle of the step over which they act on the container, they do not lag.
 
-Spheres move in the frame at rest, not in the container's: so what they gain of momentum is what
-contacts and gravity give, to round-off, and the blows on the container are its exact counterpart.
+Spheres move in the frame at rest, not in the container's: their gain of momentum is that from
+contacts and gravity, to round-off, and the impacts on the container are its exact counterpart.
 """
 
 import math
@@ -92,7 +92,7 @@ class DeviceSpheres:
 
     @ti.func
     def advance(self, s, step, motion):
-        """Take the spheres over a step; returns their blows on the container."""
+        """Advance the spheres by a step; returns the impulse of their impacts on the container."""
         dt = self.table.dt[s]
         if step == 0:
             self.bodies.board(s, motion)
@@ -224,7 +224,7 @@ class DeviceSpheres:
 
     @ti.func
     def divergence_code(self, s):
-        """0, or a code of DIVERGENCES; "not" lets NaN fail a test."""
+        """Code of DIVERGENCES, or 0; "not" makes NaN fail a test."""
         body, dt = self.bodies.body[None], self.table.dt[s]
         self.crushed[s], self.held[s] = self.search.crowded(s), 0.0
         contact = self.law.over_step(self.contact_of_pair[None], dt)

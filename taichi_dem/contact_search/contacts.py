@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 #: Largest steps that a fast body makes before it is searched again.
 STEPS = 16.0
-#: Share of its extent beyond which it is looked at whatever its speed.
+#: Share of its extent beyond which it is searched again whatever its speed.
 FARTHEST = 0.25
 
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from taichi_dem.engine.model import Model
     from taichi_dem.step.schedule import Schedule
 
-#: Marks of a body: it has spheres, and the last search looked at it.
+#: Marks of a body: it has spheres, and the last search visited it.
 EXPOSED, LOOKED = 1, 2
 _CAPACITIES = ("", "pairs_per_body", "spheres_per_body", "neighbours_per_body")
 
@@ -219,7 +219,7 @@ class BroadPhase:
 
     @ti.func
     def _find_spheres(self, a):
-        """Find the sphere pairs of an exposed body with each neighbour that is looked at."""
+        """Find the sphere pairs of an exposed body with each neighbour that is being searched."""
         i = self.exposed[a]
         least = ti.select(self.looked[i] == LOOKED, EXPOSED, LOOKED)
         for k in range(self.neighbours.first[i], self.neighbours.last[i]):

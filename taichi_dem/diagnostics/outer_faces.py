@@ -107,7 +107,7 @@ class OuterOverlaps:
                 away = vec3(ball[k, 0], ball[k, 1], ball[k, 2]) - centre
                 reach = radius + ball[k, 3]
                 j = order[k]
-                # Two loose bodies find each other twice.
+                # A pair of loose bodies would be found twice.
                 if away.norm_sqr() < reach * reach and (loose[j] == 0 or i < j):
                     apart = ti.cast(part[i] != part[j], ti.i32)
                     for p, q in ti.ndrange(4, 4):

@@ -82,7 +82,7 @@ class BlastEngine(Engine):
         parts = self.tables, self.state, self.schedule, self.contacts
         if method.solves:
             return SolvedAdvance(*parts, Solver(*parts))
-        # A method may bring an order of its own (docs/add_a_time_integrator.md).
+        # A method may have its own order of the physics (docs/add_a_time_integrator.md).
         return getattr(method, "advance", Advance)(*parts)
 
     def load(self, model: Model, method: Method, max_speed: float) -> None:

@@ -100,9 +100,9 @@ class Interrupted(KeyboardInterrupt):
 
 
 class CtrlC:
-    """In its block the first Ctrl-C is only noted, in ``asked``; the second one interrupts.
+    """Notes the first Ctrl-C in its block, in ``asked``; the second one interrupts.
 
-    Python lets the main thread alone listen: in others Ctrl-C is what it was.
+    Python delivers signals to the main thread only: in others Ctrl-C is unchanged.
     """
 
     def __init__(self) -> None:

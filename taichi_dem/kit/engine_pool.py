@@ -131,7 +131,7 @@ class Loan:
         if holder is self:
             return
         if not self.engine.accepts(self.scene):
-            # Another owner has had the kernels compiled with numbers of its own.
+            # The kernels are compiled with numbers of another owner.
             self.engine = self.pool.another(self.engine, self.scene)
             self.activate()
             return

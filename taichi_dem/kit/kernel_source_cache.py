@@ -33,7 +33,7 @@ class RememberingWrapper(textwrap.TextWrapper):
 
 
 def remembering(find: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Source lines of a function and their first number, as find returns them; cached."""
+    """Source lines of a function and their first number, as from find; cached."""
     cached = {}
 
     def lines(function):

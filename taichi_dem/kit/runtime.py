@@ -197,7 +197,7 @@ def _initialise(wanted):
             advanced_optimization=False,
             cpu_max_num_threads=wanted.threads,
             debug=wanted.debug,
-            # Below errors Taichi only tells of a cache that another process is writing.
+            # Below errors Taichi only reports a cache that another process is writing.
             log_level=ti.ERROR,
             random_seed=0,
         )

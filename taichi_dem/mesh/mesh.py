@@ -90,12 +90,12 @@ def checked_mesh(
 ) -> Mesh:
     """Build a Mesh from arrays; repair and report small defects, refuse others.
 
-    points: (n, 3) [m].  tetrahedra: (m, 4) point indices, either orientation.
-    groups: name -> (k, 3) point indices of outer faces, either orientation.
-    weld_tolerance: points not farther apart [m] become one; 0 welds nothing.
+    points: (n, 3) [m].  tetrahedra: (m, 4) point indices, either orientation. groups: name -> (k,
+    3) point indices of outer faces, either orientation. weld_tolerance: points not farther apart
+    [m] become one; 0 welds nothing.
 
-    Mended: negative volumes, points without a tetrahedron, faces twice in a group.
-    Raises InputError, with the numbers (counted from 0) of what is wrong.
+    Repaired: negative volumes, points without a tetrahedron, faces twice in a group.
+    Raises InputError, with the numbers (counted from 0) of the defects.
     """
     places = _checked_points(points)
     corners = _checked_indices("tetrahedra", tetrahedra, 4, len(places))

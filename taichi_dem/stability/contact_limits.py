@@ -80,7 +80,7 @@ class ContactLimits:
 
     @ti.func
     def margin(self, i, j):
-        """Gap [m] that two bodies can close in the time that is looked ahead."""
+        """Gap [m] that two bodies can close in the time ``ahead``."""
         ahead = self.ahead[ti.max(self.state.level[i], self.state.level[j])]
         return ahead * self.contacts.approach(i, j)
 

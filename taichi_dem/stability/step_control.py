@@ -34,22 +34,22 @@ EVENTS = ("hit", "release", "neighbour")
 class StepControl:
     """Limits of a body's step beside its displacement in it.
 
-    safety: share of each stability limit that a step may take, in (0, 1]. angle: largest turn
-    in a step [rad]. criteria: names out of ``OPTIONAL`` that count. wake: events out of ``EVENTS``
-    at which a body between its own times is brought to the present and takes its new step at
-    once: "hit" (a contact comes near), "release" (a bond near it breaks), "neighbour" (a body
-    it touches went to a much shorter step). level_jump: levels by which a body may be coarser
-    than one it touches, None for any number. ahead: steps of the finer of two bodies before they
-    could touch from which on their contacts count, at least 1: so that a coarse one is woken
-    before it is hit. dashpot_floor: with dashpot "limited", dashpots ask for no step shorter than
-    this [s]; where they need one they are limited instead. 0: they are never limited.
+    safety: share of each stability limit that a step may take, in (0, 1]. angle: largest turn in a
+    step [rad]. criteria: names out of ``OPTIONAL`` that count. wake: events out of ``EVENTS`` at
+    which a body between its own times is brought to the present and takes its new step at once:
+    "hit" (a contact comes near), "release" (a bond near it breaks), "neighbour" (a body it touches
+    refined its step strongly). level_jump: levels by which a body may be coarser than one it
+    touches, None for any number. ahead: steps of the finer of two bodies by which their contacts
+    count before they could touch, at least 1, so that a coarse body is woken before a collision.
+    dashpot_floor: with dashpot "limited", the shortest step that dashpots require [s]; where they
+    need a shorter one they are limited instead. 0: they are never limited.
     Raises InputError for a value out of its range or an unknown name.
 
     Stability allows 0.8 of the limits, accuracy less: a dashpot takes the velocity of half a step
-    ago, a held neighbour lies up to a step behind, both errors of first order. In the paper's
-    block (dt0 8e-8 s, largest error of a body at the hole at 7e-5 s) they are 0.9 % at 0.8 and
-    0.4 % at 0.4. One bond there opens to within 0.2 % of its failure and lets go two bodies of the
-    hole's wall: at 0.5 it still held, and the mean displacement of the hole was 2.4 % short.
+    ago, a held neighbour lies up to a step behind, both errors of first order. In the paper's block
+    (dt0 8e-8 s, largest error of a body at the hole at 7e-5 s) they are 0.9 % at 0.8 and 0.4 % at
+    0.4. One bond there opens to within 0.2 % of its failure and releases two bodies of the hole's
+    wall: at 0.5 it still held, and the mean displacement of the hole was 2.4 % short.
     """
 
     safety: float = 0.25

@@ -55,6 +55,6 @@ class AppliedUntil:
 
     @ti.func
     def _until(self, i, j):
-        """Tick at which two bodies are looked at again."""
+        """Tick at which a pair of bodies is evaluated again."""
         finer = ti.max(self.state.level[i], self.state.level[j])
         return self.state.tick[None] + device_ticks_of(finer)

@@ -18,7 +18,7 @@ class ContactForce:
         pair = self.contacts.store.body[p]
         i, j = pair[0], pair[1]
         branch = self.state.position[j] - self.state.position[i]
-        # Most candidates do not touch: find out in the first body's frame, where it costs half.
+        # Most candidates do not touch: tested in the first body's frame, at half the cost.
         back = self.state.rotation[i].transpose()
         turn, offset = back @ self.state.rotation[j], back @ branch
         force, moment_i, moment_j = zero3(), zero3(), zero3()

@@ -213,7 +213,7 @@ class SolvedStep(Step):
                 self.advance.solver.bonds.first(b)
         for b in range(self.advance.tables.bond_count[None]):
             self.advance.bond(b)
-            # It booked a step that never was.
+            # It booked a step before the start.
             if ti.static(self.advance.tables.has_bond_heat):
                 self.state.bond_heat[b] = 0.0 * self.state.bond_heat[b]
 
@@ -333,7 +333,7 @@ class Parallel:
 
     @ti.kernel
     def _run(self, part: ti.template(), end_tick: ti.i64, share: ti.i32) -> ti.i32:
-        # With a share of 0 nothing happens: compiled, and that is all.
+        # With a share of 0 the kernel is compiled and does nothing.
         low = ti.static(self.step.schedule.low)
         for active, item in ti.static(self.step.parts[part]):
             for a in range(share * active.count(low[None])):

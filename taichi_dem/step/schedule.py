@@ -77,7 +77,7 @@ class Schedule:
     def load(self, model: "Model", method: Method) -> None:
         """Take the steps of a method."""
         assign(self.step_seconds, method.dt0 / 2.0 ** np.arange(MAX_LEVEL + 1))
-        # A rule of one's own may have no numbers to load.
+        # A user-defined rule may have no numbers to load.
         getattr(self.criterion, "load", lambda *_: None)(method.distance, method.dt0)
         if self.has_limits:
             self.limits.load(model, method)
@@ -99,7 +99,7 @@ class Schedule:
 
     @ti.func
     def pair_step(self, i, j):
-        """Seconds until two bodies are looked at again: the smaller of their steps."""
+        """Time [s] until a pair of bodies is evaluated again: the smaller of their steps."""
         return self.step_seconds[ti.max(self.state.level[i], self.state.level[j])]
 
     @ti.func
@@ -152,7 +152,7 @@ class Schedule:
         """Level that the rates and the neighbours of body i require, and its criterion."""
         wanted, bound = self.limits.wanted(i, self.seconds(self.state.tick[None]))
         if ti.static(self.spreads):
-            # Its neighbours, many to visit, step no finer than the finest of all.
+            # Neighbours are visited only where the finest level of all could bind.
             if self.level_limit.least_beside(self.finest[None]) > wanted:
                 least = self.level_limit.least(i)
                 if least > wanted:

@@ -29,7 +29,7 @@ class WakeUp:
                 self.state.bound[i] = bound
             elif wanted > self.state.level[i]:
                 ti.atomic_add(self.limits.woken[None], 1)
-                # The present belongs to the grid of level low and finer: such a level it takes.
+                # The present is a time of level low and finer levels only.
                 self.state.level[i] = ti.max(self.state.level[i], self.schedule.low[None])
                 self.schedule.note_change(i)
                 if self.state.last_tick[i] < self.state.tick[None]:

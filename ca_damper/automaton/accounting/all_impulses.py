@@ -27,7 +27,7 @@ class AllImpulses(Uncounted):
 
     @ti.func
     def wall_impulse(self, s, cell, gain):
-        """Count a blow [quanta]."""
+        """Count an impact [quanta]."""
         return quanta(gain)
 
     @ti.func

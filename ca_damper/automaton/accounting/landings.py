@@ -46,7 +46,7 @@ class Landings(Uncounted):
 
     @ti.func
     def wall_impulse(self, s, cell, gain):
-        """Count a blow [quanta] if the particle has changed its cell since the last."""
+        """Count an impact [quanta] if the particle has changed its cell since the last."""
         result = ti.cast(0, ti.i64)
         if self.arrived[s, cell] == 1:
             result = quanta(gain)

@@ -40,7 +40,7 @@ class Uncounted:
 
     @ti.func
     def wall_impulse(self, s, cell, gain):
-        """Leave out a blow to a wall or the floor."""
+        """Leave out an impact on a wall or the floor."""
         self.impulse_balance.add(s, REST, gain)
         return ti.cast(0, ti.i64)
 
