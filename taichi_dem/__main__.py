@@ -1,4 +1,4 @@
-"""``python -m taichi_dem``: effects, methods, materials, meshes and experiments there are."""
+"""``python -m taichi_dem``: list effects, methods, materials, meshes and experiments."""
 
 import inspect
 

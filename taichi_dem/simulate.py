@@ -1,4 +1,4 @@
-"""The loop a user calls: step, sample, keep frames, and hand everything back as one result."""
+"""The loop of a run: step, sample, keep frames, and return all as one result."""
 
 import warnings
 from collections.abc import Sequence

@@ -52,7 +52,7 @@ class Contacts:
         self.search_requested = ti.field(ti.i32, shape=())
 
     def load(self, model: "Model", method: Method) -> None:
-        """Take the numbers of a scene and a method; there are no pairs yet."""
+        """Load the numbers of a scene and a method; no pairs exist yet."""
         effect, n = model.contact, model.body_count
         assign(self.skin, effect.skin)
         assign(self.pace, np.array([method.dt0, method.steps_ahead]))

@@ -34,7 +34,7 @@ class ListedPairs:
 
     @ti.func
     def begin(self, k, j, faces, p):
-        """Begin entry k for a pair with body j, of which nothing is known but the near faces.
+        """Begin entry k for a pair with body j, of which only the near faces are known.
 
         p: its slot, -1 for none.
         """

@@ -105,7 +105,7 @@ class PairStore:
 
     @ti.func
     def clear_slot(self, p):
-        """Begin with a pair of which nothing is known."""
+        """Reset the slot of a pair."""
         self.first[p], self.last[p], self.waiting[p], self.is_new[p] = 0, 0, [0, 0], 1
         self.heat[p], self.deepest[p] = vec3(0.0), 0.0
         for slot in range(2 * p, 2 * p + 2):

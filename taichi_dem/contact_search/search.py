@@ -63,7 +63,7 @@ class BroadPhase:
         self.neighbours.load(model, method)
 
     def clear(self) -> None:
-        """Forget all pairs; the next search finds those that there are then."""
+        """Forget all pairs; the next search finds those present then."""
         self.store.clear()
         self.neighbours.clear()
         assign(self.contacts.search_requested, 0)

@@ -87,7 +87,7 @@ class Effect:
             self.__dict__["_given"] = vars(given)
 
     def load_scene(self, model: "Model") -> None:
-        """Load the numbers of the effect that this bound one stands for."""
+        """Load the numbers of the scene's effect."""
         if self._count:
             assign(self.law, np.array(self.numbers(model.material), dtype=np.float64))
         self.load(model)

@@ -107,7 +107,7 @@ class Tables:
             effect.load_scene(model)
 
     def matched(self, model: Model) -> list[tuple[Any, Optional[Effect]]]:
-        """Pairs of an effect bound here and the one of a model that it stands for.
+        """Pairs of an effect bound here and the corresponding one of a model.
 
         The latter is None for a null object.
         """

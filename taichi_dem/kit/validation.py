@@ -15,7 +15,7 @@ Checked = TypeVar("Checked")
 
 #: Positive numbers lie between these, so that products of a few of them stay finite: beyond, one
 #: overflows to infinity or falls to zero, and a run ends in NaN without a reason. In SI units
-#: nothing that there is comes near.
+#: no real quantity comes near.
 SMALLEST, LARGEST = 1e-60, 1e60
 #: Value of an argument ``progress`` that asks for a bar on a terminal or in Jupyter.
 AUTO = "auto"

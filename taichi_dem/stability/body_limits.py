@@ -126,7 +126,7 @@ class StabilityLimits:
         self.woken = ti.field(ti.i32, shape=())
 
     def load(self, model: "Model", method: "Method") -> None:
-        """Take the bonds of a model and the numbers of a method."""
+        """Load the bonds of a model and the numbers of a method."""
         rule = method.control or StepControl()
         assign(self.rule, np.array([method.dt0, rule.safety, rule.dashpot_floor]))
         assign(self.jump, rule.level_jump or 0)

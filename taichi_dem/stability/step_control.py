@@ -108,7 +108,7 @@ class Displacement:
         self.rate2 = ti.field(real, shape=MAX_LEVEL + 2)
 
     def load(self, distance: float, dt0: float) -> None:
-        """Take a distance and the step of level 0 [s]."""
+        """Load a distance and the step of level 0 [s]."""
         steps = dt0 / 2.0 ** np.arange(MAX_LEVEL + 1)
         assign(self.rate2, np.append((distance / steps**self.power) ** 2, np.inf))
 

@@ -7,7 +7,7 @@ from taichi_dem.timeline import MAX_LEVEL
 
 @ti.func
 def itself(a):
-    """A member that is its own number."""
+    """Member function of lists whose members are 0 .. count - 1."""
     return a
 
 

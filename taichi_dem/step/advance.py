@@ -198,7 +198,7 @@ class Advance(ContactForce):
 
     @ti.func
     def _release(self, b, slots):
-        """One unit has failed: the face transmits nothing from now on and carries spheres."""
+        """Release a bond with a failed unit: its faces carry contact spheres from now on."""
         tick = self.state.tick[None]
         self.state.broken_tick[b] = tick
         for side in ti.static(range(2)):

@@ -32,7 +32,7 @@ _SEARCH = 2
 
 @ti.data_oriented
 class Once:
-    """Stands for a list where a phase has none: it happens once a substep."""
+    """List of one member, for phases that run once a substep."""
 
     @ti.func
     def count(self, low):
@@ -129,7 +129,7 @@ class Colour:
 
     @ti.func
     def count(self, low):
-        """How many there are."""
+        """Number of members."""
         return self.colour_first[self.colour + 1] - self.colour_first[self.colour]
 
     @ti.func

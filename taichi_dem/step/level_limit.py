@@ -34,7 +34,7 @@ class LevelLimit:
 
     @ti.func
     def note_all(self):
-        """Take the levels of all bodies as known."""
+        """Note the levels of all bodies."""
         for i in range(self.tables.body_count[None]):
             self.listed_level[i] = self.state.level[i]
 
@@ -63,7 +63,7 @@ class LevelLimit:
 
     @ti.func
     def spread(self, i):
-        """Take the level of body i as known, and list those it touches that are too coarse."""
+        """Note the level of body i, and list those it touches that are too coarse."""
         level = self.state.level[i]
         self.listed_level[i] = level
         for f in range(4):

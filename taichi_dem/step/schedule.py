@@ -75,7 +75,7 @@ class Schedule:
         self.evaluations = ti.field(ti.i64, shape=5)
 
     def load(self, model: "Model", method: Method) -> None:
-        """Take the steps of a method."""
+        """Load the steps of a method."""
         assign(self.step_seconds, method.dt0 / 2.0 ** np.arange(MAX_LEVEL + 1))
         # A user-defined rule may have no numbers to load.
         getattr(self.criterion, "load", lambda *_: None)(method.distance, method.dt0)
@@ -161,7 +161,7 @@ class Schedule:
 
     @ti.func
     def note_change(self, i):
-        """Body i has taken another level, or lost a bond."""
+        """Note that body i has another level, or has lost a bond."""
         self.changed[ti.atomic_add(self.changed_count[None], 1)] = i
 
     @ti.func
@@ -172,7 +172,7 @@ class Schedule:
 
     @ti.func
     def apply_changes(self, one):
-        """The same after bodies have been brought to the present; their list is done with."""
+        """Move entries after bodies have been brought to the present, and clear their list."""
         self.limits.done()
         if ti.static(self.retimes):
             self._rearrange()

@@ -1,4 +1,4 @@
-"""Springs between contact spheres that stick, for friction laws that remember; else nothing."""
+"""Tangential springs between contact spheres, for friction laws with memory."""
 
 from typing import TYPE_CHECKING, Optional
 

@@ -1,4 +1,4 @@
-"""Accounting that keeps momentum: everything but gravity acts on the container."""
+"""Accounting that conserves momentum: all but gravity acts on the container."""
 
 from typing import ClassVar
 

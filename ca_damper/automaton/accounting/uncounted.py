@@ -1,4 +1,4 @@
-"""Accounting that counts nothing: the base of those that count something."""
+"""Accounting that counts no impulse: the base of the others."""
 
 from typing import Any, ClassVar
 

@@ -19,7 +19,7 @@ class SolvedAdvance(Advance):
 
     @ti.func
     def predict(self, i):
-        """Velocities at the end of the step as far as they are known before it is solved."""
+        """Predict the velocities at the end of the step before it is solved."""
         elapsed = self.schedule.elapsed(i)
         linear, angular = self._gathered(i)
         linear, angular, _ = self._loaded(i, elapsed, linear, angular)

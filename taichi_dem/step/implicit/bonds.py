@@ -82,7 +82,7 @@ class BondDashpots:
 
     @ti.func
     def begin(self, b, i, j, branch):
-        """Take in the present twist of an intact bond and, now and then, its block."""
+        """Load the present twist of an intact bond and, at intervals, its block."""
         k = self.index[b]
         self.bodies[k], self.branch[k] = [i, j], branch
         now = self._twist(i, j, branch)
@@ -93,7 +93,7 @@ class BondDashpots:
 
     @ti.func
     def first(self, b):
-        """Begin a run with a guess: the twist of the first step does not change."""
+        """Set the first guess of a run: a constant twist in the first step."""
         slots, k = self.tables.bond_slots[b], self.index[b]
         i, j = slots[0] >> 2, slots[1] >> 2
         if self.state.broken_tick[b] < 0:
@@ -111,7 +111,7 @@ class BondDashpots:
 
     @ti.func
     def end(self, b):
-        """A released bond is visited no more."""
+        """Remove a released bond from the sweeps."""
         self.bodies[self.index[b]] = [-1, -1]
 
     @ti.func

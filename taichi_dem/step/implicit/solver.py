@@ -56,7 +56,7 @@ class Solver:
         self.speed2 = ti.field(real, shape=())
 
     def load(self, model: "Model", method: ImplicitDashpots) -> None:
-        """Take the numbers of a method, and the bonds of a model."""
+        """Load the numbers of a method, and the bonds of a model."""
         assign(self.bounds, np.array(method.sweeps))
         assign(self.tolerance, method.tolerance)
         if self.has_bonds:
@@ -64,7 +64,7 @@ class Solver:
 
     @ti.func
     def begin(self, one):
-        """Forget the last step's residual."""
+        """Reset the residual and the count of sweeps."""
         self.sweeps[None] = 0
         self.unsolved[None] = 1
         self.change2[None], self.speed2[None] = 0.0, 0.0
@@ -100,7 +100,7 @@ class Solver:
 
     @ti.func
     def check_convergence(self, one):
-        """End a sweep: is another one called for?"""
+        """End a sweep, and decide whether another one is required."""
         self.sweeps[None] = self.sweeps[None] + 1
         self.total_sweeps[None] = self.total_sweeps[None] + 1
         self.residual2[None] = self.change2[None]

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @ti.data_oriented
 class Velocities:
-    """Velocity and spin of every body at the end of the step, as far as it is known.
+    """Present estimate of velocity and spin of every body at the end of the step.
 
     twist: velocity [m/s] and spin [rad/s], world. turn: spin per moment, R I^-1 R^T [1/(kg m^2)],
     as supports allow. lightness: velocity per impulse without them [1/kg]. These are stored
