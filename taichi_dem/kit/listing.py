@@ -103,7 +103,8 @@ def _other_lists(package):
 
 
 def _is_checkout(root):
-    return (root / "pyproject.toml").is_file() and (root / "experiments" / "_cli.py").is_file()
+    marks = "pyproject.toml", "experiments/_gallery_pages.txt"
+    return all((root / mark).is_file() for mark in marks)
 
 
 def _line(owner, name):
