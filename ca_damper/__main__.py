@@ -1,11 +1,11 @@
-"""``python -m ca_damper``: fillings of the damper, what runs them, and experiments there are."""
+"""``python -m ca_damper``: list fillings, runs and results, and experiments."""
 
 import ca_damper
 from taichi_dem.kit import listing
 
 
-def sections():
-    """(Title, rows) of what the package offers; each name of ``__all__`` stands in one of them."""
+def sections() -> list[tuple[str, list]]:
+    """Contents of the package by section, (title, rows); each name of ``__all__`` is in one."""
     names = [name for name in ca_damper.__all__ if not name.startswith("__")]
     fillings = [name for name in names if hasattr(getattr(ca_damper, name), "bind")]
     rest = [name for name in names if name not in fillings]

@@ -6,8 +6,8 @@ numbers (see ``engine/damper_engine.py``).
 
 import contextlib
 import time
-from collections.abc import Iterator
-from typing import Any, Callable, Optional
+from collections.abc import Iterator, Mapping
+from typing import Any, Optional, Union
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from taichi_dem.kit import runtime
 from taichi_dem.kit.checkpoint import version_text
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.restart import CheckpointWriter, NoCheckpointWriter, RunSnapshot, opened
 from taichi_dem.kit.validation import choice, whole
 
@@ -54,7 +55,7 @@ class Batch(LoadedScenes):
         self.launches, self.compile_seconds = Launches(self.count), 0.0
         # Whether the present run goes on from a checkpoint.
         self.going_on = False
-        self.writer = NoCheckpointWriter()
+        self.writer: Union[CheckpointWriter, NoCheckpointWriter] = NoCheckpointWriter()
 
     def __repr__(self) -> str:
         return in_brief(self, self.filling.label, f"{self.count:,} scenes", f"on the {self.mount}")
@@ -70,7 +71,7 @@ class Batch(LoadedScenes):
         return self.launches.scene_steps
 
     def start(self, start: str = "rest") -> None:
-        """Place the particles anew and begin at time zero, the base passing upwards through zero.
+        """Place the particles at their start and begin at time zero, the base passing zero upwards.
 
         start: the container begins at "rest", or in the steady state of the "empty" container, or
         in that of a container with the particles as "rigid" mass.
@@ -84,10 +85,10 @@ class Batch(LoadedScenes):
         self._check_divergence()
 
     def change(self, **numbers: Any) -> None:
-        """Give the scenes other numbers, as ``SceneTable.change``; then ``start`` begins anew.
+        """Replace numbers of the scenes, as ``SceneTable.change``; ``start`` must follow.
 
-        The bits are those of a batch that is made with them, and nothing is compiled.
-        Raises InputError for what that batch would refuse; this one then stays as it is.
+        The bits are those of a batch made with these numbers, and nothing is compiled. Raises
+        InputError where that batch would be refused; this one then stays unchanged.
         """
         engine = self.engine
         self.numbers = self.numbers.changed(**numbers)
@@ -111,7 +112,7 @@ class Batch(LoadedScenes):
         self,
         transient_cycles: int,
         measured_cycles: int,
-        progress: Optional[Callable[[BatchProgress], None]] = None,
+        progress: Optional[Listener] = None,
     ) -> measures.Cycles:
         """Run whole cycles and measure the last of them; returns ``measures.Cycles``.
 
@@ -131,7 +132,7 @@ class Batch(LoadedScenes):
             self.engine.coupling.read(record)
         return measures.Cycles(self.table.column("frequency"), self.steps_per_cycle, record)
 
-    def advance(self, steps: Any, progress: Optional[Callable[..., None]] = None) -> None:
+    def advance(self, steps: Any, progress: Optional[Listener] = None) -> None:
         """Advance every scene by a number of steps, one for all or (scenes,), without measuring.
 
         Raises InputError unless they are whole numbers from zero, SimulationDiverged.
@@ -144,11 +145,11 @@ class Batch(LoadedScenes):
     def checkpointed(
         self, checkpoint: Any, resume: Any, identity: dict[str, str], owners: Any = ()
     ) -> Iterator[Any]:
-        """Let the runs in its block save themselves; gives what saves them.
+        """Save the runs in its block as a checkpoint asks; yields the writer.
 
-        checkpoint: a Checkpoint or None. resume: file to go on from, or None: the run that it was
-        saved in is then to be called for again, and goes on. identity: words by name that a file
-        must share; owners: (name, object) of what else goes into it, as in ``restart.RunSnapshot``.
+        checkpoint: a Checkpoint or None. resume: file to go on from, or None; the saved run must be
+        called again, and is continued. identity: words by name that a file must share; owners:
+        (name, object) of further data in it, as in ``restart.RunSnapshot``.
         Raises InputError.
         """
         self._check_started()
@@ -158,7 +159,7 @@ class Batch(LoadedScenes):
         saved = RunSnapshot({**own, **identity}, self.memory, {"batch": self, **dict(owners)})
         if arrays:
             saved.restore(arrays, resume)
-        writer = NoCheckpointWriter()
+        writer: Union[CheckpointWriter, NoCheckpointWriter] = NoCheckpointWriter()
         if checkpoint:
             writer = CheckpointWriter(checkpoint, saved, self._now)
         with writer as self.writer:
@@ -172,12 +173,12 @@ class Batch(LoadedScenes):
         return int(self._read_status()[0].mean()), float(self.time_s.mean())
 
     def saved(self) -> dict[str, np.ndarray]:
-        """What a checkpoint holds of it beside the fields, arrays by name."""
+        """Data for a checkpoint beside the fields, arrays by name."""
         pace = np.stack([*self.numbers.pace(), self.time_origin])
         return {**self.launches.saved(), "pace": pace, "steps_per_cycle": self.steps_per_cycle}
 
-    def resume(self, saved: dict[str, np.ndarray]) -> None:
-        """Take over what ``saved`` gave."""
+    def resume(self, saved: Mapping[str, np.ndarray]) -> None:
+        """Restore the data that ``saved`` returned."""
         self.launches.resume(saved)
         *pace, self.time_origin = saved["pace"].copy()
         self.numbers.take_pace(pace, saved["steps_per_cycle"])
@@ -185,7 +186,7 @@ class Batch(LoadedScenes):
         self.going_on = True
 
     def report(self) -> Report:
-        """What was done and what it cost, as a ``report.Report``."""
+        """Figures and cost of the run, a ``report.Report``."""
         particles, dt = self.table.column("particles"), self.table.column("dt")
         sprung = self.mount == "spring"
         return Report(
@@ -235,7 +236,7 @@ class Batch(LoadedScenes):
             engine.is_compiled = True
 
     def _launch_until_done(self, steps: np.ndarray, progress: Any) -> None:
-        """Launch, tell and save; a run that was saved at its end is told and saved once more."""
+        """Launch, report and save; one saved at its end is reported and saved once more."""
         launches, total, done = self.launches, max(1, int(steps.sum())), -1.0
         while done < 1.0:
             done = launches.done

@@ -1,4 +1,6 @@
-"""What a run of a batch refuses, asked before its kernels are compiled."""
+"""Checks of the input of a batch, before its kernels are compiled."""
+
+from typing import Any, Optional
 
 import numpy as np
 
@@ -9,19 +11,19 @@ from taichi_dem.kit.validation import choice, progress_option, shown, whole
 #: Motion of the container at the beginning of a run.
 STARTS = ("rest", "empty", "rigid")
 MOST_CYCLES = 10_000_000
-#: Largest field of measured sums: 1 GiB, half of what Taichi can count.
+#: Largest field of measured sums: 1 GiB, half of the most that Taichi can index.
 _MOST_NUMBERS = 2**27
 
 
-def check_run(transient_cycles, start, progress):
-    """InputError for a number of cycles, a start or a progress that cannot be meant."""
+def check_run(transient_cycles: Any, start: Any, progress: Any) -> None:
+    """Raise InputError for an invalid number of cycles, start or progress."""
     whole("transient_cycles", transient_cycles, 0, MOST_CYCLES)
     choice("start", start, STARTS)
     progress_option("progress", progress)
 
 
-def check_record_fits(scenes, measured_cycles):
-    """InputError where so many scenes and cycles leave no room for what is measured."""
+def check_record_fits(scenes: int, measured_cycles: int) -> None:
+    """Raise InputError where so many scenes and cycles exceed the record of measures."""
     cycles = scenes * max(1, measured_cycles)
     most = _MOST_NUMBERS // len(measures.COLUMNS)
     if cycles > most:
@@ -31,7 +33,7 @@ def check_record_fits(scenes, measured_cycles):
         )
 
 
-def for_all(name, value, scenes, most=None):
+def for_all(name: str, value: Any, scenes: int, most: Optional[int] = None) -> np.ndarray:
     """One number for all scenes or one for each, (scenes,); InputError for anything else.
 
     most: the largest of whole numbers from zero; None for any numbers.
@@ -41,7 +43,7 @@ def for_all(name, value, scenes, most=None):
         given = np.asarray(value)
         numbers = np.broadcast_to(given, scenes)
         bad = given.dtype.kind not in kinds
-        bad = bad or (most is not None and ((numbers < 0) | (numbers > most)).any())
+        bad = bad or (most is not None and bool(((numbers < 0) | (numbers > most)).any()))
     except ValueError:
         bad = True
     if bad:

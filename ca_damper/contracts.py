@@ -1,4 +1,4 @@
-"""Contracts between parts, written as Protocols, and the refusal of what does not keep one."""
+"""Contracts between parts, written as Protocols, and checks that an object keeps one."""
 
 import inspect
 from typing import Any
@@ -22,6 +22,6 @@ def check_members(what: str, thing: Any, members: dict[str, str]) -> None:
     for name, purpose in members.items():
         if not hasattr(thing, name):
             words = f" ({purpose})" if purpose else ""
-            # Its repr may ask for the member itself.
+            # Its repr may use the member itself.
             kind = thing if isinstance(thing, type) else type(thing)
             raise InputError(f"{what} must have {name!r}{words}, got {kind.__name__} without it")

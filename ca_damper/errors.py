@@ -1,5 +1,7 @@
 """Exceptions that a user of the package may meet; scripts end with 2 and 3 on them."""
 
+from collections.abc import Mapping
+
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.errors import SimulationDiverged as _SimulationDiverged
 
@@ -11,7 +13,16 @@ class SimulationDiverged(_SimulationDiverged):
     found. time_s: when that was [s]. dt: the step used [s]. dt_allowed: a step that would do [s].
     """
 
-    def __init__(self, sentence, *, scene, step, time_s, dt, dt_allowed):
+    def __init__(
+        self,
+        sentence: str,
+        *,
+        scene: Mapping[str, float],
+        step: int,
+        time_s: float,
+        dt: float,
+        dt_allowed: float,
+    ):
         super().__init__(sentence)
         self.scene, self.step, self.time_s = scene, step, time_s
         self.dt, self.dt_allowed = dt, dt_allowed

@@ -1,4 +1,4 @@
-"""Contract of a filling of the container: what goes in is its motion, what comes out its load.
+"""Contract of a filling of the container: its input is the motion, its output the load.
 
 A filling is a frozen dataclass of a user's options, checked when it is made (``Filling``). It binds
 itself to the scenes of an engine (``DeviceFilling``), which is compiled once and then runs every
@@ -24,8 +24,8 @@ from taichi_dem.kit.validation import shown
 class Motion:
     """The container at the beginning of a step, along x (up positive).
 
-    x: displacement [m]. v: velocity [m/s]. a: acceleration [m/s^2] by spring, dashpot, base and
-    the mass carried in the step before, without the blows of that step: they lasted an instant.
+    x: displacement [m]. v: velocity [m/s]. a: acceleration [m/s^2] by spring, dashpot, base and the
+    mass carried in the step before, without the impacts of that step, which are instantaneous.
     """
 
     x: ti.f64
@@ -35,12 +35,13 @@ class Motion:
 
 @ti.dataclass
 class Action:
-    """What a filling does to the container during a step.
+    """Action of a filling on the container during a step.
 
-    impulse: of the blows, along x [N s]. carried: mass that moves as one with the container [kg].
+    impulse: of the impacts, along x [N s]. carried: mass that moves as one with the container [kg].
     Over the step the container obeys
     (M + carried) x'' + C x' + K x = K y + C y' + impulse / dt - carried g.
-    A mass and not the force of a step ago: a force that lags by dt damps like N m w^2 dt.
+    The mass is carried in place of the force of the last step, as a force that lags by dt damps
+    like N m w^2 dt.
     """
 
     impulse: ti.f64
@@ -55,7 +56,7 @@ _MOST_PLACES = 2**25
 
 @dataclass(frozen=True)
 class Structure:
-    """What the compiler sees of a filling; fillings of equal ``key`` share their compiled kernels.
+    """Compiled structure of a filling; fillings of equal ``key`` share their compiled kernels.
 
     key: the options that decide what is compiled. sizes: places that a scene needs, by name, for
     ``SceneFields.field``, those for particles first; an engine has room for more, so that smaller
@@ -83,7 +84,7 @@ class Filling(Protocol):
 
     @property
     def default_dt(self) -> float:
-        """Step to take unless the user asks for another [s]."""
+        """Default step [s]."""
 
     @property
     def capacity(self) -> int:
@@ -99,7 +100,7 @@ class Filling(Protocol):
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """What it computes, in words for the report."""
+        """Effects that it computes, in words for the report."""
 
     @property
     def step_bound(self) -> Optional[tuple[float, str]]:
@@ -109,7 +110,7 @@ class Filling(Protocol):
         """Raise InputError for a number of particles or a step [s] that it cannot do."""
 
     def divergence(self, code: int, particles: int, dt: float) -> tuple[str, float]:
-        """Say what a code of divergence means, in words that follow "it", and a step that does."""
+        """Meaning of a code of divergence, in words that follow "it", and a step that avoids it."""
 
     def bind(self, table: SceneFields) -> "DeviceFilling":
         """Declare its fields for all scenes of a table; no field may be used yet."""
@@ -122,27 +123,27 @@ class DeviceFilling(Protocol):
     change between two steps, when a sweep goes on to its next frequency.
     """
 
-    def reset(self, s) -> None:
-        """Place the particles of scene s anew, from its seed."""
+    def reset(self, s: int) -> None:
+        """Place the particles of scene s at their start, from its seed."""
 
-    def advance(self, s, step, motion) -> Action:
+    def advance(self, s: int, step: int, motion: Motion) -> Action:
         """Take the particles of scene s over a step in which the container starts with ``motion``.
 
         step: its number (i32), counted from the reset without a gap. The container takes the step
         after this call.
         """
 
-    def energy(self, s) -> float:
+    def energy(self, s: int) -> float:
         """Kinetic and potential energy [J]; heights count from the container's floor."""
 
-    def momentum(self, s) -> float:
+    def momentum(self, s: int) -> float:
         """Momentum along x [kg m/s]."""
 
-    def divergence_code(self, s) -> int:
-        """Find out whether the scene diverged: 0, or a code from 1 up; asked every few steps."""
+    def divergence_code(self, s: int) -> int:
+        """Code of divergence of a scene, from 1 up, or 0; evaluated every few steps."""
 
     def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:
-        """What each of the named effects did, for those that can be counted."""
+        """Activity of each of the named effects, for those that can be counted."""
 
     def snapshot(self, s: int) -> dict[str, np.ndarray]:
         """Positions [m] and velocities [m/s] of the particles, (particles, 2) each, by name.
@@ -173,7 +174,7 @@ def check_places(scenes: int, places: int) -> None:
 
 
 def check_device(filling: Any, device: Any) -> Any:
-    """Return what a filling bound; InputError unless it has all members of the contract."""
+    """Return the device of a filling; InputError unless it has all members of the contract."""
     members = members_of(DeviceFilling)
     if hasattr(filling, "structure"):
         members = {**members, "load": "Take over the numbers of a filling of the same structure."}

@@ -31,7 +31,7 @@ class Empty:
             raise InputError(f"particles must be 0 in an empty container, got {shown(particles)}")
 
     def divergence(self, code: int, particles: int, dt: float) -> tuple[str, float]:
-        """Nothing that could diverge; named because the protocol asks for it."""
+        """Nothing that could diverge; required by the protocol."""
         return "is empty", dt
 
     @property
@@ -69,7 +69,7 @@ class RigidMass:
         whole("particles", particles, 0, self.capacity)
 
     def divergence(self, code: int, particles: int, dt: float) -> tuple[str, float]:
-        """A fixed mass has no state that could diverge; named because the protocol asks for it."""
+        """A fixed mass has no state that could diverge; required by the protocol."""
         return "is rigid", dt
 
     @property
@@ -111,7 +111,7 @@ class FixedMass:
 
     @ti.func
     def advance(self, s, step, motion):
-        """No blows; the whole mass is carried."""
+        """No impacts; the whole mass is carried."""
         self.velocity[s] = motion.v
         return Action(0.0, self.mass(s))
 

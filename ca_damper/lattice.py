@@ -13,7 +13,7 @@ import taichi as ti
 
 from ca_damper.scenes.scene_fields import SceneFields
 
-#: What stands in a cell: a particle on its way in one of six directions, clockwise from up ...
+#: Content of a cell: a particle that moves in one of six directions, clockwise from up ...
 UP, UP_RIGHT, DOWN_RIGHT, DOWN, DOWN_LEFT, UP_LEFT = range(6)
 #: ... or nothing, a wall, or a particle that moves as one with the container.
 EMPTY, WALL, HELD = 6, 7, 8
@@ -56,7 +56,7 @@ class Geometry:
         return (0 <= column) & (column < self.columns) & (0 <= row) & (row < self.rows)
 
     def neighbours(self) -> np.ndarray:
-        """Cell ahead of what stands in a cell, shape (cells + 1, KINDS).
+        """Cell ahead of a particle, by its cell and kind, shape (cells + 1, KINDS).
 
         What does not fly, and all beyond the lattice, looks at cell number ``cells``: nothing ever
         stands there, so that one rule serves every cell.
@@ -175,12 +175,12 @@ class Lattice:
 
     @ti.func
     def cell_ahead(self, cell, kind):
-        """Cell that a particle of this kind looks at."""
+        """Cell ahead of a particle of this kind."""
         return ti.cast(self.neighbour[cell, kind], ti.i32)
 
     @ti.func
     def upward(self, kind):
-        """Vertical part of a direction: 1, 1/2, -1/2 or -1; 0 of what does not fly."""
+        """Vertical part of a direction: 1, 1/2, -1/2 or -1; 0 for particles at rest."""
         return self.cosine[kind, UP]
 
     @ti.func

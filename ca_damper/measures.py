@@ -19,9 +19,9 @@ from taichi_dem.kit.types import FloatOrArray
 
 #: Summed over the steps of a cycle; _cos and _sin: times cos(w t) and sin(w t).
 SUMS = ("x", "x_squared", "x_cos", "x_sin", "v_cos", "v_sin", "f", "f_cos", "f_sin")
-#: What is written for a cycle; energy: of the particles, at its end [J].
+#: Columns of the record of a cycle; energy: of the particles, at its end [J].
 COLUMNS = (*SUMS, "x_max", "x_min", "energy")
-#: What ``Batch.sample`` gives beside the time.
+#: Columns of ``Batch.sample`` beside the time.
 SAMPLE = ("x", "v", "a", "y", "force", "energy", "momentum")
 
 _NOT_A_NUMBER = complex(np.nan, np.nan)
@@ -68,7 +68,7 @@ class Cycles:
 
     @property
     def amplitude(self) -> np.ndarray:
-        """Half the way from lowest to highest x [m], mean over cycles."""
+        """Half the distance from lowest to highest x [m], mean over cycles."""
         return 0.5 * (self.mean_of("x_max") - self.mean_of("x_min"))
 
     @property

@@ -19,7 +19,7 @@ from taichi_dem.kit.validation import positive
 
 @dataclass(frozen=True)
 class Oscillator:
-    """The container and what holds it.
+    """The container and its spring and dashpot.
 
     mass M [kg] of the empty container, stiffness K [N/m], damping C [N s/m], base_amplitude y0 [m].
     Raises InputError unless mass and stiffness are positive and the others not negative.
@@ -96,11 +96,11 @@ class Oscillator:
 
 @ti.dataclass
 class Forcing:
-    """What acts on the container during a step, per mass; time counts from the step's beginning.
+    """Acceleration terms of the container in a step; time counts from the step's beginning.
 
-    stiffness [1/s^2], damping [1/s]. The base pushes with drive cos(omega t) + quadrature
-    sin(omega t) [m/s^2], omega [rad/s]; constant [m/s^2] is the rest. Per mass, so that the right
-    hand side divides by nothing.
+    stiffness [1/s^2], damping [1/s]. The base contributes drive cos(omega t) + quadrature sin(omega
+    t) [m/s^2], omega [rad/s]; constant [m/s^2] is the rest. Terms are per mass, so that the
+    right-hand side needs no division.
     """
 
     stiffness: ti.f64

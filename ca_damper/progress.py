@@ -1,9 +1,11 @@
-"""How far a batch is, and runs in several stages told as one."""
+"""Progress of a batch, and of runs in several stages as a whole."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Optional
 
 from taichi_dem.kit.display import prefixed
-from taichi_dem.kit.progress.progress import Pace, Progress
+from taichi_dem.kit.progress.progress import Listener, Pace, Progress
 
 #: Calls of a progress callback keep this distance [s] when stages are short.
 _LEAST_SECONDS = 0.1
@@ -11,12 +13,12 @@ _LEAST_SECONDS = 0.1
 
 @dataclass(frozen=True)
 class BatchProgress(Progress):
-    """How far a batch is. steps: scene-steps done."""
+    """Progress of a batch. steps: scene-steps done."""
 
     steps: int
 
     @property
-    def speed(self):
+    def speed(self) -> str:
         """Scene-steps a second."""
         return prefixed(self.steps / max(self.seconds, 1e-9), "scene steps/s")
 
@@ -28,17 +30,17 @@ class Stages:
     at which the stages end.
     """
 
-    def __init__(self, progress, ends):
+    def __init__(self, progress: Optional[Listener], ends: Sequence[float]):
         self.progress, self.ends, self.stage = progress, ends, 0
         self.before = BatchProgress(0.0, 0.0, 0)
         self.pace = Pace(_LEAST_SECONDS)
 
-    def __call__(self, progress):
+    def __call__(self, progress: Progress) -> None:
         """Take note of the present stage's progress; the stage ends with a share of 1.
 
         Progress of compiling is passed on as it is: it is no part of a stage.
         """
-        if progress.phase == "compiling":
+        if not isinstance(progress, BatchProgress):
             return self._pass_on(progress)
         begin, end = self.before.share, self.ends[self.stage]
         share = end if progress.share == 1.0 else begin + (end - begin) * progress.share

@@ -1,8 +1,8 @@
-"""Random numbers that are counted, not drawn: a hash of (seed, step, cell, purpose).
+"""Counter-based random numbers: a hash of (seed, step, cell, purpose).
 
-Whoever asks for the same four numbers gets the same answer, so no result depends on the order of
-execution, on the number of threads or on what else runs beside it.
-The hash is the output permutation of PCG (O'Neill 2014, RXS-M-XS, 32 bits) used as a mixer.
+The same four numbers give the same result, so nothing depends on the order of execution, on the
+number of threads or on other scenes. The hash is the output permutation of PCG (O'Neill 2014,
+RXS-M-XS, 32 bits) used as a mixer.
 """
 
 import taichi as ti

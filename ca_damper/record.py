@@ -1,4 +1,4 @@
-"""What a run leaves behind: time series, frames for pictures, CSV files, whole or not at all."""
+"""Output of a run: time series, frames for pictures, CSV files, written whole or not at all."""
 
 from dataclasses import dataclass
 from typing import Any, Optional, Union

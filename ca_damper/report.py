@@ -15,7 +15,7 @@ RK45_STAGES = 6
 
 @dataclass(frozen=True)
 class Report:
-    """What a batch did since it was made, and what it cost.
+    """Figures and cost of a batch since it was made.
 
     method: label of the filling. mount: "spring" or "base". effects: what the filling was asked to
     compute. effect_activity: an ``EffectUse`` for each of them that can be counted, since the
@@ -66,7 +66,7 @@ class Report:
         write_text(path, json.dumps(self.as_dict(), indent=1))
 
     def _bound_row(self):
-        """What bounds the step, and how near to it the run went."""
+        """Bound of the step, and the step relative to it."""
         if self.step_bound is None:
             return ()
         most, why = self.step_bound

@@ -1,24 +1,27 @@
 """Frequency response of the damped structure: every particle number, frequency and seed a scene."""
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Optional
+from typing import Any, Optional, Union
 
 import numpy as np
 
 from ca_damper.batch import Batch
 from ca_damper.checks import check_run
-from ca_damper.filling import check_filling
-from ca_damper.measures import peak
+from ca_damper.filling import Filling, check_filling
+from ca_damper.measures import Cycles, peak
 from ca_damper.oscillator import Oscillator
 from ca_damper.report import Report
 from ca_damper.scenes.clock import steps_per_cycle
 from ca_damper.scenes.table import SceneTable
+from taichi_dem.kit.checkpoint import Checkpoint
 from taichi_dem.kit.display import counted, embedded, in_brief, listed, table, titled, unfolded
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import write_csv
+from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.progress.progress_bar import reporting
-from taichi_dem.kit.validation import AUTO, instance, positive, several, whole
+from taichi_dem.kit.validation import AUTO, FileName, instance, positive, several, whole
 
 #: Measures of a response and the unit that a CSV file says behind their names.
 UNITS = {
@@ -83,13 +86,13 @@ class Response:
         highest = f"largest RMS {1e3 * np.fmax.reduce(self.rms, axis=None, initial=np.nan):.4g} mm"
         return in_brief(self, self.axes_in_words(), highest)
 
-    def axes_in_words(self):
+    def axes_in_words(self) -> str:
         """Filling, particles, ratios and seeds in words."""
         axes = f"particles {listed(self.particles)}, f/f0 {listed(self.ratios)}"
         return f"{self.label}, {axes}, {counted(len(self.seeds), 'seed')}"
 
     def _repr_html_(self):
-        # Whoever never looks at a picture need not wait for matplotlib.
+        # Imported here, so that matplotlib loads only where a picture is shown.
         from ca_damper.plot.response import picture_of_response
 
         count = len(self.particles)
@@ -117,14 +120,14 @@ class Response:
             )
         return found
 
-    def peaks(self):
+    def peaks(self) -> tuple[np.ndarray, np.ndarray]:
         """Where each curve peaks: (ratio, rms [m]), two arrays (particles, seeds)."""
         curves = np.moveaxis(self.rms, 2, 1).reshape(-1, len(self.ratios))
         found = np.array([peak(self.ratios, curve) for curve in curves])
         shape = (len(self.particles), len(self.seeds))
         return found[:, 0].reshape(shape), found[:, 1].reshape(shape)
 
-    def write_csv(self, path):
+    def write_csv(self, path: FileName) -> None:
         """Write one row a scene: filling, particles, ratio, frequency, seed and all measures.
 
         Raises InputError when the file cannot be written.
@@ -138,20 +141,20 @@ class Response:
 
 
 def frequency_response(
-    filling,
+    filling: Filling,
     *,
-    particles,
-    ratios,
-    seeds=5,
-    oscillator=None,
-    dt=None,
-    transient_cycles=150,
-    measured_cycles=20,
-    start="rest",
-    progress=AUTO,
-    checkpoint=None,
-    resume=None,
-):
+    particles: Union[int, Sequence[int]],
+    ratios: Union[float, Sequence[float], np.ndarray],
+    seeds: Union[int, Sequence[int]] = 5,
+    oscillator: Optional[Oscillator] = None,
+    dt: Optional[float] = None,
+    transient_cycles: int = 150,
+    measured_cycles: int = 20,
+    start: str = "rest",
+    progress: Union[Listener, str, None] = AUTO,
+    checkpoint: Optional[Checkpoint] = None,
+    resume: Optional[FileName] = None,
+) -> Response:
     """Response curves of a filling, all scenes in one batch; returns a Response.
 
     particles: one number or several. ratios: ascending frequency ratios f/f0, f0 of the empty
@@ -182,7 +185,15 @@ def frequency_response(
 class Grid:
     """The checked axes of a response: particle numbers, frequency ratios, seeds, and the step."""
 
-    def __init__(self, filling, particles, ratios, seeds, oscillator, dt):
+    def __init__(
+        self,
+        filling: Filling,
+        particles: Union[int, Sequence[int]],
+        ratios: Union[float, Sequence[float], np.ndarray],
+        seeds: Union[int, Sequence[int]],
+        oscillator: Optional[Oscillator],
+        dt: Optional[float],
+    ):
         self.filling = check_filling(filling)
         self.oscillator = Oscillator() if oscillator is None else oscillator
         instance("oscillator", self.oscillator, Oscillator)
@@ -211,8 +222,8 @@ class Grid:
     def _particles(self, name, value):
         return whole(name, value, 0, self.filling.capacity)
 
-    def words(self):
-        """What is run, but for the filling, in words."""
+    def words(self) -> str:
+        """The run without the filling, in words."""
         ratios = self.ratios.tolist()
         return (
             f"particles {self.particles}, ratios {ratios}, seeds {self.seeds}, dt {self.dt}, "
@@ -220,11 +231,11 @@ class Grid:
         )
 
     @property
-    def shape(self):
+    def shape(self) -> tuple[int, int, int]:
         """Of the measures: particles, ratios, seeds."""
         return len(self.particles), len(self.ratios), len(self.seeds)
 
-    def batch(self, ratios, measured_cycles):
+    def batch(self, ratios: np.ndarray, measured_cycles: int) -> Batch:
         """Batch of all scenes at these ratios, the last axis (seeds) running fastest."""
         whole("measured_cycles", measured_cycles, 1, 100_000)
         grids = np.meshgrid(self.particles, ratios, self.seeds, indexing="ij")
@@ -234,7 +245,7 @@ class Grid:
         table = SceneTable(number, seed, self.dt, ratio * o.natural_frequency, *structure)
         return Batch(self.filling, table, measured_cycles=measured_cycles)
 
-    def measures(self, cycles):
+    def measures(self, cycles: Cycles) -> dict[str, np.ndarray]:
         """Measures of all scenes by name, each (scenes,)."""
         o = self.oscillator
         of_structure = {
@@ -244,7 +255,7 @@ class Grid:
         plain = {name: getattr(cycles, name) for name in UNITS if name not in of_structure}
         return {**plain, **of_structure}
 
-    def response(self, steps, values):
+    def response(self, steps: np.ndarray, values: Mapping[str, Any]) -> Response:
         """Response of measures by name, each of our shape; steps: a cycle, (ratios,)."""
         dt = 1.0 / (self.ratios * self.oscillator.natural_frequency * steps)
         axes = (self.particles, self.ratios, self.seeds)

@@ -10,10 +10,13 @@ Source: Dormand and Prince, J. Comput. Appl. Math. 6 (1980) 19-26; step sizes af
 and Wanner, Solving Ordinary Differential Equations I, section II.4.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Optional
 
 import numpy as np
 import taichi as ti
+from numpy.typing import ArrayLike
 
 from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.errors import InputError
@@ -30,8 +33,8 @@ def step(rhs: ti.template(), context, t, y, slope, h):
     """One step of length h from y at t, where dy/dt is ``slope``.
 
     Returns y at t + h (fifth order), dy/dt there (the next step's slope: six new evaluations a
-    step) and the difference to the embedded fourth-order result. A caller that has no use for the
-    last two pays nothing for them in a kernel, where what nobody reads is not computed.
+    step) and the difference to the embedded fourth-order result. In a kernel, unused results cost
+    nothing, as they are not computed.
     """
     k1 = slope
     k2 = rhs(context, t + h * (1 / 5), y + h * (1 / 5 * k1))
@@ -89,10 +92,10 @@ def first_step(rhs: ti.template(), context, t, y, slope, rtol, atol):
 
 @ti.pyfunc
 def attempt(rhs: ti.template(), context, t, t_end, y, slope, h, rtol, atol):
-    """Try a step of length h, or what is left to t_end.
+    """Try a step of length h, or the rest up to t_end.
 
-    Returns (t, y, dy/dt, length tried, error in units of the tolerance): where the step leads when
-    its error is at most 1, where it began when it is not.
+    Returns (t, y, dy/dt, length tried, error in units of the tolerance): at the end of the step
+    when its error is at most 1, at its beginning otherwise.
     """
     left = t_end - t
     size = min(h, left)
@@ -154,7 +157,17 @@ class Solution:
         return by_fields(self)
 
 
-def solve(rhs, span, y0, *, rtol=1e-6, atol=1e-9, at=None, first=None, most_attempts=MOST_ATTEMPTS):
+def solve(
+    rhs: Callable[[float, np.ndarray], ArrayLike],
+    span: tuple[float, float],
+    y0: ArrayLike,
+    *,
+    rtol: float = 1e-6,
+    atol: float = 1e-9,
+    at: Optional[ArrayLike] = None,
+    first: Optional[float] = None,
+    most_attempts: int = MOST_ATTEMPTS,
+) -> Solution:
     """Solve dy/dt = rhs(t, y) from y(span[0]) = y0 to span[1] in Python.
 
     y0: (k,) numbers. rtol, atol: local error allowed, |error| <= atol + rtol |y| in the Euclidean
@@ -190,7 +203,7 @@ def solve(rhs, span, y0, *, rtol=1e-6, atol=1e-9, at=None, first=None, most_atte
 
 
 class _Path:
-    """Accepted times and states on the way."""
+    """Accepted times and states of an integration."""
 
     def __init__(self, derivative, t, y, slope, h, most_attempts):
         self.derivative, self.slope, self.h = derivative, slope, h

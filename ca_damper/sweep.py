@@ -1,26 +1,31 @@
-"""Sweeps up through the frequencies and down again, the state carried on, to show hysteresis.
+"""Sweeps up through the frequencies and down again with continued state, to show hysteresis.
 
 The frequency changes at the end of a cycle, when the base passes its middle: it keeps its place and
 takes up its new speed at once.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Optional
+from typing import Optional, Union
 
 import numpy as np
 
 from ca_damper.checks import check_run
+from ca_damper.filling import Filling
+from ca_damper.oscillator import Oscillator
 from ca_damper.progress import Stages
 from ca_damper.report import Report
 from ca_damper.response import UNITS, Grid, Response
+from taichi_dem.kit.checkpoint import Checkpoint
 from taichi_dem.kit.display import in_brief
+from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.progress.progress_bar import reporting
-from taichi_dem.kit.validation import AUTO
+from taichi_dem.kit.validation import AUTO, FileName
 
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """Responses on the way up and on the way down, both with ascending ratios.
+    """Responses of the upward and the downward sweep, both with ascending ratios.
 
     report: what was done on both and what it cost.
     """
@@ -33,26 +38,26 @@ class Sweep:
         return in_brief(self, self.up.axes_in_words(), "up and down")
 
     @property
-    def hysteresis(self):
+    def hysteresis(self) -> np.ndarray:
         """By how much the RMS differs, (down - up) / larger of both; (particles, ratios, seeds)."""
         return (self.down.rms - self.up.rms) / np.maximum(self.down.rms, self.up.rms)
 
 
 def sweep_up_and_down(
-    filling,
+    filling: Filling,
     *,
-    particles,
-    ratios,
-    seeds=5,
-    oscillator=None,
-    dt=None,
-    transient_cycles=60,
-    measured_cycles=20,
-    start="rest",
-    progress=AUTO,
-    checkpoint=None,
-    resume=None,
-):
+    particles: Union[int, Sequence[int]],
+    ratios: Union[float, Sequence[float], np.ndarray],
+    seeds: Union[int, Sequence[int]] = 5,
+    oscillator: Optional[Oscillator] = None,
+    dt: Optional[float] = None,
+    transient_cycles: int = 60,
+    measured_cycles: int = 20,
+    start: str = "rest",
+    progress: Union[Listener, str, None] = AUTO,
+    checkpoint: Optional[Checkpoint] = None,
+    resume: Optional[FileName] = None,
+) -> Sweep:
     """Go up through the ratios and down again without a new start; returns a Sweep.
 
     transient_cycles: at each frequency, before the measured ones. The other arguments and errors
@@ -86,11 +91,11 @@ class _Way:
         self.count = len(grid.ratios)
 
     def checkpoint_owners(self):
-        """What a checkpoint holds of it."""
+        """Data for a checkpoint, (name, owner) pairs."""
         return ("way", self), ("up", self.up), ("down", self.down)
 
     def ends(self):
-        """Shares of what was ahead at which each ratio that was not done ends."""
+        """Shares of the remaining run at which each of the remaining ratios ends."""
         ahead = 2 * self.count - self.done
         return (np.arange(ahead) + 1.0) / max(1, ahead)
 
@@ -99,21 +104,21 @@ class _Way:
         return [*range(self.count), *reversed(range(self.count))][self.done :]
 
     def record(self, k, batch, cycles):
-        """Take what was measured at ratio number k."""
+        """Record the measures at ratio number k."""
         (self.up if self.done < self.count else self.down).record(k, batch, cycles)
         self.done += 1
 
     def saved(self):
-        """What a checkpoint holds of it, arrays by name."""
+        """Data for a checkpoint, arrays by name."""
         return {"done": np.array(self.done)}
 
     def resume(self, saved):
-        """Take over what ``saved`` gave."""
+        """Restore the data that ``saved`` returned."""
         self.done = int(saved["done"])
 
 
 class _Collected:
-    """Measures of one way, frequency by frequency."""
+    """Measures of one direction, frequency by frequency."""
 
     def __init__(self, grid):
         self.grid = grid
@@ -121,18 +126,18 @@ class _Collected:
         self.values = {name: np.empty(grid.shape) for name in UNITS}
 
     def record(self, k, batch, cycles):
-        """Take what was measured at ratio number k."""
+        """Record the measures at ratio number k."""
         particles, _, seeds = self.grid.shape
         self.steps[k] = batch.steps_per_cycle[0]
         for name, value in self.grid.measures(cycles).items():
             self.values[name][:, k] = value.reshape(particles, seeds)
 
     def saved(self):
-        """What a checkpoint holds of it, arrays by name."""
+        """Data for a checkpoint, arrays by name."""
         return {"steps": self.steps, **self.values}
 
     def resume(self, saved):
-        """Take over what ``saved`` gave."""
+        """Restore the data that ``saved`` returned."""
         self.steps = saved["steps"]
         self.values = {name: saved[name] for name in UNITS}
 

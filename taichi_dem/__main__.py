@@ -1,4 +1,4 @@
-"""``python -m taichi_dem``: effects, methods, materials, meshes and experiments there are."""
+"""``python -m taichi_dem``: list effects, methods, materials, meshes and experiments."""
 
 import inspect
 
@@ -13,8 +13,8 @@ _MESH_MODULES = tuple(
 )
 
 
-def sections():
-    """(Title, rows) of what the package offers; each name of ``__all__`` stands in one of them."""
+def sections() -> list[tuple[str, list]]:
+    """Contents of the package by section, (title, rows); each name of ``__all__`` is in one."""
     made = [
         ("Effects", listing.described("taichi_dem.effects", effects, effects.__all__)),
         ("Methods", _rows([(methods, listing.own(methods, inspect.isclass))])),

@@ -1,11 +1,12 @@
 """Measured speed-up of multirate stepping over the same bodies with one step for all.
 
-The gains of a ``Report`` count evaluations. Lists that change, looks at who is due, and lines of
-memory of which a part is used cost time beside them.
+The gains of a ``Report`` count evaluations. Changes of lists, tests for active bodies, and cache
+lines that are used in part cost time beside them.
 """
 
 import contextlib
 from dataclasses import is_dataclass, replace
+from typing import Optional
 
 import numpy as np
 
@@ -21,33 +22,33 @@ _FIRST = 64
 SHARE, MOST_SECONDS = 0.1, 0.5
 #: Shorter runs are not measured [s].
 LEAST_RUN = 0.5
-#: What a twin does not take over: its clock, its steps, impulses on their way, and its account.
+#: Fields that a twin does not copy: clock, steps, pending impulses, and account.
 _ANEW = (
     *("level", "bound", "tick", "last_tick", "injected_tick", "slot", "max_speed2", "bad_body"),
     *("bond_heat", "contact_heat", "load_work", "load_impulse"),
 )
 
 
-def speedup_of_run(simulation):
-    """``measured_speedup`` for a share of the run's own time; None where it cannot be measured.
+def speedup_of_run(simulation: Simulation) -> Optional[float]:
+    """Call ``measured_speedup`` for a share of the run's own time; None if not measurable.
 
-    That is where the run was too short, or its twin leaves its bounds: the run itself did not.
+    That is where the run was too short, or where its twin diverges, although the run did not.
     """
     spent = simulation.run_cpu_seconds
     if simulation.method.uniform or spent < LEAST_RUN or not is_dataclass(simulation.method):
         return None
-    # The run is over: who watched it is told nothing of a twin.
+    # The run is over: its listeners are told nothing of a twin.
     with contextlib.suppress(SimulationDiverged), listening(lambda _: None):
         return measured_speedup(simulation, min(MOST_SECONDS, SHARE * spent))
     return None
 
 
-def measured_speedup(simulation, seconds=MOST_SECONDS):
-    """CPU time that one step for all would have taken, over what the run took; 1 where it had one.
+def measured_speedup(simulation: Simulation, seconds: float = MOST_SECONDS) -> float:
+    """CPU time that one step for all would have taken, over that of the run; 1 if it had one step.
 
-    How many evaluations that is is counted during the run. What one takes is measured for a number
-    of CPU seconds on a twin in the same engine: it begins where the simulation stands, and all of
-    its bodies take the smallest step that there is then.
+    The number of evaluations with one step is counted during the run. Their cost is measured for a
+    number of CPU seconds on a twin in the same engine: it begins at the present state, and all of
+    its bodies take the smallest step present.
     Raises SimulationDiverged when the twin leaves its bounds.
     """
     if simulation.method.uniform or simulation.run_cpu_seconds == 0.0:
@@ -59,7 +60,7 @@ def measured_speedup(simulation, seconds=MOST_SECONDS):
         spent, done = -twin.run_cpu_seconds, -twin.evaluations()
         twin.advance_to(substeps)
         spent, done = spent + twin.run_cpu_seconds, done + twin.evaluations()
-        # A call costs time of its own: only a long one tells what a substep takes.
+        # A call costs time of its own: only a long one measures a substep.
         substeps *= 2
     return report.uniform_evaluations * spent / max(1, done) / report.run_cpu_seconds
 
@@ -67,7 +68,7 @@ def measured_speedup(simulation, seconds=MOST_SECONDS):
 def _twin(simulation, step):
     """A simulation at the same state with one step [s] for all, at time zero.
 
-    Its largest step is the one that all take: no body goes far enough in it to ask for less.
+    Its largest step is that of all bodies, as none moves far enough in it to require less.
     """
     given = {name: field.to_numpy() for name, field in simulation.state.fields().items()}
     method = replace(simulation.method, dt0=step, distance=LARGEST)
@@ -76,7 +77,7 @@ def _twin(simulation, step):
         if name not in _ANEW:
             values = given[name]
             if name.endswith("_tick"):
-                # Ticks of another length: what has been, has been since the start.
+                # Ticks have another length: all past events count as at the start.
                 values = np.where(values == NEVER, NEVER, 0)
             field.from_numpy(values)
     twin.start()

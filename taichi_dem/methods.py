@@ -4,6 +4,7 @@ from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import Any, Optional, Protocol, Union
 
+from taichi_dem.effects.roles import members_of
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import between, choice, positive, shown
 from taichi_dem.stability.step_control import Displacement, FixedStep, StepControl
@@ -13,33 +14,55 @@ DASHPOTS = ("full", "limited")
 
 
 class Method(Protocol):
-    """How bodies step; every member that the package asks for.
+    """How bodies step; every member that the package reads.
 
-    dt0: largest step [s]. name: short word for tables. uniform: whether all bodies share one step.
-    neighbour: one of NEIGHBOURS. control: a StepControl or None. dashpot: one of DASHPOTS.
-    distance: largest way in a step [m], or None. solves: whether dashpots are solved together.
-    steps_ahead: steps of a body by which its contacts are counted before they touch.
     A method may also have ``advance``, a class derived from ``step.advance.Advance``, and
     ``structure``, what its kernels depend on beside its class (``structure_of``).
     """
 
-    dt0: float
-    name: str
-    uniform: bool
-    neighbour: str
-    control: Optional[StepControl]
-    dashpot: str
-    distance: Optional[float]
-    solves: bool
-    steps_ahead: float
+    @property
+    def dt0(self) -> float:
+        """Largest step [s]."""
+
+    @property
+    def name(self) -> str:
+        """Short word for tables."""
+
+    @property
+    def uniform(self) -> bool:
+        """Whether all bodies share one step."""
+
+    @property
+    def neighbour(self) -> str:
+        """One of NEIGHBOURS."""
+
+    @property
+    def control(self) -> Optional[StepControl]:
+        """Further limits of the step."""
+
+    @property
+    def dashpot(self) -> str:
+        """One of DASHPOTS."""
+
+    @property
+    def distance(self) -> Optional[float]:
+        """Largest displacement of a body in a step [m]; None for no limit."""
+
+    @property
+    def solves(self) -> bool:
+        """Whether dashpots are solved together."""
+
+    @property
+    def steps_ahead(self) -> float:
+        """Steps of a body by which its contacts are counted before they touch."""
 
     def criterion(self) -> Any:
         """Rule for the level of a body, as ``step_control.FixedStep`` or ``Displacement``."""
 
 
 def check_method(method: object) -> None:
-    """Raise InputError, naming what is missing, unless a method is an object as ``Method`` says."""
-    wanted = [*Method.__annotations__, "criterion"]
+    """Raise InputError, naming a missing member, unless a method keeps the contract ``Method``."""
+    wanted = members_of(Method)
     missing = [name for name in wanted if not hasattr(method, name)]
     if isinstance(method, type) or len(missing) > len(wanted) // 2:
         raise InputError(f"method must be one such as ImplicitDashpots(), got {shown(method)}")
@@ -67,9 +90,9 @@ def _steps_ahead(method):
 
 
 def structure_of(method: Any) -> Hashable:
-    """What of a method its kernels depend on, hashable: all but its numbers.
+    """Parts of a method on which its kernels depend, hashable: all but its numbers.
 
-    A method of one's own says so by a member ``structure``; else any change of its numbers compiles
+    A user-defined method may have a member ``structure``; else any change of its numbers compiles
     anew, as kernels may have read them.
     """
     if type(method).__module__ != __name__:
@@ -81,7 +104,7 @@ def structure_of(method: Any) -> Hashable:
 
 
 def _suffix(method):
-    """What a name adds for control and limited dashpots."""
+    """Suffix of a name for control and limited dashpots."""
     controlled = "_controlled" if method.control is not None else ""
     return controlled + ("_limited" if method.dashpot == "limited" else "")
 
@@ -90,10 +113,10 @@ def _suffix(method):
 class Uniform:
     """One step for all bodies, explicit.
 
-    dt0: largest step [s]. distance: l [m]; no body may move further in a step, so the step of
-    all falls to that of the fastest body. Without it the step is dt0 throughout.
-    control: further limits of the step, a ``StepControl``. dashpot: "full", or "limited": a
-    dashpot keeps the share of its coefficient that the steps of its bodies bear.
+    dt0: largest step [s]. distance: l [m]; no body may move further in a step, so the step of all
+    falls to that of the fastest body. Without it the step is dt0 throughout. control: further
+    limits of the step, a ``StepControl``. dashpot: "full", or "limited": a dashpot keeps the share
+    of its coefficient that is stable at the steps of its bodies.
     Source: Konno et al., 3.1 and 4.3 ("same time increment for all elements").
     """
 
@@ -175,10 +198,10 @@ class ImplicitDashpots:
     Springs and loads are explicit; their stability bounds the step, not that of the dashpots.
     dt: step [s]. sweeps: fewest and most sweeps over all dashpots in a step. tolerance: sweeps end
     once none changes a velocity by more than this share of the largest speed in the whole scene;
-    what creeps beside something very fast needs a smaller one. theta: where in the step bond
+    slow motion beside very fast bodies needs a smaller one. theta: time in the step at which bond
     dashpots take their velocity, from 0.5 (mean of both ends, second order) to 1 (the end, first
-    order, for steps so long that the mean would ring). refresh: how long the solved blocks of
-    bonds serve [s].
+    order, for steps so long that the mean would ring). refresh: interval between updates of the
+    solved blocks of bonds [s].
     Raises InputError for a value out of its range.
     Source: specification, section 6; not in the paper.
     """
@@ -195,7 +218,7 @@ class ImplicitDashpots:
     dashpot = "full"
     distance = None
     solves = True
-    # What may touch within the step is solved with it; a little more, as a spin is rounded.
+    # Spheres that may touch within the step are solved in it; slightly more, as a spin is rounded.
     steps_ahead = 1.01
     name = "implicit"
 

@@ -1,16 +1,22 @@
-"""Observers of a run: objects that ``simulate`` calls on the way with a read-only view of it."""
+"""Observers of a run: objects that ``simulate`` calls with a read-only view of it."""
 
 import inspect
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Optional, Protocol, Union
+from typing import Any, Optional, Protocol, Union
 
 import numpy as np
 
+from taichi_dem.diagnostics.report import Report
+from taichi_dem.engine.model import Model
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import Pace
 from taichi_dem.kit.validation import positive, shown, whole
+from taichi_dem.methods import Method
+from taichi_dem.output.record import Frame, Recorder
+from taichi_dem.simulation import Simulation
 from taichi_dem.timeline import MACRO_TICKS, NEVER
 
 #: Largest steps that can be counted to, and calls of an observer in a run.
@@ -88,12 +94,14 @@ class At:
 
 
 class Observer(Protocol):
-    """Measures on the way of a run: ``when`` it is called, and ``observe`` to be called."""
+    """Measurement during a run: ``when`` it is called, and the method ``observe``."""
 
-    when: Union[Every, At]
+    @property
+    def when(self) -> Union[Every, At]:
+        """Times of the calls."""
 
     def observe(self, view: "RunView") -> None:
-        """Measure; what it raises ends the run, and no result is written."""
+        """Measure; an exception here ends the run, and no result is written."""
 
 
 class RunView:
@@ -101,7 +109,7 @@ class RunView:
 
     _parts: tuple
 
-    def __init__(self, simulation, recorder):
+    def __init__(self, simulation: Simulation, recorder: Recorder):
         object.__setattr__(self, "_parts", (simulation, recorder))
 
     def __repr__(self):
@@ -121,12 +129,12 @@ class RunView:
         return int(self._parts[0].state.tick[None]) // MACRO_TICKS
 
     @property
-    def model(self):
+    def model(self) -> Model:
         """Constants of the bodies and bonds, of which kernels know."""
         return self._parts[0].model
 
     @property
-    def method(self):
+    def method(self) -> Method:
         """Method that steps."""
         return self._parts[0].method
 
@@ -152,18 +160,18 @@ class RunView:
         return self._parts[0].running_seconds()
 
     def motion(self) -> dict:
-        """Arrays of the bodies' motion by name, as ``State.motion`` gives them."""
+        """Arrays of the bodies' motion by name, as in ``State.motion``."""
         return {name: _locked(array) for name, array in self._parts[0].state.motion().items()}
 
     def energy_balance(self) -> dict:
         """Terms of the energy balance by name [J]."""
         return self._parts[0].energy_balance.account()
 
-    def frame(self):
+    def frame(self) -> Frame:
         """Snapshot of the block, a ``Frame``."""
         return self._parts[1].frame()
 
-    def report(self):
+    def report(self) -> Report:
         """Report of the run so far."""
         return self._parts[0].report()
 
@@ -177,7 +185,7 @@ def _locked(array):
     return array
 
 
-def checked_observers(observers) -> tuple:
+def checked_observers(observers: Any) -> tuple:
     """Observers as a tuple; InputError for one without a member, or with a wrong one."""
     if not isinstance(observers, (list, tuple)):
         raise InputError(f"observers must be a list of observers, got {shown(observers)}")
@@ -200,7 +208,7 @@ def _takes_one(observe):
     except TypeError:
         return False
     except ValueError:
-        # Functions of other languages may hide what they take.
+        # Functions of other languages may hide their signature.
         return callable(observe)
     return True
 
@@ -211,8 +219,9 @@ class ObserverCalls:
     Observers of one step are called in their order. ``when`` is read once.
     """
 
-    def __init__(self, observers, last, dt, samples):
-        self._at, self._paced = {}, []
+    def __init__(self, observers: Iterable[Any], last: int, dt: float, samples: int):
+        self._at: dict[int, list[Any]] = {}
+        self._paced: list[tuple[Any, Pace]] = []
         for observer in observers:
             when = observer.when
             for step in when.marks(last, dt, samples):
@@ -221,17 +230,17 @@ class ObserverCalls:
                 self._paced.append((observer, Pace(when.wall_s)))
 
     @property
-    def steps(self):
-        """Largest steps at which somebody is called, a set."""
+    def steps(self) -> set[int]:
+        """Largest steps at which an observer is called, a set."""
         return set(self._at)
 
-    def at_step(self, step, view):
-        """Call those of a step."""
+    def at_step(self, step: int, view: RunView) -> None:
+        """Call the observers of a step."""
         for observer in self._at.get(step, ()):
             observer.observe(view)
 
-    def by_clock(self, view):
-        """Call those whose wall time has passed."""
+    def by_clock(self, view: RunView) -> None:
+        """Call the observers whose wall time has passed."""
         for observer, pace in self._paced:
             if pace.should_report():
                 observer.observe(view)

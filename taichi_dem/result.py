@@ -1,4 +1,4 @@
-"""What ``simulate`` returns: how it shows itself in a notebook, and what it writes to a folder."""
+"""Result of ``simulate``: its display in a notebook, and the files that it writes."""
 
 import json
 import os
@@ -19,12 +19,12 @@ from taichi_dem.scene import Scene
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What a run produced.
+    """Result of a run.
 
-    history: arrays by column name, one row a sample. frames: snapshots. broken_time: when each
-    bond was released [s], NaN while it holds. peak_speed: largest speed of each body at the
-    samples [m/s]. report: figures of the run. diverged: the sentence of a run that left its bounds
-    (all else then ends before that), else "".
+    history: arrays by column name, one row a sample. frames: snapshots. broken_time: when each bond
+    was released [s], NaN while it holds. peak_speed: largest speed of each body at the samples
+    [m/s]. report: figures of the run. diverged: the error sentence of a run that left its bounds,
+    whose data end before that, else "".
 
     As the last line of a notebook's cell it shows a picture and a table.
     """
@@ -45,7 +45,7 @@ class Result:
         return in_brief(self, self.report.outcome, samples, frames, early)
 
     def _repr_html_(self):
-        # Whoever never looks at a picture need not wait for matplotlib.
+        # Imported here, so that matplotlib loads only where a picture is shown.
         from taichi_dem.plot.summary import picture_of_run
 
         png = picture_of_run(

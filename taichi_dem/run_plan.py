@@ -1,16 +1,20 @@
 """When a run is sampled, photographed, observed and reported; all of these are observers of it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, Optional, Union
 
 from taichi_dem.kit.display import prefixed
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.progress.progress import LEAST_SHARE, Progress
+from taichi_dem.kit.progress.progress import LEAST_SHARE, Listener, Progress
 from taichi_dem.kit.validation import progress_option, shown
-from taichi_dem.observers import Every, ObserverCalls, checked_observers
+from taichi_dem.observers import Every, Observer, ObserverCalls, checked_observers
+from taichi_dem.output.record import Recorder
+from taichi_dem.simulation import Simulation
 
 #: Progress is reported this often [s].
 _REPORT_SECONDS = 0.2
-#: Samples or frames of a run: each costs a look at all bodies.
+#: Most samples or frames of a run: each reads all bodies.
 _MOST_RECORDS = 1_000_000
 
 
@@ -27,7 +31,7 @@ class RunProgress(Progress):
     evaluation_rate: float
 
     @property
-    def seconds_left(self):
+    def seconds_left(self) -> float:
         """Time expected until the end [s], each level weighted by its steps; infinite at first.
 
         Without bonds and pairs to evaluate, as the share of the way tells.
@@ -38,14 +42,14 @@ class RunProgress(Progress):
         return work * self.seconds / self.evaluations
 
     @property
-    def speed(self):
+    def speed(self) -> str:
         """Simulated time and evaluations a second."""
         seconds = max(self.seconds, 1e-9)
         passed = prefixed(self.time_s / seconds, "s/s")
         return f"{passed}, {prefixed(self.evaluations / seconds, 'evaluations/s')}"
 
 
-def progress_of(simulation, until):
+def progress_of(simulation: Simulation, until: float) -> RunProgress:
     """RunProgress of a simulation towards a time [s]."""
     done, seconds = simulation.evaluations(), simulation.running_seconds()
     rate = simulation.evaluation_rate()
@@ -59,7 +63,15 @@ class RunPlan:
     last: number of largest steps of dt0 [s]. Raises InputError.
     """
 
-    def __init__(self, last, dt0, samples, frames, observers, progress):
+    def __init__(
+        self,
+        last: int,
+        dt0: float,
+        samples: int,
+        frames: int,
+        observers: Sequence[Observer],
+        progress: Union[Listener, str, None],
+    ):
         _check_count("samples", samples, 1)
         _check_count("frames", frames, 0)
         progress_option("progress", progress)
@@ -67,9 +79,11 @@ class RunPlan:
         self.observers = checked_observers(observers)
         ObserverCalls(self.observers, last, dt0, samples)
 
-    def calls(self, simulation, recorder, report_progress):
-        """ObserverCalls of a run: at a step, samples and frames come before what observes them."""
-        observers = [_Sampler(simulation, recorder)]
+    def calls(
+        self, simulation: Simulation, recorder: Recorder, report_progress: Optional[Listener]
+    ) -> ObserverCalls:
+        """ObserverCalls of a run: samples and frames come before the user's observers."""
+        observers: list[Any] = [_Sampler(simulation, recorder)]
         observers += [_Photographer(recorder, self.frames), *self.observers]
         if report_progress is not None:
             until = self.last * self.dt0
@@ -78,7 +92,7 @@ class RunPlan:
 
 
 class _Sampler:
-    """Adds rows to the time series, and looks for missing effects."""
+    """Adds rows to the time series, and samples missing effects."""
 
     when = Every(samples=1)
 

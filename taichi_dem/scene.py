@@ -1,4 +1,4 @@
-"""What a user writes: mesh, material and the effects that the scene calls for."""
+"""Scene: mesh, material and the effects that act in it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,13 +13,13 @@ from taichi_dem.materials import Material
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.parts import may_meet, parts_of
 
-#: What lets bodies touch at outer faces.
+#: Option that lets bodies touch at outer faces.
 REMEDY = "SphereContact(outer_faces=True)"
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A block of bonded bodies and what acts in it; checked once, here.
+    """A block of bonded bodies and the effects that act in it; checked once, here.
 
     mesh: tetrahedra and face groups. material: its constants. effects: the effects that act; what
     is not listed is not computed. max_speed: bound [m/s] beyond which a run counts as diverged.
@@ -86,10 +86,10 @@ def _check_roles(effects):
 def outer_faces_warnings(scene: Any) -> tuple[str, ...]:
     """Sentences about parts of a scene that may meet where they carry no spheres; before a run.
 
-    A solid in one piece has nothing else to meet until it breaks, and what then happens is seen in
-    the run. Who lists contact expects bodies to meet: then all that has several parts is told. Who
-    lists none may have put independent solids into one scene: then nothing is said where they
-    stay at rest, fall alike, or are too far from each other (``parts.may_meet``).
+    A solid in one piece meets nothing until it breaks, which is detected in the run. Scenes with
+    contact are expected to have meeting bodies: any with several parts is reported. Scenes without
+    contact may hold independent solids: they are not reported where they stay at rest, fall alike,
+    or are too far from each other (``parts.may_meet``).
     scene: a Scene, or a Model, which has the same mesh and effects.
     """
     contact = [effect for effect in scene.effects if effect.role == "contact"]

@@ -1,7 +1,9 @@
-"""The loop a user calls: step, sample, keep frames, and hand everything back as one result."""
+"""The loop of a run: step, sample, keep frames, and return all as one result."""
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Optional, Union
 
 import numpy as np
 
@@ -10,13 +12,13 @@ from taichi_dem.kit.checkpoint import Checkpoint, digest, version_text
 from taichi_dem.kit.engine_pool import LoanMemory
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.files import output_folder
-from taichi_dem.kit.progress.progress import compiling
+from taichi_dem.kit.progress.progress import Listener, compiling
 from taichi_dem.kit.progress.progress_bar import reporting
-from taichi_dem.kit.restart import CheckpointWriter, NoCheckpointWriter, RunSnapshot, opened
-from taichi_dem.kit.validation import AUTO, instance
+from taichi_dem.kit.restart import CheckpointWriter, NoCheckpointWriter, Owner, RunSnapshot, opened
+from taichi_dem.kit.validation import AUTO, FileName, instance
 from taichi_dem.measured_speedup import speedup_of_run
-from taichi_dem.methods import check_method
-from taichi_dem.observers import RunView
+from taichi_dem.methods import Method, check_method
+from taichi_dem.observers import Observer, RunView
 from taichi_dem.output.record import Recorder
 from taichi_dem.result import Result
 from taichi_dem.run_plan import RunPlan
@@ -26,20 +28,20 @@ from taichi_dem.timeline import MACRO_TICKS
 
 
 def simulate(
-    scene,
+    scene: Scene,
     *,
-    method,
-    until,
-    driver="auto",
-    samples=200,
-    frames=0,
-    progress=AUTO,
-    title="simulating",
-    output=None,
-    checkpoint=None,
-    resume=None,
-    observers=(),
-):
+    method: Method,
+    until: float,
+    driver: str = "auto",
+    samples: int = 200,
+    frames: int = 0,
+    progress: Union[Listener, str, None] = AUTO,
+    title: str = "simulating",
+    output: Optional[FileName] = None,
+    checkpoint: Optional[Checkpoint] = None,
+    resume: Optional[FileName] = None,
+    observers: Sequence[Observer] = (),
+) -> Result:
     """Run a scene to a time and return the result.
 
     method: from ``taichi_dem.methods``. until: simulated time [s], rounded up to whole largest
@@ -84,8 +86,15 @@ def simulate(
 
 
 def run_simulation(
-    simulation, *, until, samples=200, frames=0, progress=AUTO, title="simulating", observers=()
-):
+    simulation: Simulation,
+    *,
+    until: float,
+    samples: int = 200,
+    frames: int = 0,
+    progress: Union[Listener, str, None] = AUTO,
+    title: str = "simulating",
+    observers: Sequence[Observer] = (),
+) -> Result:
     """Run a Simulation, whose motion may have been set, to a time; otherwise as ``simulate``."""
     instance("simulation", simulation, Simulation)
     last = macro_steps(until, simulation.method.dt0)
@@ -111,7 +120,7 @@ def _started(simulation):
 
 
 def _opened(scene, method, checkpoint, resume, last):
-    """What a run goes on from, arrays by name, or None; InputError for what it cannot."""
+    """Arrays by name to resume from, or None. Raises InputError for an unusable checkpoint."""
     if isinstance(checkpoint, Checkpoint):
         # Refuses too many of them, before anything is done.
         checkpoint.marks(last, method.dt0)
@@ -127,7 +136,7 @@ def _opened(scene, method, checkpoint, resume, last):
 
 
 def _checkpoint_writer(simulation, recorder, checkpoint, resume, arrays):
-    """What saves the run, after the run has been put where it was saved."""
+    """Writer of checkpoints, after a resumed run has been restored."""
     if checkpoint is None and resume is None:
         return NoCheckpointWriter()
     saved = saved_run(simulation, recorder)
@@ -143,9 +152,9 @@ def _checkpoint_writer(simulation, recorder, checkpoint, resume, arrays):
     return CheckpointWriter(checkpoint, saved, now)
 
 
-def saved_run(simulation, recorder):
+def saved_run(simulation: Simulation, recorder: Recorder) -> RunSnapshot:
     """All that a checkpoint holds of a started simulation, a ``restart.RunSnapshot``."""
-    parts = {
+    parts: dict[str, Owner] = {
         "simulation": simulation,
         "energy balance": simulation.energy_balance,
         "missing effects": simulation.missing_effects,
@@ -157,8 +166,8 @@ def saved_run(simulation, recorder):
     )
 
 
-def identity_of(scene, method):
-    """What two runs must share for one to go on from the other, in words.
+def identity_of(scene: Scene, method: Method) -> dict[str, str]:
+    """Properties that a resumed run must share with the saved one, in words by name.
 
     Driver, threads, and how long a run goes and what it records may differ.
     """
@@ -189,7 +198,7 @@ def _run_saved(simulation, recorder, writer, plan, report_progress):
 def _run(simulation, recorder, writer, plan, calls):
     """Step from mark to mark, and call the observers at each.
 
-    Those marks up to which a resumed run has come have been seen to.
+    A resumed run skips the marks that it has passed already.
     """
     view = RunView(simulation, recorder)
     seen = simulation.state.tick[None] if recorder.rows else -1

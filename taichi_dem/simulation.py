@@ -2,6 +2,8 @@
 
 import math
 import time
+from collections.abc import Callable, Mapping
+from typing import Any, Optional
 
 import numpy as np
 
@@ -9,50 +11,71 @@ from taichi_dem.diagnostics.divergence import DivergenceCheck
 from taichi_dem.diagnostics.effect_activity import effect_activity
 from taichi_dem.diagnostics.energy_balance import EnergyBalance
 from taichi_dem.diagnostics.missing_effects import MissingEffects
+from taichi_dem.diagnostics.readings import Readings
 from taichi_dem.diagnostics.report import Report
 from taichi_dem.diagnostics.step_resolution import StepResolution
 from taichi_dem.effects.gas_pressure import GasPressure
 from taichi_dem.engine.capacity import capacity_of
 from taichi_dem.engine.engine import ENGINES, Structure
 from taichi_dem.engine.model import Model
+from taichi_dem.engine.state import State
+from taichi_dem.engine.tables import Tables
 from taichi_dem.engine.view import PartView
 from taichi_dem.kit import runtime
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.progress.progress import compiling
 from taichi_dem.kit.validation import choice, instance, positive, whole
-from taichi_dem.methods import check_method
+from taichi_dem.methods import Method, check_method
 from taichi_dem.scene import Scene
 from taichi_dem.stability.step_control import counted_criteria
+from taichi_dem.step.advance import Advance
 from taichi_dem.step.auto_driver import AutoDriver
-from taichi_dem.step.drivers import DRIVERS
+from taichi_dem.step.drivers import DRIVERS, Step
+from taichi_dem.step.schedule import Schedule
 from taichi_dem.timeline import MACRO_TICKS, NEVER
 
 #: Largest steps of a run, of which the ticks are counted in 64 bits.
 MOST_STEPS = 2**42
-#: What is said of the resident driver where its kernel cannot run.
+#: Reason why the resident driver cannot run, for a sentence.
 CPU_ONLY = "runs on a CPU only"
 #: Bonds below which the resident driver is the quicker one, and above which the parallel one is,
-#: on a CPU with several threads whose cores are free; between them both are tried.
+#: on a CPU with several threads and free cores; between them both are tried.
 RESIDENT_BELOW, PARALLEL_FROM = 4000, 100000
-#: What stands for the driver until it has been measured.
+#: Name of the driver that is chosen by measurement.
 _MEASURED = "measured"
 
 
 class Simulation:
     """One scene, one method, one driver, on an engine of the session.
 
-    driver: "resident", "parallel", or "auto": parallel on a GPU and for large scenes, for those of
-    middle size on several threads whichever proves the quicker.
+    driver: "resident", "parallel", or "auto": parallel on a GPU and for large scenes; for those of
+    middle size on several threads, the faster one by measurement.
     brute_force: contact search without cells, for tests.
     model: the scene's arrays. tables, state, schedule, contacts, broad_phase, advance, step: parts
     of the engine, with the data of this simulation (``engine.view``); contacts and broad_phase are
     None without contact.
-    Raises InputError for what is no scene or method, an unknown driver, "resident" on a GPU, or a
-    scene that finds no room in the machine's memory.
+    Raises InputError for a wrong scene or method, an unknown driver, "resident" on a GPU, or a
+    scene that exceeds the machine's memory.
     """
 
-    def __init__(self, scene, method, driver="auto", brute_force=False):
+    # Views of these parts, with the data of this simulation.
+    tables: Tables
+    state: State
+    schedule: Schedule
+    advance: Advance
+    step: Step
+    readings: Readings
+    # None without contact.
+    contacts: Any
+    broad_phase: Any
+    outer_overlaps: Any
+    # None before the start.
+    energy_balance: Any
+
+    def __init__(
+        self, scene: Scene, method: Method, driver: str = "auto", brute_force: bool = False
+    ):
         instance("scene", scene, Scene)
         check_method(method)
         choice("driver", driver, ("auto", *DRIVERS))
@@ -76,21 +99,17 @@ class Simulation:
 
     def _take_parts(self):
         """Name the parts of the engine as this simulation sees them."""
-        self.tables, self.state, self.schedule, self.advance, self.step, self.readings = (
-            PartView(self.loan, (name,))
-            for name in ("tables", "state", "schedule", "advance", "step", "readings")
-        )
-        self.contacts = self.broad_phase = self.outer_overlaps = None
-        if self.model.has_contact:
-            self.contacts, self.broad_phase, self.outer_overlaps = (
-                PartView(self.loan, (name,))
-                for name in ("contacts", "broad_phase", "outer_overlaps")
-            )
+        for name in ("tables", "state", "schedule", "advance", "step", "readings"):
+            setattr(self, name, PartView(self.loan, (name,)))
+        for name in ("contacts", "broad_phase", "outer_overlaps"):
+            present = self.model.has_contact
+            setattr(self, name, PartView(self.loan, (name,)) if present else None)
 
     def _load(self):
         """Put the scene into the engine, at rest and at time zero."""
         self.loan.activate()
-        self.loan.engine.load(self.model, self.method, self.scene.max_speed)
+        engine: Any = self.loan.engine
+        engine.load(self.model, self.method, self.scene.max_speed)
         self.energy_balance = None
         self.run_seconds = self.run_cpu_seconds = 0.0
         self.started = None
@@ -98,12 +117,12 @@ class Simulation:
     def _driver(self, name):
         """Driver of the engine, or one that measures both."""
         if name == _MEASURED:
-            drivers = {each: PartView(self.loan, ("drivers", each)) for each in DRIVERS}
+            drivers: Any = {each: PartView(self.loan, ("drivers", each)) for each in DRIVERS}
             return AutoDriver(self.step, drivers)
         return PartView(self.loan, ("drivers", name))
 
-    def reset(self, scene=None, method=None):
-        """Begin again at time zero and at rest, with another scene or method if one is given.
+    def reset(self, scene: Optional[Scene] = None, method: Optional[Method] = None) -> None:
+        """Begin again at time zero and at rest, optionally with another scene or method.
 
         They must be of the present structure: the same kinds of effects, the same kind of method;
         then nothing is compiled. Raises InputError where they are not, or find no room.
@@ -133,14 +152,14 @@ class Simulation:
             )
 
     @property
-    def time_s(self):
+    def time_s(self) -> float:
         """Present time [s]."""
         return self.state.tick[None] * self.schedule.tick_seconds
 
-    def start(self):
+    def start(self) -> None:
         """Choose the first steps, evaluate the bonds and open the account; done once.
 
-        Compiles everything, so that stepping afterwards is all that is timed as the run.
+        Compiles everything, so that the time of the run is that of stepping alone.
         """
         if self.energy_balance is not None:
             return
@@ -162,7 +181,7 @@ class Simulation:
         self.compile_seconds += time.perf_counter() - started
 
     def _open_balance(self):
-        """Begin the energy balance and all that looks at the run."""
+        """Begin the energy balance and the other diagnostics."""
         read = self.model, self.state, self.readings, self.contacts
         self.energy_balance = EnergyBalance(*read)
         self.divergence_check = DivergenceCheck(
@@ -171,15 +190,15 @@ class Simulation:
         self.missing_effects = MissingEffects(*read, self.outer_overlaps)
         self.step_resolution = StepResolution(*read, self.schedule, self.advance)
 
-    def sample(self):
-        """Look for effects that are missed, and for bonds that the step does not resolve.
+    def sample(self) -> None:
+        """Sample missing effects, and bonds that the step does not resolve.
 
-        Called at recording times, so that the step stays bare.
+        Called at recording times, as the step itself does not check them.
         """
         self.missing_effects.sample(self.time_s)
         self.step_resolution.sample()
 
-    def advance_to(self, macro_step, on_call=None):
+    def advance_to(self, macro_step: int, on_call: Optional[Callable[[], object]] = None) -> None:
         """Step until a number of largest steps; on_call() is called about five times a second.
 
         Raises SimulationDiverged with place and reason when the run leaves its bounds, InputError
@@ -205,37 +224,38 @@ class Simulation:
             self.broad_phase.check_capacity()
 
     @property
-    def searches(self):
+    def searches(self) -> int:
         """Contact searches so far."""
         return int(self.broad_phase.searches[None]) if self.contacts is not None else 0
 
-    def saved(self):
-        """What a checkpoint holds of it beside the fields, arrays by name."""
+    def saved(self) -> dict[str, np.ndarray]:
+        """Data for a checkpoint beside the fields, arrays by name."""
         return {"cost": np.array([self.running_seconds(), self.cpu_seconds()])}
 
-    def resume(self, saved):
-        """Take over what ``saved`` gave."""
+    def resume(self, saved: Mapping[str, np.ndarray]) -> None:
+        """Restore the data that ``saved`` returned."""
         self.run_seconds, self.run_cpu_seconds = saved["cost"].tolist()
 
-    def evaluations(self):
+    def evaluations(self) -> int:
         """Bonds and contact pairs evaluated so far."""
         return int(self.schedule.evaluations[2] + self.schedule.evaluations[3])
 
-    def sweeps(self):
+    def sweeps(self) -> int:
         """Sweeps over all dashpots so far, 0 for a method that solves none."""
-        return int(self.advance.solver.total_sweeps[None]) if self.solves else 0
+        solver = self.advance.solver
+        return int(solver.total_sweeps[None]) if solver is not None else 0
 
-    def running_seconds(self):
+    def running_seconds(self) -> float:
         """Wall time spent stepping so far [s], compile time apart."""
         present = time.perf_counter() - self.started if self.started is not None else 0.0
         return self.run_seconds + present
 
-    def cpu_seconds(self):
+    def cpu_seconds(self) -> float:
         """CPU time spent stepping so far [s], compile time apart."""
         present = time.process_time() - self.started_cpu if self.started is not None else 0.0
         return self.run_cpu_seconds + present
 
-    def evaluation_rate(self):
+    def evaluation_rate(self) -> float:
         """Bonds and pairs to evaluate in a simulated second, if all levels stay as they are."""
         members = self.schedule.members()
         steps = 2.0 ** np.arange(len(members))
@@ -245,12 +265,12 @@ class Simulation:
             steps *= 1.0 + self.sweeps() / max(1, int(self.schedule.evaluations[0]))
         return float(members @ steps) / self.method.dt0
 
-    def gas_work(self):
+    def gas_work(self) -> float:
         """Work of the gas pressure [J], zero without it."""
         places = [k for k, load in enumerate(self.model.loads) if isinstance(load, GasPressure)]
         return sum(self.energy_balance.load_work(place) for place in places)
 
-    def report(self):
+    def report(self) -> Report:
         """Report of the run so far."""
         counts = [int(value) for value in self.schedule.evaluations.to_numpy()]
         linear, angular = self.energy_balance.momentum_errors()
@@ -290,7 +310,8 @@ class Simulation:
 
 
 def _driver_name(name, bond_count):
-    arch = runtime.settings().arch
+    settings: Any = runtime.settings()
+    arch = settings.arch
     if name == "auto":
         return "parallel" if arch == "cuda" else _by_size(bond_count)
     if name == "resident" and arch == "cuda":
@@ -299,12 +320,13 @@ def _driver_name(name, bond_count):
 
 
 def _by_size(bond_count):
-    if runtime.settings().threads == 1 or bond_count < RESIDENT_BELOW:
+    settings: Any = runtime.settings()
+    if settings.threads == 1 or bond_count < RESIDENT_BELOW:
         return "resident"
     return "parallel" if bond_count >= PARALLEL_FROM else _MEASURED
 
 
-def macro_steps(until, dt0):
+def macro_steps(until: float, dt0: float) -> int:
     """Number of largest steps that reach a time [s]; InputError unless it can be counted to."""
     steps = positive("until", until) / dt0
     if steps > MOST_STEPS:

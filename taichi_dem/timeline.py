@@ -1,8 +1,8 @@
-"""Time as an integer: ticks, levels, and which level is due at a tick.
+"""Time as an integer: ticks, levels, and the levels active at a tick.
 
-Level k steps by dt0 / 2^k; one tick is the step of the finest level allowed. A level is due at
-the multiples of its own step, so a body may refine at any of its own times and coarsen only where
-the coarser grid passes (Konno et al., 3.1). Plain integers here, mirrored for kernels below.
+Level k steps by dt0 / 2^k; one tick is the step of the finest level allowed. A level is active at
+the multiples of its own step, so a body may refine at any of its own times and coarsen only at
+times of the coarser grid (Konno et al., 3.1). Plain integers here, mirrored for kernels below.
 """
 
 import taichi as ti
@@ -15,19 +15,19 @@ MACRO_TICKS = 1 << MAX_LEVEL
 NEVER = -1
 
 
-def ticks_of(level):
+def ticks_of(level: int) -> int:
     """Ticks in a step of a level."""
     return 1 << (MAX_LEVEL - level)
 
 
-def coarsest_active(tick):
-    """Lowest level that is due at a tick; all finer levels are due too."""
+def coarsest_active(tick: int) -> int:
+    """Lowest level active at a tick; all finer levels are active too."""
     rest = tick % MACRO_TICKS
     return 0 if rest == 0 else MAX_LEVEL - ((rest & -rest).bit_length() - 1)
 
 
-def next_level(wanted, tick):
-    """Level a body that is due at a tick may take: what it wants, or the coarsest the grid has."""
+def next_level(wanted: int, tick: int) -> int:
+    """Level that a body active at a tick takes: the wanted one, or the coarsest allowed then."""
     return max(wanted, coarsest_active(tick))
 
 

@@ -1,14 +1,15 @@
-"""What becomes of the way travelled when a particle turns: four readings of a rule left open.
+"""Distance travelled after a turn: four readings of a rule that the paper leaves open.
 
-The paper says that way is summed up to a cell's width (eq. 8), not what a turn does to the sum.
-``signed`` takes the sum for a place: the way on along the new direction is what the old way has
-along it, so that a turn straight back changes its sign, and a wall sets it to where the wall
-stands, which is zero while the container does not move.
-``signed_through_walls`` leaves walls out, ``reset`` starts from zero at every turn, and ``kept``
-takes the sum over as it is.
+The paper says that the distance is summed up to a cell's width (eq. 8), but not how a turn changes
+the sum. ``signed`` takes the sum for a position: the distance along the new direction is the
+component of the old one, so that a turn straight back changes its sign, and a wall sets it to the
+wall's position, which is zero while the container does not move. ``signed_through_walls`` leaves
+walls out, ``reset`` starts from zero at every turn, and ``kept`` keeps the sum.
 """
 
 import taichi as ti
+
+from ca_damper.lattice import Lattice
 
 READINGS = ("signed", "signed_through_walls", "reset", "kept")
 
@@ -17,12 +18,12 @@ READINGS = ("signed", "signed_through_walls", "reset", "kept")
 class Accumulator:
     """One of the readings."""
 
-    def __init__(self, reading, lattice):
+    def __init__(self, reading: str, lattice: Lattice):
         self.reading, self.lattice = reading, lattice
 
     @ti.func
     def turned(self, travelled, old, new):
-        """Way travelled [m] after a turn from direction old to new."""
+        """Distance travelled [m] after a turn from direction old to new."""
         result = travelled
         if ti.static(self.reading.startswith("signed")):
             result = travelled * self.lattice.cosine[old, new]
@@ -33,7 +34,7 @@ class Accumulator:
 
     @ti.func
     def after_wall(self, travelled, old, new, place):
-        """Way travelled [m] after meeting a wall that stands ``place`` [m] above its cells."""
+        """Distance travelled [m] after meeting a wall that stands ``place`` [m] above its cells."""
         result = self.at_wall(new, place)
         if ti.static(self.reading != "signed"):
             result = self.turned(travelled, old, new)
@@ -41,7 +42,7 @@ class Accumulator:
 
     @ti.func
     def at_wall(self, kind, place):
-        """Way travelled [m] of a particle that leaves a wall."""
+        """Distance travelled [m] of a particle that leaves a wall."""
         result = 0.0
         if ti.static(self.reading == "signed"):
             result = place * self.lattice.upward(kind)
@@ -49,9 +50,9 @@ class Accumulator:
 
     @ti.func
     def distance_to_wall(self, travelled, kind, way, width):
-        """Way travelled [m] of a particle that flies ahead of a wall that pushes its cell along.
+        """Distance travelled [m] of a particle ahead of a wall that pushes its cell along.
 
-        Whoever flies straight (up for way 1, down for -1) keeps its place in the room.
+        A particle that flies straight (up for way 1, down for -1) keeps its place in the room.
         """
         result = 0.0
         if ti.static(self.reading == "signed"):

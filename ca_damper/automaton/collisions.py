@@ -1,8 +1,9 @@
 """Collisions of particles with each other and with walls (Komatsuzaki et al., 5.3 and 5.4).
 
-First every touching particle is judged by the state after the flight: does it join the heap, meet
-a wall, or approach another particle? Events claim the particles they need, so that no particle has
-part in two events of a step. Then the winners act; no two of them touch the same particle.
+First the event of every touching particle is found from the state after the flight: it joins the
+heap, meets a wall, or approaches another particle. Events claim the particles they need, so that no
+particle takes part in two events of a step. Then the winners are carried out; no two of them
+involve the same particle.
 """
 
 from typing import Any
@@ -45,7 +46,7 @@ class Collisions:
 
     @ti.func
     def resolve(self, s, step, shared, count, velocity, pull, pressed):
-        """All events of a step; returns velocity along x that counted blows gave [quanta].
+        """All events of a step; returns velocity along x from counted impacts [quanta].
 
         velocity: of the container [m/s]. pull: g dt [m/s].
         """
@@ -79,7 +80,7 @@ class Collisions:
 
     @ti.func
     def find_event(self, s, cell, velocity, pull, pressed):
-        """What happens to a particle, and the speed of what it meets."""
+        """Event of a particle, and the speed of its obstacle."""
         kind = self.cells.at(s, cell)
         ahead = self.lattice.cell_ahead(cell, kind)
         met = self.cells.at(s, ahead)
@@ -154,7 +155,7 @@ class Collisions:
 
     @ti.func
     def collide(self, s, shared, cell, other):
-        """Two particles meet along the line from ``cell`` to what is ahead of it (eq. 9).
+        """Collide two particles along the line from ``cell`` to the one ahead (eq. 9).
 
         Returns the gain of velocity along x that is not theirs: of the deflections, and of what one
         that came from aside had across the line [m/s].
@@ -172,7 +173,7 @@ class Collisions:
 
     @ti.func
     def go_on(self, s, shared, cell, line, speed):
-        """Give a particle its speed along a line; one that came along it is deflected if sent back.
+        """Set a particle's speed along a line; one that came along it is deflected if sent back.
 
         One that came from aside leaves along the line, which keeps the momentum in it.
         """

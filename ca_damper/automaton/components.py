@@ -19,7 +19,7 @@ from ca_damper.scenes.scene_fields import SceneFields
 
 @ti.data_oriented
 class Parameters:
-    """Parameters that kernels read; in fields, so that another value compiles nothing anew.
+    """Parameters that kernels read; in fields, so that another value compiles nothing.
 
     width of a cell [m], mass of a particle [kg], gravity [m/s^2], restitution of particle and wall;
     threshold of static contact in units of g dt.
@@ -69,7 +69,7 @@ def assemble(options: Any, table: SceneFields) -> Components:
     accounting = ACCOUNTINGS[options.accounting](table, lattice, impulse_balance)
     cells = Cells(table, lattice, traversal, accounting)
     accumulator = Accumulator(options.accumulator, lattice)
-    resting = NoStaticContact()
+    resting: Any = NoStaticContact()
     if options.particles_rest:
         resting = StaticContact(table, cells, accumulator, parameters)
     return Components(

@@ -1,7 +1,7 @@
 """Resolve conflicting claims to a cell by random rank.
 
-The largest of several does not depend on the order in which they are asked. Ranks grow with the
-step, so that old claims never need to be cleared.
+The largest rank of several does not depend on their order. Ranks grow with the step, so that old
+claims never need to be cleared.
 """
 
 from typing import Any

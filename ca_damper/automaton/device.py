@@ -67,7 +67,7 @@ class DeviceAutomaton:
             s, self.table.dt[s], pull, self.collisions.contacts
         )
         impulse += self.collisions.resolve(s, step, shared, contacts, motion.v, pull, pressed)
-        # On an oblique flight gravity acts by a quarter: what it lacks, the lattice holds.
+        # On an oblique flight gravity acts by a quarter: the lattice holds the rest.
         impulse += self.accounting.lattice_impulse(s, GRAVITY, 0.75 * pull * oblique)
         self.transport.move_all(s, step, shared, due)
         mass = self.parameters.mass[None]
@@ -75,7 +75,7 @@ class DeviceAutomaton:
 
     @ti.func
     def energy(self, s):
-        """Kinetic and potential energy [J]; what is held moves as the container did last."""
+        """Kinetic and potential energy [J]; held particles move as the container did last."""
         total = 0.0
         for cell in range(self.lattice.cell_count()):
             kind = self.cells.at(s, cell)
@@ -88,7 +88,7 @@ class DeviceAutomaton:
 
     @ti.func
     def momentum(self, s):
-        """Momentum along x [kg m/s]; what is held moves as the container did last."""
+        """Momentum along x [kg m/s]; held particles move as the container did last."""
         total = self.resting.count(s) * self.velocity[s]
         for cell in range(self.lattice.cell_count()):
             total += self.cells.vertical_speed(s, cell)
@@ -96,7 +96,7 @@ class DeviceAutomaton:
 
     @ti.func
     def divergence_code(self, s):
-        """1 when a particle needs more than one cell a step, which no rule gives it."""
+        """1 when a particle would cross more than one cell a step, which no rule allows."""
         fastest = 0.0
         for cell in range(self.lattice.cell_count()):
             fastest = max(fastest, self.cells.speed[s, cell])

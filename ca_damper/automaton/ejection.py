@@ -1,10 +1,10 @@
-"""The container's steps on the lattice, and whom its walls push along (Komatsuzaki et al., Fig. 7).
+"""Lattice steps of the container, and particles pushed by its walls (Komatsuzaki et al., Fig. 7).
 
-The lattice goes with the container, whose displacement is rounded to whole cells. When that
-staircase steps, particles under way stay where they are in the room: one cell the other way. Those
-that touch the wall behind them, and the cluster that touches these, are pushed along: they keep
-their cell, and those slower than the wall take its velocity. A column always has room for it: what
-stays in the room has nothing pushed in its way, or it would touch it and be pushed.
+The lattice moves with the container, whose displacement is rounded to whole cells. When that
+staircase steps, moving particles stay in place in the room: one cell the other way. Those that
+touch the wall behind them, and the cluster that touches these, are pushed along: they keep their
+cell, and those slower than the wall take its velocity. A column always has room for this: a
+particle that stays has no pushed one in its way, or it would touch it and be pushed.
 """
 
 from typing import Any
@@ -113,7 +113,7 @@ class Ejection:
 
     @ti.func
     def shift(self, s, way):
-        """Let all others stay in the room: one cell the other way, those in front first."""
+        """Keep all others in place in the room: one cell the other way, those in front first."""
         for column in range(self.lattice.column_count()):
             for k in range(self.lattice.row_count()):
                 row = k if way > 0 else self.lattice.row_count() - 1 - k

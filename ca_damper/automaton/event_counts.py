@@ -6,7 +6,7 @@ from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.effect_usage import EffectUse
 
 PAIRS, WALLS, PUSHES, HOLDS = range(4)
-#: What is counted, by the effect that it belongs to.
+#: Counted events by the effect that they belong to.
 _COUNTED = {
     "pairs": (PAIRS, "pairs met"),
     "landing": (WALLS, "blows to walls"),

@@ -33,7 +33,7 @@ class ImpulseBalance:
 
     @ti.func
     def clear(self, s):
-        """Start anew."""
+        """Reset."""
         for item in range(_COUNT):
             self.velocity_gain[s, item] = ti.cast(0, ti.i64)
 

@@ -1,4 +1,4 @@
-"""What a user chooses about the automaton."""
+"""Options of the automaton."""
 
 from dataclasses import dataclass
 from numbers import Integral
@@ -51,7 +51,7 @@ class Automaton:
     particle_mass: float = 0.2e-3
     gravity: float = 10.0
     v_max: float = 5.0
-    start: tuple = None
+    start: Optional[tuple] = None
     traversal: str = "list"
     ledger: bool = False
 
@@ -133,7 +133,7 @@ class Automaton:
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """What is computed, in words for the report."""
+        """Effects that are computed, in words for the report."""
         resting = ("static contact",) if self.particles_rest else ()
         ledger = ("ledger",) if self.ledger else ()
         return ("pairs", "landing", *self._accounting.effects, *resting, *ledger)
@@ -173,7 +173,7 @@ class Automaton:
             )
 
     def divergence(self, code: int, particles: int, dt: float) -> tuple[str, float]:
-        """What the one code of ``divergence_code`` means, and a step that would do [s]."""
+        """Meaning of the code of ``divergence_code``, and a step that avoids it [s]."""
         return "holds a particle faster than one cell a step", 0.2 * dt
 
     @property

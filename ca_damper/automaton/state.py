@@ -1,4 +1,4 @@
-"""What stands in the cells of every scene, and who moves it from one cell to another."""
+"""Contents of the cells of every scene, and moves from one cell to another."""
 
 from typing import Any
 
@@ -36,19 +36,19 @@ class Cells:
 
     @ti.func
     def at(self, s, cell):
-        """Kind of what stands in a cell, as i32."""
+        """Kind of the content of a cell, as i32."""
         return ti.cast(self.kind[s, cell], ti.i32)
 
     @ti.func
     def put(self, s, cell, kind, speed, travelled):
-        """Let this stand in a cell."""
+        """Set the content of a cell."""
         self.kind[s, cell] = ti.cast(kind, ti.i8)
         self.speed[s, cell] = speed
         self.travelled[s, cell] = travelled
 
     @ti.func
     def relocate(self, s, origin, target, travelled):
-        """Take what stands in one cell to another, empty one."""
+        """Move the content of a cell to another, empty one."""
         self.put(s, target, self.at(s, origin), self.speed[s, origin], travelled)
         self.put(s, origin, EMPTY, 0.0, 0.0)
         for follower in ti.static(self.followers):

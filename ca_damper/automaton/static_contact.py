@@ -1,10 +1,10 @@
-"""Static contact: what lies on the floor moves with it and weighs on it.
+"""Static contact: particles at rest on the floor move with it and load it.
 
-The paper names the absence of it as the reason why its response peak moves the wrong way (6.2).
-A particle that stands on the floor, or on one that is held already, and has almost its velocity is
-held: it moves as one with the container and its mass is carried by it. That lasts while the heap is
-pressed on the floor. When the container's acceleration falls below -g the heap lifts off as it
-stands. To particles under way the heap is wall.
+The paper names its absence as the reason why the response peak moves the wrong way (6.2). A
+particle that stands on the floor, or on a held one, and has almost its velocity is held: it moves
+as one with the container, which carries its mass. That lasts while the heap is pressed on the
+floor. When the container's acceleration falls below -g the heap lifts off as it stands. For moving
+particles the heap is a wall.
 """
 
 from typing import Any
@@ -28,7 +28,7 @@ class StaticContact:
 
     @ti.func
     def clear(self, s):
-        """Nobody is held."""
+        """No particle is held."""
         self.held[s] = 0
 
     @ti.func
@@ -43,7 +43,7 @@ class StaticContact:
 
     @ti.func
     def noticed(self, s, cell, kind):
-        """Whether a rising particle has its support below; a falling one looks at it anyway."""
+        """Whether a rising particle has support below; a falling one has it in the cell ahead."""
         return kind == UP and self.supported(s, cell)
 
     @ti.func
@@ -71,7 +71,7 @@ class StaticContact:
 
     @ti.func
     def release(self, s, velocity):
-        """Let the heap go from where it is, with the velocity of the container [m/s]."""
+        """Release the heap where it is, with the velocity of the container [m/s]."""
         if self.held[s] > 0:
             kind = UP if velocity > 0.0 else DOWN
             travelled = self.accumulator.at_wall(kind, self.cells.offset[s])
@@ -92,17 +92,17 @@ class NoStaticContact:
 
     @ti.func
     def count(self, s):
-        """Nobody."""
+        """No particle."""
         return 0
 
     @ti.func
     def noticed(self, s, cell, kind):
-        """Support is not looked at."""
+        """Support is not considered."""
         return False
 
     @ti.func
     def joins(self, s, cell, velocity, pull, pressed):
-        """Nobody joins."""
+        """No particle joins."""
         return False
 
     @ti.func

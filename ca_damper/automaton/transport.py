@@ -12,7 +12,7 @@ from ca_damper.scenes.scene_fields import SceneFields
 
 @ti.data_oriented
 class Transport:
-    """Gravity, way, and which particles have something ahead or a cell to change.
+    """Free flight: speeds, distances, and particles that meet an obstacle or may change cells.
 
     crossing: cells of particles that may change their cell, shape (scenes, cells).
     """
@@ -28,7 +28,7 @@ class Transport:
     def fly_all(self, s, dt, pull, contacts: ti.template()):
         """One step of all particles.
 
-        Returns how many touch something, how many may move on, and how many fly obliquely.
+        Returns the numbers of particles that touch something, may move on, and fly obliquely.
         """
         contact_count, crossing_count, oblique = 0, 0, 0
         for k in range(self.cells.traversal.begin(), self.cells.traversal.end(s)):
@@ -47,7 +47,7 @@ class Transport:
 
     @ti.func
     def fly(self, s, cell, dt, pull):
-        """One step of what stands in a cell.
+        """Advance the content of a cell by a step.
 
         Gravity acts by its projection. A particle that has risen as far as it can turns straight
         down. Empty cells and walls go the same way: their speed and their pull are zero.
@@ -77,7 +77,7 @@ class Transport:
 
     @ti.func
     def move_all(self, s, step, shared, crossing_count):
-        """Let the particles that are due change cells, one of the claimants for each cell."""
+        """Move particles to their new cells, one claimant for each cell."""
         claimants = 0
         for k in range(crossing_count):
             cell = ti.cast(self.crossing[s, k], ti.i32)

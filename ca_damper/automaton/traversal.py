@@ -1,7 +1,7 @@
-"""How a step finds the particles: by scanning all cells, or by a list of those that hold one.
+"""Traversal of the particles: a scan of all cells, or a list of those that hold one.
 
-Neither order reaches a result: rules read what no other cell writes, rivals are told
-apart by their random numbers, and impulses are summed as integers.
+The order changes no result: rules read only data that no other cell writes, conflicts are resolved
+by random numbers, and impulses are summed as integers.
 """
 
 from typing import Any

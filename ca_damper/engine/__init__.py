@@ -1,1 +1,1 @@
-"""What steps the scenes: container, coupling, account, and the engine that holds them."""
+"""Stepping of the scenes: container, coupling, account, and the engine that holds them."""

@@ -1,4 +1,4 @@
-"""Account of the momentum along x that a filling and its container give each other."""
+"""Account of the momentum along x that a filling and its container exchange."""
 
 import numpy as np
 import taichi as ti
@@ -8,13 +8,13 @@ from ca_damper.scenes.scene_fields import SceneFields
 
 @ti.data_oriented
 class MomentumAccount:
-    """What fillings should have gained, less what they gave to the container and their weight.
+    """Expected momentum of the fillings: the initial one, less that given to container and gravity.
 
-    Counted from the end of the first step, when all that is carried moves along.
+    Counted from the end of the first step, when all carried particles move along.
 
     weight: of a particle [N]. expected: momentum that a filling should have [kg m/s]. late: part of
-    it that what is carried takes over at its next step [kg m/s]. exchanged: sum of the magnitudes
-    of what was given [N s].
+    it that the carried mass takes over at its next step [kg m/s]. exchanged: sum of the magnitudes
+    of the impulses on the container [N s].
     """
 
     def __init__(self, table: SceneFields):
@@ -29,7 +29,7 @@ class MomentumAccount:
 
     @ti.func
     def begin(self, s, momentum, late):
-        """The first step is over; what the filling has now is right."""
+        """Start the account after the first step, from the present momentum of the filling."""
         self.expected[s], self.late[s], self.exchanged[s] = momentum + late, late, 0.0
 
     @ti.func
@@ -43,9 +43,9 @@ class MomentumAccount:
         self.late[s] = late
 
     def error(self, momentum: np.ndarray) -> float:
-        """Momentum out of nothing as a share of what was exchanged, of the worst scene.
+        """Error of momentum relative to the momentum exchanged, of the worst scene.
 
-        momentum: of the fillings, at the start of the last step for what is carried (scenes,).
+        momentum: of the fillings, (scenes,); at the start of the last step for carried particles.
         """
         late, expected, exchanged = map(
             self.table.in_use, (self.late, self.expected, self.exchanged)

@@ -1,8 +1,8 @@
-"""How the container moves: on its spring, pushed by base and filling, or fixed to the base.
+"""Motion of the container: on its spring, driven by base and filling, or fixed to the base.
 
 Both have ``load`` for the numbers of a batch, and the ti.funcs ``start(s, x, v)``, ``motion(s)`` at
-the beginning of a step, and ``advance(s, action)`` over it, which returns the attempts that the
-integration took, or -1.
+the beginning of a step, and ``advance(s, action)`` over it, which returns the attempts of the
+integration, or -1.
 """
 
 import taichi as ti
@@ -47,7 +47,7 @@ class SprungContainer:
 
     @ti.func
     def motion(self, s):
-        """Displacement, velocity, and acceleration without the blows of the step before."""
+        """Displacement, velocity, and acceleration without the impacts of the step before."""
         return Motion(
             self.state[s][0], self.state[s][1], self.slope[s][1] - self.impulse_velocity[s]
         )
@@ -108,11 +108,11 @@ class DrivenContainer:
 
     @ti.func
     def start(self, s, x, v):
-        """Where the base is; x and v are not asked for."""
+        """Position of the base; x and v are not used."""
 
     @ti.func
     def renew(self, s):
-        """Nothing to note: the motion is looked up."""
+        """Nothing to do: the motion is prescribed."""
 
     @ti.func
     def motion(self, s):

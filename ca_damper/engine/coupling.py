@@ -1,7 +1,7 @@
 """The step of a coupled scene: filling, container, measures, clock; and the loop over all scenes.
 
-One scene a thread, the whole time loop inside the kernel. All state lies in fields between
-launches, so that neither their number nor what else is in the batch changes a bit.
+One scene a thread, the whole time loop inside the kernel. All state is stored in fields between
+launches, so that neither their number nor other scenes in the batch change a bit.
 """
 
 from typing import Any
@@ -61,7 +61,7 @@ class Coupling:
 
     @ti.kernel
     def start(self, initial: _F64):
-        """Begin at step 0 with particles placed anew and the container at initial[s] = (x, v)."""
+        """Begin at step 0: particles at their start, the container at initial[s] = (x, v)."""
         for t in range(self.padding * self.table.scenes[None]):
             if t % self.padding == 0:
                 s = t // self.padding
@@ -88,7 +88,7 @@ class Coupling:
 
     @ti.kernel
     def advance(self, share: ti.f64):
-        """Take every scene to a share of the way from its begin to its goal."""
+        """Step every scene to a share of the steps from its begin to its goal."""
         for t in range(self.padding * self.table.scenes[None]):
             if t % self.padding == 0:
                 self._advance_scene(self.order[t // self.padding], share)
@@ -129,7 +129,7 @@ class Coupling:
 
     @ti.func
     def _enter(self, s, step, late):
-        """Enter a step in the account; late: what the carried mass gained in it [kg m/s]."""
+        """Enter a step in the account; late: momentum gain of the carried mass in it [kg m/s]."""
         if step > 0:
             self.account.add(s, self.force[s], late)
         else:
@@ -142,7 +142,7 @@ class Coupling:
 
     @ti.func
     def _measure(self, s, motion, now, middle):
-        """Add what ``measures.SUMS`` names; the force of a step belongs to its middle.
+        """Add the sums of ``measures.SUMS``; the force of a step belongs to its middle.
 
         Not by +=, which would be an atomic sum here.
         """
@@ -166,7 +166,7 @@ class Coupling:
 
     @ti.kernel
     def sample(self, values: _F64):
-        """Fill values[k, s] with what ``measures.SAMPLE`` names."""
+        """Fill values[k, s] with the quantities of ``measures.SAMPLE``."""
         for s in range(self.table.scenes[None]):
             motion = self.container.motion(s)
             y = self.table.base_amplitude[s] * self.clock.circle[s][0]

@@ -22,7 +22,7 @@ _LEAST = (64, 32, *(LEAST_PLACES,) * 32)
 
 @dataclass(frozen=True)
 class EngineStructure:
-    """What the compiler sees of a batch: key of its filling's structure, mount, names of sizes.
+    """Compiled structure of a batch: key of its filling's structure, mount, names of sizes.
 
     filling: one of that structure, which declares the fields.
     """
@@ -65,7 +65,7 @@ class DamperEngine(Engine):
         """InputError where a field of the engine was used before all of them are declared."""
         runtime = impl.get_runtime()
         if builder not in runtime.unfinalized_fields_builder:
-            # Taichi closed the tree at that use and opened another; the end of ours asks for it.
+            # Taichi closed the tree at that use and opened another; the end of ours expects it.
             runtime.unfinalized_fields_builder.pop(impl._root_fb, None)
             runtime.initialize_fields_builder(builder)
             raise InputError(

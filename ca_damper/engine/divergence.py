@@ -15,7 +15,7 @@ def divergence(
     dt = row["dt"]
     words, allowed = filling.divergence(max(code, 1), row["particles"], dt)
     if code == LOST:
-        # What the filling bears at most is still the best advice.
+        # The longest step of the filling is still the best advice.
         words, allowed = _LOST_IN_WORDS, min(allowed, 0.5 * dt)
     return SimulationDiverged(
         f"the scene of particles = {row['particles']} and seed {row['seed']} at "

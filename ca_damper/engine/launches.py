@@ -1,7 +1,7 @@
-"""Launches of bounded length: how long each may be, and what they took."""
+"""Launches of bounded length, and their cost."""
 
 import time
-from typing import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import taichi as ti
@@ -11,17 +11,17 @@ LAUNCH_SECONDS = 0.15
 
 
 class Launches:
-    """Way of the present run, gone in launches that take every scene the same share.
+    """Progress of the present run in launches that advance every scene by the same share.
 
-    A launch lasts about a sixth of a second, so that Ctrl-C, progress and the look at diverged
-    scenes are prompt. done: share of the way that is behind. seconds: spent on it. run_seconds,
+    A launch lasts about a sixth of a second, so that Ctrl-C, progress and the check for diverged
+    scenes are prompt. done: share of the run that is done. seconds: spent on it. run_seconds,
     scene_steps, particle_steps: of all runs. pace: scene-steps that a launch may have.
     """
 
     def __init__(self, scenes: int):
         self.done = self.seconds = self.run_seconds = 0.0
         self.scene_steps = self.particle_steps = 0
-        # One a scene to begin with, as nobody knows yet what a step costs.
+        # One a scene to begin with, as the cost of a step is not known yet.
         self.scenes, self.pace = scenes, float(scenes)
 
     def begin(self) -> None:
@@ -31,13 +31,13 @@ class Launches:
     def launch(
         self, total: int, advance: Callable[[float], None], check: Callable[[], None]
     ) -> None:
-        """Go on by one launch; total: scene-steps of the way. check: what is asked after it."""
+        """Make one launch; total: scene-steps of the run. check: called after it."""
         started = time.perf_counter()
         try:
             share = min(1.0, self.done + self.pace / total)
             advance(share)
             ti.sync()
-            # What a short way allowed to see says nothing of how fast a long one may go.
+            # A short run does not determine the pace of a long one.
             if share < 1.0:
                 self._adapt(time.perf_counter() - started)
             check()
@@ -57,13 +57,13 @@ class Launches:
         self.particle_steps += int((particles * steps).sum())
 
     def saved(self) -> dict[str, np.ndarray]:
-        """What a checkpoint holds of it, arrays by name."""
+        """Data for a checkpoint, arrays by name."""
         return {
             "run": np.array([self.done, self.seconds, self.run_seconds]),
             "steps": np.array([self.scene_steps, self.particle_steps]),
         }
 
-    def resume(self, saved: dict[str, np.ndarray]) -> None:
-        """Take over what ``saved`` gave."""
+    def resume(self, saved: Mapping[str, np.ndarray]) -> None:
+        """Restore the data that ``saved`` returned."""
         self.done, self.seconds, self.run_seconds = saved["run"].tolist()
         self.scene_steps, self.particle_steps = saved["steps"].tolist()

@@ -1,4 +1,4 @@
-"""Scenes on an engine: their numbers, and what they can be asked between two steps.
+"""Scenes on an engine: their numbers, and access to their state between two steps.
 
 The engine is that of their structure: more or larger scenes, or other numbers, run in the same one
 and compile nothing. Those that are alive at once on one engine take turns.
@@ -76,7 +76,8 @@ class LoadedScenes:
         Raises InputError for a session that has been stopped or cleared, and on another thread.
         """
         self.loan.activate()
-        return self.loan.engine
+        engine: Any = self.loan.engine
+        return engine
 
     @property
     def device(self) -> Any:
@@ -107,7 +108,7 @@ class LoadedScenes:
         return {"time_s": self.time_s, **dict(zip(measures.SAMPLE, values))}
 
     def snapshot(self, s: int) -> dict[str, np.ndarray]:
-        """Positions and velocities of the particles of scene s, as the filling gives them."""
+        """Positions and velocities of the particles of scene s, from the filling."""
         self._check_started()
         return self.device.snapshot(whole("s", s, 0, self.count - 1))
 

@@ -48,7 +48,7 @@ class Clock:
         self.half_turn = table.vector(2, ti.f64)
 
     def set(self, steps: np.ndarray) -> None:
-        """Give every scene its steps a cycle, (scenes,); the phase stays as it is."""
+        """Set the steps a cycle of every scene, (scenes,); the phase stays as it is."""
         angle = 2.0 * np.pi / np.asarray(steps, dtype=np.float64)
         turns = [f(a) for a in (angle, angle / 2) for f in (np.sin, np.cos)]
         self._set(np.ascontiguousarray(steps, dtype=np.int32), np.stack(turns))

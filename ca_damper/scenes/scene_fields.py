@@ -35,7 +35,7 @@ class SceneField:
 
 @ti.data_oriented
 class SceneFields:
-    """What tells one scene of a batch from another; fields of shape (capacity,).
+    """Parameters of each scene of a batch; fields of shape (capacity,).
 
     particles [-], seed [-] (cast to u32 for hashing), dt [s], frequency [Hz] and base_amplitude [m]
     of the base motion, and the primary structure: mass [kg], stiffness [N/m], damping [N s/m].

@@ -1,5 +1,6 @@
-"""The state of a batch as arrays: what its scenes use of the fields of an engine."""
+"""The state of a batch as arrays: the parts of an engine's fields that its scenes use."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -32,16 +33,16 @@ class SceneMemory:
         scenes = {f"scenes/{k}": self._cut(one) for k, one in enumerate(self._made())}
         return {**scenes, **{name: values(field) for name, field in self._others().items()}}
 
-    def misfit(self, arrays: dict[str, np.ndarray]) -> str:
-        """Name of a field that arrays, as ``read`` gave them, lack or do not fit; else ""."""
+    def misfit(self, arrays: Mapping[str, np.ndarray]) -> str:
+        """Name of a field that the arrays of ``read`` lack or do not fit; else ""."""
         for name, mine in self.read().items():
             array = arrays.get(name)
             if array is None or array.dtype != mine.dtype or array.shape != mine.shape:
                 return name
         return ""
 
-    def write(self, arrays: dict[str, np.ndarray]) -> None:
-        """Give the fields their values back, from what ``read`` gave and ``misfit`` accepts."""
+    def write(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """Restore the fields from arrays that ``read`` returned and ``misfit`` accepts."""
         for k, one in enumerate(self._made()):
             whole = values(one.field)
             self._window(one, whole)[...] = arrays[f"scenes/{k}"]

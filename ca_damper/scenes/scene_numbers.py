@@ -1,5 +1,6 @@
 """Numbers of the scenes of a batch, checked against its filling, with steps that fit the cycle."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -46,8 +47,8 @@ class SceneNumbers:
         """Frequencies [Hz] and steps [s], (2, scenes)."""
         return np.stack([self.table.column(name) for name in ("frequency", "dt")])
 
-    def take_pace(self, pace: np.ndarray, steps: np.ndarray) -> None:
-        """Take over what ``pace`` gave, with the steps of a cycle."""
+    def take_pace(self, pace: Sequence[np.ndarray], steps: np.ndarray) -> None:
+        """Restore the arrays of ``pace``, with the steps of a cycle."""
         self.table.drive(*pace)
         self.steps_per_cycle = steps
 

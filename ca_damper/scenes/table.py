@@ -13,7 +13,7 @@ _MOST_SCENES, _MOST_SEED = 2**24, 2**31 - 1
 
 
 class SceneTable:
-    """What tells one scene of a batch from another, one row a scene; plain NumPy.
+    """Parameters of each scene of a batch, one row a scene; plain NumPy.
 
     particles [-], seed [-], dt [s], frequency [Hz] and base_amplitude [m] of the base motion, and
     the primary structure: mass [kg], stiffness [N/m], damping [N s/m].
@@ -58,7 +58,7 @@ class SceneTable:
         return in_brief(self, counted(self.count, "scene"), *words)
 
     def change(self, **numbers: Any) -> None:
-        """Give all scenes other numbers by name, each a scalar or (scenes,).
+        """Replace numbers of all scenes by name, each a scalar or (scenes,).
 
         Raises InputError for a name that is no column.
         """
@@ -73,7 +73,7 @@ class SceneTable:
         self._host["frequency"], self._host["dt"] = pair.astype(np.float64)
 
     def column(self, name: str) -> np.ndarray:
-        """What the table says under a name, (scenes,)."""
+        """Column of the table by name, (scenes,)."""
         return self._host[name]
 
     def row(self, s: int) -> dict[str, Any]:
@@ -82,7 +82,7 @@ class SceneTable:
 
 
 def _broadcast(values: dict[str, Any]) -> list[np.ndarray]:
-    """Numbers by name as arrays of one shape (scenes,); InputError for what is none."""
+    """Numbers by name as arrays of one shape (scenes,); InputError for anything else."""
     columns = {name: _numbers(name, value) for name, value in values.items()}
     for name in ("particles", "seed"):
         _check_whole(name, columns[name])
@@ -120,7 +120,7 @@ def _check_whole(name: str, column: np.ndarray) -> None:
 def dealt(cost: np.ndarray, threads: int) -> np.ndarray:
     """Scene numbers in an order that gives each thread the same cost, (scenes,) i32.
 
-    A thread takes a contiguous part of the loop, so dear and cheap scenes are dealt out like cards.
+    A thread takes a contiguous part of the loop, so scenes are dealt out in turn by falling cost.
     """
     dear_first = np.argsort(-cost, kind="stable")
     hands = [dear_first[k::threads] for k in range(threads)]

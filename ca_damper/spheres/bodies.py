@@ -122,14 +122,14 @@ class Bodies:
 
     @ti.func
     def advance_lead(self, s, time):
-        """Let positions run a time [s] ahead of the velocities, as a change of step asks for."""
+        """Shift positions a time [s] ahead of the velocities, as a change of step requires."""
         for i in range(self.first(s), self.last(s)):
             self.position[i] = self.position[i] + (time - self.lead[s]) * self.velocity[i]
         self.lead[s] = time
 
     @ti.func
     def reset_positions(self, s):
-        """Put the spheres where they start: given places at rest, or random ones, hardly moving."""
+        """Place the spheres: given places at rest, or random ones with small velocities."""
         if ti.static(self.given):
             for i in range(self.first(s), self.last(s)):
                 self._put(i, self.start[i - self.first(s)], vec2(0.0))

@@ -1,10 +1,15 @@
-"""What two touching spheres, or a sphere and a wall, do to each other (paper, eqs 3 to 6)."""
+"""Contact forces between two spheres, or a sphere and a wall (paper, eqs 3 to 6)."""
 
 import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import taichi as ti
 
 from ca_damper.spheres.restitution import damping
+
+if TYPE_CHECKING:
+    from ca_damper.spheres.options import Spheres
 
 # Exponents p of the dashpot k d^(3/2) + c d^p d', by the name of the law.
 POWERS = {"tsuji": 0.25, "printed": 0.5}
@@ -34,13 +39,15 @@ class Contact:
     grip: ti.f64
 
 
-def hertz_stiffness(radius, young, poisson, other_young, other_poisson):
+def hertz_stiffness(
+    radius: float, young: float, poisson: float, other_young: float, other_poisson: float
+) -> float:
     """Stiffness k [N/m^(3/2)] of a Hertz contact (eqs 5, 6); radius: effective [m]; moduli [Pa]."""
     modulus = 1.0 / ((1.0 - poisson**2) / young + (1.0 - other_poisson**2) / other_young)
     return 4.0 / 3.0 * math.sqrt(radius) * modulus
 
 
-def contact_duration(mass, stiffness, speed):
+def contact_duration(mass: float, stiffness: float, speed: float) -> float:
     """Time [s] that bodies of an effective mass [kg] touch, undamped, at an impact speed [m/s].
 
     Hertz (1882): 2.943 D / v, D the deepest overlap, from k D^(5/2) 2/5 = m v^2 / 2.
@@ -49,7 +56,7 @@ def contact_duration(mass, stiffness, speed):
     return _HERTZ * deepest / speed
 
 
-def pair_numbers(options):
+def pair_numbers(options: "Spheres") -> dict[str, float]:
     """Numbers of a contact of two spheres: dict of stiffness, damping, friction, mass, reach."""
     stiffness = hertz_stiffness(
         0.5 * options.radius, options.young, options.poisson, options.young, options.poisson
@@ -64,7 +71,7 @@ def pair_numbers(options):
     )
 
 
-def wall_numbers(options):
+def wall_numbers(options: "Spheres") -> dict[str, float]:
     """Numbers of a contact of a sphere with the container: dict as of ``pair_numbers``."""
     stiffness = hertz_stiffness(
         options.radius, options.young, options.poisson, options.wall_young, options.wall_poisson
@@ -93,13 +100,13 @@ class ContactLaw:
     name: "tsuji" (p = 1/4) or "printed" (p = 1/2).
     """
 
-    def __init__(self, name):
+    def __init__(self, name: str):
         self.printed = name == "printed"
 
-    def load(self, field, numbers, tangential_share):
+    def load(self, field: ti.Field, numbers: Mapping[str, float], tangential_share: float) -> None:
         """Write the numbers of a contact, before a step is known, to a Contact field of shape ().
 
-        tangential_share: part of the effective mass that resists a tangential blow.
+        tangential_share: part of the effective mass that resists a tangential impulse.
         """
         for name in ("stiffness", "damping", "friction", "reach"):
             setattr(field[None], name, numbers[name])

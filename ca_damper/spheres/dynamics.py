@@ -1,13 +1,13 @@
-"""One step of the spheres: contacts, walls, motion; and what is asked of them between steps.
+"""One step of the spheres: contacts, walls, motion; and readings between steps.
 
-Time integration is the leapfrog, with velocities at the times t_n that the container's motion is
-given for, and positions half a step ahead. In a step, forces are taken at the positions of its
+Time integration is the leapfrog, with velocities at the times t_n of the given motion of the
+container, and positions half a step ahead. In a step, forces are evaluated at the positions of its
 middle, change the velocities over the whole step, and these move the positions on. It is of second
-order, symplectic where nothing dissipates, and needs one evaluation of the contacts. As the
-forces belong to the middle of the step over which the container feels them, they do not lag.
+order, symplectic without dissipation, and needs one evaluation of the contacts. As the forces
+belong to the middle of the step over which they act on the container, they do not lag.
 
-Spheres move in the frame at rest, not in the container's: so what they gain of momentum is what
-contacts and gravity give, to round-off, and the blows on the container are its exact counterpart.
+Spheres move in the frame at rest, not in the container's: their gain of momentum is that from
+contacts and gravity, to round-off, and the impacts on the container are its exact counterpart.
 """
 
 import math
@@ -38,11 +38,11 @@ DIVERGENCES = {
 # Share of their energy that spheres may gain from contacts. Measured over 5 to 20 cycles: 2e-4 at
 # 20 us, 6e-3 with restitution 1; at 40 us, three steps a contact, 0.06 to 0.6 where it goes wrong.
 MOST_GAIN = 0.03
-# What a single sphere may gain beside: the leapfrog's energy is off by (w dt)^2 / 4 in a contact,
-# half a period of w, that has six steps.
+# Further gain allowed to a single sphere: the leapfrog's energy is off by (w dt)^2 / 4 in a
+# contact, half a period of w, of six steps.
 _WALL_IMPULSE_SHARE = (math.pi / 6.0) ** 2 / 4.0
-# Share of a gain that is forgotten from look to look: errors of many blows that go up and down add
-# up to a gain that means nothing, while what makes a run diverge does so within some 100 looks.
+# Share of a gain that is forgotten at each check: errors of many impacts of either sign add
+# up to a spurious gain, while a diverging run shows within some 100 checks.
 _FORGOTTEN = 1.0 / 256.0
 
 
@@ -92,7 +92,7 @@ class DeviceSpheres:
 
     @ti.func
     def advance(self, s, step, motion):
-        """Take the spheres over a step; returns their blows on the container."""
+        """Advance the spheres by a step; returns the impulse of their impacts on the container."""
         dt = self.table.dt[s]
         if step == 0:
             self.bodies.board(s, motion)
@@ -224,7 +224,7 @@ class DeviceSpheres:
 
     @ti.func
     def divergence_code(self, s):
-        """0, or a code of DIVERGENCES; "not" lets NaN fail a test."""
+        """Code of DIVERGENCES, or 0; "not" makes NaN fail a test."""
         body, dt = self.bodies.body[None], self.table.dt[s]
         self.crushed[s], self.held[s] = self.search.crowded(s), 0.0
         contact = self.law.over_step(self.contact_of_pair[None], dt)
@@ -248,7 +248,7 @@ class DeviceSpheres:
 
     @ti.func
     def _gains(self, s):
-        """Whether contacts gave back a good part of the energy there is, which none ever can."""
+        """Whether contacts have created a good part of the energy present, which is impossible."""
         body = self.bodies.body[None]
         weight = self.table.particles[s] * body.mass * body.gravity
         energy, highest = self.held[s], 0.0
@@ -263,7 +263,7 @@ class DeviceSpheres:
 
     @ti.func
     def _note_pair(self, i, j, contact):
-        """Note what spheres hold, those that touch, and those that overlap by half their reach."""
+        """Note the energy of a pair, and whether it touches or overlaps by half its reach."""
         s = i // self.bodies.stride
         self.held[s] = self.held[s] + self._pair_energy(s, i, j)
         branch = self.bodies.position[j] - self.bodies.position[i]
@@ -282,7 +282,7 @@ class DeviceSpheres:
             self.effect_activity.note_contact(s, dragged, rubbed)
 
     def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:
-        """What each of the named effects did."""
+        """Activity of each of the named effects."""
         return self.effect_activity.uses(effects)
 
     def snapshot(self, s: int) -> dict[str, np.ndarray]:

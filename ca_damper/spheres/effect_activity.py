@@ -13,13 +13,13 @@ from taichi_dem.kit.effect_usage import EffectUse
 
 vec2 = ti.types.vector(2, ti.f64)
 
-#: Why what was not seen may have acted: a blow is shorter than the time between two looks.
+#: Reason why an unseen effect may have acted: an impact is shorter than the time between checks.
 _UNSEEN = "touches between two looks leave no trace"
 
 
 @ti.data_oriented
 class EffectActivity:
-    """Sums over the looks since the reset, by scene.
+    """Sums over the checks since the reset, by scene.
 
     touches: of two spheres, or of a sphere and a wall. power: into dashpots and into friction of
     sphere on sphere [W]. motion: energy of going and of turning [J].
@@ -56,7 +56,7 @@ class EffectActivity:
             self.table.in_use(field).sum(axis=0) for field in (self.power, self.motion)
         )
         touches = int(self.table.in_use(self.touches).sum())
-        # Spheres keep their spin: where none turns at any look, none has been turned.
+        # Spheres keep their spin: where none turns at any check, none has been turned.
         turned = touches if motion[1] > 0.0 else 0
         unseen = "" if touches else _UNSEEN
         found = {

@@ -1,4 +1,4 @@
-"""What a user chooses of the spheres, and what follows from it before anything runs."""
+"""Options of the spheres, and quantities that follow from them."""
 
 import math
 from dataclasses import dataclass
@@ -94,7 +94,7 @@ class Spheres:
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """What is computed, in words for the report."""
+        """Effects that are computed, in words for the report."""
         asked = {"friction": self.rubs, "rotation": self.rotation}
         return ("normal contact", *(name for name, there in asked.items() if there))
 
@@ -106,7 +106,8 @@ class Spheres:
     @property
     def lattice(self) -> tuple[int, int]:
         """Columns and rows of the spheres that fit into the box in a square packing."""
-        return tuple(int(size / self.diameter + _ROUNDING) for size in (self.width, self.height))
+        columns, rows = (int(x / self.diameter + _ROUNDING) for x in (self.width, self.height))
+        return columns, rows
 
     @property
     def capacity(self) -> int:
@@ -114,7 +115,7 @@ class Spheres:
         return self.lattice[0] * self.lattice[1]
 
     def check(self, particles: int, dt: float) -> None:
-        """InputError for a number of spheres or a step [s] that cannot be meant.
+        """Raise InputError for an invalid number of spheres or step [s].
 
         A step too long for the contacts is not refused: how long it may be depends on how fast the
         spheres come to move. Such a run ends as diverged.
@@ -127,7 +128,7 @@ class Spheres:
             )
 
     def divergence(self, code: int, particles: int, dt: float) -> tuple[str, float]:
-        """What a code of ``divergence_code`` means, and a step that would do [s]."""
+        """Meaning of a code of ``divergence_code``, and a step that avoids it [s]."""
         return DIVERGENCES[code], min(self.safe_step(), 0.5 * dt)
 
     def safe_step(self) -> float:

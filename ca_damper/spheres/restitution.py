@@ -1,11 +1,11 @@
-"""How strong a dashpot gives a wanted coefficient of restitution.
+"""Coefficient of a dashpot for a wanted coefficient of restitution.
 
-Two spheres meet head on: m d'' = -max(0, k d^(3/2) + c d^p d'); d: overlap, m: effective mass.
-In units of the overlap D = (m v^2 / k)^(2/5) and of the impact speed v, c becomes the number
-alpha = c D^(p+1) / (m v): independent of v for p = 1/4, so that restitution is one number, and
-growing with v for p = 1/2, so that it holds at one speed only.
+Two spheres meet head on: m d'' = -max(0, k d^(3/2) + c d^p d'); d: overlap, m: effective mass. In
+units of the overlap D = (m v^2 / k)^(2/5) and of the impact speed v, c becomes the number alpha = c
+D^(p+1) / (m v): independent of v for p = 1/4, so that restitution is one number, and growing with v
+for p = 1/2, so that it holds at one speed only.
 
-The contact ends where the force has fallen to zero, not where the overlap has: spheres do not pull.
+The contact ends where the force has fallen to zero, before the overlap has: spheres do not pull.
 """
 
 from functools import lru_cache
@@ -16,7 +16,7 @@ _BISECTIONS = 40
 
 
 @lru_cache(maxsize=64)
-def damping_number(restitution, power):
+def damping_number(restitution: float, power: float) -> float:
     """Number alpha of a dashpot d^power that lets spheres part at ``restitution`` times the speed.
 
     restitution lies in (0, 1]; power is 1/4 or 1/2.
@@ -33,7 +33,7 @@ def damping_number(restitution, power):
     return 0.5 * (low + high)
 
 
-def restitution_of(alpha, power):
+def restitution_of(alpha: float, power: float) -> float:
     """Speed of parting over speed of impact for a dashpot of number alpha.
 
     Overlap y^4 instead of d, and a time in which y' is the speed u: then all terms are smooth,
@@ -51,7 +51,7 @@ def restitution_of(alpha, power):
         y, u = y_new, u_new
 
 
-def damping(restitution, power, mass, stiffness, speed):
+def damping(restitution: float, power: float, mass: float, stiffness: float, speed: float) -> float:
     """Coefficient c [N s/m^(1+power)] that gives ``restitution`` at an impact speed [m/s].
 
     mass: effective mass [kg]. stiffness: k [N/m^(3/2)]. For power = 1/4 the speed cancels.

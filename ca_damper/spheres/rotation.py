@@ -12,7 +12,7 @@ from taichi_dem.kit.allocation import values
 class NoRotation:
     """Spheres that do not turn, as in the paper."""
 
-    # Share of the effective mass that resists a tangential blow.
+    # Share of the effective mass that resists a tangential impulse.
     tangential_share = 1.0
 
     def bind(self, bodies: Any) -> None:
@@ -57,7 +57,7 @@ class Rotation:
     spin: angular velocity [rad/s], anticlockwise. torque: of this step [N m]. Shape: one a sphere.
     """
 
-    # A tangential blow on a solid sphere's surface moves it like 1 / (1 + 5/2) of its mass.
+    # A tangential impulse on a solid sphere's surface moves it like 1 / (1 + 5/2) of its mass.
     tangential_share = 2.0 / 7.0
 
     def bind(self, bodies: Any) -> None:

@@ -65,7 +65,7 @@ class AllPairs:
 
 @ti.data_oriented
 class CellList:
-    """List the pairs within a skin of touching; search anew, by cells, when the skin is used up.
+    """List of pairs within a skin of touching, found by cells; renewed when the skin is used up.
 
     grid: a Grid, shape (). cell_first, next: chains of the spheres in a cell, the first and each
     one's next. pair: the list; that of a scene fills its places from the end, at ``_list_end``,
@@ -102,14 +102,14 @@ class CellList:
 
     @ti.func
     def forget(self, s):
-        """Empty the list of scene s; the next refresh searches anew."""
+        """Empty the list of scene s; the next refresh renews it."""
         self.travel[s] = self.grid[None].skin
         self.pair_first[s] = self._list_end(s)
         self.full[s] = 0
 
     @ti.func
     def moved(self, s, distance):
-        """Two spheres of scene s may have come nearer to each other by a distance [m]."""
+        """Note that two spheres of scene s may have come nearer to each other by a distance [m]."""
         self.travel[s] = self.travel[s] + distance
 
     @ti.func
@@ -126,7 +126,7 @@ class CellList:
 
     @ti.func
     def refresh(self, s):
-        """Search anew if spheres may have crossed the skin; "not" lets NaN search too."""
+        """Renew the list if spheres may have crossed the skin; "not" includes NaN."""
         if not (self.travel[s] < self.grid[None].skin):
             self._search(s)
             self.travel[s] = 0.0

@@ -1,11 +1,16 @@
-"""Bonds between the bodies of a pair, and what a break at this tick brings into being."""
+"""Bonds between the bodies of a pair, and overlaps that a break at this tick creates."""
+
+from typing import TYPE_CHECKING
 
 import taichi as ti
+
+if TYPE_CHECKING:
+    from taichi_dem.contact_search.contacts import Contacts
 
 
 @ti.data_oriented
 class Breaks:
-    """Tells the contact search which pairs are bonded, and which overlaps are new.
+    """Which pairs are bonded, and which overlaps are new, for the contact search.
 
     fresh: 1 when a face has got its spheres since the last search, whose injection is booked.
     newest: last tick at which a face of a body got its spheres, negative for none.
@@ -13,7 +18,7 @@ class Breaks:
 
     scratch_fields = ("newest",)
 
-    def __init__(self, contacts):
+    def __init__(self, contacts: "Contacts"):
         self.contacts, self.store = contacts, contacts.store
         self.tables, self.state = contacts.tables, contacts.state
         self.fresh = ti.field(ti.i32, shape=())

@@ -1,13 +1,19 @@
 """Cell grid over the centres of bodies, and the counting sort that fills it."""
 
+from typing import TYPE_CHECKING
+
 import taichi as ti
 
 from taichi_dem.kit.types import real
 
+if TYPE_CHECKING:
+    from taichi_dem.engine.state import State
+    from taichi_dem.engine.tables import Tables
+
 
 @ti.data_oriented
 class CellGrid:
-    """Sorts all bodies by cell, so that a body asks only the cells that others near it may be in.
+    """Sorts all bodies by cell, so that neighbours are sought in the cells nearby only.
 
     ball: radius of the ball around a body within which others are near whose balls it meets [m].
     member: bodies, cell by cell. brute_force: a single cell.
@@ -15,7 +21,7 @@ class CellGrid:
 
     scratch_fields = ("first", "member", "cell", "counts", "corner", "edge", "largest")
 
-    def __init__(self, tables, state, ball, brute_force=False):
+    def __init__(self, tables: "Tables", state: "State", ball: ti.Field, brute_force: bool = False):
         n = tables.capacity.bodies
         self.tables, self.state, self.ball, self.brute_force = tables, state, ball, brute_force
         self.first = ti.field(ti.i32, shape=4 * n + 66)

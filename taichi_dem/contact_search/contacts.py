@@ -1,7 +1,9 @@
 """Pairs of bodies in contact: the impulses they exchange, and how far bodies may go unsearched.
 
-A pair holds the sphere pairs that were nearer than the body skin of its bodies at the last search.
+A pair holds the sphere pairs whose gap was below the body skin of its bodies at the last search.
 """
+
+from typing import TYPE_CHECKING
 
 import numpy as np
 import taichi as ti
@@ -10,10 +12,16 @@ from taichi_dem.contact_search.lengths import SPARE_PAIRS, SPARE_SPHERES
 from taichi_dem.contact_search.pair_store import PairStore
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.types import real, vec3
+from taichi_dem.methods import Method
 
-#: Largest steps that a fast body makes before the search looks at it again.
+if TYPE_CHECKING:
+    from taichi_dem.engine.model import Model
+    from taichi_dem.engine.state import State
+    from taichi_dem.engine.tables import Tables
+
+#: Largest steps that a fast body makes before it is searched again.
 STEPS = 16.0
-#: Share of its extent beyond which it is looked at whatever its speed.
+#: Share of its extent beyond which it is searched again whatever its speed.
 FARTHEST = 0.25
 
 
@@ -21,14 +29,14 @@ FARTHEST = 0.25
 class Contacts:
     """Candidate pairs of bodies with broken faces; p: a slot of the ``PairStore``, called store.
 
-    exposed_faces: bit f for a broken face f. travel: bound of the way any point of a body went
-    since it was last looked at [m]. body_skin: how far that may be before it is looked at again
-    [m]; a pair holds the spheres whose gap is below the body skin of both. pace: largest step [s],
-    and steps of a body by which its contacts are counted before they touch. search_requested: 1
-    when the list may miss one of them.
+    exposed_faces: bit f for a broken face f. travel: bound of the displacement of any point of a
+    body since it was last searched [m]. body_skin: travel at which it is searched again [m]; a pair
+    holds the spheres whose gap is below the body skin of both. pace: largest step [s], and steps of
+    a body by which its contacts are counted before they touch. search_requested: 1 when the list
+    may miss one of them.
     """
 
-    def __init__(self, tables, state):
+    def __init__(self, tables: "Tables", state: "State"):
         n, capacity = tables.capacity.bodies, tables.capacity
         self.tables, self.state = tables, state
         self.law, self.friction = tables.contact, tables.friction
@@ -43,8 +51,8 @@ class Contacts:
         self.skin = ti.field(real, shape=())
         self.search_requested = ti.field(ti.i32, shape=())
 
-    def load(self, model, method):
-        """Take the numbers of a scene and a method; there are no pairs yet."""
+    def load(self, model: "Model", method: Method) -> None:
+        """Load the numbers of a scene and a method; no pairs exist yet."""
         effect, n = model.contact, model.body_count
         assign(self.skin, effect.skin)
         assign(self.pace, np.array([method.dt0, method.steps_ahead]))
@@ -94,7 +102,7 @@ class Contacts:
 
     @ti.func
     def add_impulse(self, p, side: ti.template(), linear, angular):
-        """Add an impulse [N s] and its moment [N m s] to what waits for a body of a pair."""
+        """Add an impulse [N s] and its moment [N m s] to the pending ones of a body of a pair."""
         slot = 2 * p + side
         self.store.waiting[p][side] = 1
         for k in ti.static(range(3)):
@@ -110,7 +118,7 @@ class Contacts:
 
     @ti.func
     def gather(self, i):
-        """Impulse and moment that contacts have given to body i; they wait no more.
+        """Collect the pending impulse and moment of the contacts of body i.
 
         The heat of the pairs in which it is first is booked to it.
         """
@@ -146,7 +154,7 @@ class Contacts:
 
     @ti.func
     def moved(self, i, velocity, spin, elapsed):
-        """Add to the way of body i and ask for a search once it may have used up its body skin."""
+        """Add to the displacement of body i; request a search once it may exceed the body skin."""
         if self.exposed_faces[i] != 0:
             speed = self._speed(i, velocity, spin)
             way = self.travel[i] + speed * elapsed
@@ -158,7 +166,7 @@ class Contacts:
     def set_body_skin(self, i):
         """Set the body skin of body i: half the skin, or more where it is fast.
 
-        A few fragments fly faster than all others: they would ask for most of the searches.
+        A few fragments are faster than all others, and would cause most of the searches.
         """
         speed = self._speed(i, self.state.velocity[i], self.state.spin[i])
         way = ti.min(STEPS * self.pace[0] * speed, FARTHEST * self.tables.extent[i])

@@ -1,7 +1,8 @@
-"""Entries of the Verlet list: what only the search asks of a pair."""
+"""Entries of the Verlet list: data of a pair that only the search reads."""
 
 import taichi as ti
 
+from taichi_dem.contact_search.contacts import Contacts
 from taichi_dem.kit.types import real
 
 
@@ -9,20 +10,21 @@ from taichi_dem.kit.types import real
 class ListedPairs:
     """The pair of each entry of the Verlet list, with the results of its last search.
 
-    A block lists forty pairs for one that is near: what only a search asks lies here, in the order
-    in which it asks; the slot in the ``PairStore`` holds all else.
+    A block lists forty pairs for one that is near. Data that only a search reads are stored here,
+    in the order of its visits; all else is in the slot of the ``PairStore``.
     Of an entry: body: the second of the two; slot: of the pair, -1 while it is not near; faces:
-    which of their faces are near, bit 4 f + g for faces f and g; broken: faces that were compared;
-    found: number of sphere pairs within the margin; new_faces: faces whose sphere pairs are not
-    written yet; until: how far the two have gone, together, when the gap of others may be 0 [m].
-    Of a body: travelled: how far any point of it had gone when it was last looked at [m]; surveyed:
-    that and its body skin; changed: 1 when the near pairs of its row may be others.
+    pairs of their faces that are near, bit 4 f + g for faces f and g; broken: faces that were
+    compared; found: number of sphere pairs within the margin; new_faces: faces whose sphere pairs
+    are not written yet; until: sum of the two bodies' travel at which the gap of others may be 0
+    [m].
+    Of a body: travelled: travel of any point when the body was last searched [m]; surveyed: that
+    plus its body skin; changed: 1 when the near pairs of its row may have changed.
     """
 
-    def __init__(self, contacts, capacity):
+    def __init__(self, contacts: Contacts, capacity: int):
         self.contacts = contacts
         self.body, self.slot, self.new_faces = (ti.field(ti.i32, shape=capacity) for _ in range(3))
-        # Side by side, as every search asks many entries for them, which are no more in the cache.
+        # Stored contiguously: every search reads many entries that are no longer in the cache.
         asked = [*(ti.field(ti.i32) for _ in range(3)), ti.field(real)]
         ti.root.dense(ti.i, capacity).place(*asked)
         self.faces, self.broken, self.found, self.until = asked
@@ -32,7 +34,7 @@ class ListedPairs:
 
     @ti.func
     def begin(self, k, j, faces, p):
-        """Begin entry k for a pair with body j, of which nothing is known but the near faces.
+        """Begin entry k for a pair with body j, of which only the near faces are known.
 
         p: its slot, -1 for none.
         """
@@ -54,7 +56,7 @@ class ListedPairs:
 
     @ti.func
     def note_travel(self, i, way):
-        """Note that body i, which is looked at, has come a way [m] since the last time."""
+        """Add the displacement [m] of body i since it was last searched."""
         self.travelled[i] = self.travelled[i] + way
         self.surveyed[i] = self.travelled[i] + self.contacts.body_skin[i]
 
@@ -68,9 +70,9 @@ class ListedPairs:
 
     @ti.func
     def faces_to_compare(self, k, i, j, faces):
-        """Those of the faces that are broken now which may bring entry k sphere pairs.
+        """Broken faces that may bring entry k new sphere pairs.
 
-        They are the fresh ones, where it has none so far and cannot have got any else.
+        Only newly broken ones, where it has no sphere pairs and cannot have gained any else.
         """
         if self.found[k] == 0 and not self._may_be_closer(k, i, j):
             faces &= ~self.broken[k]

@@ -2,6 +2,7 @@
 
 import taichi as ti
 
+from taichi_dem.contact_search.contacts import Contacts
 from taichi_dem.kit.types import real, vec4
 
 #: Skins beyond their margin within which the gap of two spheres is found; others count as farther.
@@ -10,13 +11,13 @@ OUTLOOK = 7.0
 
 @ti.data_oriented
 class NarrowPhase:
-    """Compares the spheres on the faces of two bodies, where these were last looked at.
+    """Compares the spheres on the faces of two bodies, at the positions of their last search.
 
     sphere: centre and radius of every sphere there [m]. cluster: centre of the ball around those of
     a face [m].
     """
 
-    def __init__(self, contacts):
+    def __init__(self, contacts: Contacts):
         self.contacts, self.tables, self.state = contacts, contacts.tables, contacts.state
         self.store = contacts.store
         capacity = self.tables.capacity
@@ -25,7 +26,7 @@ class NarrowPhase:
 
     @ti.func
     def note_places(self, i):
-        """Note where the spheres of body i are; computed once for many that ask."""
+        """Compute the positions of the spheres of body i, once for all comparisons."""
         size = self.tables.face_spheres[None]
         position, rotation = self.state.position[i], self.state.rotation[i]
         for face in range(4 * i, 4 * i + 4):
@@ -38,11 +39,11 @@ class NarrowPhase:
 
     @ti.func
     def compare(self, i, j, faces, start, write):
-        """Sphere pairs of two bodies within their margin: how many, and on which faces.
+        """Find the sphere pairs of two bodies within their margin: number, and bits of their faces.
 
-        Besides the smallest gap of others [m], no more than OUTLOOK skins beyond the margin. faces:
-        bit 4 f + g for faces f and g to compare. write: enter them in the store, from start on;
-        then other gaps are of no interest.
+        Returns also the smallest gap of others [m], at most OUTLOOK skins beyond the margin. faces:
+        bit 4 f + g for faces f and g to compare. write: enter the pairs in the store, from start
+        on; the gap of others is not found then.
         """
         margin = self.contacts.margin(i, j)
         count, hits, least = 0, 0, margin
@@ -60,7 +61,7 @@ class NarrowPhase:
 
     @ti.func
     def _clusters_near(self, face_i, face_j, wide):
-        """Whether the balls around the spheres of two faces come nearer than wide [m]."""
+        """Whether the balls around the spheres of two faces are nearer than wide [m]."""
         reach = self.tables.cluster[face_i][3] + self.tables.cluster[face_j][3] + wide
         return (self.cluster[face_j] - self.cluster[face_i]).norm_sqr() < reach * reach
 

@@ -3,21 +3,23 @@
 import taichi as ti
 
 from taichi_dem.contact_search.cell_grid import group
+from taichi_dem.contact_search.contacts import Contacts
+from taichi_dem.contact_search.verlet_list import VerletList
 
 
 @ti.data_oriented
 class NearPairs:
-    """Sorts the near pairs of a ``PairStore``: those with sphere pairs, or an impulse waiting.
+    """Sorts the near pairs of a ``PairStore``: those with sphere pairs, or with a pending impulse.
 
     neighbours: the ``VerletList``, whose rows are in order. Of body i: row: slots of its near
-    pairs, from neighbours.first[i] on; row_count: how many there are, row_spheres: number of their
-    sphere pairs; row_is_new: 1 where they may be others than before. full: 1 or 2 when there is no
-    capacity for pairs or for sphere pairs.
+    pairs, from neighbours.first[i] on; row_count: their number; row_spheres: number of their sphere
+    pairs; row_is_new: 1 where they may have changed. full: 1 or 2 when there is no capacity for
+    pairs or for sphere pairs.
     """
 
     scratch_fields = ("row_is_new",)
 
-    def __init__(self, contacts, neighbours):
+    def __init__(self, contacts: Contacts, neighbours: VerletList):
         self.tables, self.contacts, self.store = contacts.tables, contacts, contacts.store
         self.neighbours, self.listed = neighbours, neighbours.listed
         n = self.tables.capacity.bodies
@@ -28,9 +30,9 @@ class NearPairs:
 
     @ti.func
     def number(self, exposed: ti.template(), count):
-        """Number the near pairs in order; those that come or leave get or lose their slots.
+        """Number the near pairs in order; new ones get slots, others lose theirs.
 
-        exposed: the bodies with spheres, count of them: others are in no pair, now or before.
+        exposed: the bodies with spheres, count of them; others are in no pair.
         """
         for a in range(count):
             i = exposed[a]
@@ -59,7 +61,7 @@ class NearPairs:
                 count += 1
                 spheres += found
         self.row_count[i], self.row_spheres[i] = count, spheres
-        # Pairs that merely wait leave at the next search.
+        # Pairs that only hold a pending impulse leave at the next search.
         self.listed.changed[i] = waiting
 
     @ti.func

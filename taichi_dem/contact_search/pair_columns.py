@@ -1,4 +1,6 @@
-"""Columns of the pair store: what effects and methods keep of a pair, or of two of its spheres."""
+"""Columns of the pair store: data of effects and methods for a pair, or for two of its spheres."""
+
+from typing import Any
 
 import taichi as ti
 
@@ -12,7 +14,7 @@ class Column:
     width: components, 0 for a number.
     """
 
-    def __init__(self, kind, width, entries):
+    def __init__(self, kind: Any, width: int, entries: int):
         self.kind, self.width = kind, width
         if width:
             self.field = ti.Vector.field(width, kind, shape=entries)
@@ -37,13 +39,15 @@ class Column:
 class Columns:
     """Columns of one length, by name."""
 
-    def __init__(self, entries):
-        self.entries, self.by_name, self.members = entries, {}, ()
+    def __init__(self, entries: int):
+        self.entries = entries
+        self.by_name: dict[str, ti.Field] = {}
+        self.members: tuple[Column, ...] = ()
 
     def __len__(self):
         return len(self.members)
 
-    def declare(self, name, kind, width=0):
+    def declare(self, name: str, kind: Any, width: int = 0) -> ti.Field:
         """Field of a new column. Raises InputError for a name that is in use."""
         if name in self.by_name:
             raise InputError(f"a column of the pair store must have a new name, got {name!r}")

@@ -1,9 +1,12 @@
 """The pair store: everything that belongs to a pair of bodies that are near, in a slot of its own.
 
-A pair gets a slot when its first sphere pair comes near, and keeps it until the last has left and
-no impulse waits. Only the functions here allocate and free slots and the places of sphere pairs.
+A pair keeps its slot from its first near sphere pair until the last has left and no impulse is
+pending. Only the functions here allocate and free slots and places of sphere pairs.
 """
 
+from typing import Any
+
+import numpy as np
 import taichi as ti
 
 from taichi_dem.contact_search.pair_columns import Columns
@@ -18,27 +21,27 @@ SLACK = 4096
 class PairStore:
     """Slots of near pairs of bodies, their sphere pairs, and the order in which pairs are visited.
 
-    Of a slot: body: the two bodies, first < second; first .. last: where the sphere pairs that a
-    search has found lie in sphere; waiting: 1 for a side whose impulse waits; impulse[2 p + side]:
-    impulse [N s] and moment about the body's centre [N m s] that wait for that body, zero unless
-    waiting says so: most pairs do not touch, and to ask is cheaper than to add zeros. heat: energy
-    into dashpots, friction, and injected [J], until the first body takes it. deepest: overlap as a
-    share of the distance at which the spheres touch. is_new: 1 until the limits of a step know
-    the pair; sphere_place: new place of its sphere pairs while a search writes them.
+    Of a slot: body: the two bodies, first < second; first .. last: places in sphere of the sphere
+    pairs that a search has found; waiting: 1 for a side with a pending impulse; impulse[2 p +
+    side]: pending impulse [N s] and moment about the body's centre [N m s], read only if waiting is
+    1, as most pairs do not touch. heat: energy into dashpots, friction, and injected [J], until the
+    first body takes it. deepest: overlap as a share of the distance at which the spheres touch.
+    is_new: 1 until the limits of a step include the pair; sphere_place: new place of its sphere
+    pairs while a search writes them.
     Of a sphere pair: sphere: the two spheres; owner: slot of the pair, where its places begin.
-    slot_limit, sphere_limit: how many the scene allows; fields have room for those of an engine.
-    columns, sphere_columns: what others declare. A column is zero when its pair comes near, or its
+    slot_limit, sphere_limit: largest numbers for the scene; fields have the capacity of the engine.
+    columns, sphere_columns: declared by others. A column is zero when its pair comes near, or its
     sphere pair is found, and keeps its value as long as that lasts.
 
-    Pairs are visited by (first body, second body), whatever the order of slots: sums have one
-    order, whoever searched when. near_count: how many there are. near_slot: their slots, in order.
-    first_of[i]: place there of the first pair whose first body is i; second_slot: from
-    second_start[i] on, slots of the pairs whose second body is i.
+    Pairs are visited by (first body, second body), whatever the order of slots, so sums have one
+    order that does not depend on the history of searches. near_count: number of near pairs.
+    near_slot: their slots, in order. first_of[i]: place there of the first pair whose first body is
+    i; second_slot: from second_start[i] on, slots of the pairs whose second body is i.
     """
 
     scratch_fields = ("sphere_place",)
 
-    def __init__(self, bodies, slots, spheres):
+    def __init__(self, bodies: int, slots: int, spheres: int):
         self.slots, self.spheres = slots, spheres
         self.slot_limit, self.sphere_limit = (ti.field(ti.i32, shape=()) for _ in range(2))
         self._allocate_slots(slots)
@@ -61,25 +64,25 @@ class PairStore:
         self.deepest = ti.field(real, shape=slots)
         self.free_count, self.used_end = (ti.field(ti.i32, shape=()) for _ in range(2))
 
-    def column(self, name, kind, width=0):
+    def column(self, name: str, kind: Any, width: int = 0) -> ti.Field:
         """Field with an entry a slot; kind: data type, width: components, 0 for a number.
 
         Raises InputError for a name that is in use.
         """
         return self.columns.declare(name, kind, width)
 
-    def sphere_column(self, name, kind, width=0):
+    def sphere_column(self, name: str, kind: Any, width: int = 0) -> ti.Field:
         """The same with an entry a sphere pair."""
         return self.sphere_columns.declare(name, kind, width)
 
-    def clear(self):
+    def clear(self) -> None:
         """Free all slots; for a run that begins again."""
         for field in (self.first, self.last, self.first_of, self.second_start, self.free_count):
             assign(field, 0)
         for field in (self.used_end, self.sphere_count, self.sphere_end, self.near_count):
             assign(field, 0)
 
-    def near_table(self):
+    def near_table(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Near pairs in order: both bodies (n, 2), number of sphere pairs (n,) and deepest (n,)."""
         slots = values(self.near_slot)[: int(values(self.near_count))]
         counts = values(self.last) - values(self.first)
@@ -102,7 +105,7 @@ class PairStore:
 
     @ti.func
     def clear_slot(self, p):
-        """Begin with a pair of which nothing is known."""
+        """Reset the slot of a pair."""
         self.first[p], self.last[p], self.waiting[p], self.is_new[p] = 0, 0, [0, 0], 1
         self.heat[p], self.deepest[p] = vec3(0.0), 0.0
         for slot in range(2 * p, 2 * p + 2):
@@ -138,9 +141,9 @@ class PairStore:
 
     @ti.func
     def replace_spheres(self, p, count):
-        """Let the sphere pairs at a pair's new places follow its present ones.
+        """Replace the sphere pairs of a pair by those at its new places.
 
-        Those that stay keep their columns, those of the others are zero.
+        Those that were present before keep their columns; those of the others are zero.
         """
         start = self.sphere_place[p]
         end = start + count

@@ -1,7 +1,8 @@
-"""Where bodies were listed as neighbours, and how far they may be from there."""
+"""Positions at which bodies were listed as neighbours, and allowed distances from there."""
 
 import taichi as ti
 
+from taichi_dem.contact_search.contacts import Contacts
 from taichi_dem.kit.types import real
 
 #: Reach of the list around a body, in body skins and in skins: a longer list against fewer of them.
@@ -13,16 +14,16 @@ AHEAD, SHARE = 256.0, 0.8
 
 @ti.data_oriented
 class Reach:
-    """The place for which the Verlet list knows the neighbours of each body.
+    """The positions for which the Verlet list knows the neighbours of each body.
 
-    placed_at, turned_to, cluster: where a body was listed, and the balls around the spheres of its
-    faces [m]. reach: how far it may be from there, its body skin included [m], and ball: radius of
-    the ball around it and its reach [m]. escaped: bodies that have left their reach since,
-    escaped_count of them; left: 1 for them. They are listed anew, as a few fragments fly faster
-    than all the rest.
+    placed_at, turned_to, cluster: position and rotation at which a body was listed, and centres of
+    the balls around the spheres of its faces [m]. reach: distance that it may move from there, its
+    body skin included [m]; ball: radius of the ball around it and its reach [m]. escaped: bodies
+    that have left their reach since, escaped_count of them; left: 1 for them. They are listed again
+    one by one, as a few fragments are faster than all others.
     """
 
-    def __init__(self, contacts):
+    def __init__(self, contacts: Contacts):
         n = contacts.tables.capacity.bodies
         self.tables, self.state, self.contacts = contacts.tables, contacts.state, contacts
         self.reach = ti.field(real, shape=n)
@@ -36,8 +37,8 @@ class Reach:
 
     @ti.func
     def notice(self, i):
-        """See whether body i, which is looked at, has left its reach."""
-        # No point of the body went further than this: a norm of a matrix bounds what it does.
+        """Note whether body i, which is being searched, has left its reach."""
+        # Upper bound on the displacement of any point: a matrix norm bounds that of its product.
         way = (self.state.position[i] - self.placed_at[i]).norm()
         way += (self.state.rotation[i] - self.turned_to[i]).norm() * self.tables.extent[i]
         if not way + self.contacts.body_skin[i] < self.reach[i]:
@@ -47,7 +48,7 @@ class Reach:
 
     @ti.func
     def note_place(self, i):
-        """Note where body i and its clusters are, or will soon be if it goes on like this."""
+        """Note the position of body i and its clusters, extrapolated at its present velocity."""
         self.reach[i] = BODY_SKINS * self.contacts.body_skin[i] + SKINS * self.contacts.skin[None]
         self.ball[i] = self.tables.extent[i] + self.reach[i]
         ahead = AHEAD * self.contacts.pace[0] * self.state.velocity[i]
@@ -60,7 +61,7 @@ class Reach:
 
     @ti.func
     def end(self):
-        """All that have left their reach are listed anew."""
+        """Clear the list of escaped bodies, which have been listed again."""
         for a in range(self.escaped_count[None]):
             self.left[self.escaped[a]] = 0
         self.escaped_count[None] = 0
@@ -76,7 +77,7 @@ class Reach:
 
     @ti.func
     def faces_near(self, i, j):
-        """Which faces of two bodies are near: bit 4 f + g for faces f and g."""
+        """Pairs of faces of two bodies that are near: bit 4 f + g for faces f and g."""
         wide, faces = self.reach[i] + self.reach[j], 0
         for f in range(4):
             faces |= self._near_face(4 * i + f, j, wide) << (4 * f)
@@ -84,7 +85,7 @@ class Reach:
 
     @ti.func
     def _near_face(self, face, j, wide):
-        """Which faces of body j, a bit each, come near a face of another."""
+        """Faces of body j, a bit each, that are near a face of another body."""
         faces, reach = 0, self.tables.cluster[face][3] + wide
         whole = reach + self.tables.extent[j]
         if (self.placed_at[j] - self.cluster[face]).norm_sqr() < whole * whole:

@@ -1,21 +1,30 @@
 """Search for contact pairs: the broken ones among the neighbouring faces, then their spheres.
 
-The list is renewed when a body may have used up its body skin, or at once when a bond breaks: a
-search looks at the bodies that moved or broke, and keeps what it knows of the others. A pair keeps
-its slot of the store, so results do not depend on when a search is made.
+The lists are updated when a body may have used up its body skin, or at once when a bond breaks: a
+search visits the bodies that moved or broke, and keeps the results of the others. A pair keeps its
+slot of the store, so results do not depend on the times of searches.
 """
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import taichi as ti
 
 from taichi_dem.contact_search.breaks import Breaks
+from taichi_dem.contact_search.contacts import Contacts
 from taichi_dem.contact_search.narrow_phase import NarrowPhase
 from taichi_dem.contact_search.near_pairs import NearPairs
 from taichi_dem.contact_search.verlet_list import FAR, VerletList
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.types import vec3
+from taichi_dem.methods import Method
 
-#: Marks of a body: it has spheres, and the last search looked at it.
+if TYPE_CHECKING:
+    from taichi_dem.engine.model import Model
+    from taichi_dem.step.schedule import Schedule
+
+#: Marks of a body: it has spheres, and the last search visited it.
 EXPOSED, LOOKED = 1, 2
 _CAPACITIES = ("", "pairs_per_body", "spheres_per_body", "neighbours_per_body")
 
@@ -25,14 +34,14 @@ class BroadPhase:
     """Finds the pairs that are near and their spheres, for the store of a ``Contacts``.
 
     brute_force: compare all bodies with broken faces, for tests. everywhere: 1 when the next search
-    looks at all bodies, as is needed once they have been moved by hand. looked: LOOKED for those at
-    which the last one looked, EXPOSED for others with spheres; searched: its tick. searches: how
-    many there were. full: which list has no capacity left, an index into ``_CAPACITIES``.
+    visits all bodies, as is needed once they have been moved by hand. looked: LOOKED for bodies
+    that the last search visited, EXPOSED for others with spheres; searched: its tick. searches:
+    their number. full: the list without capacity, an index into ``_CAPACITIES``.
     """
 
     scratch_fields = ("exposed", "exposed_count", "looked")
 
-    def __init__(self, contacts, schedule, brute_force=False):
+    def __init__(self, contacts: Contacts, schedule: "Schedule", brute_force: bool = False):
         n = contacts.tables.capacity.bodies
         self.contacts, self.schedule, self.store = contacts, schedule, contacts.store
         self.tables, self.state = contacts.tables, contacts.state
@@ -49,41 +58,41 @@ class BroadPhase:
         self.full = self.near_pairs.full
         self.searches = ti.field(ti.i32, shape=())
 
-    def load(self, model, method):
-        """Let the first search make all lists."""
+    def load(self, model: "Model", method: Method) -> None:
+        """Load the limits of the lists; the first search makes all of them."""
         self.neighbours.load(model, method)
 
-    def clear(self):
-        """Forget all pairs; the next search finds those that there are then."""
+    def clear(self) -> None:
+        """Forget all pairs; the next search finds those present then."""
         self.store.clear()
         self.neighbours.clear()
         assign(self.contacts.search_requested, 0)
 
-    def ask(self, everywhere=False):
-        """Let the driver make a search before its next step."""
+    def ask(self, everywhere: bool = False) -> None:
+        """Request a search before the next step."""
         assign(self.everywhere, int(everywhere))
         assign(self.contacts.search_requested, 1)
 
-    def renew(self):
-        """Renew the lists, a parallel loop a phase, until no search is due."""
+    def renew(self) -> None:
+        """Update the lists, a parallel loop a phase, until no search is requested."""
         while values(self.contacts.search_requested):
             self._search()
 
-    def search(self, everywhere=True):
+    def search(self, everywhere: bool = True) -> None:
         """Renew the lists now. Raises InputError when they exceed their capacity."""
         self.ask(everywhere)
         self.renew()
         self.check_capacity()
 
-    def check_capacity(self):
+    def check_capacity(self) -> None:
         """Raise InputError when lists exceed the capacity that the scene gave them."""
         option = _CAPACITIES[int(values(self.full))]
         if option:
             raise InputError(f"contact lists are full: give SphereContact a larger {option}")
 
     @property
-    def phases(self):
-        """What a search does, as pairs of how often and what, in order."""
+    def phases(self) -> tuple[tuple[Callable[..., Any], Callable[..., Any]], ...]:
+        """Phases of a search in order, as pairs of a count and a function of an index."""
         return (
             (self._once, self._list_exposed),
             (self._exposed_bodies, self._choose),
@@ -160,7 +169,7 @@ class BroadPhase:
         self.schedule.start_pairs()
         self.everywhere[None] = 0
         self.searches[None] = self.searches[None] + 1
-        # A row of neighbours without room calls for another search, which makes the list anew.
+        # A full row of neighbours requires another search, which rebuilds the list.
         again = self.neighbours.stale[None] != 0 and self.full[None] == 0
         self.contacts.search_requested[None] = ti.cast(again, ti.i32)
 
@@ -183,7 +192,7 @@ class BroadPhase:
 
     @ti.func
     def _choose(self, a):
-        """Look at an exposed body if it used up much of its skin, or if a break exposed it."""
+        """Mark an exposed body that used up much of its skin, or that a break has exposed."""
         i = self.exposed[a]
         far = self.contacts.travel[i] > FAR * self.contacts.body_skin[i]
         looked = self.everywhere[None] | ti.cast(far, ti.i32)
@@ -195,11 +204,10 @@ class BroadPhase:
 
     @ti.func
     def _note_places(self, a):
-        """Note where a body is that is looked at.
+        """Note the position of a body that is being searched.
 
-        The others count as lying where they were when they were last looked at: they have used up
-        that much of their body skin since. All are looked at while the list of neighbours is made
-        anew.
+        The others are compared at the positions of their last search, from which they have used up
+        part of their body skin. All are searched while the list of neighbours is being rebuilt.
         """
         i = self.exposed[a]
         if self.neighbours.making() == 1:
@@ -211,7 +219,7 @@ class BroadPhase:
 
     @ti.func
     def _find_spheres(self, a):
-        """Find the sphere pairs of an exposed body with each neighbour that is looked at."""
+        """Find the sphere pairs of an exposed body with each neighbour that is being searched."""
         i = self.exposed[a]
         least = ti.select(self.looked[i] == LOOKED, EXPOSED, LOOKED)
         for k in range(self.neighbours.first[i], self.neighbours.last[i]):
@@ -248,7 +256,7 @@ class BroadPhase:
 
     @ti.func
     def _update_pairs(self, a):
-        """Put the near pairs of an exposed body in order, and write what is new in them."""
+        """Put the near pairs of an exposed body in order, and write their new sphere pairs."""
         i = self.exposed[a]
         if self.full[None] == 0:
             if self.near_pairs.row_is_new[i] == 1:
@@ -262,7 +270,7 @@ class BroadPhase:
 
     @ti.func
     def _notice(self, p):
-        """Tell the limits of a pair that comes near, or has bodies that a break has exposed."""
+        """Notify the limits of a pair that is new, or has bodies that a break has exposed."""
         pair, now = self.store.body[p], self.state.tick[None]
         fresh = self.breaks.exposed_since(pair[0], now) | self.breaks.exposed_since(pair[1], now)
         self.schedule.limits.notice_listed(p, self.store.is_new[p], fresh)
@@ -270,7 +278,7 @@ class BroadPhase:
 
     @ti.func
     def _update_pair(self, k, p, i, j):
-        """Write the sphere pairs of entry k, and book what their birth injects."""
+        """Write the sphere pairs of entry k, and book the energy that new overlaps inject."""
         faces, count = self.listed.new_faces[k], self.listed.found[k]
         self.listed.new_faces[k] = 0
         if faces != 0:

@@ -1,23 +1,30 @@
-"""Verlet list of the contact search: faces that come near each other while the block hardly moves.
+"""Verlet list of the contact search: faces that are near each other, within several skins.
 
-It reaches several skins and takes in every face, broken or not, so one list serves many searches.
+It contains every face, broken or not, so one list serves many searches.
 """
+
+from typing import TYPE_CHECKING
 
 import taichi as ti
 
 from taichi_dem.contact_search.cell_grid import CellGrid
+from taichi_dem.contact_search.contacts import Contacts
 from taichi_dem.contact_search.lengths import SPARE_NEIGHBOURS
 from taichi_dem.contact_search.listed_pairs import ListedPairs
 from taichi_dem.contact_search.reach import Reach
 from taichi_dem.kit.allocation import assign
+from taichi_dem.methods import Method
 
-#: What the list is when it needs to be made anew, and while it is.
+if TYPE_CHECKING:
+    from taichi_dem.engine.model import Model
+
+#: State of the list when it must be rebuilt, and while it is being rebuilt.
 STALE, MAKING = 1, 2
-#: Room left behind the neighbours of each body, for fast ones that come.
+#: Spare entries in the row of each body, for fast bodies that come near.
 SPARE = 16
-#: Bodies that leave their reach at once, at most, to be listed anew one by one.
+#: Most escaped bodies that are listed again one by one.
 MOST_ESCAPED = 1024
-#: Share of its body skin that a body may use up before a search looks at it.
+#: Share of its body skin that a body may use up before it is searched again.
 FAR = 0.6
 
 
@@ -25,12 +32,12 @@ FAR = 0.6
 class VerletList:
     """For each body the bodies of higher index near it, in order.
 
-    first[i] .. last[i]: row of body i in listed, the ``ListedPairs``, with some room behind.
-    reach: the ``Reach`` that bodies may not leave. stale: STALE when all rows are to be made anew.
-    limit: entries that the scene allows. full: 1 when there are no more.
+    first[i] .. last[i]: row of body i in listed, the ``ListedPairs``, followed by spare entries.
+    reach: the ``Reach`` that bodies may not leave. stale: STALE when all rows are to be rebuilt.
+    limit: entries that the scene allows. full: 1 when they are exceeded.
     """
 
-    def __init__(self, contacts, brute_force=False):
+    def __init__(self, contacts: Contacts, brute_force: bool = False):
         n = contacts.tables.capacity.bodies
         self.tables, self.state, self.contacts = contacts.tables, contacts.state, contacts
         self.store, self.capacity = contacts.store, contacts.tables.capacity.neighbour_entries
@@ -43,21 +50,21 @@ class VerletList:
         self.stale = ti.field(ti.i32, shape=())
         self.full = ti.field(ti.i32, shape=())
 
-    def load(self, model, method):
-        """Let the list be made anew."""
+    def load(self, model: "Model", method: Method) -> None:
+        """Set the limit of a scene; the next search rebuilds the list."""
         assign(self.stale, STALE)
         each = model.contact.neighbours_per_body
         assign(self.limit, model.body_count * each + SPARE_NEIGHBOURS)
 
-    def clear(self):
-        """Forget all neighbours; the next search lists them anew."""
+    def clear(self) -> None:
+        """Forget all neighbours; the next search rebuilds the list."""
         for field in (self.first, self.last):
             assign(field, 0)
         assign(self.stale, STALE)
 
     @ti.func
     def begin(self):
-        """See whether so many bodies have left their reach that the list is made anew."""
+        """Decide whether so many bodies have left their reach that the list is rebuilt."""
         self.full[None] = 0
         if self.reach.escaped_count[None] > ti.min(
             self.tables.body_count[None] // 16, MOST_ESCAPED
@@ -68,12 +75,12 @@ class VerletList:
 
     @ti.func
     def making(self):
-        """1 while the list is made anew."""
+        """1 while the list is being rebuilt."""
         return ti.cast(self.stale[None] == MAKING, ti.i32)
 
     @ti.func
     def amending(self):
-        """1 while bodies that have escaped are listed anew."""
+        """1 while escaped bodies are being listed again."""
         return ti.cast(self.stale[None] != MAKING and self.reach.escaped_count[None] > 0, ti.i32)
 
     @ti.func
@@ -90,7 +97,7 @@ class VerletList:
 
     @ti.func
     def allot(self):
-        """Give every body its part of the list."""
+        """Allot a row of the list to every body."""
         self.first[0] = 0
         for i in range(self.tables.body_count[None]):
             self.first[i + 1] = self.first[i + 1] + self.first[i]
@@ -112,7 +119,7 @@ class VerletList:
 
     @ti.func
     def _list_near(self, i, p):
-        """Let the row of body i know the slot of a pair that was near."""
+        """Enter the slot of a pair that was near into the row of body i."""
         j = self.store.body[p][1]
         place = self._find_row_index(i, j)
         if self._is_listed(i, place, j):
@@ -123,10 +130,10 @@ class VerletList:
 
     @ti.func
     def amend(self, i):
-        """List those that have escaped where they are now, among the neighbours of body i.
+        """List the escaped bodies at their present positions, among the neighbours of body i.
 
-        Entries where they were stay while there is room: nothing comes of them but a look. A row
-        without room leaves the list stale.
+        Outdated entries stay while there is room: they cost a comparison only. A full row leaves
+        the list stale.
         """
         place, ball = self.reach.placed_at[i], self.reach.ball[i]
         escaped, count = self.reach.left[i] == 1, self.reach.escaped_count[None]
@@ -165,7 +172,7 @@ class VerletList:
 
     @ti.func
     def _drop_far(self, i):
-        """Drop those that are near body i no more when its row is full.
+        """Drop entries that are no longer near body i when its row is full.
 
         Pairs that were near stay until they have lost their slot.
         """
@@ -183,7 +190,7 @@ class VerletList:
 
     @ti.func
     def _find_row_index(self, i, j):
-        """First place among the neighbours of body i whose body is not before j."""
+        """First place among the neighbours of body i with an index of at least j."""
         low, high = self.first[i], self.last[i]
         while low < high:
             middle = (low + high) // 2

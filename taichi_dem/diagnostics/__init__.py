@@ -1,1 +1,1 @@
-"""What is measured of a run beside its results: energy, divergence, effects, resolution."""
+"""Diagnostics of a run: energy balance, divergence, missing effects, step resolution."""

@@ -72,9 +72,10 @@ class DashpotSystem:
 
     def twists(self, motion: np.ndarray, some: Any = ALL) -> np.ndarray:
         """Twists of the bonds, or of some, at the bodies' motion (bodies, 6) [m/s, rad/s]."""
-        return sum(
+        first, second = (
             applied(onto[some], motion[body[some]]) for onto, body in zip(self.onto, self.bodies)
         )
+        return first + second
 
     def pull(self, motion: np.ndarray, impulse: np.ndarray, some: Any = ALL) -> None:
         """Let the bonds, or some, give their bodies wrench impulses; changes motion."""

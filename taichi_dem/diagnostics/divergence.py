@@ -1,19 +1,27 @@
 """Detect diverged runs, and describe where and why."""
 
 import time
+from typing import TYPE_CHECKING, Optional
 
 import numpy as np
 
+from taichi_dem.contact_search.contacts import Contacts
+from taichi_dem.diagnostics.energy_balance import EnergyBalance
 from taichi_dem.kit.errors import SimulationDiverged
 from taichi_dem.stability.contact_limits import contact_rates
 from taichi_dem.stability.quality import quality_report
 from taichi_dem.stability.stable_step import dashpot_step, spring_step
 from taichi_dem.step.drivers import CALL_SECONDS
+from taichi_dem.step.schedule import Schedule
 
-#: Energy that may appear from nowhere before a run counts as diverged, as a share of what is there.
+if TYPE_CHECKING:
+    from taichi_dem.engine.model import Model
+    from taichi_dem.engine.state import State
+
+#: Unexplained energy beyond which a run counts as diverged, as a share of the energy present.
 ENERGY_FROM_NOWHERE = 0.5
-#: Overlap of two contact spheres that no contact recovers from, as a share of the distance at which
-#: they touch: their centres are about to pass each other. A small one may be inside a large one.
+#: Overlap of two contact spheres beyond recovery, as a share of the distance at which they touch:
+#: their centres are about to pass each other. A small sphere may be inside a large one.
 DEEPEST_OVERLAP = 0.95
 #: Share of the time that a hurried check may take: it reads every bond, a tenth of a call of the
 #: driver at 100,000 bodies.
@@ -21,22 +29,31 @@ SHARE = 0.02
 
 
 class DivergenceCheck:
-    """Looks at a run after every resident call; raises SimulationDiverged with the place.
+    """Checks a run after every call of the driver; raises SimulationDiverged with the place.
 
     solves: whether the method solves dashpots implicitly, so that only springs limit the step.
     """
 
-    def __init__(self, model, state, schedule, contacts, energy_balance, solves=False):
+    def __init__(
+        self,
+        model: "Model",
+        state: "State",
+        schedule: Schedule,
+        contacts: Optional[Contacts],
+        energy_balance: EnergyBalance,
+        solves: bool = False,
+    ):
         self.model, self.state, self.schedule, self.solves = model, state, schedule, solves
         self.limited = schedule.has_limits and schedule.limits.limited
         self.contacts, self.energy_balance = contacts, energy_balance
         self.rounded_once = self._rounded_once()
         self.rest_until = 0.0
 
-    def check(self, hurried=False):
-        """Raise SimulationDiverged when a body ran away, spheres swallowed, or energy appeared.
+    def check(self, hurried: bool = False) -> None:
+        """Raise SimulationDiverged for a runaway body, extreme overlap, or unexplained energy.
 
-        hurried: look for runaways alone while all the rest would take more than SHARE of the time.
+        hurried: check for runaways only, as long as the rest would take more than SHARE of the
+        time.
         """
         self._check_speed()
         started = time.process_time()
@@ -46,8 +63,8 @@ class DivergenceCheck:
         self._check_energy()
         now = time.process_time()
         if hurried:
-            # The first check, which is not, compiles: that says nothing of what one takes. What
-            # takes no more than its share of a call does not rest, so small scenes never do.
+            # The first check, which is not hurried, compiles: its time is no measure. A check that
+            # takes no more than its share of a call is never skipped, so not in small scenes.
             self.rest_until = now + (now - started) / SHARE - CALL_SECONDS
 
     def _check_speed(self):
@@ -83,8 +100,8 @@ class DivergenceCheck:
             what = f"is the fastest while {-account['residual']:.3g} J came from nowhere"
             raise SimulationDiverged(self._sentence(body, motion, what))
 
-    def round_off(self):
-        """Energy [J] that rounded positions may have given the bonds so far, once a substep."""
+    def round_off(self) -> float:
+        """Bound of the energy [J] that rounding of positions has put into the bonds so far."""
         return max(1, int(self.schedule.evaluations[0])) * self.rounded_once
 
     def _rounded_once(self):
@@ -125,9 +142,9 @@ class DivergenceCheck:
         return self.contacts.store.near_table()[0]
 
     def _advice(self, body, links):
-        """What limits the step around a body, and a step that would do.
+        """Criterion that limits the step near a body, and a step that meets it.
 
-        What runs away is often thrown by a neighbour of a shorter step: the tightest one counts.
+        Runaways are often thrown by a neighbour of a shorter step, so the tightest limit counts.
         """
         limits = self._limits()
         near = [body, *(other for other, _ in links)]
@@ -138,7 +155,7 @@ class DivergenceCheck:
         return f"{whose} allow {limit:.3g} s: try a step of {0.5 * limit:.2g} s"
 
     def _limits(self):
-        """Largest stable explicit steps by what sets them [s], arrays (body_count,).
+        """Largest stable explicit steps [s] by criterion, arrays (body_count,).
 
         Dashpots that are solved or limited set none.
         """

@@ -1,19 +1,25 @@
 """Activity of each effect in a run, from the energy balance at its end."""
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from taichi_dem.diagnostics.energy_balance import EnergyBalance, EnergyTables
+from taichi_dem.diagnostics.missing_effects import MissingEffects
 from taichi_dem.kit.effect_usage import EffectUse
 from taichi_dem.scene import outer_faces_warnings
 
+if TYPE_CHECKING:
+    from taichi_dem.engine.model import Model
+
 _EPSILON = np.finfo(np.float64).eps
-#: Terms of the account that pass through bonds: what their dashpots took is a share of these.
+#: Terms of the account that pass through bonds; dashpots are compared with their sum.
 _THROUGH_BONDS = ("bond_strain", "bond_dashpot", "softening", "release", "slip")
-#: Roles judged by whether they acted: a crack, a slip, a wall or what sticks decides much and
-#: takes little.
+#: Roles judged by whether they acted: a crack, slip, wall or sticking contact can decide the
+#: outcome at little energy.
 _STEERING = ("tension", "shear", "contact", "friction", "support")
-#: Roles whose absence poses another question, whatever work they did.
+#: Roles that define the problem, so that they are kept whatever work they did.
 _POSED = {
     "load": "a load is part of the question",
     "support": "a support is part of the question",
@@ -26,13 +32,20 @@ _STUCK = "springs between spheres that stick hold without taking energy"
 _NO_TRACE = "without sphere dashpots a touch between two recordings leaves no trace"
 
 
-def effect_activity(model, energy_balance, tables, account, missing_effects, substeps):
+def effect_activity(
+    model: "Model",
+    energy_balance: EnergyBalance,
+    tables: EnergyTables,
+    account: Mapping[str, float],
+    missing_effects: MissingEffects,
+    substeps: int,
+) -> tuple[EffectUse, ...]:
     """An EffectUse for every listed effect, in the model's order.
 
-    tables, account: what the energy balance's methods of that name gave. missing_effects: the
-    ``MissingEffects`` of the run. substeps: of the run, each of which rounds. Judged by role, so
-    that an effect of one's own is judged like those of the package; but it is never called idle
-    where only its own code could tell.
+    tables, account: from the methods of that name of the energy balance. missing_effects: the
+    ``MissingEffects`` of the run. substeps: of the run, each of which rounds. Effects are judged by
+    role, so that user-defined ones are judged like those of the package; they are never called idle
+    where only their own code could tell.
     """
     given = abs(account["load_work"]) + abs(account["support_work"]) + energy_balance.start_energy
     rounding = _Rounding(
@@ -53,7 +66,7 @@ def _unseen(model):
 
 
 class _Rounding(NamedTuple):
-    """What rounding alone may leave in the account [J]: of a support, and of each bond."""
+    """Bounds of rounding errors in the account [J]: of a support, and of each bond."""
 
     work: float
     heat: np.ndarray
@@ -77,7 +90,7 @@ def _listed(model):
 
 
 def _by_role(model, energy_balance, tables, touching, rounding, effect):
-    """(effect, what, events, energy): terms of the account, or a number [J]."""
+    """The effect, its counted events in words, their number, and terms of the account or [J]."""
     body, bond, pair = tables
     if effect.role == "load":
         work = energy_balance.load_works(model.loads.index(effect))
@@ -125,9 +138,10 @@ def _use(account, given, model, state, lacking, rounding, effect, what, events, 
 
 
 def _why_kept(model, state, lacking, effect, events):
-    """Why an effect cannot be left out whatever was counted, in words; "" where the count tells.
+    """Reason to keep an effect whatever was counted, in words; "" where the count decides.
 
-    lacking: why a count of touches tells nothing, as faces carry no spheres; "" where it does tell.
+    lacking: reason why a count of contacts is incomplete, as faces carry no spheres; "" if
+    complete.
     """
     reason = _POSED.get(effect.role, "" if _of_the_package(effect) else _OWN)
     if effect.role in ("contact", "friction"):
@@ -143,7 +157,7 @@ def _why_kept(model, state, lacking, effect, events):
 
 
 def _of_the_package(effect):
-    """Whether the class itself is the package's: one derived from it may act in other ways."""
+    """Whether the class itself is the package's; derived classes may act differently."""
     return type(effect).__module__.startswith("taichi_dem.effects.")
 
 

@@ -4,8 +4,20 @@ work of loads and supports + energy at the start = kinetic + bond strain + spher
 + bond dashpots + slip + softening + release + friction + sphere dashpots - injected + residual.
 """
 
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Optional
+
 import numpy as np
 
+from taichi_dem.contact_search.contacts import Contacts
+from taichi_dem.diagnostics.readings import Readings
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.model import Model
+    from taichi_dem.engine.state import State
+
+#: Tables of bodies, bonds and pairs that the terms are summed from.
+EnergyTables = tuple[np.ndarray, np.ndarray, np.ndarray]
 #: Terms of the account in the order of tables and files, all in J.
 TERMS = (
     "kinetic",
@@ -25,30 +37,32 @@ TERMS = (
 
 
 class EnergyBalance:
-    """Sums what the step has booked; stored energies are computed anew by the step's own laws.
+    """Energy balance: sums of booked terms, and stored energies computed by the laws of the step.
 
     readings: the ``Readings`` of a run. contacts: its ``Contacts``, None without.
     """
 
-    def __init__(self, model, state, readings, contacts):
+    def __init__(
+        self, model: "Model", state: "State", readings: Readings, contacts: Optional[Contacts]
+    ):
         self.model, self.state, self.readings, self.contacts = model, state, readings, contacts
         self.start_energy = 0.0
         first = self.account()
         self.start_energy = first["kinetic"] + first["bond_strain"] + first["sphere_strain"]
         self.start_momentum = self.momentum()
 
-    def saved(self):
-        """What a checkpoint holds of it, arrays by name."""
+    def saved(self) -> dict[str, np.ndarray]:
+        """Data for a checkpoint, arrays by name."""
         return {"start": np.array([self.start_energy, *self.start_momentum])}
 
-    def resume(self, saved):
-        """Take over what ``saved`` gave."""
+    def resume(self, saved: Mapping[str, np.ndarray]) -> None:
+        """Restore the data that ``saved`` returned."""
         self.start_energy, self.start_momentum = float(saved["start"][0]), saved["start"][1:]
 
-    def account(self, tables=None):
-        """All terms in J by name; residual is what the account cannot explain.
+    def account(self, tables: Optional[EnergyTables] = None) -> dict[str, float]:
+        """All terms in J by name; residual is the unexplained remainder.
 
-        tables: what ``tables`` gave, where it has been read already.
+        tables: those of ``tables``, if they have been read already.
         """
         body, bond, pair = self.tables() if tables is None else tables
         terms = {
@@ -68,8 +82,8 @@ class EnergyBalance:
         terms["residual"] = self._residual(terms)
         return {name: float(value) for name, value in terms.items()}
 
-    def tables(self):
-        """What the terms are summed of [J].
+    def tables(self) -> EnergyTables:
+        """Tables that the terms are summed from [J].
 
         A row a body: kinetic, loads, supports, sphere dashpots, friction, injected. A row a bond:
         strain, dashpot, slip, release, softening. A row a pair: strain, dashpots, friction,
@@ -92,17 +106,17 @@ class EnergyBalance:
             if name not in ("load_work", "support_work", "injected", "residual")
         )
 
-    def load_work(self, index):
+    def load_work(self, index: int) -> float:
         """Work of one load [J], by its place in the scene's list of loads."""
         return float(self.load_works(index).sum())
 
-    def load_works(self, index):
+    def load_works(self, index: int) -> np.ndarray:
         """Work of one load on every body [J], (body_count,)."""
         work = np.zeros(self.model.body_count)
         self.readings.load_work(index, work)
         return work
 
-    def support_works(self, index):
+    def support_works(self, index: int) -> np.ndarray:
         """Work [J] of all supports on the bodies that one of them holds, (body_count,).
 
         NaN for a body that it does not hold.
@@ -111,14 +125,14 @@ class EnergyBalance:
         self.readings.support_work(index, work)
         return work
 
-    def momentum(self):
-        """Linear [N s] and angular momentum about the origin [N m s] less what was given, (6,)."""
+    def momentum(self) -> np.ndarray:
+        """Linear [N s] and angular momentum about the origin [N m s], less external impulses."""
         rows = np.zeros((self.model.body_count, 12))
         self.readings.momentum(rows)
         return rows[:, :6].sum(axis=0) - rows[:, 6:].sum(axis=0)
 
-    def momentum_errors(self):
-        """Linear and angular momentum out of nothing, as shares of what the bodies exchanged.
+    def momentum_errors(self) -> tuple[float, float]:
+        """Errors of linear and angular momentum, relative to the momentum exchanged.
 
         The scale is the sum over bodies of the size of momentum and of load impulse.
         """

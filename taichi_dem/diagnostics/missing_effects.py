@@ -1,22 +1,31 @@
 """Effects that a scene left out and the run needs, found at recording times."""
 
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Optional, Union
 
 import numpy as np
 
-from taichi_dem.diagnostics.outer_faces import OuterFaces
+from taichi_dem.contact_search.contacts import Contacts
+from taichi_dem.diagnostics.outer_faces import OuterFaces, OuterOverlaps
 from taichi_dem.diagnostics.part_overlaps import PartOverlaps
+from taichi_dem.diagnostics.readings import Readings
 from taichi_dem.mesh.parts import parts_of
 from taichi_dem.scene import REMEDY
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.model import Model
+    from taichi_dem.engine.state import State
 
 
 @dataclass
 class MissingEffect:
     """A need that no listed effect serves.
 
-    effect: what to list. what: the finding in words. times: recordings that saw it, of ``looks``.
-    most: the largest number of places in one of them. where: first such bond or body, as unit
-    says; place_m: the middle of its face, or of the body, in the mesh [m]. first_s: when first [s].
+    effect: the effect to list. what: the finding in words. times: recordings with the finding, of
+    ``looks``. most: largest number of places in one of them. where: first such bond or body, as
+    unit says; place_m: the middle of its face, or of the body, in the mesh [m]. first_s: time of
+    the first [s].
     """
 
     effect: str
@@ -29,8 +38,13 @@ class MissingEffect:
     first_s: float = 0.0
     unit: str = "bond"
 
-    def see(self, places, time_s, middle):
-        """Take in what a recording at a time [s] saw.
+    def see(
+        self,
+        places: Union[Sequence[int], np.ndarray],
+        time_s: float,
+        middle: Callable[[int], tuple[float, ...]],
+    ) -> None:
+        """Add the findings of a recording at a time [s].
 
         places: numbers of the bonds or bodies, one for every sight. middle: function of such a
         number, its place in the mesh [m].
@@ -61,10 +75,10 @@ _OVERLAP = "pairs of bodies overlap at outer faces, which carry no contact spher
 
 
 def _outer_faces(model, state, outer_overlaps):
-    """What finds bodies that overlap at outer faces without spheres; None where none can.
+    """Detector of bodies that overlap at outer faces without spheres; None where none can.
 
-    Without contact a solid in one piece has nothing to meet but what broke off it: that is found
-    at its released bonds.
+    Without contact a solid in one piece can only meet its own fragments, which is found at its
+    released bonds.
     """
     if model.has_contact:
         return None if model.contact.outer_faces else OuterFaces(model, state, outer_overlaps)
@@ -72,7 +86,7 @@ def _outer_faces(model, state, outer_overlaps):
     return PartOverlaps(model, state, part) if part.any() else None
 
 
-def unserved(roles):
+def unserved(roles: Container[str]) -> dict[str, MissingEffect]:
     """An empty ``MissingEffect`` by role, for every need that no effect of these roles serves."""
     return {role: MissingEffect(effect, what) for role, effect, what in _NEEDS if role not in roles}
 
@@ -80,10 +94,17 @@ def unserved(roles):
 class MissingEffects:
     """Counts the places where an absent effect would have acted, at recording times.
 
-    touching: most pairs of bodies that one of them saw in contact.
+    touching: most pairs of bodies in contact at one of them.
     """
 
-    def __init__(self, model, state, readings, contacts, outer_overlaps=None):
+    def __init__(
+        self,
+        model: "Model",
+        state: "State",
+        readings: Readings,
+        contacts: Optional[Contacts],
+        outer_overlaps: Optional[OuterOverlaps] = None,
+    ):
         self.model, self.state, self.readings = model, state, readings
         self.contacts = contacts
         self.touching = self.looks = 0
@@ -94,7 +115,7 @@ class MissingEffects:
         material = model.material
         self.limits = material.tensile_strength, material.cohesion, material.friction
 
-    def sample(self, time_s):
+    def sample(self, time_s: float) -> None:
         """Update the findings at a recording time [s]."""
         if time_s == self.last_s:
             return
@@ -112,16 +133,16 @@ class MissingEffects:
             if role in self.needed:
                 self.needed[role].see(np.flatnonzero(marks[:, column]), time_s, self._middle)
 
-    def saved(self):
-        """What a checkpoint holds of it, arrays by name."""
+    def saved(self) -> dict[str, np.ndarray]:
+        """Data for a checkpoint, arrays by name."""
         rows = [[m.times, m.most, m.where, m.first_s] for m in self._all()]
         return {
             "needed": np.array(rows, dtype=np.float64),
             "looks": np.array([self.looks, self.touching, self.last_s]),
         }
 
-    def resume(self, saved):
-        """Take over what ``saved`` gave."""
+    def resume(self, saved: Mapping[str, np.ndarray]) -> None:
+        """Restore the data that ``saved`` returned."""
         for finding, row in zip(self._all(), saved["needed"].tolist()):
             finding.times, finding.most, finding.where = (int(value) for value in row[:3])
             finding.first_s = row[3]
@@ -149,7 +170,7 @@ class MissingEffects:
         corners = self.model.topology.vertices[bond]
         return tuple(self.model.mesh.points[corners].mean(axis=0).tolist())
 
-    def findings(self):
+    def findings(self) -> tuple[MissingEffect, ...]:
         """A ``MissingEffect`` for each effect that was needed, an empty tuple where none was."""
         found = [finding for finding in self._all() if finding.times]
         return tuple(replace(finding, looks=self.looks) for finding in found)

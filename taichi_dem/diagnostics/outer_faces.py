@@ -1,8 +1,10 @@
-"""Outer faces without contact spheres: whether bodies can, and do, overlap there unnoticed.
+"""Outer faces without contact spheres: detection of bodies that can, and do, overlap there.
 
-Faces carry spheres once they break, and outer faces only if ``SphereContact`` is asked for that.
-Bodies that meet elsewhere pass through each other.
+Faces carry spheres once they break, outer faces only with the option of ``SphereContact``. Bodies
+that meet elsewhere pass through each other.
 """
+
+from typing import TYPE_CHECKING
 
 import numpy as np
 import taichi as ti
@@ -10,6 +12,11 @@ import taichi as ti
 from taichi_dem.kit.types import vec3
 from taichi_dem.mesh.tetrahedra import components
 from taichi_dem.timeline import NEVER
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.model import Model
+    from taichi_dem.engine.state import State
+    from taichi_dem.engine.tables import Tables
 
 #: Overlap of two spheres, as a share of the distance at which they touch, below which they count
 #: as apart: coordinates of a mesh file may be rounded to seven digits.
@@ -19,20 +26,20 @@ LEAST_OVERLAP = 1e-4
 class OuterFaces:
     """Finds pairs of bodies that overlap where one of them has an outer face without spheres.
 
-    A pair counts if its bodies belong to different fragments and shared no point in the mesh, if
-    spheres on outer faces would overlap, and if no spheres of broken faces do. So what is bonded,
-    or touches as it should, is left alone, and what lay side by side is left to the broken faces
-    between. A solid that bends until it meets itself is not seen.
+    A pair counts if its bodies belong to different fragments and share no point of the mesh, if
+    spheres on outer faces would overlap, and if no spheres of broken faces do. This excludes bonded
+    bodies, regular contacts, and former neighbours, which meet at broken faces. A solid that bends
+    until it meets itself is not detected.
     outer_overlaps: the ``OuterOverlaps`` of the engine.
     """
 
-    def __init__(self, model, state, outer_overlaps):
+    def __init__(self, model: "Model", state: "State", outer_overlaps: "OuterOverlaps"):
         self.model, self.state, self.outer_overlaps = model, state, outer_overlaps
         self.extent = model.spheres.extent
         self.points = np.ascontiguousarray(model.mesh.tetrahedra, dtype=np.int32)
-        self.broken_count, self.part = -1, None
+        self.broken_count, self.part = -1, np.zeros(0, dtype=np.int32)
 
-    def overlaps(self):
+    def overlaps(self) -> np.ndarray:
         """How many later bodies each body overlaps in this way now, (body_count,)."""
         found = np.zeros(self.model.body_count, dtype=np.int32)
         broken = self.state.broken_tick.to_numpy()[: self.model.bond_count] != NEVER
@@ -76,7 +83,7 @@ class OuterFaces:
 class OuterOverlaps:
     """Compares the spheres behind outer faces of bodies that may be near each other."""
 
-    def __init__(self, tables, state):
+    def __init__(self, tables: "Tables", state: "State"):
         self.tables, self.state = tables, state
 
     @ti.kernel
@@ -100,7 +107,7 @@ class OuterOverlaps:
                 away = vec3(ball[k, 0], ball[k, 1], ball[k, 2]) - centre
                 reach = radius + ball[k, 3]
                 j = order[k]
-                # Two loose bodies find each other twice.
+                # A pair of loose bodies would be found twice.
                 if away.norm_sqr() < reach * reach and (loose[j] == 0 or i < j):
                     apart = ti.cast(part[i] != part[j], ti.i32)
                     for p, q in ti.ndrange(4, 4):

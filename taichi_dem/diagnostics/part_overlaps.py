@@ -3,12 +3,18 @@
 Without contact no body has spheres, so the tetrahedra themselves are compared.
 """
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import taichi as ti
 
 from taichi_dem.diagnostics.outer_faces import LEAST_OVERLAP
 from taichi_dem.kit.types import vec3
 from taichi_dem.mesh.parts import any_overlap, part_boxes
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.model import Model
+    from taichi_dem.engine.state import State
 
 #: Square of the sine between two edges below which their cross product is no direction.
 _PARALLEL = 1e-12
@@ -17,17 +23,17 @@ _PARALLEL = 1e-12
 class PartOverlaps:
     """Finds pairs of bodies of different parts that overlap; inner bodies are left out.
 
-    As long as the boxes around the parts are apart, nothing more is looked at. part: number of
-    each body's part, ``parts.parts_of``.
+    Bodies are compared only where the boxes around the parts overlap. part: number of each body's
+    part, ``parts.parts_of``.
     """
 
-    def __init__(self, model, state, part):
+    def __init__(self, model: "Model", state: "State", part: np.ndarray):
         self.model, self.state = model, state
         self.part = part.astype(np.int32)
         self.arms = model.mesh.points[model.mesh.tetrahedra] - model.centre[:, None]
         self.outer = np.unique(model.topology.outer_body)
 
-    def overlaps(self):
+    def overlaps(self) -> np.ndarray:
         """How many later bodies each body overlaps now, (body_count,)."""
         found = np.zeros(self.model.body_count, dtype=np.int32)
         corners = np.einsum("nij,ncj->nci", self.state.rotation.to_numpy(), self.arms)

@@ -1,18 +1,25 @@
 """Readings of a run: tables of energy, momentum and shares that kernels fill for the host."""
 
+from typing import TYPE_CHECKING
+
 import taichi as ti
 
 from taichi_dem.physics.fracture import coulomb_limit
+from taichi_dem.step.advance import Advance
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.state import State
+    from taichi_dem.engine.tables import Tables
 
 
 @ti.data_oriented
 class Readings:
-    """Kernels that read what the step has booked, or compute anew by the step's own laws.
+    """Kernels that read booked terms, or compute others by the laws of the step.
 
     Every method fills arrays of the counts of the scene.
     """
 
-    def __init__(self, tables, state, advance):
+    def __init__(self, tables: "Tables", state: "State", advance: Advance):
         self.tables, self.state, self.advance = tables, state, advance
         self.contacts = advance.contacts
 
@@ -62,7 +69,7 @@ class Readings:
 
     @ti.kernel
     def support_work(self, index: ti.i32, work: ti.types.ndarray(dtype=ti.f64, ndim=1)):
-        """Work [J] of all supports on the bodies that one of them holds; others stay as given."""
+        """Work [J] of all supports on the bodies that one of them holds; other entries stay."""
         for i in range(self.tables.body_count[None]):
             for e in ti.static(range(len(self.tables.supports))):
                 if e == index and self.tables.supports[e].acts_on(i):
@@ -70,7 +77,7 @@ class Readings:
 
     @ti.kernel
     def momentum(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
-        """Linear and angular momentum of every body, and what loads and supports have given it."""
+        """Linear and angular momentum of every body, and impulses from loads and supports."""
         for i in range(self.tables.body_count[None]):
             linear = self.tables.mass[i] * self.state.velocity[i]
             angular = self.state.angular_momentum[i] + self.state.position[i].cross(linear)
@@ -125,7 +132,7 @@ class Readings:
         share: ti.types.ndarray(dtype=ti.f64, ndim=1),
         taken: ti.types.ndarray(dtype=ti.f64, ndim=1),
     ):
-        """Note, for the bodies of touching pairs, what their steps leave of sphere dashpots.
+        """Note how far the steps of touching bodies limit their sphere dashpots.
 
         share: least share, where dashpots are limited; else taken: largest part of a speed that
         they take in a step.

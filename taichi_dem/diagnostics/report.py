@@ -1,7 +1,7 @@
 """The short report at the end of a run."""
 
 from dataclasses import asdict, dataclass
-from typing import Optional
+from typing import Any, Optional
 
 from taichi_dem.kit.display import in_brief
 
@@ -11,22 +11,22 @@ _JSON_KEYS = {"effect_activity": "acted", "missing_effects": "missed"}
 
 @dataclass(frozen=True)
 class Report:
-    """What a run did and what it cost.
+    """Figures and cost of a run.
 
-    method, driver, effects: what was run. until_s: simulated time. substeps: ticks at which
-    something was due. body_updates, bond_evaluations, pair_evaluations: work done.
-    uniform_evaluations: bonds and pairs that one step for all would have evaluated in the same
-    substeps. sweeps: over all dashpots where they are solved, else 0. ideal_gain: bodies times
-    substeps over body updates, what the different steps would save if a pair cost nothing;
-    boundary_gain: uniform over actual evaluations, what they save with every pair evaluated at
-    the finer body's step. searches: rebuilt contact lists.
+    method, driver, effects: of the run. until_s: simulated time. substeps: ticks at which a body
+    was active. body_updates, bond_evaluations, pair_evaluations: work done. uniform_evaluations:
+    bonds and pairs that one step for all would have evaluated in the same substeps. sweeps: over
+    all dashpots where they are solved, else 0. ideal_gain: bodies times substeps over body updates,
+    the saving by different steps if a pair cost nothing; boundary_gain: uniform over actual
+    evaluations, the saving with every pair evaluated at the finer body's step. searches: updates of
+    the contact lists.
     energy_balance: energy terms [J]; energy_residual_fraction: residual over the work put in.
-    linear_momentum_error, angular_momentum_error: out of nothing, as shares of what was
+    linear_momentum_error, angular_momentum_error: unexplained momentum, as shares of that
     exchanged. compile_seconds, run_seconds, run_cpu_seconds: cost. effect_activity: an
     ``EffectUse`` for each effect. missing_effects: a ``missing_effects.MissingEffect`` for each
     effect that was left out and needed. unresolved: sentences about bonds and contacts for which
-    the step was too long. bound_by: bodies at the end by what bounds their step, see
-    ``step_control.CRITERIA``. round_off_J: energies below this may be round-off
+    the step was too long. bound_by: number of bodies at the end by the criterion that bounds their
+    step, see ``step_control.CRITERIA``. round_off_J: energies below this may be round-off
     (``DivergenceCheck.round_off``). measured_speedup: CPU time of one step for all over that of the
     run, where it was measured.
     """
@@ -64,33 +64,33 @@ class Report:
         return in_brief(self, self.outcome, took, "print it for all figures")
 
     @property
-    def outcome(self):
+    def outcome(self) -> str:
         """Method, simulated time and broken bonds in words."""
         broken = f"{self.broken_faces:,} of {self.bond_count:,} bonds broken"
         return f"{self.method}, {self.until_s:.4g} s simulated, {broken}"
 
     @property
-    def needs(self):
+    def needs(self) -> tuple[str, ...]:
         """Sentences about effects that were missed, and about a step that was too long."""
         return (*(str(missing) for missing in self.missing_effects), *self.unresolved)
 
     @property
-    def contact_evaluations(self):
+    def contact_evaluations(self) -> int:
         """Bonds and contact pairs evaluated."""
         return self.bond_evaluations + self.pair_evaluations
 
     @property
-    def ideal_gain(self):
+    def ideal_gain(self) -> float:
         """Bodies times substeps over body updates."""
         return self.body_count * self.substeps / max(1, self.body_updates)
 
     @property
-    def boundary_gain(self):
+    def boundary_gain(self) -> float:
         """Evaluations of one step for all over those made."""
         return self.uniform_evaluations / max(1, self.contact_evaluations)
 
     @property
-    def energy_residual_fraction(self):
+    def energy_residual_fraction(self) -> float:
         """Energy that the account cannot explain, over the work put in or the energy held."""
         return abs(self.energy_balance["residual"]) / max(*self._given_and_held(), 1e-300)
 
@@ -100,7 +100,7 @@ class Report:
         return given, self.energy_balance["kinetic"] + self.energy_balance["bond_strain"]
 
     @property
-    def unexplained(self):
+    def unexplained(self) -> str:
         """The residual in words: a share of the work put in, unless all energies are round-off."""
         given, held = self._given_and_held()
         if max(given, held) <= self.round_off_J:
@@ -108,27 +108,27 @@ class Report:
         whole = "the energy held" if held > given else "it"
         return f"{100.0 * self.energy_residual_fraction:.3g} % of {whole}"
 
-    def as_dict(self):
+    def as_dict(self) -> dict[str, Any]:
         """All figures, for a JSON file."""
-        derived = ("contact_evaluations", "ideal_gain", "boundary_gain", "energy_residual_fraction")
-        derived += ("needs",)
+        gains = "ideal_gain", "boundary_gain"
+        derived = ("contact_evaluations", *gains, "energy_residual_fraction", "needs")
         figures = {_JSON_KEYS.get(name, name): value for name, value in asdict(self).items()}
         return {**figures, **{name: getattr(self, name) for name in derived}}
 
     def _effect_rows(self):
-        """What each effect did."""
+        """Rows with the activity of each effect."""
         if not self.effect_activity:
             return (("effects", "none"),)
         rows = [f"{use.effect}: {use}" for use in self.effect_activity]
         return (("effects", rows[0]), *(("", row) for row in rows[1:]))
 
     def _bound_words(self):
-        """What bounds the steps of how many bodies."""
+        """Criteria that bound the steps, with the number of bodies."""
         words = ((name.replace("_", " "), n) for name, n in self.bound_by.items())
         return ", ".join(f"{name} ({n} bodies)" for name, n in words)
 
     def _gain_row(self):
-        """What steps of different length save, where there are some."""
+        """Row with the gain from steps of different length, where there are any."""
         if self.body_updates == self.body_count * self.substeps:
             return ()
         ideal, reached = f"{self.ideal_gain:.2f}", f"{self.boundary_gain:.2f}"
@@ -138,7 +138,7 @@ class Report:
         return (("gain over uniform", words),)
 
     def _sweeps_row(self):
-        """What solving all dashpots took, for the methods that do."""
+        """Row with the sweeps over all dashpots, for methods that solve them."""
         if not self.sweeps:
             return ()
         return (("sweeps", f"{self.sweeps:,}, {self.sweeps / self.substeps:.2f} a substep"),)

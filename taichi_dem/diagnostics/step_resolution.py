@@ -1,30 +1,49 @@
 """Bonds and contacts for which the step of a run was too long: stable, but not accurate."""
 
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Optional
+
 import numpy as np
 
+from taichi_dem.contact_search.contacts import Contacts
+from taichi_dem.diagnostics.readings import Readings
+from taichi_dem.step.advance import Advance
+from taichi_dem.step.schedule import Schedule
 from taichi_dem.timeline import NEVER
 
-#: A limited dashpot below this share of its coefficient is another material's.
+if TYPE_CHECKING:
+    from taichi_dem.engine.model import Model
+    from taichi_dem.engine.state import State
+
+#: Least share of its coefficient at which a limited dashpot still represents the material.
 LEAST_SHARE = 0.5
-#: A bond that is open by this many failure openings when it fails has failed too late: up to then
-#: its dashpots, far the stronger part of it, have pulled for as much too long.
+#: A bond open by this many failure openings when it fails has failed too late: its dashpots,
+#: far stronger than its springs, have acted too long.
 MOST_OPENING = 1.25
 #: Sphere dashpots of a pair take c n dt / m of the speed at which the bodies part or meet; above 1
-#: they turn it round, and what the springs should ease apart is thrown apart.
+#: they reverse it, and throw apart bodies that the springs should part gently.
 MOST_TAKEN = 1.0
 _KEPT = ("share", "pair_share", "taken", "step", "lightest")
 
 
 class StepResolution:
-    """Looks, at recording times, at what steps leave of dashpots; at the end, at how bonds failed.
+    """Checks of the time step: shares of dashpots at recording times, bond failures at the end.
 
-    share: least share of its dashpots that each bond was left with while it held, (bond_count,).
-    step: shortest step of each body [s]; lightest: mass of the lightest it came near [kg];
-    pair_share: least share that its contacts were seen with; taken: largest part of a speed that
-    they take in a step; all (body_count,).
+    share: least share of its dashpots that each bond kept while it held, (bond_count,). step:
+    shortest step of each body [s]; lightest: mass of the lightest body near it [kg]; pair_share:
+    least recorded share of its contacts; taken: largest part of a speed that they take in a step;
+    all (body_count,).
     """
 
-    def __init__(self, model, state, readings, contacts, schedule, advance):
+    def __init__(
+        self,
+        model: "Model",
+        state: "State",
+        readings: Readings,
+        contacts: Optional[Contacts],
+        schedule: Schedule,
+        advance: Advance,
+    ):
         self.model, self.state, self.readings, self.contacts = model, state, readings, contacts
         self.schedule, self.solves, self.limited = schedule, advance.solves, advance.limited
         self.has_dashpot = advance.has_dashpot
@@ -33,17 +52,17 @@ class StepResolution:
         self.step = np.full(model.body_count, np.inf)
         self.lightest = model.body_mass.copy()
 
-    def saved(self):
-        """What a checkpoint holds of it, arrays by name."""
+    def saved(self) -> dict[str, np.ndarray]:
+        """Data for a checkpoint, arrays by name."""
         return {name: getattr(self, name) for name in _KEPT}
 
-    def resume(self, saved):
-        """Take over what ``saved`` gave."""
+    def resume(self, saved: Mapping[str, np.ndarray]) -> None:
+        """Restore the data that ``saved`` returned."""
         for name in _KEPT:
             setattr(self, name, saved[name].copy())
 
-    def sample(self):
-        """Update the figures at a recording time. Dashpots that are solved need no look."""
+    def sample(self) -> None:
+        """Update the figures at a recording time; not for dashpots that are solved."""
         if self.solves:
             return
         if self.limited and self.has_dashpot and self.model.bond_count:
@@ -61,8 +80,8 @@ class StepResolution:
         for one, other in (pairs.T, pairs.T[::-1]):
             np.minimum.at(self.lightest, one, mass[other])
 
-    def findings(self, bodies=None):
-        """Sentences about what the step did not resolve, an empty tuple where it did all.
+    def findings(self, bodies: Optional[np.ndarray] = None) -> tuple[str, ...]:
+        """Sentences about dashpots and failures that the step did not resolve; may be empty.
 
         bodies: which to judge, booleans (body_count,), all by default.
         """
@@ -112,8 +131,8 @@ class StepResolution:
     def _contact_shares(self):
         """Largest share that limited sphere dashpots can have had where they acted, (body_count,).
 
-        What was seen of them, or that of a single contact, 1 / X with X = 2 c dt / m; see
-        ``step/stability_limits.py``. Where contacts took energy they acted; it is booked to the
+        The recorded share, or that of a single contact, 1 / X with X = 2 c dt / m; see
+        ``stability/body_limits.py``. Contacts that took energy have acted; it is booked to the
         first body of a pair.
         """
         if self.contacts is None or not self.limited:

@@ -1,4 +1,4 @@
-"""Effects a scene may list; what it leaves out is not computed, allocated or compiled."""
+"""Effects that a scene may list; all others are not computed, allocated or compiled."""
 
 from taichi_dem.effects.bond_damping import BondDamping
 from taichi_dem.effects.friction import Friction

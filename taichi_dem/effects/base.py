@@ -1,14 +1,16 @@
-"""What an effect is, and the null objects that stand where a scene lists none.
+"""Base class of effects, and null objects for roles in which a scene lists none.
 
-A user's effect holds numbers on the host. In an engine stands a bound copy of it, which has its
-fields and kernels, and into which every scene that the engine runs loads its numbers. Its ``role``
-says where ``step/advance.py`` asks for it, and which members it must have (``effects.roles``):
-tension, shear and dashpot are laws of the contact units of bonds, contact and friction those of
-contact spheres, loads push bodies, supports hold them. Roles ``load`` and ``support`` take any
-number of effects, the others at most one.
+A user's effect holds numbers on the host. An engine holds a bound copy of it with fields and
+kernels, into which each scene of the engine loads its numbers. The ``role`` determines where
+``step/advance.py`` calls it, and the members that it must have (``effects.roles``): tension, shear
+and dashpot are laws of the contact units of bonds, contact and friction those of contact spheres,
+loads push bodies, supports hold them. Roles ``load`` and ``support`` take any number of effects,
+the others at most one.
 """
 
 import copy
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Optional
 
 import numpy as np
 import taichi as ti
@@ -17,8 +19,17 @@ from taichi.lang import impl
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.display import by_arguments
 from taichi_dem.kit.types import real, vec3
+from taichi_dem.materials import Material
+
+if TYPE_CHECKING:
+    from taichi_dem.contact_search.pair_store import PairStore
+    from taichi_dem.engine.capacity import Capacity
+    from taichi_dem.engine.model import Model
+    from taichi_dem.engine.tables import Tables
 
 MANY = ("load", "support")
+#: Lowest and highest displacement along x, y and z [m].
+Travel = tuple[tuple[float, ...], tuple[float, ...]]
 #: Roles that take one effect, in the order in which effects are listed, bound and reported.
 SINGLE = ("tension", "shear", "dashpot", "friction", "contact")
 ROLES = (*SINGLE, *MANY)
@@ -27,62 +38,64 @@ ROLES = (*SINGLE, *MANY)
 class Effect:
     """Base of all effects.
 
-    role: where the step asks for it. name: the word used in reports and on the command line.
-    Kernels of a bound effect read its numbers in the field ``self.law``, constants of the scene in
-    ``self.tables`` (engine.tables.Tables), and what ``declare`` has declared.
+    role: its place in the step. name: the word used in reports and on the command line. Kernels of
+    a bound effect read its numbers in the field ``self.law``, constants of the scene in
+    ``self.tables`` (engine.tables.Tables), and the fields that ``declare`` has declared.
     """
 
     role = ""
     name = ""
     #: Whether a friction law keeps a spring for each sphere pair (``roles.FrictionMemory``).
     remembers = False
+    law: ti.Field
+    tables: "Tables"
+    _count: int
 
     def __repr__(self):
         return by_arguments(self)
 
-    def numbers(self, material) -> tuple:
+    def numbers(self, material: Material) -> tuple:
         """Numbers that kernels read as ``self.law[0]`` and on: to change them compiles nothing."""
         return ()
 
-    def declare(self, capacity):
+    def declare(self, capacity: "Capacity") -> None:
         """Declare further fields, with the capacity of an engine; no field may be used here."""
 
-    def declare_columns(self, store):
-        """Declare what it keeps of a pair of bodies, or of two spheres, in a ``PairStore``.
+    def declare_columns(self, store: "PairStore") -> None:
+        """Declare its data for each pair of bodies, or of spheres, in a ``PairStore``.
 
-        ``store.column`` and ``store.sphere_column`` give fields. Asked in scenes with contact.
+        ``store.column`` and ``store.sphere_column`` return fields. Called in scenes with contact.
         """
 
-    def load(self, model):
+    def load(self, model: "Model") -> None:
         """Fill the declared fields for a scene; they are zero before. Raises InputError."""
 
-    def state(self):
+    def state(self) -> dict[str, ti.Field]:
         """Fields that change in a run, by name; a checkpoint holds them."""
         return {}
 
-    def travel(self):
-        """How far it may carry bodies along x, y and z [m]: lowest and highest, two rows.
+    def travel(self) -> Travel:
+        """Bounds of the displacement that it may cause along x, y and z [m]: lowest and highest.
 
-        Asked of loads and supports, whether parts of a mesh may meet: without bounds unless an
-        effect knows better.
+        Used of loads and supports, to decide whether parts of a mesh may meet. Infinite by default.
         """
         return (-np.inf,) * 3, (np.inf,) * 3
 
-    def stand_for(self, given):
-        """Let the attributes of this bound effect be those of a scene's; None changes nothing."""
+    def stand_for(self, given: Optional["Effect"]) -> None:
+        """Take the attributes of this bound effect from a scene's effect; None changes nothing."""
         if given is not None:
             self.__dict__["_given"] = vars(given)
 
-    def load_scene(self, model):
-        """Load the numbers of the effect that this bound one stands for."""
+    def load_scene(self, model: "Model") -> None:
+        """Load the numbers of the scene's effect."""
         if self._count:
             assign(self.law, np.array(self.numbers(model.material), dtype=np.float64))
         self.load(model)
 
-    def accepts(self, given) -> bool:
-        """Whether kernels that were compiled for this one serve for a scene's effect ``given``.
+    def accepts(self, given: Optional["Effect"]) -> bool:
+        """Whether kernels compiled for this effect are valid for a scene's effect ``given``.
 
-        They do unless they have read one of its values where they should have read a field.
+        They are, unless they contain an attribute of it, read in a kernel, that has another value.
         """
         return given is None or all(
             _same(vars(given).get(name), value) for name, value in self._frozen.items()
@@ -98,11 +111,12 @@ class Effect:
         return given[name]
 
 
-def bound(effect, tables):
+def bound(effect: Effect, tables: "Tables") -> Any:
     """A copy of an effect with its own fields, which belongs to an engine and serves its scenes."""
     made = object.__new__(type(effect))
     made.__dict__.update(_given=vars(effect), _frozen={}, tables=tables)
-    made._count = len(effect.numbers(_AnyMaterial()))
+    material: Any = _AnyMaterial()
+    made._count = len(effect.numbers(material))
     if made._count:
         made.law = ti.field(real, shape=made._count)
     made.declare(tables.capacity)
@@ -110,7 +124,7 @@ def bound(effect, tables):
 
 
 class _AnyMaterial:
-    """Stands for a material where only the number of its constants is asked for."""
+    """Substitute for a material where only the number of constants matters."""
 
     def __getattr__(self, name):
         return 1.0
@@ -123,7 +137,7 @@ def _same(first, second):
         return first is second
 
 
-def along(direction):
+def along(direction: Sequence[float]) -> Travel:
     """Travel without end in a direction, for ``Effect.travel``."""
     low = tuple(-np.inf if x < 0.0 else 0.0 for x in direction)
     return low, tuple(np.inf if x > 0.0 else 0.0 for x in direction)
@@ -207,7 +221,8 @@ class NoFriction(Effect):
         return vec3(0.0, 0.0, 0.0)
 
 
-ABSENT = {
+#: Classes of the null objects by role; None where there is none.
+ABSENT: dict[str, Any] = {
     "tension": ElasticTension,
     "shear": ElasticShear,
     "dashpot": NoDashpot,
@@ -215,4 +230,4 @@ ABSENT = {
     "contact": None,
 }
 
-__all__ = ["ABSENT", "MANY", "ROLES", "SINGLE", "Effect", "along", "bound"]
+__all__ = ["ABSENT", "MANY", "ROLES", "SINGLE", "Effect", "Travel", "along", "bound"]

@@ -1,4 +1,4 @@
-"""What a load sees of a body when it is asked for its force."""
+"""Motion of a body, as passed to loads."""
 
 import taichi as ti
 

@@ -4,6 +4,7 @@ import taichi as ti
 
 from taichi_dem.effects.base import Effect
 from taichi_dem.kit.types import vec3
+from taichi_dem.materials import Material
 
 
 @ti.data_oriented
@@ -13,7 +14,7 @@ class BondDamping(Effect):
     role = "dashpot"
     name = "bond_damping"
 
-    def numbers(self, material):
+    def numbers(self, material: Material) -> tuple[float, ...]:
         """Normal and tangential damping coefficient [Pa s/m]."""
         return material.normal_damping, material.shear_damping
 

@@ -3,6 +3,7 @@
 import taichi as ti
 
 from taichi_dem.effects.base import Effect
+from taichi_dem.materials import Material
 from taichi_dem.physics.sphere_pair import friction_force
 
 
@@ -13,7 +14,7 @@ class Friction(Effect):
     role = "friction"
     name = "friction"
 
-    def numbers(self, material):
+    def numbers(self, material: Material) -> tuple[float, ...]:
         """Friction coefficient."""
         return (material.friction,)
 

@@ -1,16 +1,23 @@
 """Pressure of the blast gas on the wall of the hole (Konno et al., 4.1, eq. 4, Fig. 11)."""
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 import taichi as ti
+from numpy.typing import ArrayLike
 
 from taichi_dem.effects.base import Effect
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.validation import positive, word
+from taichi_dem.materials import Material
 from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.mesh.topology import face_vertices, faces_of_group
 from taichi_dem.physics.rotation import zero3
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.capacity import Capacity
+    from taichi_dem.engine.model import Model
 
 
 @ti.func
@@ -36,28 +43,34 @@ class GasPressure(Effect):
     role = "load"
     name = "gas_pressure"
 
-    def __init__(self, group="hole", peak=575e6, rise=1.33e-4, decay_ratio=2.75):
+    def __init__(
+        self,
+        group: str = "hole",
+        peak: float = 575e6,
+        rise: float = 1.33e-4,
+        decay_ratio: float = 2.75,
+    ):
         self.group = word("group", group)
         self.peak = positive("peak", peak)
         self.rise = positive("rise", rise)
         self.decay_ratio = positive("decay_ratio", decay_ratio)
 
     @property
-    def duration(self):
+    def duration(self) -> float:
         """Time from the beginning until there is no pressure any more [s]."""
         return (self.decay_ratio + 1.0) * self.rise
 
-    def numbers(self, material):
+    def numbers(self, material: Material) -> tuple[float, ...]:
         """Peak [Pa], rise [s] and decay ratio."""
         return self.peak, self.rise, self.decay_ratio
 
-    def declare(self, capacity):
+    def declare(self, capacity: "Capacity") -> None:
         """Loaded faces of every body: area vectors [m^2] and arms from the centre [m]."""
         self.first = ti.field(ti.i32, shape=capacity.bodies + 1)
         self.area = ti.Vector.field(3, ti.f64, shape=capacity.faces)
         self.arm = ti.Vector.field(3, ti.f64, shape=capacity.faces)
 
-    def load(self, model):
+    def load(self, model: "Model") -> None:
         """Find the loaded faces; InputError when the mesh has no such group."""
         body, face = faces_of_group(model.mesh, model.topology, self.group)
         order = np.argsort(body, kind="stable")
@@ -83,7 +96,7 @@ class GasPressure(Effect):
             torque += self.arm[k].cross(push)
         return motion.rotation @ force, motion.rotation @ torque
 
-    def pressure_at(self, times):
+    def pressure_at(self, times: ArrayLike) -> np.ndarray:
         """Pressure [Pa] at an array of times [s], for pictures."""
         times = np.ascontiguousarray(times, dtype=np.float64)
         pressure = np.zeros_like(times)

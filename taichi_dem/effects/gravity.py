@@ -1,10 +1,13 @@
 """Weight."""
 
+from collections.abc import Sequence
+
 import taichi as ti
 
-from taichi_dem.effects.base import Effect, along
+from taichi_dem.effects.base import Effect, Travel, along
 from taichi_dem.kit.types import vec3
 from taichi_dem.kit.validation import direction
+from taichi_dem.materials import Material
 from taichi_dem.physics.rotation import zero3
 
 
@@ -15,14 +18,14 @@ class Gravity(Effect):
     role = "load"
     name = "gravity"
 
-    def __init__(self, acceleration=(0.0, -9.81, 0.0)):
+    def __init__(self, acceleration: Sequence[float] = (0.0, -9.81, 0.0)):
         self._acceleration = direction("acceleration", acceleration)
 
-    def numbers(self, material):
+    def numbers(self, material: Material) -> tuple[float, ...]:
         """Acceleration [m/s^2], three components."""
         return self._acceleration
 
-    def travel(self):
+    def travel(self) -> Travel:
         """Without end along the acceleration."""
         return along(self._acceleration)
 

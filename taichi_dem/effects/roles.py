@@ -1,63 +1,68 @@
-"""Roles of effects as typed contracts: the members that the step asks of each.
+"""Roles of effects as typed contracts: the members that each must have.
 
 All members are ``ti.func`` methods of the bound effect. b is a bond, u one of its three contact
 units (3 b, 3 b + 1, 3 b + 2), i a body, k a sphere pair.
 """
 
-from typing import Protocol
+from typing import Any, Protocol
 
+import taichi as ti
+
+from taichi_dem.effects.body_motion import BodyMotion
 from taichi_dem.kit.errors import InputError
 
 
 class TensionLaw(Protocol):
     """Normal law of a bond's contact units; role "tension"."""
 
-    def traction(self, stiffness, u, opening):
+    def traction(self, stiffness: float, u: int, opening: float) -> float:
         """Traction [Pa] at a normal opening [m]."""
 
-    def failed(self, u):
+    def failed(self, u: int) -> int:
         """1 once the unit transmits nothing any more, else 0."""
 
-    def stored(self, b, u, opening):
+    def stored(self, b: int, u: int, opening: float) -> float:
         """Elastic energy per area [J/m^2]."""
 
-    def spent(self, b, u):
+    def spent(self, b: int, u: int) -> float:
         """Energy per area [J/m^2] that has been spent in the unit."""
 
-    def damage(self, b, u):
+    def damage(self, b: int, u: int) -> float:
         """0 intact to 1 failed."""
 
 
 class ShearLaw(Protocol):
     """Tangential law of a bond's contact units; role "shear"."""
 
-    def traction(self, stiffness, u, sliding, pressure):
+    def traction(
+        self, stiffness: float, u: int, sliding: ti.Vector, pressure: float
+    ) -> tuple[ti.Vector, float]:
         """Traction [Pa], two components, and energy per area slipped away now [J/m^2]."""
 
-    def stored(self, b, u, sliding):
+    def stored(self, b: int, u: int, sliding: ti.Vector) -> float:
         """Elastic energy per area [J/m^2]."""
 
 
 class DashpotLaw(Protocol):
     """Damping of a bond's contact units; role "dashpot"."""
 
-    def traction(self, velocity):
+    def traction(self, velocity: ti.Vector) -> ti.Vector:
         """Traction [Pa] at a relative velocity in the face frame [m/s]."""
 
 
 class ContactLaw(Protocol):
     """Normal law of contact spheres; role "contact"."""
 
-    def normal(self, overlap, opening_rate):
+    def normal(self, overlap: float, opening_rate: float) -> float:
         """Repulsion [N] at an overlap [m] of spheres that part at a rate [m/s]."""
 
-    def elastic(self, overlap):
+    def elastic(self, overlap: float) -> float:
         """Part of it that is stored [N]."""
 
-    def damping(self):
+    def damping(self) -> float:
         """Coefficient of the dashpot [N s/m], which friction shares."""
 
-    def stored(self, overlap):
+    def stored(self, overlap: float) -> float:
         """Energy [J]."""
 
 
@@ -67,10 +72,10 @@ class FrictionLaw(Protocol):
     One with ``remembers = True`` also keeps the contract ``FrictionMemory``.
     """
 
-    def limit(self, force_normal):
+    def limit(self, force_normal: float) -> float:
         """Largest friction [N] at a normal force [N]; of impulses likewise."""
 
-    def force(self, damping, force_normal, slide):
+    def force(self, damping: float, force_normal: float, slide: ti.Vector) -> ti.Vector:
         """Force [N] on the second sphere against its sliding velocity [m/s]."""
 
 
@@ -80,39 +85,46 @@ class FrictionMemory(Protocol):
     Vectors are in the first body's frame.
     """
 
-    def follow(self, k, normal, way):
-        """Turn the spring of pair k into the present contact plane and stretch it by a way [m]."""
+    def follow(self, k: int, normal: ti.Vector, way: ti.Vector) -> None:
+        """Turn the spring of pair k into the plane of contact and stretch it by ``way`` [m]."""
 
-    def slip(self, k, limit, way):
-        """Let the spring slip beyond a limit [N]; energy [J] that this takes."""
+    def slip(self, k: int, limit: float, way: ti.Vector) -> float:
+        """Shorten the spring to a limit [N]; return the energy dissipated [J]."""
 
-    def spring(self, k):
+    def spring(self, k: int) -> ti.Vector:
         """Force [N] on the second sphere."""
 
-    def stored(self, k):
+    def stored(self, k: int) -> float:
         """Energy [J]."""
 
-    def part(self, k):
+    def part(self, k: int) -> float:
         """Forget the spring as the spheres part; energy [J] that it had."""
 
 
 class Load(Protocol):
     """Force on bodies; role "load"."""
 
-    def acts_on(self, i):
+    def acts_on(self, i: int) -> int:
         """Nonzero for a body on which it acts."""
 
-    def wrench(self, i, motion):
+    def wrench(self, i: int, motion: BodyMotion) -> tuple[ti.Vector, ti.Vector]:
         """Force [N] and torque about the centre [N m]; motion: a ``body_motion.BodyMotion``."""
 
 
 class Support(Protocol):
     """Constraint of bodies; role "support"."""
 
-    def acts_on(self, i):
+    def acts_on(self, i: int) -> int:
         """Nonzero for a body that it holds."""
 
-    def held(self, i, t, rotation, velocity, angular_momentum):
+    def held(
+        self,
+        i: int,
+        t: float,
+        rotation: ti.Matrix,
+        velocity: ti.Vector,
+        angular_momentum: ti.Vector,
+    ) -> tuple[ti.Vector, ti.Vector]:
         """Velocity [m/s] and angular momentum [kg m^2/s] that it allows at a time [s]."""
 
 
@@ -128,12 +140,12 @@ CONTRACTS = {
 }
 
 
-def members_of(contract) -> tuple:
-    """Names of the members that a Protocol asks for."""
+def members_of(contract: type) -> tuple:
+    """Names of the members of a Protocol."""
     return tuple(name for name in vars(contract) if not name.startswith("_"))
 
 
-def check_effect(effect):
+def check_effect(effect: Any) -> None:
     """Raise InputError unless an effect has a known role and every member of its contract."""
     kind = type(effect).__name__
     if effect.role not in CONTRACTS:

@@ -1,9 +1,15 @@
 """Coulomb slip of bonds (Konno et al., 2.1, eq. 1 and 2, Fig. 3)."""
 
+from typing import TYPE_CHECKING
+
 import taichi as ti
 
 from taichi_dem.effects.base import Effect
+from taichi_dem.materials import Material
 from taichi_dem.physics.fracture import coulomb_limit, slip_beyond
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.capacity import Capacity
 
 
 @ti.data_oriented
@@ -17,15 +23,15 @@ class ShearSlip(Effect):
     role = "shear"
     name = "shear_slip"
 
-    def numbers(self, material):
+    def numbers(self, material: Material) -> tuple[float, ...]:
         """Cohesion [Pa] and friction coefficient."""
         return material.cohesion, material.friction
 
-    def declare(self, capacity):
+    def declare(self, capacity: "Capacity") -> None:
         """Residual slip of every contact unit."""
         self.slip = ti.Vector.field(2, ti.f64, shape=capacity.units)
 
-    def state(self):
+    def state(self) -> dict[str, ti.Field]:
         """Residual slip of every unit in the face frame [m]."""
         return {"shear_slip": self.slip}
 

@@ -1,12 +1,19 @@
 """Softening and fracture of bonds in tension (Konno et al., 2.1, Fig. 4)."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import taichi as ti
 
 from taichi_dem.effects.base import Effect
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.types import vec2
+from taichi_dem.materials import Material
 from taichi_dem.physics.fracture import envelope_traction, softening_energy
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.capacity import Capacity
+    from taichi_dem.engine.model import Model
 
 
 @ti.data_oriented
@@ -21,21 +28,21 @@ class Softening(Effect):
     role = "tension"
     name = "softening"
 
-    def numbers(self, material):
+    def numbers(self, material: Material) -> tuple[float, ...]:
         """Tensile strength [Pa] and opening at failure [m]."""
         return material.tensile_strength, material.failure_opening
 
-    def declare(self, capacity):
+    def declare(self, capacity: "Capacity") -> None:
         """Elastic limit and secant stiffness of every contact unit."""
         self.unit = ti.Vector.field(2, ti.f64, shape=capacity.units)
 
-    def load(self, model):
-        """Let every unit be intact."""
+    def load(self, model: "Model") -> None:
+        """Set every unit intact."""
         stiffness = np.repeat(model.bond_stiffness[:, 0], 3)
         onset = model.material.tensile_strength / stiffness
         assign(self.unit, np.stack([onset, stiffness], axis=1))
 
-    def state(self):
+    def state(self) -> dict[str, ti.Field]:
         """Elastic limit [m] and secant stiffness [Pa/m] of every unit."""
         return {"softening_unit": self.unit}
 
@@ -45,7 +52,7 @@ class Softening(Effect):
 
     @ti.func
     def traction(self, stiffness, u, opening):
-        """Traction [Pa] at a normal opening [m]; moves the elastic limit on the way out."""
+        """Traction [Pa] at a normal opening [m]; raises the elastic limit beyond it."""
         traction = stiffness * opening
         if opening > 0.0:
             unit = self.unit[u]

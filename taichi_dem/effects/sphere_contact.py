@@ -4,6 +4,7 @@ import taichi as ti
 
 from taichi_dem.effects.base import Effect
 from taichi_dem.kit.validation import flag, positive, whole
+from taichi_dem.materials import Material
 from taichi_dem.physics.sphere_pair import normal_force
 
 #: Entries of a list for each body: a thousand tetrahedra with as many take some GiB.
@@ -16,10 +17,10 @@ class SphereContact(Effect):
 
     divisions: equal parts of a face's edges; 5 gives the paper's six spheres a face.
     outer_faces: free outer faces carry spheres from the start too (the paper: no).
-    skin: how far apart spheres still enter the candidate list, at least; farther where bodies are
-        fast [m]. It changes time, not results.
-    neighbours_per_body, pairs_per_body, spheres_per_body: room of the lists, on average; that of
-        the spheres also takes what the next search finds, before what it replaces is let go.
+    skin: gap up to which spheres enter the candidate list, at least; more where bodies are fast
+    [m]. It changes time, not results.
+    neighbours_per_body, pairs_per_body, spheres_per_body: capacity of the lists, on average; that
+    of the spheres includes those of the next search, before those that they replace are freed.
     """
 
     role = "contact"
@@ -27,12 +28,12 @@ class SphereContact(Effect):
 
     def __init__(
         self,
-        divisions=5,
-        outer_faces=False,
-        skin=1.2e-3,
-        neighbours_per_body=64,
-        pairs_per_body=24,
-        spheres_per_body=160,
+        divisions: int = 5,
+        outer_faces: bool = False,
+        skin: float = 1.2e-3,
+        neighbours_per_body: int = 64,
+        pairs_per_body: int = 24,
+        spheres_per_body: int = 160,
     ):
         self.divisions = whole("divisions", divisions, 3, 20)
         self.outer_faces = flag("outer_faces", outer_faces)
@@ -51,7 +52,7 @@ class SphereContact(Effect):
         """Entries for each body in the lists of pairs, sphere pairs and neighbours."""
         return self.pairs_per_body, self.spheres_per_body, self.neighbours_per_body
 
-    def numbers(self, material):
+    def numbers(self, material: Material) -> tuple[float, ...]:
         """Stiffness [N/m] and damping [N s/m] of a contact."""
         return material.contact_stiffness, material.contact_damping
 

@@ -1,17 +1,23 @@
 """Friction of contact spheres that stick until they slip (Cundall and Strack 1979)."""
 
+from typing import TYPE_CHECKING
+
 import taichi as ti
 
 from taichi_dem.effects.friction import Friction
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.kit.validation import between
+from taichi_dem.materials import Material
+
+if TYPE_CHECKING:
+    from taichi_dem.contact_search.pair_store import PairStore
 
 
 @ti.data_oriented
 class StickingFriction(Friction):
     """Friction with a tangential spring in each contact of two spheres, up to Coulomb's limit.
 
-    What rests on a slope below the friction angle stays, where ``Friction`` lets it creep. The
+    A body at rest on a slope below the friction angle stays there; with ``Friction`` it creeps. The
     spring's stretch turns with the first body and is lost when the spheres part.
     stiffness_ratio: stiffness of the spring over the material's contact stiffness; spheres of a
     Poisson's ratio nu have 2 (1 - nu) / (2 - nu) (Mindlin 1949).
@@ -22,20 +28,20 @@ class StickingFriction(Friction):
     name = "sticking_friction"
     remembers = True
 
-    def __init__(self, stiffness_ratio=0.8):
+    def __init__(self, stiffness_ratio: float = 0.8):
         self.stiffness_ratio = between("stiffness_ratio", stiffness_ratio, 1e-6, 1.0)
 
-    def numbers(self, material):
+    def numbers(self, material: Material) -> tuple[float, ...]:
         """Friction coefficient, and stiffness of the spring [N/m]."""
         return material.friction, self.stiffness_ratio * material.contact_stiffness
 
-    def declare_columns(self, store):
+    def declare_columns(self, store: "PairStore") -> None:
         """Keep the stretch [m] of the spring of each sphere pair, in the first body's frame."""
         self.stretch = store.sphere_column("tangential_stretch", real, 3)
 
     @ti.func
     def follow(self, k, normal, way):
-        """Turn the spring of sphere pair k into the plane of contact and stretch it by a way [m].
+        """Turn the spring of sphere pair k into the plane of contact and stretch it by ``way`` [m].
 
         normal: of the contact; way: of the second sphere against the first across the normal.
         """
@@ -46,10 +52,10 @@ class StickingFriction(Friction):
 
     @ti.func
     def slip(self, k, limit, way):
-        """Shorten the spring of sphere pair k to what a limit [N] can hold; energy it takes [J].
+        """Shorten the spring of sphere pair k to a limit [N]; return the energy dissipated [J].
 
-        way: by which it has just been stretched [m]. The work of the way, by the mean of the forces
-        before and after, is what the spring stores and what slipping takes.
+        way: its stretch in this step [m]. The work of the stretch, at the mean of the forces before
+        and after, is the energy stored plus that dissipated by slipping.
         """
         trial = self.stretch[k]
         longest = limit / self.law[1]
@@ -72,7 +78,7 @@ class StickingFriction(Friction):
 
     @ti.func
     def part(self, k):
-        """Lose the spring of sphere pair k, whose spheres touch no more; its energy [J]."""
+        """Reset the spring of sphere pair k, whose spheres have parted; return its energy [J]."""
         energy = self.stored(k)
         self.stretch[k] = vec3(0.0)
         return energy

@@ -1,17 +1,24 @@
 """Supports: bodies with a face in a group are fixed, held on a plane, or moved as prescribed."""
 
 import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import taichi as ti
 
-from taichi_dem.effects.base import Effect, along
+from taichi_dem.effects.base import Effect, Travel, along
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.types import vec3
 from taichi_dem.kit.validation import direction, positive, shown, word
+from taichi_dem.materials import Material
 from taichi_dem.mesh.topology import faces_of_group
 from taichi_dem.physics.rotation import zero3
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.capacity import Capacity
+    from taichi_dem.engine.model import Model
 
 
 @ti.data_oriented
@@ -20,18 +27,18 @@ class _Support(Effect):
 
     role = "support"
 
-    def __init__(self, group):
+    def __init__(self, group: str):
         self.group = word("group", group)
 
-    def travel(self):
-        """None: it holds what it acts on."""
+    def travel(self) -> Travel:
+        """No displacement: the bodies are held."""
         return (0.0,) * 3, (0.0,) * 3
 
-    def declare(self, capacity):
+    def declare(self, capacity: "Capacity") -> None:
         """Marks of the supported bodies."""
         self.marked = ti.field(ti.i32, shape=capacity.bodies)
 
-    def load(self, model):
+    def load(self, model: "Model") -> None:
         """Mark the supported bodies; InputError when the mesh has no such group."""
         body, _ = faces_of_group(model.mesh, model.topology, self.group)
         marks = np.zeros(model.body_count, dtype=np.int32)
@@ -65,14 +72,14 @@ class Roller(_Support):
 
     name = "roller"
 
-    def __init__(self, group, normal):
+    def __init__(self, group: str, normal: Sequence[float]):
         super().__init__(group)
         numbers = np.array(direction("normal", normal))
         if not np.linalg.norm(numbers) > 0.0:
             raise InputError(f"normal must be longer than zero, got {shown(normal)}")
         self._normal = numbers / np.linalg.norm(numbers)
 
-    def numbers(self, material):
+    def numbers(self, material: Material) -> tuple[float, ...]:
         """Unit normal, three components."""
         return tuple(self._normal)
 
@@ -81,7 +88,7 @@ class Roller(_Support):
         """Velocity within the plane, spin about its normal."""
         normal = vec3(self.law[0], self.law[1], self.law[2])
         axis = rotation.transpose() @ normal
-        # The plane's moment is across the normal: what there is along it stays.
+        # The plane's moment is normal to its normal, so the component along it is unchanged.
         spin = angular_momentum.dot(normal) / axis.dot(self.tables.inertia[i] @ axis)
         kept = rotation @ (self.tables.inertia[i] @ (spin * axis))
         return velocity - velocity.dot(normal) * normal, kept
@@ -96,16 +103,16 @@ class PrescribedMotion(_Support):
 
     name = "prescribed_motion"
 
-    def __init__(self, group, velocity, frequency=0.0):
+    def __init__(self, group: str, velocity: Sequence[float], frequency: float = 0.0):
         super().__init__(group)
         self._velocity = direction("velocity", velocity)
         self._frequency = positive("frequency", frequency, zero_allowed=True)
 
-    def numbers(self, material):
+    def numbers(self, material: Material) -> tuple[float, ...]:
         """Velocity [m/s], three components, and angular frequency [rad/s]."""
         return (*self._velocity, 2.0 * math.pi * self._frequency)
 
-    def travel(self):
+    def travel(self) -> Travel:
         """As far as it swings, or without end along a constant velocity."""
         if not self._frequency:
             return along(self._velocity)

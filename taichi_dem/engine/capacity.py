@@ -1,9 +1,12 @@
 """How much finds room in an engine; counts of a scene are read at run time."""
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from taichi_dem.contact_search.lengths import SPARE_NEIGHBOURS, SPARE_PAIRS, SPARE_SPHERES
 from taichi_dem.kit.errors import InputError
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.model import Model
 
 #: Entries of one list, whose indices are counted in 32 bits.
 _MOST_ENTRIES = 2**31 - 1
@@ -57,7 +60,7 @@ class Capacity(NamedTuple):
         """Entries of the list of neighbours."""
         return self.bodies * self.neighbours + SPARE_NEIGHBOURS
 
-    def check(self):
+    def check(self) -> None:
         """Raise InputError where a list would have more entries than can be counted."""
         largest = max(9 * self.bonds, self.spheres, 2 * self.pair_entries, self.sphere_entries)
         if max(largest, self.neighbour_entries) > _MOST_ENTRIES:
@@ -67,8 +70,8 @@ class Capacity(NamedTuple):
             )
 
 
-def capacity_of(model) -> Capacity:
-    """What a ``Model`` needs."""
+def capacity_of(model: "Model") -> Capacity:
+    """Capacity that a ``Model`` needs."""
     if not model.has_contact:
         return Capacity(model.body_count)
     return Capacity(model.body_count, model.contact.face_spheres, *model.contact.lengths)

@@ -1,14 +1,18 @@
 """The engine of a blast: all fields and kernels of one structure, which runs any scene of it."""
 
+from collections.abc import Iterable
+
 from taichi_dem.contact_search.contacts import Contacts
 from taichi_dem.contact_search.search import BroadPhase
 from taichi_dem.diagnostics.outer_faces import OuterOverlaps
 from taichi_dem.diagnostics.readings import Readings
+from taichi_dem.effects.base import Effect
 from taichi_dem.engine.capacity import LEAST, Capacity
+from taichi_dem.engine.model import Model
 from taichi_dem.engine.state import State
 from taichi_dem.engine.tables import Tables
 from taichi_dem.kit.engine_pool import Engine, EnginePool
-from taichi_dem.methods import structure_of
+from taichi_dem.methods import Method, structure_of
 from taichi_dem.stability.body_limits import limits_for
 from taichi_dem.step.advance import Advance
 from taichi_dem.step.drivers import DRIVERS, SolvedStep, Step
@@ -18,13 +22,13 @@ from taichi_dem.step.schedule import Schedule
 
 
 class Structure:
-    """What a compiler sees of a scene and a method: classes of effects, kind of the method.
+    """Compiled structure of a scene and a method: classes of effects, kind of method.
 
-    Two structures are equal where one's kernels serve the other. effects, method: those of the
-    first scene, of which engines make copies. brute_force: contact search without cells.
+    Scenes of equal structures share kernels. effects, method: those of the first scene, of which
+    engines make copies. brute_force: contact search without cells.
     """
 
-    def __init__(self, effects, method, brute_force=False):
+    def __init__(self, effects: Iterable[Effect], method: Method, brute_force: bool = False):
         self.effects, self.method, self.brute_force = tuple(effects), method, brute_force
         self.key = tuple(map(type, self.effects)), structure_of(method), brute_force
 
@@ -46,7 +50,7 @@ class BlastEngine(Engine):
         "neighbours_per_body)"
     )
 
-    def declare(self):
+    def declare(self) -> None:
         """Build all parts; Taichi allocates their fields afterwards, all at once."""
         capacity = Capacity(*self.capacity)
         capacity.check()
@@ -78,10 +82,10 @@ class BlastEngine(Engine):
         parts = self.tables, self.state, self.schedule, self.contacts
         if method.solves:
             return SolvedAdvance(*parts, Solver(*parts))
-        # A method may bring an order of its own (docs/add_a_time_integrator.md).
+        # A method may have its own order of the physics (docs/add_a_time_integrator.md).
         return getattr(method, "advance", Advance)(*parts)
 
-    def load(self, model, method, max_speed):
+    def load(self, model: Model, method: Method, max_speed: float) -> None:
         """Take over a scene, at rest and at time zero; max_speed [m/s]."""
         self.clear()
         self.enter(model)
@@ -105,12 +109,12 @@ class BlastEngine(Engine):
             lengths[room.spheres] = 4 * n * model.spheres.per_face
         return lengths
 
-    def accepts(self, model):
-        """Whether no kernel has read a number of an effect that the scene gives another value."""
+    def accepts(self, model: Model) -> bool:
+        """Whether effect parameters compiled into kernels have the values of the scene."""
         return all(effect.accepts(given) for effect, given in self.tables.matched(model))
 
-    def enter(self, model):
-        """Note the counts of a scene whose data come in, and the numbers of its effects."""
+    def enter(self, model: Model) -> None:
+        """Set the counts and effects of the scene whose data are loaded."""
         self.lengths = self._lengths(model)
         for effect, given in self.tables.matched(model):
             effect.stand_for(given)

@@ -1,12 +1,16 @@
-"""What never changes in a run, as arrays: bodies, bonds and contact spheres of a scene."""
+"""Constants of a scene as arrays: bodies, bonds and contact spheres."""
 
+from collections.abc import Iterable
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from taichi_dem.effects.base import ROLES
+from taichi_dem.effects.base import ROLES, Effect
 from taichi_dem.kit.display import counted, in_brief
-from taichi_dem.mesh.contact_spheres import spheres_of_faces
+from taichi_dem.materials import Material
+from taichi_dem.mesh.contact_spheres import ContactSpheres, spheres_of_faces
+from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.mesh.topology import body_properties, topology_of
 
@@ -20,7 +24,7 @@ class Model:
     Source: Konno et al., section 2.
     """
 
-    def __init__(self, mesh, material, effects):
+    def __init__(self, mesh: Mesh, material: Material, effects: Iterable[Effect]):
         self.mesh, self.material = mesh, material
         self.topology = topology_of(mesh)
         self.body_count, self.bond_count = mesh.body_count, self.topology.bond_count
@@ -28,7 +32,7 @@ class Model:
         corners = mesh.points[mesh.tetrahedra] - self.centre[:, None]
         self.body_radius = np.linalg.norm(corners, axis=-1).max(axis=1)
         self.by_role = {role: [e for e in effects if e.role == role] for role in ROLES}
-        self.contact = next(iter(self.by_role["contact"]), None)
+        self.contact: Any = next(iter(self.by_role["contact"]), None)
         self.has_contact = self.contact is not None
 
     def __repr__(self):
@@ -51,12 +55,12 @@ class Model:
         return tuple(self.by_role["support"])
 
     @cached_property
-    def spheres(self):
+    def spheres(self) -> ContactSpheres:
         """``ContactSpheres`` of every face; with contact only."""
         return spheres_of_faces(self.mesh, self.centre, self.contact.divisions)
 
     @cached_property
-    def bonds(self):
+    def bonds(self) -> dict[str, np.ndarray]:
         """Arrays of all bonds by name.
 
         slots (n, 2): master's and slave's face as 4 body + local face. frame (n, 3, 3): normal, xi

@@ -1,11 +1,17 @@
-"""Everything that changes in a run; with the effects' own state this is what a checkpoint holds."""
+"""Everything that changes in a run; checkpoints hold this and the effects' own state."""
+
+from typing import Optional
 
 import numpy as np
 import taichi as ti
+from numpy.typing import ArrayLike
 
 from taichi_dem.effects.body_motion import BodyMotion
+from taichi_dem.engine.model import Model
+from taichi_dem.engine.tables import Tables
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.kit.types import real, vec3, vec4
+from taichi_dem.mesh.topology import Topology
 from taichi_dem.physics.rotation import rotation_matrix, spin_of
 from taichi_dem.timeline import NEVER
 
@@ -14,26 +20,25 @@ from taichi_dem.timeline import NEVER
 class State:
     """Motion of the bodies, pending impulses, fracture and the energy account.
 
-    position [m], velocity [m/s], orientation (unit quaternion, scalar first), angular_momentum
-    [kg m^2/s] in world axes; rotation (matrix) and spin [rad/s] follow from them and are kept so
-    that neighbours need not compute them. A body's motion is that of its own last tick.
-    level: step dt0 / 2^level. bound: what asked for it, a place in ``step_control.CRITERIA``.
+    position [m], velocity [m/s], orientation (unit quaternion, scalar first), angular_momentum [kg
+    m^2/s] in world axes; rotation (matrix) and spin [rad/s] follow from them and are stored so that
+    neighbours need not compute them. A body's motion is that of its own last tick.
+    level: step dt0 / 2^level. bound: its criterion, an index into ``step_control.CRITERIA``.
     last_tick: when the body was last advanced.
     slot: impulse [N s] and its moment about the body's centre [N m s] that face f of body i has
     gathered since then, entry 4 i + f.
     broken_tick: when a bond was released, NEVER while it holds. exposed_tick: since when a face
     carries contact spheres; with contact only.
-    bond_heat: energy that dashpots, slip and release have taken from each bond [J]; not for bonds
-    that are merely elastic.
-    contact_heat: energy that sphere dashpots and friction have taken, and energy that releases
-    have injected [J], booked to the first body of a pair; with contact only.
-    injected_tick: last tick whose releases have been booked there.
-    load_work: work [J], one component a load and a last one for supports; load_impulse: what all
-    of them gave a body (linear, and angular about the origin). tick: present time. bad_body:
-    lowest body out of bounds, body_count if none.
+    bond_heat: energy taken from each bond by dashpots, slip and release [J]; not for elastic bonds.
+    contact_heat: energy taken by sphere dashpots and by friction, and energy injected by releases
+    [J], booked to the first body of a pair; with contact only. injected_tick: last tick whose
+    releases have been booked there.
+    load_work: work [J], one component a load and a last one for supports; load_impulse: total
+    impulse of all of them on a body (linear, and angular about the origin). tick: present time.
+    bad_body: lowest body out of bounds, body_count if none.
     """
 
-    def __init__(self, tables):
+    def __init__(self, tables: Tables):
         n, bonds = tables.capacity.bodies, tables.capacity.bonds
         self.tables = tables
         self.position = ti.Vector.field(3, real, shape=n)
@@ -59,7 +64,7 @@ class State:
         self.bad_body = ti.field(ti.i32, shape=())
         self.max_speed2 = ti.field(real, shape=())
 
-    def load(self, model, max_speed):
+    def load(self, model: Model, max_speed: float) -> None:
         """Put the bodies where the mesh has them, at rest; all fields are zero before."""
         n = model.body_count
         if self.tables.has_contact:
@@ -69,15 +74,22 @@ class State:
         assign(self.bad_body, n)
         self.set_motion(model.centre, np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)))
 
-    def set_motion(self, position, orientation, velocity=None, spin=None):
+    def set_motion(
+        self,
+        position: ArrayLike,
+        orientation: ArrayLike,
+        velocity: Optional[ArrayLike] = None,
+        spin: Optional[ArrayLike] = None,
+    ) -> None:
         """Set the motion of all bodies.
 
         position (n, 3) [m], orientation (n, 4) unit quaternions, velocity (n, 3) [m/s] and spin
         (n, 3) [rad/s] in world axes, zero by default.
         """
         still = np.zeros((self.body_count, 3))
-        arrays = (position, orientation, still if velocity is None else velocity)
-        arrays = (*arrays, still if spin is None else spin)
+        velocity = still if velocity is None else velocity
+        spin = still if spin is None else spin
+        arrays = (position, orientation, velocity, spin)
         self._write_motion(*(np.ascontiguousarray(a, dtype=np.float64) for a in arrays))
 
     @ti.func
@@ -120,13 +132,13 @@ class State:
         """Bodies of the scene."""
         return int(values(self.tables.body_count))
 
-    def expose(self, topology):
-        """Let all outer faces carry contact spheres from the start, beside those that do."""
+    def expose(self, topology: Topology) -> None:
+        """Put contact spheres on all outer faces from the start."""
         marks = values(self.exposed_tick)
         marks[4 * topology.outer_body + topology.outer_face] = 0
         assign(self.exposed_tick, marks)
 
-    def motion(self):
+    def motion(self) -> dict[str, np.ndarray]:
         """Arrays of the bodies' motion by name.
 
         position, velocity, spin, angular_momentum (n, 3), orientation (n, 4), rotation (n, 3, 3)
@@ -159,7 +171,7 @@ class State:
                 table[i, 16 + 3 * r + c] = rotation[r, c]
             table[i, 25] = ti.cast(self.level[i], ti.f64)
 
-    def fields(self):
+    def fields(self) -> dict[str, ti.Field]:
         """Every field that changes, by name, the bound effects' state included."""
         own = {k: v for k, v in vars(self).items() if isinstance(v, (ti.Field,))}
         for effect in self.tables.effects:

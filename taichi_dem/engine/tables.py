@@ -1,16 +1,21 @@
 """Constant tables of the scene that an engine holds, as fields, and the effects bound to them."""
 
+from collections.abc import Iterable
+from typing import Any, Optional
+
 import numpy as np
 import taichi as ti
 
-from taichi_dem.effects.base import ABSENT, ROLES, SINGLE, bound
+from taichi_dem.effects.base import ABSENT, ROLES, SINGLE, Effect, bound
+from taichi_dem.engine.capacity import Capacity
+from taichi_dem.engine.model import Model
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.types import real
 
 
 @ti.data_oriented
 class Tables:
-    """Device side of a ``Model``: what kernels read and never write.
+    """Device side of a ``Model``, which kernels only read.
 
     body_count, bond_count: of the scene; fields have the capacity of the engine.
     mass [kg] and inertia [kg m^2] with their inverses, radius (of the ball around the body, [m])
@@ -31,7 +36,14 @@ class Tables:
         "face_spheres",
     )
 
-    def __init__(self, capacity, effects):
+    # Bound effects by role; null objects where the scene lists none, contact is None then.
+    tension: Any
+    shear: Any
+    dashpot: Any
+    friction: Any
+    contact: Any
+
+    def __init__(self, capacity: Capacity, effects: Iterable[Effect]):
         self.capacity = capacity
         self.body_count, self.bond_count = ti.field(ti.i32, shape=()), ti.field(ti.i32, shape=())
         self._declare_bodies(capacity.bodies)
@@ -79,7 +91,7 @@ class Tables:
         self.cluster = ti.Vector.field(4, real, shape=capacity.faces)
         self.extent = ti.field(real, shape=capacity.bodies)
 
-    def load(self, model):
+    def load(self, model: Model) -> None:
         """Take over a model; all fields are zero before."""
         assign(self.body_count, model.body_count)
         assign(self.bond_count, model.bond_count)
@@ -94,8 +106,8 @@ class Tables:
         for effect in self.effects:
             effect.load_scene(model)
 
-    def matched(self, model):
-        """Pairs of an effect bound here and the one of a model that it stands for.
+    def matched(self, model: Model) -> list[tuple[Any, Optional[Effect]]]:
+        """Pairs of an effect bound here and the corresponding one of a model.
 
         The latter is None for a null object.
         """

@@ -1,11 +1,16 @@
-"""Parts of an engine as their simulation sees them: its own data are on the device when asked."""
+"""Views of the parts of an engine: the data of their simulation are loaded before each access."""
 
+from typing import Any
+
+import numpy as np
 import taichi as ti
+from numpy.typing import ArrayLike
 from taichi.lang import impl
 from taichi.lang.matrix import MatrixField
 
 from taichi_dem.kit.allocation import array_of, assign, values
 from taichi_dem.kit.display import in_brief
+from taichi_dem.kit.engine_pool import Loan
 
 _OWN = ("taichi_dem", "ca_damper")
 
@@ -13,11 +18,11 @@ _OWN = ("taichi_dem", "ca_damper")
 class PartView:
     """A part of an engine on behalf of a simulation, which may share the engine with others.
 
-    Attributes and methods are those of the part; before any of them is reached, the simulation's
-    data are brought to the device. Fields come as ``FieldView``. Kernels see the part itself.
+    Attributes and methods are those of the part; before each access the simulation's data are
+    brought to the device. Fields are returned as ``FieldView``. Kernels see the part itself.
     """
 
-    def __init__(self, loan, path):
+    def __init__(self, loan: Loan, path: tuple[str, ...]):
         self.__dict__.update(_loan=loan, _path=path)
 
     def _part(self):
@@ -49,21 +54,21 @@ class PartView:
 
     @property
     def name(self) -> str:
-        """Name of the part; asked for also after its session has ended."""
+        """Name of the part; available also after its session has ended."""
         return self._part().name
 
 
 class FieldView:
-    """A field of an engine on behalf of a simulation: entries of its scene, no room behind them.
+    """A field of an engine on behalf of a simulation: only the entries of its scene.
 
     As a NumPy array by ``to_numpy()``; single entries by index, as those of a field.
     """
 
-    def __init__(self, loan, path):
+    def __init__(self, loan: Loan, path: tuple[Any, ...]):
         self._loan, self._path = loan, path
 
     @property
-    def field(self):
+    def field(self) -> ti.Field:
         """The field itself, with the data of the simulation in it."""
         self._loan.activate()
         if isinstance(self._path[0], ti.Field):
@@ -77,17 +82,17 @@ class FieldView:
         lengths = self._loan.engine.lengths
         return (lengths.get(shape[0], shape[0]), *shape[1:]) if shape else shape
 
-    def to_numpy(self):
+    def to_numpy(self) -> np.ndarray:
         """Copy of the entries."""
         found = values(self.field)
         return found[: self.shape[0]] if self.field.shape else found
 
-    def from_numpy(self, array):
+    def from_numpy(self, array: ArrayLike) -> None:
         """Write the first entries."""
         assign(self.field, array)
 
-    def fill(self, value):
-        """Give all entries of the scene a value."""
+    def fill(self, value: float) -> None:
+        """Set all entries of the scene to a value."""
         whole = self.to_numpy()
         whole[...] = value
         assign(self.field, whole)

@@ -22,7 +22,7 @@ from taichi.lang.util import to_numpy_type
 
 from taichi_dem.kit.errors import InputError
 
-#: Trees after which nothing new is begun; what has begun needs some more.
+#: Trees beyond which no new one is begun; a few more complete those begun.
 MOST_TREES = 480
 #: Share of the free memory that a tree may take.
 _SHARE = 0.9
@@ -75,7 +75,7 @@ class FieldTree:
         self.memory()[:] = 0
 
     def destroy(self) -> None:
-        """Give the memory back; the fields must not be used any more."""
+        """Free the memory; the fields must not be used any more."""
         _bases.pop(self._builder.root.ptr.id, None)
         _destroyed.add(self._builder.root.ptr.id)
         self._tree.destroy()
@@ -85,7 +85,7 @@ class FieldTree:
 #: Addresses of the trees of the session by their roots, and the session's program.
 _bases: dict = {}
 _bases_of = None
-#: Roots whose memory has been given back; Taichi goes on to list them.
+#: Roots whose memory has been freed; Taichi still lists them.
 _destroyed: set = set()
 
 
@@ -96,7 +96,7 @@ def _base(root) -> int:
 
 
 def _forget_other_sessions() -> None:
-    """Numbers of roots begin anew in each session."""
+    """Restart the numbers of roots, as each session does."""
     global _bases_of
     if _bases_of is not impl.get_runtime().prog:
         _bases_of = impl.get_runtime().prog
@@ -157,7 +157,7 @@ def assign(field: ti.Field, array: ArrayLike) -> None:
 
 
 def available_bytes() -> float:
-    """Memory that a new allocation may take, infinite where the system does not tell."""
+    """Memory available to a new allocation; infinite where the system does not report it."""
     found = [_free_memory()]
     with contextlib.suppress(OSError, ValueError):
         with (
@@ -262,7 +262,7 @@ def field_bytes() -> int:
 
 @ti.func
 def raise_to(field: ti.template(), value):
-    """Let a field of no dimension hold the largest of the values that a loop gives it."""
-    # Ask first: an atomic for every body costs as much as its rotation.
+    """Raise a field of no dimension to the largest value of a loop."""
+    # Compare first: an atomic for every body costs as much as its rotation.
     if value > field[None]:
         ti.atomic_max(field[None], value)

@@ -1,7 +1,7 @@
-"""Runs that are saved on their way and gone on with: when, into what file, and for whom it is.
+"""Checkpoints: when a run is saved, the file, and the identity that a resumed run must share.
 
-A file holds arrays by name and an identity: what a run has to share with it to go on from it.
-Nothing here knows what is simulated.
+A file holds arrays by name and an identity, words by name.
+Nothing here depends on the physics.
 """
 
 import hashlib
@@ -55,7 +55,7 @@ class Checkpoint:
                 positive(name, getattr(self, name))
 
     def marks(self, last: int, dt: float) -> set[int]:
-        """Steps of dt [s] from 0 to last at which it asks to be saved, a set.
+        """Steps of dt [s] from 0 to last at which the run is to be saved, a set.
 
         Raises InputError where they are more than a million.
         """
@@ -72,7 +72,7 @@ class Checkpoint:
 
 
 class SaveTimer:
-    """Whether a checkpoint is due, from what has passed since the last one."""
+    """Timer that tells whether a checkpoint is due."""
 
     def __init__(self, checkpoint: Checkpoint):
         self.every = (checkpoint.every_steps, checkpoint.every_s, checkpoint.every_wall_s)
@@ -100,9 +100,9 @@ class Interrupted(KeyboardInterrupt):
 
 
 class CtrlC:
-    """In its block the first Ctrl-C is only noted, in ``asked``; the second one interrupts.
+    """Notes the first Ctrl-C in its block, in ``asked``; the second one interrupts.
 
-    Python lets the main thread alone listen: in others Ctrl-C is what it was.
+    Python delivers signals to the main thread only: in others Ctrl-C is unchanged.
     """
 
     def __init__(self) -> None:
@@ -176,7 +176,7 @@ def read_checkpoint(path: FileName, identity: Mapping[str, str]) -> dict[str, np
 
 
 def _read(path):
-    """What the file says of itself, and its arrays; every part is checked against its sum."""
+    """Header of a file, and its arrays; every part is checked against its checksum."""
     path = path_name("checkpoint", path)
     if os.path.exists(path) and not os.path.isfile(path):
         what = "it is a folder" if os.path.isdir(path) else "it is no file"

@@ -17,7 +17,7 @@ from taichi_dem.kit.validation import shown
 
 #: Letters of a representation at a prompt.
 _LONGEST = 400
-#: Numbers of a sequence that are listed; longer ones are given by their ends.
+#: Longest sequence of numbers that is listed; longer ones are shown by their ends.
 _LISTED = 6
 _CELL = "text-align:left;padding:2px 12px 2px 0"
 _PICTURE = "max-width:100%"
@@ -46,7 +46,7 @@ def _short(value):
 
 
 def by_arguments(thing: object) -> str:
-    """Representation of an object that keeps what its class was called with, as such a call."""
+    """Representation of an object as the call that made it, from its attributes."""
     names = signature(type(thing)).parameters
     kept = {name: vars(thing).get(f"_{name}", vars(thing).get(name)) for name in names}
     texts = {name: _argument(value) for name, value in kept.items()}
@@ -55,7 +55,7 @@ def by_arguments(thing: object) -> str:
 
 
 def _argument(value):
-    """A plain value or a short vector as text; "" for what is none, such as a field."""
+    """A plain value or a short vector as text; "" for anything else, such as a field."""
     if isinstance(value, np.ndarray):
         value = tuple(value.tolist())
     return shown(value) if isinstance(value, (str, bool, int, float, tuple)) else ""
@@ -94,7 +94,7 @@ def _row(tag, cells):
 
 
 def embedded(png: bytes, alt: str) -> str:
-    """HTML of a PNG image, bytes, that brings its data along; alt: what it shows in words."""
+    """HTML of a PNG image with its data embedded; alt: description in words."""
     data = base64.b64encode(png).decode("ascii")
     source = f"data:image/png;base64,{data}"
     return f'<img style="{_PICTURE}" alt="{html.escape(alt)}" src="{source}">'

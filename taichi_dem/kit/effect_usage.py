@@ -1,4 +1,4 @@
-"""What an effect did in a run, and which of them a user may leave out; plain data, no physics."""
+"""Activity of effects in a run, and advice on those to leave out; plain data, no physics."""
 
 from dataclasses import dataclass
 from typing import Optional
@@ -8,14 +8,14 @@ from taichi_dem.kit.display import in_brief
 
 @dataclass(frozen=True)
 class EffectUse:
-    """What one effect did.
+    """Activity of one effect.
 
-    effect: its name. what: the events in words. events: how many, of at most ``of`` (0 where there
-    is no most). energy_J: taken or given, None where it is not booked. share: of ``whole``, in
-    words; None where there is nothing to compare with. steers: whether it directs the rest even
-    where it takes little, as a crack does: then only one that never acted can be left out. kept:
-    why it cannot be left out whatever was counted, in words, or "". rounding: whether all that was
-    booked is no more than the rounding of numbers may leave; then no event is counted.
+    effect: its name. what: the events in words. events: their number, of at most ``of`` (0 for no
+    limit). energy_J: taken or given, None where it is not booked. share: of ``whole``, in words;
+    None where there is nothing to compare with. steers: whether it directs the rest even where it
+    takes little, as a crack does: then only one that never acted can be left out. kept: reason to
+    keep it whatever was counted, in words, or "". rounding: whether the booked energy is no more
+    than rounding errors; then no event is counted.
     """
 
     effect: str
@@ -95,7 +95,7 @@ class Advice:
         return in_brief(self, *(f"{word} {', '.join(of)}" for word, of in lists.items() if of))
 
     def __str__(self):
-        """A line for every effect, then what was missed."""
+        """A line for every effect, then one for every missing effect."""
         lines = [self._line(use) for use in self.uses]
         return "\n".join([*lines, *(f"missed     {finding}" for finding in self.missing)])
 

@@ -1,11 +1,11 @@
-"""Engines of a session: what is compiled once for a structure and then runs any scene of it.
+"""Engines of a session: each is compiled once for a structure and runs any scene of it.
 
 An engine owns the fields and kernels of one structure, with a capacity. A scene that fits is loaded
 into it in milliseconds; a larger one gets a larger engine. Several scenes may be alive on one
-engine at once: they take turns, and the data of those that wait are kept aside, bit for bit.
+engine at once: they take turns, and the data of inactive ones are kept aside, bit for bit.
 
 Each kind of engine has an ``EnginePool``. A simulation borrows an engine from it as a ``Loan`` and
-asks ``loan.activate()`` before it touches a field.
+calls ``loan.activate()`` before it touches a field.
 """
 
 import weakref
@@ -22,13 +22,13 @@ from taichi_dem.kit.field_memory import FieldMemory
 
 
 class Engine:
-    """Base of engines: fields in one ``FieldTree`` and who has data in them.
+    """Base of engines: fields in one ``FieldTree``, and the present owner of their data.
 
     capacity: tuple of whole numbers, the most that fits. Derived classes declare all of their
     fields in ``declare``, which is called once. tree: the fields' memory.
     """
 
-    #: What to do where the machine lacks the memory, as the end of a sentence.
+    #: Advice where the machine lacks the memory, as the end of a sentence.
     advice = "take a smaller one"
 
     def __init__(self, structure: Any, capacity: Iterable[int]):
@@ -48,7 +48,7 @@ class Engine:
         return True
 
     def enter(self, scene: Any) -> None:
-        """Note on the host whose data are coming to the device."""
+        """Update the host side for the scene whose data are loaded."""
 
     def fits(self, size: Iterable[int]) -> bool:
         """Whether so many of each find room."""
@@ -73,7 +73,7 @@ class _WholeTree:
         return self.tree.memory().copy()
 
     def write(self, saved):
-        """Give all fields their bytes back."""
+        """Restore the bytes of all fields."""
         ti.sync()
         self.tree.memory()[:] = saved
 
@@ -93,7 +93,7 @@ class _FieldByField:
         return [memory.read() for memory in self.memories]
 
     def write(self, saved):
-        """Give all fields their values back."""
+        """Restore all fields."""
         for memory, arrays in zip(self.memories, saved):
             memory.write(arrays)
 
@@ -131,7 +131,7 @@ class Loan:
         if holder is self:
             return
         if not self.engine.accepts(self.scene):
-            # Another owner has had the kernels compiled with numbers of its own.
+            # The kernels are compiled with numbers of another owner.
             self.engine = self.pool.another(self.engine, self.scene)
             self.activate()
             return
@@ -164,7 +164,7 @@ class LoanMemory:
         return self._memory().misfit(arrays)
 
     def write(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """Give all fields their values back."""
+        """Restore all fields."""
         self._memory().write(arrays)
 
 

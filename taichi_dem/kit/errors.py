@@ -2,7 +2,7 @@
 
 
 class InputError(ValueError):
-    """What the user gave cannot be used; the sentence names it, its value and what is allowed."""
+    """Invalid input; the sentence names the argument, its value and the allowed range."""
 
 
 class SimulationDiverged(RuntimeError):

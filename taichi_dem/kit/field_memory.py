@@ -13,7 +13,7 @@ from taichi.lang.util import to_numpy_type
 
 from taichi_dem.kit.allocation import array_of, in_tree
 
-#: What is looked into for fields: all objects but those of these libraries.
+#: Libraries whose objects are not searched for fields.
 _FOREIGN = ("taichi", "numpy", "builtins")
 
 
@@ -45,7 +45,7 @@ def fields_of(root: object) -> list[FieldOf]:
 
 
 def _members(thing, kind):
-    """What hangs on an object, as (name, kind of a field there, member)."""
+    """Members of an object, as (name, kind of a field there, member)."""
     if isinstance(thing, StructField):
         thing = thing.field_dict
     if isinstance(thing, dict):
@@ -90,7 +90,7 @@ class FieldMemory:
         return self.views[name] if name in self.views else self.fields[name].to_numpy()
 
     def misfit(self, arrays: Mapping[str, np.ndarray]) -> str:
-        """Name of a field that arrays, as ``read`` gave them, lack or do not fit; else ""."""
+        """Name of a field that the arrays of ``read`` lack or do not fit; else ""."""
         for name, field in self.fields.items():
             shape, array = _shape(field), arrays.get(name)
             if array is None or array.dtype != to_numpy_type(field.dtype):
@@ -100,7 +100,7 @@ class FieldMemory:
         return ""
 
     def write(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """Give all fields their values back, from what ``read`` gave and ``misfit`` accepts."""
+        """Restore all fields from arrays that ``read`` returned and ``misfit`` accepts."""
         ti.sync()
         for name, field in self.fields.items():
             whole = np.zeros(_shape(field), arrays[name].dtype)
@@ -112,7 +112,7 @@ class FieldMemory:
 
 
 def without_end(array: np.ndarray) -> np.ndarray:
-    """The array without what is zero in all bits at its end; lists have room to spare."""
+    """The array without trailing entries that are zero in all bits; lists have spare room."""
     if array.ndim == 0 or array.size == 0:
         return array
     in_bytes = np.ascontiguousarray(array).view(np.uint8).reshape(len(array), -1)

@@ -41,7 +41,7 @@ def renamed_when_done(path: FileName) -> Iterator[str]:
     folder, name = os.path.split(path)
     if not os.path.isdir(folder or "."):
         raise InputError(f"cannot write {path}: there is no folder {folder}")
-    root, ending = os.path.splitext(name)  # kept, since it tells some writers the format
+    root, ending = os.path.splitext(name)  # kept, since some writers derive the format from it
     temporary = os.path.join(folder, f".{root}.{os.getpid()}.part{ending}")
     try:
         yield temporary

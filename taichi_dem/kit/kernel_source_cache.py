@@ -1,9 +1,9 @@
 """Cache of source lines, so that Taichi reads kernels in half the time.
 
-For the message of an error that may come it notes, at every name and operator, the line and a mark
-below it, broken at 80 characters; and wherever a function is called it takes its source apart to
-find where it ends. Together that is half of the time in which it reads the kernels of a step, each
-time a program starts. What comes of it is kept here.
+For a possible error message Taichi notes, at every name and operator, the source line and a mark
+below it, broken at 80 characters; and wherever a function is called it parses its source to find
+its end. Together that is half of the time in which it reads the kernels of a step, at each start of
+a program. The results are cached here.
 """
 
 import functools
@@ -25,7 +25,7 @@ def broken(text: str, width: int) -> tuple[str, ...]:
 
 
 class RememberingWrapper(textwrap.TextWrapper):
-    """A ``textwrap.TextWrapper`` with the usual options that looks up what it broke before."""
+    """A ``textwrap.TextWrapper`` with the usual options that caches its results."""
 
     def wrap(self, text: str) -> list[str]:
         """Lines of a text, a list."""
@@ -33,12 +33,12 @@ class RememberingWrapper(textwrap.TextWrapper):
 
 
 def remembering(find: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """A function's source lines and where they begin, as find gives them, each looked for once."""
+    """Source lines of a function and their first number, as from find; cached."""
     cached = {}
 
     def lines(function):
         """Source lines of a function and the number of the first."""
-        # Equal code of two files may differ in what is no code: annotations.
+        # Equal code of two files may differ in annotations, which are not part of it.
         key = (function.__code__.co_filename, function.__code__)
         if key not in cached:
             cached[key] = find(function)
@@ -49,7 +49,7 @@ def remembering(find: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
 
 def remember() -> None:
-    """Let Taichi use both, where it has them by the names of Taichi 1.7; once is enough."""
+    """Install both caches in Taichi, where it has the names of Taichi 1.7."""
     if hasattr(ast_transformer_utils, "TextWrapper"):
         ast_transformer_utils.TextWrapper = RememberingWrapper
     find = getattr(kernel_impl, "getsourcelines", None)

@@ -1,4 +1,4 @@
-"""Lists of what a package offers, made from its modules and their docstrings.
+"""Lists of the contents of a package, made from its modules and their docstrings.
 
 ``python -m taichi_dem`` and ``python -m ca_damper`` print them. A section is a title and rows
 (name, line); names are dotted, as ``import`` and ``python -m pydoc`` take them.
@@ -55,7 +55,7 @@ def described(prefix: str, owner: object, names: Iterable[str]) -> list[Row]:
 
 
 def own(module: ModuleType, kind: Callable[[object], bool]) -> list[str]:
-    """Names of what a module itself defines in public, in order; kind: such as inspect.isclass."""
+    """Public names that a module itself defines, in order; kind: such as inspect.isclass."""
     return [
         name
         for name, thing in vars(module).items()
@@ -87,7 +87,7 @@ def experiments(root: Path) -> list[Row]:
 
 
 def documentation(root: Path) -> list[Row]:
-    """Rows of pages by their first headings: of a checkout, or what an installation has of them."""
+    """Rows of pages by their first headings, of a checkout or of an installation."""
     rows = [("python -m pydoc NAME", "all that a name above does: arguments, units, errors")]
     if not _is_checkout(root):
         about = root.glob("taichi_dem-*.dist-info/METADATA")
@@ -103,7 +103,8 @@ def _other_lists(package):
 
 
 def _is_checkout(root):
-    return (root / "pyproject.toml").is_file() and (root / "experiments" / "_cli.py").is_file()
+    marks = "pyproject.toml", "experiments/_gallery_pages.txt"
+    return all((root / mark).is_file() for mark in marks)
 
 
 def _line(owner, name):
@@ -137,6 +138,6 @@ def _section(section):
 
 
 def _show(text):
-    """Print, and end in silence when nobody reads on, as in ``| head``."""
+    """Print, and end silently when the reader has left, as in ``| head``."""
     with lasting_output():
         print(text)

@@ -37,7 +37,7 @@ STYLE = {
     "ytick.labelsize": 8.5,
 }
 
-#: Okabe and Ito's colours, told apart by colour-blind readers too.
+#: Okabe and Ito's colours, which colour-blind readers can distinguish.
 BLUE, RED, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
 ORANGE, SKY, BLACK, GREY = "#E69F00", "#56B4E9", "#222222", "#8A8A8A"
 BROWN, VIOLET = "#8C6D31", "#6A51A3"
@@ -53,7 +53,7 @@ class MethodStyle:
     line: str = "-"
 
 
-#: Styles by name; what the same picture shows has colours of its own.
+#: Styles by name; those that share a picture have different colours.
 STYLES = {
     "uniform": MethodStyle("paper's rule, one step for all", RED, "o"),
     "multirate_held": MethodStyle("paper's rule, multirate", BLUE, "s", "--"),
@@ -147,7 +147,7 @@ class _PlainLogFormatter(LogFormatterSciNotation):
 
 
 def _write_plain_numbers(figure):
-    """Give logarithmic axes that have matplotlib's own formatters plain numbers."""
+    """Label logarithmic axes that have matplotlib's own formatters with plain numbers."""
     for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
         for level, give in (
             ("major", axis.set_major_formatter),

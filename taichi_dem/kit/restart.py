@@ -1,4 +1,4 @@
-"""Runs that save themselves: what a run consists of, when it is saved, how one goes on from it."""
+"""Saving and resuming runs: the parts of a run, the times of saving, and how a run is resumed."""
 
 import os
 from collections.abc import Callable, Mapping
@@ -29,7 +29,7 @@ class Memory(Protocol):
         """Name of a field that arrays lack or do not fit; else ""."""
 
     def write(self, arrays: Mapping[str, np.ndarray], /) -> None:
-        """Give all fields their values back."""
+        """Restore all fields."""
 
 
 class Owner(Protocol):
@@ -39,11 +39,11 @@ class Owner(Protocol):
         """Arrays by name."""
 
     def resume(self, saved: Mapping[str, np.ndarray], /) -> None:
-        """Take over the arrays that ``saved`` gave."""
+        """Restore the arrays that ``saved`` returned."""
 
 
 class RunSnapshot:
-    """All of a run that changes: the fields on the device and what its owners hold beside them.
+    """All changing data of a run: fields on the device, and data of its owners on the host.
 
     identity: what two runs must share for one to go on from the other, words by name. memory: of
     the fields. owners: by name.
@@ -60,7 +60,7 @@ class RunSnapshot:
         write_checkpoint(path, self.identity, arrays)
 
     def restore(self, arrays: Mapping[str, np.ndarray], path: FileName) -> None:
-        """Put the run where it was saved, with the arrays that ``opened`` gave for a path.
+        """Restore the run from the arrays that ``opened`` returned for a path.
 
         Raises InputError where the fields are not those of this run.
         """
@@ -82,7 +82,7 @@ def _under(part, arrays):
 
 
 class CheckpointWriter:
-    """Saves a run when its checkpoint asks for it, and on Ctrl-C; its block listens for that.
+    """Saves a run when its checkpoint is due, and on Ctrl-C within its block.
 
     checkpoint: a Checkpoint. snapshot: of the run, a ``RunSnapshot``. now: gives its present step
     and time [s]. All methods are called between two steps only.
@@ -104,11 +104,11 @@ class CheckpointWriter:
         self.ctrl_c.__exit__(*error)
 
     def marks(self, last: int, dt: float) -> set[int]:
-        """Steps of dt [s] up to the last at which to look, a set."""
+        """Steps of dt [s] up to the last at which a save may be due, a set."""
         return self.checkpoint.marks(last, dt)
 
     def save_if_needed(self) -> None:
-        """Save the run if that is due. Raises Interrupted after Ctrl-C, InputError."""
+        """Save the run if a save is due. Raises Interrupted after Ctrl-C, InputError."""
         step, time_s = self.now()
         if self.ctrl_c.asked or self.timer.now(step, time_s):
             self.save()
@@ -116,7 +116,7 @@ class CheckpointWriter:
             raise Interrupted(time_s, self.checkpoint.path)
 
     def save(self) -> None:
-        """Save the run. Raises InputError that tells what the last good checkpoint is."""
+        """Save the run. Raises InputError that names the last good checkpoint."""
         try:
             self.snapshot.write(self.checkpoint.path)
         except InputError as error:
@@ -126,7 +126,7 @@ class CheckpointWriter:
         self.timer.saved_at(step, time_s)
 
     def last_good(self) -> str:
-        """What is left to go on from, as the end of a sentence."""
+        """The last good checkpoint, as the end of a sentence."""
         if self.saved_s is None:
             return "; this run has saved no checkpoint before"
         path = os.fspath(self.checkpoint.path)
@@ -162,7 +162,7 @@ def opened(
     resume: Optional[FileName],
     identity: Callable[[], Mapping[str, str]],
 ) -> Optional[dict[str, np.ndarray]]:
-    """Look, before anything dear is done, whether a run can be saved and gone on with.
+    """Check, before any costly work, that a run can be saved and resumed.
 
     checkpoint: a Checkpoint or None. resume: file to go on from, or None. identity: gives that of
     the run. Returns the arrays of the file, None without. Raises InputError.

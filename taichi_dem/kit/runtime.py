@@ -19,7 +19,7 @@ from typing import Optional
 
 os.environ.setdefault("TI_SKIP_VERSION_CHECK", "ON")
 os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
-# TI_ARCH would overrule the architecture that the caller asks for without a word.
+# TI_ARCH would silently overrule the architecture that the caller requests.
 os.environ.pop("TI_ARCH", None)
 if not os.environ.get("HOME"):
     os.environ["HOME"] = tempfile.mkdtemp(prefix="taichi-home-")
@@ -38,7 +38,7 @@ ARCHITECTURES = ("cpu", "cuda")
 
 @dataclass(frozen=True)
 class Settings:
-    """What Taichi was started with.
+    """Settings with which Taichi was started.
 
     arch: "cpu" or "cuda". threads: CPU threads of parallel loops. debug: bounds checks in kernels.
     """
@@ -57,7 +57,7 @@ _on_clear: list[Callable[[], object]] = []
 
 
 class Session:
-    """What one start of Taichi brought about; objects that own fields remember theirs.
+    """One start of Taichi; objects that own fields remember theirs.
 
     program: Taichi's own object of it. thread: the one that started it, the only one that may use
     it. cleared: whether its engines have been given back since.
@@ -97,7 +97,7 @@ def stop() -> None:
 
 
 def clear() -> None:
-    """Give back the memory of all engines; simulations and batches made so far become invalid.
+    """Free the memory of all engines; simulations and batches made so far become invalid.
 
     Kernels compile anew afterwards; Taichi itself goes on. Does nothing before the first start.
     """
@@ -127,7 +127,7 @@ def session() -> Session:
 
 
 def check_session(made_in: Session, what: str) -> None:
-    """Raise InputError unless a session is the present one, unharmed, and asked by its thread.
+    """Raise InputError unless a session is the present one, intact, and used by its own thread.
 
     what: whose session it is, in words, such as "simulation".
     """
@@ -179,7 +179,7 @@ def _checked(arch, threads, debug):
 
 
 def _initialise(wanted):
-    # Taichi falls back to the CPU with a mere warning: ask first, and read back what it took.
+    # Taichi falls back to the CPU with a mere warning: check first, and read back its choice.
     if wanted.arch == "cuda" and not cuda_present():
         raise InputError("arch 'cuda' was asked for, but no CUDA device answers here: use 'cpu'")
     _remove_stale_lock()
@@ -197,7 +197,7 @@ def _initialise(wanted):
             advanced_optimization=False,
             cpu_max_num_threads=wanted.threads,
             debug=wanted.debug,
-            # Below errors Taichi only tells of a cache that another process is writing.
+            # Below errors Taichi only reports a cache that another process is writing.
             log_level=ti.ERROR,
             random_seed=0,
         )

@@ -7,7 +7,7 @@ from typing import TypeVar, cast
 
 from taichi_dem.kit.errors import InputError
 
-#: What the function gives.
+#: Result of the function.
 Value = TypeVar("Value")
 
 
@@ -16,7 +16,7 @@ class _Ended(Exception):
 
 
 def run_with_timeout(seconds: float, call: Callable[[], Value], sentence: str) -> Value:
-    """What call() returns or raises; InputError with a sentence where it takes longer [s].
+    """Return or raise as call() does; InputError with a sentence where it takes longer [s].
 
     It runs in a thread of its own, which is ended then: code that spins in Python ends at once,
     other code when it comes back to Python.
@@ -25,7 +25,7 @@ def run_with_timeout(seconds: float, call: Callable[[], Value], sentence: str) -
     errors: list[BaseException] = []
 
     def work():
-        """Keep what comes out; SystemExit too, as some readers end a program."""
+        """Keep the result or exception; SystemExit too, as some readers end a program."""
         try:
             values.append(call())
         except (Exception, SystemExit) as error:

@@ -1,4 +1,4 @@
-"""Checks of what a user gives: the value comes back, or InputError names it and what is allowed."""
+"""Checks of user input: the value is returned, or InputError names it and the allowed range."""
 
 import math
 import numbers
@@ -10,14 +10,14 @@ from taichi_dem.kit.errors import InputError
 
 #: Name of a file or folder.
 FileName = Union[str, os.PathLike]
-#: What a check of one value gives.
+#: Result of the check of one value.
 Checked = TypeVar("Checked")
 
 #: Positive numbers lie between these, so that products of a few of them stay finite: beyond, one
 #: overflows to infinity or falls to zero, and a run ends in NaN without a reason. In SI units
-#: nothing that there is comes near.
+#: no real quantity comes near.
 SMALLEST, LARGEST = 1e-60, 1e60
-#: Value of an argument ``progress`` that asks for a bar where somebody watches.
+#: Value of an argument ``progress`` that asks for a bar on a terminal or in Jupyter.
 AUTO = "auto"
 #: Letters of a value that a sentence quotes.
 _QUOTED = 80

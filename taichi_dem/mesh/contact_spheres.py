@@ -12,7 +12,7 @@ from taichi_dem.kit.display import by_fields
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.tetrahedra import all_faces, area_vectors
 
-#: Steps towards the centre of a small ball around spheres, and what stands for no distance [m].
+#: Steps towards the centre of a small ball around spheres, and a negligible distance [m].
 _CENTRINGS, _SMALL = 10, 1e-300
 
 

@@ -1,4 +1,4 @@
-"""What a mesh file holds beside tetrahedra and groups of faces, in words; meshes as meshio's."""
+"""Report of contents of a mesh file beside tetrahedra and groups of faces; meshes as meshio's."""
 
 import os
 import re
@@ -11,7 +11,7 @@ import numpy as np
 from taichi_dem.kit.errors import InputError
 from taichi_dem.mesh.split import shape_of
 
-#: Name of a group that is not read, and what it is of.
+#: Name of a group that is not read, and the kind of its members.
 Unread = tuple[str, str]
 
 #: Gmsh's groups by their dimension.
@@ -39,7 +39,7 @@ _IN_A_GROUP = (
 
 
 def refuse_without_tetrahedra(raw: Any, path: str, printed: str = "") -> NoReturn:
-    """Raise InputError for a file that has no tetrahedra, with what to do about it.
+    """Raise InputError for a file that has no tetrahedra, with a remedy.
 
     printed: what the reader wrote to the terminal.
     """
@@ -62,7 +62,7 @@ def _remedy(raw, path):
 
 
 def _as_stl(name):
-    """What to do first, and the name of the STL then: one that needs no quotes anywhere."""
+    """First step of the remedy, and the name of the STL then: one that needs no quotes anywhere."""
     if not name.lower().endswith(".stl") or not name.isprintable():
         return f"save it as {_PLAIN}, ", _PLAIN
     if re.fullmatch(r"\w[\w.-]*", name):
@@ -79,7 +79,7 @@ def cells_counted(count: int, kind: str) -> str:
 
 
 def cells_dropped(printed: str) -> str:
-    """A sentence about cells that meshio passes over, or ""; printed: what it wrote to say so."""
+    """A sentence about cells that meshio ignores, or ""; printed: its message."""
     if "cells that meshio cannot handle" not in " ".join(printed.split()):
         return ""
     return f"it {_UNKNOWN}, and these are not read: {_SPLIT}"
@@ -129,7 +129,7 @@ def is_quadrangle(kind: str) -> bool:
 
 
 def unread_groups(raw: Any) -> tuple[Unread, ...]:
-    """Groups that are not of faces, as pairs of name and what they are of."""
+    """Groups that are not of faces, as pairs of name and kind of member."""
     names = {(int(tag), int(dimension)): name for name, (tag, dimension) in raw.field_data.items()}
     found = []
     for block, tags in zip(raw.cells, raw.cell_data.get("gmsh:physical", ())):
@@ -153,7 +153,7 @@ def surfaces_of_abaqus(path: str) -> tuple[Unread, ...]:
 
 
 def parts_dropped(raw: Any, groups: Sequence[Unread]) -> list[str]:
-    """Sentences about what is not read and may change a result; groups: from ``unread_groups``.
+    """Sentences about unread contents that may change a result; groups: from ``unread_groups``.
 
     One group of volumes says nothing that the tetrahedra do not say.
     """

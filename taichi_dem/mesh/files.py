@@ -127,7 +127,7 @@ def write_pvd(path: FileName, times_s: Sequence[float], file_names: Sequence[str
 
 
 def _read_raw(path):
-    """The file as meshio sees it, and what meshio printed.
+    """The mesh as meshio reads it, and the text that meshio printed.
 
     Whatever goes wrong inside becomes one InputError.
     """
@@ -155,7 +155,7 @@ def _mesh(raw, scale, weld_tolerance):
     """The mesh of a file's cells, cut once their points are welded; raw gets the welded numbers."""
     notes: list[str] = []
     welding: list[str] = []
-    with np.errstate(over="ignore"):  # checked_mesh refuses what is no finite number
+    with np.errstate(over="ignore"):  # checked_mesh refuses numbers that are not finite
         points = scale * np.asarray(raw.points, dtype=np.float64)
     tetrahedra = _tetrahedra(raw, notes)
     label = welded_numbers(points, tetrahedra, weld_tolerance, welding)
@@ -168,7 +168,7 @@ def _mesh(raw, scale, weld_tolerance):
 
 
 def _renumber(raw, label):
-    """Give the solid cells and faces other point numbers, label (n,) by the old ones.
+    """Renumber the points of solid cells and faces, label (n,) by the old numbers.
 
     Numbers of no point stay, to be refused later.
     """
@@ -180,7 +180,7 @@ def _renumber(raw, label):
 
 
 def _cell_at_fault(raw):
-    """What an error means for the file's cells, where some have been cut; else ""."""
+    """Meaning of an error for the file's cells, where some have been cut; else ""."""
     cut = [block for block in raw.cells if len(block.data) and shape_of(block.type)]
     finite = np.isfinite(raw.points).all() and np.shape(raw.points)[1:] == (3,)
     for block in cut if finite else ():

@@ -9,7 +9,7 @@ from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import renamed_when_done
 from taichi_dem.kit.validation import FileName, finite, path_name, positive, shown
 
-#: Everything that could make two runs of the same Gmsh differ, and what may shape the elements.
+#: Options that could make two runs of the same Gmsh differ, or change the elements.
 _OPTIONS = {
     "General.Terminal": 0,
     "General.NumThreads": 1,

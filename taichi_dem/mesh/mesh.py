@@ -17,7 +17,7 @@ from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.parts_in_files import parts_of
 from taichi_dem.mesh.weld import COINCIDENT, weld_labels
 
-#: Below this share of (longest edge)^3 a volume counts as zero: what round-off leaves of it.
+#: Share of (longest edge)^3 below which a volume counts as zero, as it may be round-off.
 FLAT = 1e-12
 
 #: The extent of a mesh lies between these [m]: a moment of inertia is its fifth power.
@@ -88,14 +88,14 @@ def checked_mesh(
     source: FileName = "",
     weld_tolerance: float = 0.0,
 ) -> Mesh:
-    """Build a Mesh from arrays, mend what can be mended (and say so), refuse the rest.
+    """Build a Mesh from arrays; repair and report small defects, refuse others.
 
-    points: (n, 3) [m].  tetrahedra: (m, 4) point indices, either orientation.
-    groups: name -> (k, 3) point indices of outer faces, either orientation.
-    weld_tolerance: points not farther apart [m] become one; 0 welds nothing.
+    points: (n, 3) [m].  tetrahedra: (m, 4) point indices, either orientation. groups: name -> (k,
+    3) point indices of outer faces, either orientation. weld_tolerance: points not farther apart
+    [m] become one; 0 welds nothing.
 
-    Mended: negative volumes, points without a tetrahedron, faces twice in a group.
-    Raises InputError, with the numbers (counted from 0) of what is wrong.
+    Repaired: negative volumes, points without a tetrahedron, faces twice in a group.
+    Raises InputError, with the numbers (counted from 0) of the defects.
     """
     places = _checked_points(points)
     corners = _checked_indices("tetrahedra", tetrahedra, 4, len(places))
@@ -199,7 +199,7 @@ def _refuse_extent(points):
 
 
 def _refuse_coincident(points):
-    """Refuse points at one place: bodies that look joined there would not be bonded."""
+    """Refuse coincident points: bodies that seem joined there would not be bonded."""
     distance = COINCIDENT * np.ptp(points, axis=0).max()
     pairs = geometry.close_pairs(points, distance) if distance > 0.0 else np.empty((0, 2))
     if len(pairs):

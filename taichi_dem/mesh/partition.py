@@ -44,7 +44,7 @@ def recut(cuts: ArrayLike, seconds: ArrayLike) -> np.ndarray:
 
 
 def share_costs(cost: ArrayLike, cuts: ArrayLike) -> np.ndarray:
-    """What every share takes, (workers, ...); cost (n, ...)."""
+    """Cost of every share, (workers, ...); cost (n, ...)."""
     start = np.zeros((1, *np.shape(cost)[1:]))
     return np.diff(np.concatenate([start, np.cumsum(cost, axis=0)])[np.asarray(cuts)], axis=0)
 

@@ -54,12 +54,12 @@ def any_overlap(low: np.ndarray, high: np.ndarray) -> bool:
 
 
 def may_meet(scene: Any, part: np.ndarray) -> bool:
-    """Whether parts of a scene at rest may come to meet, as far as can be known before a run.
+    """Whether parts of a scene at rest may meet, as far as can be known before a run.
 
-    Not where nothing moves them, and not where uniform acceleration is all that does. Else every
-    part may come as far from its box as ``NEARNESS`` says and as its loads and supports may carry
-    it (``Effect.travel``); what all parts have in common carries them side by side, unless it may
-    go anywhere, as gas. part: what ``parts_of`` gave.
+    They cannot where nothing moves them, or where uniform acceleration is all that does. Else every
+    part may move from its box by a share of its size (``NEARNESS``) and by the displacement that
+    its loads and supports may cause (``Effect.travel``); displacements common to all parts do not
+    count, unless they are unbounded in all directions, as with gas. part: from ``parts_of``.
     """
     drives = [effect for effect in scene.effects if effect.role in ("load", "support")]
     travels = np.array([effect.travel() for effect in drives]).reshape(-1, 2, 3)

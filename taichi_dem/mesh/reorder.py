@@ -1,4 +1,4 @@
-"""Bodies numbered along a curve that fills space: what touches lies near in memory too.
+"""Bodies numbered along a space-filling curve, so that neighbours are near in memory too.
 
 The numbers of a mesh generator leap through the block: half of all bonds of a Gmsh mesh of 20,000
 tetrahedra join bodies whose numbers differ by more than 3,400, against 5 along the curve, and a

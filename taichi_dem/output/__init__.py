@@ -1,1 +1,1 @@
-"""What a run leaves behind: series, frames, files and the result."""
+"""Output of a run: time series, frames and files."""

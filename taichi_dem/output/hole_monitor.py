@@ -22,7 +22,7 @@ class HoleMonitor:
         area = area_vectors(mesh.points, corners)
         middle = mesh.points[corners].mean(axis=1)
         weight = np.linalg.norm(area, axis=1)
-        # No wall face looks along the axis: it is the weakest direction among the normals.
+        # No wall face has a normal along the axis: it is the weakest direction among the normals.
         self.axis = np.linalg.eigh(area.T @ (area / weight[:, None]))[1][:, 0]
         self.axis_point = weight @ middle / weight.sum()
         self.bodies = np.unique(body)

@@ -1,4 +1,4 @@
-"""What a run leaves behind: time series, snapshots, ParaView files; written whole or not at all."""
+"""Output of a run: time series, snapshots, ParaView files; written whole or not at all."""
 
 import os
 import re
@@ -130,7 +130,7 @@ class Recorder:
         )
 
     def saved(self) -> dict[str, np.ndarray]:
-        """What a checkpoint holds of it, arrays by name: columns of rows, stacks of frames."""
+        """Data for a checkpoint, arrays by name: columns of rows, stacks of frames."""
         rows = {f"row.{name}": column for name, column in self.history().items()}
         stacks = {
             f"frame.{field.name}": np.array([getattr(frame, field.name) for frame in self.frames])
@@ -140,7 +140,7 @@ class Recorder:
         return {**rows, **stacks, "peak_speed": self.peak_speed}
 
     def resume(self, saved: Mapping[str, np.ndarray]) -> None:
-        """Take over what ``saved`` gave."""
+        """Restore the data that ``saved`` returned."""
         self.peak_speed = saved.get("peak_speed", self.peak_speed)
         rows = {k[4:]: column.tolist() for k, column in saved.items() if k.startswith("row.")}
         self.rows = [dict(zip(rows, values)) for values in zip(*rows.values())]

@@ -46,7 +46,7 @@ def add_within(held, more, bound):
     share = 1.0
     if square + 2.0 * along > left:
         root = ti.sqrt(along * along + square * left)
-        # Two ways to write one root of the quadratic: none subtracts what is nearly equal.
+        # Two ways to write one root of the quadratic: neither subtracts nearly equal numbers.
         if along > 0.0:
             share = left / (root + along)
         else:

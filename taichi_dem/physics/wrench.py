@@ -32,7 +32,7 @@ def cross_matrix(r):
 
 @ti.func
 def point_block(arm, law):
-    """What resists at one point: J^T law J, J = [1, -[arm]x] from the twist to its velocity.
+    """Block of a law at one point: J^T law J, J = [1, -[arm]x] from the twist to its velocity.
 
     arm: from where the twist is taken to the point [m]. law: symmetric, force per velocity.
     """

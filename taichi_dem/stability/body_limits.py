@@ -4,6 +4,8 @@ A body's rates change only where a bond breaks or a contact comes near or leaves
 listed, and their rates found anew at the start of the next substep.
 """
 
+from typing import TYPE_CHECKING, Any, Optional
+
 import numpy as np
 import taichi as ti
 
@@ -30,6 +32,13 @@ from taichi_dem.stability.step_control import (
     shorter,
 )
 
+if TYPE_CHECKING:
+    from taichi_dem.contact_search.contacts import Contacts
+    from taichi_dem.engine.model import Model
+    from taichi_dem.engine.state import State
+    from taichi_dem.engine.tables import Tables
+    from taichi_dem.methods import Method
+
 HIT, RELEASE, CLOSE = (1 << k for k in range(len(EVENTS)))
 #: With c min(1, LIMITED / X) no dashpot takes more than this in a step (X = 2 is unstable).
 LIMITED = 1.7
@@ -41,7 +50,7 @@ STOPS = 1.0
 
 @ti.data_oriented
 class StabilityLimits:
-    """Rates of every body, and the list of those whose rates must be found anew.
+    """Rates of every body, and the list of bodies whose rates must be updated.
 
     dashpot_table, spring_table: largest eigenvalue of the bonds' block by the set of intact
     bonds, [1/s] and [1/s^2]. bond_damping, contact_damping: rates of a body's dashpots [1/s].
@@ -76,7 +85,9 @@ class StabilityLimits:
 
     constant_fields = ("dashpot_table", "spring_table")
 
-    def __init__(self, tables, state, contacts, method):
+    def __init__(
+        self, tables: "Tables", state: "State", contacts: Optional["Contacts"], method: "Method"
+    ):
         self.tables, self.state, self.contacts = tables, state, contacts
         self.control = method.control
         self.controlled = method.control is not None
@@ -99,7 +110,7 @@ class StabilityLimits:
         if self.control is not None:
             self.wakes = sum(1 << k for k, event in enumerate(EVENTS) if event in rule.wake)
         self.contact_limits = None
-        if self.has_contact:
+        if contacts is not None:
             self.contact_limits = ContactLimits(tables, state, contacts)
         n = tables.capacity.bodies
         self.dashpot_table = ti.field(real, shape=(n, 16))
@@ -114,15 +125,16 @@ class StabilityLimits:
         self.listed_count = ti.field(ti.i32, shape=())
         self.woken = ti.field(ti.i32, shape=())
 
-    def load(self, model, method):
-        """Take the bonds of a model and the numbers of a method."""
+    def load(self, model: "Model", method: "Method") -> None:
+        """Load the bonds of a model and the numbers of a method."""
         rule = method.control or StepControl()
         assign(self.rule, np.array([method.dt0, rule.safety, rule.dashpot_floor]))
         assign(self.jump, rule.level_jump or 0)
+        distance: Any = method.distance
         if self.has_distance:
-            self.displacement.load(method.distance, method.dt0)
+            self.displacement.load(distance, method.dt0)
         if self.has_load:
-            self.leap.load(method.distance, method.dt0)
+            self.leap.load(distance, method.dt0)
         if self.counts["rotation"]:
             self.turn.load(rule.angle, method.dt0)
         if self.has_contact:
@@ -134,7 +146,7 @@ class StabilityLimits:
 
     @ti.func
     def count(self, low):
-        """Bodies whose rates must be found anew."""
+        """Number of bodies whose rates must be updated."""
         return self.listed_count[None]
 
     @ti.func
@@ -144,7 +156,7 @@ class StabilityLimits:
 
     @ti.func
     def notice(self, i, event):
-        """List body i, once, and remember what happened to it."""
+        """List body i, once, and note the event."""
         if ti.atomic_or(self.events[i], event) == 0:
             self.listed[ti.atomic_add(self.listed_count[None], 1)] = i
 
@@ -158,10 +170,10 @@ class StabilityLimits:
 
     @ti.func
     def notice_listed(self, p, entered, fresh):
-        """Count the contacts of a pair that a search lists: entered and fresh tell why, if not 0.
+        """Count the contacts of a pair that a search lists; entered, fresh: nonzero for the reason.
 
-        Entering the list does not change a body's limits: a search lists what may come near, and
-        how far it looks must not matter. Spheres that a break has just set free may touch already.
+        Entering the list does not change a body's limits, as results must not depend on the reach
+        of a search. Spheres that a break has just exposed may touch already.
         """
         if fresh != 0:
             self.notice_pair(p, self.contact_limits.count_within_margin(p), RELEASE)
@@ -225,7 +237,7 @@ class StabilityLimits:
 
     @ti.func
     def wanted(self, i, now):
-        """Level that body i wants at a time [s], and the criterion that asks for it.
+        """Wanted level of body i at a time [s], and its criterion.
 
         A body asks at every step: squares and tables spare it roots and quotients.
         """
@@ -243,10 +255,10 @@ class StabilityLimits:
 
     @ti.func
     def _push2(self, i, now):
-        """Square of the acceleration that the loads alone give body i [m^2/s^4].
+        """Square of the acceleration of body i by the loads alone [m^2/s^4].
 
-        The larger one of now and a largest step ahead: a body does not leap into a load that sets
-        in before its next update.
+        The larger one of now and a largest step ahead, for loads that set in before its next
+        update.
         """
         push2, step = 0.0, self.rule[0]
         for ahead in ti.static(range(2)):
@@ -259,24 +271,26 @@ class StabilityLimits:
 
     @ti.func
     def bond_share(self, i, step):
-        """Share of its bonds' dashpots that a step [s] of body i bears."""
+        """Share of its bonds' dashpots that is stable at a step [s] of body i."""
         return self._bonds_get(i, step) / ti.max(2.0 * step * self.bond_damping[i], 1e-200)
 
     @ti.func
     def contact_share(self, i, step):
-        """Share of its contacts' dashpots that a step [s] of body i bears, beside its bonds."""
+        """Share of its contacts' dashpots that is stable, beside its bonds, at a step [s]."""
         x = 2.0 * step * self.contact_damping[i]
         left = ti.min(STOPS, LIMITED - self._bonds_get(i, step))
         return ti.min(1.0, left / ti.max(x, 1e-200))
 
     @ti.func
     def _bonds_get(self, i, step):
-        """What the bonds take of LIMITED."""
+        """Part of LIMITED that the bonds take."""
         contacts = ti.min(FOR_CONTACTS, 2.0 * step * self.contact_damping[i])
         return ti.min(2.0 * step * self.bond_damping[i], LIMITED - contacts)
 
 
-def limits_for(tables, state, contacts, method):
+def limits_for(
+    tables: "Tables", state: "State", contacts: Optional["Contacts"], method: "Method"
+) -> Optional[StabilityLimits]:
     """Limits for a method; None where it neither controls steps nor limits dashpots."""
     wanted = getattr(method, "control", None) or getattr(method, "dashpot", "full") == "limited"
     return StabilityLimits(tables, state, contacts, method) if wanted else None

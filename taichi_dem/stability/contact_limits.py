@@ -1,7 +1,10 @@
 """Contacts counted before they touch, and the limits they set to a body's step."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import taichi as ti
+from numpy.typing import ArrayLike
 
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.types import mat3, real
@@ -10,16 +13,23 @@ from taichi_dem.physics.wrench import cross_matrix
 from taichi_dem.stability.mesh_limits import inverse_root
 from taichi_dem.timeline import MAX_LEVEL
 
+if TYPE_CHECKING:
+    from taichi_dem.contact_search.contacts import Contacts
+    from taichi_dem.engine.model import Model
+    from taichi_dem.engine.state import State
+    from taichi_dem.engine.tables import Tables
+
 #: Squarings of the block of near contacts: tr(A^32)^(1/32) exceeds its largest eigenvalue by at
 #: most 6^(1/32), 6 %, and is never below it.
 SQUARINGS = 5
 
 
-def contact_rates(pairs, counts, mass):
+def contact_rates(pairs: np.ndarray, counts: ArrayLike, mass: np.ndarray) -> np.ndarray:
     """Most sphere pairs that a body has with another, over its mass [1/kg], (body_count,).
 
     pairs: bodies that are near each other, (n, 2). counts: their sphere pairs, at least 1 counts.
-    mass: of the bodies [kg]. What one such pair allows, for a sentence; ``StepReport`` has bounds.
+    mass: of the bodies [kg]. An estimate from single pairs, for a sentence; ``StepReport`` has
+    bounds.
     """
     rates = np.zeros(len(mass))
     for bodies, count in zip(pairs, np.maximum(1, counts)):
@@ -43,16 +53,16 @@ def largest_eigenvalue(a, b, c):
 
 @ti.data_oriented
 class ContactLimits:
-    """Which sphere pairs count as contacts, and the block they form on each body.
+    """Sphere pairs that count as contacts, and the block they form on each body.
 
-    A sphere pair counts from the moment at which it could touch within some steps of the finer of
-    its bodies: it is evaluated once a step, and the coarser body is woken before the next time.
-    count: how many of the sphere pairs of a body pair count.
+    A sphere pair counts once it could touch within some steps of the finer of its bodies: it is
+    evaluated once a step, and the coarser body is woken before the next time. count: number of the
+    sphere pairs of a body pair that count.
     """
 
     constant_fields = ("ahead", "root_mass", "root_inertia")
 
-    def __init__(self, tables, state, contacts):
+    def __init__(self, tables: "Tables", state: "State", contacts: "Contacts"):
         self.tables, self.state, self.contacts = tables, state, contacts
         self.store = contacts.store
         self.ahead = ti.field(real, shape=MAX_LEVEL + 1)
@@ -61,8 +71,8 @@ class ContactLimits:
         self.root_mass = ti.field(real, shape=tables.capacity.bodies)
         self.root_inertia = ti.Matrix.field(3, 3, real, shape=tables.capacity.bodies)
 
-    def load(self, model, ahead):
-        """Take a model, and the time [s] that a step of level 0 looks ahead."""
+    def load(self, model: "Model", ahead: float) -> None:
+        """Load a model, and the time [s] that a step of level 0 looks ahead."""
         assign(self.ahead, ahead / 2.0 ** np.arange(MAX_LEVEL + 1))
         root = inverse_root(model.body_mass, model.body_inertia)
         assign(self.root_mass, root[:, 0, 0])
@@ -70,7 +80,7 @@ class ContactLimits:
 
     @ti.func
     def margin(self, i, j):
-        """Gap [m] that two bodies can close in the time that is looked ahead."""
+        """Gap [m] that two bodies can close in the time ``ahead``."""
         ahead = self.ahead[ti.max(self.state.level[i], self.state.level[j])]
         return ahead * self.contacts.approach(i, j)
 

@@ -1,4 +1,4 @@
-"""How good the elements of a mesh are, and what the bad ones cost in time step."""
+"""Quality of the elements of a mesh, and the cost of bad ones in time step."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _WORST = 10
 
 @dataclass(frozen=True, eq=False)
 class QualityReport:
-    """Per-body figures, each of shape (body_count,), and what the explicit step pays for them.
+    """Quality of each body, arrays (body_count,), and the explicit steps that follow.
 
     volume_m3; mass_kg; aspect_ratio, longest edge / smallest altitude (1.22 when regular);
     smallest_altitude_m; dashpot_step_s and spring_step_s, the largest explicit step at which a
@@ -97,7 +97,7 @@ class QualityReport:
         return lines
 
     def _worst_lines(self):
-        """The worst bodies and what the step would gain without them."""
+        """The worst bodies, and the gain in step without them."""
         lines = [
             "worst bodies; the last column is how much larger the step of the whole mesh would be",
             "without this body and those above it",

@@ -1,4 +1,4 @@
-"""Which step a body may take: one object a rule, asked by the schedule at the body's own times."""
+"""Rules for the step of a body, evaluated by the schedule at the body's own times."""
 
 from dataclasses import dataclass
 from typing import Optional
@@ -11,7 +11,7 @@ from taichi_dem.kit.types import real
 from taichi_dem.kit.validation import between, choices, whole
 from taichi_dem.timeline import MAX_LEVEL
 
-#: What may bound the step of a body; the state holds a place in this tuple for each of them.
+#: Criteria that may bound the step of a body; the state holds an index into this tuple for each.
 CRITERIA = (
     "largest_step",
     "displacement",
@@ -24,32 +24,32 @@ CRITERIA = (
     "neighbour",
 )
 LARGEST, DISPLACEMENT, ROTATION, BOND_K, BOND_C, CONTACT_K, CONTACT_C, LOAD, NEIGHBOUR = range(9)
-#: The criteria that a user may leave out, to see what happens then.
+#: Criteria that a user may leave out, for comparison.
 OPTIONAL = CRITERIA[2:8]
-#: Events that bring a body to the present time and let it choose its step anew.
+#: Events at which a body is brought to the present time and chooses a new step.
 EVENTS = ("hit", "release", "neighbour")
 
 
 @dataclass(frozen=True)
 class StepControl:
-    """Limits of a body's step beside the way that it may go.
+    """Limits of a body's step beside its displacement in it.
 
-    safety: share of each stability limit that a step may take, in (0, 1]. angle: largest turn
-    in a step [rad]. criteria: names out of ``OPTIONAL`` that count. wake: events out of ``EVENTS``
-    at which a body between its own times is brought to the present and takes its new step at
-    once: "hit" (a contact comes near), "release" (a bond near it breaks), "neighbour" (a body
-    it touches went to a much shorter step). level_jump: levels by which a body may be coarser
-    than one it touches, None for any number. ahead: steps of the finer of two bodies before they
-    could touch from which on their contacts count, at least 1: so that a coarse one is woken
-    before it is hit. dashpot_floor: with dashpot "limited", dashpots ask for no step shorter than
-    this [s]; where they need one they are limited instead. 0: they are never limited.
+    safety: share of each stability limit that a step may take, in (0, 1]. angle: largest turn in a
+    step [rad]. criteria: names out of ``OPTIONAL`` that count. wake: events out of ``EVENTS`` at
+    which a body between its own times is brought to the present and takes its new step at once:
+    "hit" (a contact comes near), "release" (a bond near it breaks), "neighbour" (a body it touches
+    refined its step strongly). level_jump: levels by which a body may be coarser than one it
+    touches, None for any number. ahead: steps of the finer of two bodies by which their contacts
+    count before they could touch, at least 1, so that a coarse body is woken before a collision.
+    dashpot_floor: with dashpot "limited", the shortest step that dashpots require [s]; where they
+    need a shorter one they are limited instead. 0: they are never limited.
     Raises InputError for a value out of its range or an unknown name.
 
     Stability allows 0.8 of the limits, accuracy less: a dashpot takes the velocity of half a step
-    ago, a held neighbour lies up to a step behind, both errors of first order. In the paper's
-    block (dt0 8e-8 s, largest error of a body at the hole at 7e-5 s) they are 0.9 % at 0.8 and
-    0.4 % at 0.4. One bond there opens to within 0.2 % of its failure and lets go two bodies of the
-    hole's wall: at 0.5 it still held, and the mean displacement of the hole was 2.4 % short.
+    ago, a held neighbour lies up to a step behind, both errors of first order. In the paper's block
+    (dt0 8e-8 s, largest error of a body at the hole at 7e-5 s) they are 0.9 % at 0.8 and 0.4 % at
+    0.4. One bond there opens to within 0.2 % of its failure and releases two bodies of the hole's
+    wall: at 0.5 it still held, and the mean displacement of the hole was 2.4 % short.
     """
 
     safety: float = 0.25
@@ -71,8 +71,8 @@ class StepControl:
             whole("level_jump", self.level_jump, 0, MAX_LEVEL)
 
 
-def counted_criteria(bound):
-    """Number of bodies by the name of what bounds their step, for those that occur.
+def counted_criteria(bound: np.ndarray) -> dict[str, int]:
+    """Number of bodies by the criterion that bounds their step, for those that occur.
 
     bound: places in CRITERIA, shape (body_count,).
     """
@@ -84,7 +84,7 @@ def counted_criteria(bound):
 class FixedStep:
     """Every body keeps the largest step."""
 
-    def load(self, distance, dt0):
+    def load(self, distance: Optional[float], dt0: float) -> None:
         """Nothing to take."""
 
     @ti.func
@@ -103,18 +103,18 @@ class Displacement:
 
     constant_fields = ("rate2",)
 
-    def __init__(self, power=1):
+    def __init__(self, power: int = 1):
         self.power = power
         self.rate2 = ti.field(real, shape=MAX_LEVEL + 2)
 
-    def load(self, distance, dt0):
-        """Take a distance and the step of level 0 [s]."""
+    def load(self, distance: float, dt0: float) -> None:
+        """Load a distance and the step of level 0 [s]."""
         steps = dt0 / 2.0 ** np.arange(MAX_LEVEL + 1)
         assign(self.rate2, np.append((distance / steps**self.power) ** 2, np.inf))
 
     @ti.func
     def finer(self, level, rate2):
-        """Lowest level from a given one on for a squared rate, [m^2/s^2] for a speed."""
+        """Lowest level, from ``level`` on, for a squared rate, [m^2/s^2] for a speed."""
         k = level
         while rate2 > self.rate2[k] and k < MAX_LEVEL:
             k += 1
@@ -142,7 +142,7 @@ def level_of(step, dt0):
 
 @ti.func
 def shorter(step, bound, other, criterion):
-    """The shorter of two steps [s] with what bounds it."""
+    """The shorter of two steps [s], with its criterion."""
     if other < step:
         step, bound = other, criterion
     return step, bound
@@ -150,7 +150,7 @@ def shorter(step, bound, other, criterion):
 
 @ti.func
 def finer(level, bound, other, criterion):
-    """The finer of two levels with what bounds it."""
+    """The finer of two levels, with its criterion."""
     if other > level:
         level, bound = other, criterion
     return level, bound

@@ -1,4 +1,4 @@
-"""What limits the step of a mesh and material, by method and element by element, before any run."""
+"""Limits of the step for a mesh and material, by method and element, before any run."""
 
 from dataclasses import dataclass
 from typing import Optional, Union
@@ -27,9 +27,9 @@ from taichi_dem.stability.step_control import StepControl
 
 #: Elements listed in the printed table.
 _WORST = 10
-#: What binds a body without bonds and contacts.
+#: Criterion of a body without bonds and contacts.
 NOTHING = "nothing"
-#: The methods by what they do with dashpots.
+#: Methods by their treatment of dashpots.
 METHODS = {
     "full": "Uniform, Multirate",
     "limited": 'the same with dashpot="limited"',
@@ -85,7 +85,7 @@ class StepReport:
         together = stable_together(springs, drags)
         if dashpots == "full":
             return together
-        # Of the 2 that an explicit step bears, limited dashpots take LIMITED at most.
+        # Of the stability limit 2 of an explicit step, limited dashpots take at most LIMITED.
         return np.maximum(together, springs * np.sqrt(1.0 - 0.5 * LIMITED))
 
     def worst(self, count: int = _WORST) -> np.ndarray:
@@ -114,7 +114,7 @@ class StepReport:
         return in_brief(self, bodies, step, "print it for the table")
 
     def __str__(self):
-        """What each method bears, what binds how many bodies, the worst, and what they cost."""
+        """Steps by method, numbers of bodies by criterion, the worst bodies and their cost."""
         lines = [*self._method_lines(), "", *self._criterion_lines(), *self._worst_lines()]
         if self._free:
             lines = ["nothing limits the step: no body has a bond, and no contact is listed"]
@@ -126,7 +126,7 @@ class StepReport:
         return not np.isfinite(self.step_s).any()
 
     def _method_lines(self):
-        """A line for every way of taking dashpots, then how to read it."""
+        """A line for every treatment of dashpots, then an explanation."""
         lines = [f"{'largest stable step':32s}{'in bonds s':>12s}{'':10s}{'in contact s':>14s}"]
         for dashpots, words in METHODS.items():
             bonds, contact = (self._smallest(dashpots, link) for link in ("bond", "contact"))
@@ -141,7 +141,7 @@ class StepReport:
         return lines
 
     def _smallest(self, dashpots, link):
-        """Smallest step that a method bears [s], and whether springs or dashpots limit it."""
+        """Largest stable step of a method [s], and whether springs or dashpots limit it."""
         steps = self.borne(dashpots, link)
         body = int(np.argmin(steps))
         if not np.isfinite(steps[body]):
@@ -168,7 +168,7 @@ class StepReport:
         return [*lines, *self._price_lines()]
 
     def _price_lines(self):
-        """What the worst bodies cost, where others are left whose step is limited too."""
+        """Cost of the worst bodies, where the step of others is limited too."""
         price = self.price()
         if not np.isfinite(price):
             return []
@@ -237,9 +237,9 @@ def contact_eigenvalues(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Largest eigenvalues of M^-1/2 (J^T D J) M^-1/2 of each body [1/kg], two arrays (n,).
 
-    The first is for the worst of its spheres in contact, the second for all of the worst face.
-    D is the identity with friction, n n^T without; contacts act where a sphere touches its face.
-    The step finds the same from the contacts that are near (``step/contact_limits.py``).
+    The first is for the worst of its spheres in contact, the second for all of the worst face. D is
+    the identity with friction, n n^T without; contacts act where a sphere touches its face. The
+    step finds the same from the near contacts (``stability/contact_limits.py``).
     """
     mass, centre, inertia = body_properties(mesh, density)
     spheres = spheres_of_faces(mesh, centre, divisions)

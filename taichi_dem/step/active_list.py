@@ -1,4 +1,4 @@
-"""List in order of falling level; the members that are active at a tick come first."""
+"""List by falling level, in which the members active at a tick come first."""
 
 import taichi as ti
 
@@ -7,7 +7,7 @@ from taichi_dem.timeline import MAX_LEVEL
 
 @ti.func
 def itself(a):
-    """A member that is its own number."""
+    """Member function of lists whose members are 0 .. count - 1."""
     return a
 
 
@@ -19,7 +19,7 @@ class ActiveList:
     not listed. The order within a key does not matter: nothing that is computed depends on it.
     """
 
-    def __init__(self, capacity):
+    def __init__(self, capacity: int):
         self.order = ti.field(ti.i32, shape=capacity)
         self.index = ti.field(ti.i32, shape=capacity)
         self.key = ti.field(ti.i32, shape=capacity)
@@ -64,7 +64,7 @@ class ActiveList:
 
     @ti.func
     def move(self, m, key):
-        """Give a listed member another key; a negative one takes it off the list.
+        """Change the key of a listed member; a negative one removes it.
 
         It changes places with the first, or last, of each key that it passes.
         """

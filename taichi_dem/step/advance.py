@@ -1,13 +1,16 @@
-"""What happens to one bond, one contact pair, one body: the only place that composes the physics.
+"""Advance one bond, one contact pair, one body: the only place that composes the physics.
 
-Drivers choose who is next and call these functions; no other file applies a force or moves a body.
-A bond or pair evaluated at a tick gives both bodies the impulse F * (smaller of their steps), with
-opposite signs; a body takes what has gathered at its own time (Konno et al., 3.1, eq. 3):
-v += S / m, L += T, then x += dt v and q = exp(dt w) q, with the spin w in the middle of the turn.
+Drivers choose the active members and call these functions; no other file applies a force or moves a
+body. A bond or pair evaluated at a tick applies the impulse F * (smaller of their steps) to both
+bodies, with opposite signs; a body takes the sum at its own time (Konno et al., 3.1, eq. 3): v += S
+/ m, L += T, then x += dt v and q = exp(dt w) q, with the spin w in the middle of the turn.
 """
+
+from typing import TYPE_CHECKING, Optional
 
 import taichi as ti
 
+from taichi_dem.contact_search.contacts import Contacts
 from taichi_dem.kit.types import real, vec2, vec3
 from taichi_dem.physics.bond import bond_motion, unit_arm, unit_opening, unit_velocity
 from taichi_dem.physics.rotation import mean_spin, rotation_matrix, spin_of, turned, zero3
@@ -15,12 +18,25 @@ from taichi_dem.stability.body_limits import RELEASE
 from taichi_dem.step.contact_force import ContactForce
 from taichi_dem.step.tangential_springs import TangentialSprings
 
+if TYPE_CHECKING:
+    from taichi_dem.engine.state import State
+    from taichi_dem.engine.tables import Tables
+    from taichi_dem.step.implicit.solver import Solver
+    from taichi_dem.step.schedule import Schedule
+
 
 @ti.data_oriented
 class Advance(ContactForce):
     """The order in which physics and effects act; see the module."""
 
-    def __init__(self, tables, state, schedule, contacts, solver=None):
+    def __init__(
+        self,
+        tables: "Tables",
+        state: "State",
+        schedule: "Schedule",
+        contacts: Optional[Contacts],
+        solver: Optional["Solver"] = None,
+    ):
         self.tables, self.state, self.schedule = tables, state, schedule
         self.solver, self.solves = solver, solver is not None
         self.solves_bonds = self.solves and solver.has_bonds
@@ -28,7 +44,7 @@ class Advance(ContactForce):
         self.has_contact = contacts is not None
         if not self.solves:
             self.springs = TangentialSprings(tables, state, schedule, contacts)
-        # Without fast_math a product with zero is not folded: what is absent must not be written.
+        # Without fast_math a product with zero is not folded: absent terms must not be written.
         self.has_dashpot = bool(tables.dashpot.name)
         self.limits, self.retimes = schedule.limits, schedule.retimes
         self.has_limits = schedule.has_limits
@@ -85,7 +101,7 @@ class Advance(ContactForce):
 
     @ti.func
     def _renew(self, b, slots, motion, failed, dragged):
-        """Let the solver take in the twist a bond has now, or forget it; dragged [J]."""
+        """Pass the present twist of a bond to the solver, or remove the bond; dragged [J]."""
         if failed == 0:
             self.solver.bonds.begin(b, slots[0] >> 2, slots[1] >> 2, motion.branch)
         else:
@@ -96,7 +112,7 @@ class Advance(ContactForce):
 
     @ti.func
     def _is_pending(self, b):
-        """Whether a bond holds, and has not given its impulse for the coming step already."""
+        """Whether a bond holds and has not applied its impulse for the coming step already."""
         pending = self.state.broken_tick[b] < 0
         if ti.static(self.retimes):
             slots = self.tables.bond_slots[b]
@@ -107,7 +123,7 @@ class Advance(ContactForce):
 
     @ti.func
     def _bond_step(self, b, i, j):
-        """Seconds for which a bond gives its impulse now."""
+        """Time [s] for which a bond applies its force now."""
         dt = 0.0
         if ti.static(self.retimes):
             dt = self.schedule.applied_until.apply_bond(b, i, j)
@@ -117,7 +133,7 @@ class Advance(ContactForce):
 
     @ti.func
     def bond_share(self, b):
-        """Share of its coefficient that a bond's limited dashpot keeps: what both bodies bear."""
+        """Share of its coefficient that a bond's limited dashpot keeps: the smaller of two."""
         i, j = self.tables.bond_slots[b][0] >> 2, self.tables.bond_slots[b][1] >> 2
         first = self.limits.bond_share(i, self.schedule.own_step(i))
         return ti.min(first, self.limits.bond_share(j, self.schedule.own_step(j)))
@@ -137,7 +153,7 @@ class Advance(ContactForce):
 
     @ti.func
     def _pull_together(self, slots, motion, impulse, moment):
-        """Give master and slave opposite impulses; moment is about the slave's centre."""
+        """Add opposite impulses to master and slave; moment is about the slave's centre."""
         turn_back = motion.axes.transpose()
         linear, angular = turn_back @ impulse, turn_back @ moment
         self._add(slots[0], linear, angular + motion.branch.cross(linear))
@@ -182,7 +198,7 @@ class Advance(ContactForce):
 
     @ti.func
     def _release(self, b, slots):
-        """One unit has failed: the face transmits nothing from now on and carries spheres."""
+        """Release a bond with a failed unit: its faces carry contact spheres from now on."""
         tick = self.state.tick[None]
         self.state.broken_tick[b] = tick
         for side in ti.static(range(2)):
@@ -196,7 +212,7 @@ class Advance(ContactForce):
 
     @ti.func
     def body(self, i):
-        """Bring a body to the present tick and let it choose its next step."""
+        """Bring a body to the present tick and choose its next step."""
         elapsed = self.schedule.elapsed(i)
         linear, angular = self._gathered(i)
         velocity, momentum = self._kicked(i, elapsed, linear, angular)
@@ -204,7 +220,7 @@ class Advance(ContactForce):
 
     @ti.func
     def _moved(self, i, elapsed, velocity, momentum):
-        """Let body i go on for elapsed [s] and choose its next step."""
+        """Move body i for elapsed [s] and choose its next step."""
         spin = self.spin(i, momentum)
         self._drift(i, elapsed, velocity, momentum, spin)
         self.state.velocity[i], self.state.angular_momentum[i] = velocity, momentum
@@ -213,7 +229,7 @@ class Advance(ContactForce):
 
     @ti.func
     def _drift(self, i, elapsed, velocity, momentum, spin):
-        """Move and turn body i, which begins with a spin; note the way it went, and a runaway."""
+        """Move and turn body i from a spin; note its displacement, and a runaway."""
         turning = self._turning(i, elapsed, momentum, spin)
         orientation = turned(self.state.orientation[i], turning, elapsed)
         self.state.orientation[i] = orientation
@@ -231,7 +247,7 @@ class Advance(ContactForce):
 
     @ti.func
     def _turning(self, i, elapsed, momentum, spin):
-        """World spin in the middle of the step [rad/s]; a body in supports has what they allow."""
+        """World spin in the middle of the step [rad/s], as supports allow."""
         inverse = self.tables.inertia_inverse[i]
         turning = mean_spin(self.state.rotation[i], inverse, momentum, spin, elapsed)
         for effect in ti.static(self.tables.supports):
@@ -241,7 +257,7 @@ class Advance(ContactForce):
 
     @ti.func
     def _gathered(self, i):
-        """Impulse and moment waiting in the slots of a body, always summed in one order."""
+        """Collect the impulse and moment in the slots of a body, always summed in one order."""
         linear, angular = zero3(), zero3()
         for f in range(4):
             taken = self.state.slot[4 * i + f]
@@ -278,17 +294,17 @@ class Advance(ContactForce):
 
     @ti.func
     def _load_time(self, elapsed):
-        """Time at which loads are asked for their force: the beginning of the step [s].
+        """Time at which loads are evaluated: the beginning of the step [s].
 
-        Forces that change velocities there, and positions that follow from the new ones, are the
-        leapfrog whose velocities live half a step earlier: of second order without dashpots. The
-        middle of the step would be half a step ahead of the springs, an error of first order.
+        Velocities change by the forces there, and positions by the new velocities: the leapfrog,
+        whose velocities are half a step earlier, of second order without dashpots. The middle of
+        the step would be half a step ahead of the springs, an error of first order.
         """
         return self.schedule.seconds(self.state.tick[None]) - elapsed
 
     @ti.func
     def _book_loads(self, i, kick, velocity, momentum):
-        """Book what the loads gave body i, at a mean velocity and angular momentum."""
+        """Book work and impulse of the loads on body i, at a mean velocity and angular momentum."""
         for e in ti.static(range(len(self.tables.loads))):
             if self.tables.loads[e].acts_on(i):
                 push = vec3(kick[e, 0], kick[e, 1], kick[e, 2])
@@ -306,8 +322,8 @@ class Advance(ContactForce):
         """Velocity and angular momentum that the supports allow; books their work and the loads'.
 
         With the means of velocity and angular momentum before and after all impulses of the step,
-        bonds, loads and supports together, the change of kinetic energy is exact: what holds a body
-        still does no work.
+        bonds, loads and supports together, the change of kinetic energy is exact: a support that
+        holds a body still does no work.
         """
         free, free_momentum, held = velocity, momentum, 0
         half = self.schedule.seconds(self.state.tick[None]) - 0.5 * elapsed

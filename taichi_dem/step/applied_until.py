@@ -1,8 +1,16 @@
 """Time up to which each bond or pair has applied its impulse."""
 
+from typing import TYPE_CHECKING, Optional
+
 import taichi as ti
 
+from taichi_dem.contact_search.contacts import Contacts
 from taichi_dem.timeline import device_ticks_of
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.state import State
+    from taichi_dem.engine.tables import Tables
+    from taichi_dem.step.schedule import Schedule
 
 
 @ti.data_oriented
@@ -10,14 +18,16 @@ class AppliedUntil:
     """Tick up to which each bond and pair has applied its impulse, where bodies may be woken early.
 
     A bond applies its impulse for the coming step of the finer body at once. When that body is
-    woken and takes a shorter step, the bond is due again although its impulse is still ahead of the
-    clock: it applies no more until the tick up to which it has. That is a time of the coarser
-    step and so of any finer one: no impulse is ever applied in part.
-    bond, pair: that tick for every bond, and for every slot of the pair store. schedule: knows
-    their steps.
+    woken and takes a shorter step, the bond becomes active although its impulse reaches ahead of
+    the clock: it applies no more until that tick. This is a time of the coarser step and so of any
+    finer one: no impulse is ever applied in part.
+    bond, pair: that tick for every bond, and for every slot of the pair store. schedule: their
+    steps.
     """
 
-    def __init__(self, tables, state, schedule, contacts):
+    def __init__(
+        self, tables: "Tables", state: "State", schedule: "Schedule", contacts: Optional[Contacts]
+    ):
         self.state, self.schedule = state, schedule
         self.bond = ti.field(ti.i64, shape=tables.capacity.bonds)
         if contacts is not None:
@@ -45,6 +55,6 @@ class AppliedUntil:
 
     @ti.func
     def _until(self, i, j):
-        """Tick at which two bodies are looked at again."""
+        """Tick at which a pair of bodies is evaluated again."""
         finer = ti.max(self.state.level[i], self.state.level[j])
         return self.state.tick[None] + device_ticks_of(finer)

@@ -1,13 +1,14 @@
-"""Driver chosen by measurement: continues with the faster one; both give the same bits.
+"""Driver chosen by measurement: it continues with the faster one; both give the same bits.
 
-Which one it is depends on how much is due in a step and on how free the cores are: the parallel
-driver pays for every phase with a launch, and much more where other programs hold a core.
+The choice depends on the work in a step and on free cores: the parallel driver pays a launch for
+every phase, and much more where other programs occupy a core.
 """
 
 import time
+from collections.abc import Callable, Mapping
 
 from taichi_dem.kit.allocation import values
-from taichi_dem.step.drivers import Parallel, Resident
+from taichi_dem.step.drivers import Driver, Parallel, Resident, Step
 
 #: Substeps of a try, and how often each driver is tried; the better of its tries counts.
 _SUBSTEPS = 8
@@ -19,11 +20,16 @@ _SHARE = 0.05
 class AutoDriver:
     """Tries both drivers from time to time, a few substeps each.
 
-    seconds: for a member that was due, the best of the last tries by name of the driver. clock:
-    gives seconds; tests have their own. drivers: both, by name.
+    seconds: time for an evaluated member, the best of the last tries, by name of the driver. clock:
+    returns seconds; replaced in tests. drivers: both, by name.
     """
 
-    def __init__(self, step, drivers, clock=time.perf_counter):
+    def __init__(
+        self,
+        step: Step,
+        drivers: Mapping[str, Driver],
+        clock: Callable[[], float] = time.perf_counter,
+    ):
         self.step, self.clock = step, clock
         self.drivers = {name: drivers[name] for name in (Parallel.name, Resident.name)}
         self.chosen = Resident.name
@@ -35,16 +41,16 @@ class AutoDriver:
         self.seconds, self.spent, self.since = {}, 0.0, 0.0
 
     @property
-    def name(self):
-        """Name of the driver that goes on, and that this was measured."""
+    def name(self) -> str:
+        """Name of the chosen driver, marked as measured."""
         return f"{self.chosen} (measured)"
 
-    def prepare(self):
-        """Make the search that is due, without a step; compiles both drivers."""
+    def prepare(self) -> None:
+        """Make a requested search, without a step; compiles both drivers."""
         for driver in self.drivers.values():
             driver.prepare()
 
-    def run(self, end_tick):
+    def run(self, end_tick: int) -> None:
         """Advance to a tick, to the next halt, for a try, or for about as long as the driver."""
         started = self.clock()
         if self.pending_tries:
@@ -57,14 +63,14 @@ class AutoDriver:
                 self._begin()
 
     def _try(self, name, end_tick):
-        """Time some substeps by a driver; after the last try the quicker one goes on."""
+        """Time some substeps by a driver; after the last try choose the faster one."""
         before, started = self._visited(), self.clock()
         self.drivers[name].few(end_tick, _SUBSTEPS)
         seconds = (self.clock() - started) / max(1, self._visited() - before)
         self.seconds[name] = min(seconds, self.seconds.get(name, seconds))
         if not self.pending_tries:
-            self.chosen = min(self.seconds, key=self.seconds.get)
+            self.chosen = min(self.seconds, key=lambda name: self.seconds[name])
 
     def _visited(self):
-        """Bodies, bonds and pairs that were due so far."""
+        """Number of bodies, bonds and pairs evaluated so far."""
         return int(values(self.step.schedule.evaluations)[1:4].sum())

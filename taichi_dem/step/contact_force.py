@@ -14,11 +14,11 @@ class ContactForce:
 
     @ti.func
     def contact(self, p):
-        """Evaluate the spheres of a pair of bodies: repulsion, and friction of what slides."""
+        """Evaluate the sphere contacts of a pair of bodies: repulsion and friction."""
         pair = self.contacts.store.body[p]
         i, j = pair[0], pair[1]
         branch = self.state.position[j] - self.state.position[i]
-        # Most candidates do not touch: find out in the first body's frame, where it costs half.
+        # Most candidates do not touch: tested in the first body's frame, at half the cost.
         back = self.state.rotation[i].transpose()
         turn, offset = back @ self.state.rotation[j], back @ branch
         force, moment_i, moment_j = zero3(), zero3(), zero3()
@@ -71,7 +71,7 @@ class ContactForce:
 
     @ti.func
     def _rub(self, k, i, normal, push, drag, slide, elapsed):
-        """Friction on the second sphere and the spring's part of it [N]; what slipping took [J]."""
+        """Friction on the second sphere and the spring's part of it [N]; energy of slipping [J]."""
         rub, stuck, spent = zero3(), zero3(), 0.0
         if ti.static(self.springs.present):
             rotation, bound = self.state.rotation[i], self.tables.friction.limit(push)
@@ -92,7 +92,7 @@ class ContactForce:
 
     @ti.func
     def _pair_step(self, p, i, j):
-        """Seconds for which a touching pair gives its impulse now; 0 when it has given it."""
+        """Time [s] for which a touching pair applies its force now; 0 if done already."""
         dt = 0.0
         if ti.static(self.retimes):
             dt = self.schedule.applied_until.apply_pair(p, i, j)

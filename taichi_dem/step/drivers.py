@@ -5,12 +5,17 @@ every item writes its own slots, and every sum has a fixed order.
 """
 
 import time
+from collections.abc import Callable
+from typing import Any, Optional, Protocol
 
 import taichi as ti
 
+from taichi_dem.contact_search.search import BroadPhase
 from taichi_dem.kit.allocation import values
+from taichi_dem.step.advance import Advance
 from taichi_dem.step.implicit.bonds import BOND_COLOURS
-from taichi_dem.step.implicit.pairs import COLOURS
+from taichi_dem.step.implicit.pairs import COLOURS, PairDashpots
+from taichi_dem.step.schedule import Schedule
 from taichi_dem.step.wake_up import WakeUp
 
 #: The parallel driver is called for about this long [s] between two checks of divergence, progress
@@ -19,13 +24,15 @@ CALL_SECONDS = 0.2
 #: The resident one is kept near this long [s]: its kernel cannot be interrupted.
 _KERNEL_SECONDS = 0.1
 _MAX_SUBSTEPS = 1 << 24
-#: Bit that a parallel substep adds to what it returns when a search is due.
+#: Pairs of an active list and the function that is called with each active member.
+Phases = tuple[tuple[Any, Callable[..., Any]], ...]
+#: Bit that a parallel substep sets in its result when a search is requested.
 _SEARCH = 2
 
 
 @ti.data_oriented
 class Once:
-    """Stands for a list where a phase has none: it happens once a substep."""
+    """List of one member, for phases that run once a substep."""
 
     @ti.func
     def count(self, low):
@@ -34,13 +41,13 @@ class Once:
 
     @ti.func
     def pick(self, a):
-        """The place itself; nobody looks at it."""
+        """The place itself, which is not used."""
         return a
 
 
 @ti.data_oriented
 class Step:
-    """The phases of a substep, as (active list, what happens to one member) pairs.
+    """Phases of a substep, pairs of an active list and a function of a member.
 
     A substep begins with the contacts of the present tick, whose bonds are evaluated already, and
     ends with the bonds of the next: between substeps the contact lists can be renewed.
@@ -48,7 +55,7 @@ class Step:
     search: the ``BroadPhase`` that does so, None for a scene without contact.
     """
 
-    def __init__(self, advance, schedule, search):
+    def __init__(self, advance: Advance, schedule: Schedule, search: Optional[BroadPhase]):
         self.advance, self.schedule, self.search = advance, schedule, search
         self.has_contact = search is not None
         self.state = advance.state
@@ -74,16 +81,16 @@ class Step:
             ),
         )
 
-    def repeats(self, part):
+    def repeats(self, part: int) -> bool:
         """Whether a part of the phases is called for once more: never here."""
         return False
 
     def _retimed(self):
-        """Phases in which bodies take new rates, and are woken, where the method asks for it."""
+        """Phases that update rates and wake bodies, where the method requires it."""
         limits = self.schedule.limits
         if limits is None:
             return ()
-        phases = ((limits, limits.refresh),)
+        phases: Phases = ((limits, limits.refresh),)
         if self.schedule.retimes:
             phases += ((limits, WakeUp(self.advance, self.schedule).wake_up),)
         return (*phases, (Once(), self.schedule.apply_changes))
@@ -117,12 +124,12 @@ class Step:
 class Colour:
     """The members of one colour: those from colour_first[colour] on, in their order."""
 
-    def __init__(self, colour_first, colour):
+    def __init__(self, colour_first: ti.Field, colour: int):
         self.colour_first, self.colour = colour_first, colour
 
     @ti.func
     def count(self, low):
-        """How many there are."""
+        """Number of members."""
         return self.colour_first[self.colour + 1] - self.colour_first[self.colour]
 
     @ti.func
@@ -135,7 +142,7 @@ class Colour:
 class PairColour(Colour):
     """The contact pairs of one colour."""
 
-    def __init__(self, pairs, colour):
+    def __init__(self, pairs: PairDashpots, colour: int):
         super().__init__(pairs.colour_first, colour)
         self.order = pairs.order
 
@@ -155,7 +162,8 @@ class SolvedStep(Step):
 
     def _parts(self):
         advance, schedule, solver = self.advance, self.schedule, self.advance.solver
-        touching, booked = (), ()
+        touching: Phases = ()
+        booked: Phases = ()
         if self.has_contact:
             touching = ((schedule.pairs, solver.pairs.begin), (Once(), solver.pairs.sort))
             booked = ((schedule.pairs, solver.pairs.book),)
@@ -175,7 +183,8 @@ class SolvedStep(Step):
 
     def _sweep(self, solver):
         """One sweep, colour by colour."""
-        bonds, pairs = (), ()
+        bonds: Phases = ()
+        pairs: Phases = ()
         if solver.has_bonds:
             first = solver.bonds.colour_first
             bonds = tuple((Colour(first, c), solver.bond) for c in range(BOND_COLOURS))
@@ -184,7 +193,7 @@ class SolvedStep(Step):
             pairs += ((Once(), solver.last_pairs),)
         return (*bonds, *pairs, (Once(), solver.check_convergence))
 
-    def repeats(self, part):
+    def repeats(self, part: int) -> bool:
         """Whether a part, the sweep, is called for once more."""
         return part == 1 and values(self.advance.solver.unsolved) == 1
 
@@ -204,9 +213,27 @@ class SolvedStep(Step):
                 self.advance.solver.bonds.first(b)
         for b in range(self.advance.tables.bond_count[None]):
             self.advance.bond(b)
-            # It booked a step that never was.
+            # It booked a step before the start.
             if ti.static(self.advance.tables.has_bond_heat):
                 self.state.bond_heat[b] = 0.0 * self.state.bond_heat[b]
+
+
+class Driver(Protocol):
+    """One way to run the phases of a ``Step``; all ways give the same bits."""
+
+    name: str
+
+    def load(self) -> None:
+        """Begin with another scene."""
+
+    def prepare(self) -> None:
+        """Make a requested search, without a step; compiles the kernels."""
+
+    def few(self, end_tick: int, substeps: int) -> None:
+        """Advance some substeps, or to a tick or the next halt."""
+
+    def run(self, end_tick: int) -> None:
+        """Advance to a tick, to the next halt, or for about the time of a call."""
 
 
 @ti.data_oriented
@@ -215,23 +242,23 @@ class Resident:
 
     name = "resident"
 
-    def __init__(self, step):
+    def __init__(self, step: Step):
         self.step = step
         self.load()
 
-    def load(self):
-        """Begin with short calls: nobody knows yet what a step of the scene costs."""
+    def load(self) -> None:
+        """Begin with short calls, as the cost of a step is not known yet."""
         self.substeps = 4
 
-    def prepare(self):
-        """Make the search that is due, without a step; compiles the kernel."""
+    def prepare(self) -> None:
+        """Make a requested search, without a step; compiles the kernel."""
         self._run(0, 0)
 
-    def few(self, end_tick, substeps):
+    def few(self, end_tick: int, substeps: int) -> None:
         """Advance some substeps, or to a tick or the next halt."""
         self._run(end_tick, substeps)
 
-    def run(self, end_tick):
+    def run(self, end_tick: int) -> None:
         """Advance to a tick, to the next halt, or for about _KERNEL_SECONDS."""
         start = time.perf_counter()
         done = self._run(end_tick, self.substeps)
@@ -268,33 +295,33 @@ class Parallel:
 
     name = "parallel"
 
-    def __init__(self, step):
+    def __init__(self, step: Step):
         self.step = step
 
-    def load(self):
+    def load(self) -> None:
         """Nothing depends on the scene."""
 
-    def prepare(self):
-        """Make the search that is due, without a step; compiles the kernels."""
+    def prepare(self) -> None:
+        """Make a requested search, without a step; compiles the kernels."""
         for part in range(len(self.step.parts)):
             self._run(part, 0, 0)
         if self.step.has_contact:
             self.step.search.renew()
 
-    def few(self, end_tick, substeps):
+    def few(self, end_tick: int, substeps: int) -> None:
         """Advance some substeps, or to a tick or the next halt."""
         for _ in range(substeps):
             if self._substep(end_tick):
                 break
 
-    def run(self, end_tick):
+    def run(self, end_tick: int) -> None:
         """Advance to a tick, to the next halt, or for about CALL_SECONDS."""
         start = time.perf_counter()
         while self._substep(end_tick) == 0 and time.perf_counter() - start < CALL_SECONDS:
             pass
 
     def _substep(self, end_tick):
-        """All parts of a substep, and the search that is due; nonzero at the end or a halt."""
+        """Run all parts of a substep, and a requested search; nonzero at the end or a halt."""
         state = 0
         for part in range(len(self.step.parts)):
             state = self._run(part, end_tick, 1)
@@ -306,7 +333,7 @@ class Parallel:
 
     @ti.kernel
     def _run(self, part: ti.template(), end_tick: ti.i64, share: ti.i32) -> ti.i32:
-        # With a share of 0 nothing happens: compiled, and that is all.
+        # With a share of 0 the kernel is compiled and does nothing.
         low = ti.static(self.step.schedule.low)
         for active, item in ti.static(self.step.parts[part]):
             for a in range(share * active.count(low[None])):
@@ -318,5 +345,7 @@ class Parallel:
         return finished
 
 
-#: Drivers by the name that users give.
-DRIVERS = {driver.name: driver for driver in (Resident, Parallel)}
+#: Drivers by name.
+DRIVERS: dict[str, Callable[[Step], Driver]] = {
+    driver.name: driver for driver in (Resident, Parallel)
+}

@@ -1,8 +1,15 @@
 """How much coarser a body may step than those it touches."""
 
+from typing import TYPE_CHECKING, Optional
+
 import taichi as ti
 
-from taichi_dem.stability.body_limits import CLOSE
+from taichi_dem.contact_search.contacts import Contacts
+from taichi_dem.stability.body_limits import CLOSE, StabilityLimits
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.state import State
+    from taichi_dem.engine.tables import Tables
 
 
 @ti.data_oriented
@@ -13,7 +20,13 @@ class LevelLimit:
     levels at the last ordering of the lists, so that no result depends on the order of bodies.
     """
 
-    def __init__(self, tables, state, contacts, limits):
+    def __init__(
+        self,
+        tables: "Tables",
+        state: "State",
+        contacts: Optional[Contacts],
+        limits: StabilityLimits,
+    ):
         self.tables, self.state, self.limits = tables, state, limits
         self.has_contact = contacts is not None
         self.store = contacts.store if self.has_contact else None
@@ -21,7 +34,7 @@ class LevelLimit:
 
     @ti.func
     def note_all(self):
-        """Take the levels of all bodies as known."""
+        """Note the levels of all bodies."""
         for i in range(self.tables.body_count[None]):
             self.listed_level[i] = self.state.level[i]
 
@@ -50,7 +63,7 @@ class LevelLimit:
 
     @ti.func
     def spread(self, i):
-        """Take the level of body i as known, and list those it touches that are too coarse."""
+        """Note the level of body i, and list those it touches that are too coarse."""
         level = self.state.level[i]
         self.listed_level[i] = level
         for f in range(4):

@@ -1,19 +1,29 @@
-"""Who is due: levels of bodies, and lists of bodies, bonds and pairs in order of falling level.
+"""Schedule: levels of bodies, and lists of active bodies, bonds and pairs by falling level.
 
-Levels change seldom against how often they are used, so a body that changes its own moves just its
-own entries.
+Levels change seldom compared with their use, so a change of a body's level moves only its own
+entries.
 """
+
+from typing import TYPE_CHECKING, Any, Optional
 
 import numpy as np
 import taichi as ti
 
+from taichi_dem.contact_search.contacts import Contacts
 from taichi_dem.kit.allocation import assign, raise_to, values
 from taichi_dem.kit.types import real
+from taichi_dem.methods import Method
+from taichi_dem.stability.body_limits import StabilityLimits
 from taichi_dem.stability.step_control import DISPLACEMENT, LARGEST, NEIGHBOUR
 from taichi_dem.step.active_list import ActiveList, itself
 from taichi_dem.step.applied_until import AppliedUntil
 from taichi_dem.step.level_limit import LevelLimit
 from taichi_dem.timeline import MACRO_TICKS, MAX_LEVEL, device_coarsest_active, device_ticks_of
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.model import Model
+    from taichi_dem.engine.state import State
+    from taichi_dem.engine.tables import Tables
 
 
 @ti.data_oriented
@@ -21,24 +31,33 @@ class Schedule:
     """Clock and active lists of a run.
 
     criterion: rule from ``step_control``. uniform: all bodies share the finest level wanted.
-    drifted: bodies next to a due one are brought to its time too, else only due bodies move.
-    finest: finest level present. low: coarsest level now due.
-    changed: bodies whose own level or bonds changed since the lists were put in order.
-    limits: the ``StabilityLimits`` of the bodies, None where the rule needs none. retimes:
-    whether bodies may be brought to the present between their own times; applied_until then holds
-    the time up to which what bonds and pairs have given ahead. level_limit: how much coarser than
-    its neighbours a body may be. evaluations: substeps, bodies advanced, bonds and pairs evaluated,
+    drifted: neighbours of an active body are brought to its time too, else only active bodies move.
+    finest: finest level present. low: coarsest level active now. changed: bodies whose own level or
+    bonds changed since the lists were ordered.
+    limits: the ``StabilityLimits`` of the bodies, None where the rule needs none. retimes: whether
+    bodies may be brought to the present between their own times; applied_until then holds the time
+    up to which bonds and pairs have applied their impulses. level_limit: largest difference of
+    levels between neighbours. evaluations: substeps, bodies advanced, bonds and pairs evaluated,
     and the bonds and pairs that one step for all would have evaluated in the same substeps.
     """
 
-    def __init__(self, tables, state, contacts, criterion, uniform, drifted, limits=None):
+    def __init__(
+        self,
+        tables: "Tables",
+        state: "State",
+        contacts: Optional[Contacts],
+        criterion: Any,
+        uniform: bool,
+        drifted: bool,
+        limits: Optional[StabilityLimits] = None,
+    ):
         self.tables, self.state, self.contacts, self.limits = tables, state, contacts, limits
         self.has_limits = limits is not None
         self.controlled = self.has_limits and limits.control is not None
         self.retimes = self.controlled and limits.wakes != 0
         self.applied_until = AppliedUntil(tables, state, self, contacts) if self.retimes else None
         self.spreads = self.controlled and not uniform and limits.spreads
-        if self.spreads:
+        if limits is not None and self.spreads:
             self.level_limit = LevelLimit(tables, state, contacts, limits)
         self.criterion, self.uniform, self.drifted = criterion, uniform, drifted
         self.has_contact = contacts is not None
@@ -55,32 +74,32 @@ class Schedule:
         self.changed_count = ti.field(ti.i32, shape=())
         self.evaluations = ti.field(ti.i64, shape=5)
 
-    def load(self, model, method):
-        """Take the steps of a method."""
+    def load(self, model: "Model", method: Method) -> None:
+        """Load the steps of a method."""
         assign(self.step_seconds, method.dt0 / 2.0 ** np.arange(MAX_LEVEL + 1))
-        # A rule of one's own may have no numbers to load.
+        # A user-defined rule may have no numbers to load.
         getattr(self.criterion, "load", lambda *_: None)(method.distance, method.dt0)
         if self.has_limits:
             self.limits.load(model, method)
 
     @property
-    def dt0(self):
+    def dt0(self) -> float:
         """Largest step [s]."""
         return float(values(self.step_seconds)[0])
 
     @property
-    def tick_seconds(self):
+    def tick_seconds(self) -> float:
         """Seconds of a tick."""
         return self.dt0 / MACRO_TICKS
 
-    def members(self):
+    def members(self) -> np.ndarray:
         """How many bonds and pairs are evaluated at the step of each level, (MAX_LEVEL + 1,)."""
         ends = values(self.bonds.end) + values(self.pairs.end)
         return ends[:-1] - ends[1:]
 
     @ti.func
     def pair_step(self, i, j):
-        """Seconds until two bodies are looked at again: the smaller of their steps."""
+        """Time [s] until a pair of bodies is evaluated again: the smaller of their steps."""
         return self.step_seconds[ti.max(self.state.level[i], self.state.level[j])]
 
     @ti.func
@@ -101,7 +120,7 @@ class Schedule:
 
     @ti.func
     def advance_clock(self, one):
-        """Move the clock to the next tick at which a body is due."""
+        """Move the clock to the next tick at which a body is active."""
         if ti.static(self.has_contact):
             self.evaluations[3] = self.evaluations[3] + self.pairs.end[self.low[None]]
             self.evaluations[4] = self.evaluations[4] + self.pairs.end[0]
@@ -111,7 +130,7 @@ class Schedule:
 
     @ti.func
     def choose_level(self, i, speed2):
-        """Let body i, if it is its own time, take the step it wants."""
+        """Choose the level of body i, if the present is one of its own times."""
         low, level = self.low[None], self.state.level[i]
         if level >= low:
             wanted = low
@@ -130,10 +149,10 @@ class Schedule:
 
     @ti.func
     def controlled_level(self, i):
-        """Level that the rates and the neighbours of body i ask for, and which criterion does."""
+        """Level that the rates and the neighbours of body i require, and its criterion."""
         wanted, bound = self.limits.wanted(i, self.seconds(self.state.tick[None]))
         if ti.static(self.spreads):
-            # Its neighbours, many to visit, step no finer than the finest of all.
+            # Neighbours are visited only where the finest level of all could bind.
             if self.level_limit.least_beside(self.finest[None]) > wanted:
                 least = self.level_limit.least(i)
                 if least > wanted:
@@ -142,18 +161,18 @@ class Schedule:
 
     @ti.func
     def note_change(self, i):
-        """Body i has taken another level, or lost a bond."""
+        """Note that body i has another level, or has lost a bond."""
         self.changed[ti.atomic_add(self.changed_count[None], 1)] = i
 
     @ti.func
     def reorder(self, one):
-        """Move the entries of the bodies that changed, and count what this tick evaluates."""
+        """Move the entries of changed bodies, and count the evaluations of this tick."""
         self._rearrange()
         self._count()
 
     @ti.func
     def apply_changes(self, one):
-        """The same after bodies have been brought to the present; their list is done with."""
+        """Move entries after bodies have been brought to the present, and clear their list."""
         self.limits.done()
         if ti.static(self.retimes):
             self._rearrange()
@@ -197,7 +216,7 @@ class Schedule:
 
     @ti.func
     def start_all(self):
-        """Fill all lists anew."""
+        """Fill all lists."""
         if ti.static(self.uniform):
             self._level_all()
         self.changed_count[None] = 0
@@ -213,8 +232,8 @@ class Schedule:
     def start_pairs(self):
         """Take in the pairs of a new contact search; neighbours may now reach further.
 
-        All lists are filled anew on the occasion: what lies side by side is then visited in turn,
-        which moving entries undoes with time (5 % of the time of a run).
+        All lists are filled again, which restores contiguous visits; moving entries destroys them
+        with time (5 % of the time of a run).
         """
         self._list_pairs()
         if ti.static(not self.uniform):
@@ -231,7 +250,7 @@ class Schedule:
 
     @ti.func
     def _level_all(self):
-        """Give every body the finest level that any of them wants."""
+        """Set every body to the finest level that any of them wants."""
         if self.wanted[None] != self.state.level[0]:
             for i in range(self.tables.body_count[None]):
                 self.state.level[i] = self.wanted[None]
@@ -248,7 +267,7 @@ class Schedule:
 
     @ti.func
     def _count(self):
-        """Count what this tick evaluates: substeps, bodies, bonds, contact pairs."""
+        """Count the evaluations of this tick: substeps, bodies, bonds, contact pairs."""
         low = self.low[None]
         self.evaluations[0] = self.evaluations[0] + 1
         self.evaluations[1] = self.evaluations[1] + self.bodies.count(low)
@@ -257,7 +276,7 @@ class Schedule:
 
     @ti.func
     def count_sweep(self, with_bonds: ti.template()):
-        """Count what a sweep over all dashpots visits as evaluations."""
+        """Count the visits of a sweep over all dashpots as evaluations."""
         visits = ti.cast(0, ti.i64)
         if ti.static(with_bonds):
             visits += self.bonds.end[0]
@@ -296,7 +315,7 @@ class Schedule:
 
     @ti.func
     def _key(self, i, j):
-        """Finer level of two bodies; where all step alike, all are due at every tick."""
+        """Finer level of two bodies; where all step alike, all are active at every tick."""
         key = MAX_LEVEL
         if ti.static(not self.uniform):
             key = ti.max(self.state.level[i], self.state.level[j])

@@ -1,6 +1,15 @@
-"""Springs between contact spheres that stick, for friction laws that remember; else nothing."""
+"""Tangential springs between contact spheres, for friction laws with memory."""
+
+from typing import TYPE_CHECKING, Optional
 
 import taichi as ti
+
+from taichi_dem.contact_search.contacts import Contacts
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.state import State
+    from taichi_dem.engine.tables import Tables
+    from taichi_dem.step.schedule import Schedule
 
 
 @ti.data_oriented
@@ -10,7 +19,9 @@ class TangentialSprings:
     evaluated: of a pair, one more than the tick at which it was last evaluated, 0 for never.
     """
 
-    def __init__(self, tables, state, schedule, contacts):
+    def __init__(
+        self, tables: "Tables", state: "State", schedule: "Schedule", contacts: Optional[Contacts]
+    ):
         self.friction, self.state, self.schedule = tables.friction, state, schedule
         self.present = contacts is not None and contacts.remembers
         self.store = contacts.store if self.present else None
@@ -28,13 +39,13 @@ class TangentialSprings:
 
     @ti.func
     def follow(self, k, rotation, normal, way):
-        """Stretch the spring of sphere pair k by a way [m]."""
+        """Stretch the spring of sphere pair k by ``way`` [m]."""
         back = rotation.transpose()
         self.friction.follow(k, back @ normal, back @ way)
 
     @ti.func
     def slip(self, k, rotation, bound, way):
-        """Shorten the spring of sphere pair k to a bound [N] after a way [m]; energy spent [J]."""
+        """Shorten the spring of sphere pair k to a bound [N] after ``way`` [m]; energy [J]."""
         return self.friction.slip(k, bound, rotation.transpose() @ way)
 
     @ti.func

@@ -2,17 +2,20 @@
 
 import taichi as ti
 
+from taichi_dem.step.advance import Advance
+from taichi_dem.step.schedule import Schedule
+
 
 @ti.data_oriented
 class WakeUp:
     """Updates the bodies that ``StabilityLimits`` has listed, at the start of a substep.
 
     A body waits for its own time with a step chosen before a contact came near, a bond broke or a
-    neighbour went to shorter steps. Bonds that have applied their impulse ahead apply no more until
+    neighbour refined its step. Bonds that have applied their impulse ahead apply no more until
     then.
     """
 
-    def __init__(self, advance, schedule):
+    def __init__(self, advance: Advance, schedule: Schedule):
         self.advance, self.schedule, self.limits = advance, schedule, schedule.limits
         self.state = schedule.state
 
@@ -26,7 +29,7 @@ class WakeUp:
                 self.state.bound[i] = bound
             elif wanted > self.state.level[i]:
                 ti.atomic_add(self.limits.woken[None], 1)
-                # The present belongs to the grid of level low and finer: such a level it takes.
+                # The present is a time of level low and finer levels only.
                 self.state.level[i] = ti.max(self.state.level[i], self.schedule.low[None])
                 self.schedule.note_change(i)
                 if self.state.last_tick[i] < self.state.tick[None]:

@@ -23,7 +23,7 @@ from taichi_dem.mesh.shapes import bar, pair, single
 from taichi_dem.methods import Method
 
 MEMBERS = [(role, name) for role, contract in CONTRACTS.items() for name in members_of(contract)]
-METHOD_MEMBERS = [*Method.__annotations__, "criterion"]
+METHOD_MEMBERS = members_of(Method)
 
 
 def own_effect(role, names):

@@ -90,9 +90,9 @@ def parsed(path, text):
     return Source(path, text, ast.parse(text, filename=path, feature_version=PYTHON))
 
 
-def imported_names(source):
-    """(line, full dotted name) of everything imported, anywhere in the file."""
-    for node in ast.walk(source.tree):
+def imported_names(source, tree=None):
+    """(line, full dotted name) of everything imported, anywhere in the file or a tree of it."""
+    for node in ast.walk(source.tree if tree is None else tree):
         if isinstance(node, ast.Import):
             for alias in node.names:
                 yield node.lineno, alias.name
@@ -113,9 +113,21 @@ def modules_have_a_layer(source):
         yield 1, f"'{source.module}' is not in LAYERS: add it to a row in tests/unit/test_house.py"
 
 
+def imports_for_types(source):
+    """What is imported in ``if TYPE_CHECKING`` blocks, as by imported_names."""
+    for node in ast.walk(source.tree):
+        if isinstance(node, ast.If) and last_name(node.test) == "TYPE_CHECKING":
+            for statement in node.body:
+                yield from imported_names(source, statement)
+
+
 def imports_go_one_way(source):
+    """Nothing is imported from a later layer, unless annotations alone need its name."""
+    types = set(imports_for_types(source))
     for line, name in imported_names(source):
         parts = name.split(".")
+        if (line, name) in types and parts[0] == source.package:
+            continue
         if parts[0] in ("experiments", "tests"):
             yield line, f"imports {name}: nothing imports {parts[0]}"
         elif source.package in LAYERS and parts[0] in LAYERS:
@@ -290,6 +302,13 @@ BAD = [
     (imports_go_one_way, PHYSICS, "import taichi_dem", "later layer"),
     (imports_go_one_way, "taichi_dem/step/a.py", "from taichi_dem.engine import x", "later layer"),
     (imports_go_one_way, "taichi_dem/step/a.py", "def f():\n    from .. import simulate", "later"),
+    (imports_go_one_way, PHYSICS, "if TYPE_CHECKING:\n    import ca_damper", "takes nothing"),
+    (
+        imports_go_one_way,
+        PHYSICS,
+        "if TYPE_CHECKING:\n    pass\nelse:\n    from .. import step",
+        "later",
+    ),
     (imports_go_one_way, "taichi_dem/scene.py", "from ca_damper import x", "takes nothing"),
     (imports_go_one_way, "ca_damper/batch.py", "from taichi_dem import mesh", "takes nothing"),
     (imports_go_one_way, "taichi_dem/plot.py", "import experiments.blast", "nothing imports"),
@@ -335,6 +354,7 @@ DOCUMENTED = '"""One.\n' + "Long.\n" * 100 + '"""\n'
 GOOD = {
     STARTER: "import taichi as ti\nti.init(fast_math=False)\nimport taichi_dem.kit.errors",
     PHYSICS: "from taichi_dem.kit.types import x\nfrom . import rotation\nti.atomic_add(n[0], 1)",
+    "taichi_dem/contact_search/reach.py": "if TYPE_CHECKING:\n    from ..engine.state import State",
     "taichi_dem/engine/model.py": "from ..physics.bond import f\nfrom taichi_dem import materials",
     "taichi_dem/kit/plot_style.py": "import matplotlib\ndef _hidden():\n    pass",
     "taichi_dem/__init__.py": "from taichi_dem.simulate import simulate",

@@ -117,7 +117,7 @@ def test_a_checkout_lists_its_experiments_and_pages(package, capsys):
 
 def test_what_is_no_checkout_has_none_and_a_draft_has_no_line(tmp_path):
     (tmp_path / "experiments").mkdir()
-    (tmp_path / "experiments" / "_cli.py").touch()
+    (tmp_path / "experiments" / "_gallery_pages.txt").touch()
     (tmp_path / "experiments" / "draft.py").write_bytes(b'"""Not yet."""\ndef (\xff')
     (tmp_path / "README.md").write_bytes(b"no title\n# A \xff page\n")
     assert listing.experiments(tmp_path) == []

@@ -1,4 +1,4 @@
-"""What acts on the container (Komatsuzaki et al., 6.2, eq. 11: the sum of m (v - v') / dt).
+"""Forces on the container (Komatsuzaki et al., 6.2, eq. 11: the sum of m (v - v') / dt).
 
 One file an accounting and one line in the table below; the contract is ``protocol.Accounting``.
 """

@@ -1,4 +1,4 @@
-"""Accounting that keeps momentum: everything but gravity acts on the container."""
+"""Accounting that conserves momentum: all but gravity acts on the container."""
 
 from typing import ClassVar
 
@@ -10,10 +10,10 @@ from ca_damper.automaton.impulse_balance import quanta
 
 @ti.data_oriented
 class AllImpulses(Uncounted):
-    """Every blow and push counts, and what the six directions take from the particles.
+    """Every impact and push counts, and so do losses to the six directions of the lattice.
 
-    The container holds the lattice, so it feels what the lattice causes. Momentum is then kept, and
-    the mean force is the weight.
+    The container holds the lattice, so impulses of the lattice act on it. Momentum is then
+    conserved, and the mean force is the weight.
     """
 
     labels: ClassVar[tuple[str, str]] = ("ca_all", "ca_static")
@@ -27,7 +27,7 @@ class AllImpulses(Uncounted):
 
     @ti.func
     def wall_impulse(self, s, cell, gain):
-        """Count a blow [quanta]."""
+        """Count an impact [quanta]."""
         return quanta(gain)
 
     @ti.func

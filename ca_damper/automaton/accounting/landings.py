@@ -1,7 +1,7 @@
 """Accountings of the paper: particles act on the container while they move (6.2).
 
-Only a landing counts: the first blow to a wall after a change of cell. Blows between a heap and the
-floor that it lies on are left out and go to the impulse balance, if there is one.
+Only a landing counts: the first impact on a wall after a change of cell. Impacts between a heap and
+the floor that it lies on are left out and go to the impulse balance, if there is one.
 """
 
 from typing import Any, ClassVar
@@ -15,10 +15,10 @@ from ca_damper.scenes.scene_fields import SceneFields
 
 @ti.data_oriented
 class Landings(Uncounted):
-    """Blows of particles that came from another cell.
+    """Impacts of particles that came from another cell.
 
-    arrived: 1 for a particle that changed its cell since it last met a wall, shape
-    (scenes, cells + 1); meaningless in cells without a particle.
+    arrived: 1 for a particle that changed its cell since it last met a wall, shape (scenes, cells +
+    1); meaningless in cells without a particle.
     """
 
     labels: ClassVar[tuple[str, str]] = ("ca_landing", "ca_landing_static")
@@ -46,7 +46,7 @@ class Landings(Uncounted):
 
     @ti.func
     def wall_impulse(self, s, cell, gain):
-        """Count a blow [quanta] if the particle has changed its cell since the last."""
+        """Count an impact [quanta] if the particle has changed its cell since the last."""
         result = ti.cast(0, ti.i64)
         if self.arrived[s, cell] == 1:
             result = quanta(gain)

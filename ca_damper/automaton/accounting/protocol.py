@@ -1,6 +1,8 @@
 """Contract of an accounting: which impulses of the particles act on the container."""
 
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar, Protocol
+
+from ca_damper.scenes.scene_fields import SceneFields
 
 
 class Accounting(Protocol):
@@ -13,7 +15,7 @@ class Accounting(Protocol):
 
     #: Labels of an automaton without and with static contact, for tables and files.
     labels: ClassVar[tuple[str, str]]
-    #: What is counted beside "landing", in words for the report.
+    #: Effects counted beside "landing", in words for the report.
     effects: ClassVar[tuple[str, ...]]
     #: Whether particles rest on the floor unless the user says otherwise.
     static_contact: ClassVar[bool]
@@ -24,23 +26,23 @@ class Accounting(Protocol):
     def needs_lattice_impulse(self) -> bool:
         """Whether ``lattice_impulse`` has any effect; if not, gains in flight are not summed."""
 
-    def __init__(self, table, lattice, impulse_balance) -> None:
-        """Allocate what has to be remembered, with ``table.field``."""
+    def __init__(self, table: SceneFields, lattice: Any, impulse_balance: Any) -> None:
+        """Allocate its fields, with ``table.field``."""
 
-    def clear(self, s):
-        """Start scene s anew, the impulse balance included."""
+    def clear(self, s: int) -> None:
+        """Reset scene s, the impulse balance included."""
 
-    def moved(self, s, origin, target):
+    def moved(self, s: int, origin: int, target: int) -> None:
         """Follow a particle from one cell to another."""
 
-    def arrive(self, s, cell):
+    def arrive(self, s: int, cell: int) -> None:
         """Note that a particle has flown into a cell."""
 
-    def wall_impulse(self, s, cell, gain):
+    def wall_impulse(self, s: int, cell: int, gain: float) -> int:
         """Book the gain of a particle that meets a wall or comes to rest on the floor."""
 
-    def push(self, s, gain):
+    def push(self, s: int, gain: float) -> int:
         """Book the gain of a particle that a wall pushes along."""
 
-    def lattice_impulse(self, s, item, gain):
+    def lattice_impulse(self, s: int, item: int, gain: float) -> int:
         """Book a gain that the lattice causes: ``item`` of the impulse balance."""

@@ -1,4 +1,4 @@
-"""Accounting that counts nothing: the base of those that count something."""
+"""Accounting that counts no impulse: the base of the others."""
 
 from typing import Any, ClassVar
 
@@ -22,12 +22,12 @@ class Uncounted:
 
     @property
     def needs_lattice_impulse(self) -> bool:
-        """Whether anybody asks what the lattice causes."""
+        """Whether impulses of the lattice are counted or balanced."""
         return self.counts_all or self.impulse_balance.active
 
     @ti.func
     def clear(self, s):
-        """Start the balance of scene s anew."""
+        """Reset the balance of scene s."""
         self.impulse_balance.clear(s)
 
     @ti.func
@@ -40,7 +40,7 @@ class Uncounted:
 
     @ti.func
     def wall_impulse(self, s, cell, gain):
-        """Leave out a blow to a wall or the floor."""
+        """Leave out an impact on a wall or the floor."""
         self.impulse_balance.add(s, REST, gain)
         return ti.cast(0, ti.i64)
 

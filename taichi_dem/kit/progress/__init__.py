@@ -1,1 +1,1 @@
-"""Progress of compiling and running: what is reported, and the bar that shows it."""
+"""Progress of compiling and running: reports, and the bar that shows them."""

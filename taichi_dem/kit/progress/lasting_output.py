@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 @contextlib.contextmanager
 def lasting_output() -> Iterator[None]:
-    """Let prints in the block go nowhere, without a word, once nobody reads them."""
+    """Discard prints in the block silently once their reader has left."""
     for number, name in ((1, "stdout"), (2, "stderr")):
         if getattr(sys, name) is None:
             # Closed from the beginning: keep the next file that is opened from taking its number.
@@ -28,7 +28,7 @@ def _opened_nowhere(number):
 
 
 class _LastingOutput:
-    """A text stream that drops what can no longer be written: its reader has left, say."""
+    """A text stream that drops text which can no longer be written, as its reader has left."""
 
     def __init__(self, stream):
         self._stream = stream
@@ -42,12 +42,12 @@ class _LastingOutput:
         return len(text)
 
     def _encodable(self, text):
-        """The text, with a question mark for what the encoding of the stream lacks."""
+        """The text, with question marks for characters that the encoding of the stream lacks."""
         encoding = self._stream.encoding or "utf-8"
         return text.encode(encoding, "replace").decode(encoding)
 
     def flush(self):
-        """Send what waits in the buffer, or drop it."""
+        """Flush the buffer, or drop its contents."""
         try:
             self._stream.flush()
         except OSError as error:
@@ -56,7 +56,7 @@ class _LastingOutput:
     def _drop(self, error):
         if not isinstance(error, BrokenPipeError):
             print(f"standard output cannot be written to: {error.strerror}", file=sys.stderr)
-        # The buffer keeps what it could not send, and Python would complain of it at the exit.
+        # The buffer keeps unsent text, and Python would complain of it at the exit.
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, self._stream.fileno())
         os.close(nowhere)

@@ -1,4 +1,4 @@
-"""How far a job is: the one thing that progress bars and progress callbacks are given."""
+"""Progress of a job, as passed to progress bars and progress callbacks."""
 
 import contextlib
 import math
@@ -31,7 +31,7 @@ class Progress:
 
     @property
     def speed(self) -> str:
-        """How fast the job goes, in words; empty where there is nothing to tell."""
+        """Speed of the job in words; may be empty."""
         return ""
 
     def __str__(self):
@@ -62,11 +62,11 @@ class Compiling(Progress):
 
     @property
     def seconds_left(self) -> float:
-        """Unknown, infinite: a part may come from the cache of kernels or be compiled anew."""
+        """Infinite, as unknown: a part may come from the cache of kernels or be compiled."""
         return math.inf
 
     def __str__(self):
-        """What is being compiled, how far it is, and why the user will wait less next time."""
+        """Share done and part being compiled, in one line."""
         share = f"{100.0 * self.share:3.0f} %"
         return f"{share}, compiling {self.part} kernels, the next start is faster"
 
@@ -97,10 +97,10 @@ class Pace:
         return due
 
 
-#: Function that is told how far a job is.
+#: Function that is called with the progress of a job.
 Listener = Callable[[Progress], object]
 
-#: Who is told of compiling, the innermost last, and since when each listens [s].
+#: Listeners to compiling, the innermost last, and since when each listens [s].
 _listeners: list[tuple[Listener, float]] = []
 
 
@@ -115,7 +115,7 @@ def listening(listener: Listener) -> Iterator[None]:
 
 
 def compiling(part: str, share: float) -> None:
-    """Tell the listener that a part of the kernels is compiled next; share: of all of them."""
+    """Report that a part of the kernels is compiled next; share: of all of them."""
     if _listeners:
         listener, since = _listeners[-1]
         listener(Compiling(share, time.perf_counter() - since, part))

@@ -1,4 +1,4 @@
-"""A progress bar where somebody watches: on a terminal and in Jupyter; silent elsewhere."""
+"""A progress bar on a terminal and in Jupyter; silent elsewhere."""
 
 import contextlib
 import html
@@ -69,7 +69,7 @@ class ProgressBar:
 
 @contextlib.contextmanager
 def reporting(progress: Union[Listener, str, None], title: str) -> Iterator[Optional[Listener]]:
-    """What a job is to report its Progress to, given its argument ``progress``; None for nobody.
+    """Listener to the Progress of a job for its argument ``progress``; None for silence.
 
     "auto" gives a bar where somebody watches. A function is also told of compiling.
     """
@@ -84,7 +84,7 @@ def reporting(progress: Union[Listener, str, None], title: str) -> Iterator[Opti
 
 
 class _Nothing:
-    """Nobody watches."""
+    """Silent bar, where there is neither a terminal nor Jupyter."""
 
     def show(self, progress):
         """Do nothing."""
@@ -109,7 +109,7 @@ class _Terminal:
         spinner = SpinnerColumn("dots" if console.encoding.startswith("utf") else "line")
         self._narrow = console.width < _NARROW
         bars = () if self._narrow else (BarColumn(None),)
-        # The bar takes what the words leave of a line. Prints go where they would go without it.
+        # The bar takes the rest of a line. Prints go where they would go without it.
         self._bar = Progress(
             *(spinner, texts[0], *bars, texts[1]),
             console=console,
@@ -121,7 +121,7 @@ class _Terminal:
         self._bar.start()
 
     def show(self, progress):
-        """Draw how far the job is, and what it says of itself."""
+        """Draw the progress of the job."""
         # Rich's own thread redraws ten times a second, but not while Taichi compiles a kernel.
         at_once = progress.phase == "compiling"
         parts = str(progress).split(", ")
@@ -148,7 +148,7 @@ class _PlainTerminal:
             print(f"{self._title}: {progress}", file=sys.stderr, flush=True)
 
     def close(self):
-        """Leave what was written."""
+        """Leave the text as written."""
 
 
 class _Notebook:
@@ -164,7 +164,7 @@ class _Notebook:
         return {"text/plain": f"{self._title}: {words}", "text/html": marked}
 
     def show(self, progress):
-        """Draw how far the job is, and what it says of itself."""
+        """Draw the progress of the job."""
         if self._pace.should_report(progress.phase == "compiling"):
             self._handle.update(self._drawn(progress.share, str(progress)), raw=True)
 

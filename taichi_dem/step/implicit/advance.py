@@ -1,4 +1,4 @@
-"""What happens to a body in a step whose dashpots are solved together; bonds are as ever."""
+"""Advance a body in a step whose dashpots are solved together; bonds are as in ``Advance``."""
 
 import taichi as ti
 
@@ -11,15 +11,15 @@ from taichi_dem.step.advance import Advance
 class SolvedAdvance(Advance):
     """``Advance`` with bodies that take their new velocities from a ``Solver``.
 
-    Velocities are found first for the end of the step, with the impulses of springs and loads at
-    its beginning and of the dashpots as in the step before; the sweeps mend them. Springs and
-    loads at the time of the positions, dashpots with the mean of the velocities before and after:
-    the scheme is of second order, and the velocities are those in the middle of the next step.
+    Velocities at the end of the step are predicted with the impulses of springs and loads at its
+    beginning and of the dashpots as in the step before; the sweeps correct them. Springs and loads
+    act at the time of the positions, dashpots with the mean of the velocities before and after: the
+    scheme is of second order, and the velocities are those in the middle of the next step.
     """
 
     @ti.func
     def predict(self, i):
-        """Velocities at the end of the step as far as they are known before it is solved."""
+        """Predict the velocities at the end of the step before it is solved."""
         elapsed = self.schedule.elapsed(i)
         linear, angular = self._gathered(i)
         linear, angular, _ = self._loaded(i, elapsed, linear, angular)
@@ -28,7 +28,7 @@ class SolvedAdvance(Advance):
 
     @ti.func
     def body(self, i):
-        """Bring a body to the present tick with what the sweeps found."""
+        """Bring a body to the present tick with the velocities found by the sweeps."""
         elapsed = self.schedule.elapsed(i)
         velocity, momentum = self.solver.velocities.found(i)
         _, _, kick = self._loaded(i, elapsed, zero3(), zero3())

@@ -1,13 +1,23 @@
 """Dashpots of bonds: one 6x6 block each, visited in the order of a fixed edge colouring."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import taichi as ti
 
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.types import real, vec3, vec6
+from taichi_dem.methods import ImplicitDashpots
 from taichi_dem.physics.wrench import inverse, mobility, plus, point_block, zero_block
 from taichi_dem.step.implicit.colouring import edge_colours
+from taichi_dem.step.implicit.velocities import Velocities
 from taichi_dem.timeline import MACRO_TICKS
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.model import Model
+    from taichi_dem.engine.state import State
+    from taichi_dem.engine.tables import Tables
+    from taichi_dem.step.schedule import Schedule
 
 #: Colours that links of at most four a body can need: a link meets six others at most.
 BOND_COLOURS = 7
@@ -15,7 +25,7 @@ BOND_COLOURS = 7
 
 @ti.data_oriented
 class BondDashpots:
-    """What the sweeps read of a bond, packed in the order in which they visit.
+    """Per-bond data used in sweeps, packed in the order of visits.
 
     A bond answers the twist in a step (slave against master, at the slave's centre) with the
     wrench impulse y = C (theta s1 + (1 - theta) s0), s0 and s1 at both ends of the step. The sum
@@ -32,7 +42,9 @@ class BondDashpots:
 
     constant_fields = ("theta", "refresh_every", "index", "colour_first")
 
-    def __init__(self, tables, state, schedule, velocities):
+    def __init__(
+        self, tables: "Tables", state: "State", schedule: "Schedule", velocities: Velocities
+    ):
         self.tables, self.state = tables, state
         self.schedule, self.velocities = schedule, velocities
         bonds = tables.capacity.bonds
@@ -46,7 +58,7 @@ class BondDashpots:
         self.last = ti.Vector.field(6, real, shape=bonds)
         self.colour_first = ti.field(ti.i32, shape=BOND_COLOURS + 1)
 
-    def load(self, model, method):
+    def load(self, model: "Model", method: ImplicitDashpots) -> None:
         """Colour the bonds of a model and take the numbers of a method."""
         assign(self.theta, np.array([method.theta, (1.0 - method.theta) / method.theta]))
         assign(self.refresh_every, max(1, round(method.refresh / method.dt)))
@@ -70,7 +82,7 @@ class BondDashpots:
 
     @ti.func
     def begin(self, b, i, j, branch):
-        """Take in the present twist of an intact bond and, now and then, its block."""
+        """Load the present twist of an intact bond and, at intervals, its block."""
         k = self.index[b]
         self.bodies[k], self.branch[k] = [i, j], branch
         now = self._twist(i, j, branch)
@@ -81,7 +93,7 @@ class BondDashpots:
 
     @ti.func
     def first(self, b):
-        """Begin a run with a guess: the twist of the first step does not change."""
+        """Set the first guess of a run: a constant twist in the first step."""
         slots, k = self.tables.bond_slots[b], self.index[b]
         i, j = slots[0] >> 2, slots[1] >> 2
         if self.state.broken_tick[b] < 0:
@@ -99,7 +111,7 @@ class BondDashpots:
 
     @ti.func
     def end(self, b):
-        """A released bond is visited no more."""
+        """Remove a released bond from the sweeps."""
         self.bodies[self.index[b]] = [-1, -1]
 
     @ti.func
@@ -126,7 +138,7 @@ class BondDashpots:
         dt = self.schedule.step_seconds[0]
         axes = self.tables.bond_frame[b] @ self.state.rotation[i].transpose()
         along = self.tables.dashpot.traction(vec3(1.0, 1.0, 1.0))
-        # A trace of the springs lets the block be inverted where a coefficient is zero.
+        # A trace of the springs keeps the block invertible where a coefficient is zero.
         stiffness = self.tables.bond_stiffness[b]
         along += 1e-9 * dt * vec3(stiffness[0], stiffness[1], stiffness[1])
         scaled = axes

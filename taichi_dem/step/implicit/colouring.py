@@ -3,7 +3,7 @@
 import numpy as np
 
 
-def edge_colours(links, body_count):
+def edge_colours(links: np.ndarray, body_count: int) -> np.ndarray:
     """Colour of every link, (n,) from 0 on; links that share a body differ.
 
     links: the two bodies of each, shape (n, 2). Greedy; where that would take a new colour, one
@@ -11,7 +11,7 @@ def edge_colours(links, body_count):
     bonds, for which five colours always suffice and four or five come out.
     """
     colours = np.full(len(links), -1, dtype=np.int32)
-    at = [{} for _ in range(body_count)]
+    at: list[dict[int, int]] = [{} for _ in range(body_count)]
     for link, (i, j) in enumerate(np.asarray(links).tolist()):
         most = max(max(at[i], default=-1), max(at[j], default=-1)) + 1
         used = max(most, 1 + int(colours.max(initial=-1)))

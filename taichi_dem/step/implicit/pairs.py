@@ -1,31 +1,40 @@
 """Dashpots and friction of contacts, sphere by sphere: they push, within the bound of friction."""
 
+from typing import TYPE_CHECKING
+
 import taichi as ti
 
 from taichi_dem.contact_search.cell_grid import group
+from taichi_dem.contact_search.contacts import Contacts
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.physics.rotation import unit3, zero3
 from taichi_dem.physics.sphere_pair import add_within, cut_to, meeting
+from taichi_dem.step.implicit.velocities import Velocities
 from taichi_dem.step.tangential_springs import TangentialSprings
 
-#: Colours of pairs that share no body; what finds no free one is visited last, in turn.
+if TYPE_CHECKING:
+    from taichi_dem.engine.state import State
+    from taichi_dem.engine.tables import Tables
+    from taichi_dem.step.schedule import Schedule
+
+#: Colours of pairs that share no body; pairs without a free one are visited last, in turn.
 COLOURS = 16
 
 
 @ti.data_oriented
 class PairDashpots:
-    """What the sweeps read of the spheres that touch.
+    """Data of touching spheres used in sweeps.
 
-    One block for all spheres of a pair would let those that part hold on to each other while the
-    others push: a pair that rocks would stick. So each sphere has its own impulse.
+    One block for all spheres of a pair would let parting spheres pull on each other while others
+    push: a rocking pair would stick. So each sphere has its own impulse.
 
-    touching: how many spheres of a pair touch, or may within the step; they come first among the
-    pair's candidates. entry: which candidate. normal: from first to second. arm: from the second's
-    centre to the contact [m]. push: impulse of the spring, or what the gap still lets through
-    [N s]. share: velocity per impulse along the normal, and across at most [1/kg]. impulse: on the
-    second, of spring, dashpot and friction, as found [N s]; entries as in ``PairStore.sphere``.
-    Where friction sticks, pull: impulse of the spring across the contact [N s]; elapsed: time since
-    a pair was last evaluated [s].
+    touching: number of spheres of a pair that touch, or may within the step; they come first among
+    the pair's candidates. entry: index of the candidate. normal: from first to second. arm: from
+    the second's centre to the contact [m]. push: impulse of the spring, or of the remaining gap [N
+    s]. share: velocity per impulse along the normal, and largest across it [1/kg]. impulse: on the
+    second, of spring, dashpot and friction [N s]; entries as in ``PairStore.sphere``. Where
+    friction sticks, pull: impulse of the spring across the contact [N s]; elapsed: time since a
+    pair was last evaluated [s].
     active: the pairs that touch, count of them. order: places in it by colour, those of colour c
     from colour_first[c] on.
     """
@@ -36,7 +45,14 @@ class PairDashpots:
         *("active", "order", "colour", "taken", "colour_first"),
     )
 
-    def __init__(self, tables, state, schedule, contacts, velocities):
+    def __init__(
+        self,
+        tables: "Tables",
+        state: "State",
+        schedule: "Schedule",
+        contacts: Contacts,
+        velocities: Velocities,
+    ):
         self.tables, self.state, self.schedule = tables, state, schedule
         self.contacts, self.velocities = contacts, velocities
         self.has_friction = bool(tables.friction.name)
@@ -66,8 +82,8 @@ class PairDashpots:
     def sort(self, one):
         """List and colour the pairs that touch: those of one colour share no body.
 
-        Each takes the lowest colour that is free at both bodies; what finds none comes last.
-        Candidates that do not touch are left out, so that no skin changes the order.
+        Each takes the lowest colour that is free at both bodies; those without a free one come
+        last. Candidates that do not touch are left out, so that no skin changes the order.
         """
         count = 0
         for k in range(self.store.near_count[None]):
@@ -100,7 +116,7 @@ class PairDashpots:
 
     @ti.func
     def begin(self, p):
-        """Find what touches and its springs' impulse; start from the impulses of the last step."""
+        """Find touching spheres and their spring impulses; start from the last impulses."""
         pair = self.store.body[p]
         i, j = pair[0], pair[1]
         dt = self.schedule.step_seconds[0]
@@ -150,7 +166,7 @@ class PairDashpots:
 
     @ti.func
     def _way(self, i, j, branch, arm, normal, elapsed):
-        """Way of a contact's second sphere against the first across the normal in a time [m]."""
+        """Tangential displacement of a contact's second sphere against the first in a time [m]."""
         spin = self.state.spin[i]
         velocity = self.state.velocity[j] + self.state.spin[j].cross(arm)
         velocity -= self.state.velocity[i] + spin.cross(arm + branch)
@@ -177,7 +193,7 @@ class PairDashpots:
 
     @ti.func
     def _deposit(self, p, branch, force, moment):
-        """Let both bodies have the first guess: force on the second, moment about its centre."""
+        """Add the first guess to both bodies: impulse on the second, moment about its centre."""
         around = moment + branch.cross(force)
         self.contacts.add_impulse(p, 0, -force, -around)
         self.contacts.add_impulse(p, 1, force, moment)
@@ -220,7 +236,7 @@ class PairDashpots:
 
     @ti.func
     def book(self, p):
-        """Book what the dashpots and friction of a pair took, with its mean motion in the step."""
+        """Book the energy taken by dashpots and friction of a pair, at its mean motion."""
         if self.touching[p] > 0:
             pair = self.store.body[p]
             i, j, branch = pair[0], pair[1], self.branch[p]
@@ -246,7 +262,7 @@ class PairDashpots:
 
     @ti.func
     def _slip(self, p, c, i, j, pressed):
-        """Let a spring slip in a step; its impulse [N s], and the energy that slipping took [J]."""
+        """Limit a spring in a step; return its impulse [N s] and the energy of slipping [J]."""
         k, normal, rotation = self.entry[c], self.normal[c], self.state.rotation[i]
         dt = self.schedule.step_seconds[0]
         bound = self.tables.friction.limit(pressed) / dt

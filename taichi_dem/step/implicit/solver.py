@@ -1,29 +1,41 @@
 """Sweeps over the dashpots of all bonds and contacts until their impulses agree."""
 
+from typing import TYPE_CHECKING, Optional
+
 import numpy as np
 import taichi as ti
 
+from taichi_dem.contact_search.contacts import Contacts
 from taichi_dem.kit.allocation import assign, raise_to
 from taichi_dem.kit.types import real
+from taichi_dem.methods import ImplicitDashpots
 from taichi_dem.step.implicit.bonds import BondDashpots
 from taichi_dem.step.implicit.pairs import COLOURS, PairDashpots
 from taichi_dem.step.implicit.velocities import Velocities
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.model import Model
+    from taichi_dem.engine.state import State
+    from taichi_dem.engine.tables import Tables
+    from taichi_dem.step.schedule import Schedule
 
 
 @ti.data_oriented
 class Solver:
     """Gauss-Seidel over bonds with dashpots, then touching pairs, in the order of their colours.
 
-    Members of one colour share no body: they may be visited side by side, and the order within a
-    colour changes no bit. So one core and many cores run the same sweeps to the same bits.
+    Members of one colour share no body: they may be visited in parallel, and their order changes no
+    bit. So one core and many cores run the same sweeps to the same bits.
 
-    bounds: fewest and most sweeps of a step. tolerance: of the velocities. sweeps: how many the
-    present step has had. change2: largest squared change of a velocity in the present sweep
-    [m2/s2], residual2 that of the last. speed2: largest squared speed of a body at the beginning of
-    the step. unsolved: 1 while another sweep is called for.
+    bounds: fewest and most sweeps of a step. tolerance: of the velocities. sweeps: number in the
+    present step. change2: largest squared change of a velocity in the present sweep [m2/s2],
+    residual2 that of the last. speed2: largest squared speed of a body at the beginning of the
+    step. unsolved: 1 while another sweep is required.
     """
 
-    def __init__(self, tables, state, schedule, contacts):
+    def __init__(
+        self, tables: "Tables", state: "State", schedule: "Schedule", contacts: Optional[Contacts]
+    ):
         self.tables, self.state, self.schedule, self.contacts = tables, state, schedule, contacts
         self.bounds = ti.field(ti.i32, shape=2)
         self.tolerance = ti.field(real, shape=())
@@ -34,7 +46,7 @@ class Solver:
             self.bonds = BondDashpots(tables, state, schedule, self.velocities)
         self.pairs = None
         self.has_contact = contacts is not None
-        if self.has_contact:
+        if contacts is not None:
             self.pairs = PairDashpots(tables, state, schedule, contacts, self.velocities)
         self.sweeps = ti.field(ti.i32, shape=())
         self.unsolved = ti.field(ti.i32, shape=())
@@ -43,8 +55,8 @@ class Solver:
         self.residual2 = ti.field(real, shape=())
         self.speed2 = ti.field(real, shape=())
 
-    def load(self, model, method):
-        """Take the numbers of a method, and the bonds of a model."""
+    def load(self, model: "Model", method: ImplicitDashpots) -> None:
+        """Load the numbers of a method, and the bonds of a model."""
         assign(self.bounds, np.array(method.sweeps))
         assign(self.tolerance, method.tolerance)
         if self.has_bonds:
@@ -52,7 +64,7 @@ class Solver:
 
     @ti.func
     def begin(self, one):
-        """Forget the last step's residual."""
+        """Reset the residual and the count of sweeps."""
         self.sweeps[None] = 0
         self.unsolved[None] = 1
         self.change2[None], self.speed2[None] = 0.0, 0.0
@@ -88,7 +100,7 @@ class Solver:
 
     @ti.func
     def check_convergence(self, one):
-        """End a sweep: is another one called for?"""
+        """End a sweep, and decide whether another one is required."""
         self.sweeps[None] = self.sweeps[None] + 1
         self.total_sweeps[None] = self.total_sweeps[None] + 1
         self.residual2[None] = self.change2[None]

@@ -1,25 +1,31 @@
 """Velocities while a step is being solved, and their change per impulse."""
 
+from typing import TYPE_CHECKING
+
 import taichi as ti
 
 from taichi_dem.kit.types import real
 from taichi_dem.physics.rotation import unit3
 
+if TYPE_CHECKING:
+    from taichi_dem.engine.state import State
+    from taichi_dem.engine.tables import Tables
+
 
 @ti.data_oriented
 class Velocities:
-    """Velocity and spin of every body at the end of the step, as far as it is known.
+    """Present estimate of velocity and spin of every body at the end of the step.
 
-    twist: velocity [m/s] and spin [rad/s], world. turn: spin per moment, R I^-1 R^T
-    [1/(kg m^2)], as supports allow. lightness: velocity per impulse without them [1/kg]. These lie
-    side by side, 128 bytes a body: a sweep visits bodies out of order, and large blocks wait for
-    memory. Where there are supports, hold: velocity per impulse [1/kg],
-    and given: all that a body was given in the step [N s, N m s].
+    twist: velocity [m/s] and spin [rad/s], world. turn: spin per moment, R I^-1 R^T [1/(kg m^2)],
+    as supports allow. lightness: velocity per impulse without them [1/kg]. These are stored
+    contiguously, 128 bytes a body: a sweep visits bodies out of order, and large blocks wait for
+    memory. With supports, hold: velocity per impulse [1/kg], and given: total impulse and moment on
+    a body in the step [N s, N m s].
     """
 
     scratch_fields = ("twist", "given")
 
-    def __init__(self, tables, state):
+    def __init__(self, tables: "Tables", state: "State"):
         n = tables.capacity.bodies
         self.tables, self.state = tables, state
         self.twist, self.turn = ti.Vector.field(6, real), ti.Matrix.field(3, 3, real)
@@ -49,7 +55,7 @@ class Velocities:
 
     @ti.func
     def _support(self, i, advance):
-        """Supports change velocities linearly: ask them for the unit impulses and moments."""
+        """Apply the supports, which are linear, to the unit impulses and moments."""
         unit, turn = unit3(), self.turn[i]
         rest, rest_turn = advance.allowed(i, 0.0 * unit[0, :], 0.0 * unit[0, :])
         for k in ti.static(range(3)):
@@ -63,7 +69,7 @@ class Velocities:
 
     @ti.func
     def predict(self, i, advance, linear, angular):
-        """Let body i have an impulse [N s] and moment [N m s], as its supports allow."""
+        """Apply an impulse [N s] and a moment [N m s] to body i, as its supports allow."""
         velocity = self.state.velocity[i] + self.tables.mass_inverse[i] * linear
         spin = self.state.spin[i] + self.turn[i] @ angular
         if ti.static(self.has_supports):
@@ -79,7 +85,7 @@ class Velocities:
     def found(self, i):
         """Velocity and angular momentum at the end of the step, before supports act.
 
-        The momentum is found from the change of the spin: where nothing acts it stays, to the bit.
+        The momentum follows from the change of the spin: without impulses it stays, to the bit.
         """
         twist, rotation = self.twist[i], self.state.rotation[i]
         velocity = twist[0:3]
@@ -100,7 +106,7 @@ class Velocities:
 
     @ti.func
     def pull(self, i, j, branch, force, moment):
-        """Give i an impulse and a moment at j's centre, and j the opposite."""
+        """Apply an impulse and a moment at j's centre to body i, and the opposite to j."""
         turned = self.turn[i] @ (moment + branch.cross(force))
         back = self.turn[j] @ moment
         first, second = force, force
