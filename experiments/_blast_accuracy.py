@@ -6,8 +6,7 @@ import numpy as np
 
 from _blast import paper_effects
 from _demo import set_moving
-from _hard_cases._case import renew_session
-from taichi_dem import CONCRETE, At, Scene, Simulation, SimulationDiverged
+from taichi_dem import CONCRETE, At, Scene, Simulation, SimulationDiverged, runtime
 from taichi_dem.simulate import run_simulation
 
 #: How far bodies are displaced at the start of a run that differs by round-off only [m].
@@ -51,7 +50,7 @@ def blast(mesh, method, until, driver="auto", seed=None, progress=None):
 
     seed: None, or of the disturbance of all positions by DISTURBANCE.
     """
-    renew_session()
+    runtime.clear()
     simulation, failure = Simulation(Scene(mesh, CONCRETE, paper_effects()), method, driver), ""
     if seed is not None:
         noise = np.random.default_rng(seed).uniform(-DISTURBANCE, DISTURBANCE, (mesh.body_count, 3))

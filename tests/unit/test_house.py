@@ -18,7 +18,7 @@ LAYERS = {
     "taichi_dem": (
         ("kit",),
         ("meshes", "mesh", "materials"),
-        ("physics", "timeline"),
+        ("physics", "timeline", "closed_forms"),
         ("effects",),
         ("scene",),
         ("stability",),
