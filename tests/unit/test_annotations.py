@@ -20,6 +20,7 @@ ANNOTATED = (
     "taichi_dem/stability/step_report.py",
     *("ca_damper/measures.py", "ca_damper/report.py", "ca_damper/record.py"),
     *("ca_damper/scenes/table.py", "ca_damper/lattice.py", "ca_damper/oscillator.py"),
+    "ca_damper/bouncing.py",
 )
 ON_THE_DEVICE = ("func", "kernel", "pyfunc", "real_func")
 # Dunder methods whose types a caller depends on; the others have those that Python demands.

@@ -37,7 +37,7 @@ LAYERS = {
     ),
     "ca_damper": (
         ("errors", "random_numbers", "progress", "measures", "report", "contracts"),
-        ("rk45", "oscillator", "record", "checks"),
+        ("rk45", "oscillator", "record", "checks", "bouncing"),
         ("scenes",),
         ("filling", "lattice"),
         ("fixed_mass", "automaton", "spheres"),
