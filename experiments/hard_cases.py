@@ -19,11 +19,11 @@ import sys
 import time
 
 from _hard_cases import registry
-from _hard_cases._pictures import picture_cases, picture_margins
 from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.kit.study import figure, finish, main, parser, several, show_rows, whole, write_rows
 from taichi_dem.kit.study.cases import FAILED, PASSED, REFUSED, Limit, assess, cases_named
+from taichi_dem.kit.study.cases_picture import picture_cases, picture_margins
 
 NAME = "hard_cases"
 #: Cases of a quick run, one of each kind; the tests ask all, at quick size.
@@ -32,6 +32,8 @@ OF_QUICK = (
     *("spheres_near_limit", "spheres_beyond_limit", "single_cell"),
     *("faster_than_the_bound", "flat_element", "step_that_is_no_number"),
 )
+#: A uniform step of a hard case is fixed: the paper's rule does not shorten it.
+STYLES = {"uniform": "fixed"}
 
 
 def options_parser():
@@ -60,9 +62,8 @@ def run(options):
     for package in dict.fromkeys(case.package for case in cases):
         sheets[f"hard_cases_{package}"] = [t for t in trials if t.case.package == package]
     for name, own in sheets.items():
-        columns = 1 if name in {case.name for case in cases} else options.columns
-        picture_cases(os.path.join(options.out, f"{name}.png"), own, columns)
-    picture_margins(os.path.join(options.out, "hard_cases.png"), trials)
+        picture_cases(os.path.join(options.out, f"{name}.png"), own, options.columns, STYLES)
+    picture_margins(os.path.join(options.out, "hard_cases.png"), trials, STYLES)
     print_rows(rows)
     compiling = sum(trial.compile_s for trial in trials)
     seconds = compiling, time.perf_counter() - started - compiling

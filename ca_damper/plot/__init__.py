@@ -2,13 +2,16 @@
 
 from ca_damper.plot.animation import moving_picture
 from ca_damper.plot.box import Box, DrawnBox, frame_panel
+from ca_damper.plot.film_strip import animate_films, picture_film_strips
 from ca_damper.plot.response import picture_hysteresis, picture_measures, picture_responses
 
 __all__ = [
     "Box",
     "DrawnBox",
+    "animate_films",
     "frame_panel",
     "moving_picture",
+    "picture_film_strips",
     "picture_hysteresis",
     "picture_measures",
     "picture_responses",

@@ -10,6 +10,7 @@ import pytest
 from ca_damper import Automaton, Spheres, plot
 from ca_damper.bouncing import Fall, RecordedFall
 from ca_damper.lattice import Geometry
+from ca_damper.measures import first_harmonic
 from tests.experiments.contract import (
     NAMES,
     QuickRun,
@@ -233,12 +234,11 @@ def test_particle_that_comes_to_rest_early_is_compared_as_far_as_it_bounced(show
     assert figures["impact_error_ms"] <= 0.1 * (2.0 * (2.0 + 3.0 * 0.5) + 1.0)
 
 
-def test_harmonic_gives_amplitude_and_lag(script):
-    harmonic = script("damper_patterns").harmonic
+def test_harmonic_gives_amplitude_and_lag():
     phase = np.arange(32) * 52 / 1667
     lag = np.radians(47.0)
     values = 3.0 + 2.0 * np.sin(2.0 * np.pi * phase - lag)
-    amplitude, degrees = harmonic(phase, values)
+    amplitude, degrees = first_harmonic(phase, values)
     assert amplitude == pytest.approx(2.0, rel=1e-12)
     assert degrees == pytest.approx(47.0, rel=1e-12)
 
@@ -246,6 +246,7 @@ def test_harmonic_gives_amplitude_and_lag(script):
 def test_box_of_the_automaton_is_staggered_and_moves_by_cells():
     box = plot.Box.of_automaton(Automaton())
     plain = plot.Box.of_spheres(Spheres())
+    assert (plot.Box.of(Automaton()), plot.Box.of(Spheres())) == (box, plain)
     assert (box.width, box.height) == pytest.approx((plain.width, plain.height), rel=1e-12)
     displaced = np.array([-0.0031, -0.0029, 0.0, 0.0029, 0.0031])
     assert box.lift(displaced) == pytest.approx([-6e-3, 0.0, 0.0, 0.0, 6e-3], abs=1e-15)

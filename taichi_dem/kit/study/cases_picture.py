@@ -1,56 +1,62 @@
-"""Pictures of hard cases: curves of every case, and how far methods stay within their bounds."""
+"""Pictures of cases: curves of every case, and how far methods stay within their bounds."""
 
 import math
 import re
 import textwrap
+from collections.abc import Mapping, Sequence
+from typing import Optional
 
 from taichi_dem.kit.plot_style import BLACK, GREY, RED, line_key, picture, power, styles_of
-from taichi_dem.kit.study.cases import FAILED, PASSED, REFUSED
+from taichi_dem.kit.study.cases import FAILED, PASSED, REFUSED, Trial
 
-#: A uniform step of a hard case is fixed: the paper's rule does not shorten it.
-MEANT = {"uniform": "fixed"}
 #: Margins from which on more means nothing; where those stand that refuse, and those that fail.
-MOST, PLACES = 1e4, {REFUSED: 0.05, FAILED: 0.4}
-TICKS = {0.05: "refused", 1.0: "1", 10.0: "10", 100.0: "100", MOST: "10⁴ or exact"}
+_MOST, _PLACES = 1e4, {REFUSED: 0.05, FAILED: 0.4}
+_TICKS = {0.05: "refused", 1.0: "1", 10.0: "10", 100.0: "100", _MOST: "10⁴ or exact"}
+#: Style of a method in ``styles_of``, where it has another name there.
+Alias = Mapping[str, str]
 
 
-def case_title(name):
+def case_title(name: str) -> str:
     """Name of a case in words: fragment_at_1_km_s -> fragment at 1 km/s."""
     words = re.sub(r"(\d+_k?m)_s(?![a-z])", r"\1/s", name).replace("_", " ")
     return with_powers(words)
 
 
-def with_powers(words):
+def with_powers(words: str) -> str:
     """Words with powers of ten for numbers as a program prints them: 1e4 -> 10⁴."""
     return re.sub(r"\d+(?:\.\d+)?e[-+]?\d+", lambda found: power(float(found[0])), words)
 
 
-def distinct(trials, name):
+def _distinct(trials, name):
     """Different values of a member of trials, in their order."""
     return list(dict.fromkeys(getattr(trial, name) for trial in trials))
 
 
-def looks_of(trials):
+def _looks_of(trials, alias):
     """Label and colour of every method."""
-    methods = distinct(trials, "method")
-    styles = styles_of(MEANT.get(method, method) for method in methods)
+    methods = _distinct(trials, "method")
+    styles = styles_of((alias or {}).get(method, method) for method in methods)
     return {m: {"label": s.label, "color": s.colour} for m, s in zip(methods, styles.values())}
 
 
-def picture_cases(path, trials, columns):
+def picture_cases(
+    path: str, trials: Sequence[Trial], columns: int = 5, alias: Optional[Alias] = None
+) -> None:
     """A panel a case with the curves of its methods; one case alone with its question."""
-    cases, looks, shape = distinct(trials, "case"), looks_of(trials), {"squeeze": False}
+    cases, looks = _distinct(trials, "case"), _looks_of(trials, alias)
     # The first are thick, so that all are seen.
     for k, look in enumerate(looks.values()):
         look["lw"] = max(0.8, 3.0 - 0.45 * k)
-    rows, alone = -(-len(cases) // columns), len(cases) == 1
-    shape["size"] = (7.0, 4.6) if alone else (3.2 * columns, min(16.0, 0.4 + 2.4 * rows))
-    with picture(path, rows, columns, **shape) as (figure, axes):
+    alone = len(cases) == 1
+    columns = 1 if alone else columns
+    rows = -(-len(cases) // columns)
+    size = (7.0, 4.6) if alone else (3.2 * columns, min(16.0, 0.4 + 2.4 * rows))
+    with picture(path, rows, columns, size, squeeze=False) as (figure, axes):
         for axis in axes.ravel()[len(cases) :]:
             axis.set_axis_off()
         for axis, case in zip(axes.ravel(), cases):
             own = [trial for trial in trials if trial.case is case]
-            draw_case(axis, own, looks, 8.0 if alone else 6.0)
+            _draw_case(axis, own, looks, 8.0 if alone else 6.0)
         shown = dict.fromkeys(trial.method for trial in trials if trial.curve)
         keys = [line_key(**looks[method]) for method in shown]
         place = "lower center" if alone else "upper left"
@@ -60,7 +66,7 @@ def picture_cases(path, trials, columns):
             figure.suptitle(question, fontsize=9.0, x=0.02, ha="left")
 
 
-def draw_case(axis, own, looks, size):
+def _draw_case(axis, own, looks, size):
     """Curves of the methods of a case, and how they fared in the title; size: of letters."""
     shown = [trial for trial in own if trial.curve]
     for trial in shown:
@@ -84,10 +90,10 @@ def draw_case(axis, own, looks, size):
         label.set_size(size)
     failed = any(trial.status == FAILED for trial in own)
     look = {"fontsize": size + 1.0, "color": RED if failed else BLACK}
-    axis.set_title(f"{case_title(own[0].case.name)}: {verdict(own)}", **look)
+    axis.set_title(f"{case_title(own[0].case.name)}: {_verdict(own)}", **look)
 
 
-def verdict(own):
+def _verdict(own):
     """How the methods of a case fared, in words."""
     counts = {
         word: sum(trial.status == word for trial in own) for word in (PASSED, REFUSED, FAILED)
@@ -99,44 +105,44 @@ def verdict(own):
     return ", ".join(said)
 
 
-def picture_margins(path, trials):
+def picture_margins(path: str, trials: Sequence[Trial], alias: Optional[Alias] = None) -> None:
     """A panel a package, a row a case, a mark a method: its margin, or that it refuses."""
     packages = dict.fromkeys(trial.case.package for trial in trials)
     panels = {name: [trial for trial in trials if trial.case.package == name] for name in packages}
     size = (
         4.4 * len(panels),
-        1.4 + 0.17 * max(len(distinct(own, "case")) for own in panels.values()),
+        1.4 + 0.17 * max(len(_distinct(own, "case")) for own in panels.values()),
     )
     with picture(path, 1, len(panels), size, squeeze=False) as (_, axes):
         for axis, (package, own) in zip(axes[0], panels.items()):
-            draw_margins(axis, own)
+            _draw_margins(axis, own, _looks_of(own, alias))
             look = {"fontsize": 6.5, "title_fontsize": 9.5, "alignment": "left", "ncols": 2}
             look.update(loc="lower left", bbox_to_anchor=(-0.3, 1.0), borderpad=0.0)
             axis.legend(title=f"{package}: {len(own)} runs", **look)
 
 
-def draw_margins(axis, own):
+def _draw_margins(axis, own, looks):
     """Marks of all methods, those that fail as crosses."""
-    cases, looks = distinct(own, "case"), looks_of(own)
+    cases = _distinct(own, "case")
     failed = [trial for trial in own if trial.status == FAILED]
     for k, (method, look) in enumerate(looks.items()):
         spread = 0.5 * (k / max(1, len(looks) - 1) - 0.5)
         for mark, some in (({"marker": "o", "ms": 3.4}, own), ({"marker": "X", "ms": 8.0}, failed)):
             mine = [trial for trial in some if trial.method == method]
-            where = [place_of(trial) for trial in mine]
+            where = [_place_of(trial) for trial in mine]
             level = [cases.index(trial.case) + spread for trial in mine]
             axis.plot(where, level, ls="none", mew=0.0, **mark, **look)
             look = {"color": look["color"]}
     if failed:
         axis.plot([], [], "X", ms=8.0, color=BLACK, label="failed")
     axis.axvline(1.0, color=GREY, lw=1.0, label="at the bound")
-    axis.set(xscale="log", xlim=(0.02, 2.5 * MOST), ylim=(len(cases) - 0.3, -0.7))
+    axis.set(xscale="log", xlim=(0.02, 2.5 * _MOST), ylim=(len(cases) - 0.3, -0.7))
     axis.set_yticks(range(len(cases)), [case_title(case.name) for case in cases], fontsize=6.5)
-    axis.set_xticks(list(TICKS), list(TICKS.values()), fontsize=7.0)
+    axis.set_xticks(list(_TICKS), list(_TICKS.values()), fontsize=7.0)
     axis.set_xticks([], minor=True)
     axis.set_xlabel("margin: bound of physics / worst figure [1]")
 
 
-def place_of(trial):
+def _place_of(trial):
     """Place of a trial on the axis of margins."""
-    return PLACES.get(trial.status, min(trial.margin, MOST))
+    return _PLACES.get(trial.status, min(trial.margin, _MOST))
