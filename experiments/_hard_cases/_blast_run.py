@@ -3,18 +3,10 @@
 import numpy as np
 
 from _demo import set_moving
-from taichi_dem import (
-    CONCRETE,
-    ImplicitDashpots,
-    Multirate,
-    Scene,
-    Simulation,
-    StepControl,
-    Uniform,
-    effects,
-)
+from taichi_dem import CONCRETE, Scene, Simulation, StepControl, effects
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import bar, pair, placed_together, single
+from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
 from taichi_dem.output.motion_record import MotionRecord
 from taichi_dem.simulate import run_simulation
 
@@ -142,7 +134,7 @@ def beside(mesh, shift, other):
     return placed_together({"first": (mesh, shift), "other": (other, np.zeros(3))})
 
 
-def fragment_and_block():
+def shot_at_block():
     """A fragment of 100 m/s, 10 µm before a cube of six bodies at rest: mesh and velocities."""
     block = bar(0.1, 0.1, (1, 1, 1))
     velocity = np.outer(np.arange(7) == 0, (100.0, 0.0, 0.0))

@@ -1,20 +1,13 @@
 """Hard cases of the blast: free bodies, bonds and supports; a formula stands with every bound."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from _hard_cases._blast_run import (
-    ACCURACY,
-    AREA,
-    EPS,
-    FREE,
-    TOUCHING,
-    Run,
-    grown,
-)
+from _hard_cases._blast_run import ACCURACY, AREA, EPS, FREE, TOUCHING, Run, grown
 from taichi_dem import CONCRETE, ImplicitDashpots, Multirate, StepControl, Uniform, effects
 from taichi_dem.closed_forms import LinearBonds, damped_opening
 from taichi_dem.kit.study.cases import Cases
@@ -30,10 +23,9 @@ OPENING = 5e-6
 TEARING = 100.0
 #: Bond springs bear 1.6e-8 s here: 100 times as stiff as the shear springs make them elsewhere.
 STIFF = {"uniform": Uniform(1e-8), "implicit": ImplicitDashpots(1e-8)}
-STANDING = {**STIFF, "uniform": Uniform(2e-8), "multirate_held": Multirate(2e-8, 1e-7)}
-STANDING["implicit"] = ImplicitDashpots(4e-7)
-TOO_LONG = {"uniform": Uniform(1e-6), "multirate_held": Multirate(1e-6, 1e-3)}
-TOO_LONG["implicit"] = ImplicitDashpots(2e-5)
+BASIC = ("uniform", "multirate_held", "implicit")
+STANDING = dict(zip(BASIC, (Uniform(2e-8), Multirate(2e-8, 1e-7), ImplicitDashpots(4e-7))))
+TOO_LONG = dict(zip(BASIC, (Uniform(1e-6), Multirate(1e-6, 1e-3), ImplicitDashpots(2e-5))))
 #: Edges of the scan [m]: frequency times largest step runs through a factor of four.
 SCAN = np.geomspace(0.02, 0.32, 16)
 #: Height of the light neighbour over that of the others.
@@ -66,22 +58,10 @@ def spin(trial, axis, speed=1e4):
     run.draw("energy of spin / at the start - 1 [1]", energy - 1.0)
 
 
-@case(FREE)
-def spin_about_x(trial):
-    """An uneven body at 1e4 rad/s about x tumbles and keeps energy and angular momentum."""
-    spin(trial, 0)
-
-
-@case(FREE)
-def spin_about_y(trial):
-    """An uneven body at 1e4 rad/s about y tumbles and keeps energy and angular momentum."""
-    spin(trial, 1)
-
-
-@case(FREE)
-def spin_about_z(trial):
-    """An uneven body at 1e4 rad/s about z tumbles and keeps energy and angular momentum."""
-    spin(trial, 2)
+for number, axis in enumerate("xyz"):
+    about = f"An uneven body at 1e4 rad/s about {axis}"
+    question = f"{about} tumbles and keeps energy and angular momentum."
+    case.add(f"spin_about_{axis}", question, partial(spin, axis=number), FREE)
 
 
 @case(FREE)

@@ -4,15 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from _hard_cases._blast_run import (
-    FREE,
-    TOUCHING,
-    Run,
-    beside,
-    fragment_and_block,
-    right_half,
-    soon,
-)
+from _hard_cases._blast_run import FREE, TOUCHING, Run, beside, right_half, shot_at_block, soon
 from taichi_dem import CONCRETE, ImplicitDashpots, Multirate, StepControl, Uniform, effects
 from taichi_dem.closed_forms import damped_opening, velocity_after_impact
 from taichi_dem.kit.study.cases import Cases
@@ -37,7 +29,7 @@ MEETING = np.array([X, 0.0 * X])
 @case(TOUCHING)
 def fragment_hits_block(trial):
     """A fragment of 100 m/s hits a resting block at once: no energy, no momentum from nowhere."""
-    mesh, velocity = fragment_and_block()
+    mesh, velocity = shot_at_block()
     run = Run(trial, mesh, velocity=velocity)
     run.momentum_kept()
     run.no_energy_made()
@@ -47,7 +39,7 @@ def fragment_hits_block(trial):
 @case(JUMPING)
 def jump_of_ten_levels(trial):
     """A fragment of 100 m/s hits a block whose bodies sleep ten levels above its own."""
-    mesh, velocity = fragment_and_block()
+    mesh, velocity = shot_at_block()
     run = Run(trial, mesh, 1e-5, methods=JUMPING, velocity=velocity)
     level = run["level"][0]
     run.momentum_kept()

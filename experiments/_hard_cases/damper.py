@@ -2,18 +2,8 @@
 
 import numpy as np
 
-from _hard_cases._damper_run import (
-    AUTOMATA,
-    EPS,
-    EXACT,
-    OSCILLATOR,
-    SPHERES,
-    Run,
-    drive,
-    fall,
-    filling,
-    spring,
-)
+from _hard_cases import _damper_run as scenes
+from _hard_cases._damper_run import AUTOMATA, EXACT, SPHERES, drive, fall, filling, spring
 from ca_damper import Batch, SceneTable, SimulationDiverged
 from taichi_dem.kit.study.cases import Cases
 
@@ -203,7 +193,7 @@ def light_particles(trial):
     what = filling(trial, particle_mass=1e-7)
     # Contacts of light spheres are as much briefer.
     dt = what.safe_step() if trial.method in SPHERES else what.default_dt
-    quality, share = 0.5 / OSCILLATOR.damping_ratio, 30.0 * 1e-7 / OSCILLATOR.mass
+    quality, share = 0.5 / scenes.OSCILLATOR.damping_ratio, 30.0 * 1e-7 / scenes.OSCILLATOR.mass
     limit, cycles = (4.0 * quality * share + 1e-8, "4 Q N m / M"), 4 if trial.quick else 40
     below_lift_off(trial, *limit, 30, cycles, what=what, dt=dt)
 
@@ -214,7 +204,7 @@ def odd_step(trial):
     asked = 1.37e-4 if trial.method in AUTOMATA else 1.7e-5
     run = drive(trial, filling(trial), 30, 5, dt=asked, frequency=5.777)
     turns, longer = run.row["dt"] * 5.777 * run.steps, max(0.0, run.row["dt"] / asked - 1.0)
-    trial.limit("cycle error", abs(turns - 1.0), 4.0 * EPS, "rounding")
+    trial.limit("cycle error", abs(turns - 1.0), 4.0 * np.spacing(1.0), "rounding")
     trial.limit("step beyond the one asked for", longer, 0.0, "shortened")
 
 
@@ -222,7 +212,7 @@ def odd_step(trial):
 def still_heap(trial):
     """A hundred particles in a container at rest come to rest, and weigh what they weigh."""
     still = {"frequency": 10.0, "base_amplitude": 0.0, "transient": 30}
-    run = Run(trial, filling(trial), 100, 10 if trial.quick else 100, **still)
+    run = scenes.Run(trial, filling(trial), 100, 10 if trial.quick else 100, **still)
     run.kept_inside()
     run.weight_carried(1e-3, "the specification")
     energy = run.column("energy")
@@ -250,7 +240,7 @@ def single_cell(trial):
         bound = 2.0 * what.width / (np.pi * 24e-3)
         bounds[1] = bound, "4 / pi x half a cell / amplitude"
     for when, amplitude, limit in zip(("below g", "at 3.5 g"), (5e-3, 24e-3), bounds):
-        run = Run(trial, what, 1, 20, base_amplitude=amplitude)
+        run = scenes.Run(trial, what, 1, 20, base_amplitude=amplitude)
         mass = run.cycles.apparent_mass[0] / what.particle_mass
         trial.limit(f"apparent mass error {when}", abs(mass - 1.0), *limit)
     run.sound()

@@ -76,20 +76,29 @@ class Cases(list):
         super().__init__()
         self.package = package
 
+    def add(
+        self,
+        name: str,
+        question: str,
+        run: Callable[["Trial"], None],
+        methods: Iterable[str],
+        *refusals: tuple[Iterable[str], str],
+    ) -> None:
+        """Add a Case; refusals: pairs (methods that refuse it, words of their sentence)."""
+        refused = {name: words for names, words in refusals for name in names}
+        self.append(Case(name, self.package, question, run, tuple(methods), refused))
+
     def __call__(self, methods: Iterable[str], *refusals: tuple[Iterable[str], str]) -> Callable:
         """Decorate a function as a case; the first line of its docstring is the question.
 
-        refusals: pairs (methods that refuse it, words of their sentence).
+        methods, refusals: as in ``add``.
         """
-        refused = {name: words for names, words in refusals for name in names}
 
-        def add(run):
-            question = run.__doc__.split("\n")[0]
-            name = run.__name__
-            self.append(Case(name, self.package, question, run, tuple(methods), refused))
+        def decorate(run):
+            self.add(run.__name__, run.__doc__.split("\n")[0], run, methods, *refusals)
             return run
 
-        return add
+        return decorate
 
 
 @dataclass(eq=False)
