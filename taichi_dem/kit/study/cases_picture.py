@@ -60,7 +60,7 @@ def picture_cases(
         shown = dict.fromkeys(trial.method for trial in trials if trial.curve)
         keys = [line_key(**looks[method]) for method in shown]
         place = "lower center" if alone else "upper left"
-        figure.legend(handles=keys, loc=f"outside {place}", ncols=3)
+        figure.legend(handles=keys, loc=f"outside {place}", ncols=3 if size[0] > 9.0 else 2)
         if alone:
             question = textwrap.fill(with_powers(cases[0].question), 100)
             figure.suptitle(question, fontsize=9.0, x=0.02, ha="left")
