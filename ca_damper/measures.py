@@ -127,6 +127,17 @@ class Cycles:
         return (damping + self.apparent_damping) / critical
 
 
+def first_harmonic(phase: ArrayLike, values: ArrayLike) -> tuple[float, float]:
+    """Amplitude of a quantity over a cycle, and its lag [degrees] behind sin(2 pi phase).
+
+    phase: of the values, in cycles. By least squares, so that the phases need no even spacing.
+    """
+    angle = 2.0 * np.pi * np.asarray(phase)
+    columns = np.column_stack([np.ones_like(angle), np.sin(angle), np.cos(angle)])
+    _, sine, cosine = np.linalg.lstsq(columns, np.asarray(values), rcond=None)[0]
+    return float(np.hypot(sine, cosine)), float(np.degrees(np.arctan2(-cosine, sine)))
+
+
 def peak(frequency_ratio: ArrayLike, response: ArrayLike) -> tuple[float, float]:
     """Where a response curve peaks and how high it is there: (ratio, response), floats.
 

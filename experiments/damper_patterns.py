@@ -13,46 +13,37 @@ Writes patterns_20.png, patterns_40.png, cycle.png, patterns.gif, cycles.csv, pa
 summary.json to results/damper_patterns/.
 """
 
+import itertools
 import os
 import sys
 
 import numpy as np
 
-import _patterns_pictures as pictures
 from ca_damper import Automaton, Batch, SceneTable, Spheres, film
 from ca_damper.automaton import ACCOUNTINGS
-from ca_damper.plot import Box
+from ca_damper.measures import first_harmonic
+from ca_damper.plot import Box, animate_films, picture_film_strips
 from ca_damper.progress import Stages
 from taichi_dem.kit.files import output_folder
+from taichi_dem.kit.plot_style import BLACK, GREY, area_key, line_key, picture, styles_of
 from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.kit.study import (
-    figure,
-    finish,
-    main,
-    number,
-    parser,
-    print_table,
-    whole,
-    write_rows,
-)
+from taichi_dem.kit.study import figure, finish, main, number, parser, show_rows, whole, write_rows
 
 NAME = "damper_patterns"
-QUICK = {"transient": 5, "cycles": 1, "seeds": 2}
-FULL = {"transient": 30, "cycles": 4, "seeds": 5}
-PARTICLES = (20, 40)
-TITLES = {"ca": "automaton", "dem": "spheres"}
-KEYS = [(particles, name) for particles in PARTICLES for name in TITLES]
-#: Frames a cycle of the animation and the measures.
-FRAMES = 32
+QUICK, FULL = {"transient": 5, "cycles": 1, "seeds": 2}, {"transient": 30, "cycles": 4, "seeds": 5}
+PARTICLES, TITLES = (20, 40), {"ca": "automaton", "dem": "spheres"}
+KEYS = list(itertools.product(PARTICLES, TITLES))
+#: Frames a cycle of the animation and the measures; the pictures show every fourth.
+FRAMES, SHOWN = 32, 4
 #: Step of the automaton [s], and steps of the spheres within one.
 CA_DT, STEPS_IN_ONE = 1e-4, 5
-#: Figure of summary.json by filling and particles: column of the table.
+#: Figure of summary.json by filling and particles: column of the table, unit.
 COLUMNS = {
-    "height_amplitude_mm": "swing [mm]",
-    "height_lag_deg": "lag [deg]",
-    "height_above_floor_mm": "above floor [mm]",
-    "floor_share_least": "at floor, least",
-    "floor_share_most": "at floor, most",
+    "height_amplitude_mm": ("swing [mm]", "mm"),
+    "height_lag_deg": ("lag [deg]", "deg"),
+    "height_above_floor_mm": ("above floor [mm]", "mm"),
+    "floor_share_least": ("at floor, least", "1"),
+    "floor_share_most": ("at floor, most", "1"),
 }
 
 
@@ -69,48 +60,43 @@ def options_parser():
 
 def run(options):
     """Shake both fillings, compare, picture."""
-    settings = QUICK if options.quick else FULL
+    settings, swing = QUICK if options.quick else FULL, 1e-3 * options.amplitude
     seeds = options.seeds or settings["seeds"]
-    automaton, spheres = Automaton(accounting=options.accounting), Spheres()
-    boxes = {"ca": Box.of_automaton(automaton), "dem": Box.of_spheres(spheres)}
-    jobs = {"ca": (automaton, CA_DT), "dem": (spheres, options.dt or CA_DT / STEPS_IN_ONE)}
-    batches = {name: shaken_batch(*job, seeds, options) for name, job in jobs.items()}
+    jobs = {"ca": (Automaton(accounting=options.accounting), CA_DT)}
+    jobs["dem"] = Spheres(), options.dt or CA_DT / STEPS_IN_ONE
+    scenes = np.repeat(PARTICLES, seeds), np.tile(np.arange(seeds) + 1, len(PARTICLES))
+    batches = {
+        name: Batch(filling, SceneTable(*scenes, dt, options.frequency, swing), mount="base")
+        for name, (filling, dt) in jobs.items()
+    }
     output_folder(options.out)
-    measures, films = {}, {}
+    films, measures = {}, {}
     for name, batch in batches.items():
         with ProgressBar(TITLES[name]) as progress:
             frames = shake(batch, settings, progress)
-        for particles, cycles in frames.items():
-            measures[particles, name] = measured(boxes[name], cycles)
-            films[particles, name] = cycles
+        for particles in PARTICLES:
+            films[particles, name] = frames[particles]
+            measures[particles, name] = measured(Box.of(batch.filling), frames[particles])
     steps = int(batches["ca"].steps_per_cycle[0])
     # Whole steps miss even spacing by a trifle.
     phase = np.arange(FRAMES) * (steps // FRAMES) / steps
-    labels = {name: batch.filling.label for name, batch in batches.items()}
-    shown = {(n, labels[name]): (boxes[name], films[n, name][0]) for n, name in KEYS}
-    curves = {(n, labels[name]): measures[n, name] for n, name in KEYS}
-    pictures.draw_all(options.out, shown, curves, phase, options)
+    picture_all(options, {name: batch.filling for name, batch in batches.items()}, films)
+    plot_cycle(os.path.join(options.out, "cycle.png"), phase, measures, batches, options.amplitude)
     write_tables(films, measures, phase, seeds, options.out)
-    figures = figures_of(measures, phase)
-    print_heights(figures)
+    rows, figures = compared(measures, phase)
+    print("Mean height of the particles over one cycle")
+    shown = {words: (key, ".3g") for key, (words, _) in COLUMNS.items()}
+    show_rows(rows, {"particles": ("particles", ""), "filling": ("filling", ""), **shown})
     finish(options, NAME, figures, batches.values(), show=False)
 
 
-def shaken_batch(filling, dt, seeds, options):
-    """Batch of all numbers of particles and seeds; InputError for a step out of range."""
-    particles, seed = np.repeat(PARTICLES, seeds), np.tile(np.arange(seeds) + 1, len(PARTICLES))
-    table = SceneTable(particles, seed, dt, options.frequency, 1e-3 * options.amplitude)
-    return Batch(filling, table, mount="base", measured_cycles=0)
-
-
 def shake(batch, settings, progress):
-    """Shake the container through a transient, then film some cycles; returns the frames."""
+    """Shake the container, then film cycles: their frames, of all seeds, by number of particles."""
     batch.start()
     transient, cycles = settings["transient"], settings["cycles"]
     tell = Stages(progress, np.arange(transient, transient + cycles + 1) / (transient + cycles))
     batch.run(transient, 0, tell)
-    steps = int(batch.steps_per_cycle[0])
-    frames = {particles: [] for particles in PARTICLES}
+    steps, frames = int(batch.steps_per_cycle[0]), {particles: [] for particles in PARTICLES}
     for _ in range(cycles):
         every = {"sample_every": steps, "frame_every": steps // FRAMES}
         shot = film(batch, steps, **every, progress=tell)
@@ -127,7 +113,7 @@ def measured(box, cycles):
     share of the particles less than half a diameter away from it.
     """
     rows, near = [], 0.5 * box.diameter
-    for frame in (frame for cycle in cycles for frame in cycle):
+    for frame in itertools.chain(*cycles):
         below, above = box.gaps(frame.position)
         over = below.mean()
         heights = 1e3 * (box.lift(frame.x) + over), 1e3 * over
@@ -136,33 +122,26 @@ def measured(box, cycles):
     return dict(zip(names, np.array(rows).T.reshape(4, len(cycles), FRAMES)))
 
 
-def harmonic(phase, values):
-    """Amplitude and lag [degrees] behind the container of a quantity over a cycle."""
-    angle = 2.0 * np.pi * phase
-    columns = np.column_stack([np.ones_like(angle), np.sin(angle), np.cos(angle)])
-    _, sine, cosine = np.linalg.lstsq(columns, values, rcond=None)[0]
-    return float(np.hypot(sine, cosine)), float(np.degrees(np.arctan2(-cosine, sine)))
-
-
-def figures_of(measures, phase):
-    """Heights and lags of the particles by filling, and how far the fillings differ."""
-    figures, units = {}, ("mm", "deg", "mm", "1", "1")
+def compared(measures, phase):
+    """Rows of heights and lags of the particles by filling; all figures, with the differences."""
+    rows, figures = [], {}
     for particles in PARTICLES:
-        fillings = {name: measures[particles, name] for name in TITLES}
-        cycles = {name: one["height_mm"].mean(axis=0) for name, one in fillings.items()}
-        swings = {name: harmonic(phase, cycle) for name, cycle in cycles.items()}
-        for name, one in fillings.items():
-            floor, above = one["floor"].mean(axis=0), one["above_floor_mm"].mean()
-            values = (*swings[name], float(above), float(floor.min()), float(floor.max()))
-            for key, value, unit in zip(COLUMNS, values, units):
-                figures[f"{key}_{name}_N{particles}"] = figure(value, unit)
+        cycles = {name: measures[particles, name]["height_mm"].mean(axis=0) for name in TITLES}
+        swings = {name: first_harmonic(phase, cycle) for name, cycle in cycles.items()}
+        for name, title in TITLES.items():
+            one = measures[particles, name]
+            floor, above = one["floor"].mean(axis=0).tolist(), float(one["above_floor_mm"].mean())
+            values = dict(zip(COLUMNS, (*swings[name], above, min(floor), max(floor))))
+            rows.append({"particles": particles, "filling": title, **values})
+            for key, (_, unit) in COLUMNS.items():
+                figures[f"{key}_{name}_N{particles}"] = figure(values[key], unit)
         (ca, late), (dem, later) = swings["ca"], swings["dem"]
         turn = (late - later + 180.0) % 360.0 - 180.0
+        apart = float(np.sqrt(((cycles["ca"] - cycles["dem"]) ** 2).mean()))
         figures[f"amplitude_difference_mm_N{particles}"] = figure(ca - dem, "mm")
         figures[f"lag_difference_deg_N{particles}"] = figure(turn, "deg")
-        apart = float(np.sqrt(((cycles["ca"] - cycles["dem"]) ** 2).mean()))
         figures[f"height_difference_mm_N{particles}"] = figure(apart, "mm")
-    return figures
+    return rows, figures
 
 
 def write_tables(films, measures, phase, seeds, folder):
@@ -182,14 +161,56 @@ def write_tables(films, measures, phase, seeds, folder):
     write_rows(os.path.join(folder, "particles.csv"), places, names)
 
 
-def print_heights(figures):
-    """Print the figures, a row each filling and number of particles."""
-    rows = []
-    for particles, name in KEYS:
-        values = (figures[f"{key}_{name}_N{particles}"]["value"] for key in COLUMNS)
-        rows.append((particles, TITLES[name], *(f"{value:.3g}" for value in values)))
-    print("Mean height of the particles over one cycle")
-    print_table(rows, ["particles", "filling", *COLUMNS.values()])
+def picture_all(options, fillings, films):
+    """Frames of the first cycle: a picture for each number of particles, and an animation."""
+    motion, moving = (1e-3 * options.amplitude, options.frequency), {}
+    for particles in PARTICLES:
+        strips = {}
+        for name, filling in fillings.items():
+            box, frames = Box.of(filling), films[particles, name][0]
+            strips[filling.label] = box, frames[::SHOWN]
+            title = styles_of([filling.label])[filling.label].label.replace(", ", ",\n")
+            moving[f"{title}\n{particles} particles"] = box, frames
+        path = os.path.join(options.out, f"patterns_{particles}.png")
+        picture_film_strips(path, strips, *motion)
+    animate_films(os.path.join(options.out, "patterns.gif"), moving, *motion)
+
+
+def plot_cycle(path, phase, measures, batches, amplitude):
+    """Mean height of the particles and how many touch floor and ceiling, over one closed cycle."""
+    labels = {name: batch.filling.label for name, batch in batches.items()}
+    styles, time = styles_of(labels.values()), np.linspace(0.0, 1.0, 200)
+    shape = {"size": (4.2 * len(PARTICLES) + 0.6, 5.7), "sharex": True, "sharey": "row"}
+    with picture(path, 2, len(PARTICLES), **shape) as (figure, panels):
+        for top, bottom, particles in zip(*panels, PARTICLES):
+            motion = amplitude * np.sin(2.0 * np.pi * time)
+            top.plot(time, motion, color=GREY, linestyle=":", label="container")
+            top.set_title(f"{particles} particles")
+            for name, label in labels.items():
+                draw_measures(top, bottom, phase, measures[particles, name], styles[label])
+            bottom.set(xlabel="phase of the container [cycles]", xlim=(0.0, 1.0), ylim=(0.0, None))
+        panels[0, 0].set_ylabel("mean height in the room\nless that at rest [mm]")
+        panels[1, 0].set_ylabel("particles that touch [%]")
+        ends = {"-": "floor", "--": "ceiling"}
+        keys = [line_key(words, color=BLACK, ls=line) for line, words in ends.items()]
+        panels[1, 0].legend(handles=keys, loc="upper right")
+        keys, _ = panels[0, 0].get_legend_handles_labels()
+        keys.append(area_key("± standard deviation of the cycles", fc=GREY, alpha=0.3))
+        figure.legend(handles=keys, loc="outside upper left", ncols=len(keys))
+
+
+def draw_measures(top, bottom, phase, one, style):
+    """Curves of a filling: means over the cycles, and the spread of the height between them."""
+    # The cycle is closed: it ends as it begins.
+    closed = {name: np.append(values, values[:, :1], axis=1) for name, values in one.items()}
+    phase = np.append(phase, 1.0)
+    height, spread = closed["height_mm"].mean(axis=0), closed["height_mm"].std(axis=0)
+    top.plot(phase, height, color=style.colour, label=style.label)
+    band = {"color": style.colour, "alpha": 0.18, "linewidth": 0}
+    top.fill_between(phase, height - spread, height + spread, **band)
+    for end, line in (("floor", "-"), ("ceiling", "--")):
+        share = 100.0 * closed[end].mean(axis=0)
+        bottom.plot(phase, share, color=style.colour, linestyle=line)
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from ca_damper.plot.animation import moving_picture
 from ca_damper.plot.box import Box, DrawnBox, frame_panel
+from ca_damper.plot.film_strip import animate_films, picture_film_strips
 from ca_damper.plot.response import (
     picture_compared,
     picture_hysteresis,
@@ -12,9 +13,11 @@ from ca_damper.plot.response import (
 __all__ = [
     "Box",
     "DrawnBox",
+    "animate_films",
     "frame_panel",
     "moving_picture",
     "picture_compared",
+    "picture_film_strips",
     "picture_hysteresis",
     "picture_measures",
     "picture_responses",

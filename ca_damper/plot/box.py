@@ -36,6 +36,11 @@ class Box:
         """Of Spheres."""
         return cls(spheres.width, spheres.height, spheres.diameter)
 
+    @classmethod
+    def of(cls, filling):
+        """Of an Automaton or Spheres."""
+        return (cls.of_automaton if hasattr(filling, "columns") else cls.of_spheres)(filling)
+
     def lift(self, x):
         """Height of the box [m] when the container is displaced by x [m]."""
         cell = self.diameter

@@ -2,323 +2,272 @@
 
 import numpy as np
 
-from _hard_cases import _damper_scenes as scenes
-from _hard_cases._case import Curves, Limit, Measured, cases_of
-from _hard_cases._damper_scenes import AUTOMATA, EXACT, SPHERES, filling
+from _hard_cases import _damper_run as scenes
+from _hard_cases._damper_run import AUTOMATA, EXACT, SPHERES, drive, fall, filling, spring
 from ca_damper import Batch, SceneTable, SimulationDiverged
+from taichi_dem.kit.study.cases import Cases
 
-CASES, case = cases_of("damper")
-_ALL = (*AUTOMATA, *SPHERES)
-
-
-def _sound(run, method, *more, shown=None):
-    """What always holds, beside what else the case asks for."""
-    limits = [scenes.kept_inside(run), *more]
-    if method in EXACT:
-        limits.append(scenes.momentum_kept(run))
-    shown = shown or scenes.energies(run, method)
-    return Measured(tuple(limits), shown, run.batch.compile_seconds)
+case = CASES = Cases("damper")
+ALL = (*AUTOMATA, *SPHERES)
+#: An amplitude [m] at which spheres are shaken at 2.2 g.
+MILD = 0.015
+#: Options of particles whose blows give back a share of the speed.
+FULL, NONE = ({"restitution": e, "wall_restitution": e} for e in (1.0, 0.0))
+STEEL = {"young": 2e11, "wall_young": 2e11}
 
 
-@case(_ALL)
-def full_box(method, quick):
+@case(ALL)
+def full_box(trial):
     """Every cell taken, shaken at 3.5 g: nothing can move far, nothing may be lost."""
-    what = filling(method)
-    run = scenes.drive(what, what.capacity, 4 if quick else 40)
-    more = [scenes.speed_bounded(run)]
-    return _sound(run, method, *more, shown=scenes.places(run, method))
+    what = filling(trial)
+    run = drive(trial, what, what.capacity, 4 if trial.quick else 40)
+    run.speed_bounded()
+    run.draw_places()
 
 
-@case(("empty", *_ALL))
-def empty_box(method, quick):
+@case(("empty", *ALL))
+def empty_box(trial):
     """No particle, at resonance: the transfer function, to RK45's tolerance and its round-off."""
-    run = scenes.spring(filling(method), 0, 20 if quick else 1000)
-    limit = scenes.rigid_response(run, 1e-8, "10 x rtol of RK45")
-    return Measured((limit,), scenes.swings(run, method), run.batch.compile_seconds)
+    run = spring(trial, filling(trial), 0, 20 if trial.quick else 1000)
+    run.rigid_response(1e-8, "10 x rtol of RK45")
+    run.draw_swings()
 
 
-@case(_ALL)
-def one_particle(method, quick):
+@case(ALL)
+def one_particle(trial):
     """One particle, shaken at 3.5 g."""
-    run = scenes.drive(filling(method), 1, 20 if quick else 500)
-    return _sound(run, method, scenes.speed_bounded(run))
+    drive(trial, filling(trial), 1, 20 if trial.quick else 500).speed_bounded()
 
 
-@case((), (_ALL, "particles must"))
-def too_many(method, quick):
+@case((), (ALL, "particles must"))
+def too_many(trial):
     """One more than fits."""
-    what = filling(method)
-    return _sound(scenes.drive(what, what.capacity + 1, 1), method)
+    drive(trial, filling(trial), filling(trial).capacity + 1, 1)
 
 
-@case(("automaton",), (SPHERES, "restitution must lie in"))
-def no_rebound(method, quick):
+@case(["automaton"], (SPHERES, "restitution must lie in"))
+def no_rebound(trial):
     """Restitution 0: a particle stays where it falls, at less than the speed of what rests."""
-    none = {"restitution": 0.0, "wall_restitution": 0.0}
-    what = filling(method, automaton={"start": ((5, 15),)}, **none)
-    history = scenes.fall(what, 0.4)
-    weight = what.particle_mass * what.gravity
+    what = filling(trial, automaton={"start": ((5, 15),)}, **NONE)
     # Heights count to the middle of a cell; the kinetic energy left is at most that at the
     # threshold of static contact, 5 g dt, of m g 15 cells.
-    fallen = history["energy"][-1, 0] / (weight * what.width) - 0.5
+    energy = fall(trial, what, 0.4)[-1] / (what.particle_mass * what.gravity * what.width) - 0.5
     bound = 12.5 * what.gravity * what.default_dt**2 / (15.0 * what.width)
-    limit = Limit("energy left", float(fallen) / 15.0, bound, "(5 g dt)^2 / (2 g h)")
-    return Measured((limit,), _energy_in_time(history, method))
+    trial.limit("energy left", energy / 15.0, bound, "(5 g dt)^2 / (2 g h)")
 
 
-@case(_ALL)
-def full_rebound(method, quick):
+@case(ALL)
+def full_rebound(trial):
     """Restitution 1: a particle bounces for ever; energy may err by the lateness of each blow.
 
     A blow seen up to 1.5 steps late changes the speed v by 1.5 g dt, the energy by 3 g dt / v. The
     leapfrog's energy is off by (w dt)^2 / 24 where a contact, half a period of w, has six steps.
     """
-    full = {"restitution": 1.0, "wall_restitution": 1.0}
     start = {"automaton": {"start": ((5, 15),)}, "spheres": {"start": ((0.03, 0.093),)}}
-    what = filling(method, **start, **full)
-    duration = 1.4 if quick else 14.0
-    history = scenes.fall(what, duration)
-    energy = history["energy"][:, 0] / history["energy"][0, 0]
-    height = 0.09
-    blows = 1 + duration / (2.0 * np.sqrt(2.0 * height / what.gravity))
-    late = 3.0 * what.gravity * what.default_dt / np.sqrt(2.0 * what.gravity * height)
-    bound, formula = blows * late, "3 g dt / v a blow"
-    if method in SPHERES:
-        bound, formula = blows * (np.pi / 6.0) ** 2 / 24.0, "(w dt)^2 / 24 a blow, w dt = pi / 6"
-    limit = Limit("energy error", float(np.abs(energy - 1.0).max()), bound, formula)
-    return Measured((limit,), _energy_in_time(history, method))
+    what = filling(trial, **start, **FULL)
+    duration, speed = 1.4 if trial.quick else 14.0, np.sqrt(2.0 * what.gravity * 0.09)
+    error, formula = 3.0 * what.gravity * what.default_dt / speed, "3 g dt / v a blow"
+    if trial.method in SPHERES:
+        error, formula = (np.pi / 6.0) ** 2 / 24.0, "(w dt)^2 / 24 a blow, w dt = pi / 6"
+    energy = fall(trial, what, duration)
+    bound = error * (1.0 + 0.5 * duration * what.gravity / speed)
+    trial.limit("energy error", abs(energy / energy[0] - 1.0), bound, formula)
 
 
-def _energy_in_time(history, method):
-    energy = history["energy"][:, 0]
-    lines = {method: (history["time_s"][:, 0], energy / energy[0])}
-    return Curves("time [s]", "energy / energy at the start [1]", lines)
-
-
-@case(_ALL)
-def no_gravity(method, quick):
+@case(ALL)
+def no_gravity(trial):
     """Nothing pulls down: the mean force comes from walls alone, and momentum is kept."""
-    what = filling(method, gravity=0.0)
-    return _sound(scenes.drive(what, 30, 10 if quick else 100), method)
+    drive(trial, filling(trial, gravity=0.0), 30, 10 if trial.quick else 100)
+
+
+def push(trial, cells, cycles):
+    """The wall takes some cells a step."""
+    amplitude = cells * filling(trial).width / 1e-3 / (2.0 * np.pi * 6.0)
+    drive(trial, filling(trial), 30, cycles, amplitude, dt=1e-3)
 
 
 @case(AUTOMATA)
-def wall_near_a_cell_a_step(method, quick):
+def wall_near_a_cell_a_step(trial):
     """The wall takes half a cell a step: what it throws back, (1 + e) V, just fits in one."""
-    what, dt = filling(method), 1e-3
-    amplitude = 0.5 * what.width / dt / (2.0 * np.pi * 6.0)
-    run = scenes.drive(what, 30, 5 if quick else 50, dt=dt, amplitude=amplitude)
-    return _sound(run, method)
+    push(trial, 0.5, 5 if trial.quick else 50)
 
 
 @case((), (AUTOMATA, "faster than one cell a step"))
-def wall_above_a_cell_a_step(method, quick):
+def wall_above_a_cell_a_step(trial):
     """The wall takes 1.5 cells a step: particles that it pushes skip cells."""
-    what, dt = filling(method), 1e-3
-    amplitude = 1.5 * 6e-3 / dt / (2.0 * np.pi * 6.0)
-    return _sound(scenes.drive(what, 30, 5, dt=dt, amplitude=amplitude), method)
+    push(trial, 1.5, 5)
 
 
 @case(AUTOMATA)
-def longest_steps(method, quick):
+def longest_steps(trial):
     """Steps of 1.1 ms, of the 1.2 ms in which the largest speed crosses a cell, shaken at 3.5 g."""
-    run = scenes.drive(filling(method), 50, 20 if quick else 200, dt=1.1e-3)
-    return _sound(run, method, scenes.speed_bounded(run))
+    drive(trial, filling(trial), 50, 20 if trial.quick else 200, dt=1.1e-3).speed_bounded()
 
 
 @case((), (AUTOMATA, "dt must lie in"))
-def step_above_limit(method, quick):
+def step_above_limit(trial):
     """A step in which a particle at the largest speed would cross more than a cell."""
-    return _sound(scenes.drive(filling(method), 50, 1, dt=2e-3), method)
+    drive(trial, filling(trial), 50, 1, dt=2e-3)
+
+
+def mild(trial, cycles=3, **options):
+    """Spheres shaken at 2.2 g."""
+    what = options.pop("what", filling(trial))
+    drive(trial, what, options.pop("particles", 30), cycles, MILD, **options).flight_energy()
 
 
 @case(SPHERES)
-def spheres_near_limit(method, quick):
+def spheres_near_limit(trial):
     """Steps of 30 us, four in a contact, shaken at 2.2 g."""
-    run = scenes.drive(filling(method), 30, 5 if quick else 50, dt=3e-5, amplitude=0.015)
-    return _sound(run, method, _flight_energy(run))
-
-
-def _flight_energy(run):
-    """Energy of particles that all fly at twice the wall's speed, as high as the box."""
-    what, row = run.batch.filling, run.batch.table.row(0)
-    wall = 2.0 * np.pi * row["frequency"] * row["base_amplitude"]
-    height = what.height if hasattr(what, "height") else what.rows * what.width
-    most = run.particles * what.particle_mass * (2.0 * wall**2 + what.gravity * height)
-    energy = float(run.column("energy").max())
-    return Limit("energy [J]", energy, most, "N m ((2 V)^2 / 2 + g H)")
+    mild(trial, 5 if trial.quick else 50, dt=3e-5)
 
 
 @case((), (SPHERES, "dt must be at most"))
-def spheres_beyond_limit(method, quick):
+def spheres_beyond_limit(trial):
     """Steps of 0.1 ms: a contact is over before it is seen."""
-    run = scenes.drive(filling(method), 30, 3, dt=1e-4, amplitude=0.015)
-    return _sound(run, method, _flight_energy(run))
+    mild(trial, dt=1e-4)
 
 
-@case((), (("spheres",), "dt must be at most"))
-def spheres_that_gain(method, quick):
+@case((), (["spheres"], "dt must be at most"))
+def spheres_that_gain(trial):
     """Steps of 40 us, three in a contact: some contacts give back more than they took.
 
     Named by the account of energy, or by a speed, whichever is seen first.
     """
-    run = scenes.drive(filling(method), 50, 5, dt=4e-5, amplitude=0.015)
-    return _sound(run, method, _flight_energy(run))
+    mild(trial, 5, particles=50, dt=4e-5)
 
 
 @case(SPHERES)
-def advised_step(method, quick):
+def advised_step(trial):
     """The step that the end of a diverged run advises must do."""
-    what = filling(method)
     try:
-        scenes.drive(what, 30, 3, dt=1e-4, amplitude=0.015)
+        mild(trial, dt=1e-4)
     except SimulationDiverged as error:
-        run = scenes.drive(what, 30, 5 if quick else 50, dt=error.dt_allowed, amplitude=0.015)
-        return _sound(run, method, _flight_energy(run))
-    return Measured((Limit("runs that diverged", np.nan, 1.0, "0.1 ms has to diverge"),))
+        trial.limits.clear()
+        mild(trial, 5 if trial.quick else 50, dt=error.dt_allowed)
+    else:
+        trial.limit("runs that diverged", np.nan, 1.0, "0.1 ms has to diverge")
 
 
 @case(EXACT)
-def resonance_for_long(method, quick):
+def resonance_for_long(trial):
     """Thirty particles at the peak of the damped response, for 1000 cycles.
 
     The mean force is the weight: what is left is the momentum kept at the ends, over the time.
     """
-    cycles = 100 if quick else 1000
-    run = scenes.spring(filling(method), 30, cycles, ratio=0.966, transient=40)
-    row, what = run.batch.table.row(0), run.batch.filling
-    wall = 2.0 * np.pi * row["frequency"] * run.column("x_max").max()
-    kept = 4.0 * wall / (what.gravity * cycles / row["frequency"])
-    taken = Limit("power given", -float(run.cycles.complex_power[0].real), 0.0, "grains only take")
-    weight = scenes.weight_carried(run, kept, "4 V / (g T)")
-    return _sound(run, method, weight, taken, shown=scenes.swings(run, method))
+    cycles = 100 if trial.quick else 1000
+    run = spring(trial, filling(trial), 30, cycles, ratio=0.966, transient=40)
+    run.sound()
+    wall = run.omega * run.column("x_max").max()
+    run.weight_carried(4.0 * wall / (run.what.gravity * run.time), "4 V / (g T)")
+    trial.limit("power given", -run.cycles.complex_power[0].real, 0.0, "grains only take")
+    run.draw_swings()
+
+
+def below_lift_off(trial, bound, formula, particles, cycles, *, what=None, **options):
+    """Particles that never lift answer as a mass glued to the container."""
+    run = spring(trial, what or filling(trial), particles, cycles, **options)
+    run.sound()
+    run.rigid_response(bound, formula)
+    run.draw_swings()
 
 
 @case(EXACT)
-def rigid_limit(method, quick):
+def rigid_limit(trial):
     """Fifty particles that never lift: those of a structure heavier by N m, to 2e-3."""
-    run = scenes.spring(
-        filling(method), 50, 20, ratio=0.8, base=0.1e-3, transient=100 if quick else 250
-    )
-    rigid = scenes.rigid_response(run, 2e-3, "the specification")
-    return _sound(run, method, rigid, shown=scenes.swings(run, method))
+    options = {"ratio": 0.8, "base": 0.1e-3, "transient": 100 if trial.quick else 250}
+    below_lift_off(trial, 2e-3, "the specification", 50, 20, **options)
 
 
 @case(EXACT)
-def heavy_particles(method, quick):
+def heavy_particles(trial):
     """Particles ten times as heavy as the container (1 g), never lifting: no added-mass blow-up."""
-    what = filling(method)
     # The peak of 51 particles' worth of mass lies at 2.7 f0; 0.8 f0 is far below it.
-    run = scenes.spring(what, 50, 20, ratio=0.8, base=0.5e-3, mass=1e-3, transient=100)
-    rigid = scenes.rigid_response(run, 2e-3, "the specification")
-    return _sound(run, method, rigid, shown=scenes.swings(run, method))
+    options = {"ratio": 0.8, "base": 0.5e-3, "mass": 1e-3, "transient": 100}
+    below_lift_off(trial, 2e-3, "the specification", 50, 20, **options)
 
 
-@case(_ALL)
-def light_particles(method, quick):
+@case(ALL)
+def light_particles(trial):
     """Particles of 0.1 mg: the container feels no more of them than their share of its mass."""
-    what = filling(method, particle_mass=1e-7)
+    what = filling(trial, particle_mass=1e-7)
     # Contacts of light spheres are as much briefer.
-    dt = what.safe_step() if method in SPHERES else None
-    run = scenes.spring(what, 30, 4 if quick else 40, dt=dt)
-    share = 30.0 * 1e-7 / scenes.OSCILLATOR.mass
-    quality = 0.5 / scenes.OSCILLATOR.damping_ratio
-    bound = 4.0 * quality * share + 1e-8
-    limit = scenes.rigid_response(run, bound, "4 Q N m / M")
-    return _sound(run, method, limit, shown=scenes.swings(run, method))
+    dt = what.safe_step() if trial.method in SPHERES else what.default_dt
+    quality, share = 0.5 / scenes.OSCILLATOR.damping_ratio, 30.0 * 1e-7 / scenes.OSCILLATOR.mass
+    limit, cycles = (4.0 * quality * share + 1e-8, "4 Q N m / M"), 4 if trial.quick else 40
+    below_lift_off(trial, *limit, 30, cycles, what=what, dt=dt)
 
 
-@case(_ALL)
-def odd_step(method, quick):
+@case(ALL)
+def odd_step(trial):
     """A step that does not divide the cycle is shortened, never lengthened."""
-    asked = 1.37e-4 if method in AUTOMATA else 1.7e-5
-    run = scenes.drive(filling(method), 30, 5, dt=asked, frequency=5.777)
-    turns = run.dt * 5.777 * int(run.batch.steps_per_cycle[0])
-    whole = Limit("cycle error", abs(turns - 1.0), 4.0 * scenes.EPS, "rounding")
-    longer = Limit(
-        "step beyond the one asked for", max(0.0, run.dt / asked - 1.0), 0.0, "shortened"
-    )
-    return _sound(run, method, whole, longer)
+    asked = 1.37e-4 if trial.method in AUTOMATA else 1.7e-5
+    run = drive(trial, filling(trial), 30, 5, dt=asked, frequency=5.777)
+    turns, longer = run.row["dt"] * 5.777 * run.steps, max(0.0, run.row["dt"] / asked - 1.0)
+    trial.limit("cycle error", abs(turns - 1.0), 4.0 * np.spacing(1.0), "rounding")
+    trial.limit("step beyond the one asked for", longer, 0.0, "shortened")
 
 
 @case(EXACT)
-def still_heap(method, quick):
+def still_heap(trial):
     """A hundred particles in a container at rest come to rest, and weigh what they weigh."""
-    seconds = 1.0 if quick else 10.0
-    run = scenes.drive(
-        *(filling(method), 100, int(10 * seconds)),
-        frequency=10.0,
-        amplitude=0.0,
-        transient=30,
-    )
-    weight = scenes.weight_carried(run, 1e-3, "the specification")
+    still = {"frequency": 10.0, "base_amplitude": 0.0, "transient": 30}
+    run = scenes.Run(trial, filling(trial), 100, 10 if trial.quick else 100, **still)
+    run.kept_inside()
+    run.weight_carried(1e-3, "the specification")
     energy = run.column("energy")
-    rise = Limit("energy rise", float(np.diff(energy).max() / energy[0]), 1e-6, "nothing moves")
-    place = scenes.places(run, method)
-    limits = (scenes.kept_inside(run), weight, rise)
-    return Measured(limits, place, run.batch.compile_seconds)
+    trial.limit("energy rise", np.diff(energy) / energy[0], 1e-6, "nothing moves")
+    run.draw_places()
 
 
-@case(_ALL)
-def violent_base(method, quick):
+@case(ALL)
+def violent_base(trial):
     """348 g: the base swings 24 mm at 60 Hz, its walls at 9 m/s."""
-    dt = 1e-5 if method in AUTOMATA else 2e-6
-    run = scenes.drive(filling(method), 30, 5 if quick else 50, dt=dt, frequency=60.0)
-    return _sound(run, method, scenes.speed_bounded(run))
+    dt, cycles = 1e-5 if trial.method in AUTOMATA else 2e-6, 5 if trial.quick else 50
+    drive(trial, filling(trial), 30, cycles, dt=dt, frequency=60.0).speed_bounded()
 
 
 @case(EXACT)
-def single_cell(method, quick):
+def single_cell(trial):
     """A box as large as its one particle: it can only ride along, at 3.5 g as below g."""
     boxed = {"automaton": {"columns": 1, "rows": 1}, "spheres": {"width": 6e-3, "height": 6e-3}}
-    what = filling(method, **boxed)
-    pressed, thrown = (scenes.drive(what, 1, 20, amplitude=a) for a in (5e-3, 24e-3))
+    what = filling(trial, **boxed)
     # A sphere between two walls is a mass on their springs, heavier by (w / W)^2 < 1e-3.
-    bound, formula = 2e-3, "the rigid limit of the specification"
-    limits = [_mass_error("below g", pressed, bound, formula)]
-    if method in AUTOMATA:
+    bounds = [(2e-3, "the rigid limit of the specification")] * 2
+    if trial.method in AUTOMATA:
         # In free flight it is known to half a cell only, and a square wave of that height has a
         # first harmonic 4 / pi as high.
-        bound, formula = 2.0 * what.width / (np.pi * 24e-3), "4 / pi x half a cell / amplitude"
-    limits.append(_mass_error("at 3.5 g", thrown, bound, formula))
-    return _sound(thrown, method, *limits)
-
-
-def _mass_error(when, run, bound, formula):
-    mass = float(run.cycles.apparent_mass[0] / run.batch.filling.particle_mass)
-    return Limit(f"apparent mass error {when}", abs(mass - 1.0), bound, formula)
+        bound = 2.0 * what.width / (np.pi * 24e-3)
+        bounds[1] = bound, "4 / pi x half a cell / amplitude"
+    for when, amplitude, limit in zip(("below g", "at 3.5 g"), (5e-3, 24e-3), bounds):
+        run = scenes.Run(trial, what, 1, 20, base_amplitude=amplitude)
+        mass = run.cycles.apparent_mass[0] / what.particle_mass
+        trial.limit(f"apparent mass error {when}", abs(mass - 1.0), *limit)
+    run.sound()
 
 
 @case(SPHERES)
-def hard_spheres(method, quick):
+def hard_spheres(trial):
     """Spheres of steel's modulus run at the step advised for them, a tenth of the soft ones'."""
-    what = filling(method, young=2e11, wall_young=2e11)
-    cycles = 1 if quick else 3
-    run = scenes.drive(what, 30, cycles, dt=what.safe_step(), amplitude=0.015)
-    return _sound(run, method, _flight_energy(run))
+    what = filling(trial, **STEEL)
+    mild(trial, 1 if trial.quick else 3, what=what, dt=what.safe_step())
 
 
 @case((), (SPHERES, "dt must be at most"))
-def hard_spheres_at_long_step(method, quick):
+def hard_spheres_at_long_step(trial):
     """Spheres of steel's modulus at the step of the soft ones."""
-    what = filling(method, young=2e11, wall_young=2e11)
-    run = scenes.drive(what, 30, 3, amplitude=0.015)
-    return _sound(run, method, _flight_energy(run))
+    mild(trial, what=filling(trial, **STEEL))
 
 
 @case(SPHERES)
-def rough_spheres(method, quick):
+def rough_spheres(trial):
     """Friction 1000: nothing chatters, energy of a still heap falls to rest."""
-    what = filling(method, friction=1e3, wall_friction=1e3)
-    history = scenes.fall(what, 1.0 if quick else 3.0, particles=60)
-    energy = history["energy"][:, 0] / history["energy"][0, 0]
-    rise = Limit("energy rise", float(np.diff(energy).max()), 0.01, "the specification")
-    return Measured((rise,), _energy_in_time(history, method))
+    what = filling(trial, friction=1e3, wall_friction=1e3)
+    energy = fall(trial, what, 1.0 if trial.quick else 3.0, particles=60)
+    trial.limit("energy rise", np.diff(energy / energy[0]), 0.01, "the specification")
 
 
-@case((), (_ALL, "frequency must"))
-def infinite_numbers(method, quick):
+@case((), (ALL, "frequency must"))
+def infinite_numbers(trial):
     """A frequency that is no number."""
-    batch = Batch(filling(method), SceneTable(30, 1, 1e-4, np.nan, 0.024), mount="base")
-    batch.start()
-    return Measured((Limit("runs", np.nan, 0.0, "there is no such cycle"),))
+    Batch(filling(trial), SceneTable(30, 1, 1e-4, np.nan, 0.024), mount="base").start()

@@ -3,8 +3,8 @@
 import pytest
 
 from _hard_cases import registry
-from _hard_cases._margins import case_title, with_powers
 from taichi_dem.kit.plot_style import RED, STYLES, power, styled, styles_of
+from taichi_dem.kit.study.cases_picture import case_title, with_powers
 from tests.figures import bad_words_in, defects
 
 

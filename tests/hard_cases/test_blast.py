@@ -1,29 +1,38 @@
 """The hard cases of the blast at quick size: what is claimed holds, what is not is refused.
 
-Compiling is what they cost. The experiment asks all methods; here those of a case that shares its
-run with others are the two that share least code, and a case with a run of its own is asked of the
-first method that claims it and the first that refuses it, among the slow tests.
+The experiment asks all methods; here they are the two that share least code, the first that claims
+a case and the first that refuses it. Compiling is what they cost, so that those with an engine of
+their own are among the slow tests.
 """
 
 import pytest
 
-from _hard_cases import blast, judge, registry
+from _hard_cases import registry
+from taichi_dem.kit.study.cases import assess
 from tests.figures import UNIT
 
-SHARED = ("multirate_drifted", "implicit")
+LEAST_ALIKE = ("multirate_drifted", "implicit")
+#: Cases with effects, methods or limits of their own compile an engine.
+OF_ITS_OWN = (
+    *("jump_of_ten_levels", "stiffness_ratio_1e4", "many_steps_at_rest", "step_beyond_all_limits"),
+    *("sudden_pressure_on_sleepers", "step_ratio_resonance", "step_ratio_beyond_resonance"),
+)
 
 
 def methods_of(case):
-    if case in blast.CASES:
-        return [method for method in case.asked if method in SHARED]
-    return [*case.methods[:1], *list(case.refused)[:1]]
+    chosen = [method for method in case.asked if method in LEAST_ALIKE]
+    return dict.fromkeys((*chosen, *case.methods[:1], *list(case.refused)[:1]))
+
+
+def is_quick(case, method):
+    return method in LEAST_ALIKE and case.name not in OF_ITS_OWN
 
 
 ASKED = [
     pytest.param(
         *(case, method),
         id=f"{case.name}-{method}",
-        marks=() if case in blast.CASES else pytest.mark.slow,
+        marks=() if is_quick(case, method) else pytest.mark.slow,
     )
     for case in registry()
     if case.package == "blast"
@@ -33,11 +42,11 @@ ASKED = [
 
 @pytest.mark.parametrize(("case", "method"), ASKED)
 def test_method_bears_the_case_or_refuses_it_in_words(case, method):
-    result = judge(case, method, quick=True)
+    result = assess(case, method, quick=True)
     wanted = "refused" if method in case.refused else "passed"
     assert result.status == wanted, result.words
-    shown = result.shown
-    assert shown is None or all(map(UNIT.search, (shown.xlabel, shown.ylabel)))
+    curve = result.curve
+    assert curve is None or all(map(UNIT.search, (curve.xlabel, curve.ylabel)))
 
 
 def test_there_are_enough_cases():

@@ -2,7 +2,8 @@
 
 import pytest
 
-from _hard_cases import judge, registry
+from _hard_cases import registry
+from taichi_dem.kit.study.cases import assess
 from tests.figures import UNIT
 
 #: They differ from others by one law or account, which other tests are about.
@@ -22,11 +23,11 @@ ASKED = [
 
 @pytest.mark.parametrize(("case", "method"), ASKED)
 def test_method_bears_the_case_or_refuses_it_in_words(case, method):
-    result = judge(case, method, quick=True)
+    result = assess(case, method, quick=True)
     wanted = "refused" if method in case.refused else "passed"
     assert result.status == wanted, result.words
-    shown = result.shown
-    assert shown is None or all(map(UNIT.search, (shown.xlabel, shown.ylabel)))
+    curve = result.curve
+    assert curve is None or all(map(UNIT.search, (curve.xlabel, curve.ylabel)))
 
 
 def test_there_are_enough_cases():

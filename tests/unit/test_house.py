@@ -18,7 +18,7 @@ LAYERS = {
     "taichi_dem": (
         ("kit",),
         ("meshes", "mesh", "materials"),
-        ("physics", "timeline"),
+        ("physics", "timeline", "closed_forms"),
         ("effects",),
         ("scene",),
         ("stability",),
@@ -38,7 +38,7 @@ LAYERS = {
     ),
     "ca_damper": (
         ("errors", "random_numbers", "progress", "measures", "report", "contracts"),
-        ("rk45", "oscillator", "record", "checks"),
+        ("rk45", "oscillator", "record", "checks", "bouncing"),
         ("scenes",),
         ("filling", "lattice"),
         ("fixed_mass", "automaton", "spheres"),

@@ -1,0 +1,141 @@
+"""A run of a hard case of the blast: methods by name, bodies, and the limits that many share."""
+
+import numpy as np
+
+from _demo import set_moving
+from taichi_dem import CONCRETE, Scene, Simulation, StepControl, effects
+from taichi_dem.mesh.mesh import checked_mesh
+from taichi_dem.mesh.shapes import bar, pair, placed_together, single
+from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
+from taichi_dem.output.motion_record import MotionRecord
+from taichi_dem.simulate import run_simulation
+
+EPS = np.finfo(float).eps
+SAMPLES = 40
+#: By how much a method that claims a case may miss what it has to converge to, as a share.
+ACCURACY = 0.01
+#: Edge of most bodies [m], and the area of their faces [m^2].
+EDGE = 0.05
+AREA = 0.25 * 3.0**0.5 * EDGE**2
+#: Methods of bodies that nothing touches.
+FREE = {
+    "uniform": Uniform(1e-7),
+    "multirate_held": Multirate(1e-7, 1e-5),
+    "multirate_drifted": Multirate(1e-7, 1e-5, "drifted"),
+    "controlled": Multirate(1e-7, 1e-5, control=StepControl()),
+    "limited": Uniform(1e-7, dashpot="limited"),
+    "implicit": ImplicitDashpots(4e-7),
+}
+#: Steps that bear contact of bodies of 35 g; those of the paper's rule do by their largest step.
+TOUCHING = {
+    "uniform": Uniform(4e-10),
+    "multirate_held": Multirate(4e-10, 1e-8),
+    "multirate_drifted": Multirate(4e-10, 1e-8, "drifted"),
+    "controlled": Multirate(
+        8e-8, 1e-6, control=StepControl(dashpot_floor=1e-8, level_jump=None), dashpot="limited"
+    ),
+    "limited": Uniform(2e-8, dashpot="limited"),
+    "implicit": ImplicitDashpots(4e-7, sweeps=(2, 50), tolerance=1e-3),
+}
+
+
+def contact_effects():
+    """All effects but loads, spheres on all outer faces."""
+    bonds = [effects.BondDamping(), effects.Softening(), effects.ShearSlip()]
+    return [*bonds, effects.SphereContact(outer_faces=True), effects.Friction()]
+
+
+def soon(trial):
+    """Time of cases with contact [s]."""
+    return 2e-5 if trial.quick else 1e-4
+
+
+class Run(MotionRecord):
+    """The bodies of a mesh by the method of a trial, and limits on what they did.
+
+    velocity [m/s], shift [m] and spin [rad/s] at the start are broadcast to all bodies. bodies:
+    which are judged. scene: options of ``Scene``, by default concrete with ``contact_effects``.
+    dt: largest step [s]; steps: how many of them.
+    """
+
+    def __init__(
+        self, trial, mesh, until=None, *, methods=TOUCHING, bodies=slice(None), velocity=0.0,
+        shift=0.0, spin=0.0, **scene,
+    ):  # fmt: skip
+        super().__init__(bodies)
+        method, shape = methods[trial.method], (mesh.body_count, 3)
+        scene = Scene(mesh, **{"material": CONCRETE, "effects": contact_effects(), **scene})
+        simulation = self.simulation = Simulation(scene, method)
+        set_moving(simulation, *(np.broadcast_to(each, shape) for each in (velocity, shift, spin)))
+        until = until or soon(trial)
+        run_simulation(simulation, until=until, samples=SAMPLES, progress=None, observers=[self])
+        trial.compile_s += simulation.compile_seconds
+        trial.warnings += simulation.step_resolution.findings()
+        self.trial, self.dt, self.steps = trial, method.dt0, self.time_s[-1] / method.dt0
+
+    def draw(self, ylabel, y):
+        """Draw a quantity over time."""
+        self.trial.draw("time [µs]", 1e6 * self.time_s, ylabel, y)
+
+    def energy(self):
+        """Kinetic energy over that at the start, which is drawn."""
+        share = self.kinetic_energy / self.kinetic_energy[0]
+        self.draw("kinetic energy / given [1]", share)
+        return share
+
+    def no_energy_made(self):
+        """Kinetic energy never exceeds what there was at the start."""
+        rise, formula = self.energy().max() - 1.0, "kinetic <= kinetic at the start"
+        self.trial.limit("kinetic energy above what was there", rise, 1e-3, formula)
+
+    def momentum_kept(self):
+        """Pair impulses cancel bit for bit; sums of them round, and so does every body's place."""
+        place = abs(self["position"]).max() / EDGE
+        bound = EPS * (100.0 * self.steps**0.5 + self.steps * place)
+        formula = "100 eps sqrt(n) + n eps place / size"
+        self.trial.limit("momentum error", self.momentum_error(EDGE), bound, formula)
+
+    def converged(
+        self, name, found, true, scale, bound=ACCURACY, formula="1 % of the exact solution"
+    ):
+        """Largest distance of what was found from what it has to converge to, over a scale."""
+        self.trial.limit(name, abs(np.asarray(found) - true) / scale, bound, formula)
+
+    def gap(self, opening=0.0):
+        """Distance of body 1 from body 0 along x beyond that of the mesh [m], drawn."""
+        gap = opening + self.moved[:, 1, 0] - self.moved[:, 0, 0]
+        self.draw("opening [µm]", 1e6 * gap)
+        return gap
+
+
+def grown(edge, heights):
+    """A regular body with a neighbour on some faces; heights: over that of a regular one, by face.
+
+    Returns the mesh and the directions (n, 3) in which the neighbours lie.
+    """
+    corners = single(edge).points[single(edge).tetrahedra[0]]
+    points, bodies, outward = [*corners], [[0, 1, 2, 3]], []
+    for k, height in heights.items():
+        face = [j for j in range(4) if j != k]
+        bodies.append([*face, len(points)])
+        away = corners[face].mean(axis=0) - corners[k]
+        points.append(corners[face].mean(axis=0) + height * away)
+        outward.append(away / np.linalg.norm(away))
+    return checked_mesh(points, bodies, {}), np.array(outward)
+
+
+def right_half():
+    """The second body of a pair, alone."""
+    return checked_mesh(pair().points[[0, 1, 2, 4]], [[3, 0, 2, 1]], {})
+
+
+def beside(mesh, shift, other):
+    """Two solids in one mesh, the first shifted [m]."""
+    return placed_together({"first": (mesh, shift), "other": (other, np.zeros(3))})
+
+
+def shot_at_block():
+    """A fragment of 100 m/s, 10 µm before a cube of six bodies at rest: mesh and velocities."""
+    block = bar(0.1, 0.1, (1, 1, 1))
+    velocity = np.outer(np.arange(7) == 0, (100.0, 0.0, 0.0))
+    return beside(single(), (-1e-5, 0.05, 0.05), block), velocity

@@ -1,0 +1,173 @@
+"""A run of a hard case of the damper: fillings by name, and the limits that many share."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ca_damper import Automaton, Batch, Empty, Oscillator, SceneTable, Spheres, film
+from ca_damper.measures import COLUMNS
+from ca_damper.plot import Box
+
+FILLINGS = {
+    "automaton": Automaton(),
+    "automaton_ejection": Automaton(accounting="landing+ejection"),
+    "automaton_landing": Automaton(accounting="landing"),
+    "spheres": Spheres(),
+    "spheres_printed": Spheres(damping="printed"),
+    "empty": Empty(),
+}
+AUTOMATA, SPHERES = tuple(FILLINGS)[:3], tuple(FILLINGS)[3:5]
+#: Those whose account of forces keeps momentum.
+EXACT = ("automaton", *SPHERES)
+OSCILLATOR = Oscillator()
+EPS = np.finfo(float).eps
+
+
+def filling(trial, automaton=None, spheres=None, **shared):
+    """The filling of a trial; options: for all, and for automata or spheres only."""
+    own = automaton if trial.method in AUTOMATA else spheres
+    return replace(FILLINGS[trial.method], **shared, **(own or {}))
+
+
+class Run:
+    """A measured run of one scene, by default at 6 Hz in a container that swings by 24 mm.
+
+    what: its filling. transient: cycles before measuring. columns: of ``SceneTable``.
+    """
+
+    def __init__(self, trial, what, particles, cycles, *, spring=False, transient=0, **columns):
+        columns = {"dt": what.default_dt, "frequency": 6.0, "base_amplitude": 0.024, **columns}
+        table, mount = SceneTable(particles, 1, **columns), "spring" if spring else "base"
+        self.batch = Batch(what, table, mount=mount, measured_cycles=cycles)
+        self.batch.start("rigid" if spring else "rest")
+        # At least one step: the first takes the particles to the speed of the container.
+        self.batch.run(max(1, transient), 0)
+        before = self.batch.sample()["momentum"][0]
+        self.cycles = self.batch.run(0, cycles)
+        self.momentum_gained = self.batch.sample()["momentum"][0] - before
+        self.trial, self.what, self.particles = trial, what, particles
+        trial.compile_s += self.batch.compile_seconds
+        self.row, self.steps = self.batch.table.row(0), int(self.batch.steps_per_cycle[0])
+        self.time = cycles / self.row["frequency"]
+        self.omega = 2.0 * np.pi * self.row["frequency"]
+        self.weight = particles * what.particle_mass * what.gravity
+
+    def column(self, name):
+        """A column of ``measures.COLUMNS`` over the measured cycles, (cycles,)."""
+        return self.cycles.record[0, :, COLUMNS.index(name)]
+
+    def sound(self):
+        """Limits that always hold: particles inside, and momentum where it is kept exactly."""
+        self.kept_inside()
+        if self.trial.method in EXACT:
+            self.momentum_kept()
+        self.draw("energy of the particles [mJ]", 1e3 * self.column("energy"))
+
+    def draw(self, ylabel, *lines):
+        """Draw quantities over the cycles."""
+        self.trial.draw("cycle [1]", np.arange(1, len(lines[0]) + 1), ylabel, *lines)
+
+    def draw_swings(self):
+        """Draw the highest and the lowest displacement of every cycle."""
+        self.draw("highest and lowest x [mm]", *(1e3 * self.column(n) for n in ("x_max", "x_min")))
+
+    def draw_places(self):
+        """Draw where the particles are."""
+        x, y = 1e3 * self.batch.snapshot(0)["position"].T
+        self.trial.draw("across [mm]", x, "up [mm]", y, dots=True)
+
+    def kept_inside(self):
+        """No particle is missing or out of the box.
+
+        In an automaton one may be a cell under way, and every other column stands half a cell
+        higher.
+        """
+        place, box = self.batch.snapshot(0)["position"], Box.of(self.what)
+        slack = box.diameter * box.staggered
+        top = np.array([box.width, box.height + 0.5 * slack])
+        inside = ((place >= -slack) & (place <= top + slack)).all(axis=1)
+        lost = self.particles - inside.sum()
+        self.trial.limit("particles lost", lost, 0.0, "their number is exact")
+
+    def momentum_kept(self):
+        """P' = -f - N m g: the container's loss and the weight's impulse are the particles' gain.
+
+        As a share of N m v, v the container's largest speed. The automaton's held particles count
+        with the container's velocity of a step ago: off by a dt / v = w dt. Otherwise round-off of
+        a step and quanta of 2^-40 m/s.
+        """
+        given = -(self.cycles.mean_force[0] + self.weight) * self.time
+        swing = 0.5 * (self.column("x_max").max() - self.column("x_min").min())
+        scale = self.particles * self.what.particle_mass * self.omega * swing
+        steps = self.steps * len(self.column("x"))
+        bound, formula = 10.0 * steps * EPS, "10 steps x 2^-52"
+        if self.trial.method in AUTOMATA:
+            bound = 2.0 * self.omega * self.row["dt"]
+            formula = "2 w dt: held particles count a step late"
+        error = abs(self.momentum_gained - given) / scale
+        self.trial.limit("momentum error / N m v", error, bound, formula)
+
+    def weight_carried(self, bound, formula):
+        """Mean force on the container against -N m g, as a share of it."""
+        error = abs(self.cycles.mean_force[0] + self.weight) / self.weight
+        self.trial.limit("mean force error", error, bound, formula)
+
+    def rigid_response(self, bound, formula):
+        """RMS displacement against that of a structure with the particles glued in."""
+        o = Oscillator(*(self.row[n] for n in ("mass", "stiffness", "damping", "base_amplitude")))
+        added = self.particles * self.what.particle_mass
+        wanted = o.base_amplitude * abs(o.transfer(self.row["frequency"], added)) / np.sqrt(2.0)
+        error = abs(self.cycles.rms[0] / wanted - 1.0)
+        self.trial.limit("response error", error, bound, formula)
+
+    def speed_bounded(self):
+        """No particle gets faster than the walls and the fall can make it.
+
+        Between two walls that move at V towards it, a speed v comes back as e v + (1 + e) V: at
+        most V (1 + e) / (1 - e), plus the fall through the box and g dt for each of four steps seen
+        late.
+        """
+        what = self.what
+        wall = self.omega * max(self.column("x_max").max(), -self.column("x_min").min())
+        e = max(what.wall_restitution, what.restitution)
+        bound = wall * (1.0 + e) / (1.0 - e) + np.sqrt(2.0 * what.gravity * Box.of(what).height)
+        bound += 4.0 * what.gravity * self.row["dt"]
+        fastest = np.linalg.norm(self.batch.snapshot(0)["velocity"], axis=1).max(initial=0.0)
+        self.trial.limit("fastest [m/s]", fastest, bound, "V (1 + e) / (1 - e) + sqrt(2 g H)")
+
+    def flight_energy(self):
+        """Energy of particles that all fly at twice the wall's speed, as high as the box."""
+        wall = self.omega * self.row["base_amplitude"]
+        height = Box.of(self.what).height
+        most = 2.0 * wall**2 + self.what.gravity * height
+        most *= self.particles * self.what.particle_mass
+        self.trial.limit("energy [J]", self.column("energy"), most, "N m ((2 V)^2 / 2 + g H)")
+
+
+def drive(trial, what, particles, cycles, amplitude=0.024, **options):
+    """A container that moves as told, x = amplitude sin(2 pi f t); returns a sound Run."""
+    run = Run(trial, what, particles, cycles, base_amplitude=amplitude, **options)
+    run.sound()
+    return run
+
+
+def spring(trial, what, particles, cycles, *, ratio=1.0, base=0.6e-3, **options):
+    """A container on its spring, from the steady state of a rigid filling; ratio: f / f0.
+
+    f0: of the paper's structure, whatever the mass [kg] of the container here.
+    """
+    options.update(frequency=ratio * OSCILLATOR.natural_frequency, base_amplitude=base)
+    return Run(trial, what, particles, cycles, spring=True, **options)
+
+
+def fall(trial, what, seconds, particles=1, samples=400):
+    """Energy of particles in a container at rest over that at the start; it is drawn."""
+    batch = Batch(what, SceneTable(particles, 1, what.default_dt, 10.0, 0.0), mount="base")
+    batch.start()
+    every = max(1, round(seconds / samples / batch.table.row(0)["dt"]))
+    history = film(batch, every * samples, sample_every=every).history
+    trial.compile_s += batch.compile_seconds
+    energy = history["energy"][:, 0]
+    share = energy / energy[0]
+    trial.draw("time [s]", history["time_s"][:, 0], "energy / energy at the start [1]", share)
+    return energy

@@ -1,0 +1,162 @@
+"""Hard cases of the blast: contacts, pressure, and what has to be refused."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from _hard_cases._blast_run import FREE, TOUCHING, Run, beside, right_half, shot_at_block, soon
+from taichi_dem import CONCRETE, ImplicitDashpots, Multirate, StepControl, Uniform, effects
+from taichi_dem.closed_forms import damped_opening, velocity_after_impact
+from taichi_dem.kit.study.cases import Cases
+from taichi_dem.mesh.contact_spheres import spheres_of_faces
+from taichi_dem.mesh.mesh import checked_mesh
+from taichi_dem.mesh.shapes import bar, single
+from taichi_dem.mesh.topology import body_properties
+
+case = CASES = Cases("blast")
+BASIC = {"uniform": Uniform, "multirate_held": Multirate, "implicit": ImplicitDashpots}
+LIMITED = (("limited", "controlled"), "parts too fast")
+PAIR_TOO_FAST = ("uniform", "multirate_held", "multirate_drifted"), "throw bodies apart"
+JUMPING = {
+    "controlled": Multirate(8e-8, 5e-9, control=StepControl(level_jump=None)),
+    "multirate_held": Multirate(8e-8, 5e-9),
+}
+X = np.array([1.0, 0.0, 0.0])
+#: One body moves towards another at rest [m/s].
+MEETING = np.array([X, 0.0 * X])
+
+
+@case(TOUCHING)
+def fragment_hits_block(trial):
+    """A fragment of 100 m/s hits a resting block at once: no energy, no momentum from nowhere."""
+    mesh, velocity = shot_at_block()
+    run = Run(trial, mesh, velocity=velocity)
+    run.momentum_kept()
+    run.no_energy_made()
+    trial.limit("block not reached", not run.moved[-1, 1:].any(), 0.0, "it was hit")
+
+
+@case(JUMPING)
+def jump_of_ten_levels(trial):
+    """A fragment of 100 m/s hits a block whose bodies sleep ten levels above its own."""
+    mesh, velocity = shot_at_block()
+    run = Run(trial, mesh, 1e-5, methods=JUMPING, velocity=velocity)
+    level = run["level"][0]
+    run.momentum_kept()
+    run.no_energy_made()
+    jump = max(1.0, level[0] - level[1:].min())
+    trial.limit("10 / jump at the start", 10.0 / jump, 1.0, "log2(v dt0 / l)")
+
+
+@case(["implicit"], PAIR_TOO_FAST, LIMITED)
+def deep_overlap_at_start(trial):
+    """Two fragments that begin 1 mm inside each other are pushed apart as their dashpots let them.
+
+    Mirror images: six spheres of either face meet, each overlapped by the 1 mm.
+    """
+    run = Run(trial, beside(single(), 1e-3 * X, right_half()))
+    laws = 6.0 * CONCRETE.contact_stiffness, 6.0 * CONCRETE.contact_damping
+    way = 1e-3 - damped_opening(0.5 * run.mass[0], *laws, 1e-3, 0.0, run.time_s)
+    # Up to 1 % of the overlap: later on those that touch at an angle part before the others.
+    early = run.time_s < 2.1e-5
+    parted = run.moved[:, 1, 0] - run.moved[:, 0, 0]
+    run.momentum_kept()
+    run.converged("error of the way apart / way", parted[early], way[early], way[early][-1])
+    run.draw("distance [µm]", 1e6 * parted)
+
+
+@case(["implicit"], LIMITED)
+def mass_ratio_1e4(trial):
+    """A body of 3.5 mg meets one of 35 g at 1 m/s: dashpots stop the point that meets."""
+    small, large = single(0.05 * 1e-4 ** (1.0 / 3.0)), right_half()
+    # The spheres stand behind the faces, so that two of them have to be aimed at each other.
+    points = [sphere_on_base(mesh) for mesh in (small, large)]
+    shift = points[1] - points[0] - 1e-7 * X
+    methods = {**TOUCHING, "limited": Uniform(4e-9, dashpot="limited")}
+    # The exact solution knows one contact; later the small body has turned, and others meet.
+    run = Run(trial, beside(small, shift, large), 2e-5, methods=methods, velocity=MEETING)
+    arms = [
+        point - body_properties(mesh, CONCRETE.density)[1][0]
+        for point, mesh in zip(points, (small, large))
+    ]
+    true = velocity_after_impact((small, large), CONCRETE, arms, X, X)
+    speed = run["velocity"][:, 0]
+    run.momentum_kept()
+    run.converged("velocity error / speed", speed[-1], true, 1.0)
+    run.draw("speed [m/s]", speed[:, 0])
+
+
+def sphere_on_base(mesh):
+    """Where the first contact sphere of a single body's face in x = 0 touches it [m], (3,)."""
+    _, centre, _ = body_properties(mesh, 1.0)
+    spheres = spheres_of_faces(mesh, centre, effects.SphereContact().divisions)
+    apex = int(abs(mesh.points[mesh.tetrahedra[0]][:, 0]).argmax())
+    return (centre[0] + spheres.centre[0, apex, 0]) * [0.0, 1.0, 1.0]
+
+
+@case(("controlled", "implicit"))
+def damping_ratio_300(trial):
+    """Contacts damped 300 times critical bring two bodies to one speed, and never to throw back."""
+    mesh = beside(single(), -1e-7 * X, right_half())
+    mass = 0.5 * CONCRETE.density * 0.05**3 / (6.0 * 2.0**0.5)
+    critical = 2.0 * (mass * CONCRETE.contact_stiffness) ** 0.5
+    material = replace(CONCRETE, contact_damping=300.0 * critical)
+    run = Run(trial, mesh, material=material, velocity=MEETING)
+    speed = run["velocity"][:, :, 0]
+    run.momentum_kept()
+    # The springs hold v^2 / (4 zeta^2) of the energy at most, and give it back in c / k = 12 ms.
+    run.converged("speed error / first", speed[-1], 0.5, 1.0, formula="1 % of one speed")
+    run.draw("speed [m/s]", speed[:, 0])
+
+
+@case(("multirate_held", "controlled", "implicit"))
+def sudden_pressure_on_sleepers(trial):
+    """Full pressure within 10 ns on bodies at rest: momentum is the pressure's to rounding."""
+    gas = effects.GasPressure(group="left", peak=100e6, rise=1e-8, decay_ratio=1e7)
+    acting = [effects.BondDamping(), effects.Softening(), effects.ShearSlip(), gas]
+    methods, until = {**FREE, "multirate_held": Multirate(1e-8, 1e-7)}, soon(trial)
+    run = Run(trial, bar(0.2, 0.1, (2, 1, 1)), until, methods=methods, effects=acting)
+    impulse, given = run.momentum[:, 0], 100e6 * 0.1**2 * run.time_s[-1]
+    late, report = (2.0 * run.dt + 1e-8) / until, run.simulation.report()
+    trial.limit("impulse error", abs(impulse[-1] / given - 1.0), late, "(2 dt + rise) / t")
+    trial.limit("momentum error", report.linear_momentum_error, 1e-12, "rounding")
+    residual = report.energy_residual_fraction
+    trial.limit("energy from nowhere", residual, 0.05, "the specification")
+    run.draw("impulse [N s]", impulse)
+
+
+@case((), (["uniform"], "moves at"))
+def faster_than_the_bound(trial):
+    """A body beyond the speed at which a scene counts as run away."""
+    Run(trial, single(), 1e-5, methods=FREE, effects=(), velocity=1e3 * X, max_speed=100.0)
+
+
+@case((), (["uniform"], "volume"))
+def flat_element(_):
+    """Four points in one plane are no body."""
+    checked_mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], [[0, 1, 2, 3]], {})
+
+
+@case((), (["uniform"], "face"))
+def face_of_three(_):
+    """A face between three bodies is no bond."""
+    points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, -1], [1, 1, 1]]
+    checked_mesh(points, [[0, 1, 2, 3], [0, 2, 1, 4], [0, 1, 2, 5]], {})
+
+
+@case((), (["uniform"], "points"))
+def points_at_one_place(_):
+    """Two bodies that share a place but no points look joined, and are not."""
+    checked_mesh(np.vstack([single().points] * 2), [[0, 1, 2, 3], [4, 5, 6, 7]], {})
+
+
+@case((), (BASIC, "positive finite"))
+def step_that_is_no_number(trial):
+    """A step that is no number."""
+    BASIC[trial.method](float("nan"))
+
+
+@case((), (["uniform"], "fracture_energy"))
+def strength_beyond_stiffness(_):
+    """A bond whose fracture energy is spent before it reaches its strength."""
+    replace(CONCRETE, fracture_energy=1.0)
