@@ -102,15 +102,11 @@ def step_seconds(batch, scene, least=0.2):
 def response_seconds(labels):
     """Wall and CPU seconds of the response figure of each filling."""
     full, seconds = {name: values[0] for name, values in SETTINGS.items()}, []
+    job = {name: full[name] for name in ("particles", "ratios", "seeds")}
+    job.update(transient_cycles=full["transient"], measured_cycles=full["measured"])
     for label in labels:
         told, cpu = [], time.process_time()
-        frequency_response(
-            FILLINGS[label],
-            **{name: full[name] for name in ("particles", "ratios", "seeds")},
-            transient_cycles=full["transient"],
-            measured_cycles=full["measured"],
-            progress=told.append,
-        )
+        frequency_response(FILLINGS[label], **job, progress=told.append)
         seconds.append((told[-1].seconds, time.process_time() - cpu))
     return seconds
 

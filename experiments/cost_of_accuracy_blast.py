@@ -33,7 +33,6 @@ from taichi_dem import (
     read_mesh,
 )
 from taichi_dem.kit import study
-from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.plot_style import power, seconds, styles_of
 from taichi_dem.kit.study.work_precision import Point, percent
 from taichi_dem.kit.study.work_precision_picture import picture_errors, picture_work_precision
@@ -104,9 +103,8 @@ def options_parser():
 
 def run(options):
     """Run all methods, write pictures and tables, answer what an error costs."""
-    study.take_settings(options, SETTINGS)
     mesh = read_mesh(options.mesh)
-    output_folder(options.out)
+    folder = study.begin(options, SETTINGS)
     reference, kept = reference_of(mesh, options)
     runs = {}
     for name, steps in options.steps.items():
@@ -126,8 +124,8 @@ def run(options):
     order = sorted(runs, key=lambda key: (list(METHODS).index(key[0]), key[2]))
     rows = [row_of(("reference", np.nan, 0), reference, reference)]
     rows += [row_of(key, runs[key], reference) for key in order]
-    study.write_rows(os.path.join(options.out, "runs.csv"), rows, COLUMNS)
-    picture_all(options, runs, points, floors, reference, check, titles)
+    study.write_rows(folder / "runs.csv", rows, COLUMNS)
+    picture_all(folder, options, runs, points, floors, reference, check, titles)
     figures = {
         **study.cheapest_figures(points, 0.01, floors, "cheapest_seconds"),
         **study.cheapest_figures(points, 0.001, floors, "seconds"),
@@ -203,7 +201,7 @@ def row_of(key, run, reference):
     return (*key, *errors, len(run.broken), *cost, *energy, run.failure.replace(",", ";"))
 
 
-def picture_all(options, runs, points, floors, reference, check, titles):
+def picture_all(folder, options, runs, points, floors, reference, check, titles):
     """The work-precision diagram, and the same for broken faces and energy."""
     scene = (
         f"Paper's block, {len(reference.moved)} bodies to {1e6 * options.until:.0f} µs, "
@@ -213,7 +211,7 @@ def picture_all(options, runs, points, floors, reference, check, titles):
     # Floors far below all errors would only squeeze the picture.
     least = min(point.error for point in points if point.error > 0.0)
     picture_work_precision(
-        os.path.join(options.out, "work_precision.png"),
+        folder / "work_precision.png",
         points,
         titles,
         floors={name: floor for name, floor in floors.items() if floor > 0.1 * least},
@@ -240,7 +238,7 @@ def picture_all(options, runs, points, floors, reference, check, titles):
         for words, error in MEASURES.items()
     }
     caption = f"{scene}. {against}. Points at the bottom edge have no error at all."
-    path = os.path.join(options.out, "errors.png")
+    path = folder / "errors.png"
     picture_errors(path, errors, titles, time_name=TIME, caption=caption)
 
 

@@ -14,7 +14,6 @@ with the transfer function of the empty container.
 import os
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -31,7 +30,6 @@ from ca_damper.force_check import checked_response
 from ca_damper.measures import curve_distance, seed_variance
 from ca_damper.plot import picture_compared
 from taichi_dem.kit import study
-from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.plot_style import seconds, styles_of
 from taichi_dem.kit.study.work_precision import Point, answers, write_points
 from taichi_dem.kit.study.work_precision_picture import picture_work_precision
@@ -72,8 +70,7 @@ def options_parser():
 
 def run(options):
     """Measure all methods, write pictures and tables, find the cheapest method for an error."""
-    study.take_settings(options, SETTINGS)
-    folder = Path(output_folder(options.out))
+    folder = study.begin(options, SETTINGS)
     with ProgressBar("sweep") as bar:
         made = {
             name: Sweep(name, options, bar)

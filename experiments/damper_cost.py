@@ -10,7 +10,6 @@ apart. Then every filling is run at longer and longer steps until it refuses or 
 """
 
 import sys
-from pathlib import Path
 from statistics import median
 
 import numpy as np
@@ -18,7 +17,6 @@ import numpy as np
 import ca_damper
 from ca_damper import Automaton, Batch, InputError, SceneTable, Spheres
 from taichi_dem.kit import study
-from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.plot_style import BLACK, STYLES, picture, styles_of
 from taichi_dem.kit.study import several, whole
 
@@ -62,8 +60,7 @@ def options_parser():
 
 def run(options):
     """Time all variants, find their longest steps, write tables and pictures."""
-    study.take_settings(options, SETTINGS)
-    folder = Path(output_folder(options.out))
+    folder = study.begin(options, SETTINGS)
     with ca_damper.ProgressBar("timing") as bar:
         costs, compiling = {}, 0.0
         for k, label in enumerate(VARIANTS):
