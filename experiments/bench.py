@@ -28,8 +28,7 @@ from taichi_dem.simulation import macro_steps
 
 NAME = "bench"
 #: Cells of the automaton's box; particles of the scenes, and the place of 50 in them.
-CELLS = 18 * 12
-NUMBERS = (1, 10, 20, 30, 40, 50, 60, 80, 100, 120)
+CELLS, NUMBERS = 18 * 12, (1, 10, 20, 30, 40, 50, 60, 80, 100, 120)
 SOME = NUMBERS.index(50)
 #: Boxes along the edges of a block, six tetrahedra each; steps that are timed together, how often.
 SMALL, LARGE, LARGEST = (20, 10, 10), (40, 20, 20), (112, 39, 39)

@@ -14,7 +14,6 @@ distance is the chaos floor, their time the spread. Times are CPU seconds of one
 alone, without compiling.
 """
 
-import os
 import sys
 
 import numpy as np
@@ -105,7 +104,7 @@ def run(options):
     """Run all methods, write pictures and tables, answer what an error costs."""
     mesh = read_mesh(options.mesh)
     folder = study.begin(options, SETTINGS)
-    reference, kept = reference_of(mesh, options)
+    reference, kept = reference_of(mesh, options, folder)
     runs = {}
     for name, steps in options.steps.items():
         for step in steps:
@@ -119,7 +118,7 @@ def run(options):
     floors = {name: apart[name, step] for name, step in apart}
     points = [point_of(key, runs, reference, options.until) for key in runs if not key[2]]
     titles = {name: style.label for name, style in styles_of(options.steps).items()}
-    check = [point.error for point in points if point.method == CHECK][-1]
+    check = outcome.displacement_error(runs[CHECK, options.steps[CHECK][-1], 0], reference)
     study.give_answers(options.out, points, TARGETS, floors, titles)
     order = sorted(runs, key=lambda key: (list(METHODS).index(key[0]), key[2]))
     rows = [row_of(("reference", np.nan, 0), reference, reference)]
@@ -129,7 +128,7 @@ def run(options):
     figures = {
         **study.cheapest_figures(points, 0.01, floors, "cheapest_seconds"),
         **study.cheapest_figures(points, 0.001, floors, "seconds"),
-        **figures_of(points),
+        **figures_of(points, runs, reference),
         "chaos_floor": study.figure(max(floors.values()), "1"),
         "chaos_at_any_step": study.figure(max(apart.values()), "1"),
         "reference_check": study.figure(check, "1"),
@@ -139,12 +138,12 @@ def run(options):
     study.finish(options, NAME, figures, float(sum(one.compile_seconds for one in made)))
 
 
-def reference_of(mesh, options):
+def reference_of(mesh, options, folder):
     """(Outcome of the reference, whether it was kept from before)."""
     # Swept until nothing changes by a thousandth, not a twentieth, of the largest speed.
     method = ImplicitDashpots(options.reference, sweeps=(6, 50), tolerance=1e-3)
     settings = (method, options.until, mesh.points.tobytes(), mesh.tetrahedra.tobytes())
-    place = os.path.join(options.out, "references"), "implicit", settings, ("taichi_dem",)
+    place = folder / "references", "implicit", settings, ("taichi_dem",)
     found, kept = study.cached(*place, lambda: blast(mesh, method, options, "reference").as_dict())
     return outcome.Outcome(**found), kept
 
@@ -225,34 +224,28 @@ def picture_all(folder, options, runs, points, floors, reference, check, titles)
         f"the paper's multirate rule at its finest lies {percent(check)} from it. "
         f"Runs that differ by 1 pm at the start end {power(max(floors.values()))} apart.",
     )
-    good = [point for point in points if not point.failure]
+    own = {name: [p for p in points if p.method == name and not p.failure] for name in titles}
     errors = {
         words: {
-            name: [
-                (point.low, error(runs[name, point.step, 0], reference))
-                for point in good
-                if point.method == name
-            ]
-            for name in titles
+            name: [(p.low, error(runs[name, p.step, 0], reference)) for p in good]
+            for name, good in own.items()
         }
         for words, error in MEASURES.items()
     }
     caption = f"{scene}. {against}. Points at the bottom edge have no error at all."
-    path = folder / "errors.png"
-    picture_errors(path, errors, titles, time_name=TIME, caption=caption)
+    picture_errors(folder / "errors.png", errors, titles, time_name=TIME, caption=caption)
 
 
-def figures_of(points):
+def figures_of(points, runs, reference):
     """Price of the paper's rule, and the longest step that full dashpots bear."""
-    figures = {}
-    for point in points:
-        if (point.method, point.step) == ("uniform", PAPER_L):
-            figures["paper_rule_seconds"] = study.figure(point.seconds.median, "s")
-            figures["paper_rule_error"] = study.figure(point.error, "1")
-    fixed = [point for point in points if point.method == "fixed"]
-    if fixed:
-        longest = max((point.step for point in fixed if not point.failure), default=None)
-        figures["longest_fixed_step_full_dashpots"] = study.figure(longest, "s")
+    figures, paper = {}, runs.get(("uniform", PAPER_L, 0))
+    if paper:
+        error = outcome.displacement_error(paper, reference)
+        fixed = [p.step for p in points if p.method == "fixed" and not p.failure]
+        figures["paper_rule_seconds"] = study.figure(paper.cpu_s, "s")
+        figures["paper_rule_error"] = study.figure(error, "1")
+        longest = study.figure(max(fixed, default=None), "s")
+        figures["longest_fixed_step_full_dashpots"] = longest
     return figures
 
 

@@ -61,8 +61,6 @@ ADDED = ("rotation",)
 #: Columns of what an effect adds, and their units.
 ADDS = {"run_s": "s", "memory_MB": "MB", "compiled_kB": "kB"}
 HIDDEN = ("group", "failed", "run_s", "spared_least_percent", "spared_most_percent")
-#: Changes are drawn from the first on [%].
-TICKS = (0.01, 0.1, 1.0, 10.0, 100.0)
 
 
 def options_parser():
@@ -195,12 +193,9 @@ def figures_of(tables, elastic):
     # Each against its neighbour in time: a machine is never equally fast for long.
     ratio = np.array(elastic["composed"]) / np.array(elastic["by_hand"])
     low, middle, high = 100.0 * (np.percentile(ratio, [25, 50, 75]) - 1.0)
-    found = {
-        "overhead_absent_percent": (middle, "%"),
-        "overhead_absent_low_percent": (low, "%"),
-        "overhead_absent_high_percent": (high, "%"),
-        "blast_seconds": (tables["blast"][0]["run_s"], "s"),
-    }
+    overhead = {"": middle, "_low": low, "_high": high}
+    found = {f"overhead_absent{end}_percent": (value, "%") for end, value in overhead.items()}
+    found["blast_seconds"] = tables["blast"][0]["run_s"], "s"
     if chance_in(tables["blast"]) is not None:
         found["blast_chance_percent"] = chance_in(tables["blast"]), "%"
     for group, rows in tables.items():
@@ -243,7 +238,7 @@ def picture_effects(path, tables):
             draw_costs(left, effects)
             draw_changes(right, effects, chance_in(rows) or 0.0)
         single = all(row["step_ms"] == row["step_ms_most"] for row in tables["blast"])
-        unknown = ": unknown, one run each" if single else ""
+        unknown = ": unknown, one run each" * single
         marks = [
             line_key(f"range of the repeats{unknown}", color=BLACK, lw=1.0),
             area_key("no cost told: that range holds 0", fc=SKY),
@@ -275,13 +270,13 @@ def draw_costs(axes, effects):
 
 def draw_changes(axes, effects, chance):
     """Bars on a logarithmic scale, over a stripe of what chance changes."""
-    changes = [row["change_percent"] for _, row, _ in effects]
-    axes.axvspan(TICKS[0], max(chance, TICKS[0]), color=GREY, alpha=0.3, linewidth=0)
-    bars = axes.barh(range(len(changes)), np.maximum(changes, TICKS[0]), color=RED, height=0.6)
+    changes, ticks = [row["change_percent"] for _, row, _ in effects], (0.01, 0.1, 1.0, 10.0, 100.0)
+    axes.axvspan(ticks[0], max(chance, ticks[0]), color=GREY, alpha=0.3, linewidth=0)
+    bars = axes.barh(range(len(changes)), np.maximum(changes, ticks[0]), color=RED, height=0.6)
     words = [f"{value:.0f} %" if value >= 10.0 else f"{value:.2g} %" for value in changes]
     axes.bar_label(bars, words, padding=3, fontsize=8.5)
-    axes.set(xscale="log", xlim=(TICKS[0], 2e3), yticks=[])
-    axes.set_xticks(TICKS, [f"{tick:g}" for tick in TICKS])
+    axes.set(xscale="log", xlim=(ticks[0], 2e3), yticks=[])
+    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
     axes.set_xticks([], minor=True)
     axes.invert_yaxis()
     axes.set_xlabel("use: change of the result without it [%]")

@@ -45,12 +45,8 @@ VARIANTS = {
     "ca_scan_2e-5": (SCAN, 2e-5, "scan, 20 µs", "s", "--"),
     "ca_list_2e-5": (Automaton(), 2e-5, "list, 20 µs", "s", "-"),
 }
-#: Outcome of a run: words and marker.
-OUTCOMES = {
-    "runs": ("runs", "o"),
-    "diverges": ("diverges", "X"),
-    "refused": ("refused before the first step", "|"),
-}
+#: Marker of each outcome of a run.
+OUTCOMES = {"runs": "o", "diverges": "X", "refused": "|"}
 
 
 def options_parser():
@@ -164,8 +160,9 @@ def picture_steps(path, borne):
     """Outcome of a run at each step: a row a filling. borne: {name: [(dt [s], outcome)]}."""
     styles = styles_of(borne)
     with picture(path, 1, 1, (7.0, 1.2 + 0.5 * len(borne))) as (_, axis):
-        for word, (words, mark) in OUTCOMES.items():
-            axis.plot([], [], mark, color=BLACK, label=words, ms=7)
+        for word, mark in OUTCOMES.items():
+            label = word.replace("refused", "refused before the first step")
+            axis.plot([], [], mark, color=BLACK, label=label, ms=7)
             for row, (name, found) in enumerate(borne.items()):
                 steps = [1e6 * dt for dt, end in found if end == word]
                 axis.plot(steps, [row] * len(steps), mark, color=styles[name].colour, ms=7)
