@@ -18,19 +18,9 @@ import sys
 
 import numpy as np
 
-from _blast import blast_parser, paper_effects
+from _blast import blast_parser, paper_scene
 from _hard_cases._case import renew_session
-from taichi_dem import (
-    CONCRETE,
-    ImplicitDashpots,
-    Multirate,
-    ProgressBar,
-    Scene,
-    StepControl,
-    Uniform,
-    outcome,
-    read_mesh,
-)
+from taichi_dem import ImplicitDashpots, Multirate, ProgressBar, StepControl, Uniform, outcome
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import power, seconds, styles_of
 from taichi_dem.kit.study.work_precision import Point, percent
@@ -102,13 +92,13 @@ def options_parser():
 
 def run(options):
     """Run all methods, write pictures and tables, answer what an error costs."""
-    mesh = read_mesh(options.mesh)
+    scene = paper_scene(options.mesh)
     folder = study.begin(options, SETTINGS)
-    reference, kept = reference_of(mesh, options, folder)
+    reference, kept = reference_of(scene, options, folder)
     runs = {}
     for name, steps in options.steps.items():
         for step in steps:
-            runs.update(twin_runs(name, step, mesh, options))
+            runs.update(twin_runs(name, step, scene, options))
     apart = {
         (name, step): outcome.displacement_error(one, runs[name, step, 0])
         for (name, step, disturbed), one in runs.items()
@@ -138,28 +128,28 @@ def run(options):
     study.finish(options, NAME, figures, float(sum(one.compile_seconds for one in made)))
 
 
-def reference_of(mesh, options, folder):
+def reference_of(scene, options, folder):
     """(Outcome of the reference, whether it was kept from before)."""
     # Swept until nothing changes by a thousandth, not a twentieth, of the largest speed.
     method = ImplicitDashpots(options.reference, sweeps=(6, 50), tolerance=1e-3)
+    mesh = scene.mesh
     settings = (method, options.until, mesh.points.tobytes(), mesh.tetrahedra.tobytes())
     place = folder / "references", "implicit", settings, ("taichi_dem",)
-    found, kept = study.cached(*place, lambda: blast(mesh, method, options, "reference").as_dict())
+    found, kept = study.cached(*place, lambda: blast(scene, method, options, "reference").as_dict())
     return outcome.Outcome(**found), kept
 
 
-def blast(mesh, method, options, title, **disturbance):
+def blast(scene, method, options, title, **disturbance):
     """Outcome of the paper's blast by a method."""
     renew_session()
-    scene = Scene(mesh, CONCRETE, paper_effects())
     with ProgressBar(title) as bar:
         looks = {"driver": options.driver, "progress": bar, **disturbance}
         return outcome.outcome_of(scene, method, options.until, **looks)
 
 
-def twin_runs(name, step, mesh, options):
+def twin_runs(name, step, scene, options):
     """Outcome of a method at a step, by (name, step, 0); and by 1 of its disturbed twin."""
-    job = mesh, METHODS[name](step), options, f"{name}, {label_of(name, step)}"
+    job = scene, METHODS[name](step), options, f"{name}, {label_of(name, step)}"
     runs = {(name, step, 0): blast(*job)}
     steps, made = options.steps[name], runs[name, step, 0]
     # The coarsest of several is too coarse for its spread to matter.

@@ -216,9 +216,9 @@ def figures_of(tables, elastic):
 def show(rows, title):
     """Print the rows, and why some of them failed."""
     print(f"\n{title}")
+    forms = {"scene": "", "broken_faces": ""}
     names = [name for name in rows[0] if name not in HIDDEN]
-    plain = ("scene", "broken_faces")
-    study.show_rows(rows, {name: (name, "" if name in plain else ".3g") for name in names})
+    study.show_rows(rows, {name: (name, forms.get(name, ".3g")) for name in names})
     for row in rows:
         if row["failed"]:
             print(f"{row['scene']}: {row['failed']}")

@@ -14,7 +14,6 @@ Responses and sweeps save themselves at their end, on Ctrl-C, and as often as --
 says; the same command with --resume goes on from there and repeats nothing.
 """
 
-import os
 import sys
 from pathlib import Path
 
@@ -84,7 +83,7 @@ def run(options):
     picture_responses(folder / "response.png", responses, PARTICLE_MASS)
     picture_measures(folder / "measures.png", responses, PARTICLE_MASS)
     picture_hysteresis(folder / "hysteresis.png", sweeps)
-    figures = {**print_peaks(responses), **figures_of(responses, sweeps)}
+    figures = {**show_peaks(responses), **figures_of(responses, sweeps)}
     reports = [one.report for one in (*responses.values(), *sweeps.values())]
     study.finish(options, NAME, figures, reports)
 
@@ -105,10 +104,7 @@ def jobs_of(filling, options):
 
 def made(work, arguments, name, options):
     """What work(**arguments) gives, under a progress bar, with a checkpoint of its own."""
-    kept = study.checkpoint_of(options, f"checkpoint_{name}")
-    # Jobs not begun before the interruption have no file.
-    if options.resume and not os.path.exists(kept["resume"]):
-        kept["resume"] = None
+    kept = study.checkpoint_of(options, f"checkpoint_{name}", may_be_new=True)
     with ProgressBar(name.replace("_", " ")) as bar:
         return work(**arguments, **kept, progress=bar)
 
@@ -126,7 +122,7 @@ def write_tables(responses, sweeps, folder):
     study.write_rows(folder / "peaks.csv", rows, "filling particles seed peak_ratio peak_rms_mm")
 
 
-def print_peaks(responses):
+def show_peaks(responses):
     """Print the peaks beside those of a rigid mass; returns their figures, medians over seeds."""
     figures, rows = {}, []
     for label, response in responses.items():
@@ -148,9 +144,8 @@ def figures_of(responses, sweeps):
     """Largest hysteresis of each filling, and the seconds of its runs."""
     figures = {}
     for label, sweep in sweeps.items():
-        for n, hysteresis in zip(sweep.up.particles, np.abs(sweep.hysteresis)):
-            key = f"hysteresis_{label}_N{n}"
-            figures[key] = study.figure(float(hysteresis.max()), "1")
+        for n, most in zip(sweep.up.particles, np.abs(sweep.hysteresis).max(axis=(1, 2))):
+            figures[f"hysteresis_{label}_N{n}"] = study.figure(float(most), "1")
         spent = responses[label].report.run_seconds + sweep.report.run_seconds
         figures[f"run_seconds_{label}"] = study.figure(spent, "s")
     return figures
