@@ -110,7 +110,7 @@ def run(options):
     titles = {name: style.label for name, style in styles_of(options.steps).items()}
     check = outcome.displacement_error(runs[CHECK, options.steps[CHECK][-1], 0], reference)
     study.give_answers(options.out, points, TARGETS, floors, titles)
-    order = sorted(runs, key=lambda key: (list(METHODS).index(key[0]), key[2]))
+    order = sorted(runs, key=lambda key: (list(options.steps).index(key[0]), key[2]))
     rows = [row_of(("reference", np.nan, 0), reference, reference)]
     rows += [row_of(key, runs[key], reference) for key in order]
     study.write_rows(folder / "runs.csv", rows, COLUMNS)
@@ -231,11 +231,12 @@ def figures_of(points, runs, reference):
     figures, paper = {}, runs.get(("uniform", PAPER_L, 0))
     if paper:
         error = outcome.displacement_error(paper, reference)
-        fixed = [p.step for p in points if p.method == "fixed" and not p.failure]
         figures["paper_rule_seconds"] = study.figure(paper.cpu_s, "s")
         figures["paper_rule_error"] = study.figure(error, "1")
-        longest = study.figure(max(fixed, default=None), "s")
-        figures["longest_fixed_step_full_dashpots"] = longest
+    fixed = [point for point in points if point.method == "fixed"]
+    if fixed:
+        longest = max((point.step for point in fixed if not point.failure), default=None)
+        figures["longest_fixed_step_full_dashpots"] = study.figure(longest, "s")
     return figures
 
 
