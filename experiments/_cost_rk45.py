@@ -5,6 +5,7 @@ import time
 import numpy as np
 
 from ca_damper import Batch, Empty, Oscillator, SceneTable, rk45
+from ca_damper.measures import curve_distance
 from taichi_dem.kit.plot_style import power
 from taichi_dem.kit.study import Timing
 from taichi_dem.kit.study.work_precision import Point
@@ -34,12 +35,6 @@ def rk45_points(frequency, repeats, quick):
     return points, compiling
 
 
-def response_error(rms, frequency):
-    """Root mean square error of an RMS displacement [m], as a share of the peak."""
-    exact = OSCILLATOR.rms(frequency)
-    return float(np.sqrt(((rms - exact) ** 2).mean()) / exact.max())
-
-
 def in_kernel(frequency, repeats, dt, rtol):
     """(Evaluations, error, timing) of a Batch, and its seconds of compiling."""
     table = SceneTable(0, 1, dt, frequency, OSCILLATOR.base_amplitude)
@@ -52,8 +47,8 @@ def in_kernel(frequency, repeats, dt, rtol):
         rms = batch.run(CYCLES - 1, 1).rms
         seconds.append(time.perf_counter() - started)
     evaluations = 6 * int(batch.attempts().sum())
-    found = evaluations, response_error(rms, frequency), Timing.of(seconds[1:])
-    return found, batch.compile_seconds
+    error = curve_distance(rms, OSCILLATOR.rms(frequency))
+    return (evaluations, error, Timing.of(seconds[1:])), batch.compile_seconds
 
 
 def in_python(frequency, rtol):
@@ -67,4 +62,4 @@ def in_python(frequency, rtol):
         evaluations += solution.evaluations
     rms = np.sqrt(np.square(x).mean(axis=1) - np.mean(x, axis=1) ** 2)
     spent = Timing.of([time.perf_counter() - started])
-    return evaluations, response_error(rms, frequency), spent
+    return evaluations, curve_distance(rms, OSCILLATOR.rms(frequency)), spent

@@ -6,16 +6,9 @@ import numpy as np
 
 from _blast import EFFECTS
 from ca_damper import Automaton, Batch, Oscillator, SceneTable, Spheres
-from taichi_dem import (
-    CONCRETE,
-    PAPER_BLOCK,
-    ImplicitDashpots,
-    Scene,
-    SimulationDiverged,
-    read_mesh,
-    simulate,
-)
+from taichi_dem import CONCRETE, PAPER_BLOCK, ImplicitDashpots, Scene, read_mesh, simulate
 from taichi_dem.kit.allocation import field_bytes
+from taichi_dem.kit.errors import SimulationDiverged
 from taichi_dem.measured_overhead import elastic_step_seconds
 
 FILLINGS = {"spheres": Spheres, "automaton": Automaton}

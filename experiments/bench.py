@@ -28,8 +28,7 @@ from taichi_dem.simulation import macro_steps
 
 NAME = "bench"
 #: Cells of the automaton's box; particles of the scenes, and the place of 50 in them.
-CELLS = 18 * 12
-NUMBERS = (1, 10, 20, 30, 40, 50, 60, 80, 100, 120)
+CELLS, NUMBERS = 18 * 12, (1, 10, 20, 30, 40, 50, 60, 80, 100, 120)
 SOME = NUMBERS.index(50)
 #: Boxes along the edges of a block, six tetrahedra each; steps that are timed together, how often.
 SMALL, LARGE, LARGEST = (20, 10, 10), (40, 20, 20), (112, 39, 39)
@@ -102,15 +101,11 @@ def step_seconds(batch, scene, least=0.2):
 def response_seconds(labels):
     """Wall and CPU seconds of the response figure of each filling."""
     full, seconds = {name: values[0] for name, values in SETTINGS.items()}, []
+    job = {name: full[name] for name in ("particles", "ratios", "seeds")}
+    job.update(transient_cycles=full["transient"], measured_cycles=full["measured"])
     for label in labels:
         told, cpu = [], time.process_time()
-        frequency_response(
-            FILLINGS[label],
-            **{name: full[name] for name in ("particles", "ratios", "seeds")},
-            transient_cycles=full["transient"],
-            measured_cycles=full["measured"],
-            progress=told.append,
-        )
+        frequency_response(FILLINGS[label], **job, progress=told.append)
         seconds.append((told[-1].seconds, time.process_time() - cpu))
     return seconds
 

@@ -14,26 +14,14 @@ distance is the chaos floor, their time the spread. Times are CPU seconds of one
 alone, without compiling.
 """
 
-import os
 import sys
 
 import numpy as np
 
-from _blast import blast_parser, paper_effects
+from _blast import blast_parser, paper_scene
 from _hard_cases._case import renew_session
-from taichi_dem import (
-    CONCRETE,
-    ImplicitDashpots,
-    Multirate,
-    ProgressBar,
-    Scene,
-    StepControl,
-    Uniform,
-    outcome,
-    read_mesh,
-)
+from taichi_dem import ImplicitDashpots, Multirate, ProgressBar, StepControl, Uniform, outcome
 from taichi_dem.kit import study
-from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.plot_style import power, seconds, styles_of
 from taichi_dem.kit.study.work_precision import Point, percent
 from taichi_dem.kit.study.work_precision_picture import picture_errors, picture_work_precision
@@ -104,14 +92,13 @@ def options_parser():
 
 def run(options):
     """Run all methods, write pictures and tables, answer what an error costs."""
-    study.take_settings(options, SETTINGS)
-    mesh = read_mesh(options.mesh)
-    output_folder(options.out)
-    reference, kept = reference_of(mesh, options)
+    scene = paper_scene(options.mesh)
+    folder = study.begin(options, SETTINGS)
+    reference, kept = reference_of(scene, options, folder)
     runs = {}
     for name, steps in options.steps.items():
         for step in steps:
-            runs.update(twin_runs(name, step, mesh, options))
+            runs.update(twin_runs(name, step, scene, options))
     apart = {
         (name, step): outcome.displacement_error(one, runs[name, step, 0])
         for (name, step, disturbed), one in runs.items()
@@ -121,17 +108,17 @@ def run(options):
     floors = {name: apart[name, step] for name, step in apart}
     points = [point_of(key, runs, reference, options.until) for key in runs if not key[2]]
     titles = {name: style.label for name, style in styles_of(options.steps).items()}
-    check = [point.error for point in points if point.method == CHECK][-1]
+    check = outcome.displacement_error(runs[CHECK, options.steps[CHECK][-1], 0], reference)
     study.give_answers(options.out, points, TARGETS, floors, titles)
-    order = sorted(runs, key=lambda key: (list(METHODS).index(key[0]), key[2]))
+    order = sorted(runs, key=lambda key: (list(options.steps).index(key[0]), key[2]))
     rows = [row_of(("reference", np.nan, 0), reference, reference)]
     rows += [row_of(key, runs[key], reference) for key in order]
-    study.write_rows(os.path.join(options.out, "runs.csv"), rows, COLUMNS)
-    picture_all(options, runs, points, floors, reference, check, titles)
+    study.write_rows(folder / "runs.csv", rows, COLUMNS)
+    picture_all(folder, options, runs, points, floors, reference, check, titles)
     figures = {
         **study.cheapest_figures(points, 0.01, floors, "cheapest_seconds"),
         **study.cheapest_figures(points, 0.001, floors, "seconds"),
-        **figures_of(points),
+        **figures_of(points, runs, reference),
         "chaos_floor": study.figure(max(floors.values()), "1"),
         "chaos_at_any_step": study.figure(max(apart.values()), "1"),
         "reference_check": study.figure(check, "1"),
@@ -141,28 +128,28 @@ def run(options):
     study.finish(options, NAME, figures, float(sum(one.compile_seconds for one in made)))
 
 
-def reference_of(mesh, options):
+def reference_of(scene, options, folder):
     """(Outcome of the reference, whether it was kept from before)."""
     # Swept until nothing changes by a thousandth, not a twentieth, of the largest speed.
     method = ImplicitDashpots(options.reference, sweeps=(6, 50), tolerance=1e-3)
+    mesh = scene.mesh
     settings = (method, options.until, mesh.points.tobytes(), mesh.tetrahedra.tobytes())
-    place = os.path.join(options.out, "references"), "implicit", settings, ("taichi_dem",)
-    found, kept = study.cached(*place, lambda: blast(mesh, method, options, "reference").as_dict())
+    place = folder / "references", "implicit", settings, ("taichi_dem",)
+    found, kept = study.cached(*place, lambda: blast(scene, method, options, "reference").as_dict())
     return outcome.Outcome(**found), kept
 
 
-def blast(mesh, method, options, title, **disturbance):
+def blast(scene, method, options, title, **disturbance):
     """Outcome of the paper's blast by a method."""
     renew_session()
-    scene = Scene(mesh, CONCRETE, paper_effects())
     with ProgressBar(title) as bar:
         looks = {"driver": options.driver, "progress": bar, **disturbance}
         return outcome.outcome_of(scene, method, options.until, **looks)
 
 
-def twin_runs(name, step, mesh, options):
+def twin_runs(name, step, scene, options):
     """Outcome of a method at a step, by (name, step, 0); and by 1 of its disturbed twin."""
-    job = mesh, METHODS[name](step), options, f"{name}, {label_of(name, step)}"
+    job = scene, METHODS[name](step), options, f"{name}, {label_of(name, step)}"
     runs = {(name, step, 0): blast(*job)}
     steps, made = options.steps[name], runs[name, step, 0]
     # The coarsest of several is too coarse for its spread to matter.
@@ -203,7 +190,7 @@ def row_of(key, run, reference):
     return (*key, *errors, len(run.broken), *cost, *energy, run.failure.replace(",", ";"))
 
 
-def picture_all(options, runs, points, floors, reference, check, titles):
+def picture_all(folder, options, runs, points, floors, reference, check, titles):
     """The work-precision diagram, and the same for broken faces and energy."""
     scene = (
         f"Paper's block, {len(reference.moved)} bodies to {1e6 * options.until:.0f} µs, "
@@ -213,7 +200,7 @@ def picture_all(options, runs, points, floors, reference, check, titles):
     # Floors far below all errors would only squeeze the picture.
     least = min(point.error for point in points if point.error > 0.0)
     picture_work_precision(
-        os.path.join(options.out, "work_precision.png"),
+        folder / "work_precision.png",
         points,
         titles,
         floors={name: floor for name, floor in floors.items() if floor > 0.1 * least},
@@ -227,30 +214,25 @@ def picture_all(options, runs, points, floors, reference, check, titles):
         f"the paper's multirate rule at its finest lies {percent(check)} from it. "
         f"Runs that differ by 1 pm at the start end {power(max(floors.values()))} apart.",
     )
-    good = [point for point in points if not point.failure]
+    own = {name: [p for p in points if p.method == name and not p.failure] for name in titles}
     errors = {
         words: {
-            name: [
-                (point.low, error(runs[name, point.step, 0], reference))
-                for point in good
-                if point.method == name
-            ]
-            for name in titles
+            name: [(p.low, error(runs[name, p.step, 0], reference)) for p in good]
+            for name, good in own.items()
         }
         for words, error in MEASURES.items()
     }
     caption = f"{scene}. {against}. Points at the bottom edge have no error at all."
-    path = os.path.join(options.out, "errors.png")
-    picture_errors(path, errors, titles, time_name=TIME, caption=caption)
+    picture_errors(folder / "errors.png", errors, titles, time_name=TIME, caption=caption)
 
 
-def figures_of(points):
+def figures_of(points, runs, reference):
     """Price of the paper's rule, and the longest step that full dashpots bear."""
-    figures = {}
-    for point in points:
-        if (point.method, point.step) == ("uniform", PAPER_L):
-            figures["paper_rule_seconds"] = study.figure(point.seconds.median, "s")
-            figures["paper_rule_error"] = study.figure(point.error, "1")
+    figures, paper = {}, runs.get(("uniform", PAPER_L, 0))
+    if paper:
+        error = outcome.displacement_error(paper, reference)
+        figures["paper_rule_seconds"] = study.figure(paper.cpu_s, "s")
+        figures["paper_rule_error"] = study.figure(error, "1")
     fixed = [point for point in points if point.method == "fixed"]
     if fixed:
         longest = max((point.step for point in fixed if not point.failure), default=None)

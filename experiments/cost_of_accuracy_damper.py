@@ -14,7 +14,7 @@ with the transfer function of the empty container.
 import os
 import sys
 from dataclasses import replace
-from pathlib import Path
+from operator import attrgetter
 
 import numpy as np
 
@@ -31,7 +31,6 @@ from ca_damper.force_check import checked_response
 from ca_damper.measures import curve_distance, seed_variance
 from ca_damper.plot import picture_compared
 from taichi_dem.kit import study
-from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.plot_style import seconds, styles_of
 from taichi_dem.kit.study.work_precision import Point, answers, write_points
 from taichi_dem.kit.study.work_precision_picture import picture_work_precision
@@ -62,7 +61,7 @@ SETTINGS = {
 }
 #: Repeats of a point end when they took so long together [s].
 ENOUGH = 1.5
-RK45 = ("rk45_tolerance", "rk45_step", "rk45_python")
+run_seconds = attrgetter("report.run_seconds")
 
 
 def options_parser():
@@ -72,8 +71,7 @@ def options_parser():
 
 def run(options):
     """Measure all methods, write pictures and tables, find the cheapest method for an error."""
-    study.take_settings(options, SETTINGS)
-    folder = Path(output_folder(options.out))
+    folder = study.begin(options, SETTINGS)
     with ProgressBar("sweep") as bar:
         made = {
             name: Sweep(name, options, bar)
@@ -93,7 +91,8 @@ def run(options):
     write_points(folder / "points_empty.csv", empty, {})
     rows = [row for sweep in made.values() for row in sweep.rows()]
     study.write_rows(folder / "curves.csv", rows, "method ratio step_s seed rms_m reference")
-    draw_all(folder, options, made, own, toward, empty, {"titles": titles, "floors": floors})
+    shared = {"titles": titles, "floors": floors, "work_name": "particle steps [1]"}
+    draw_all(folder, options, made, own, toward, empty, shared)
     study.finish(options, NAME, figures_of(made, own, toward, empty, floors), compiling)
 
 
@@ -201,11 +200,6 @@ class Sweep:
         return float(np.mean([seed_variance(rms) for rms in runs]) ** 0.5)
 
 
-def run_seconds(response):
-    """Seconds that a response took without compiling."""
-    return response.report.run_seconds
-
-
 def draw_all(folder, options, made, own, toward, empty, shared):
     """Work-precision diagrams: by method, toward the spheres, of the empty container; curves."""
     ratios, (transient, measured) = options.ratios, options.cycles
@@ -220,7 +214,6 @@ def draw_all(folder, options, made, own, toward, empty, shared):
         folder / "work_precision.png",
         own,
         error_name="error of the response curve / its peak [1]",
-        work_name="particle steps [1]",
         residual_names=("step [µs]", balance),
         step_unit=1e-6,
         caption=f"{scenes}Reference of each method: itself with other seeds, at {shorter:.2g} of "
@@ -231,7 +224,6 @@ def draw_all(folder, options, made, own, toward, empty, shared):
         folder / "against_spheres.png",
         toward,
         error_name="difference to the spheres' curve / its peak [1]",
-        work_name="particle steps [1]",
         caption=f"{scenes}Reference of all: spheres, p = 1/4, at "
         f"{seconds(made[SPHERES].reference['step'])}.",
         **shared,
@@ -239,7 +231,7 @@ def draw_all(folder, options, made, own, toward, empty, shared):
     picture_work_precision(
         folder / "rk45.png",
         empty,
-        {name: style.label for name, style in styles_of(RK45).items()},
+        {name: style.label for name, style in styles_of(p.method for p in empty).items()},
         floors={},
         order=5,
         error_name="error of the response curve / its peak [1]",
@@ -272,9 +264,8 @@ def figures_of(made, own, toward, empty, floors):
             "check_force": sweep.reference["force_check"],
             "distance_to_spheres": curve_distance(sweep.mean, made[SPHERES].mean),
         }
-        for name, value in values.items():
-            if value is not None:
-                figures[f"{name}_{label}"] = study.figure(value, "1")
+        known = {f"{name}_{label}": value for name, value in values.items() if value is not None}
+        figures.update({name: study.figure(value, "1") for name, value in known.items()})
     evaluations = answers(empty, 1e-6, {})[0].point.evaluations
     figures["rk45_evaluations_at_1e-6"] = study.figure(evaluations, "1")
     return figures

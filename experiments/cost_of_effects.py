@@ -16,14 +16,12 @@ Writes effects.png, blast.csv, damper.csv and summary.json to results/cost_of_ef
 
 import os
 import sys
-from pathlib import Path
 
 import numpy as np
 
 from _effects_runs import absent, blast, damper
 from ca_damper.measures import curve_distance
 from taichi_dem.kit import study
-from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREY, RED, SKY, area_key, line_key, picture
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 
@@ -60,15 +58,9 @@ FILLINGS = {
     },
 }
 ADDED = ("rotation",)
-#: What an effect adds, as a column and as a figure.
-ADDS = (
-    ("run_s", "seconds", "s"),
-    ("memory_MB", "memory_MB", "MB"),
-    ("compiled_kB", "compiled_kB", "kB"),
-)
+#: Columns of what an effect adds, and their units.
+ADDS = {"run_s": "s", "memory_MB": "MB", "compiled_kB": "kB"}
 HIDDEN = ("group", "failed", "run_s", "spared_least_percent", "spared_most_percent")
-#: Changes are drawn from the first on [%].
-TICKS = (0.01, 0.1, 1.0, 10.0, 100.0)
 
 
 def options_parser():
@@ -78,18 +70,17 @@ def options_parser():
 
 def run(options):
     """Measure, then write and print."""
-    study.take_settings(options, SETTINGS)
-    folder = Path(output_folder(options.out))
-    groups = {"blast": blasts(options), **{name: dampers(name, options) for name in FILLINGS}}
-    calls = {scene: call for group in groups.values() for scene, call in group.items()}
+    folder = study.begin(options, SETTINGS)
+    calls = {**blasts(options), **dampers(options)}
     workers = options.threads or min(2, os.cpu_count() or 1)
     with ProgressBar("measuring") as bar:
         results = study.call_rounds(calls, options.repeats, workers, bar.count)
     elastic = study.call_in_process(absent, substeps=SUBSTEPS, repeats=options.again)
-    tables = {
-        name: rows_of(name, {scene: results[scene] for scene in group})
-        for name, group in groups.items()
-    }
+    tables, complete = {}, {}
+    for scene, repeats in results.items():
+        group = calls[scene][1].get("filling", "blast")
+        complete.setdefault(group, repeats)
+        tables.setdefault(group, []).append(row_of(group, scene, repeats, complete[group]))
     rows = tables["spheres"] + tables["automaton"]
     study.write_rows(folder / "blast.csv", tables["blast"])
     study.write_rows(folder / "damper.csv", rows)
@@ -119,26 +110,24 @@ def blasts(options):
     return calls
 
 
-def dampers(filling, options):
-    """A filling as it is, and with each effect left out or added."""
-    shared = {"filling": filling, "step": STEPS[filling], "particles": 30, "seeds": (1, 2)}
-    shared.update(ratios=options.ratios, cycles=options.cycles)
-    scenes = FILLINGS[filling]
-    return {scene: (damper, {**shared, "options": chosen}) for scene, chosen in scenes.items()}
+def dampers(options):
+    """Each filling as it is, and with each effect left out or added."""
+    shared = {"particles": 30, "seeds": (1, 2), "ratios": options.ratios, "cycles": options.cycles}
+    return {
+        scene: (damper, {"filling": filling, "step": STEPS[filling], "options": chosen, **shared})
+        for filling, scenes in FILLINGS.items()
+        for scene, chosen in scenes.items()
+    }
 
 
-def rows_of(group, found):
-    """Rows of the table of a group; found: results of the repeats by scene, first the complete."""
-    rows, complete = [], next(iter(found.values()))
+def row_of(group, scene, repeats, complete):
+    """Row of a scene's table; complete: results of the group's first scene."""
+    failed = repeats[0].get("failed", "")
     result = blast_result if group == "blast" else damper_result
-    for scene, repeats in found.items():
-        row = {"group": group, "scene": scene, "failed": repeats[0].get("failed", "")}
-        if row["failed"]:
-            rows.append({**dict.fromkeys(rows[0]), **row})
-        else:
-            changed = result(scene, repeats[0], complete[0])
-            rows.append({**row, **costs(repeats, complete), **changed})
-    return rows
+    known = complete if failed else repeats
+    columns = {**costs(known, complete), **result(scene, known[0], complete[0])}
+    row = {"group": group, "scene": scene, "failed": failed}
+    return {**row, **(dict.fromkeys(columns) if failed else columns)}
 
 
 def costs(repeats, complete):
@@ -204,21 +193,18 @@ def figures_of(tables, elastic):
     # Each against its neighbour in time: a machine is never equally fast for long.
     ratio = np.array(elastic["composed"]) / np.array(elastic["by_hand"])
     low, middle, high = 100.0 * (np.percentile(ratio, [25, 50, 75]) - 1.0)
-    found = {
-        "overhead_absent_percent": (middle, "%"),
-        "overhead_absent_low_percent": (low, "%"),
-        "overhead_absent_high_percent": (high, "%"),
-        "blast_seconds": (tables["blast"][0]["run_s"], "s"),
-    }
+    overhead = {"": middle, "_low": low, "_high": high}
+    found = {f"overhead_absent{end}_percent": (value, "%") for end, value in overhead.items()}
+    found["blast_seconds"] = tables["blast"][0]["run_s"], "s"
     if chance_in(tables["blast"]) is not None:
         found["blast_chance_percent"] = chance_in(tables["blast"]), "%"
     for group, rows in tables.items():
         for name, row, sign in effects_in(rows):
             own, known = group == "blast", not row["failed"]
             key = name.split()[0] if own else f"{group}_{name.replace(' ', '_')}"
-            for column, word, unit in ADDS:
+            for column, unit in ADDS.items():
                 more = sign * (rows[0][column] - row[column]) if known else None
-                found[f"{key}_{word}"] = more, unit
+                found[f"{key}_{column.replace('run_s', 'seconds')}"] = more, unit
             what = "displacement" if own else "response"
             found[f"{key}_{what}_change_percent"] = row["change_percent"], "%"
             if own:
@@ -230,9 +216,9 @@ def figures_of(tables, elastic):
 def show(rows, title):
     """Print the rows, and why some of them failed."""
     print(f"\n{title}")
+    forms = {"scene": "", "broken_faces": ""}
     names = [name for name in rows[0] if name not in HIDDEN]
-    plain = ("scene", "broken_faces")
-    study.show_rows(rows, {name: (name, "" if name in plain else ".3g") for name in names})
+    study.show_rows(rows, {name: (name, forms.get(name, ".3g")) for name in names})
     for row in rows:
         if row["failed"]:
             print(f"{row['scene']}: {row['failed']}")
@@ -251,9 +237,11 @@ def picture_effects(path, tables):
             left.sharex(axes[0, 0])
             draw_costs(left, effects)
             draw_changes(right, effects, chance_in(rows) or 0.0)
+        single = all(row["step_ms"] == row["step_ms_most"] for row in tables["blast"])
+        unknown = ": unknown, one run each" * single
         marks = [
-            line_key("range of the repeats", color=BLACK, lw=1.0),
-            area_key("cost below the spread: that range holds 0", fc=SKY),
+            line_key(f"range of the repeats{unknown}", color=BLACK, lw=1.0),
+            area_key("no cost told: that range holds 0", fc=SKY),
             area_key("change by chance alone (round-off, seeds)", fc=GREY, alpha=0.3),
         ]
         figure.legend(handles=marks, loc="outside lower right", ncols=3)
@@ -268,26 +256,27 @@ def draw_costs(axes, effects):
         hidden = least <= 0.0 <= most
         axes.barh(place, cost, color=SKY if hidden else BLUE, height=0.6)
         axes.plot([least, most], [place, place], color=BLACK, linewidth=1.0)
-        words = f"  {cost:.0f} %, below the spread" if hidden else f"  {cost:.0f} %"
+        words = f"  {cost:.0f} %, within the spread" if hidden else f"  {cost:.0f} %"
         axes.text(max(most, 0.0), place, words, va="center", fontsize=8.5)
     names = [f"{name} (added)" if sign < 0.0 else name for name, _, sign in effects]
     names = [name.replace("_", " ").replace(" and ", "\nand ") for name in names]
     axes.set(yticks=range(len(names)), yticklabels=names)
     axes.set_xlabel("cost: share of a step's time [%], below 0: slower without it")
     axes.axvline(0.0, color=GREY, linewidth=0.8)
+    axes.margins(x=0.3)
     axes.invert_yaxis()
     axes.grid(axis="y", visible=False)
 
 
 def draw_changes(axes, effects, chance):
     """Bars on a logarithmic scale, over a stripe of what chance changes."""
-    changes = [row["change_percent"] for _, row, _ in effects]
-    axes.axvspan(TICKS[0], max(chance, TICKS[0]), color=GREY, alpha=0.3, linewidth=0)
-    bars = axes.barh(range(len(changes)), np.maximum(changes, TICKS[0]), color=RED, height=0.6)
+    changes, ticks = [row["change_percent"] for _, row, _ in effects], (0.01, 0.1, 1.0, 10.0, 100.0)
+    axes.axvspan(ticks[0], max(chance, ticks[0]), color=GREY, alpha=0.3, linewidth=0)
+    bars = axes.barh(range(len(changes)), np.maximum(changes, ticks[0]), color=RED, height=0.6)
     words = [f"{value:.0f} %" if value >= 10.0 else f"{value:.2g} %" for value in changes]
     axes.bar_label(bars, words, padding=3, fontsize=8.5)
-    axes.set(xscale="log", xlim=(TICKS[0], 2e3), yticks=[])
-    axes.set_xticks(TICKS, [f"{tick:g}" for tick in TICKS])
+    axes.set(xscale="log", xlim=(ticks[0], 2e3), yticks=[])
+    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
     axes.set_xticks([], minor=True)
     axes.invert_yaxis()
     axes.set_xlabel("use: change of the result without it [%]")

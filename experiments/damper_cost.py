@@ -10,7 +10,6 @@ apart. Then every filling is run at longer and longer steps until it refuses or 
 """
 
 import sys
-from pathlib import Path
 from statistics import median
 
 import numpy as np
@@ -18,7 +17,6 @@ import numpy as np
 import ca_damper
 from ca_damper import Automaton, Batch, InputError, SceneTable, Spheres
 from taichi_dem.kit import study
-from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.plot_style import BLACK, STYLES, picture, styles_of
 from taichi_dem.kit.study import several, whole
 
@@ -47,12 +45,8 @@ VARIANTS = {
     "ca_scan_2e-5": (SCAN, 2e-5, "scan, 20 µs", "s", "--"),
     "ca_list_2e-5": (Automaton(), 2e-5, "list, 20 µs", "s", "-"),
 }
-#: Outcome of a run: words and marker.
-OUTCOMES = {
-    "runs": ("runs", "o"),
-    "diverges": ("diverges", "X"),
-    "refused": ("refused before the first step", "|"),
-}
+#: Marker of each outcome of a run.
+OUTCOMES = {"runs": "o", "diverges": "X", "refused": "|"}
 
 
 def options_parser():
@@ -62,8 +56,7 @@ def options_parser():
 
 def run(options):
     """Time all variants, find their longest steps, write tables and pictures."""
-    study.take_settings(options, SETTINGS)
-    folder = Path(output_folder(options.out))
+    folder = study.begin(options, SETTINGS)
     with ca_damper.ProgressBar("timing") as bar:
         costs, compiling = {}, 0.0
         for k, label in enumerate(VARIANTS):
@@ -167,8 +160,9 @@ def picture_steps(path, borne):
     """Outcome of a run at each step: a row a filling. borne: {name: [(dt [s], outcome)]}."""
     styles = styles_of(borne)
     with picture(path, 1, 1, (7.0, 1.2 + 0.5 * len(borne))) as (_, axis):
-        for word, (words, mark) in OUTCOMES.items():
-            axis.plot([], [], mark, color=BLACK, label=words, ms=7)
+        for word, mark in OUTCOMES.items():
+            label = word.replace("refused", "refused before the first step")
+            axis.plot([], [], mark, color=BLACK, label=label, ms=7)
             for row, (name, found) in enumerate(borne.items()):
                 steps = [1e6 * dt for dt, end in found if end == word]
                 axis.plot(steps, [row] * len(steps), mark, color=styles[name].colour, ms=7)

@@ -14,7 +14,6 @@ Responses and sweeps save themselves at their end, on Ctrl-C, and as often as --
 says; the same command with --resume goes on from there and repeats nothing.
 """
 
-import os
 import sys
 from pathlib import Path
 
@@ -84,9 +83,9 @@ def run(options):
     picture_responses(folder / "response.png", responses, PARTICLE_MASS)
     picture_measures(folder / "measures.png", responses, PARTICLE_MASS)
     picture_hysteresis(folder / "hysteresis.png", sweeps)
-    print_peaks(responses)
+    figures = {**show_peaks(responses), **figures_of(responses, sweeps)}
     reports = [one.report for one in (*responses.values(), *sweeps.values())]
-    study.finish(options, NAME, figures_of(responses, sweeps), reports)
+    study.finish(options, NAME, figures, reports)
 
 
 def jobs_of(filling, options):
@@ -105,10 +104,7 @@ def jobs_of(filling, options):
 
 def made(work, arguments, name, options):
     """What work(**arguments) gives, under a progress bar, with a checkpoint of its own."""
-    kept = study.checkpoint_of(options, f"checkpoint_{name}")
-    # Jobs not begun before the interruption have no file.
-    if options.resume and not os.path.exists(kept["resume"]):
-        kept["resume"] = None
+    kept = study.checkpoint_of(options, f"checkpoint_{name}", may_be_new=True)
     with ProgressBar(name.replace("_", " ")) as bar:
         return work(**arguments, **kept, progress=bar)
 
@@ -126,36 +122,33 @@ def write_tables(responses, sweeps, folder):
     study.write_rows(folder / "peaks.csv", rows, "filling particles seed peak_ratio peak_rms_mm")
 
 
-def figures_of(responses, sweeps):
-    """Median over seeds of where each curve peaks and how high; hysteresis; seconds."""
-    figures = {}
+def show_peaks(responses):
+    """Print the peaks beside those of a rigid mass; returns their figures, medians over seeds."""
+    figures, rows = {}, []
     for label, response in responses.items():
-        for particles, ratio, rms in zip(response.particles, *response.peaks()):
-            key = f"{label}_N{particles}"
-            figures[f"peak_ratio_{key}"] = study.figure(float(np.median(ratio)), "1")
-            figures[f"peak_rms_mm_{key}"] = study.figure(1e3 * float(np.median(rms)), "mm")
-        sweep = sweeps[label]
-        for particles, hysteresis in zip(sweep.up.particles, np.abs(sweep.hysteresis)):
-            key = f"hysteresis_{label}_N{particles}"
-            figures[key] = study.figure(float(hysteresis.max()), "1")
-        spent = response.report.run_seconds + sweep.report.run_seconds
-        figures[f"run_seconds_{label}"] = study.figure(spent, "s")
-    return figures
-
-
-def print_peaks(responses):
-    """Print the peaks beside those of a rigid mass."""
-    rows = []
-    for label, response in responses.items():
-        for n, ratio, rms in zip(response.particles, *response.peaks()):
+        for n, ratios, rms in zip(response.particles, *response.peaks()):
             rigid_ratio, rigid = response.oscillator.peak(n * PARTICLE_MASS)
-            middle, low, high = 1e3 * np.median(rms), 1e3 * rms.min(), 1e3 * rms.max()
-            place = f"{np.median(ratio):.4f}", f"{rigid_ratio:.4f}"
-            height = f"{middle:.2f}", f"{low:.2f} .. {high:.2f}"
-            rows.append((label, n, *place, *height, f"{1e3 * rigid:.2f}"))
+            ratio, middle = float(np.median(ratios)), 1e3 * float(np.median(rms))
+            spread = f"{1e3 * rms.min():.2f} .. {1e3 * rms.max():.2f}"
+            place = f"{ratio:.4f}", f"{rigid_ratio:.4f}"
+            rows.append((label, n, *place, f"{middle:.2f}", spread, f"{1e3 * rigid:.2f}"))
+            figures[f"peak_ratio_{label}_N{n}"] = study.figure(ratio, "1")
+            figures[f"peak_rms_mm_{label}_N{n}"] = study.figure(middle, "mm")
     header = ["filling", "N", "peak f/f0", "rigid", "peak RMS [mm]", "seeds", "rigid [mm]"]
     study.print_table(rows, header)
     print()
+    return figures
+
+
+def figures_of(responses, sweeps):
+    """Largest hysteresis of each filling, and the seconds of its runs."""
+    figures = {}
+    for label, sweep in sweeps.items():
+        for n, most in zip(sweep.up.particles, np.abs(sweep.hysteresis).max(axis=(1, 2))):
+            figures[f"hysteresis_{label}_N{n}"] = study.figure(float(most), "1")
+        spent = responses[label].report.run_seconds + sweep.report.run_seconds
+        figures[f"run_seconds_{label}"] = study.figure(spent, "s")
+    return figures
 
 
 if __name__ == "__main__":

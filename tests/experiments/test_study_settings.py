@@ -36,6 +36,15 @@ def test_a_setting_without_a_type_is_no_option_and_defaults_are_set():
         made.parse_args(["--ratios", "1"])
 
 
+def test_a_job_that_the_interruption_came_before_begins_anew(tmp_path):
+    options = SimpleNamespace(out=str(tmp_path), resume=True, checkpoint_every={})
+    path = tmp_path / "some.npz"
+    assert study.checkpoint_of(options, "some")["resume"] == str(path)
+    assert study.checkpoint_of(options, "some", may_be_new=True)["resume"] is None
+    path.touch()
+    assert study.checkpoint_of(options, "some", may_be_new=True)["resume"] == str(path)
+
+
 def test_all_that_is_not_compiling_since_the_start_counts_as_running(tmp_path, monkeypatch, capsys):
     written = {}
     monkeypatch.setattr(study.summary, "write_summary", lambda *_, **found: written.update(found))

@@ -18,7 +18,7 @@ from taichi_dem.kit.study.command_line import (
     whole,
 )
 from taichi_dem.kit.study.new_process import call_in_process, call_rounds
-from taichi_dem.kit.study.settings import add_settings, take_settings
+from taichi_dem.kit.study.settings import add_settings, begin, take_settings
 from taichi_dem.kit.study.summary import (
     figure,
     figures_from,
@@ -42,6 +42,7 @@ __all__ = [
     "add_settings",
     "ask_worker",
     "bare_parser",
+    "begin",
     "cached",
     "call_in_process",
     "call_rounds",

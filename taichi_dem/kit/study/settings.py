@@ -2,7 +2,10 @@
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
+
+from taichi_dem.kit.files import output_folder
 
 #: Name -> (full, quick), or (full, quick, type, help) for a setting that is an option too.
 Settings = Mapping[str, tuple]
@@ -26,3 +29,9 @@ def take_settings(options: Namespace, settings: Settings) -> None:
     for name, (full, quick, *_) in settings.items():
         if getattr(options, name, None) is None:
             setattr(options, name, quick if options.quick else full)
+
+
+def begin(options: Namespace, settings: Settings) -> Path:
+    """Take the settings and make the folder for the output; returns its path."""
+    take_settings(options, settings)
+    return Path(output_folder(options.out))
