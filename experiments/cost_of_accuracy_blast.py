@@ -19,7 +19,6 @@ import sys
 import numpy as np
 
 from _blast import blast_parser, paper_scene
-from _hard_cases._case import renew_session
 from taichi_dem import ImplicitDashpots, Multirate, ProgressBar, StepControl, Uniform, outcome
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import power, seconds, styles_of
@@ -141,7 +140,6 @@ def reference_of(scene, options, folder):
 
 def blast(scene, method, options, title, **disturbance):
     """Outcome of the paper's blast by a method."""
-    renew_session()
     with ProgressBar(title) as bar:
         looks = {"driver": options.driver, "progress": bar, **disturbance}
         return outcome.outcome_of(scene, method, options.until, **looks)
