@@ -1,8 +1,10 @@
 """Coulomb slip of bonds (Konno et al., 2.1, eq. 1 and 2, Fig. 3)."""
 
+from dataclasses import replace
+
 import taichi as ti
 
-from taichi_dem.effects.base import Effect
+from taichi_dem.effects.base import HARMLESS, Effect
 from taichi_dem.physics.fracture import coulomb_limit, slip_beyond
 
 
@@ -20,6 +22,10 @@ class ShearSlip(Effect):
     def numbers(self, material):
         """Cohesion [Pa] and friction coefficient."""
         return material.cohesion, material.friction
+
+    def harmless(self, material):
+        """Cohesion beyond any load."""
+        return replace(material, cohesion=HARMLESS * material.tensile_strength)
 
     def declare(self, capacity):
         """Residual slip of every contact unit."""
