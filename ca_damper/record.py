@@ -103,8 +103,9 @@ def frames_of(batch: Any, present: Optional[dict[str, np.ndarray]] = None) -> tu
     present: what ``Batch.sample`` has just given, if it has been asked.
     """
     found = batch.sample() if present is None else present
-    places = zip(*(found[name].tolist() for name in ("time_s", "x", "y")))
-    shots = map(batch.snapshot, range(batch.count))
+    time_s, x, y = (found[name].tolist() for name in ("time_s", "x", "y"))
+    shots = [batch.snapshot(s) for s in range(batch.count)]
     return tuple(
-        Frame(*place, shot["position"], shot["velocity"]) for place, shot in zip(places, shots)
+        Frame(time_s[s], x[s], y[s], shot["position"], shot["velocity"])
+        for s, shot in enumerate(shots)
     )

@@ -20,17 +20,19 @@ from dataclasses import replace
 import numpy as np
 
 from _demo import set_moving
-from _wave_and_spall import CELL, LENGTH, TABLE, Bars, caption, figures_of, wave_speed, write
-from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects
+from _wave_and_spall import CELL, LENGTH, TABLE, Bars, caption, figures_of, write
+from taichi_dem import CONCRETE, Every, Scene, Simulation, Uniform, effects
 from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.kit.study import finish, main, parser, show_rows, whole
 from taichi_dem.mesh.shapes import bar, placed_together
+from taichi_dem.simulate import run_simulation
 
 NAME = "demo_wave_and_spall"
 WIDTH, CELLS = 0.1, 40
 QUICK, FULL = (1.5, 2.0), (1.25, 1.5, 1.75, 2.0)
-STEP = 1e-6
+#: Time step [s], and steps from look to look.
+STEP, LOOK = 1e-6, 20
 #: Tail and front of the pulse [m], and the share of the dashpots that is left.
 TAIL, FRONT, DAMPING = 2.4, 0.4, 0.05
 #: How long the bars are watched, over the time that the pulse takes to turn.
@@ -48,7 +50,7 @@ def push(cells, progress):
     """A weak push on the left end of an elastic bar."""
     load = effects.GasPressure("left", peak=1e4, rise=2e-4, decay_ratio=1.0)
     scene = Scene(bar(LENGTH, WIDTH, (cells, 1, 1)), CONCRETE, [load])
-    return Bars(1, cells).follow(Simulation(scene, Uniform(STEP)), 2.6e-3, progress)
+    return followed(Simulation(scene, Uniform(STEP)), 1, cells, 2.6e-3, progress)
 
 
 def spall(cells, ratios, speed, progress):
@@ -60,7 +62,15 @@ def spall(cells, ratios, speed, progress):
     simulation = Simulation(Scene(mesh, replace(CONCRETE, **damping), acting), Uniform(STEP))
     lay_pulse(simulation, np.repeat(ratios, CELL * cells), speed)
     until = WATCHED * (FRONT + TAIL / 2.0) / speed
-    return Bars(len(ratios), cells).follow(simulation, until, progress)
+    return followed(simulation, len(ratios), cells, until, progress)
+
+
+def followed(simulation, bars, cells, until, progress):
+    """Step to the last look before a time [s]; returns Bars over time, and the Report."""
+    seen = Bars(Every(steps=LOOK), bars, cells)
+    until = round(until / STEP) // LOOK * LOOK * STEP
+    looks = {"samples": 1, "progress": progress, "observers": [seen]}
+    return seen, run_simulation(simulation, until=until, **looks).report
 
 
 def lay_pulse(simulation, ratio, speed):
@@ -86,15 +96,14 @@ def run(options):
     output_folder(options.out)
     with ProgressBar("wave") as shown:
         wave, first = push(cells, shown)
-    speed = wave_speed(wave, STEP)
+    speed = wave.speed(STEP)
     with ProgressBar("spall") as shown:
         made, second = spall(cells, ratios, speed, shown)
     rows = made.spalled(ratios, speed, TAIL)
     show_rows(rows, TABLE)
     write(wave, made, rows, speed, options.out)
-    finish(
-        options, NAME, figures_of(wave, rows, speed), [first, second], caption=caption(rows, wave)
-    )
+    figures = figures_of(wave, rows, speed)
+    finish(options, NAME, figures, [first, second], caption=caption(rows, wave))
 
 
 if __name__ == "__main__":
