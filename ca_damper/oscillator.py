@@ -45,6 +45,13 @@ class Oscillator:
         """Share of critical damping, with the container empty."""
         return self.damping / (2.0 * math.sqrt(self.stiffness * self.mass))
 
+    def energy(self, x: FloatOrArray, v: FloatOrArray, y: FloatOrArray = 0.0) -> Any:
+        """Energy of the container's motion and of its spring [J].
+
+        x, y: displacement of container and base [m]; v: velocity of the container [m/s].
+        """
+        return 0.5 * (self.mass * v**2 + self.stiffness * (x - y) ** 2)
+
     def transfer(self, frequency: ArrayLike, added_mass: FloatOrArray = 0.0) -> Any:
         """Complex x / y of the steady state at a frequency [Hz] with more mass [kg]; or arrays."""
         omega = 2.0 * np.pi * np.asarray(frequency, dtype=np.float64)

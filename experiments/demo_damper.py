@@ -17,10 +17,10 @@ import sys
 
 import numpy as np
 
-import _demo_damper_pictures as pictures
+import _demo_damper as shown
 from ca_damper import Automaton, Batch, Empty, Oscillator, SceneTable, Spheres, film
 from ca_damper.progress import Stages
-from taichi_dem.kit.files import output_folder
+from taichi_dem.kit.files import output_folder, write_text
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.kit.study import figure, finish, main, number, parser, whole
 
@@ -56,11 +56,11 @@ def run(options):
     out = output_folder(options.out)
     runs = {title: swing(title, batch, **settings) for title, batch in batches.items()}
     figures = figures_of(runs["full"][1], runs["empty"][1], o)
-    pictures.picture(out, runs, o, filling, options)
-    sentences = pictures.write_caption(out, figures, filling, o, options)
-    report = batches["full"].report()
+    shown.write(out, runs, o, filling, options)
+    words, report = shown.sentences(figures, filling, o, options), batches["full"].report()
     report.write(os.path.join(out, "report.json"))
-    print(*sentences, f"\n{report}", sep="\n")
+    write_text(os.path.join(out, "caption.txt"), " ".join(words) + "\n")
+    print(*words, f"\n{report}", sep="\n")
     finish(options, NAME, figures, batches.values(), show=False)
 
 
@@ -71,12 +71,11 @@ def swing(title, batch, begin, measured):
     with ProgressBar(f"{title} container") as progress:
         tell = Stages(progress, ends / ends[-1])
         every = {"sample_every": steps // SAMPLES, "progress": tell}
-        shown = film(batch, SHOWN * steps, frame_every=steps // FRAMES, **every)
-        later = film(batch, (begin - SHOWN) * steps, **every)
+        early = film(batch, SHOWN * steps, frame_every=steps // FRAMES, **every)
+        late = film(batch, (begin - SHOWN) * steps, **every)
         cycles = batch.run(0, measured, tell)
-    parts = zip(shown.history, shown.history.values(), later.history.values())
-    history = {name: np.concatenate([early, late])[:, 0] for name, early, late in parts}
-    return history, cycles, shown.frames[0][: SHOWN * FRAMES]
+    history = {k: np.concatenate([v, late.history[k]])[:, 0] for k, v in early.history.items()}
+    return history, cycles, early.frames[0][: SHOWN * FRAMES]
 
 
 def figures_of(cycles, empty, o):

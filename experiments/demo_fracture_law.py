@@ -57,7 +57,7 @@ class Bench:
     def __init__(self, simulation, steps):
         self.state, self.steps = simulation.state, steps
         self.drives = [one for one in simulation.tables.supports if one.name == "prescribed_motion"]
-        self.plans = law.plans(steps, STEP)
+        self.plans = [law.velocities(corners, steps, STEP) for corners in law.ways()]
         self.moved, self.given = [], []
 
     def observe(self, view):
@@ -72,26 +72,26 @@ class Bench:
 
 
 def measure(steps):
-    """Drive the bench; returns the measured curves and the Report of the run."""
+    """Drive the bench; returns the measured curves and the Result of the run."""
     with ProgressBar("bench") as bar:
         simulation = Simulation(bench(), Uniform(STEP))
         cells = Bench(simulation, steps)
         looks = {"samples": 1, "progress": bar, "observers": [cells]}
         result = run_simulation(simulation, until=(steps + 1) * STEP, **looks)
     traction = -np.diff(cells.given, axis=0) / (group_area(single(EDGE), "base") * STEP)
-    made = law.Measured(np.array(cells.moved[:-1]), traction, round(result.broken_time[0] / STEP))
-    return made, result.report
+    return law.curves_of(np.array(cells.moved[:-1]), traction), result
 
 
 def run(options):
     """Measure all specimens, compare with the law, picture."""
     steps = options.steps or (QUICK if options.quick else FULL)
     folder = output_folder(options.out)
-    made, report = measure(steps)
-    rows = law.comparison(made)
-    law.write(made, pair(EDGE).points, folder)
+    curves, result = measure(steps)
+    rows = law.comparison(curves, round(result.broken_time[0] / STEP))
+    law.write(curves, pair(EDGE).points, folder)
     show_rows(rows, law.TABLE)
-    finish(options, NAME, law.figures_of(rows), [report], caption=law.caption(rows, steps))
+    caption = law.caption(rows, steps)
+    finish(options, NAME, law.figures_of(rows), [result.report], caption=caption)
 
 
 if __name__ == "__main__":

@@ -2,11 +2,14 @@
 
 from ca_damper.plot.animation import moving_picture
 from ca_damper.plot.box import Box, DrawnBox, frame_panel
+from ca_damper.plot.hanging import Hanging, film_hanging
 from ca_damper.plot.response import picture_hysteresis, picture_measures, picture_responses
 
 __all__ = [
     "Box",
     "DrawnBox",
+    "Hanging",
+    "film_hanging",
     "frame_panel",
     "moving_picture",
     "picture_hysteresis",
