@@ -166,3 +166,21 @@ def peak(frequency_ratio: ArrayLike, response: ArrayLike) -> tuple[float, float]
     top = 0.5 * (x[k - 1] + x[k] - left / bend)
     height = y[k] + (top - x[k]) * (left + bend * (top - x[k - 1]))
     return float(top), float(height)
+
+
+def curve_distance(curve: ArrayLike, reference: ArrayLike) -> float:
+    """Root mean square of the difference of two response curves, as a share of the second's peak.
+
+    Both at the same frequencies, one value each.
+    """
+    true = np.asarray(reference)
+    return float(np.sqrt(((np.asarray(curve) - true) ** 2).mean()) / np.max(true))
+
+
+def seed_variance(responses: ArrayLike) -> float:
+    """Variance from seed to seed as a share of the peak squared, mean over the frequencies.
+
+    responses: (frequencies, seeds); the peak is that of the mean over the seeds.
+    """
+    by_seed = np.asarray(responses)
+    return float(by_seed.var(axis=1, ddof=1).mean() / by_seed.mean(axis=1).max() ** 2)

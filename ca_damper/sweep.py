@@ -5,11 +5,13 @@ takes up its new speed at once.
 """
 
 from dataclasses import dataclass
+from typing import Optional
 
 import numpy as np
 
 from ca_damper.checks import check_run
 from ca_damper.progress import Stages
+from ca_damper.report import Report
 from ca_damper.response import UNITS, Grid, Response
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.progress.progress_bar import reporting
@@ -18,10 +20,14 @@ from taichi_dem.kit.validation import AUTO
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """Responses on the way up and on the way down, both with ascending ratios."""
+    """Responses on the way up and on the way down, both with ascending ratios.
+
+    report: what was done on both and what it cost.
+    """
 
     up: Response
     down: Response
+    report: Optional[Report] = None
 
     def __repr__(self):
         return in_brief(self, self.up.axes_in_words(), "up and down")
@@ -69,7 +75,7 @@ def sweep_up_and_down(
                 cycles = batch.run(transient_cycles, measured_cycles, tell)
                 way.record(k, batch, cycles)
             writer.save()
-    return Sweep(way.up.response(), way.down.response())
+    return Sweep(way.up.response(), way.down.response(), batch.report())
 
 
 class _Way:

@@ -2,25 +2,14 @@
 
 import numpy as np
 
-from taichi_dem import (
-    CONCRETE,
-    PAPER_BLOCK,
-    Every,
-    ImplicitDashpots,
-    Multirate,
-    Scene,
-    StepControl,
-    Uniform,
-    effects,
-    quality_report,
-    read_mesh,
-)
-from taichi_dem.kit.study import parser
+from taichi_dem import CONCRETE, PAPER_BLOCK, Scene, effects, quality_report, read_mesh
+from taichi_dem.kit.study import add_checkpoints, add_settings, checkpoint_of, parser
+from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
+from taichi_dem.observers import Every
+from taichi_dem.stability.step_control import StepControl
 
 #: Drivers of a blast, the first the default.
 BLAST_DRIVERS = ("auto", "resident", "parallel")
-#: Metres that a body may go in a second's worth of the paper's largest step: l = 1e-7 m at 1e-8 s.
-WAY_PER_STEP = 10.0
 EFFECTS = {
     "bond_damping": effects.BondDamping,
     "softening": effects.Softening,
@@ -32,11 +21,25 @@ EFFECTS = {
 }
 
 
-def blast_parser(name, description, drivers=BLAST_DRIVERS):
-    """Parser of an experiment on the paper's block or another mesh."""
+def blast_parser(
+    name, description, drivers=BLAST_DRIVERS, settings=(), mesh=PAPER_BLOCK, saves=False
+):
+    """Parser of an experiment on a mesh; settings: as of ``add_settings``.
+
+    saves: whether its run is written whole, and saves itself on the way.
+    """
     made = parser(name, description, drivers)
-    made.add_argument("--mesh", default=PAPER_BLOCK, help="tetrahedra with a face group hole")
-    return made
+    made.add_argument("--mesh", default=mesh, help="tetrahedra with a face group hole")
+    if saves:
+        add_checkpoints(made)
+    return add_settings(made, dict(settings))
+
+
+def run_options(options):
+    """Those arguments of ``simulate`` that options give."""
+    names = ("until", "driver", "samples", "frames")
+    kept = {"output": options.out, **checkpoint_of(options)} if "resume" in options else {}
+    return {**kept, **{name: value for name, value in vars(options).items() if name in names}}
 
 
 class Costs:
@@ -61,14 +64,14 @@ def level_shares(levels):
     return np.array([np.bincount(level, minlength=count) / len(level) for level in levels])
 
 
+def level_columns(shares):
+    """Columns of a table, by name, of what ``level_shares`` gave."""
+    return {f"level_{k}": share for k, share in enumerate(shares.T)}
+
+
 def paper_effects():
     """All effects of the paper's scene."""
     return [make() for name, make in EFFECTS.items() if name != "gravity"]
-
-
-def print_quality(scene):
-    """Print the worst of a scene's mesh."""
-    print("\n".join(str(quality_report(scene.mesh, scene.material)).splitlines()[:7]))
 
 
 def paper_scene(mesh=PAPER_BLOCK):
@@ -76,33 +79,24 @@ def paper_scene(mesh=PAPER_BLOCK):
     return Scene(read_mesh(mesh), CONCRETE, paper_effects())
 
 
-def paper_uniform(step):
-    """The paper's rule with one step for all; step: its largest [s]."""
-    return Uniform(step, WAY_PER_STEP * step)
+def print_quality(scene):
+    """Print the worst of a scene's mesh."""
+    print("\n".join(str(quality_report(scene.mesh, scene.material)).splitlines()[:7]))
 
 
-def paper_multirate(step):
-    """The paper's rule with a step for each."""
-    return Multirate(step, WAY_PER_STEP * step)
-
-
-def multirate_controlled(step):
+def controlled(step):
     """Steps for each by what limits them, down to an eighth, with dashpots limited to that."""
     # With the usual 0.25 the hole is 0.24 % off at 5e-4 s, with 0.2 less than 0.2 %.
     control = StepControl(safety=0.2, dashpot_floor=step / 8.0)
     return Multirate(step, 1e-5, control=control, dashpot="limited")
 
 
-def explicit_limited(step):
-    """One fixed step for all, dashpots limited to what it bears."""
-    return Uniform(step, dashpot="limited")
-
-
-#: Method by name: how it is made of a step [s], and the step that it is used with.
+#: Method by name: how it is made of a step [s], and the step that it is used with. In those of the
+#: paper a body may go l = 1e-7 m in its largest step of 1e-8 s, and in others in proportion.
 METHODS = {
-    "paper_uniform": (paper_uniform, 1e-8),
-    "paper_multirate": (paper_multirate, 1e-8),
-    "multirate_controlled": (multirate_controlled, 8e-8),
-    "explicit_limited": (explicit_limited, 2.5e-8),
+    "paper_uniform": (lambda step: Uniform(step, 10.0 * step), 1e-8),
+    "paper_multirate": (lambda step: Multirate(step, 10.0 * step), 1e-8),
+    "multirate_controlled": (controlled, 8e-8),
+    "explicit_limited": (lambda step: Uniform(step, dashpot="limited"), 2.5e-8),
     "implicit": (ImplicitDashpots, 4e-7),
 }

@@ -1,21 +1,28 @@
 """What a second thread, or a device, does for whole steps of a large block."""
 
-from pathlib import Path
+import time
 
 import numpy as np
 
-from taichi_dem import InputError
-from taichi_dem.kit.study import ask_worker
+from _blast import METHODS, paper_effects
+from taichi_dem import CONCRETE, InputError, Scene, Simulation, effects, read_mesh
+from taichi_dem.kit.checkpoint import digest
+from taichi_dem.kit.field_memory import FieldMemory
+from taichi_dem.kit.study import call_in_process
+from taichi_dem.kit.study.machine import busiest_seconds, memory_bandwidth, thread_seconds
+from taichi_dem.mesh.reorder import in_space_order
+from taichi_dem.mesh.shapes import bar
 
 #: How often runs on one and on two threads take turns.
 ROUNDS = 2
+#: Length and width of the bar that stands for a block [m].
+BAR = (2.0, 1.0)
 
 
-def thread_job(mesh, cells, method, threads, steps, repeats, arch="cpu"):
-    """What ``_scaling_worker`` says of whole steps by the parallel driver."""
-    job = {"mesh": mesh, "cells": cells, "method": method, "threads": threads, "arch": arch}
-    job.update(driver="parallel", warm=2, steps=steps, repeats=repeats)
-    return ask_worker(Path(__file__).with_name("_scaling_worker.py"), job, f"on {threads} threads")
+def thread_job(mesh, cells, method, threads, steps, repeats):
+    """What ``whole_steps`` measures in a process of its own: threads cannot change within one."""
+    job = {"mesh": mesh, "cells": cells, "method": method, "steps": steps, "repeats": repeats}
+    return call_in_process(whole_steps, threads=threads, title=f"on {threads} threads", **job)
 
 
 def thread_gain(mesh, cells, method, steps, rounds, repeats):
@@ -25,20 +32,61 @@ def thread_gain(mesh, cells, method, steps, rounds, repeats):
     same of what the busiest thread took of the cores, None where the system does not tell. seconds:
     those of a step on two threads.
     """
-    times = {name: {1: [], 2: []} for name in ("seconds", "busy")}
-    digests = set()
-    for _ in range(rounds):
-        for threads in (1, 2):
-            found = thread_job(mesh, cells, method, threads, steps, repeats)
-            digests.add(found["digest"])
-            for name, by_threads in times.items():
-                by_threads[threads] += [value for value in found[name] if value is not None]
-    if len(digests) > 1:
+    turns = (1, 2) * rounds
+    found = [thread_job(mesh, cells, method, threads, steps, repeats) for threads in turns]
+    if len({one["digest"] for one in found}) > 1:
         raise InputError("one thread and two threads must give the same bits, and do not")
-    busy = _gain(times["busy"]) if times["busy"][2] else None
-    kept = {key: found[key] for key in ("bodies", "bytes", "bandwidth")}
-    return {**kept, "gain": _gain(times["seconds"]), "busy": busy, "seconds": times["seconds"][2]}
+
+    def least(name, first):
+        return min(value for one in found[first::2] for value in one[name])
+
+    told = None not in found[0]["busy"]
+    return {
+        **{key: found[-1][key] for key in ("bodies", "bytes", "bandwidth")},
+        "gain": least("seconds", 0) / least("seconds", 1),
+        "busy": least("busy", 0) / least("busy", 1) if told else None,
+        "seconds": [value for one in found[1::2] for value in one["seconds"]],
+    }
 
 
-def _gain(times):
-    return float(np.min(times[1]) / np.min(times[2]))
+def scene_of(mesh, cells):
+    """The paper's effects on a mesh file, or on a bar of some boxes under the same gas."""
+    if mesh:
+        return Scene(in_space_order(read_mesh(mesh)), CONCRETE, paper_effects())
+    blown = [e for e in paper_effects() if e.name != "gas_pressure"]
+    gas = effects.GasPressure(group="left")
+    return Scene(in_space_order(bar(*BAR, cells)), CONCRETE, [*blown, gas])
+
+
+def whole_steps(mesh, cells, method, steps, repeats):
+    """Seconds of whole steps by the parallel driver, two of them to warm up; for a JSON file.
+
+    seconds: of a step, one a repeat. busy: the same of what the busiest thread took of the cores.
+    digest: of where bodies end.
+    """
+    make, step = METHODS[method]
+    simulation = Simulation(scene_of(mesh, cells), make(step), "parallel")
+    simulation.advance_to(2)
+    seconds, busy = [], []
+    for k in range(repeats):
+        started, before = time.perf_counter(), thread_seconds()
+        simulation.advance_to(2 + (k + 1) * steps)
+        seconds.append((time.perf_counter() - started) / steps)
+        spent = busiest_seconds(before, thread_seconds())
+        busy.append(None if spent is None else spent / steps)
+    motion = simulation.state.motion()
+    return {
+        "seconds": seconds,
+        "busy": busy,
+        "bodies": simulation.model.body_count,
+        "bytes": bytes_a_step(simulation.loan.engine),
+        "bandwidth": memory_bandwidth(),
+        "digest": digest(*(np.ascontiguousarray(motion[key]) for key in ("position", "velocity"))),
+    }
+
+
+def bytes_a_step(engine):
+    """Bytes that a step of all bodies must move at least: the model read, the state written too."""
+    kept = FieldMemory(engine.tables, "constant"), FieldMemory(engine.state, "saved")
+    read, written = (sum(array.nbytes for array in part.read().values()) for part in kept)
+    return read + 2 * written

@@ -17,128 +17,89 @@ all that is plotted, summary.json and a ParaView series (paraview/blast_fracture
 results/blast_fracture/.
 """
 
-import os
 import sys
+from functools import partial
 
 import numpy as np
 
-from _blast import (
-    EFFECTS,
-    blast_parser,
-    explicit_limited,
-    level_shares,
-    multirate_controlled,
-    print_quality,
-)
-from taichi_dem import (
-    CONCRETE,
-    ImplicitDashpots,
-    InputError,
-    Multirate,
-    Scene,
-    SimulationDiverged,
-    Uniform,
-    plot,
-    read_mesh,
-    simulate,
-)
+from _blast import EFFECTS, blast_parser, level_columns, level_shares, print_quality, run_options
+from _blast import METHODS as BLAST_METHODS
+from taichi_dem import CONCRETE, InputError, Scene, SimulationDiverged, plot, read_mesh, simulate
+from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv
-from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.kit.study import (
-    add_checkpoints,
-    checkpoint_of,
-    figure,
-    finish,
-    main,
-    number,
-    take_defaults,
-    whole,
-)
+from taichi_dem.methods import Multirate, Uniform
+from taichi_dem.output.record import write_bodies
 
 NAME = "blast_fracture"
-#: Method by name: how it is made of the largest step and the displacement limit l; its largest step
-#: [s], l [m].
-METHODS = {
-    "implicit": (lambda dt0, distance: ImplicitDashpots(dt0), 4e-7, None),
-    "limited": (lambda dt0, distance: explicit_limited(dt0), 2.5e-8, None),
-    "controlled": (lambda dt0, distance: multirate_controlled(dt0), 8e-8, None),
-    "multirate": (lambda dt0, distance: Multirate(dt0, distance), 1e-8, 1e-7),
-    "multirate_drifted": (lambda dt0, distance: Multirate(dt0, distance, "drifted"), 1e-8, 1e-7),
-    "uniform": (lambda dt0, distance: Uniform(dt0, distance), 1e-8, 1e-7),
-    "fixed": (lambda dt0, distance: Uniform(dt0), 1e-8, None),
+#: Methods of the paper, made of the largest step dt0 [s] and the displacement limit l [m].
+PAPER_METHODS = {
+    "multirate": Multirate,
+    "multirate_drifted": partial(Multirate, neighbour="drifted"),
+    "uniform": Uniform,
 }
-DEFAULT = [name for name in EFFECTS if name != "gravity"]
-QUICK = {"until": 8e-5, "frames": 6, "samples": 20}
-FULL = {"until": 5e-4, "frames": 40, "samples": 200}
+#: The others by name: how they are made of their largest step, and that step [s].
+METHODS = {
+    "implicit": BLAST_METHODS["implicit"],
+    "limited": BLAST_METHODS["explicit_limited"],
+    "controlled": BLAST_METHODS["multirate_controlled"],
+    "fixed": (Uniform, 1e-8),
+}
+PAPER_DT0, PAPER_L = 1e-8, 1e-7
+SETTINGS = {
+    "dt0": (None, None, study.number(0, 1), "largest step [s], by method"),
+    "l": (None, None, study.number(0, 1), "the paper's way of a body in a step [m], 1e-7"),
+    "without": ("", "", str, "effects to leave out, by comma"),
+    "until": (5e-4, 8e-5, study.number(0, 1), "simulated time [s], 5e-4"),
+    "frames": (40, 6, study.whole(1, 10000), "snapshots, 40"),
+    "samples": (200, 20, study.whole(1, 1000000), "rows of the time series, 200"),
+}
 
 
 def options_parser():
     """Options of this experiment."""
-    made = blast_parser(NAME, __doc__)
-    made.add_argument("--until", type=number(0, 1), help="simulated time [s], 5e-4")
-    made.add_argument("--method", choices=METHODS, default="implicit")
-    made.add_argument("--dt0", type=number(0, 1), help="largest step [s], by method")
-    made.add_argument(
-        "--l", type=number(0, 1), help="the paper's way of a body in a step [m], 1e-7"
-    )
+    made = blast_parser(NAME, __doc__, settings=SETTINGS, saves=True)
+    made.add_argument("--method", choices=(*METHODS, *PAPER_METHODS), default="implicit")
     made.add_argument("--with", dest="added", default="", help="effects to add, by comma")
-    made.add_argument("--without", default="", help="effects to leave out, by comma")
-    made.add_argument("--frames", type=whole(1, 10000), help="snapshots, 40")
-    made.add_argument("--samples", type=whole(1, 1000000), help="rows of the time series, 200")
-    add_checkpoints(made)
     return made
 
 
 def chosen_effects(added, without):
-    """Names of the effects to run with; InputError for a name that is none."""
-    lists = [[name for name in text.split(",") if name] for text in (added, without)]
-    for name in (*lists[0], *lists[1]):
+    """All effects but gravity, with those named in one list and without those of the other."""
+    added, without = ([name for name in text.split(",") if name] for text in (added, without))
+    for name in (*added, *without):
         if name not in EFFECTS:
             raise InputError(f"effect must be one of {', '.join(EFFECTS)}, got {name!r}")
-    return [name for name in (*DEFAULT, *lists[0]) if name not in lists[1]]
+    names = (name for name in EFFECTS if name != "gravity" or name in added)
+    return [EFFECTS[name]() for name in names if name not in without]
 
 
 def chosen_method(name, dt0, distance):
     """Method of a name with its own step and way, or those asked for."""
-    make, own_dt0, own_distance = METHODS[name]
-    if distance is not None and own_distance is None:
-        paper = ", ".join(key for key, (_, _, way) in METHODS.items() if way is not None)
+    if name in PAPER_METHODS:
+        return PAPER_METHODS[name](dt0 or PAPER_DT0, distance or PAPER_L)
+    if distance is not None:
+        paper = ", ".join(PAPER_METHODS)
         raise InputError(f"l must be left out unless method is one of {paper}, got {distance:g}")
-    return make(dt0 or own_dt0, distance or own_distance)
-
-
-def build_scene(options):
-    """Mesh, concrete and the chosen effects."""
-    names = dict.fromkeys(chosen_effects(options.added, options.without))
-    return Scene(read_mesh(options.mesh), CONCRETE, [EFFECTS[name]() for name in names])
+    make, step = METHODS[name]
+    return make(dt0 or step)
 
 
 def run(options):
     """Run, picture, print."""
-    take_defaults(options, FULL, QUICK)
+    study.take_settings(options, SETTINGS)
     method = chosen_method(options.method, options.dt0, options.l)
-    scene = build_scene(options)
+    acting = chosen_effects(options.added, options.without)
+    scene = Scene(read_mesh(options.mesh), CONCRETE, acting)
     print_quality(scene)
     try:
-        with ProgressBar("blasting") as progress:
-            result = simulate(
-                scene,
-                method=method,
-                until=options.until,
-                driver=options.driver,
-                samples=options.samples,
-                frames=options.frames,
-                progress=progress,
-                output=options.out,
-                **checkpoint_of(options),
-            )
+        result = simulate(scene, method=method, title="blasting", **run_options(options))
     except SimulationDiverged as error:
         if error.result.frames:
             picture(error.result, options.out)
         raise
     picture(result, options.out)
     print(f"\n{result.report}\n")
-    finish(options, NAME, figures_of(result), [result.report], see="cracks.png")
+    study.finish(options, NAME, figures_of(result), [result.report], see="cracks.png")
 
 
 def figures_of(result):
@@ -146,9 +107,14 @@ def figures_of(result):
     history, report = result.history, result.report
     paper_mm = 1.93 if abs(report.until_s - 5e-4) < 1e-9 else None
     per_ms = report.run_cpu_seconds / (1e3 * report.until_s)
-    found = {
-        "hole_radial_displacement_mm": (history.get("hole_radial_displacement_mm"), "mm"),
-        "monitor_displacement_mm": (history.get("monitor_displacement_mm"), "mm", paper_mm),
+    # A scene without a hole has no displacement of it.
+    moved = {
+        f"{place}_displacement_mm": (float(history[f"{place}_displacement_mm"][-1]), "mm", paper)
+        for place, paper in (("hole_radial", None), ("monitor", paper_mm))
+        if f"{place}_displacement_mm" in history
+    }
+    return {
+        **moved,
         "broken_faces": (report.broken_faces, "1"),
         "ledger_residual_fraction": (report.energy_residual_fraction, "1"),
         "linear_momentum_error": (report.linear_momentum_error, "1"),
@@ -157,56 +123,29 @@ def figures_of(result):
         "contact_evaluations": (report.contact_evaluations, "1"),
         "seconds_per_simulated_ms": (per_ms, "s", 2702 * 60 / 0.5),
     }
-    # Columns by their last row; a scene without a hole has none.
-    found = {
-        k: (float(v[-1]) if isinstance(v, np.ndarray) else v, *r) for k, (v, *r) in found.items()
-    }
-    return {name: figure(*one) for name, one in found.items() if one[0] is not None}
 
 
 def picture(result, folder):
     """Draw and write everything that is plotted."""
-
-    def at(name):
-        return os.path.join(folder, name)
-
-    _write_bodies(result, at("bodies.csv"))
-    gas = [load for load in result.model.loads if load.name == "gas_pressure"]
-    if gas:
-        time_s = np.linspace(0.0, 1.1 * (gas[0].decay_ratio + 1.0) * gas[0].rise, 400)
-        pressure = gas[0].pressure_at(time_s)
-        plot.plot_pressure(at("pressure.png"), time_s, pressure, result.history["time_s"][-1])
+    at = study.output_paths(folder)
+    frames, model, history = result.frames, result.model, result.history
+    dt0, broken_time = result.method.dt0, result.broken_time
+    write_bodies(at("bodies.csv"), frames)
+    for gas in (load for load in model.loads if load.name == "gas_pressure"):
+        time_s = np.linspace(0.0, 1.1 * gas.duration, 400)
+        pressure = gas.pressure_at(time_s)
+        plot.plot_pressure(at("pressure.png"), time_s, pressure, history["time_s"][-1])
         write_csv(at("pressure.csv"), {"time_s": time_s, "pressure_pa": pressure})
-    frames, model, dt0 = result.frames, result.model, result.method.dt0
-    plot.plot_history(at("history.png"), result.history)
-    plot.plot_energy(at("energy.png"), result.history)
-    plot.plot_cracks(at("cracks.png"), model, frames[-1], result.broken_time, magnify=3.0)
+    plot.plot_history(at("history.png"), history)
+    plot.plot_energy(at("energy.png"), history)
+    plot.plot_cracks(at("cracks.png"), model, frames[-1], broken_time, magnify=3.0)
     shares, time_s = level_shares([f.level for f in frames]), [frame.time_s for frame in frames]
     if shares.shape[1] > 1:
-        picked = np.unique(np.linspace(0, len(frames) - 1, 7).round().astype(int))
-        picked = [frames[k] for k in picked]
-        plot.plot_steps(at("steps.png"), model, picked[1:] or picked, dt0, result.broken_time)
+        plot.plot_steps(at("steps.png"), model, frames[1:] or frames, dt0, broken_time)
         plot.plot_levels(at("levels.png"), time_s, shares, dt0)
-        columns = {f"level_{k}": column for k, column in enumerate(shares.T)}
-        write_csv(at("levels.csv"), {"time_s": time_s, **columns})
-    plot.save_animation(at("blast.gif"), model, frames, result.broken_time, magnify=3.0)
-
-
-def _write_bodies(result, path):
-    frames, bodies = result.frames, result.model.body_count
-    write_csv(
-        path,
-        {
-            "time_s": np.repeat([frame.time_s for frame in frames], bodies),
-            "body": np.tile(np.arange(bodies), len(frames)),
-            "level": np.concatenate([frame.level for frame in frames]),
-            "speed_m_s": np.concatenate([frame.speed for frame in frames]),
-            "displacement_m": np.linalg.norm(
-                np.concatenate([frame.displacement for frame in frames]), axis=1
-            ),
-        },
-    )
+        write_csv(at("levels.csv"), {"time_s": time_s, **level_columns(shares)})
+    plot.save_animation(at("blast.gif"), model, frames, broken_time, magnify=3.0)
 
 
 if __name__ == "__main__":
-    sys.exit(main(run, options_parser()))
+    sys.exit(study.main(run, options_parser()))

@@ -16,109 +16,62 @@ Times are CPU seconds of stepping alone. Writes methods.png, the table as CSV, t
 method and summary.json to results/blast_methods/.
 """
 
-import os
 import sys
+from functools import partial
+from operator import itemgetter
+from types import SimpleNamespace
 
 import numpy as np
 
-from _blast import METHODS, Costs, blast_parser, paper_scene
-from taichi_dem import (
-    ImplicitDashpots,
-    InputError,
-    ProgressBar,
-    SimulationDiverged,
-    plot,
-    simulate,
-)
-from taichi_dem.kit.files import output_folder, write_csv
-from taichi_dem.kit.study import (
-    figure,
-    figures_from,
-    finish,
-    main,
-    number,
-    several,
-    show_rows,
-    take_defaults,
-    whole,
-    write_rows,
-)
+from _blast import METHODS, Costs, blast_parser, paper_scene, run_options
+from taichi_dem import ImplicitDashpots, ProgressBar, SimulationDiverged, plot, simulate
+from taichi_dem.kit import study
+from taichi_dem.kit.files import write_csv
+from taichi_dem.kit.validation import choice
 
 NAME = "blast_methods"
 REFERENCE = ImplicitDashpots(2.5e-8, sweeps=(6, 40))
-QUICK = {"until": 1e-5, "stable_until": 1e-5, "samples": 10, "doublings": 0}
-FULL = {"until": 5e-4, "stable_until": 1e-4, "samples": 100, "doublings": 8}
+named = partial(choice, "method", allowed=METHODS)
+SETTINGS = {
+    "methods": ([*METHODS], [*METHODS], study.several(named), "by comma; all"),
+    "until": (5e-4, 1e-5, study.number(0, 1), "simulated time [s], 5e-4"),
+    "stable_until": (1e-4, 1e-5, study.number(0, 1), "for the stable step [s], 1e-4"),
+    "samples": (100, 10, study.whole(1, 100000), "rows of the time series, 100"),
+    "doublings": (8, 0, study.whole(0, 20), "tried for the largest stable step, 8"),
+}
 #: Error of the displacement beyond which a run counts as unstable though no body ran away.
 USABLE = 0.1
 MOVED = "hole_radial_displacement_mm"
-UNITS = {
-    "seconds": "s",
-    "displacement_error": "1",
-    "broken_faces": "1",
-    "ledger_residual_fraction": "1",
-    "largest_stable_step_s": "s",
-    "evaluations": "1",
-}
-TABLE = {
-    "method": ("method", ""),
-    "step [s]": ("step_s", ".2g"),
-    "smallest": ("smallest_step_s", ".2g"),
-    "stable to": ("largest_stable_step_s", ".2g"),
-    "CPU [s]": ("seconds", ".3g"),
-    "evaluations": ("evaluations", ","),
-    "hole [mm]": ("displacement_mm", ".4f"),
-    "error": ("displacement_error", ".2g%"),
-    "faces": ("broken_faces", ""),
-    "residual": ("ledger_residual_fraction", ".2g%"),
-    "most bound by": ("bound_by", ""),
-}
-
-
-def method_name(text):
-    """Type of an option that names a method."""
-    if text not in METHODS:
-        raise InputError(f"method must be one of {', '.join(METHODS)}, got {text!r}")
-    return text
-
-
-def options_parser():
-    """Options of this experiment."""
-    made = blast_parser(NAME, __doc__)
-    made.add_argument("--until", type=number(0, 1), help="simulated time [s], 5e-4")
-    made.add_argument("--stable-until", type=number(0, 1), help="for the stable step [s], 1e-4")
-    made.add_argument("--samples", type=whole(1, 100000), help="rows of the time series, 100")
-    made.add_argument("--doublings", type=whole(0, 20), help="tried for the largest stable step, 8")
-    made.add_argument(
-        "--methods", type=several(method_name), default=list(METHODS), help="by comma; all"
-    )
-    return made
+TABLE = study.Table(
+    method=("name", "method"),
+    step_s=("step", "step [s]", ".2g"),
+    smallest_step_s=(lambda one: float(one.series["smallest_step_s"].min()), "smallest", ".2g"),
+    seconds=("report.run_cpu_seconds", "CPU [s]", ".3g", "s"),
+    evaluations=("report.contact_evaluations", "evaluations", ",", "1"),
+    displacement_mm=("moved", "hole [mm]", ".4f"),
+    displacement_error=(lambda one: abs(one.moved / one.wanted - 1.0), "error", ".2g%", "1"),
+    broken_faces=("report.broken_faces", "faces", "", "1"),
+    ledger_residual_fraction=("report.energy_residual_fraction", "residual", ".2g%", "1"),
+    largest_stable_step_s=("stable", "stable to", ".2g", "s"),
+    bound_by=(lambda one: max(one.report.bound_by.items(), key=itemgetter(1))[0], "most bound by"),
+)
+options_parser = partial(blast_parser, NAME, __doc__, settings=SETTINGS)
 
 
 def follow(scene, method, options, name):
     """Report and time series of one run; writes the series."""
     costs = Costs()
-    with ProgressBar(name) as bar:
-        result = simulate(
-            scene,
-            method=method,
-            until=options.until,
-            driver=options.driver,
-            samples=options.samples,
-            progress=bar,
-            observers=[costs],
-        )
+    result = simulate(scene, method=method, title=name, observers=[costs], **run_options(options))
     series = {**result.history, **costs.columns}
-    write_csv(os.path.join(options.out, f"history_{name}.csv"), series)
+    write_csv(f"{options.out}/history_{name}.csv", series)
     return result.report, series
 
 
 def serves(scene, method, exact, options):
     """Whether a method reaches the time for stability, undiverged and near the reference."""
-    until, driver = options.stable_until, options.driver
+    short = {**run_options(options), "until": options.stable_until, "samples": 1}
     try:
-        found = simulate(
-            scene, method=method, until=until, driver=driver, samples=1, progress=None
-        ).history
+        found = simulate(scene, method=method, progress=None, **short).history
     except SimulationDiverged:
         return False
     wanted = np.interp(found["time_s"][-1], exact["time_s"], exact[MOVED])
@@ -136,54 +89,36 @@ def largest_stable_step(scene, make, step, exact, options):
     return step
 
 
-def row_of(name, report, series, wanted, stable, step):
-    """One row of the table; wanted: displacement of the reference [mm]."""
-    moved = float(series[MOVED][-1])
-    return {
-        "method": name,
-        "step_s": step,
-        "smallest_step_s": float(np.min(series["smallest_step_s"])),
-        "seconds": report.run_cpu_seconds,
-        "evaluations": report.contact_evaluations,
-        "displacement_mm": moved,
-        "displacement_error": abs(moved / wanted - 1.0),
-        "broken_faces": report.broken_faces,
-        "ledger_residual_fraction": report.energy_residual_fraction,
-        "largest_stable_step_s": stable,
-        "bound_by": max(report.bound_by, key=report.bound_by.get),
-    }
-
-
 def run(options):
     """Run the reference and all methods, compare, picture."""
-    take_defaults(options, FULL, QUICK)
-    scene = paper_scene(options.mesh)
-    output_folder(options.out)
+    study.take_settings(options, SETTINGS)
+    scene, at = paper_scene(options.mesh), study.output_paths(options.out)
     best, exact = follow(scene, REFERENCE, options, "reference")
-    wanted = float(exact[MOVED][-1])
-    rows, reports, histories = [], [best], {"reference": exact}
+    wanted, runs, histories = float(exact[MOVED][-1]), [], {"reference": exact}
     for name in options.methods:
         make, step = METHODS[name]
-        report, histories[name] = follow(scene, make(step), options, name)
+        report, series = follow(scene, make(step), options, name)
         stable = largest_stable_step(scene, make, step, exact, options)
-        rows.append(row_of(name, report, histories[name], wanted, stable, step))
-        reports.append(report)
-    write_rows(os.path.join(options.out, "methods.csv"), rows)
-    plot.plot_methods(os.path.join(options.out, "methods.png"), histories, MOVED)
+        histories[name], made = series, {"name": name, "step": step, "stable": stable}
+        made.update(moved=float(series[MOVED][-1]), wanted=wanted, report=report, series=series)
+        runs.append(SimpleNamespace(**made))
+    rows = TABLE.rows(runs)
+    study.write_rows(at("methods.csv"), rows)
+    plot.plot_methods(at("methods.png"), histories, MOVED)
     figures = {
-        "reference_displacement_mm": figure(wanted, "mm"),
-        "reference_broken_faces": figure(best.broken_faces, "1"),
-        "reference_seconds": figure(best.run_cpu_seconds, "s"),
+        "reference_displacement_mm": (wanted, "mm"),
+        "reference_broken_faces": (best.broken_faces, "1"),
+        "reference_seconds": (best.run_cpu_seconds, "s"),
     }
     for row in rows:
-        figures.update(figures_from(row, UNITS, f"{{}}_{row['method']}"))
+        figures.update(TABLE.figures(row, "{key}_{method}"))
     print(
         f"Reference: {REFERENCE.name} at {REFERENCE.dt:g} s, {best.run_cpu_seconds:.3g} s of CPU: "
         f"hole {wanted:.4f} mm, {best.broken_faces} faces\n"
     )
-    show_rows(rows, TABLE)
-    finish(options, NAME, figures, reports)
+    TABLE.show(rows)
+    study.finish(options, NAME, figures, [best, *(one.report for one in runs)])
 
 
 if __name__ == "__main__":
-    sys.exit(main(run, options_parser()))
+    sys.exit(study.main(run, options_parser()))

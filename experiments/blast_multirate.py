@@ -13,75 +13,61 @@ Times are CPU seconds of stepping alone, without compiling. Writes pictures, CSV
 plotted and summary.json to results/blast_multirate/.
 """
 
-import math
-import os
 import sys
+from functools import partial
+from types import SimpleNamespace
 
-from _blast import Costs, blast_parser, level_shares, paper_scene
-from taichi_dem import (
-    At,
-    InputError,
-    Multirate,
-    ProgressBar,
-    Uniform,
-    plot,
-    simulate,
-)
-from taichi_dem.kit.files import output_folder, write_csv
+from _blast import Costs, blast_parser, level_columns, level_shares, paper_scene, run_options
+from taichi_dem import At, InputError, Multirate, Uniform, plot, simulate
+from taichi_dem.kit import study
+from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.plot_style import styles_of
-from taichi_dem.kit.study import (
-    Timing,
-    figure,
-    finish,
-    main,
-    number,
-    show_rows,
-    take_defaults,
-    whole,
-    write_rows,
-)
 from taichi_dem.output.hole_monitor import HoleMonitor
 
 NAME = "blast_multirate"
 METHODS = {
     "uniform": Uniform,
     "multirate_held": Multirate,
-    "multirate_drifted": lambda dt0, distance: Multirate(dt0, distance, "drifted"),
+    "multirate_drifted": partial(Multirate, neighbour="drifted"),
 }
-QUICK = {"l": 1e-7, "until": 6e-5, "repeats": 1, "samples": 12}
-FULL = {"l": 1e-7, "until": 5e-4, "repeats": 1, "samples": 100}
-EARLY, QUICK_EARLY = 5e-5, 2e-5
-#: The paper's minutes at its two instants [s], and its displacements [mm] at the second.
-PAPER_MINUTES = {
-    "uniform": {5e-5: 16, 5e-4: 3897},
-    "multirate_held": {5e-5: 14, 5e-4: 2702},
+SETTINGS = {
+    "l": (1e-7, 1e-7, study.number(0, 1), "largest way of a body in a step [m], 1e-7"),
+    "dt0": (1e-8, 1e-8, study.number(0, 1), "largest step [s], 1e-8"),
+    "early": (5e-5, 2e-5, study.number(0, 1), "first instant compared [s], 5e-5"),
+    "until": (5e-4, 6e-5, study.number(0, 1), "second instant compared [s], 5e-4"),
+    "samples": (100, 12, study.whole(1, 100000), "rows of the time series, 100"),
+    "repeats": (1, 1, study.whole(1, 100), "runs of every method, 1"),
 }
-PAPER_MM = {"uniform": {5e-4: 2.16}, "multirate_held": {5e-4: 1.93}}
-TABLE = {
-    "method": ("method", ""),
-    "time [s]": ("time_s", ".3g"),
-    "CPU [s]": ("cpu_s", ".3g"),
-    "evaluations": ("evaluations", ","),
-    "ideal": ("ideal_gain", ".2f"),
-    "boundary": ("boundary_gain", ".2f"),
-    "realised": ("realised_gain", ".2f"),
-    "displacement [mm]": ("displacement_mm", ".4f"),
-    "difference": ("displacement_difference", "+.2f%"),
-    "broken": ("broken_faces", ""),
-    "residual": ("residual_fraction", ".2g%"),
+#: The paper's figures by method and instant [s]: its minutes, its displacement, what follows.
+PAPER = {
+    ("uniform", "5e-05"): {"cpu_s": 16 * 60.0},
+    ("uniform", "0.0005"): {"cpu_s": 3897 * 60.0, "displacement_mm": 2.16},
+    ("multirate_held", "5e-05"): {"cpu_s": 14 * 60.0, "realised_gain": 16 / 14},
+    ("multirate_held", "0.0005"): {
+        **{"cpu_s": 2702 * 60.0, "realised_gain": 3897 / 2702},
+        **{"displacement_mm": 1.93, "displacement_difference": 1.93 / 2.16 - 1.0},
+    },
 }
-
-
-def options_parser():
-    """Options of this experiment."""
-    made = blast_parser(NAME, __doc__)
-    made.add_argument("--l", type=number(0, 1), help="largest way of a body in a step [m], 1e-7")
-    made.add_argument("--dt0", type=number(0, 1), default=1e-8, help="largest step [s]")
-    made.add_argument("--early", type=number(0, 1), help="first instant compared [s], 5e-5")
-    made.add_argument("--until", type=number(0, 1), help="second instant compared [s], 5e-4")
-    made.add_argument("--samples", type=whole(1, 100000), help="rows of the time series, 100")
-    made.add_argument("--repeats", type=whole(1, 100), help="runs of every method, 1")
-    return made
+TABLE = study.Table(
+    method=("name", "method"),
+    instant=("instant",),
+    time_s=("report.until_s", "time [s]", ".3g"),
+    cpu_s=("timing.median", "CPU [s]", ".3g", "s"),
+    cpu_spread=("timing.spread",),
+    substeps=("report.substeps",),
+    evaluations=("report.contact_evaluations", "evaluations", ",", "1"),
+    ideal_gain=("report.ideal_gain", "ideal", ".2f", "1"),
+    boundary_gain=("report.boundary_gain", "boundary", ".2f", "1"),
+    displacement_mm=("moved_mm", "displacement [mm]", ".4f", "mm"),
+    radial_mm=("radial_mm",),
+    broken_faces=("report.broken_faces", "broken"),
+    residual_fraction=("report.energy_residual_fraction", "residual", ".2g%"),
+    realised_gain=(lambda one: one.base.timing.median / one.timing.median, "realised", ".2f", "1"),
+    displacement_difference=(
+        *(lambda one: one.moved_mm / one.base.moved_mm - 1.0, "difference", "+.2f%", "1"),
+    ),
+)
+options_parser = partial(blast_parser, NAME, __doc__, settings=SETTINGS)
 
 
 class Instant:
@@ -93,129 +79,83 @@ class Instant:
     def observe(self, view):
         """Look at the run."""
         hole, place = HoleMonitor(view.model, "hole"), view.motion()["position"]
-        self.report, self.radial_mm = view.report(), 1e3 * hole.radial_displacement(place)
-        self.moved_mm = 1e3 * hole.monitored_displacement(place)
+        self.report, self.radial_mm = view.report(), 1e3 * float(hole.radial_displacement(place))
+        self.moved_mm = 1e3 * float(hole.monitored_displacement(place))
 
 
 def follow(name, options, scene):
-    """One run of a method: an Instant each for early and late, and the series."""
+    """One run of a method: what is measured early and late, its series, levels of its bodies."""
     method, costs = METHODS[name](options.dt0, options.l), Costs()
-    instants = [Instant(time_s) for time_s in (options.early, options.until)]
-    with ProgressBar(styles_of([name])[name].label) as bar:
-        try:
-            result = simulate(
-                scene,
-                method=method,
-                until=options.until,
-                driver=options.driver,
-                samples=options.samples,
-                progress=bar,
-                observers=[costs, *instants],
-            )
-        finally:
-            # Also what a run that diverged, or was interrupted, had reached.
-            if costs.view is not None:
-                history = costs.view.history()
-                write_csv(os.path.join(options.out, f"history_{name}.csv"), history)
-    return (*instants, {**result.history, **costs.columns}, costs.levels)
+    made = {"early": Instant(options.early), "late": Instant(options.until)}
+    looks = {"title": styles_of([name])[name].label, "observers": [costs, *made.values()]}
+    try:
+        result = simulate(scene, method=method, **looks, **run_options(options))
+    finally:
+        # Also what a run that diverged, or was interrupted, had reached.
+        if costs.view is not None:
+            history = costs.view.history()
+            write_csv(f"{options.out}/history_{name}.csv", history)
+    return SimpleNamespace(**made, series={**result.history, **costs.columns}, levels=costs.levels)
 
 
 def run(options):
     """Run all methods, compare, picture."""
-    take_defaults(options, FULL, QUICK)
-    if options.early is None:
-        options.early = min(QUICK_EARLY if options.quick else EARLY, options.until)
-    if options.early > options.until:
+    asked = options.early is not None
+    study.take_settings(options, SETTINGS)
+    if asked and options.early > options.until:
         raise InputError(f"early must be at most until, {options.until:g} s, got {options.early:g}")
-    scene = paper_scene(options.mesh)
-    output_folder(options.out)
+    options.early = min(options.early, options.until)
+    scene, at = paper_scene(options.mesh), study.output_paths(options.out)
     runs = {
         name: [follow(name, options, scene) for _ in range(options.repeats)] for name in METHODS
     }
-    rows = table_of(runs)
-    write_rows(os.path.join(options.out, "comparison.csv"), rows)
-    picture(runs, options)
+    rows = TABLE.rows(compared(runs, "early") + compared(runs, "late"))
+    study.write_rows(at("comparison.csv"), rows)
+    draw(at, {name: made[0] for name, made in runs.items()}, options.dt0)
     print(f"One step for all against a step for each, all at l = {options.l:g} m\n")
-    show_rows(rows, TABLE)
+    TABLE.show(rows)
     if options.repeats > 1:
         spread = max(row["cpu_spread"] for row in rows)
         print(f"CPU times: medians of {options.repeats} runs, spread up to {spread:.0%}\n")
-    reports = [one[1].report for made in runs.values() for one in made]
-    finish(options, NAME, figures_of(rows), reports)
+    reports = [one.late.report for made in runs.values() for one in made]
+    study.finish(options, NAME, figures_of(rows), reports)
 
 
-def table_of(runs):
-    """A row, as a dict, for every method and instant; the first run's counts, all runs' times."""
-    rows = []
-    for place, instant in enumerate(("early", "late")):
-        base = len(rows)
-        for name, made in runs.items():
-            first = made[0][place]
-            report, moved = first.report, float(first.moved_mm)
-            timing = Timing.of([one[place].report.run_cpu_seconds for one in made])
-            row = {
-                "method": name,
-                "instant": instant,
-                "time_s": report.until_s,
-                "cpu_s": timing.median,
-                "cpu_spread": timing.spread,
-                "substeps": report.substeps,
-                "evaluations": report.contact_evaluations,
-                "ideal_gain": report.ideal_gain,
-                "boundary_gain": report.boundary_gain,
-                "displacement_mm": moved,
-                "radial_mm": float(first.radial_mm),
-                "broken_faces": report.broken_faces,
-                "residual_fraction": report.energy_residual_fraction,
-            }
-            rows.append(row)
-            row["realised_gain"] = rows[base]["cpu_s"] / max(row["cpu_s"], 1e-12)
-            row["displacement_difference"] = moved / rows[base]["displacement_mm"] - 1.0
-    return rows
+def compared(runs, instant):
+    """A subject of ``TABLE`` for each method; the first run's counts, all runs' times."""
+    made = []
+    for name, repeats in runs.items():
+        instants = [getattr(one, instant) for one in repeats]
+        first = SimpleNamespace(**vars(instants[0]), name=name, instant=instant)
+        first.timing = study.Timing.of(one.report.run_cpu_seconds for one in instants)
+        made.append(first)
+        first.base = made[0]
+    return made
 
 
 def figures_of(rows):
     """Figures for summary.json: times, gains and displacements beside the paper's."""
     figures = {}
     for row in rows:
-        name, key = row["method"], f"{row['method']}_{row['instant']}"
-        minutes, base = paper(PAPER_MINUTES, name, row), paper(PAPER_MINUTES, "uniform", row)
-        moved, base_moved = paper(PAPER_MM, name, row), paper(PAPER_MM, "uniform", row)
-        figures[f"{key}_cpu_s"] = figure(row["cpu_s"], "s", minutes and 60.0 * minutes)
-        figures[f"{key}_evaluations"] = figure(row["evaluations"], "1")
-        figures[f"{key}_displacement_mm"] = figure(row["displacement_mm"], "mm", moved)
-        papers = {
-            "ideal_gain": None,
-            "boundary_gain": None,
-            "realised_gain": minutes and base / minutes,
-            "displacement_difference": moved and moved / base_moved - 1.0,
-        }
-        if name != "uniform":
-            figures.update({f"{key}_{k}": figure(row[k], "1", v) for k, v in papers.items()})
+        paper = PAPER.get((row["method"], f"{row['time_s']:.9g}"), {})
+        made = TABLE.figures(row, "{method}_{instant}_{key}", paper)
+        # One step for all gains nothing over itself.
+        compares = row["method"] != "uniform"
+        alone = (name for name in made if compares or not name.endswith(("gain", "difference")))
+        figures.update((name, made[name]) for name in alone)
     return figures
 
 
-def paper(values, name, row):
-    """The paper's value for a method at the instant of a row; None where it names none."""
-    found = [v for t, v in values.get(name, {}).items() if math.isclose(t, row["time_s"])]
-    return found[0] if found else None
-
-
-def picture(runs, options):
+def draw(at, runs, dt0):
     """Draw and write all that is plotted."""
-
-    def at(name):
-        return os.path.join(options.out, name)
-
-    series = {name: made[0][2] for name, made in runs.items()}
-    for name, made in series.items():
-        shares = level_shares(runs[name][0][3])
-        levels = {f"level_{k}": column for k, column in enumerate(shares.T)}
-        write_csv(at(f"{name}.csv"), {**made, **levels})
+    for name, made in runs.items():
+        shares = level_shares(made.levels)
+        write_csv(at(f"{name}.csv"), {**made.series, **level_columns(shares)})
         if name != "uniform":
-            plot.plot_levels(at(f"levels_{name}.png"), made["time_s"], shares, options.dt0)
+            plot.plot_levels(at(f"levels_{name}.png"), made.series["time_s"], shares, dt0)
+    series = {name: made.series for name, made in runs.items()}
     plot.plot_methods(at("methods.png"), series, "monitor_displacement_mm")
 
 
 if __name__ == "__main__":
-    sys.exit(main(run, options_parser()))
+    sys.exit(study.main(run, options_parser()))

@@ -20,135 +20,150 @@ cores busy, look at what the busiest thread took of the cores instead (..._busy)
 Writes scaling.png, scaling.csv, shares.csv and summary.json to results/blast_scaling/.
 """
 
-import os
 import sys
-import time
+from functools import partial
 
 import numpy as np
 
 from _blast import blast_parser, paper_scene
-from _scaling_picture import picture_scaling
-from _scaling_record import record
-from _scaling_simulate import WAYS, Workers, acceleration
 from _scaling_threads import ROUNDS, thread_gain
-from taichi_dem import Multirate
-from taichi_dem.kit.files import output_folder, write_csv
-from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.kit.study import (
-    figure,
-    finish,
-    main,
-    number,
-    show_rows,
-    take_defaults,
-    whole,
-    write_rows,
-)
-from taichi_dem.mesh.partition import imbalance
+from taichi_dem import Multirate, ProgressBar
+from taichi_dem.kit import study
+from taichi_dem.kit.files import write_csv
+from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, PURPLE, RED, picture
+from taichi_dem.workload import WAYS, Workers, record_workload
 
 NAME = "blast_scaling"
-QUICK = {"until": 1e-4, "l": 1e-7}
-FULL = {"until": 5e-4, "l": 1e-8}
-DT0 = 1e-8
-COUNTS = (*range(1, 25), 32, 48, 64, 96, 128, 192, 256)
-QUICK_COUNTS = (1, 2, 4, 8, 16, 24, 64, 256)
-#: Workers of the paper's Fig 15, and its shortest and longest time of one [s].
-PAPER_WORKERS = 24
-PAPER_STATIC, PAPER_REBALANCED = 20381.0 / 3493.0, 9787.0 / 9023.0
-#: Minutes of one process and of 24 with and without rebalancing (4.3, 4.4); share of one's time
-#: that is not contact.
-PAPER_ONE, PAPER_MANY, PAPER_FIXED, PAPER_SERIAL = 2702.0, 501.0, 541.0, 0.05
-#: Boxes of the bar for the threads, six tetrahedra each.
-CELLS, QUICK_CELLS = (40, 20, 20), (20, 10, 10)
-TABLE = {
-    "way of sharing": ("way", ""),
-    "workers": ("workers", ""),
-    "slowest/fastest": ("imbalance", ".3g"),
-    "contact": ("contact", ".3g"),
-    "whole": ("whole", ".3g"),
+SETTINGS = {
+    "until": (5e-4, 1e-4, study.number(0, 1), "simulated time [s], 5e-4"),
+    "l": (1e-8, 1e-7, study.number(0, 1), "the paper's way of a body in a step [m]"),
+    "every": (50, 50, study.whole(1, 100000), "steps an interval, 50"),
+    "repeats": (5, 2, study.whole(1, 100), "of the threads' times"),
+    "counts": ((*range(1, 25), 32, 48, 64, 96, 128, 192, 256), (1, 2, 4, 8, 16, 24, 64, 256)),
+    # Boxes of the bar for the threads, six tetrahedra each, and turns of one and two threads.
+    "cells": ((40, 20, 20), (20, 10, 10)),
+    "rounds": (ROUNDS, 1),
 }
-
-
-def options_parser():
-    """Options of this experiment."""
-    made = blast_parser(NAME, __doc__, ())
-    made.add_argument("--until", type=number(0, 1), help="simulated time [s], 5e-4")
-    made.add_argument("--l", type=number(0, 1), help="the paper's way of a body in a step [m]")
-    made.add_argument("--every", type=whole(1, 100000), default=50, help="steps an interval, 50")
-    made.add_argument("--repeats", type=whole(1, 100), default=5, help="of the threads' times")
-    return made
-
-
-def figures_of(workers, shared, gains):
-    """Figures for summary.json, beside the paper's."""
-    made = {}
-    paper = {"static": PAPER_STATIC, "rebalanced": PAPER_REBALANCED}
-    for way in ("static", "polyline", "rebalanced"):
-        apart = imbalance(shared[way][PAPER_WORKERS].seconds)
-        made[f"imbalance_24_{way}"] = figure(apart, "1", paper.get(way))
-    paper = {"static": PAPER_ONE / PAPER_FIXED, "rebalanced": PAPER_ONE / PAPER_MANY}
-    for way in WAYS:
-        one = shared[way][PAPER_WORKERS]
-        contact = acceleration(workers.total, one.elapsed, 0.0)
-        made[f"contact_24_{way}"] = figure(contact, "1")
-        gain = acceleration(workers.total, one.elapsed, PAPER_SERIAL)
-        name = "speedup_24_simulated" if way == "rebalanced" else f"speedup_24_{way}"
-        made[name] = figure(gain, "1", paper.get(way))
-    bar, block = gains
-    for name, row in (("", bar), ("_paper_block", block)):
-        made[f"speedup_2_threads{name}"] = figure(row["gain"], "1")
-        made[f"speedup_2_threads_busy{name}"] = figure(row["busy"], "1")
-    made["speedup_2_threads_bodies"] = figure(bar["bodies"], "1")
-    for name, price in zip(("bond", "pair", "sphere_pair"), workers.prices):
-        made[f"ns_a_{name}"] = figure(1e9 * float(price), "ns")
-    return made
-
-
-def row_of(workers, way, count, one):
-    """Acceleration and imbalance with a number of workers; one: a ``Shared``."""
-    gains = [acceleration(workers.total, one.elapsed, share) for share in (0.0, PAPER_SERIAL)]
-    names = ("workers", "way", "contact", "whole", "imbalance")
-    return dict(zip(names, (count, way, *gains, imbalance(one.seconds))))
+DT0 = 1e-8
+#: Workers of the paper's Fig 15, and the share of one's time that is not contact.
+PAPER_WORKERS, PAPER_SERIAL = 24, 0.05
+#: By way of sharing: shortest over longest time of a worker in Fig 15, and minutes of one process
+#: over those of 24 (4.3, 4.4).
+PAPER_IMBALANCE = {"static": 20381.0 / 3493.0, "rebalanced": 9787.0 / 9023.0}
+PAPER_SPEEDUP = {"static": 2702.0 / 541.0, "rebalanced": 2702.0 / 501.0}
+LOOK = dict(zip(WAYS, ((RED, "-"), (PURPLE, "--"), (BLUE, "-"), (GREEN, "-"))))
+TABLE = study.Table(
+    workers=("workers", "workers"),
+    way=("way", "way of sharing"),
+    contact=(lambda one: one.acceleration(), "contact", ".3g"),
+    whole=(lambda one: one.acceleration(PAPER_SERIAL), "whole", ".3g"),
+    imbalance=("imbalance", "slowest/fastest", ".3g"),
+)
+options_parser = partial(blast_parser, NAME, __doc__, (), SETTINGS)
 
 
 def run(options):
     """Record, simulate, measure, picture."""
-    take_defaults(options, FULL, QUICK)
-    scene = paper_scene(options.mesh)
-    output_folder(options.out)
-    started = time.perf_counter()
-    with ProgressBar("blast") as bar:
-        method = Multirate(DT0, options.l)
-        recorded, simulation = record(scene, method, options.until, options.every, bar)
-    workers, counts = Workers(recorded), QUICK_COUNTS if options.quick else COUNTS
-    shared = {way: {count: workers.share(way, count) for count in counts} for way in WAYS}
-    gains = measured(options)
-    rows = [row_of(workers, way, *one) for way in WAYS for one in shared[way].items()]
-    write_rows(os.path.join(options.out, "scaling.csv"), rows)
-    each = {f"{way}_s": shared[way][PAPER_WORKERS].seconds for way in WAYS}
-    numbers = np.arange(1, PAPER_WORKERS + 1)
-    write_csv(os.path.join(options.out, "shares.csv"), {"worker": numbers, **each})
-    path = os.path.join(options.out, "scaling.png")
-    paper = PAPER_ONE / PAPER_FIXED, PAPER_ONE / PAPER_MANY
-    points = dict(zip(("2 threads, bar", "2 threads, block"), ((2, g["gain"]) for g in gains)))
-    picture_scaling(path, workers, shared, PAPER_WORKERS, PAPER_SERIAL, paper, points)
+    study.take_settings(options, SETTINGS)
+    scene, at = paper_scene(options.mesh), study.output_paths(options.out)
+    counting = {"until": options.until, "every": options.every, "title": "blast"}
+    workload, simulation = record_workload(scene, Multirate(DT0, options.l), **counting)
+    workers = Workers(workload)
+    shared = {way: {n: workers.share(way, n) for n in options.counts} for way in WAYS}
+    bar, block = gains = measured(options)
+    rows = TABLE.rows(one for by_count in shared.values() for one in by_count.values())
+    study.write_rows(at("scaling.csv"), rows)
+    chosen = {way: by_count[PAPER_WORKERS] for way, by_count in shared.items()}
+    each = {f"{way}_s": one.seconds for way, one in chosen.items()}
+    write_csv(at("shares.csv"), {"worker": np.arange(1, PAPER_WORKERS + 1), **each})
+    draw(at("scaling.png"), shared, chosen, workload, {"bar": bar["gain"], "block": block["gain"]})
     shown = [row for row in rows if row["workers"] in (2, 4, PAPER_WORKERS, 256)]
-    show_rows([{**row, "way": WAYS[row["way"]]} for row in shown], TABLE)
-    seconds = simulation.compile_seconds, time.perf_counter() - started
-    finish(options, NAME, figures_of(workers, shared, gains), seconds)
+    TABLE.show([{**row, "way": WAYS[row["way"]]} for row in shown])
+    figures = figures_of(chosen, workers.prices, *gains)
+    study.finish(options, NAME, figures, simulation.compile_seconds)
 
 
 def measured(options):
-    """What a second thread gains on the bar, and on the paper's block."""
-    cells, *often = (QUICK_CELLS, 1, 2) if options.quick else (CELLS, ROUNDS, options.repeats)
-    blocks = ("", cells, "paper_multirate", 10), (options.mesh, None, "paper_multirate", 400)
-    gains = []
+    """Gains of a second thread on the bar, and on the paper's block."""
+    gains, often = [], (options.rounds, options.repeats)
     with ProgressBar("two threads") as bar:
-        for block in blocks:
-            bar.count(len(gains), len(blocks))
-            gains.append(thread_gain(*block, *often))
+        for mesh, cells, steps in (("", options.cells, 10), (options.mesh, None, 400)):
+            bar.count(len(gains), 2)
+            gains.append(thread_gain(mesh, cells, "paper_multirate", steps, *often))
     return gains
 
 
+def figures_of(chosen, prices, bar, block):
+    """Figures for summary.json, beside the paper's."""
+    made = {}
+    for way, one in chosen.items():
+        if way != "due":
+            made[f"imbalance_24_{way}"] = (one.imbalance, "1", PAPER_IMBALANCE.get(way))
+        made[f"contact_24_{way}"] = (one.acceleration(), "1")
+        name = "speedup_24_simulated" if way == "rebalanced" else f"speedup_24_{way}"
+        made[name] = (one.acceleration(PAPER_SERIAL), "1", PAPER_SPEEDUP.get(way))
+    for name, row in (("", bar), ("_paper_block", block)):
+        made[f"speedup_2_threads{name}"] = (row["gain"], "1")
+        made[f"speedup_2_threads_busy{name}"] = (row["busy"], "1")
+    made["speedup_2_threads_bodies"] = (bar["bodies"], "1")
+    kinds = ("bond", "pair", "sphere_pair")
+    return {**made, **{f"ns_a_{kind}": (1e9 * float(s), "ns") for kind, s in zip(kinds, prices)}}
+
+
+def draw(path, shared, chosen, workload, measured):
+    """Acceleration and shares, as the paper's Figs 9, 14 and 15; see ``run``."""
+    names = [["whole", "contact"], ["shares", "cuts"]]
+    with picture(path, 0, size=(11.0, 9.0)) as (figure, _):
+        axes = figure.subplot_mosaic(names)
+        draw_acceleration(axes["whole"], shared, PAPER_WORKERS, PAPER_SERIAL)
+        look = {"ls": "none", "marker": "o"}
+        for (way, gain), filled in zip(PAPER_SPEEDUP.items(), (RED, PURPLE)):
+            words = "measured in the paper, " + way.replace("static", "fixed")
+            axes["whole"].plot(PAPER_WORKERS, gain, color=filled, label=words, **look)
+        look = {"ls": "none", "color": BLACK, "ms": 9}
+        for (name, gain), mark in zip(measured.items(), "*P"):
+            words = f"measured here, 2 threads, {name}"
+            axes["whole"].plot(2, gain, marker=mark, label=words, **look)
+        words = f"Whole run, simulated workers, {100 * PAPER_SERIAL:g} % not shared (Fig 14)"
+        axes["whole"].set(xlim=(0, PAPER_WORKERS + 1), ylim=(0, None), title=words)
+        handles = axes["whole"].get_legend_handles_labels()
+        figure.legend(*handles, loc="outside lower center", ncols=3)
+        draw_acceleration(axes["contact"], shared, np.inf, 0.0)
+        words = "Contact calculation alone, many simulated workers"
+        axes["contact"].set(xscale="log", yscale="log", title=words)
+        draw_shares(axes["shares"], chosen)
+        time_ms = 1e3 * workload.time
+        axes["cuts"].plot(time_ms, chosen["rebalanced"].cuts[:, 1:-1], color=BLUE, linewidth=0.5)
+        axes["cuts"].set(xlabel="time [ms]", ylabel="number of the body [1]")
+        axes["cuts"].set(xlim=(0.0, time_ms[-1]), ylim=(0, workload.counts.shape[1]))
+        axes["cuts"].set_title("Lines: where simulated workers' shares begin (Fig 9)")
+        words = "Lines: simulated workers that share the work of one recorded run"
+        figure.suptitle(f"{words}; points: measured times of processes or threads")
+
+
+def draw_acceleration(axes, shared, most, serial):
+    """Acceleration over the number of workers, and what nobody can exceed."""
+    for way, (colour, line) in LOOK.items():
+        counts = np.array([count for count in shared[way] if count <= most])
+        gains = [shared[way][count].acceleration(serial) for count in counts]
+        axes.plot(counts, gains, line, color=colour, label=WAYS[way])
+    bound = counts / (1.0 + serial * (counts - 1.0))
+    axes.plot(counts, bound, ":", color=GREY, label="bound: nobody ever waits")
+    axes.set(xlabel="workers [1]", ylabel="acceleration [1]")
+
+
+def draw_shares(axes, chosen):
+    """Time of every worker over the mean (Fig 15)."""
+    numbers = np.arange(1, PAPER_WORKERS + 1)
+    for way, (colour, line) in LOOK.items():
+        if way != "due":
+            share, words = chosen[way].seconds, f"{WAYS[way]}: {chosen[way].imbalance:.3g}"
+            axes.step(numbers, share / share.mean(), line, where="mid", color=colour, label=words)
+    axes.set(xlabel="number of the worker [1]", ylabel="time of its work / mean [1]")
+    axes.set(xlim=(0.5, PAPER_WORKERS + 0.5), ylim=(0.0, 1.4 * axes.get_ylim()[1]))
+    axes.set_title("Simulated workers: slowest over fastest in the run (Fig 15)")
+    axes.legend(loc="upper right")
+
+
 if __name__ == "__main__":
-    sys.exit(main(run, options_parser()))
+    sys.exit(study.main(run, options_parser()))

@@ -15,18 +15,16 @@ sweeps.png, sweeps.csv and summary.json to results/blast_sweeps/.
 """
 
 import itertools
-import os
 import sys
+from functools import partial
 
 import numpy as np
 
 from _blast import blast_parser, paper_scene
-from _dashpot_system import DashpotSystem
 from taichi_dem import At, ImplicitDashpots, Simulation
-from taichi_dem.kit.files import output_folder
+from taichi_dem.diagnostics.dashpot_system import DashpotSystem
+from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import BROWN, GREY, STYLES, VIOLET, picture
-from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.kit.study import figure, finish, main, show_rows, write_rows
 from taichi_dem.simulate import run_simulation
 
 NAME = "blast_sweeps"
@@ -39,11 +37,7 @@ WAYS = {
 }
 TOLERANCES = (0.05, 0.01, 1e-3)
 KICK, SWEEPS = 0.05, 30
-
-
-def options_parser():
-    """Options of this experiment."""
-    return blast_parser(NAME, __doc__, ())
+options_parser = partial(blast_parser, NAME, __doc__, ())
 
 
 class Solving:
@@ -62,20 +56,16 @@ class Solving:
         fastest = np.linalg.norm(motion["velocity"], axis=1).max()
         kicked, random = still.copy(), np.random.default_rng(0)
         kicked[:, :3] += KICK * fastest * random.standard_normal(motion["velocity"].shape)
-        twist = system.twists(still)
-        exact = next(itertools.islice(system.gauss_seidel(kicked, twist), 200, None))
-        ways = {
-            "gauss_seidel": system.gauss_seidel(kicked, twist),
-            "jacobi": system.jacobi(kicked, twist),
-            "momentum": system.jacobi(kicked, twist, momentum=True),
-        }
+        start = kicked, system.twists(still)
+        exact = next(itertools.islice(system.gauss_seidel(*start), 200, None))
+        ways = system.gauss_seidel(*start), system.jacobi(*start), system.jacobi(*start, True)
 
         def error(moving):
             return np.linalg.norm((moving - exact)[:, :3], axis=1).max() / fastest
 
         self.found[view.time_s] = {
             name: np.array([error(kicked), *map(error, itertools.islice(way, SWEEPS))])
-            for name, way in ways.items()
+            for name, way in zip(WAYS, ways)
         }
 
 
@@ -88,52 +78,45 @@ def draw(path, found):
     """Error over sweeps of every way, a line a time."""
     with picture(path, size=(6.0, 4.0)) as (_, axes):
         for name, (words, colour) in WAYS.items():
-            for place, errors in enumerate(found.values()):
-                label = words if place == 0 else None
-                axes.semilogy(errors[name], color=colour, alpha=0.7, label=label)
+            lines = np.transpose([errors[name] for errors in found.values()])
+            axes.semilogy(lines, color=colour, alpha=0.7)[0].set_label(words)
         for tolerance in TOLERANCES:
             axes.axhline(tolerance, color=GREY, linewidth=0.8, linestyle=":")
         axes.lines[-1].set_label("errors of 5, 1 and 0.1 %")
-        axes.set(xlabel="sweeps [1]", ylabel="error of velocities [1]")
-        axes.set(xlim=(0, 20), ylim=(1e-9, 1))
-        axes.set_xticks(range(0, 21, 2))
-        axes.set_title("Each line: one time of the blast")
+        axes.set(xlabel="sweeps [1]", ylabel="error of velocities [1]", xticks=range(0, 21, 2))
+        axes.set(xlim=(0, 20), ylim=(1e-9, 1), title="Each line: one time of the blast")
         axes.legend()
 
 
 def run(options):
     """Go from time to time, solve in every way, compare."""
-    scene = paper_scene(options.mesh)
-    output_folder(options.out)
+    scene, at = paper_scene(options.mesh), study.output_paths(options.out)
     times = QUICK_TIMES if options.quick else TIMES
-    with ProgressBar("blast") as bar:
-        simulation = Simulation(scene, ImplicitDashpots(refresh=4e-7))
-        solving = Solving(simulation, times)
-        looks = {"samples": 1, "progress": bar, "observers": [solving]}
-        report = run_simulation(simulation, until=times[-1], **looks).report
-    found = solving.found
-    rows = [
-        {"time_s": time_s, "sweeps": k, **{way: errors[way][k] for way in WAYS}}
-        for time_s, errors in found.items()
+    simulation = Simulation(scene, ImplicitDashpots(refresh=4e-7))
+    solving = Solving(simulation, times)
+    looks = {"samples": 1, "title": "blast", "observers": [solving]}
+    report = run_simulation(simulation, until=times[-1], **looks).report
+    errors = [
+        {"time_s": time_s, "sweeps": k, **{way: found[way][k] for way in WAYS}}
+        for time_s, found in solving.found.items()
         for k in range(SWEEPS + 1)
     ]
-    write_rows(os.path.join(options.out, "sweeps.csv"), rows)
-    draw(os.path.join(options.out, "sweeps.png"), found)
+    study.write_rows(at("sweeps.csv"), errors)
+    draw(at("sweeps.png"), solving.found)
     rows = [
-        {"t": 1e6 * time_s, "way": way, **{t: sweeps_to(errors[way], t) for t in TOLERANCES}}
-        for time_s, errors in found.items()
-        for way in WAYS
+        {"t": 1e6 * time_s, "way": words, **{t: sweeps_to(found[way], t) for t in TOLERANCES}}
+        for time_s, found in solving.found.items()
+        for way, (words, _) in WAYS.items()
     ]
-    figures = {
-        f"sweeps_{way}_{t:g}": figure(max(row[t] for row in rows if row["way"] == way), "1")
-        for way in WAYS
+    tolerances = {f"to {100 * t:g} %": (t, "") for t in TOLERANCES}
+    study.show_rows(rows, {"t [us]": ("t", ".0f"), "way": ("way", ""), **tolerances})
+    most = {
+        f"sweeps_{way}_{t:g}": (max(row[t] for row in rows if row["way"] == words), "1")
+        for way, (words, _) in WAYS.items()
         for t in TOLERANCES
     }
-    rows = [{**row, "way": WAYS[row["way"]][0]} for row in rows]
-    tolerances = {f"to {100 * t:g} %": (t, "") for t in TOLERANCES}
-    show_rows(rows, {"t [us]": ("t", ".0f"), "way": ("way", ""), **tolerances})
-    finish(options, NAME, figures, [report])
+    study.finish(options, NAME, most, [report])
 
 
 if __name__ == "__main__":
-    sys.exit(main(run, options_parser()))
+    sys.exit(study.main(run, options_parser()))

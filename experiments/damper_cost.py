@@ -9,50 +9,32 @@ all cells, as in the paper, and by a list of particles, at the paper's 1e-4 s an
 apart. Then every filling is run at longer and longer steps until it refuses or diverges.
 """
 
-import os
 import sys
-import time
+from pathlib import Path
+from statistics import median
 
 import numpy as np
 
-from ca_damper import Automaton, Batch, SceneTable, SimulationDiverged, Spheres
-from taichi_dem import InputError
+import ca_damper
+from ca_damper import Automaton, Batch, InputError, SceneTable, Spheres
+from taichi_dem.kit import study
 from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.plot_style import BLACK, STYLES, picture, styles_of
-from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.kit.study import (
-    Timing,
-    figure,
-    finish,
-    main,
-    parser,
-    print_table,
-    seconds_of,
-    several,
-    take_defaults,
-    whole,
-    write_rows,
-)
+from taichi_dem.kit.study import several, whole
 
 NAME = "damper_cost"
 FREQUENCY, BASE_AMPLITUDE = 6.0, 0.6e-3
 #: Particles in the search for the longest step.
 SOME = 50
+NUMBERS = [1, 2, 5, 10, 20, 30, 40, 50, 60, 80, 100, 120, 140, 160]
 #: Steps tried for stability [s].
 STEPS = (1e-5, 2e-5, 3e-5, 5e-5, 7e-5, 1e-4, 2e-4, 3e-4, 5e-4, 7e-4, 1e-3, 1.5e-3, 2e-3, 3e-3)
-FULL = {
-    "particles": [1, 2, 5, 10, 20, 30, 40, 50, 60, 80, 100, 120, 140, 160],
-    "repeats": 5,
-    "seconds": 0.05,
-    "cycles": 20,
-    "steps": STEPS,
-}
-QUICK = {
-    "particles": [1, 10, 50, 160],
-    "repeats": 3,
-    "seconds": 0.01,
-    "cycles": 3,
-    "steps": (2e-5, 1e-4, 1e-3, 2e-3),
+SETTINGS = {
+    "particles": (NUMBERS, [1, 10, 50, 160], several(whole(1, 160)), "numbers, 1 to 160"),
+    "repeats": (5, 3, whole(1, 1000), "of every timing, 5"),
+    "seconds": (0.05, 0.01),
+    "cycles": (20, 3),
+    "steps": (STEPS, (2e-5, 1e-4, 1e-3, 2e-3)),
 }
 PAIRS, SCAN = Spheres(search="all_pairs"), Automaton(traversal="scan")
 #: Label: filling, step [s], search or traversal with the step, marker, line. The paper's way is
@@ -75,48 +57,55 @@ OUTCOMES = {
 
 def options_parser():
     """Options of this experiment; times are of one thread."""
-    made = parser(NAME, __doc__)
-    made.set_defaults(threads=1)
-    made.add_argument("--particles", type=several(whole(1, 160)), help="numbers, 1 to 160")
-    made.add_argument("--repeats", type=whole(1, 1000), help="of every timing, 5")
-    return made
+    return study.add_settings(study.parser(NAME, __doc__), SETTINGS, threads=1)
 
 
 def run(options):
     """Time all variants, find their longest steps, write tables and pictures."""
-    take_defaults(options, FULL, QUICK)
-    folder = output_folder(options.out)
-    started = time.perf_counter()
-    with ProgressBar("timing") as bar:
-        costs = time_all(options, bar)
-    fillings = (Spheres(), Automaton(), Automaton(accounting="landing"))
-    borne = {one.label: outcomes(one, options.steps, options.cycles) for one in fillings}
-    write_tables(costs, borne, options)
-    picture_cost(os.path.join(folder, "cost.png"), options.particles, costs)
-    picture_steps(os.path.join(folder, "steps.png"), borne)
-    seconds = time.perf_counter() - started
-    compiling = sum(cost["compile_s"] for cost in costs.values())
-    print_costs(costs, options.particles)
-    finish(options, NAME, figures_of(costs, borne, options), (compiling, seconds - compiling))
+    study.take_settings(options, SETTINGS)
+    folder = Path(output_folder(options.out))
+    with ca_damper.ProgressBar("timing") as bar:
+        costs, compiling = {}, 0.0
+        for k, label in enumerate(VARIANTS):
+            costs[label], seconds = cost_of(label, options)
+            compiling += seconds
+            bar.count(k + 1, len(VARIANTS))
+    borne = {
+        one.label: [(dt, outcome(one, dt, options.cycles)) for dt in options.steps]
+        for one in (Spheres(), Automaton(), Automaton(accounting="landing"))
+    }
+    study.write_rows(folder / "cost.csv", [row for rows in costs.values() for row in rows])
+    tried = [(label, *found) for label, rows in borne.items() for found in rows]
+    study.write_rows(folder / "steps.csv", tried, "filling dt_s outcome")
+    picture_cost(folder / "cost.png", costs)
+    picture_steps(folder / "steps.png", borne)
+    print("CPU milliseconds a cycle")
+    rows = [[f"{1e3 * row['cpu_s']:.3g}" for row in some] for some in zip(*costs.values())]
+    study.print_table([(n, *row) for n, row in zip(options.particles, rows)], ["N", *costs])
+    print()
+    study.finish(options, NAME, figures_of(costs, borne), compiling)
 
 
-def time_all(options, bar):
-    """CPU seconds a cycle: {label: {"timings": a Timing for each N, "steps", "compile_s"}}."""
-    costs, numbers = {}, options.particles
-    for label, (filling, dt, *_) in VARIANTS.items():
-        batch = scenes(filling, numbers, dt)
-        steps = int(batch.steps_per_cycle[0])
-        batch.advance(steps)
-        timings = []
-        for k in range(len(numbers)):
-            timings.append(time_cycle(batch, k, options))
-            bar.count(len(costs) * len(numbers) + k + 1, len(VARIANTS) * len(numbers))
-        costs[label] = {"timings": timings, "steps": steps, "compile_s": batch.compile_seconds}
-    return costs
+def cost_of(label, options):
+    """CPU seconds a cycle of a variant, a row for each number of particles; those of compiling."""
+    filling, dt, *_ = VARIANTS[label]
+    batch = scenes(filling, options.particles, dt)
+    steps = int(batch.steps_per_cycle[0])
+    batch.advance(steps)
+    rows = []
+    for k, particles in enumerate(options.particles):
+        # At a time as many cycles as fill a moment.
+        cycles = 1 + int(options.seconds / max(cycle_seconds(batch, k, 1), 1e-6))
+        repeats = [cycle_seconds(batch, k, cycles) / cycles for _ in range(options.repeats)]
+        row = {"variant": label, "particles": particles, "steps": steps}
+        rows.append(
+            {**row, "cpu_s": median(repeats), "low_s": min(repeats), "high_s": max(repeats)}
+        )
+    return rows, batch.compile_seconds
 
 
 def scenes(filling, particles, dt):
-    """A batch of scenes near resonance, started; particles or dt may be several."""
+    """A batch of scenes near resonance, started; particles may be several."""
     batch = Batch(filling, SceneTable(particles, 1, dt, FREQUENCY, BASE_AMPLITUDE))
     # Swinging fully from the first cycle, so that the particles fly from then on.
     batch.start("empty")
@@ -127,97 +116,51 @@ def cycle_seconds(batch, scene, cycles):
     """CPU time of some cycles of one scene [s]; the others stand."""
     steps = [0] * batch.count
     steps[scene] = cycles * int(batch.steps_per_cycle[scene])
-    return seconds_of(batch.advance, steps)
+    return study.seconds_of(batch.advance, steps)
 
 
-def time_cycle(batch, scene, options):
-    """Timing of a cycle of a scene in CPU seconds; at a time as many as fill a moment."""
-    cycles = 1 + int(options.seconds / max(cycle_seconds(batch, scene, 1), 1e-6))
-    return Timing.of([cycle_seconds(batch, scene, cycles) / cycles for _ in range(options.repeats)])
+def outcome(filling, dt, cycles):
+    """How a run of 50 particles at a step [s] ends, one of OUTCOMES."""
+    try:
+        filling.check(SOME, dt)
+        cycle_seconds(scenes(filling, SOME, dt), 0, cycles)
+    except (InputError, ca_damper.SimulationDiverged) as error:
+        return "refused" if isinstance(error, InputError) else "diverges"
+    return "runs"
 
 
-def outcomes(filling, steps, cycles):
-    """Outcome of a run of 50 particles at every step: (dt, "runs" | "diverges" | "refused")."""
-    allowed, found = [], []
-    for dt in steps:
-        try:
-            filling.check(SOME, dt)
-            allowed.append(dt)
-        except InputError:
-            found.append((dt, "refused"))
-    while allowed:
-        # A batch that holds a diverged scene goes no further: the rest gets one of its own.
-        batch = scenes(filling, SOME, allowed)
-        for k in range(batch.count):
-            dt = allowed.pop(0)
-            try:
-                cycle_seconds(batch, k, cycles)
-                found.append((dt, "runs"))
-            except SimulationDiverged:
-                found.append((dt, "diverges"))
-                break
-    return sorted(found)
-
-
-def write_tables(costs, borne, options):
-    """CSV of all timings, and of the steps tried."""
-    timed = [
-        (label, particles, cost["steps"], timing.median, timing.low, timing.high)
-        for label, cost in costs.items()
-        for particles, timing in zip(options.particles, cost["timings"])
-    ]
-    names = "variant particles steps cpu_s low_s high_s"
-    write_rows(os.path.join(options.out, "cost.csv"), timed, names)
-    tried = [(label, dt, word) for label, found in borne.items() for dt, word in found]
-    write_rows(os.path.join(options.out, "steps.csv"), tried, "filling dt_s outcome")
-
-
-def figures_of(costs, borne, options):
+def figures_of(costs, borne):
     """Seconds a cycle at 50 particles, rates, growth from fewest to most, longest steps."""
     figures = {}
-    some = min(options.particles, key=lambda n: abs(n - SOME))
-    place = options.particles.index(some)
-    for label, cost in costs.items():
-        seconds = [timing.median for timing in cost["timings"]]
-        figures[f"cycle_ms_{label}_N{some}"] = figure(1e3 * seconds[place], "ms")
-        rate = 1e-6 * some * cost["steps"] / seconds[place]
-        figures[f"particle_steps_{label}_N{some}"] = figure(rate, "million/s")
-        figures[f"growth_{label}"] = figure(seconds[-1] / seconds[0], "1")
+    for label, rows in costs.items():
+        at = min(rows, key=lambda row: abs(row["particles"] - SOME))
+        some, seconds = at["particles"], at["cpu_s"]
+        rate = 1e-6 * some * at["steps"] / seconds
+        figures[f"cycle_ms_{label}_N{some}"] = study.figure(1e3 * seconds, "ms")
+        figures[f"particle_steps_{label}_N{some}"] = study.figure(rate, "million/s")
+        figures[f"growth_{label}"] = study.figure(rows[-1]["cpu_s"] / rows[0]["cpu_s"], "1")
     for label, found in borne.items():
         running = [dt for dt, word in found if word == "runs"]
-        figures[f"longest_step_{label}"] = figure(max(running, default=None), "s")
+        figures[f"longest_step_{label}"] = study.figure(max(running, default=None), "s")
     return figures
 
 
-def print_costs(costs, particles):
-    """Print the milliseconds a cycle."""
-    timings = zip(*(cost["timings"] for cost in costs.values()))
-    rows = [(n, *(f"{1e3 * t.median:.3g}" for t in row)) for n, row in zip(particles, timings)]
-    print("CPU milliseconds a cycle")
-    print_table(rows, ["N", *costs])
-    print()
-
-
-def picture_cost(path, particles, costs):
+def picture_cost(path, costs):
     """CPU time of a cycle over the number of particles, linear and logarithmic."""
     with picture(path, 1, 2, (10.0, 5.0)) as (figure, axes):
-        for label, cost in costs.items():
+        for label, rows in costs.items():
             filling, _, words, mark, line = VARIANTS[label]
-            style = STYLES[filling.label]
+            style, table = STYLES[filling.label], study.columns_of(rows)
             look = {"color": style.colour, "marker": mark, "ms": 4, "ls": line, "lw": 1.2}
-            low, middle, high = (
-                [1e3 * getattr(timing, name) for timing in cost["timings"]]
-                for name in ("low", "median", "high")
-            )
-            bars = [np.subtract(middle, low), np.subtract(high, middle)]
+            look["label"] = f"{style.label}, {words}"
+            low, middle, high = (1e3 * np.array(table[key]) for key in ("low_s", "cpu_s", "high_s"))
             for axis in axes:
-                axis.errorbar(particles, middle, bars, label=f"{style.label}, {words}", **look)
+                axis.errorbar(table["particles"], middle, [middle - low, high - middle], **look)
         axes[0].set(title="bars: range of the repeats", ylim=(0, None))
         axes[1].set(title="the same, logarithmic", yscale="log")
         for axis in axes:
             axis.set(xlabel="particles N [1]", ylabel="CPU time of a cycle [ms]")
-        handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper left", ncols=3)
+        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper left", ncols=3)
 
 
 def picture_steps(path, borne):
@@ -227,7 +170,7 @@ def picture_steps(path, borne):
         for word, (words, mark) in OUTCOMES.items():
             axis.plot([], [], mark, color=BLACK, label=words, ms=7)
             for row, (name, found) in enumerate(borne.items()):
-                steps = [1e6 * dt for dt, outcome in found if outcome == word]
+                steps = [1e6 * dt for dt, end in found if end == word]
                 axis.plot(steps, [row] * len(steps), mark, color=styles[name].colour, ms=7)
         axis.set(xscale="log", xlabel="step [µs]", ylim=(-0.6, len(borne) - 0.4))
         axis.set_yticks(range(len(borne)), [style.label for style in styles.values()])
@@ -235,4 +178,4 @@ def picture_steps(path, borne):
 
 
 if __name__ == "__main__":
-    sys.exit(main(run, options_parser()))
+    sys.exit(study.main(run, options_parser()))

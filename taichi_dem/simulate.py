@@ -34,6 +34,7 @@ def simulate(
     samples=200,
     frames=0,
     progress=AUTO,
+    title="simulating",
     output=None,
     checkpoint=None,
     resume=None,
@@ -46,6 +47,7 @@ def simulate(
     the one at the start. progress: "auto" for a bar on a terminal and in Jupyter, None for silence,
     or a function that is called with a Progress while kernels are compiled, and then with a
     RunProgress about five times a second; ``progress=print`` prints percent and time left.
+    title: of the progress bar.
     output: folder for the result, written at the end, or up to the last good sample when the
     run diverges. checkpoint: a Checkpoint that says where and when the run saves itself, besides
     at its end and on Ctrl-C. resume: a checkpoint file to go on from, of the same scene and method;
@@ -65,7 +67,7 @@ def simulate(
         output_folder(output)
     for sentence in outer_faces_warnings(scene):
         warnings.warn(sentence, stacklevel=2)
-    with reporting(progress, "simulating") as report_progress:
+    with reporting(progress, title) as report_progress:
         simulation, recorder = _started(Simulation(scene, method, driver))
         writer = _checkpoint_writer(simulation, recorder, checkpoint, resume, arrays)
         error = _run_saved(simulation, recorder, writer, plan, report_progress)
@@ -84,10 +86,7 @@ def simulate(
 def run_simulation(
     simulation, *, until, samples=200, frames=0, progress=AUTO, title="simulating", observers=()
 ):
-    """Run a Simulation, whose motion may have been set, to a time; otherwise as ``simulate``.
-
-    title: of the progress bar.
-    """
+    """Run a Simulation, whose motion may have been set, to a time; otherwise as ``simulate``."""
     instance("simulation", simulation, Simulation)
     last = macro_steps(until, simulation.method.dt0)
     plan = RunPlan(last, simulation.method.dt0, samples, frames, observers, progress)

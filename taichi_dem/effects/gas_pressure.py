@@ -42,6 +42,11 @@ class GasPressure(Effect):
         self.rise = positive("rise", rise)
         self.decay_ratio = positive("decay_ratio", decay_ratio)
 
+    @property
+    def duration(self):
+        """Time from the beginning until there is no pressure any more [s]."""
+        return (self.decay_ratio + 1.0) * self.rise
+
     def numbers(self, material):
         """Peak [Pa], rise [s] and decay ratio."""
         return self.peak, self.rise, self.decay_ratio

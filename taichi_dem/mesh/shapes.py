@@ -7,7 +7,7 @@ from typing import Optional
 import numpy as np
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import positive, shown
+from taichi_dem.kit.validation import positive, shown, whole
 from taichi_dem.mesh.mesh import Mesh, checked_mesh
 
 #: Groups of a bar: name -> (axis, 0 low or 1 high end).
@@ -85,6 +85,27 @@ def placed_together(parts: dict) -> Mesh:
         first += mesh.point_count
     joined = {key: np.vstack(faces) for key, faces in groups.items()}
     return checked_mesh(np.vstack(points), np.vstack(tetrahedra), joined)
+
+
+def mirrored_copies(mesh: Mesh, copies: int) -> Mesh:
+    """Copies of a block one behind the other along z, each the mirror image of the one before.
+
+    mesh: fills 0 to its depth along z, with flat ends in the groups back (z = 0) and front; as
+    mirror images meet, the faces of both match and bond. Groups: as in the mesh; back and front are
+    those of the ends. Raises InputError as ``checked_mesh``.
+    """
+    copies = whole("copies", copies, 1, _MOST_BOXES)
+    depth = float(mesh.points[:, 2].max())
+    points = np.tile(mesh.points, (copies, 1, 1))
+    points[1::2, :, 2] = depth - points[1::2, :, 2]
+    points[:, :, 2] += depth * np.arange(copies)[:, None]
+    # Mirrored points differ from their originals in the last bit.
+    points, place = np.unique(np.round(points.reshape(-1, 3), 12), axis=0, return_inverse=True)
+    place = place.reshape(copies, -1)
+    groups = {name: place[:, faces].reshape(-1, 3) for name, faces in mesh.groups.items()}
+    groups["back"] = place[0][mesh.groups["back"]]
+    groups["front"] = place[-1][mesh.groups["front" if copies % 2 else "back"]]
+    return checked_mesh(points, place[:, mesh.tetrahedra].reshape(-1, 4), groups)
 
 
 def _base(edge, height):

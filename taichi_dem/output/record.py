@@ -195,6 +195,22 @@ def write_bonds(path: FileName, model: Model, broken_time: np.ndarray) -> None:
     write_csv(path, columns)
 
 
+def write_bodies(path: FileName, frames: Sequence[Frame]) -> None:
+    """Write a CSV row for each body of each frame: its level, speed and displacement.
+
+    Raises InputError when the file cannot be written.
+    """
+    moved = [np.linalg.norm(frame.displacement, axis=1) for frame in frames]
+    columns = {
+        "time_s": np.concatenate([np.full(len(f.level), f.time_s) for f in frames]),
+        "body": np.concatenate([np.arange(len(frame.level)) for frame in frames]),
+        "level": np.concatenate([frame.level for frame in frames]),
+        "speed_m_s": np.concatenate([frame.speed for frame in frames]),
+        "displacement_m": np.concatenate(moved),
+    }
+    write_csv(path, columns)
+
+
 def series_name(folder: FileName) -> str:
     """Name of a series after its folder, fit for files everywhere; "run" where nothing is left.
 

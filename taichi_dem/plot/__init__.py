@@ -1,7 +1,9 @@
 """Pictures of a run; the only part of the package that imports matplotlib."""
 
 from taichi_dem.plot.animation import save_animation
+from taichi_dem.plot.attenuation import plot_attenuation
 from taichi_dem.plot.block import plot_cracks, plot_steps
+from taichi_dem.plot.deep import plot_deep_cracks
 from taichi_dem.plot.series import (
     plot_energy,
     plot_history,
@@ -11,7 +13,9 @@ from taichi_dem.plot.series import (
 )
 
 __all__ = [
+    "plot_attenuation",
     "plot_cracks",
+    "plot_deep_cracks",
     "plot_energy",
     "plot_history",
     "plot_levels",

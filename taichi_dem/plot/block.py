@@ -112,12 +112,16 @@ def _close_up(axes, view, model, frame, broken_time):
 
 
 def plot_steps(path, model, frames, dt0, broken_time=None, axis=(0.0, 0.0, 1.0)):
-    """Step of every body at several times, at most six (Konno et al., Fig 13).
+    """Step of every body at several times (Konno et al., Fig 13).
 
-    dt0: step of level 0 [s]. broken_time: (bond_count,) [s], NaN while a bond holds; lets one see
-    into open cracks. axis: towards the viewer.
+    frames: of more than six, six are drawn, evenly up to the last. dt0: step of level 0 [s].
+    broken_time: (bond_count,) [s], NaN while a bond holds; lets one see into open cracks. axis:
+    towards the viewer.
     """
     view, broken_time = View(axis), break_times(model, broken_time)
+    if len(frames) > 6:
+        picked = np.linspace(0, len(frames), 7).round().astype(int)[1:] - 1
+        frames = [frames[k] for k in picked]
     rows = 1 if len(frames) <= 3 else 2
     columns = -(-len(frames) // rows)
     top = max(1, *(int(frame.level.max()) for frame in frames))

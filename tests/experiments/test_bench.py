@@ -14,12 +14,13 @@ def processes(monkeypatch):
     """Jobs of new processes as (function, cache, whether its cache was empty); none is started."""
     made = []
 
-    def in_new_process(module, function, *arguments, cache, threads=1):
+    def call_in_process(work, *, cache, **arguments):
         cold = cache not in [seen for _, seen, _ in made]
-        made.append((function, cache, cold))
-        return {"two_scenes": [8.0, 7.0] if cold else [3.0, 2.0]}.get(function, [float(cold)])
+        made.append((work.__name__, cache, cold))
+        both = [8.0, 7.0] if cold else [3.0, 2.0]
+        return both if work is _bench_start.two_scenes else float(cold)
 
-    monkeypatch.setattr(_bench_start, "in_new_process", in_new_process)
+    monkeypatch.setattr(_bench_start, "call_in_process", call_in_process)
     return made
 
 
@@ -42,10 +43,14 @@ def test_a_quick_bench_measures_each_wait_once_and_no_ten_scenes(processes):
 
 
 def test_named_waits_are_keys_of_the_file_with_their_medians(tmp_path, monkeypatch, capsys):
-    waits = SimpleNamespace(measure=lambda quick: [("some_seconds", "s", [3.0, 1.0, 2.0], "<= 2")])
-    rates = SimpleNamespace(measure=lambda quick: [("a rate", "1/s", [4.0], "")])
-    for name in ("_bench_damper", "_bench_start", "_bench_blast", "_bench_block"):
-        monkeypatch.setattr(bench, name, waits if name == "_bench_start" else rates)
+    def waits(quick):
+        return [("some_seconds", "s", [3.0, 1.0, 2.0], "<= 2")]
+
+    def rates(quick):
+        return [("a rate", "1/s", [4.0], "")]
+
+    assert len(bench.PARTS) == 4
+    monkeypatch.setattr(bench, "PARTS", (rates, waits, rates, rates))
     monkeypatch.setattr(bench.runtime, "settings", lambda: bench.runtime.Settings("cpu", 1, False))
     bench.run(SimpleNamespace(out=str(tmp_path), quick=True))
     content = json.loads((tmp_path / "bench.json").read_text())

@@ -12,9 +12,11 @@ from taichi_dem import (
     read_mesh,
     simulate,
 )
+from taichi_dem.engine.model import Model
 from taichi_dem.mesh.mesh import group_area, volumes
-from taichi_dem.mesh.shapes import bar
+from taichi_dem.mesh.shapes import bar, mirrored_copies
 from taichi_dem.mesh.topology import topology_of
+from taichi_dem.output.attenuation import Attenuation
 from taichi_dem.plot.deep import crossings
 
 
@@ -25,10 +27,10 @@ def block(script):
 
 
 @pytest.mark.parametrize("copies", [1, 2, 3])
-def test_mirrored_copies_are_one_block(block, copies):
+def test_mirrored_copies_are_one_block(copies):
     """All bonds of each copy and one for every face of a seam; nothing stands alone between."""
     flat = read_mesh(PAPER_BLOCK)
-    deep = block.stacked_block(copies)
+    deep = mirrored_copies(flat, copies)
     bonds = [topology_of(mesh).bond_count for mesh in (flat, deep)]
     seams = sum(len(flat.groups[("front", "back")[k % 2]]) for k in range(copies - 1))
     assert bonds[1] == copies * bonds[0] + seams
@@ -43,9 +45,8 @@ def test_mirrored_copies_are_one_block(block, copies):
 
 
 def test_sizes_of_elements_follow_the_measured_counts(block):
-    from _deep_block import _MADE, scale_for
-
-    for scale, count in _MADE:
+    scale_for = block.scale_for
+    for scale, count in zip(block.SCALES, block.COUNTS):
         assert scale_for(count) == pytest.approx(scale, rel=1e-12)
     assert 0.585 < scale_for(50000) < 1.0 and scale_for(200000) < 0.585 and scale_for(3000) > 1.9
 
@@ -64,13 +65,25 @@ def test_section_cuts_triangles_where_the_plane_is():
         assert len(crossings(triangle, 2, place)[0]) == 0
 
 
-def test_power_law_of_inner_bodies_is_found(block):
+def test_power_law_of_inner_bodies_is_found():
     """Speeds of 3 r^-1.5, those of the others ten times as large: least squares to round-off."""
     distance = np.linspace(2.0, 60.0, 200)
     inner = distance < 32.0
     speed = 3.0 * distance**-1.5 * np.where(inner, 1.0, 10.0)
-    assert block.fitted(distance, speed, inner) == pytest.approx((-1.5, 3.0), rel=1e-10)
-    assert np.isnan(block.fitted(distance, speed, distance < 5.0)).all()
+    law = Attenuation(distance, speed, inner).power_law(4.0)
+    assert law == pytest.approx((-1.5, 3.0), rel=1e-10)
+    assert np.isnan(Attenuation(distance, speed, distance < 5.0).power_law(4.0)).all()
+
+
+def test_distances_are_those_from_the_axis_of_the_hole():
+    """The paper's hole lies at (1.6, 1.0) in a block of 2 m by 2 m by 0.2 m."""
+    model = Model(read_mesh(PAPER_BLOCK), CONCRETE, [])
+    made = Attenuation.of(model, np.ones(model.body_count), 0.025)
+    x, y, z = model.centre.T
+    away = np.hypot(x - 1.6, y - 1.0)
+    assert made.distance == pytest.approx(away / 0.025, rel=1e-9)
+    sides = np.min([x, 2.0 - x, y, 2.0 - y, z, 0.2 - z], axis=0)
+    assert np.array_equal(made.inner, away < sides) and made.inner.any()
 
 
 @pytest.mark.slow

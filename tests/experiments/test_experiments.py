@@ -294,7 +294,7 @@ def test_interrupted_blast_goes_on_to_the_same_files(script, monkeypatch, capsys
 
     assert run("straight") == (0, "")
     with monkeypatch.context() as patched:
-        patched.setattr(module, "ProgressBar", CtrlC)
+        patched.setattr("taichi_dem.kit.progress.progress_bar.ProgressBar", CtrlC)
         code, said = run("stopped")
     path = tmp_path / "stopped" / "checkpoint.npz"
     assert code == 130

@@ -14,7 +14,7 @@ from tests.unit.test_house import FUNCTIONS, ROOT, last_name, parsed
 ANNOTATED = (
     *("taichi_dem/kit", "taichi_dem/mesh", "taichi_dem/output"),
     *("taichi_dem/scene.py", "taichi_dem/methods.py", "taichi_dem/materials.py"),
-    *("taichi_dem/needed_effects.py", "taichi_dem/result.py"),
+    *("taichi_dem/needed_effects.py", "taichi_dem/result.py", "taichi_dem/workload"),
     *("taichi_dem/stability/mesh_limits.py", "taichi_dem/stability/quality.py"),
     "taichi_dem/stability/step_report.py",
     *("ca_damper/measures.py", "ca_damper/report.py", "ca_damper/record.py"),

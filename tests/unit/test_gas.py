@@ -40,6 +40,7 @@ def test_pulse_has_the_values_of_equation_4(body):
     pressure = body.tables.loads[0].pressure_at(times)
     assert np.abs(pressure / PEAK - shares).max() < 8 * EPS
     assert pressure.min() >= 0.0
+    assert body.tables.loads[0].duration == RISE * (1.0 + RATIO)
 
 
 def test_a_free_body_takes_the_impulse_of_the_pulse(body):

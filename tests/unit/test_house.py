@@ -32,6 +32,7 @@ LAYERS = {
         ("plot",),
         ("result",),
         ("simulate", "needed_effects"),
+        ("workload",),
         ("__init__",),
         ("__main__",),
     ),

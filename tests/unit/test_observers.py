@@ -1,6 +1,7 @@
 """Observers of a run: when they are called, their view of it, and what is refused."""
 
 import os
+import re
 import sys
 
 import numpy as np
@@ -12,6 +13,7 @@ from taichi_dem import (
     Checkpoint,
     Every,
     InputError,
+    ProgressBar,
     Scene,
     Simulation,
     SimulationDiverged,
@@ -20,9 +22,11 @@ from taichi_dem import (
     simulate,
 )
 from taichi_dem.mesh.shapes import bar
+from taichi_dem.output.progress_lines import ProgressLines
 from taichi_dem.simulate import run_simulation
 
 STEP, UNTIL = 4e-7, 8e-6
+LINE = r"t = (\S+) ms, \S+ ms a step, \d+ (?:s|min) left, \d+ MB of fields, \d+ MB in all"
 
 
 class Notes:
@@ -93,6 +97,30 @@ def assert_read_only(view):
         for array in arrays.values():
             with pytest.raises(ValueError, match="read-only"):
                 array[...] = 0
+
+
+def test_progress_lines_tell_of_each_tenth_of_the_way(capsys):
+    run(ProgressLines(UNTIL))
+    lines = capsys.readouterr().out.splitlines()
+    times = [float(re.fullmatch(LINE, line)[1]) for line in lines]
+    # 20 steps: two a tenth. Lines have three decimals.
+    assert times == pytest.approx(1e3 * 2 * STEP * np.arange(1, 11), abs=0.5e-3)
+    assert re.search(", 0 s left, ", lines[-1])
+
+
+def test_a_run_has_a_title_of_its_own(monkeypatch):
+    titles = []
+
+    class Bar(ProgressBar):
+        def __init__(self, title):
+            titles.append(title)
+            super().__init__(title)
+
+    monkeypatch.setattr("taichi_dem.kit.progress.progress_bar.ProgressBar", Bar)
+    options = {"method": Uniform(STEP), "until": UNTIL, "samples": 1}
+    simulate(scene(), title="blasting", **options)
+    simulate(scene(), **options)
+    assert titles == ["blasting", "simulating"]
 
 
 def test_an_observer_that_raises_ends_the_run_and_nothing_is_written(tmp_path):

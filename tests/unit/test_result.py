@@ -29,7 +29,8 @@ from taichi_dem import (
 from taichi_dem.kit.files import write_text
 from taichi_dem.mesh.files import write_mesh
 from taichi_dem.mesh.shapes import bar, single
-from taichi_dem.output.record import series_name, write_paraview
+from taichi_dem.output.record import series_name, write_bodies, write_paraview
+from taichi_dem.plot import block, plot_steps
 from taichi_dem.plot.summary import _draw_curves, scale, viewed_along
 from taichi_dem.plot.view import View
 from tests.bad_input.refusals import steady
@@ -220,6 +221,29 @@ def test_times_of_breaking_are_written(broken, tmp_path):
     assert [float(row["area_m2"]) for row in rows] == pytest.approx(area, rel=1e-14)
     centre = np.array([[float(row[f"{axis}_m"]) for axis in "xyz"] for row in rows])
     assert centre == pytest.approx((a + b + c) / 3.0, abs=1e-15)
+
+
+def test_bodies_of_all_frames_are_written(beam, tmp_path):
+    write_bodies(tmp_path / "bodies.csv", beam.frames)
+    rows, count = rows_of(tmp_path / "bodies.csv"), beam.model.body_count
+    assert [int(row["body"]) for row in rows] == [*range(count)] * len(beam.frames)
+    frame, last = beam.frames[-1], rows[-count:]
+    assert [float(row["time_s"]) for row in last] == [frame.time_s] * count
+    assert [int(row["level"]) for row in last] == frame.level.tolist()
+    assert [float(row["speed_m_s"]) for row in last] == frame.speed.tolist()
+    moved = np.linalg.norm(frame.displacement, axis=1)
+    assert [float(row["displacement_m"]) for row in last] == moved.tolist() and moved.any()
+
+
+@pytest.mark.parametrize(("count", "drawn"), [(3, 3), (6, 6), (7, 6), (40, 6)])
+def test_steps_are_drawn_at_six_times_at_most(beam, tmp_path, monkeypatch, count, drawn):
+    frames = [dataclasses.replace(beam.frames[0], time_s=1e-3 * k) for k in range(count)]
+    titles, levels = [], block._levels
+    monkeypatch.setattr(
+        block, "_levels", lambda *given: titles.append(given[3].time_s) or levels(*given)
+    )
+    plot_steps(tmp_path / "steps.png", beam.model, frames, 1e-6)
+    assert len(titles) == drawn and titles[-1] == frames[-1].time_s
 
 
 def test_a_body_alone_leaves_a_table_without_rows(results, tmp_path):

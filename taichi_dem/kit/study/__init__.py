@@ -10,11 +10,14 @@ from taichi_dem.kit.study.command_line import (
     interval,
     main,
     number,
+    output_paths,
     parser,
     several,
     take_defaults,
     whole,
 )
+from taichi_dem.kit.study.new_process import call_in_process, call_rounds
+from taichi_dem.kit.study.settings import add_settings, take_settings
 from taichi_dem.kit.study.summary import (
     figure,
     figures_from,
@@ -25,17 +28,22 @@ from taichi_dem.kit.study.summary import (
     versions,
     write_summary,
 )
+from taichi_dem.kit.study.table import Table
 from taichi_dem.kit.study.tables import columns_of, print_table, show_rows, write_rows
 from taichi_dem.kit.study.timing import Timing, clock, on_device, seconds_of
 from taichi_dem.kit.study.worker import ask_worker, read_job
 
 __all__ = [
     "Parser",
+    "Table",
     "Timing",
     "add_checkpoints",
+    "add_settings",
     "ask_worker",
     "bare_parser",
     "cached",
+    "call_in_process",
+    "call_rounds",
     "checkpoint_of",
     "clock",
     "columns_of",
@@ -48,6 +56,7 @@ __all__ = [
     "main",
     "number",
     "on_device",
+    "output_paths",
     "parser",
     "print_figures",
     "print_table",
@@ -57,6 +66,7 @@ __all__ = [
     "several",
     "show_rows",
     "take_defaults",
+    "take_settings",
     "value_in_words",
     "versions",
     "whole",

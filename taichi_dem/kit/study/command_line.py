@@ -1,9 +1,11 @@
 """Options, endings and exit codes of a study that is run as a program."""
 
 import argparse
+import functools
 import os
 import re
 import sys
+import time
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from typing import Any, Callable, NoReturn, Optional
@@ -11,6 +13,7 @@ from typing import Any, Callable, NoReturn, Optional
 from taichi_dem.kit import runtime
 from taichi_dem.kit.checkpoint import Checkpoint, Interrupted
 from taichi_dem.kit.errors import InputError, SimulationDiverged
+from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.progress.lasting_output import lasting_output
 from taichi_dem.kit.validation import shown
 
@@ -105,6 +108,14 @@ def take_defaults(options: Namespace, full: dict, quick: dict) -> None:
             setattr(options, name, value)
 
 
+def output_paths(folder: str) -> Callable[[str], str]:
+    """Make the folder of the output; returns a function: path of a file in it, by its name.
+
+    Raises InputError when it cannot be made or written to.
+    """
+    return functools.partial(os.path.join, output_folder(folder))
+
+
 def add_checkpoints(made: ArgumentParser) -> None:
     """Add the options of a job that saves itself; see ``checkpoint_of``."""
     words = "save the run every 600s on the wall, 5000steps or 1e-5sim simulated seconds"
@@ -128,10 +139,14 @@ def main(
     made: ArgumentParser,
     arguments: Optional[Sequence[str]] = None,
 ) -> int:
-    """Parse, start Taichi, run; returns the exit code of ``exit_code``."""
+    """Parse, start Taichi, run; returns the exit code of ``exit_code``.
+
+    options.started: when, on ``time.perf_counter``.
+    """
 
     def work():
         options = made.parse_args(arguments)
+        options.started = time.perf_counter()
         runtime.start(options.arch, options.threads)
         run(options)
 

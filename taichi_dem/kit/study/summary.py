@@ -8,6 +8,7 @@ import shlex
 import subprocess
 import sys
 import textwrap
+import time
 from argparse import Namespace
 from collections.abc import Iterable, Mapping
 from typing import Any, Union
@@ -19,7 +20,7 @@ from taichi_dem.kit.files import write_text
 from taichi_dem.kit.study.tables import print_table
 from taichi_dem.kit.version import __version__, taichi_version
 
-#: A figure by its name.
+#: A figure by its name, as of ``figure``; ``finish`` takes the arguments of that as well.
 Figures = Mapping[str, dict]
 _HERE = os.path.dirname(os.path.abspath(__file__))
 
@@ -42,8 +43,8 @@ def figures_from(row: Mapping[str, Any], units: Mapping[str, str], name: str = "
 def finish(
     options: Namespace,
     name: str,
-    figures: Figures,
-    runs: Union[Iterable, tuple[float, float]],
+    figures: Mapping[str, Union[dict, tuple]],
+    runs: Union[Iterable, tuple[float, float], float],
     *,
     caption: str = "",
     see: str = "",
@@ -51,13 +52,18 @@ def finish(
 ) -> None:
     """Write summary.json, and caption.txt where there is a caption; print them, and the folder.
 
-    runs: objects with compile_seconds and run_seconds, or both sums as a pair of numbers. see: the
-    picture to look at first. show: whether the figures are printed too.
+    figures: by name, as of ``figure``, or tuples of its arguments.
+    runs: objects with compile_seconds and run_seconds, or both sums as a pair of numbers; or those
+    of compiling alone: all else since ``main`` began counts as running. see: the picture to look
+    at first. show: whether the figures are printed too.
     """
+    if isinstance(runs, float):
+        runs = runs, time.perf_counter() - options.started - runs
     compiling, running = runs if isinstance(runs, tuple) else _seconds_of(runs)
-    write_summary(options.out, name, figures, compile_seconds=compiling, run_seconds=running)
+    made = {key: figure(*one) if isinstance(one, tuple) else one for key, one in figures.items()}
+    write_summary(options.out, name, made, compile_seconds=compiling, run_seconds=running)
     if show:
-        print_figures(figures)
+        print_figures(made)
     if caption:
         write_text(os.path.join(options.out, "caption.txt"), caption + "\n")
         print("\n" + textwrap.fill(caption, 100))

@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from typing import Any, Union
 
@@ -16,11 +17,16 @@ def ask_worker(script: Union[str, PathLike], job: dict, title: str, **environmen
 
     Raises InputError with the end of what it said, where it failed. title: of the job.
     """
+    return answer_of([str(script)], job, title, environment)
+
+
+def answer_of(program: Sequence[str], job: dict, title: str, environment: Mapping[str, str]) -> Any:
+    """The same of a program: arguments of Python, such as the name of a script."""
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "job.json")
         with open(path, "w", encoding="utf-8") as handle:
             json.dump(job, handle)
-        line = [sys.executable, str(script), path]
+        line = [sys.executable, *program, path]
         options: Any = {"capture_output": True, "text": True, "env": {**os.environ, **environment}}
         done = subprocess.run(line, **options)
     if done.returncode != 0:

@@ -1,15 +1,22 @@
 """The dashpots of all bonds of a running simulation as one linear system, and ways to sweep it.
 
-In NumPy, to compare ways that the solver does not have. A bond answers its twist (velocity and spin
-of one body against the other) with a wrench impulse; both bodies give way to it.
+In NumPy, to check the kernels' solution and to compare ways that they do not have. A bond answers
+its twist (velocity and spin of one body against the other) with a wrench impulse; both bodies give
+way to it.
 """
+
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
 from taichi_dem.step.implicit.colouring import edge_colours
 
+#: All bonds.
+ALL = slice(None)
 
-def cross_matrices(vectors):
+
+def cross_matrices(vectors: np.ndarray) -> np.ndarray:
     """Matrices [r]x with [r]x w = r x w, (n, 3, 3), of vectors (n, 3)."""
     made = np.zeros((len(vectors), 3, 3))
     for row, column, part, sign in ((0, 1, 2, -1), (0, 2, 1, 1), (1, 2, 0, -1)):
@@ -18,20 +25,23 @@ def cross_matrices(vectors):
     return made
 
 
-def applied(matrices, vectors):
+def applied(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     """Products of n matrices with n vectors."""
     return np.einsum("nij,nj->ni", matrices, vectors)
 
 
 class DashpotSystem:
-    """What the sweeps need of the bonds that hold; simulation: of ``ImplicitDashpots``, started.
+    """Matrices of the bonds that hold in a simulation by ``ImplicitDashpots``, started.
+
+    motion in all methods: velocity and spin of the bodies, (bodies, 6) [m/s, rad/s]; twist: of the
+    bonds, (n, 6).
 
     bodies: two of each bond, (2, n). onto: Jacobians from the twists of both to that of the bond,
     (2, n, 6, 6). gives: twist of a body per wrench impulse, (bodies, 6, 6) [1/kg, ...]. law:
     inverse of the bonds' own blocks. colours: of the bonds.
     """
 
-    def __init__(self, simulation):
+    def __init__(self, simulation: Any):
         solver, model = simulation.advance.solver, simulation.model
         pairs = solver.bonds.bodies.to_numpy()
         holds = pairs[:, 0] >= 0
@@ -60,19 +70,19 @@ class DashpotSystem:
             for onto, body in zip(self.onto, self.bodies)
         ]
 
-    def twists(self, motion, some=slice(None)):
+    def twists(self, motion: np.ndarray, some: Any = ALL) -> np.ndarray:
         """Twists of the bonds, or of some, at the bodies' motion (bodies, 6) [m/s, rad/s]."""
         return sum(
             applied(onto[some], motion[body[some]]) for onto, body in zip(self.onto, self.bodies)
         )
 
-    def pull(self, motion, impulse, some=slice(None)):
+    def pull(self, motion: np.ndarray, impulse: np.ndarray, some: Any = ALL) -> None:
         """Let the bonds, or some, give their bodies wrench impulses; changes motion."""
         for onto, body in zip(self.onto, self.bodies):
             push = applied(onto[some].swapaxes(1, 2), impulse)
             np.subtract.at(motion, body[some], applied(self.gives[body[some]], push))
 
-    def gauss_seidel(self, motion, twist):
+    def gauss_seidel(self, motion: np.ndarray, twist: np.ndarray) -> Iterator[np.ndarray]:
         """Motion after each sweep by colours; twist: that the impulses so far have answered."""
         solved = np.linalg.inv(self.law + sum(self._mobilities()))
         motion, twist = motion.copy(), twist.copy()
@@ -84,7 +94,9 @@ class DashpotSystem:
                 twist[some] = self.twists(motion, some)
             yield motion
 
-    def jacobi(self, motion, twist, momentum=False):
+    def jacobi(
+        self, motion: np.ndarray, twist: np.ndarray, momentum: bool = False
+    ) -> Iterator[np.ndarray]:
         """The same with all bonds at once, the mass of a body split among its bonds.
 
         momentum: Nesterov's, begun anew when it leads away (Macklin and others, 2014; Mazhar and

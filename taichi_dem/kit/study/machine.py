@@ -1,0 +1,50 @@
+"""The machine under a measurement: CPU seconds of each thread, bandwidth of the memory."""
+
+import glob
+import os
+import time
+from collections.abc import Mapping
+from typing import Optional
+
+import taichi as ti
+
+
+def thread_seconds() -> dict[int, float]:
+    """CPU seconds of each thread of this process so far, by its number; empty where unknown."""
+    found = {}
+    for path in glob.glob("/proc/self/task/*/schedstat"):
+        with open(path, encoding="ascii") as handle:
+            found[int(path.split("/")[-2])] = 1e-9 * int(handle.read().split()[0])
+    return found
+
+
+def busiest_seconds(before: Mapping[int, float], after: Mapping[int, float]) -> Optional[float]:
+    """CPU seconds between two ``thread_seconds`` that no further core would have saved.
+
+    They are those of the main thread, which waits while others work, and of the busiest of the
+    others: on free cores a run takes no less. None where threads are not known.
+    """
+    spent = {number: seconds - before.get(number, 0.0) for number, seconds in after.items()}
+    if not spent:
+        return None
+    main_thread = spent.pop(os.getpid())
+    return main_thread + max(spent.values(), default=0.0)
+
+
+@ti.kernel
+def _copy(a: ti.template(), b: ti.template()):  # type: ignore[valid-type]
+    for k in a:  # type: ignore[attr-defined]
+        b[k] = a[k]  # type: ignore[index]
+
+
+def memory_bandwidth(entries: int = 1 << 24, repeats: int = 5) -> float:
+    """Bytes a second that a copy of numbers reads and writes, the best of some repeats."""
+    a, b = (ti.field(ti.f64, shape=entries) for _ in range(2))
+    best = 0.0
+    for _ in range(repeats + 1):
+        ti.sync()
+        started = time.perf_counter()
+        _copy(a, b)
+        ti.sync()
+        best = max(best, 16.0 * entries / (time.perf_counter() - started))
+    return best

@@ -1,0 +1,49 @@
+"""How peak particle velocities fall with the distance from a blast hole."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from taichi_dem.engine.model import Model
+from taichi_dem.output.hole_monitor import HoleMonitor
+
+#: Bodies below which no power is fitted.
+_FEWEST = 10
+
+
+@dataclass(frozen=True, eq=False)
+class Attenuation:
+    """Peak velocities of bodies over their scaled distance from a hole; arrays (body_count,).
+
+    distance: from the hole's axis, in radii of the hole. speed: the largest [m/s]. inner: whether
+    the body is nearer to the axis than to any side of the block; elsewhere the wave comes back.
+    """
+
+    distance: np.ndarray
+    speed: np.ndarray
+    inner: np.ndarray
+
+    @classmethod
+    def of(
+        cls, model: Model, peak_speed: np.ndarray, radius: float, group: str = "hole"
+    ) -> Attenuation:
+        """Attenuation in a run; radius: of the hole [m], whose wall is a face group."""
+        hole, points = HoleMonitor(model, group), model.mesh.points
+        away = model.centre - hole.axis_point
+        away = np.linalg.norm(away - np.outer(away @ hole.axis, hole.axis), axis=1)
+        ends = model.centre - points.min(axis=0), points.max(axis=0) - model.centre
+        return cls(away / radius, peak_speed, away < np.minimum(*ends).min(axis=1))
+
+    def power_law(self, nearest: float) -> tuple[float, float]:
+        """Exponent, and speed at one radius [m/s], for inner bodies by least squares.
+
+        nearest: bodies nearer to the axis are left out [radii]. NaN for both where fewer than ten
+        bodies are left.
+        """
+        taken = self.inner & (self.distance > nearest) & (self.speed > 0.0)
+        if taken.sum() < _FEWEST:
+            return np.nan, np.nan
+        slope, level = np.polyfit(np.log(self.distance[taken]), np.log(self.speed[taken]), 1)
+        return float(slope), float(np.exp(level))

@@ -1,0 +1,32 @@
+"""Peak particle velocities over the distance from a blast hole."""
+
+import numpy as np
+
+from taichi_dem.kit.plot_style import BLACK, BLUE, GREY, picture
+
+
+def plot_attenuation(path, attenuation, nearest):
+    """Peak speed of every body, and the power law fitted from the nearest distance on [radii].
+
+    attenuation: an ``Attenuation``.
+    """
+    distance, speed, inner = attenuation.distance, attenuation.speed, attenuation.inner
+    slope, level = attenuation.power_law(nearest)
+    with picture(path, size=(6.6, 4.6)) as (_, axes):
+        for chosen, colour, side in ((~inner, GREY, "a free side"), (inner, BLUE, "the hole")):
+            look = {"s": 4, "alpha": 0.4, "linewidths": 0, "color": colour}
+            axes.scatter(distance[chosen], speed[chosen], label=f"bodies nearer to {side}", **look)
+        ends = np.array([nearest, distance[inner].max()])
+        fit, wave = level * ends**slope, (ends / ends[0]) ** -0.5
+        axes.plot(ends, fit, color=BLACK, label=f"power {slope:.2f} (fitted)")
+        axes.plot(ends, fit[0] * wave, ":", color=BLACK, label="power -0.5 (cylindrical wave)")
+        positive = speed[speed > 0.0]
+        axes.set(
+            xscale="log",
+            yscale="log",
+            xlabel="distance from the axis / radius of the hole [1]",
+            ylabel="peak particle velocity [m/s]",
+            ylim=(0.5 * np.percentile(positive, 0.1), 2.0 * positive.max()),
+        )
+        for handle in axes.legend(loc="upper right", markerscale=4).legend_handles:
+            handle.set_alpha(1.0)

@@ -1,0 +1,77 @@
+"""The dashpots of all bonds as a linear system in NumPy, against itself and the kernels."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, effects
+from taichi_dem.diagnostics.dashpot_system import DashpotSystem, cross_matrices
+from taichi_dem.mesh.shapes import bar
+
+STEP = 4e-7
+
+
+@pytest.fixture(scope="module")
+def simulation():
+    """A damped bar in motion after a step, its dashpots solved to round-off.
+
+    With theta = 1 the twists that the dashpots answered are those at the end of the step.
+    """
+    scene = Scene(bar(0.1, 0.05, (3, 2, 2)), CONCRETE, [effects.BondDamping()])
+    made = Simulation(scene, ImplicitDashpots(STEP, theta=1.0, sweeps=(2, 500), tolerance=1e-14))
+    centre = made.model.centre
+    speeds = np.random.default_rng(1).normal(size=(2, *centre.shape))
+    made.state.set_motion(centre, np.tile([1.0, 0.0, 0.0, 0.0], (len(centre), 1)), *speeds)
+    made.start()
+    made.advance_to(1)
+    return made
+
+
+@pytest.fixture(scope="module")
+def kicked(simulation):
+    """The system, motion after random kicks, and the twists before them."""
+    system, now = DashpotSystem(simulation), simulation.state.motion()
+    still = np.hstack([now["velocity"], now["spin"]])
+    return system, still + np.random.default_rng(2).normal(size=still.shape), system.twists(still)
+
+
+def after(sweeps, count):
+    return next(itertools.islice(sweeps, count, None))
+
+
+def test_cross_matrices_multiply_as_the_cross_product():
+    r, w = np.random.default_rng(0).normal(size=(2, 5, 3))
+    assert np.allclose(np.einsum("nij,nj->ni", cross_matrices(r), w), np.cross(r, w), rtol=1e-15)
+
+
+def test_all_ways_of_sweeping_reach_one_motion(kicked):
+    """Three iterations of one system that has one solution."""
+    system, motion, twist = kicked
+    exact = after(system.gauss_seidel(motion, twist), 300)
+    assert np.abs(exact - motion).max() > 0.1
+    for momentum in (False, True):
+        found = after(system.jacobi(motion, twist, momentum=momentum), 2000)
+        assert np.abs(found - exact).max() < 1e-10
+
+
+def test_sweeps_keep_the_linear_momentum(kicked, simulation):
+    """Both bodies of a bond get the same impulse, with opposite signs."""
+    system, motion, twist = kicked
+    mass = simulation.model.body_mass
+    exact = after(system.gauss_seidel(motion, twist), 20)
+    change = mass @ (exact - motion)[:, :3]
+    assert np.abs(change).max() < 1e-12 * np.abs(mass[:, None] * motion[:, :3]).sum()
+
+
+def test_what_the_kernels_have_solved_is_a_solution(simulation):
+    """A sweep from the kernels' velocities, with the twists that they answered, changes nothing.
+
+    Nothing but what a step turns the branches: of them, and of spins near 50 / s, 2e-5.
+    """
+    system, bonds = DashpotSystem(simulation), simulation.advance.solver.bonds
+    motion = simulation.advance.solver.velocities.twist.to_numpy()
+    swept = after(system.gauss_seidel(motion, bonds.last.to_numpy()), 0)
+    assert np.abs(swept - motion).max() < 2e-5 * np.abs(motion).max()
+    unsolved = after(system.gauss_seidel(motion, 0.5 * bonds.last.to_numpy()), 0)
+    assert np.abs(unsolved - motion).max() > 0.1 * np.abs(motion).max()
