@@ -1,7 +1,5 @@
 """Pictures and words of ``demo_damper.py``: a container with particles beside an empty one."""
 
-import os
-
 import numpy as np
 
 from ca_damper.plot import Box, Hanging, film_hanging
@@ -9,20 +7,20 @@ from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.plot_style import BLACK, GREY, STYLES, picture, styles_of
 
 
-def write(folder, runs, o, filling, options):
+def write(at, runs, o, filling, options):
     """Write the curves, their table and the animation; runs: history, Cycles and frames by name."""
     full, empty = (series(runs[title][0], o) for title in ("full", "empty"))
     table = {**full, "x_empty_mm": empty["x_mm"], "energy_empty_mJ": empty["energy_mJ"]}
-    write_csv(os.path.join(folder, "motion.csv"), table)
+    write_csv(at("motion.csv"), table)
     title, style = counted(options.particles), styles_of([filling.label])[filling.label]
-    plot_motion(os.path.join(folder, "motion.png"), title, full, empty, style)
+    plot_motion(at("motion.png"), title, full, empty, style)
     omega = 2.0 * np.pi * options.frequency * o.natural_frequency
     fastest = 1.2 * omega * max(float(cycles.amplitude[0]) for _, cycles, _ in runs.values())
     box = Box.of_spheres(filling) if options.filling == "spheres" else Box.of_automaton(filling)
     # The empty container moves as smoothly as the structure: its box is not staggered.
     bare = Hanging("empty", Box(box.width, box.height, box.diameter), runs["empty"][2], GREY)
     shown = [bare, Hanging(title, box, runs["full"][2], style.colour)]
-    film_hanging(os.path.join(folder, "damper.gif"), shown, fastest)
+    film_hanging(at("damper.gif"), shown, fastest)
 
 
 def series(history, o):
@@ -59,7 +57,7 @@ def plot_motion(path, title, full, empty, style):
 
 def sentences(figures, filling, oscillator, options):
     """The comparison in words."""
-    value = {name: item["value"] for name, item in figures.items()}
+    value = {name: one for name, (one, _) in figures.items()}
     own, mass = oscillator.natural_frequency, 1e3 * oscillator.mass
     load = 1e3 * options.particles * filling.particle_mass
     return (

@@ -1,13 +1,10 @@
 """The law of ``demo_fracture_law.py`` beside the tractions that its bench measures."""
 
-import os
-
 import numpy as np
 
 from taichi_dem import CONCRETE as LAW
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, RED, picture
-from taichi_dem.kit.study import figure
 from taichi_dem.plot.film import moving_picture
 
 #: Way of the specimen in tension [m]: beyond the strength, back into compression, to the break.
@@ -82,8 +79,8 @@ def figures_of(rows):
     figures = {}
     for row in rows:
         name = row["name"]
-        figures[name] = figure(float(row["measured"]), row["unit"], PAPER.get(name))
-        figures[f"{name}_error"] = figure(row["error"], "1")
+        figures[name] = (float(row["measured"]), row["unit"], PAPER.get(name))
+        figures[f"{name}_error"] = (row["error"], "1")
     return figures
 
 
@@ -115,18 +112,17 @@ def drawn_law():
     return lines
 
 
-def write(curves, points, folder):
+def write(curves, points, at):
     """Write the curves, their tables and the film; points: of a specimen."""
     opening, pull = curves[0]
-    path = os.path.join(folder, "tension.csv")
-    write_csv(path, {"opening_m": opening, "traction_Pa": pull})
+    write_csv(at("tension.csv"), {"opening_m": opening, "traction_Pa": pull})
     columns = {}
     for pressure, (sliding, shear) in zip(PRESSURES, curves[1:]):
         columns[f"sliding_{1e-6 * pressure:g}_MPa_m"] = sliding
         columns[f"traction_{1e-6 * pressure:g}_MPa_Pa"] = shear
-    write_csv(os.path.join(folder, "shear.csv"), columns)
-    picture_law(os.path.join(folder, "law.png"), curves)
-    film_law(os.path.join(folder, "law.gif"), curves, points)
+    write_csv(at("shear.csv"), columns)
+    picture_law(at("law.png"), curves)
+    film_law(at("law.gif"), curves, points)
 
 
 def draw(panels, curves, size):

@@ -1,28 +1,36 @@
 """Runs of ``demo_multirate.py``: what is measured on them, tables, pictures and words."""
 
-import os
-
 import numpy as np
 
-from _blast import level_shares
+from _blast import level_columns, level_shares
+from taichi_dem import InputError
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.plot_style import GREY, line_key, picture, styles_of
-from taichi_dem.kit.study import figures_from
+from taichi_dem.kit.study import Table
 from taichi_dem.mesh.topology import faces_of_group
 from taichi_dem.plot.film_runs import FilmedRun, film_runs
 from taichi_dem.plot.levels import draw_level_shares, level_look, level_names
 
-TABLE = {
-    "method": ("method", ""),
-    "evaluations": ("evaluations", ","),
-    "fewer by": ("fewer_evaluations", ".2f"),
-    "struck end [um]": ("struck_um", ".2f"),
-    "difference": ("difference", ".3f%"),
-    "broken": ("broken_faces", ""),
-    "residual": ("residual", ".2g%"),
-    "CPU [s]": ("cpu_s", ".2f"),
-}
-UNITS = {"evaluations": "1", "struck_um": "um", "broken_faces": "1", "residual": "1"}
+TABLE = Table(
+    method=("name", "method"),
+    evaluations=(lambda made: int(made.evaluations[-1]), "evaluations", ",", "1"),
+    fewer_evaluations=("fewer_evaluations", "fewer by", ".2f", "1"),
+    struck_um=(lambda made: 1e6 * float(made.struck[-1]), "struck end [um]", ".2f", "um"),
+    difference=("difference", "difference", ".3f%", "1"),
+    broken_faces=("result.report.broken_faces", "broken", "", "1"),
+    residual=("result.report.energy_residual_fraction", "residual", ".2g%", "1"),
+    cpu_s=("result.report.run_cpu_seconds", "CPU [s]", ".2f"),
+)
+
+
+def check_speed(speed, gap, until):
+    """InputError for a fragment that does not cross a gap [m] in half of the time [s]."""
+    slowest = 2.0 * gap / until
+    if speed < slowest:
+        raise InputError(
+            f"speed must be at least {slowest:g} m/s, at which the fragment crosses its gap of "
+            f"{1e6 * gap:g} um in half of {until:g} s, got {speed:g}"
+        )
 
 
 class Impact:
@@ -43,27 +51,20 @@ class Impact:
         bodies, _ = faces_of_group(self.model.mesh, self.model.topology, group)
         return np.array([-frame.displacement[bodies, 0].mean() for frame in self.frames])
 
-    def row(self, base):
-        """Row of the table; differences from a base are the largest over time, of its way."""
-        report, apart = self.result.report, np.abs(self.struck - base.struck).max()
-        return {
-            "method": self.name,
-            "evaluations": int(self.evaluations[-1]),
-            "fewer_evaluations": float(base.evaluations[-1] / self.evaluations[-1]),
-            "struck_um": 1e6 * float(self.struck[-1]),
-            "difference": float(apart / np.abs(base.struck).max()),
-            "broken_faces": report.broken_faces,
-            "residual": report.energy_residual_fraction,
-            "cpu_s": report.run_cpu_seconds,
-        }
+    def compare(self, base):
+        """Take a base; the difference from it is the largest over time, of its largest way."""
+        self.fewer_evaluations = float(base.evaluations[-1] / self.evaluations[-1])
+        apart = np.abs(self.struck - base.struck).max()
+        self.difference = float(apart / np.abs(base.struck).max())
 
 
 def figures_of(rows):
-    """Figures for summary.json."""
-    figures = figures_from(rows[0], UNITS, f"{rows[0]['method']}_{{}}")
-    compared = {**UNITS, "fewer_evaluations": "1", "difference": "1"}
-    for row in rows[1:]:
-        figures.update(figures_from(row, compared, f"{row['method']}_{{}}"))
+    """Figures for summary.json; the first row is what the others are compared with."""
+    figures = {}
+    for row in rows:
+        figures.update(TABLE.figures(row, "{method}_{key}"))
+    for key in ("fewer_evaluations", "difference"):
+        del figures[f"{rows[0]['method']}_{key}"]
     return figures
 
 
@@ -97,19 +98,18 @@ def short_steps(impact, length):
     )
 
 
-def write(impacts, dt0, folder):
+def write(impacts, dt0, at):
     """Write the tables of all that is plotted, the picture, and the film of the first two."""
     columns = {"time_s": impacts[0].time}
     for impact in impacts:
         columns[f"struck_{impact.name}_m"] = impact.struck
         columns[f"far_{impact.name}_m"] = impact.far
         columns[f"evaluations_{impact.name}"] = impact.evaluations
-        levels = {f"level_{k}": share for k, share in enumerate(level_shares(impact.levels).T)}
-        path = os.path.join(folder, f"levels_{impact.name}.csv")
-        write_csv(path, {"time_s": impact.time, **levels})
-    write_csv(os.path.join(folder, "blow.csv"), columns)
-    picture_blow(os.path.join(folder, "blow.png"), impacts, dt0)
-    film_blow(os.path.join(folder, "blow.gif"), impacts[:2], dt0)
+        levels = level_columns(level_shares(impact.levels))
+        write_csv(at(f"levels_{impact.name}.csv"), {"time_s": impact.time, **levels})
+    write_csv(at("blow.csv"), columns)
+    picture_blow(at("blow.png"), impacts, dt0)
+    film_blow(at("blow.gif"), impacts[:2], dt0)
 
 
 def picture_blow(path, impacts, dt0):

@@ -1,23 +1,24 @@
 """Runs of ``demo_step_too_large.py``: what is seen of them, tables, pictures and words."""
 
-import os
 import textwrap
 
 import numpy as np
 
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.plot_style import BLACK, GREEN, GREY, ORANGE, RED, picture, power, seconds
-from taichi_dem.kit.study import figure, show_rows, write_rows
+from taichi_dem.kit.study import Table, write_rows
 from taichi_dem.plot.film_runs import FilmedRun, film_runs
 
-TABLE = {
-    "limited by": ("limited_by", ""),
-    "step / limit": ("share_of_limit", "g"),
-    "step [s]": ("step_s", ".3g"),
-    "reached [s]": ("reached_s", ".3g"),
-    "unexplained / put in": ("unexplained", ".2g"),
-    "end": ("end", ""),
-}
+TABLE = Table(
+    limited_by=("limit", "limited by"),
+    share_of_limit=("share", "step / limit", "g"),
+    step_s=("step", "step [s]", ".3g"),
+    diverged=(lambda made: int(bool(made.sentence)), "", "", "1"),
+    reached_s=(lambda made: float(made.time[-1]), "reached [s]", ".3g", "s"),
+    unexplained=(lambda made: float(made.residual[-1]), "unexplained / put in", ".2g", "1"),
+    end=(lambda made: "diverged" if made.sentence else "done", "end"),
+    sentence=("sentence",),
+)
 #: Colours of the runs of a limit; axes of the unexplained energy.
 COLOURS = (GREEN, ORANGE, RED)
 UNEXPLAINED = {"yscale": "log", "ylim": (1e-5, 1e3)}
@@ -39,18 +40,6 @@ class Struck:
             [[row["load_work"], row["residual"]] for row in seen.rows["energy"]]
         ).T
         self.residual = found / np.where(given > 0.0, given, np.inf)
-
-    @property
-    def row(self):
-        """Row of the table."""
-        return {
-            "limited_by": self.limit,
-            "share_of_limit": self.share,
-            "step_s": self.step,
-            "reached_s": float(self.time[-1]),
-            "unexplained": float(self.residual[-1]),
-            "end": "diverged" if self.sentence else "done",
-        }
 
 
 def corner_speed(view):
@@ -82,35 +71,15 @@ def ended(made):
     )
 
 
-def print_runs(runs):
-    """The runs as a table, and every sentence word for word."""
-    show_rows([made.row for made in runs], TABLE)
-    said = [f"  {m.limit}, {m.share:g}: {m.sentence}" for m in runs if m.sentence]
-    print("What the program said:", *said, "", sep="\n")
-
-
-def figures_of(runs, limits):
-    """Figures for summary.json."""
-    figures = {f"limit_{limit}_s": figure(step, "s") for limit, step in limits.items()}
-    for made in runs:
-        key = f"{made.limit}_{made.share:g}"
-        figures[f"{key}_diverged"] = figure(int(bool(made.sentence)), "1")
-        figures[f"{key}_reached_s"] = figure(made.row["reached_s"], "s")
-        figures[f"{key}_unexplained"] = figure(made.row["unexplained"], "1")
-    return figures
-
-
-def write(runs, folder):
+def write(runs, rows, at):
     """Write the tables of all that is plotted, the picture, and the film."""
     for made in runs:
         columns = {"time_s": made.time, "unexplained_over_put_in": made.residual}
-        name = f"history_{made.limit}_{made.share:g}.csv"
-        write_csv(os.path.join(folder, name), columns)
-    names = ("limited_by", "share_of_limit", "step_s", "reached_s")
-    rows = [{**{k: made.row[k] for k in names}, "sentence": made.sentence} for made in runs]
-    write_rows(os.path.join(folder, "steps.csv"), rows)
-    picture_energy(os.path.join(folder, "energy.png"), runs)
-    film(os.path.join(folder, "shaken.gif"), *runs[:2])
+        write_csv(at(f"history_{made.limit}_{made.share:g}.csv"), columns)
+    names = ("limited_by", "share_of_limit", "step_s", "reached_s", "sentence")
+    write_rows(at("steps.csv"), [{name: row[name] for name in names} for row in rows])
+    picture_energy(at("energy.png"), runs)
+    film(at("shaken.gif"), *runs[:2])
 
 
 def picture_energy(path, runs):

@@ -1,16 +1,13 @@
 """Bars of ``demo_wave_and_spall.py`` over time: their pictures, tables and words."""
 
-import os
-
 import numpy as np
 
 from taichi_dem import CONCRETE
 from taichi_dem.kit.files import write_csv
-from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, ORANGE, RED, picture
-from taichi_dem.kit.study import figure, figures_from, write_rows
-from taichi_dem.output.profile import Profile
-from taichi_dem.plot.film import moving_picture
-from taichi_dem.plot.space_time import draw_space_time, tension_shades
+from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, RED, picture
+from taichi_dem.kit.study import write_rows
+from taichi_dem.output.profile import Profile, travel_time
+from taichi_dem.plot.bars import draw_space_time, film_bar
 
 #: Length of a bar [m]; bodies a cell.
 LENGTH, CELL = 4.0, 6
@@ -35,17 +32,11 @@ class Bars(Profile):
         self.place = self.cell * (np.arange(cells) + 0.5)
         self.gates = [round(share * cells) for share in GATES]
 
-    def stress(self, modulus):
-        """Stress of every joint [Pa], tension positive, zero where broken; modulus [Pa]."""
-        strain = np.diff(self.displacement, axis=2) / self.cell
-        return np.where(self.joints, 0.0, modulus * strain)
-
     def speed(self, step):
-        """Speed [m/s] at which a push passes the gates: where the two records agree best."""
-        fine = np.arange(0.0, self.time[-1], step)
-        first, second = (np.interp(fine, self.time, self.velocity[:, 0, k]) for k in self.gates)
-        likeness = np.correlate(second, first, mode="full")[len(fine) - 1 :]
-        return (self.gates[1] - self.gates[0]) * self.cell / (likeness.argmax() * step)
+        """Speed [m/s] at which a push passes the gates."""
+        first, second = (self.velocity[:, 0, k] for k in self.gates)
+        way = (self.gates[1] - self.gates[0]) * self.cell
+        return way / travel_time(self.time, first, second, step)
 
     def spalled(self, ratios, speed, tail):
         """A row for every bar: the stress that arrived, depth of the first break, the formula's."""
@@ -94,28 +85,28 @@ def shown(rows):
 def figures_of(wave, rows, speed):
     """Figures for summary.json."""
     figures = {
-        "wave_speed_m_s": figure(float(speed), "m/s"),
-        "free_end_over_wave": figure(wave.doubling, "1"),
-        "cell_m": figure(wave.cell, "m"),
+        "wave_speed_m_s": (float(speed), "m/s"),
+        "free_end_over_wave": (wave.doubling, "1"),
+        "cell_m": (wave.cell, "m"),
     }
     for row in rows:
         key, apart = f"spall_{row['ratio']:g}", float(row["depth_m"] - row["formula_m"])
-        figures.update(figures_from(row, {"depth_m": "m", "formula_m": "m"}, f"{key}_{{}}"))
-        figures[f"{key}_error_cells"] = figure(apart / wave.cell, "1")
+        figures.update({f"{key}_{name}": (row[name], "m") for name in ("depth_m", "formula_m")})
+        figures[f"{key}_error_cells"] = (apart / wave.cell, "1")
     return figures
 
 
-def write(wave, made, rows, speed, folder):
+def write(wave, made, rows, speed, at):
     """Write the pictures, their tables and the film."""
     names = [f"at_{wave.place[k]:g}_m" for k in wave.gates]
     columns = dict(zip([*names, "free_end"], wave.velocity[:, 0, [*wave.gates, -1]].T))
-    write_csv(os.path.join(folder, "wave.csv"), {"time_s": wave.time, **columns})
-    write_rows(os.path.join(folder, "spall.csv"), rows)
-    picture_wave(os.path.join(folder, "wave.png"), wave)
-    stress = 1e-6 * made.stress(CONCRETE.density * speed**2)
-    picture_spall(os.path.join(folder, "spall.png"), made, stress, rows)
-    bar = shown(rows)
-    film_spall(os.path.join(folder, "spall.gif"), made, stress[:, bar], bar)
+    write_csv(at("wave.csv"), {"time_s": wave.time, **columns})
+    write_rows(at("spall.csv"), rows)
+    picture_wave(at("wave.png"), wave)
+    stress = made.stress(CONCRETE.density * speed**2, made.cell)
+    picture_spall(at("spall.png"), made, 1e-6 * stress, rows)
+    look = {"length": LENGTH, "strength_pa": CONCRETE.tensile_strength}
+    film_bar(at("spall.gif"), made, stress, bar=shown(rows), **look)
 
 
 def picture_wave(path, wave):
@@ -159,36 +150,3 @@ def picture_spall(path, made, stress, rows):
         axes.set(xlabel="pulse s$_0$ that arrived [MPa]", ylabel="depth of the first break [m]")
         axes.set(ylim=(0.0, None), title="the stronger, the thinner")
         axes.legend(loc="upper right")
-
-
-def film_spall(path, made, stress, bar, count=40, magnify=150.0):
-    """Velocity, stress [MPa] and a bar itself, broken joints marked. count: of pictures."""
-    speed, joint = made.velocity[:, bar], made.place[:-1] + 0.5 * made.cell
-    moved = magnify * (made.displacement[:, bar] - made.displacement[:, bar, :1])
-    with moving_picture(path, (4.0, 3.8), 110) as (figure, shoot):
-        ratios = (1.0, 1.0, 0.55)
-        fast, tight, whole = figure.subplots(3, 1, sharex=True, height_ratios=ratios)
-        (moving,) = fast.plot(made.place, speed[0], color=GREEN)
-        fast.set(ylabel="velocity [m/s]", ylim=(1.1 * speed.min(), 1.1 * speed.max()))
-        (loaded,) = tight.plot(joint, stress[0], color=BLACK)
-        strength = 1e-6 * CONCRETE.tensile_strength
-        tight.axhline(strength, color=RED, ls="--", label="strength")
-        (breaks,) = tight.plot([], [], "x", color=ORANGE, ms=6, mew=1.6, label="broken face")
-        tight.set(ylabel="stress [MPa]", ylim=(1.1 * stress.min(), 1.1 * stress.max()))
-        tight.legend(loc="lower left")
-        boxes = whole.bar(made.place, 1.0, made.cell, linewidth=0.0)
-        whole.set(xlim=(-0.05 * LENGTH, 1.16 * LENGTH), ylim=(0.0, 1.0), yticks=[])
-        whole.set(xlabel=f"place [m]; displacement × {magnify:g}, red: tension, blue: pressure")
-        whole.grid(False)
-        # A cell has the mean stress of its two joints.
-        own = 0.5 * (np.pad(stress, ((0, 0), (0, 1))) + np.pad(stress, ((0, 0), (1, 0))))
-        shades = tension_shades(own, np.abs(stress).max())
-        for row in np.linspace(0, len(made.time) - 1, count).round().astype(int):
-            broken = joint[made.joints[row, bar]]
-            moving.set_ydata(speed[row])
-            loaded.set_ydata(stress[row])
-            breaks.set_data(broken, 0.0 * broken)
-            for box, place, shade in zip(boxes, made.place + moved[row], shades[row]):
-                box.set(x=place - 0.5 * made.cell, facecolor=shade)
-            fast.set_title(f"t = {1e3 * made.time[row]:.2f} ms")
-            shoot()

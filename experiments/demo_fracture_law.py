@@ -19,24 +19,17 @@ import numpy as np
 
 import _fracture_law as law
 from taichi_dem import CONCRETE, Every, Scene, Simulation, Uniform, effects
-from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.kit.study import finish, main, parser, show_rows, whole
+from taichi_dem.kit.study import finish, main, output_paths, parser, show_rows, whole
 from taichi_dem.mesh.mesh import group_area
 from taichi_dem.mesh.shapes import pair, placed_together, single
 from taichi_dem.simulate import run_simulation
 
-NAME, QUICK, FULL = "demo_fracture_law", 1000, 5000
+NAME = "demo_fracture_law"
+SETTINGS = {"steps": (5000, 1000, whole(200, 100000), "samples along the way, 5000")}
 EDGE, APART = 0.05, 0.2
 #: Bodies are driven, so the step decides only how finely the law is sampled.
 STEP = 1e-8
-
-
-def options_parser():
-    """Options of this demonstration."""
-    made = parser(NAME, __doc__)
-    made.add_argument("--steps", type=whole(200, 100000), help="samples along the way, 5000")
-    return made
 
 
 def bench():
@@ -84,15 +77,14 @@ def measure(steps):
 
 def run(options):
     """Measure all specimens, compare with the law, picture."""
-    steps = options.steps or (QUICK if options.quick else FULL)
-    folder = output_folder(options.out)
-    curves, result = measure(steps)
+    at = output_paths(options.out)
+    curves, result = measure(options.steps)
     rows = law.comparison(curves, round(result.broken_time[0] / STEP))
-    law.write(curves, pair(EDGE).points, folder)
+    law.write(curves, pair(EDGE).points, at)
     show_rows(rows, law.TABLE)
-    caption = law.caption(rows, steps)
+    caption = law.caption(rows, options.steps)
     finish(options, NAME, law.figures_of(rows), [result.report], caption=caption)
 
 
 if __name__ == "__main__":
-    sys.exit(main(run, options_parser()))
+    sys.exit(main(run, parser(NAME, __doc__), settings=SETTINGS))

@@ -16,28 +16,22 @@ summary.json to results/demo_step_too_large/.
 import sys
 
 import _step_too_large as shown
-from taichi_dem import (
-    CONCRETE,
-    At,
-    RunView,
-    Scene,
-    SimulationDiverged,
-    Uniform,
-    Watch,
-    effects,
-    quality_report,
-    simulate,
-)
-from taichi_dem.kit.files import output_folder
+import taichi_dem as dem
+from taichi_dem.kit import study
 from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.kit.study import finish, main, number, parser
 from taichi_dem.mesh.shapes import bar
+from taichi_dem.simulate import outcome_of
 from taichi_dem.simulation import macro_steps
 
 NAME = "demo_step_too_large"
-#: Steps as shares of the limit, by what sets it; the first is safe, the second just too large.
-QUICK = {"dashpots": (0.9, 1.3)}
-FULL = {"dashpots": (0.9, 1.3, 2.0), "springs": (0.9, 1.1, 1.3)}
+SETTINGS = {
+    "peak": (1e6, 1e6, study.number(0, 1e8), "of the blow [Pa], 1e6"),
+    # Steps as shares of the limit; the first is safe, the second just too large.
+    "shares": (
+        {"dashpots": (0.9, 1.3, 2.0), "springs": (0.9, 1.1, 1.3)},
+        {"dashpots": (0.9, 1.3)},
+    ),
+}
 #: Simulated time [s], looks on the way.
 UNTIL, SAMPLES = {"dashpots": 4e-5, "springs": 2e-4}, 200
 BAR = bar(0.4, 0.1, (8, 2, 2))
@@ -45,40 +39,32 @@ BAR = bar(0.4, 0.1, (8, 2, 2))
 UNHEEDED = 5
 
 
-def options_parser():
-    """Options of this demonstration."""
-    made = parser(NAME, __doc__)
-    made.add_argument("--peak", type=number(0, 1e8), default=1e6, help="of the blow [Pa], 1e6")
-    return made
-
-
 def struck_bar(limit, peak):
     """The scene: a bar under a short blow on its left end, with or without dashpots."""
-    blow = effects.GasPressure("left", peak=peak, rise=5e-6, decay_ratio=2.0)
-    damping = [effects.BondDamping()] if limit == "dashpots" else []
-    return Scene(BAR, CONCRETE, [blow, *damping])
+    blow = dem.effects.GasPressure("left", peak=peak, rise=5e-6, decay_ratio=2.0)
+    damping = [dem.effects.BondDamping()] if limit == "dashpots" else []
+    return dem.Scene(BAR, dem.CONCRETE, [blow, *damping])
 
 
 def strike(limit, share, peak):
     """Run the bar with a share of the limit as its step, to its end or as far as it goes."""
     scene = struck_bar(limit, peak)
     step = share * longest_step(limit)
-    when = At([step * mark for mark in marks(macro_steps(UNTIL[limit], step))])
-    energy = {"energy": RunView.energy_balance, "frame": RunView.frame}
-    seen = Watch(when, time=lambda view: view.time_s, speed=shown.corner_speed, **energy)
+    when = dem.At([step * mark for mark in marks(macro_steps(UNTIL[limit], step))])
+    energy = {"energy": dem.RunView.energy_balance, "frame": dem.RunView.frame}
+    seen = dem.Watch(when, time=lambda view: view.time_s, speed=shown.corner_speed, **energy)
     with ProgressBar(f"{share:g} x the limit of {limit}") as bar_shown:
         looks = {"samples": 1, "progress": bar_shown, "observers": [seen]}
-        try:
-            result = simulate(scene, method=Uniform(step), until=UNTIL[limit], **looks)
-        except SimulationDiverged as diverged:
-            result = diverged.result
-            seen.observe(seen.view)
+        until = UNTIL[limit]
+        result = outcome_of(dem.simulate, scene, method=dem.Uniform(step), until=until, **looks)
+    if result.diverged:
+        seen.observe(seen.view)
     return shown.Struck(limit, share, step, seen, result)
 
 
 def longest_step(limit):
     """Longest safe step of the bar's worst body [s], by what sets it."""
-    report = quality_report(BAR, CONCRETE)
+    report = dem.quality_report(BAR, dem.CONCRETE)
     return float({"dashpots": report.dashpot_step_s, "springs": report.spring_step_s}[limit].min())
 
 
@@ -90,15 +76,19 @@ def marks(last):
 
 def run(options):
     """Strike the bar with every step, compare, picture."""
-    cases = (QUICK if options.quick else FULL).items()
-    output_folder(options.out)
+    at, cases = study.output_paths(options.out), options.shares.items()
     runs = [strike(limit, share, options.peak) for limit, shares in cases for share in shares]
-    shown.print_runs(runs)
-    shown.write(runs, options.out)
-    figures = shown.figures_of(runs, {limit: longest_step(limit) for limit in UNTIL})
+    rows = shown.TABLE.rows(runs)
+    shown.TABLE.show(rows)
+    said = [f"  {made.limit}, {made.share:g}: {made.sentence}" for made in runs if made.sentence]
+    print("What the program said:", *said, "", sep="\n")
+    shown.write(runs, rows, at)
+    figures = {f"limit_{limit}_s": (longest_step(limit), "s") for limit in UNTIL}
+    for row in rows:
+        figures.update(shown.TABLE.figures(row, "{limited_by}_{share_of_limit:g}_{key}"))
     reports = [made.result.report for made in runs]
-    finish(options, NAME, figures, reports, caption=shown.caption(runs))
+    study.finish(options, NAME, figures, reports, caption=shown.caption(runs))
 
 
 if __name__ == "__main__":
-    sys.exit(main(run, options_parser()))
+    sys.exit(study.main(run, study.parser(NAME, __doc__), settings=SETTINGS))

@@ -22,28 +22,23 @@ import numpy as np
 from _demo import set_moving
 from _wave_and_spall import CELL, LENGTH, TABLE, Bars, caption, figures_of, write
 from taichi_dem import CONCRETE, Every, Scene, Simulation, Uniform, effects
-from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.kit.study import finish, main, parser, show_rows, whole
+from taichi_dem.kit.study import finish, main, output_paths, parser, show_rows, whole
 from taichi_dem.mesh.shapes import bar, placed_together
 from taichi_dem.simulate import run_simulation
 
 NAME = "demo_wave_and_spall"
-WIDTH, CELLS = 0.1, 40
-QUICK, FULL = (1.5, 2.0), (1.25, 1.5, 1.75, 2.0)
+WIDTH = 0.1
+SETTINGS = {
+    "cells": (40, 40, whole(20, 160), "boxes along a bar, 40"),
+    "ratios": ((1.25, 1.5, 1.75, 2.0), (1.5, 2.0)),
+}
 #: Time step [s], and steps from look to look.
 STEP, LOOK = 1e-6, 20
 #: Tail and front of the pulse [m], and the share of the dashpots that is left.
 TAIL, FRONT, DAMPING = 2.4, 0.4, 0.05
 #: How long the bars are watched, over the time that the pulse takes to turn.
 WATCHED = 1.9
-
-
-def options_parser():
-    """Options of this demonstration."""
-    made = parser(NAME, __doc__)
-    made.add_argument("--cells", type=whole(20, 160), help="boxes along a bar, 40")
-    return made
 
 
 def push(cells, progress):
@@ -92,19 +87,18 @@ def lay_pulse(simulation, ratio, speed):
 
 def run(options):
     """Push, measure, spall, picture."""
-    cells, ratios = options.cells or CELLS, QUICK if options.quick else FULL
-    output_folder(options.out)
+    at = output_paths(options.out)
     with ProgressBar("wave") as shown:
-        wave, first = push(cells, shown)
+        wave, first = push(options.cells, shown)
     speed = wave.speed(STEP)
     with ProgressBar("spall") as shown:
-        made, second = spall(cells, ratios, speed, shown)
-    rows = made.spalled(ratios, speed, TAIL)
+        made, second = spall(options.cells, options.ratios, speed, shown)
+    rows = made.spalled(options.ratios, speed, TAIL)
     show_rows(rows, TABLE)
-    write(wave, made, rows, speed, options.out)
-    figures = figures_of(wave, rows, speed)
-    finish(options, NAME, figures, [first, second], caption=caption(rows, wave))
+    write(wave, made, rows, speed, at)
+    figures, words = figures_of(wave, rows, speed), caption(rows, wave)
+    finish(options, NAME, figures, [first, second], caption=words)
 
 
 if __name__ == "__main__":
-    sys.exit(main(run, options_parser()))
+    sys.exit(main(run, parser(NAME, __doc__), settings=SETTINGS))

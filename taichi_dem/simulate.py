@@ -101,6 +101,17 @@ def run_simulation(
     return result
 
 
+def outcome_of(run, *arguments, **options):
+    """Result of ``simulate`` or ``run_simulation``, also of a run that diverged.
+
+    Its ``diverged`` is then the sentence of the program, else "". arguments, options: of run.
+    """
+    try:
+        return run(*arguments, **options)
+    except SimulationDiverged as diverged:
+        return diverged.result
+
+
 def _started(simulation):
     """A simulation ready to step and its recorder, with all kernels compiled."""
     recorder = Recorder(simulation, _watched_group(simulation.scene))

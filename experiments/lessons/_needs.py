@@ -16,7 +16,6 @@ from taichi_dem import (
     CONCRETE,
     Scene,
     Simulation,
-    SimulationDiverged,
     Uniform,
     effects,
     needed_effects,
@@ -26,7 +25,7 @@ from taichi_dem.kit.session_thread import session
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.plot.bodies import draw_bodies
 from taichi_dem.result import Result
-from taichi_dem.simulate import run_simulation
+from taichi_dem.simulate import outcome_of, simulate
 
 LENGTH, WIDTH, CELLS = 0.3, 0.1, (3, 2, 2)
 STEP, UNTIL, LOOKS = 2e-8, 9e-4, 20
@@ -101,12 +100,8 @@ def scene(names, program, speed):
 
 def moved(names, program, speed):
     """Result of a program in which the effects named act; diverged ones too."""
-    simulation = Simulation(scene(names, program, speed), Uniform(STEP))
     looks = {"until": UNTIL, "samples": LOOKS, "frames": LOOKS, "progress": None}
-    try:
-        return run_simulation(simulation, **looks)
-    except SimulationDiverged as diverged:
-        return diverged.result
+    return outcome_of(simulate, scene(names, program, speed), method=Uniform(STEP), **looks)
 
 
 @session.remember

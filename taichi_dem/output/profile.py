@@ -35,6 +35,14 @@ class Profile:
             raise AttributeError(f"Profile has no {name}")
         return np.array([row[names.index(name)] for row in self._rows])
 
+    def stress(self, modulus: float, distance: float) -> np.ndarray:
+        """Stress between a slice and the next [Pa], (looks, ..., slices - 1), tension positive.
+
+        modulus [Pa] of the bar; distance [m] from slice to slice. Zero where the joint is broken.
+        """
+        strain = np.diff(self.displacement, axis=-1) / distance
+        return np.where(self.joints, 0.0, modulus * strain)
+
     def _broken(self, view):
         shape, topology = self.slices.shape[:-1], view.model.topology
         count = int(np.prod(shape))
@@ -45,3 +53,13 @@ class Profile:
         bonds = np.bincount(ends[0, between], minlength=count)
         broken = np.bincount(ends[0, between & view.broken], minlength=count)
         return ((bonds > 0) & (broken == bonds)).reshape(shape)[..., :-1]
+
+
+def travel_time(time_s: np.ndarray, first: np.ndarray, second: np.ndarray, step: float) -> float:
+    """Time that a pulse takes from one record to another [s]: where they agree best.
+
+    time_s: of both records, ascending from zero [s]. step: resolution of the result [s].
+    """
+    fine = np.arange(0.0, time_s[-1], step)
+    early, late = (np.interp(fine, time_s, record) for record in (first, second))
+    return float(np.correlate(late, early, mode="full")[len(fine) - 1 :].argmax() * step)

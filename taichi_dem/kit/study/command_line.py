@@ -7,7 +7,8 @@ import re
 import sys
 import time
 from argparse import ArgumentParser, Namespace
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from types import MappingProxyType
 from typing import Any, Callable, NoReturn, Optional
 
 from taichi_dem.kit import runtime
@@ -15,6 +16,7 @@ from taichi_dem.kit.checkpoint import Checkpoint, Interrupted
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.progress.lasting_output import lasting_output
+from taichi_dem.kit.study.settings import Settings, add_settings, take_settings
 from taichi_dem.kit.validation import shown
 
 _INTERVALS = {None: "every_wall_s", "s": "every_wall_s", "steps": "every_steps", "sim": "every_s"}
@@ -37,6 +39,11 @@ def number(low: float, high: float, *, open_low: bool = True) -> Callable[[str],
 def whole(low: int, high: int) -> Callable[[str], int]:
     """Type of an option that is a whole number in a range."""
     return _checked(int, f"a whole number from {low} to {high}", lambda x: low <= x <= high)
+
+
+def one_of(names: Collection[str]) -> Callable[[str], str]:
+    """Type of an option that is one of some names."""
+    return _checked(str, f"one of {', '.join(names)}", lambda x: x in names)
 
 
 def _checked(kind, words, allowed):
@@ -138,14 +145,17 @@ def main(
     run: Callable[[Namespace], None],
     made: ArgumentParser,
     arguments: Optional[Sequence[str]] = None,
+    settings: Settings = MappingProxyType({}),
 ) -> int:
     """Parse, start Taichi, run; returns the exit code of ``exit_code``.
 
+    settings: further options, and numbers of the full and of the quick job, as of ``add_settings``.
     options.started: when, on ``time.perf_counter``.
     """
 
     def work():
-        options = made.parse_args(arguments)
+        options = add_settings(made, settings).parse_args(arguments)
+        take_settings(options, settings)
         options.started = time.perf_counter()
         runtime.start(options.arch, options.threads)
         run(options)
