@@ -58,6 +58,15 @@ class Oscillator:
         held = self.stiffness + 1j * omega * self.damping
         return held / (held - (self.mass + added_mass) * omega**2)
 
+    def rms(self, frequency: ArrayLike, added_mass: FloatOrArray = 0.0) -> Any:
+        """Root mean square of x in the steady state [m]; arguments as of ``transfer``."""
+        return self.base_amplitude * np.abs(self.transfer(frequency, added_mass)) / math.sqrt(2.0)
+
+    def scaled(self, mass: float, base_amplitude: float) -> "Oscillator":
+        """The same frequency and damping ratio with another mass [kg] and base motion [m]."""
+        share = mass / self.mass
+        return Oscillator(mass, share * self.stiffness, share * self.damping, base_amplitude)
+
     def peak(self, added_mass: float = 0.0) -> tuple[float, float]:
         """Where the steady state peaks with more mass [kg], and how high: (ratio, RMS [m]).
 

@@ -3,7 +3,6 @@
 The grains are those of the automaton with static contact. All runs on the thread of the session.
 """
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -84,9 +83,7 @@ def structure(grains, share, base):
     Only ratios matter to how grains and box move, so the box is made heavier and not the grains
     lighter.
     """
-    mass = grains * FILLING.particle_mass / share
-    scale = mass / PAPER.mass
-    return Oscillator(mass, scale * PAPER.stiffness, scale * PAPER.damping, base)
+    return PAPER.scaled(grains * FILLING.particle_mass / share, base)
 
 
 @session.remember
@@ -135,8 +132,8 @@ def _response(axes, answer):
     fine, o = np.linspace(RATIOS[0], RATIOS[-1], 300), answer.oscillator
     glued = answer.share * o.mass, "--", "grains glued to the floor"
     for mass, line, label in ((0.0, ":", STYLES["empty"].label), glued):
-        high = o.base_amplitude * np.abs(o.transfer(fine * o.natural_frequency, mass))
-        axes.plot(fine, 1e3 * high / math.sqrt(2.0), color=GREY, ls=line, lw=1.2, label=label)
+        rms = 1e3 * o.rms(fine * o.natural_frequency, mass)
+        axes.plot(fine, rms, color=GREY, ls=line, lw=1.2, label=label)
     rms, look = 1e3 * answer.cycles.rms, {"color": STYLES[FILLING.label].colour, "ms": 4}
     axes.plot(RATIOS, rms, "o-", label=f"{answer.grains} grains", **look)
     axes.plot(answer.ratio, answer.at_ratio(rms), "o", ms=12, mfc="none", mec=BLACK, mew=1.5)

@@ -11,15 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+import taichi_dem as dem
 from _page import percent
-from taichi_dem import (
-    CONCRETE,
-    Scene,
-    Simulation,
-    Uniform,
-    effects,
-    needed_effects,
-)
 from taichi_dem.kit.plot_style import BLUE, GREY, RED, png_of, styled
 from taichi_dem.kit.session_thread import session
 from taichi_dem.mesh.shapes import bar
@@ -36,11 +29,11 @@ SIDEWAYS, FREQUENCY = 0.5, 900.0
 SHOWN = {"pulled open": 6, "pressed together": LOOKS}
 #: Effects to choose from and their words; the first three act without contact.
 EFFECTS = {
-    "bond_damping": (effects.BondDamping, "dashpots of the bonds"),
-    "softening": (effects.Softening, "fracture"),
-    "shear_slip": (effects.ShearSlip, "slip in shear"),
-    "sphere_contact": (effects.SphereContact, "contact of fragments"),
-    "friction": (effects.Friction, "friction of fragments"),
+    "bond_damping": (dem.effects.BondDamping, "dashpots of the bonds"),
+    "softening": (dem.effects.Softening, "fracture"),
+    "shear_slip": (dem.effects.ShearSlip, "slip in shear"),
+    "sphere_contact": (dem.effects.SphereContact, "contact of fragments"),
+    "friction": (dem.effects.Friction, "friction of fragments"),
 }
 ALL, WITHOUT_CONTACT = tuple(EFFECTS), tuple(EFFECTS)[:3]
 
@@ -92,16 +85,18 @@ def allowed(names):
 
 def scene(names, program, speed):
     """The bar, held on the left and moved on the right; effects not named are silent."""
-    moved = effects.PrescribedMotion("right", (speed, SIDEWAYS * speed, 0.0), FREQUENCY)
+    moved = dem.effects.PrescribedMotion("right", (speed, SIDEWAYS * speed, 0.0), FREQUENCY)
     made = [(name, EFFECTS[name][0]()) for name in program]
     listed = [effect if name in names else effect.silent() for name, effect in made]
-    return Scene(bar(LENGTH, WIDTH, CELLS), CONCRETE, [*listed, effects.Fixed("left"), moved])
+    return dem.Scene(
+        bar(LENGTH, WIDTH, CELLS), dem.CONCRETE, [*listed, dem.effects.Fixed("left"), moved]
+    )
 
 
 def moved(names, program, speed):
     """Result of a program in which the effects named act; diverged ones too."""
     looks = {"until": UNTIL, "samples": LOOKS, "frames": LOOKS, "progress": None}
-    return outcome_of(simulate, scene(names, program, speed), method=Uniform(STEP), **looks)
+    return outcome_of(simulate, scene(names, program, speed), method=dem.Uniform(STEP), **looks)
 
 
 @session.remember
@@ -122,32 +117,23 @@ def answer(names, speed):
 
 def price(names, speed):
     """The Answer with costs: both programs run one after the other."""
-    Simulation(scene(names, names, speed), Uniform(STEP)).start()
+    dem.Simulation(scene(names, names, speed), dem.Uniform(STEP)).start()
     return Answer(speed, measured(names, speed), measured(ALL, speed), measured=True)
 
 
 def compile_all():
     """Compile both programs that answers come from, so that no later answer has to wait."""
     for names in (ALL, WITHOUT_CONTACT):
-        Simulation(scene(names, names, SPEEDS[0]), Uniform(STEP)).start()
+        dem.Simulation(scene(names, names, SPEEDS[0]), dem.Uniform(STEP)).start()
 
 
 def verdicts(answer):
     """A row for every effect: (words, whether listed, what it did, what the program advises)."""
-    advice, rows = needed_effects(answer.chosen), []
-    uses = {use.effect: use for use in advice.uses}
-    missed = {finding.effect: finding for finding in advice.missing}
-    for name, (kind, words) in EFFECTS.items():
-        finding = missed.get(kind.__name__)
-        if name in uses:
-            says = "drop it" if name in advice.droppable else "keep it"
-            rows.append((words, True, str(uses[name]), says))
-        elif finding is not None:
-            did = f"{finding.what}: up to {finding.most} at a time"
-            rows.append((words, False, did, "list it"))
-        else:
-            rows.append((words, False, "left out", "not missed"))
-    return rows
+    advice, listed = dem.needed_effects(answer.chosen), answer.chosen.report.effects
+    return [
+        (words, name in listed, *advice.verdict(name, kind.__name__))
+        for name, (kind, words) in EFFECTS.items()
+    ]
 
 
 def words(answer):

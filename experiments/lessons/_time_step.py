@@ -10,15 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from taichi_dem import (
-    CONCRETE,
-    ImplicitDashpots,
-    Scene,
-    Simulation,
-    Uniform,
-    effects,
-    quality_report,
-)
+import taichi_dem as dem
 from taichi_dem.kit.plot_style import BLACK, GREY, RED, png_of, seconds, styled, styles_of
 from taichi_dem.kit.session_thread import session
 from taichi_dem.mesh.shapes import bar
@@ -41,9 +33,9 @@ CHOICES = {
     "rise": ([round(1e6 * one) for one in RISES], 20, "the blow rises in [µs]"),
 }
 METHODS = {
-    "explicit": Uniform(),
-    "limited": Uniform(dashpot="limited"),
-    "solved": ImplicitDashpots(tolerance=1e-3),
+    "explicit": dem.Uniform(),
+    "limited": dem.Uniform(dashpot="limited"),
+    "solved": dem.ImplicitDashpots(tolerance=1e-3),
 }
 STYLES = styles_of(METHODS)
 #: Of the displacement of the drawn bar.
@@ -89,13 +81,13 @@ class Answer(NamedTuple):
 
 def scene(rise=RISES[0]):
     """The bar under a short blow on its left end, with a rise [s]."""
-    blow = effects.GasPressure("left", peak=PEAK, rise=rise, decay_ratio=1.0)
-    return Scene(bar(LENGTH, WIDTH, CELLS), CONCRETE, [blow, effects.BondDamping()])
+    blow = dem.effects.GasPressure("left", peak=PEAK, rise=rise, decay_ratio=1.0)
+    return dem.Scene(bar(LENGTH, WIDTH, CELLS), dem.CONCRETE, [blow, dem.effects.BondDamping()])
 
 
 def limits():
     """Longest stable explicit step of the worst body [s]: by its dashpots, and by its springs."""
-    report = quality_report(scene().mesh, CONCRETE)
+    report = dem.quality_report(scene().mesh, dem.CONCRETE)
     return float(report.dashpot_step_s.min()), float(report.spring_step_s.min())
 
 
@@ -103,7 +95,7 @@ def ready(method, step, rise):
     """The bar at rest, with a step and a rise of the blow [s]; a method is compiled once."""
     # The first field of every method is its step.
     name = next(iter(vars(METHODS[method])))
-    return Simulation(scene(rise), replace(METHODS[method], **{name: step}))
+    return dem.Simulation(scene(rise), replace(METHODS[method], **{name: step}))
 
 
 def strike(method, step, rise):
@@ -138,6 +130,13 @@ def answer(method, step, rise):
     own = tried[method] = [timed(method, one, rise) for one in STEPS]
     ladders = {name: tried[name] for name in METHODS if name in tried}
     return Answer(method, own[STEPS.index(step)], truth(rise), ladders)
+
+
+def answer_to(method, chosen):
+    """The Answer to a method by name and the values of the sliders."""
+    return answer(
+        method, nearest(STEPS, 1e-9 * chosen["step"]), nearest(RISES, 1e-6 * chosen["rise"])
+    )
 
 
 def nearest(values, value):

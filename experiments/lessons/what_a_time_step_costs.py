@@ -51,21 +51,16 @@ def _(lesson, mo, sliders):
 
 @app.cell
 def _(chosen, lesson, method, mo, percent, seconds, served, session):
-    _step = lesson.nearest(lesson.STEPS, 1e-9 * chosen.value["step"])
-    _rise = lesson.nearest(lesson.RISES, 1e-6 * chosen.value["rise"])
     with mo.status.spinner("Striking. When a lesson is first opened it compiles, some seconds."):
         if served:
             session.ask(lesson.compile_all)
-        _answer = session.ask(lesson.answer, method.value, _step, _rise)
+        _answer = session.ask(lesson.answer_to, method.value, chosen.value)
         _picture = session.ask(lesson.picture, _answer)
-    _strike = _answer.chosen
+    _strike, _error = _answer.chosen, percent(_answer.chosen.error(_answer.truth))
     _words = f"The program says: *{_strike.sentence}.*"
     if not _strike.sentence:
-        _words = (
-            f"With {seconds(_strike.step)} a step the far end is wrong by "
-            f"**{percent(_strike.error(_answer.truth))}** at most, for "
-            f"**{seconds(_strike.seconds)}** of one core."
-        )
+        _words = f"With {seconds(_strike.step)} a step the far end is wrong by **{_error}** at most"
+        _words += f", for **{seconds(_strike.seconds)}** of one core."
     if not served:
         print(_words)
     mo.vstack([mo.image(_picture, alt="Bar, far end, error over cost"), mo.md(_words)])

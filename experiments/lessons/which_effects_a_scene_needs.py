@@ -15,11 +15,11 @@ def _():
     import marimo as mo
 
     import _needs as lesson
-    from _page import percent, questions, sliders
+    from _page import questions, sliders
     from taichi_dem.kit.session_thread import session
 
     served = mo.app_meta().mode in ("run", "edit")
-    return lesson, mo, percent, questions, served, session, sliders
+    return lesson, mo, questions, served, session, sliders
 
 
 @app.cell
@@ -27,10 +27,9 @@ def _(mo):
     mo.md("""
     # Which effects does my scene need?
 
-    A bar is held on the left. Its right end is pulled out and a little down, and then pressed
-    back in. Switch effects off: what is not listed is not computed, not stored, not compiled.
-
-    A good scene lists what it needs, and nothing else.
+    A bar is held on the left. Its right end is pulled out and a little down, and then pressed back
+    in. Switch effects off: what is not listed is not computed, not stored, not compiled. A good
+    scene lists what it needs, and nothing else.
     """)
     return
 
@@ -42,30 +41,27 @@ def _(lesson, mo, sliders):
     )
     chosen = sliders(mo, {"speed": (lesson.SPEEDS, 2.0, "the right end starts with [m/s]")})
     measure = mo.ui.run_button(label="measure what this choice costs (compiles it, some seconds)")
-    _right = mo.vstack([chosen.elements["speed"], measure])
-    mo.hstack([mo.vstack(list(listed.elements.values())), _right], justify="start", gap=3)
+    _left, _right = list(listed.elements.values()), [chosen.elements["speed"], measure]
+    mo.hstack([mo.vstack(_left), mo.vstack(_right)], justify="start", gap=3)
     return chosen, listed, measure
 
 
 @app.cell
-def _(chosen, lesson, listed, measure, mo, percent, served, session):
-    _names = lesson.allowed([name for name, on in listed.value.items() if on])
+def _(chosen, lesson, listed, measure, mo, served, session):
+    _names = lesson.allowed(name for name, on in listed.value.items() if on)
     with mo.status.spinner("Pulling. When a lesson is first opened it compiles, some seconds."):
         if served:
             session.ask(lesson.compile_all)
         _work = lesson.price if measure.value else lesson.answer
         _answer = session.ask(_work, _names, chosen.value["speed"])
         _picture = session.ask(lesson.picture, _answer)
-    _words = lesson.words(_answer)
-    _rows = [
-        f"| {words} | {'yes' if on else 'no'} | {did} | **{says}** |"
-        for words, on, did, says in lesson.verdicts(_answer)
-    ]
-    _head = ["| effect | listed | what it did | the program says |", "|---|---|---|---|"]
+    _rows = ["| effect | listed | what it did | the program says |", "|---|---|---|---|"]
+    for _name, _on, _did, _says in lesson.verdicts(_answer):
+        _rows.append(f"| {_name} | {'yes' if _on else 'no'} | {_did} | **{_says}** |")
     if not served:
-        print(_words)
-    _alt = "Bar with all effects and with those chosen, cost of a step"
-    mo.vstack([mo.image(_picture, alt=_alt), mo.md(_words), mo.md("\n".join([*_head, *_rows]))])
+        print(lesson.words(_answer))
+    _image = mo.image(_picture, alt="Bar with all effects and with those chosen, cost of a step")
+    mo.vstack([_image, mo.md(lesson.words(_answer)), mo.md("\n".join(_rows))])
     return
 
 
@@ -74,7 +70,7 @@ def _(mo, questions):
     _text = """
     Pull gently, with 0.2 m/s. Which effects can you switch off, and how do you know? :: All but the
     dashpots. The table says *never acted*: without an effect that never acted **not a bit** of the
-    answer differs. Switch off fracture, slip, contact and friction, and the change stays zero.
+    answer differs. Switch off fracture, slip, contact and friction: the change stays zero.
 
     Pull with 2 m/s and switch off the contact. What do you see, what does the program say? :: The
     pieces pass through each other when the bar is pressed together. The run ends without a word of
