@@ -64,7 +64,7 @@ def built_scene():
 
 def hit(name, options):
     """Run one impact with a method; returns Impact."""
-    cost = dem.Watch(dem.Every(samples=1), evaluations=lambda view: view.evaluations)
+    cost = dem.Collector(dem.Every(samples=1), evaluations=lambda view: view.evaluations)
     with ProgressBar(styles_of([name])[name].label) as shown:
         made = dem.Simulation(built_scene(), METHODS[name](DT0, DISTANCE), options.driver)
         set_moving(made, np.outer(made.model.centre[:, 0] > LENGTH, (-options.speed, 0.0, 0.0)))

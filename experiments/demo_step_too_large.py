@@ -52,7 +52,7 @@ def strike(limit, share, peak):
     step = share * longest_step(limit)
     when = dem.At([step * mark for mark in marks(macro_steps(UNTIL[limit], step))])
     energy = {"energy": dem.RunView.energy_balance, "frame": dem.RunView.frame}
-    seen = dem.Watch(when, time=lambda view: view.time_s, speed=shown.corner_speed, **energy)
+    seen = dem.Collector(when, time=lambda view: view.time_s, speed=shown.corner_speed, **energy)
     with ProgressBar(f"{share:g} x the limit of {limit}") as bar_shown:
         looks = {"samples": 1, "progress": bar_shown, "observers": [seen]}
         until = UNTIL[limit]

@@ -96,12 +96,12 @@ class Observer(Protocol):
         """Measure; what it raises ends the run, and no result is written."""
 
 
-class Watch:
+class Collector:
     """Observer that keeps what functions of the view give, in lists by name.
 
     when: of its calls. read: functions by name, such as ``cost=lambda view: view.cpu_seconds``.
-    rows: what they gave, by name; ``watch[name]`` is an array of it. view: of the last call, for
-    one more look at a run that diverged.
+    rows: what they gave, by name; ``collector[name]`` is an array of it. view: of the last call,
+    for one more look at a run that diverged.
     """
 
     def __init__(self, when: Union[Every, At], **read: Callable[["RunView"], Any]):
