@@ -5,7 +5,7 @@ import textwrap
 import numpy as np
 
 from taichi_dem.kit.files import write_csv
-from taichi_dem.kit.plot_style import BLACK, GREEN, GREY, ORANGE, RED, picture, power, seconds
+from taichi_dem.kit.plot_style import BLACK, GREEN, GREY, ORANGE, RED, picture, seconds
 from taichi_dem.kit.study import Table, write_rows
 from taichi_dem.plot.film_runs import FilmedRun, film_runs
 
@@ -115,24 +115,19 @@ def film(path, safe, bad, count=40, held=8):
     for made, colour in ((safe, GREEN), (bad, ORANGE)):
         name = f"{made.share:g} × limit"
         titles = [f"{name}, t = {1e6 * time:.1f} µs" for time in made.time]
-        shown = made.result.model, made.frames, np.log10(np.maximum(made.speeds, 1e-9)), titles
+        shown = made.result.model, made.frames, made.speeds, titles
         runs.append(FilmedRun(*shown, positive(made.residual), name, colour))
     # Closer together towards the end, where all happens at once.
-    early = np.linspace(0.0, 0.6 * end, (count - held) // 3, endpoint=False)
-    late = np.linspace(0.6 * end, end, count - held - len(early))
-    said = [""] * (count - held - 1) + [textwrap.fill(bad.sentence, 66)] * (held + 1)
-    low, high = round(np.log10(fastest)) - 4, round(np.log10(fastest)) + 2
-    powers = np.arange(low, high + 1)
+    moving = end * (1.0 - np.linspace(1.0, 0.0, count - held) ** 1.5)
+    look = {"cmap": "YlOrRd", "norm": "log", "clim": (1e-4 * fastest, 1e2 * fastest)}
     film_runs(
-        *(path, runs, [*early, *late, *[end] * held]),
+        *(path, runs, [*moving, *[end] * held]),
         words="speed of a body [m/s]",
-        ticks=(powers, [power(10.0**k) for k in powers]),
         curve={"ylabel": "unexplained\nenergy /\nput in [1]", **UNEXPLAINED},
         magnify=6000.0,
         # Oblique enough to show two sides and the struck end.
         axis=(-0.35, 0.45, 1.0),
-        footers=said,
+        footers=[""] * (count - held - 1) + [textwrap.fill(bad.sentence, 66)] * (held + 1),
         milliseconds=130,
-        cmap="YlOrRd",
-        clim=(low, high),
+        **look,
     )
