@@ -13,6 +13,7 @@ Writes damper.gif, motion.png, motion.csv, caption.txt and summary.json to resul
 """
 
 import sys
+from functools import partial
 
 import numpy as np
 
@@ -35,6 +36,7 @@ SETTINGS = {
     "begin": (40, 10),
     "measured": (20, 5),
 }
+options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
 #: Cycles of the animation, the first ones, and frames in each; samples a cycle of the curves.
 SHOWN, FRAMES, SAMPLES = 3, 13, 40
 
@@ -91,4 +93,4 @@ def figures_of(cycles, empty, o):
 
 
 if __name__ == "__main__":
-    sys.exit(study.main(run, study.parser(NAME, __doc__), settings=SETTINGS))
+    sys.exit(study.main(run, options_parser()))

@@ -14,6 +14,7 @@ law.gif, law.png, tension.csv, shear.csv and summary.json to results/demo_fractu
 """
 
 import sys
+from functools import partial
 
 import numpy as np
 
@@ -27,6 +28,7 @@ from taichi_dem.simulate import run_simulation
 
 NAME = "demo_fracture_law"
 SETTINGS = {"steps": (5000, 1000, whole(200, 100000), "samples along the way, 5000")}
+options_parser = partial(parser, NAME, __doc__, settings=SETTINGS)
 EDGE, APART = 0.05, 0.2
 #: Bodies are driven, so the step decides only how finely the law is sampled.
 STEP = 1e-8
@@ -87,4 +89,4 @@ def run(options):
 
 
 if __name__ == "__main__":
-    sys.exit(main(run, parser(NAME, __doc__), settings=SETTINGS))
+    sys.exit(main(run, options_parser()))

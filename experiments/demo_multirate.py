@@ -17,6 +17,7 @@ Writes blow.gif, blow.png, blow.csv, levels_*.csv and summary.json to results/de
 
 import sys
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -42,6 +43,7 @@ SETTINGS = {
     "methods": (tuple(METHODS), ("uniform", "held")),
     "until": (2e-4, 4e-5),
 }
+options_parser = partial(study.parser, NAME, __doc__, BLAST_DRIVERS, settings=SETTINGS)
 DT0, DISTANCE = 4e-8, 5e-8
 #: Bar and fragment [m], and the gap between them.
 LENGTH, WIDTH, CELLS = 0.9, 0.1, (18, 2, 2)
@@ -88,4 +90,4 @@ def run(options):
 
 
 if __name__ == "__main__":
-    sys.exit(study.main(run, study.parser(NAME, __doc__, BLAST_DRIVERS), settings=SETTINGS))
+    sys.exit(study.main(run, options_parser()))

@@ -14,13 +14,14 @@ summary.json to results/demo_step_too_large/.
 """
 
 import sys
+from functools import partial
 
 import _step_too_large as shown
 import taichi_dem as dem
 from taichi_dem.kit import study
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.mesh.shapes import bar
-from taichi_dem.simulate import outcome_of
+from taichi_dem.simulate import result_of
 from taichi_dem.simulation import macro_steps
 
 NAME = "demo_step_too_large"
@@ -32,6 +33,7 @@ SETTINGS = {
         {"dashpots": (0.9, 1.3)},
     ),
 }
+options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
 #: Simulated time [s], looks on the way.
 UNTIL, SAMPLES = {"dashpots": 4e-5, "springs": 2e-4}, 200
 BAR = bar(0.4, 0.1, (8, 2, 2))
@@ -56,7 +58,7 @@ def strike(limit, share, peak):
     with ProgressBar(f"{share:g} x the limit of {limit}") as bar_shown:
         looks = {"samples": 1, "progress": bar_shown, "observers": [seen]}
         until = UNTIL[limit]
-        result = outcome_of(dem.simulate, scene, method=dem.Uniform(step), until=until, **looks)
+        result = result_of(dem.simulate, scene, method=dem.Uniform(step), until=until, **looks)
     if result.diverged:
         seen.observe(seen.view)
     return shown.Struck(limit, share, step, seen, result)
@@ -91,4 +93,4 @@ def run(options):
 
 
 if __name__ == "__main__":
-    sys.exit(study.main(run, study.parser(NAME, __doc__), settings=SETTINGS))
+    sys.exit(study.main(run, options_parser()))

@@ -16,6 +16,7 @@ wave.png, spall.png, wave.csv, spall.csv and summary.json to results/demo_wave_a
 
 import sys
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -32,6 +33,7 @@ SETTINGS = {
     "cells": (40, 40, whole(20, 160), "boxes along a bar, 40"),
     "ratios": ((1.25, 1.5, 1.75, 2.0), (1.5, 2.0)),
 }
+options_parser = partial(parser, NAME, __doc__, settings=SETTINGS)
 #: Time step [s], and steps from look to look.
 STEP, LOOK = 1e-6, 20
 #: Tail and front of the pulse [m], and the share of the dashpots that is left.
@@ -97,4 +99,4 @@ def run(options):
 
 
 if __name__ == "__main__":
-    sys.exit(main(run, parser(NAME, __doc__), settings=SETTINGS))
+    sys.exit(main(run, options_parser()))

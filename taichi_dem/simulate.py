@@ -101,7 +101,7 @@ def run_simulation(
     return result
 
 
-def outcome_of(run, *arguments, **options):
+def result_of(run, *arguments, **options):
     """Result of ``simulate`` or ``run_simulation``, also of a run that diverged.
 
     Its ``diverged`` is then the sentence of the program, else "". arguments, options: of run.

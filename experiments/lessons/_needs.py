@@ -18,7 +18,7 @@ from taichi_dem.kit.session_thread import session
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.plot.bodies import draw_bodies
 from taichi_dem.result import Result
-from taichi_dem.simulate import outcome_of, simulate
+from taichi_dem.simulate import result_of, simulate
 
 LENGTH, WIDTH, CELLS = 0.3, 0.1, (3, 2, 2)
 STEP, UNTIL, LOOKS = 2e-8, 9e-4, 20
@@ -96,7 +96,7 @@ def scene(names, program, speed):
 def moved(names, program, speed):
     """Result of a program in which the effects named act; diverged ones too."""
     looks = {"until": UNTIL, "samples": LOOKS, "frames": LOOKS, "progress": None}
-    return outcome_of(simulate, scene(names, program, speed), method=dem.Uniform(STEP), **looks)
+    return result_of(simulate, scene(names, program, speed), method=dem.Uniform(STEP), **looks)
 
 
 @session.remember

@@ -16,7 +16,7 @@ from taichi_dem.kit.session_thread import session
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.plot.bodies import draw_bodies
 from taichi_dem.result import Result
-from taichi_dem.simulate import outcome_of, run_simulation
+from taichi_dem.simulate import result_of, run_simulation
 
 LENGTH, WIDTH, CELLS = 0.4, 0.05, (12, 1, 1)
 #: Steps to choose from [s], and that of the truth.
@@ -101,7 +101,7 @@ def ready(method, step, rise):
 def strike(method, step, rise):
     """Run the bar with a step and a rise of the blow [s]."""
     looks = {"until": UNTIL, "samples": 1, "frames": SAMPLES, "progress": None}
-    result = outcome_of(run_simulation, ready(method, step, rise), **looks)
+    result = result_of(run_simulation, ready(method, step, rise), **looks)
     end = result.model.centre[:, 0] > LENGTH * (1.0 - 1.0 / CELLS[0])
     moved = np.full(SAMPLES + 1, np.nan)
     moved[: len(result.frames)] = [frame.displacement[end, 0].mean() for frame in result.frames]

@@ -11,7 +11,7 @@ from taichi_dem.mesh.shapes import bar
 from taichi_dem.output.profile import Profile, travel_time
 from taichi_dem.plot.bars import draw_space_time, film_bar
 from taichi_dem.plot.film_runs import FilmedRun, film_runs
-from taichi_dem.simulate import outcome_of
+from taichi_dem.simulate import result_of
 
 
 def pulled(*observers, dt=1e-7):
@@ -20,7 +20,7 @@ def pulled(*observers, dt=1e-7):
     listed = [effects.Softening(), effects.Fixed("left"), drive]
     scene = Scene(bar(0.3, 0.1, (3, 1, 1)), CONCRETE, listed)
     looks = {"samples": 1, "frames": 6, "progress": None, "observers": list(observers)}
-    return outcome_of(simulate, scene, method=Uniform(dt), until=600 * dt, **looks)
+    return result_of(simulate, scene, method=Uniform(dt), until=600 * dt, **looks)
 
 
 @pytest.fixture(scope="module")

@@ -23,7 +23,12 @@ _INTERVALS = {None: "every_wall_s", "s": "every_wall_s", "steps": "every_steps",
 
 
 class Parser(argparse.ArgumentParser):
-    """An argument parser whose complaints are one sentence."""
+    """An argument parser whose complaints are one sentence.
+
+    settings: of the study, for ``main``.
+    """
+
+    settings: Settings = MappingProxyType({})
 
     def error(self, message: str) -> NoReturn:
         """Turn a wrong command line into an InputError."""
@@ -89,8 +94,16 @@ def several(kind: Callable[[str], Any]) -> Callable[[str], list]:
     return parse
 
 
-def parser(name: str, description: Optional[str], drivers: Sequence[str] = ()) -> Parser:
-    """Parser with the options every experiment has; drivers: to choose from, where there are."""
+def parser(
+    name: str,
+    description: Optional[str],
+    drivers: Sequence[str] = (),
+    settings: Settings = MappingProxyType({}),
+) -> Parser:
+    """Parser with the options every experiment has; drivers: to choose from, where there are.
+
+    settings: further options, and numbers of the full and of the quick job, as of ``add_settings``.
+    """
     made = bare_parser(name, description)
     made.add_argument("--quick", action="store_true", help="a smaller job of under a minute")
     place: Any = {"type": os.path.expanduser, "default": os.path.join("results", name)}
@@ -99,6 +112,8 @@ def parser(name: str, description: Optional[str], drivers: Sequence[str] = ()) -
     if drivers:
         made.add_argument("--driver", default=drivers[0], choices=drivers)
     made.add_argument("--threads", type=whole(1, 1024), default=None, help="CPU threads")
+    made.settings = settings
+    add_settings(made, settings)
     return made
 
 
@@ -145,17 +160,16 @@ def main(
     run: Callable[[Namespace], None],
     made: ArgumentParser,
     arguments: Optional[Sequence[str]] = None,
-    settings: Settings = MappingProxyType({}),
 ) -> int:
     """Parse, start Taichi, run; returns the exit code of ``exit_code``.
 
-    settings: further options, and numbers of the full and of the quick job, as of ``add_settings``.
+    The settings of its parser have their values of the full or of the quick job in options.
     options.started: when, on ``time.perf_counter``.
     """
 
     def work():
-        options = add_settings(made, settings).parse_args(arguments)
-        take_settings(options, settings)
+        options = made.parse_args(arguments)
+        take_settings(options, getattr(made, "settings", {}))
         options.started = time.perf_counter()
         runtime.start(options.arch, options.threads)
         run(options)
