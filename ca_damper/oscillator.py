@@ -5,6 +5,7 @@ y0; 0.6 mm lets the empty container peak at 24.4 mm, near the +-25 mm of its Fig
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -58,10 +59,6 @@ class Oscillator:
         held = self.stiffness + 1j * omega * self.damping
         return held / (held - (self.mass + added_mass) * omega**2)
 
-    def rms(self, frequency: ArrayLike, added_mass: FloatOrArray = 0.0) -> Any:
-        """Root mean square of x in the steady state [m]; arguments as of ``transfer``."""
-        return self.base_amplitude * np.abs(self.transfer(frequency, added_mass)) / math.sqrt(2.0)
-
     def scaled(self, mass: float, base_amplitude: float) -> "Oscillator":
         """The same frequency and damping ratio with another mass [kg] and base motion [m]."""
         share = mass / self.mass
@@ -80,6 +77,22 @@ class Oscillator:
         ratio = own * math.sqrt(self.mass / mass)
         high = abs(self.transfer(ratio * self.natural_frequency, added_mass))
         return ratio, float(self.base_amplitude * high / math.sqrt(2.0))
+
+    def rms(self, frequency: ArrayLike, added_mass: FloatOrArray = 0.0) -> Any:
+        """RMS displacement [m] of the steady state at a frequency [Hz] with more mass [kg]."""
+        return self.base_amplitude * abs(self.transfer(frequency, added_mass)) / np.sqrt(2.0)
+
+    def right_hand_side(self, frequency: float) -> Callable[[float, Any], np.ndarray]:
+        """d(x, v)/dt of the empty container at a frequency [Hz], for ``rk45.solve``."""
+        omega = 2.0 * np.pi * frequency
+
+        def slope(t: float, state: Any) -> np.ndarray:
+            y, rate = np.sin(omega * t), omega * np.cos(omega * t)
+            push = self.base_amplitude * (self.stiffness * y + self.damping * rate)
+            pull = push - self.stiffness * state[0] - self.damping * state[1]
+            return np.array([state[1], pull / self.mass])
+
+        return slope
 
     def steady_state(
         self, frequency: ArrayLike, added_mass: FloatOrArray = 0.0, gravity: float = 0.0

@@ -1,4 +1,4 @@
-"""What a second thread, or a device, does for whole steps of a large block."""
+"""Gain of a second thread, or of a device, for whole steps of a large block."""
 
 import time
 
@@ -20,7 +20,7 @@ BAR = (2.0, 1.0)
 
 
 def thread_job(mesh, cells, method, threads, steps, repeats):
-    """What ``whole_steps`` measures in a process of its own: threads cannot change within one."""
+    """Result of ``whole_steps`` in a process of its own: threads cannot change within one."""
     job = {"mesh": mesh, "cells": cells, "method": method, "steps": steps, "repeats": repeats}
     return call_in_process(whole_steps, threads=threads, title=f"on {threads} threads", **job)
 

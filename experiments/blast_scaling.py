@@ -47,7 +47,7 @@ SETTINGS = {
 DT0 = 1e-8
 #: Workers of the paper's Fig 15, and the share of one's time that is not contact.
 PAPER_WORKERS, PAPER_SERIAL = 24, 0.05
-#: By way of sharing: shortest over longest time of a worker in Fig 15, and minutes of one process
+#: By way of sharing: longest over shortest time of a worker in Fig 15, and minutes of one process
 #: over those of 24 (4.3, 4.4).
 PAPER_IMBALANCE = {"static": 20381.0 / 3493.0, "rebalanced": 9787.0 / 9023.0}
 PAPER_SPEEDUP = {"static": 2702.0 / 541.0, "rebalanced": 2702.0 / 501.0}

@@ -14,54 +14,39 @@ distance is the chaos floor, their time the spread. Times are CPU seconds of one
 alone, without compiling.
 """
 
-import math
 import os
 import sys
-import time
-from dataclasses import dataclass, replace
-from typing import Callable
 
-from _blast import blast_parser
-from _blast_accuracy import MEASURES, SPLIT, Outcome, blast, displacement_error
-from taichi_dem import ImplicitDashpots, Multirate, StepControl, Uniform, read_mesh
-from taichi_dem.kit.files import output_folder
-from taichi_dem.kit.plot_style import power, styles_of
-from taichi_dem.kit.plot_style import seconds as seconds_in_words
-from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.kit.study import Timing, cached, figure, finish, main, print_table, write_rows
-from taichi_dem.kit.study.work_precision import (
-    ANSWER_HEADER,
-    Point,
-    answer_rows,
-    answers,
-    percent,
-    write_answers,
-    write_points,
+import numpy as np
+
+from _blast import blast_parser, paper_effects
+from _hard_cases._case import renew_session
+from taichi_dem import (
+    CONCRETE,
+    ImplicitDashpots,
+    Multirate,
+    ProgressBar,
+    Scene,
+    StepControl,
+    Uniform,
+    outcome,
+    read_mesh,
 )
+from taichi_dem.kit import study
+from taichi_dem.kit.files import output_folder
+from taichi_dem.kit.plot_style import power, seconds, styles_of
+from taichi_dem.kit.study.work_precision import Point, percent
 from taichi_dem.kit.study.work_precision_picture import picture_errors, picture_work_precision
 
 NAME = "cost_of_accuracy_blast"
-PAPER_DT0 = 1e-8
-#: The paper's largest way in a step [m].
-PAPER_L = 1e-8
 TARGETS = (0.1, 0.01, 0.001)
+#: The paper's largest step [s], and its largest way in a step [m].
+PAPER_DT0, PAPER_L = 1e-8, 1e-8
+#: How far bodies are displaced at the start of a run that differs by round-off only [m].
+DISTURBANCE = 1e-12
 #: A run that took longer is not made a second time [s].
 ENOUGH = 4.0
 TIME = "CPU time of one thread [s], least of its runs"
-
-
-@dataclass(frozen=True)
-class Method:
-    """A way to step: make(step) gives the method; steps: coarse to fine [s], or [m] if by_way."""
-
-    make: Callable
-    steps: tuple
-    steps_of_quick: tuple = ()
-    by_way: bool = False
-
-    def label(self, step):
-        """A step in words."""
-        return f"l = {1e6 * step:g} µm" if self.by_way else seconds_in_words(step)
 
 
 def controlled(dt0):
@@ -70,252 +55,208 @@ def controlled(dt0):
     return Multirate(dt0, 1e-5, control=control, dashpot="limited")
 
 
+#: How each method is made of a step.
 METHODS = {
-    "uniform": Method(
-        lambda way: Uniform(PAPER_DT0, way), (1e-6, 3e-7, 1e-7, PAPER_L), by_way=True
-    ),
-    "multirate_held": Method(
-        lambda way: Multirate(PAPER_DT0, way),
-        (1e-6, 3e-7, 1e-7, 3e-8, PAPER_L),
-        (1e-7,),
-        by_way=True,
-    ),
-    "multirate_drifted": Method(
-        lambda way: Multirate(PAPER_DT0, way, "drifted"), (3e-7, 1e-7, 3e-8), by_way=True
-    ),
-    "controlled": Method(controlled, (3.2e-7, 1.6e-7, 8e-8, 4e-8, 2e-8)),
-    "limited": Method(
-        lambda dt: Uniform(dt, dashpot="limited"), (1e-7, 4e-8, 2e-8, 1e-8, 5e-9), (2e-8,)
-    ),
-    "implicit": Method(ImplicitDashpots, (4e-6, 2e-6, 1e-6, 5e-7, 2.5e-7, 1e-7, 5e-8), (5e-7,)),
-    "fixed": Method(Uniform, (1e-8, 4e-9, 2e-9, 1e-9)),
+    "uniform": lambda way: Uniform(PAPER_DT0, way),
+    "multirate_held": lambda way: Multirate(PAPER_DT0, way),
+    "multirate_drifted": lambda way: Multirate(PAPER_DT0, way, "drifted"),
+    "controlled": controlled,
+    "limited": lambda dt: Uniform(dt, dashpot="limited"),
+    "implicit": ImplicitDashpots,
+    "fixed": Uniform,
 }
-FULL = {"until": 1e-4, "methods": tuple(METHODS), "reference": 1.25e-8, "twins": tuple(METHODS)}
-QUICK = {
-    "until": 6e-5,
-    "methods": ("multirate_held", "limited", "implicit"),
-    "reference": 5e-8,
-    "twins": ("multirate_held",),
+#: Their steps are ways [m], those of the others times [s]; all from coarse to fine.
+BY_WAY = ("uniform", "multirate_held", "multirate_drifted")
+STEPS = {
+    "uniform": (1e-6, 3e-7, 1e-7, PAPER_L),
+    "multirate_held": (1e-6, 3e-7, 1e-7, 3e-8, PAPER_L),
+    "multirate_drifted": (3e-7, 1e-7, 3e-8),
+    "controlled": (3.2e-7, 1.6e-7, 8e-8, 4e-8, 2e-8),
+    "limited": (1e-7, 4e-8, 2e-8, 1e-8, 5e-9),
+    "implicit": (4e-6, 2e-6, 1e-6, 5e-7, 2.5e-7, 1e-7, 5e-8),
+    "fixed": (1e-8, 4e-9, 2e-9, 1e-9),
 }
+QUICK_STEPS = {"multirate_held": (1e-7,), "limited": (2e-8,), "implicit": (5e-7,)}
 CHECK = "multirate_held"
+SETTINGS = {
+    "until": (1e-4, 6e-5),
+    "steps": (STEPS, QUICK_STEPS),
+    "reference": (1.25e-8, 5e-8),
+    "twins": (tuple(METHODS), (CHECK,)),
+}
+#: Errors by the picture's words, the displacements' first.
+MEASURES = {
+    "displacement field": outcome.displacement_error,
+    "faces broken in one only": outcome.faces_error,
+    "energy split / work of the gas": outcome.energy_error,
+}
+SPLIT = (*outcome.SPLIT, "load_work")
+COLUMNS = (
+    "method step disturbed displacement_error faces_error energy_error broken_faces evaluations "
+    f"cpu_s wall_s compile_s residual reached_s {' '.join(f'{term}_J' for term in SPLIT)} failure"
+)
 
 
 def options_parser():
     """Options of this experiment; times are of one thread."""
-    made = blast_parser(NAME, __doc__)
-    made.set_defaults(threads=1)
-    return made
+    return study.add_settings(blast_parser(NAME, __doc__), {}, threads=1)
 
 
 def run(options):
     """Run all methods, write pictures and tables, answer what an error costs."""
-    sizes = QUICK if options.quick else FULL
+    study.take_settings(options, SETTINGS)
     mesh = read_mesh(options.mesh)
     output_folder(options.out)
-    started = time.perf_counter()
-    with ProgressBar("reference") as bar:
-        reference, kept = reference_of(mesh, sizes, options, bar)
-    made = {name: Sweep(name, mesh, sizes, options, reference) for name in sizes["methods"]}
-    points = [point for sweep in made.values() for point in sweep.points]
-    floors = {name: sweep.floor for name, sweep in made.items() if sweep.twins}
-    titles = {name: style.label for name, style in styles_of(made).items()}
-    rows = answer_rows(points, TARGETS, floors, titles)
-    write_all(options.out, made, points, floors, rows, reference)
-    picture_all(options.out, made, points, floors, reference, sizes, titles)
-    runs = [run for sweep in made.values() for run in sweep.everything]
-    compiling = sum(run.compile_seconds for run in [*runs, *([] if kept else [reference])])
-    print_table(rows, ANSWER_HEADER)
-    print()
-    figures = figures_of(made, points, floors, reference)
-    spent = time.perf_counter() - started
-    finish(options, NAME, figures, (compiling, spent - compiling))
+    reference, kept = reference_of(mesh, options)
+    runs = {}
+    for name, steps in options.steps.items():
+        for step in steps:
+            runs.update(twin_runs(name, step, mesh, options))
+    apart = {
+        (name, step): outcome.displacement_error(one, runs[name, step, 0])
+        for (name, step, disturbed), one in runs.items()
+        if disturbed
+    }
+    # The finest comes last.
+    floors = {name: apart[name, step] for name, step in apart}
+    points = [point_of(key, runs, reference, options.until) for key in runs if not key[2]]
+    titles = {name: style.label for name, style in styles_of(options.steps).items()}
+    check = [point.error for point in points if point.method == CHECK][-1]
+    study.give_answers(options.out, points, TARGETS, floors, titles)
+    order = sorted(runs, key=lambda key: (list(METHODS).index(key[0]), key[2]))
+    rows = [row_of(("reference", np.nan, 0), reference, reference)]
+    rows += [row_of(key, runs[key], reference) for key in order]
+    study.write_rows(os.path.join(options.out, "runs.csv"), rows, COLUMNS)
+    picture_all(options, runs, points, floors, reference, check, titles)
+    figures = {
+        **study.cheapest_figures(points, 0.01, floors, "cheapest_seconds"),
+        **study.cheapest_figures(points, 0.001, floors, "seconds"),
+        **figures_of(points),
+        "chaos_floor": study.figure(max(floors.values()), "1"),
+        "chaos_at_any_step": study.figure(max(apart.values()), "1"),
+        "reference_check": study.figure(check, "1"),
+        **study.figures_by_method(points, 0.01, floors),
+    }
+    made = [*runs.values()] + ([] if kept else [reference])
+    study.finish(options, NAME, figures, float(sum(one.compile_seconds for one in made)))
 
 
-def reference_of(mesh, sizes, options, bar):
+def reference_of(mesh, options):
     """(Outcome of the reference, whether it was kept from before)."""
     # Swept until nothing changes by a thousandth, not a twentieth, of the largest speed.
-    method = ImplicitDashpots(sizes["reference"], sweeps=(6, 50), tolerance=1e-3)
-    settings = (method, sizes["until"], mesh.points.tobytes(), mesh.tetrahedra.tobytes())
-    found, kept = cached(
-        os.path.join(options.out, "references"),
-        "implicit",
-        settings,
-        ("taichi_dem",),
-        lambda: blast(mesh, method, sizes["until"], options.driver, progress=bar).as_dict(),
-    )
-    return Outcome(**found), kept
+    method = ImplicitDashpots(options.reference, sweeps=(6, 50), tolerance=1e-3)
+    settings = (method, options.until, mesh.points.tobytes(), mesh.tetrahedra.tobytes())
+    place = os.path.join(options.out, "references"), "implicit", settings, ("taichi_dem",)
+    found, kept = study.cached(*place, lambda: blast(mesh, method, options, "reference").as_dict())
+    return outcome.Outcome(**found), kept
 
 
-class Sweep:
-    """All runs of one method.
-
-    runs: Outcome by step, coarse to fine. twins: of those that were run again disturbed. points:
-    of the diagram.
-    """
-
-    def __init__(self, name, mesh, sizes, options, reference):
-        self.name, self.method, self.reference = name, METHODS[name], reference
-        self.mesh, self.until, self.driver = mesh, sizes["until"], options.driver
-        self.runs, self.twins = {}, {}
-        steps = self.method.steps_of_quick if options.quick else self.method.steps
-        for step in steps:
-            # The coarsest of several is too coarse for its spread to matter.
-            again = name in sizes["twins"] and (step != steps[0] or len(steps) == 1)
-            with ProgressBar(f"{name}, {self.method.label(step)}") as bar:
-                self._run(step, again, bar)
-
-    def _run(self, step, again, bar):
-        settings = (self.mesh, self.method.make(step), self.until, self.driver)
-        run = self.runs[step] = blast(*settings, progress=bar)
-        if again and not run.failure and run.cpu_s < ENOUGH:
-            self.twins[step] = blast(*settings, seed=1, progress=bar)
-
-    @property
-    def everything(self):
-        """All runs."""
-        return (*self.runs.values(), *self.twins.values())
-
-    @property
-    def points(self):
-        """A Point for every run."""
-        return [self._point(step, run) for step, run in self.runs.items()]
-
-    def _point(self, step, run):
-        blank = Point(self.name, step, self.method.label(step), run.evaluations)
-        if run.failure:
-            words = f"diverged at {1e6 * run.reached_s:.0f} µs"
-            return replace(blank, evaluations=self._missed_work(step), failure=words)
-        timing = Timing.of([run.cpu_s, *(self.twins[s].cpu_s for s in self.twins if s == step)])
-        error = displacement_error(run, self.reference)
-        return replace(blank, error=error, seconds=timing, residual=run.residual)
-
-    def _missed_work(self, step):
-        """Evaluations of a failed run, had it come to its end: as of the next finer, by steps."""
-        good = [s for s in self.runs if not self.runs[s].failure]
-        near = max(good, default=None)
-        if near is None:
-            run = self.runs[step]
-            return run.evaluations * self.until / run.reached_s
-        return self.runs[near].evaluations * near / step
-
-    @property
-    def floor(self):
-        """Distance of two runs that differ by round-off, at the finest step that was run twice."""
-        return self.apart(min(self.twins))
-
-    def apart(self, step):
-        """Distance of the two runs at a step, as a share of the displacement."""
-        return displacement_error(self.twins[step], self.runs[step])
+def blast(mesh, method, options, title, **disturbance):
+    """Outcome of the paper's blast by a method."""
+    renew_session()
+    scene = Scene(mesh, CONCRETE, paper_effects())
+    with ProgressBar(title) as bar:
+        looks = {"driver": options.driver, "progress": bar, **disturbance}
+        return outcome.outcome_of(scene, method, options.until, **looks)
 
 
-def write_all(folder, made, points, floors, rows, reference):
-    """CSV of points, of every run with all its errors and its energy split, and of answers."""
-    write_points(os.path.join(folder, "points.csv"), points, floors)
-    write_answers(os.path.join(folder, "answers.csv"), rows)
-    table = [_row("reference", math.nan, reference, reference, False)]
-    for name, sweep in made.items():
-        for runs, again in ((sweep.runs, False), (sweep.twins, True)):
-            table += [_row(name, step, one, reference, again) for step, one in runs.items()]
-    write_rows(os.path.join(folder, "runs.csv"), table)
+def twin_runs(name, step, mesh, options):
+    """Outcome of a method at a step, by (name, step, 0); and by 1 of its disturbed twin."""
+    job = mesh, METHODS[name](step), options, f"{name}, {label_of(name, step)}"
+    runs = {(name, step, 0): blast(*job)}
+    steps, made = options.steps[name], runs[name, step, 0]
+    # The coarsest of several is too coarse for its spread to matter.
+    again = name in options.twins and (step != steps[0] or len(steps) == 1)
+    if again and not made.failure and made.cpu_s < ENOUGH:
+        runs[name, step, 1] = blast(*job, disturbance=DISTURBANCE)
+    return runs
 
 
-def _row(name, step, run, reference, again):
-    failed = bool(run.failure)
-    measures = {
-        f"{measure}_error": math.nan if failed else error(run, reference)
-        for measure, (error, _) in MEASURES.items()
-    }
-    return {
-        "method": name,
-        "step": step,
-        "disturbed": int(again),
-        **measures,
-        "broken_faces": len(run.broken),
-        "evaluations": run.evaluations,
-        "cpu_s": run.cpu_s,
-        "wall_s": run.wall_s,
-        "compile_s": run.compile_seconds,
-        "residual": run.residual,
-        "reached_s": run.reached_s,
-        **{f"{term}_J": run.energy[term] for term in (*SPLIT, "load_work")},
-        # A comma would end the cell.
-        "failure": run.failure.replace(",", ";"),
-    }
+def label_of(name, step):
+    """A step in words."""
+    return f"l = {1e6 * step:g} µm" if name in BY_WAY else seconds(step)
 
 
-def picture_all(folder, made, points, floors, reference, sizes, titles):
+def point_of(key, runs, reference, until):
+    """Point of a run; a failed one has the evaluations of the next finer, by steps."""
+    name, step, _ = key
+    run, label = runs[key], label_of(name, step)
+    if run.failure:
+        good = [at for at in runs if at[0] == name and not runs[at].failure]
+        work = run.evaluations * until / run.reached_s
+        if good:
+            near = max(good, key=lambda at: at[1])
+            work = runs[near].evaluations * near[1] / step
+        words = f"diverged at {1e6 * run.reached_s:.0f} µs"
+        return Point(name, step, label, work, failure=words)
+    timing = study.Timing.of([one.cpu_s for at, one in runs.items() if at[:2] == key[:2]])
+    error = outcome.displacement_error(run, reference)
+    return Point(name, step, label, run.evaluations, error, timing, run.residual)
+
+
+def row_of(key, run, reference):
+    """Row of runs.csv: all errors of a run, its cost and its energy split."""
+    errors = [np.nan if run.failure else error(run, reference) for error in MEASURES.values()]
+    cost = run.evaluations, run.cpu_s, run.wall_s, run.compile_seconds, run.residual, run.reached_s
+    energy = [run.energy[term] for term in SPLIT]
+    # A comma would end the cell.
+    return (*key, *errors, len(run.broken), *cost, *energy, run.failure.replace(",", ";"))
+
+
+def picture_all(options, runs, points, floors, reference, check, titles):
     """The work-precision diagram, and the same for broken faces and energy."""
     scene = (
-        f"{len(reference.moved)} bodies to {1e6 * sizes['until']:.0f} µs, "
+        f"Paper's block, {len(reference.moved)} bodies to {1e6 * options.until:.0f} µs, "
         f"{len(reference.broken)} faces broken"
     )
-    against = f"Reference: solved dashpots at {seconds_in_words(sizes['reference'])}"
-    check = distance_of_check(made)
+    against = f"Reference: solved dashpots at {seconds(options.reference)}"
     # Floors far below all errors would only squeeze the picture.
     least = min(point.error for point in points if point.error > 0.0)
-    shown = {name: floor for name, floor in floors.items() if floor > 0.1 * least}
-    chaos = f"Runs that differ by 1 pm at the start end {power(max(floors.values()))} apart"
     picture_work_precision(
-        os.path.join(folder, "work_precision.png"),
+        os.path.join(options.out, "work_precision.png"),
         points,
         titles,
-        floors=shown,
+        floors={name: floor for name, floor in floors.items() if floor > 0.1 * least},
         time_name=TIME,
         error_name="error of the displacement field [1]",
         work_name="evaluations of bonds and contact pairs [1]",
         residual_names=("step [ns], or displacement limit l [nm]", "unexplained energy / work [1]"),
         step_unit=1e-9,
-        caption=f"Paper's block, {scene}. Error: RMS over all bodies of (displacement - reference) "
+        caption=f"{scene}. Error: RMS over all bodies of (displacement - reference) "
         f"/ RMS of the reference. Step control has limited dashpots.\n{against}; "
-        f"the paper's multirate rule at its finest lies {percent(check)} from it. {chaos}.",
+        f"the paper's multirate rule at its finest lies {percent(check)} from it. "
+        f"Runs that differ by 1 pm at the start end {power(max(floors.values()))} apart.",
     )
+    good = [point for point in points if not point.failure]
     errors = {
         words: {
             name: [
-                (point.seconds.low, error(sweep.runs[point.step], reference))
-                for point in sweep.points
-                if not point.failure
+                (point.low, error(runs[name, point.step, 0], reference))
+                for point in good
+                if point.method == name
             ]
-            for name, sweep in made.items()
+            for name in titles
         }
-        for error, words in MEASURES.values()
+        for words, error in MEASURES.items()
     }
-    caption = f"Paper's block, {scene}. {against}. Points at the bottom edge have no error at all."
-    path = os.path.join(folder, "errors.png")
+    caption = f"{scene}. {against}. Points at the bottom edge have no error at all."
+    path = os.path.join(options.out, "errors.png")
     picture_errors(path, errors, titles, time_name=TIME, caption=caption)
 
 
-def distance_of_check(made):
-    """Distance of the reference to the finest run of the paper's multirate rule."""
-    sweep = made[CHECK]
-    return displacement_error(sweep.runs[min(sweep.runs)], sweep.reference)
-
-
-def figures_of(made, points, floors, reference):
-    """Cheapest ways to an error, price of the paper's rule, floors, check of the reference."""
+def figures_of(points):
+    """Price of the paper's rule, and the longest step that full dashpots bear."""
     figures = {}
-    for target, prefix in ((0.01, "cheapest_seconds_at_"), (0.001, "seconds_at_")):
-        words = percent(target).replace(" %", "_percent")
-        best = answers(points, target, floors)[0]
-        figures[f"{prefix}{words}"] = figure(best.point and best.point.seconds.low, "s")
-        figures[f"cheapest_method_at_{words}"] = figure(best.point and best.method, "")
-    if "uniform" in made:
-        paper = made["uniform"].runs[PAPER_L]
-        figures["paper_rule_seconds"] = figure(paper.cpu_s, "s")
-        figures["paper_rule_error"] = figure(displacement_error(paper, reference), "1")
-    figures["chaos_floor"] = figure(max(floors.values()), "1")
-    apart = [sweep.apart(step) for sweep in made.values() for step in sweep.twins]
-    figures["chaos_at_any_step"] = figure(max(apart), "1")
-    figures["reference_check"] = figure(distance_of_check(made), "1")
-    if "fixed" in made:
-        good = [step for step, run in made["fixed"].runs.items() if not run.failure]
-        figures["longest_fixed_step_full_dashpots"] = figure(max(good, default=None), "s")
-    for name in made:
-        best = next(a for a in answers(points, 0.01, floors) if a.method == name)
-        seconds = best.point and best.point.seconds.low
-        figures[f"seconds_at_1_percent_{name}"] = figure(seconds, "s")
+    for point in points:
+        if (point.method, point.step) == ("uniform", PAPER_L):
+            figures["paper_rule_seconds"] = study.figure(point.seconds.median, "s")
+            figures["paper_rule_error"] = study.figure(point.error, "1")
+    fixed = [point for point in points if point.method == "fixed"]
+    if fixed:
+        longest = max((point.step for point in fixed if not point.failure), default=None)
+        figures["longest_fixed_step_full_dashpots"] = study.figure(longest, "s")
     return figures
 
 
 if __name__ == "__main__":
-    sys.exit(main(run, options_parser()))
+    sys.exit(study.main(run, options_parser()))

@@ -16,287 +16,282 @@ Writes effects.png, blast.csv, damper.csv and summary.json to results/cost_of_ef
 
 import os
 import sys
+from pathlib import Path
 
 import numpy as np
 
-from _damper_response import distance
-from _effects_jobs import Job, run_all
-from _effects_picture import picture_effects
+from _effects_runs import absent, blast, damper
+from ca_damper.measures import curve_distance
+from taichi_dem.kit import study
 from taichi_dem.kit.files import output_folder
+from taichi_dem.kit.plot_style import BLACK, BLUE, GREY, RED, SKY, area_key, line_key, picture
 from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.kit.study import (
-    figure,
-    finish,
-    main,
-    number,
-    parser,
-    show_rows,
-    take_defaults,
-    whole,
-    write_rows,
-)
 
 NAME = "cost_of_effects"
 #: Effects in the order in which they are added; the load is always there.
 ORDER = ("bond_damping", "softening", "shear_slip", "sphere_contact", "friction")
 #: What cannot stay without it.
 ALONG = {"sphere_contact": ("friction",)}
-ALL = "all effects"
-STEP = 4e-7
-FULL = {
-    "until": 2.5e-4,
-    "repeats": 3,
-    "ratios": (0.88, 0.91, 0.94, 0.96, 0.98, 1.0, 1.03),
-    "cycles": (60, 20),
-    "left_out": ORDER,
-    "added": ORDER,
-    "again": 100,
-}
-QUICK = {
-    "until": 1e-4,
-    "repeats": 1,
-    "ratios": (0.92, 0.96, 1.0),
-    "cycles": (15, 5),
-    "left_out": ("sphere_contact", "friction"),
-    "added": (),
-    "again": 40,
+SETTINGS = {
+    "until": (2.5e-4, 1e-4, study.number(0, 1), "simulated time of the blast [s], 2.5e-4"),
+    "repeats": (3, 1, study.whole(1, 100), "of every run, 3"),
+    "ratios": ((0.88, 0.91, 0.94, 0.96, 0.98, 1.0, 1.03), (0.92, 0.96, 1.0)),
+    "cycles": ((60, 20), (15, 5)),
+    "left_out": (ORDER, ("sphere_contact", "friction")),
+    "added": (ORDER, ()),
+    "again": (100, 40),
 }
 #: Substeps that the elastic block is timed over at a time.
 SUBSTEPS = 150
-LAST_BIT = "all effects, last bit of the load changed"
-PARTICLES, SEEDS = 30, (1, 2)
-#: What is left out of a filling, or added to it: in words, and as options.
-SPHERES = (
-    ("friction of spheres", {"friction": 0.0}),
-    ("friction at walls", {"wall_friction": 0.0}),
-    ("rotation", {"rotation": True}),
-)
-AUTOMATON = (
-    ("static contact", {"accounting": "landing+ejection"}),
-    ("ejection and static contact", {"accounting": "landing"}),
-)
-#: Step of a filling [s], and its variants.
-FILLINGS = {"spheres": (3e-5, SPHERES), "automaton": (1e-4, AUTOMATON)}
+ALL, LAST_BIT = "all effects", "all effects, last bit of the load changed"
+STEPS = {"blast": 4e-7, "spheres": 3e-5, "automaton": 1e-4}
+#: Scenes of a filling by its options: as it is, then with an effect left out of it, or added.
+FILLINGS = {
+    "spheres": {
+        "spheres as they are": {},
+        "friction of spheres": {"friction": 0.0},
+        "friction at walls": {"wall_friction": 0.0},
+        "rotation": {"rotation": True},
+    },
+    "automaton": {
+        "automaton as they are": {},
+        "static contact": {"accounting": "landing+ejection"},
+        "ejection and static contact": {"accounting": "landing"},
+    },
+}
 ADDED = ("rotation",)
-VARIANTS = tuple(label for label, _ in SPHERES + AUTOMATON)
-COSTS = (
-    *("step_ms", "step_ms_most", "run_s"),
-    *("spared_percent", "spared_least_percent", "spared_most_percent"),
-    *("memory_MB", "before_first_step_s", "compiled_kB"),
+#: What an effect adds, as a column and as a figure.
+ADDS = (
+    ("run_s", "seconds", "s"),
+    ("memory_MB", "memory_MB", "MB"),
+    ("compiled_kB", "compiled_kB", "kB"),
 )
 HIDDEN = ("group", "failed", "run_s", "spared_least_percent", "spared_most_percent")
+#: Changes are drawn from the first on [%].
+TICKS = (0.01, 0.1, 1.0, 10.0, 100.0)
 
 
 def options_parser():
     """Options of this experiment; threads: processes side by side."""
-    made = parser(NAME, __doc__)
-    made.add_argument("--until", type=number(0, 1), help="simulated time of the blast [s], 2.5e-4")
-    made.add_argument("--repeats", type=whole(1, 100), help="of every run, 3")
-    return made
+    return study.add_settings(study.parser(NAME, __doc__), SETTINGS)
 
 
 def run(options):
     """Measure, then write and print."""
-    take_defaults(options, FULL, QUICK)
-    output_folder(options.out)
-    jobs = [*blast_jobs(options), *damper_jobs(options), absent_job(options)]
+    study.take_settings(options, SETTINGS)
+    folder = Path(output_folder(options.out))
+    groups = {"blast": blasts(options), **{name: dampers(name, options) for name in FILLINGS}}
+    calls = {scene: call for group in groups.values() for scene, call in group.items()}
     workers = options.threads or min(2, os.cpu_count() or 1)
     with ProgressBar("measuring") as bar:
-        seconds = run_all(jobs, options.repeats, workers, options.arch, bar)
-    blast, damper = blast_rows(jobs), damper_rows(jobs)
-    write_rows(os.path.join(options.out, "blast.csv"), blast)
-    write_rows(os.path.join(options.out, "damper.csv"), damper)
-    picture(blast, damper, os.path.join(options.out, "effects.png"))
-    show(blast, "The blast: hole's displacement [mm] and broken faces")
-    show(damper, "The damper: peak of the response [mm]; first rows: what two seeds may differ by")
-    compiling = sum(job.first.get("compile_s", 0.0) for job in jobs)
-    finish(options, NAME, figures_of(jobs, blast, damper), (compiling, seconds))
+        results = study.call_rounds(calls, options.repeats, workers, bar.count)
+    elastic = study.call_in_process(absent, substeps=SUBSTEPS, repeats=options.again)
+    tables = {
+        name: rows_of(name, {scene: results[scene] for scene in group})
+        for name, group in groups.items()
+    }
+    rows = tables["spheres"] + tables["automaton"]
+    study.write_rows(folder / "blast.csv", tables["blast"])
+    study.write_rows(folder / "damper.csv", rows)
+    picture_effects(folder / "effects.png", tables)
+    show(tables["blast"], "The blast: hole's displacement [mm] and broken faces")
+    show(rows, "The damper: peak of the response [mm]; first rows: what two seeds may differ by")
+    compiling = sum(found[0].get("compile_s", 0.0) for found in results.values())
+    study.finish(options, NAME, figures_of(tables, elastic), compiling)
 
 
-def picture(blast, damper, path):
-    """Bars: what an effect costs, and what changes without it."""
-    parts = [("Blast of the paper's block", verdicts(blast), _chance(blast) or 0.0)]
-    for group in FILLINGS:
-        own = [row for row in damper if row["group"] == group]
-        parts.append((f"Damper, {group}", verdicts(own), own[0]["change_percent"]))
-    picture_effects(path, parts)
-
-
-def _chance(blast):
-    """What a change of the load's last bit changes [%], None where that was not tried."""
-    return next((row["change_percent"] for row in blast if row["scene"] == LAST_BIT), None)
-
-
-def blast_jobs(options):
+def blasts(options):
     """All effects, without each, and from the load alone up to all; none of them twice."""
-    wanted = {ALL: ORDER}
+    scenes = {ORDER: ALL}
     for name in options.left_out:
         gone = (name, *ALONG.get(name, ()))
-        wanted[f"without {' and '.join(gone)}"] = tuple(e for e in ORDER if e not in gone)
-    wanted["gas pressure alone"] = ()
-    wanted.update({f"up to {name}": ORDER[: k + 1] for k, name in enumerate(options.added)})
-    first = {}
-    for label, names in wanted.items():
-        first.setdefault(names, label)
-    common = {"until": options.until, "step": STEP}
-    jobs = [(label, names, 0) for names, label in first.items()]
-    jobs += [(LAST_BIT, ORDER, 1)] if options.repeats > 1 else []
-    return [
-        Job("blast", label, "blast", {"names": ["gas_pressure", *names], "ulps": ulps, **common})
-        for label, names, ulps in jobs
-    ]
+        scenes[tuple(e for e in ORDER if e not in gone)] = f"without {' and '.join(gone)}"
+    scenes[()] = "gas pressure alone"
+    for k, name in enumerate(options.added):
+        scenes.setdefault(ORDER[: k + 1], f"up to {name}")
+    shared = {"until": options.until, "step": STEPS["blast"], "ulps": 0}
+    calls = {
+        scene: (blast, {**shared, "names": ["gas_pressure", *names]})
+        for names, scene in scenes.items()
+    }
+    if options.repeats > 1:
+        calls[LAST_BIT] = blast, {**calls[ALL][1], "ulps": 1}
+    return calls
 
 
-def damper_jobs(options):
-    """Both fillings as they are, and with each effect left out or added."""
-    common = {"particles": PARTICLES, "seeds": SEEDS}
-    common.update(ratios=options.ratios, cycles=options.cycles)
-    return [
-        Job(
-            filling,
-            label,
-            "damper",
-            {**common, "filling": filling, "step": step, "options": chosen},
-        )
-        for filling, (step, variants) in FILLINGS.items()
-        for label, chosen in ((f"{filling} as they are", {}), *variants)
-    ]
+def dampers(filling, options):
+    """A filling as it is, and with each effect left out or added."""
+    shared = {"filling": filling, "step": STEPS[filling], "particles": 30, "seeds": (1, 2)}
+    shared.update(ratios=options.ratios, cycles=options.cycles)
+    scenes = FILLINGS[filling]
+    return {scene: (damper, {**shared, "options": chosen}) for scene, chosen in scenes.items()}
 
 
-def absent_job(options):
-    """An elastic block as composed and as stripped by hand."""
-    arguments = {"substeps": SUBSTEPS, "repeats": options.again}
-    return Job("absent", "elastic block", "absent", arguments)
-
-
-def blast_rows(jobs):
-    """A row of the table for every blast."""
-    blasts = [job for job in jobs if job.group == "blast"]
-    rows = [_cost_row(job, blasts[0]) for job in blasts]
-    for row, job in zip(rows, blasts):
-        row["hole_mm"] = None if job.failed else job.first["hole_mm"]
-        row["broken_faces"] = None if job.failed else job.first["broken"]
-        # Of the first effect that is left out, in the complete scene.
-        name = row["scene"].replace("without ", "").split()[0]
-        share = blasts[0].first.get("shares", {}).get(name)
-        row["energy_percent"] = None if share is None else 100.0 * share
-        wanted, found = rows[0]["hole_mm"], row["hole_mm"]
-        change = None if job.failed else 100.0 * abs(found - wanted) / abs(wanted)
-        row["change_percent"] = change
+def rows_of(group, found):
+    """Rows of the table of a group; found: results of the repeats by scene, first the complete."""
+    rows, complete = [], next(iter(found.values()))
+    result = blast_result if group == "blast" else damper_result
+    for scene, repeats in found.items():
+        row = {"group": group, "scene": scene, "failed": repeats[0].get("failed", "")}
+        if row["failed"]:
+            rows.append({**dict.fromkeys(rows[0]), **row})
+        else:
+            changed = result(scene, repeats[0], complete[0])
+            rows.append({**row, **costs(repeats, complete), **changed})
     return rows
 
 
-def damper_rows(jobs):
-    """A row for every response curve; the change is the distance to that of the full filling.
-
-    The floor is half of the distance of two seeds: what the mean over them may owe to chance.
-    """
-    rows = []
-    for group in FILLINGS:
-        curves = [job for job in jobs if job.group == group]
-        whole_curve = _curve(curves[0])
-        for job in curves:
-            row = _cost_row(job, curves[0])
-            curve = _curve(job)
-            row["peak_mm"] = None if job.failed else float(curve.max())
-            row["change_percent"] = None if job.failed else 100.0 * distance(curve, whole_curve)
-            rows.append(row)
-        one, other = curves[0].first["rms_mm"]
-        rows[-len(curves)]["change_percent"] = 50.0 * distance(one, other)
-    return rows
-
-
-def _curve(job):
-    """Mean over the seeds [mm], (ratios,)."""
-    return np.mean(np.atleast_2d(job.first.get("rms_mm", np.nan)), axis=0)
-
-
-def _cost_row(job, complete):
-    """What a job cost, and what share of a step of the complete scene it spares."""
-    row = {"group": job.group, "scene": job.label, "failed": job.failed}
-    if job.failed:
-        return {**row, **dict.fromkeys(COSTS)}
-    timing = job.step_ms
+def costs(repeats, complete):
+    """What a run cost, and what share of a step of the complete scene it spares."""
+    first = repeats[0]
+    times, others = ([1e3 * r["run_s"] / r["steps"] for r in some] for some in (repeats, complete))
+    low, high, least, most = min(times), max(times), min(others), max(others)
     return {
-        **row,
-        "step_ms": timing.low,
-        "step_ms_most": timing.high,
-        "run_s": 1e-3 * timing.low * job.first["steps"],
-        "spared_percent": 100.0 * (1.0 - timing.low / complete.step_ms.low),
+        "step_ms": low,
+        "step_ms_most": high,
+        "run_s": 1e-3 * low * first["steps"],
+        "spared_percent": 100.0 * (1.0 - low / least),
         # From the slowest of its repeats beside the fastest of the others to the reverse.
-        "spared_least_percent": 100.0 * (1.0 - timing.high / complete.step_ms.low),
-        "spared_most_percent": 100.0 * (1.0 - timing.low / complete.step_ms.high),
-        "memory_MB": job.first["memory_MB"],
-        "before_first_step_s": job.first["compile_s"],
-        "compiled_kB": job.compiled_kB,
+        "spared_least_percent": 100.0 * (1.0 - high / least),
+        "spared_most_percent": 100.0 * (1.0 - low / most),
+        "memory_MB": first["memory_MB"],
+        "before_first_step_s": first["compile_s"],
+        "compiled_kB": first["compiled_kB"],
     }
 
 
-def verdicts(rows):
-    """(name, cost [%] with its least and most, change [%]) for each effect left out or added."""
-    found = []
-    for row in rows:
+def blast_result(scene, found, complete):
+    """Result of a blast; the share of energy is that of the first effect that is left out."""
+    share = complete["shares"].get(scene.replace("without ", "").split()[0])
+    hole, wanted = found["hole_mm"], complete["hole_mm"]
+    return {
+        "hole_mm": hole,
+        "broken_faces": found["broken_faces"],
+        "energy_percent": None if share is None else 100.0 * share,
+        "change_percent": 100.0 * abs(hole - wanted) / abs(wanted),
+    }
+
+
+def damper_result(scene, found, complete):
+    """Peak of a response; the change is the distance to that of the complete filling.
+
+    For the complete filling it is half of the distance of two seeds: what the mean over them may
+    owe to chance.
+    """
+    curve, (one, other) = np.mean(found["rms_mm"], axis=0), complete["rms_mm"]
+    change = 100.0 * curve_distance(curve, np.mean(complete["rms_mm"], axis=0))
+    if found is complete:
+        change = 50.0 * curve_distance(one, other)
+    return {"peak_mm": float(curve.max()), "change_percent": change}
+
+
+def effects_in(rows):
+    """(Name, row, sign) of each effect that was left out alone, or added: then the sign is -1."""
+    for row in rows[1:]:
         name = row["scene"].replace("without ", "")
-        alone = row["scene"].startswith("without ") or name in VARIANTS
-        if alone and not row["failed"]:
-            costs = [row[f"spared_{key}percent"] for key in ("", "least_", "most_")]
-            if name in ADDED:
-                name, costs = f"{name} (added)", [-costs[0], -costs[2], -costs[1]]
-            found.append((name, costs, row["change_percent"]))
-    return found
+        if row["group"] != "blast" or name != row["scene"]:
+            yield name, row, -1.0 if name in ADDED else 1.0
 
 
-def figures_of(jobs, blast, damper):
+def chance_in(rows):
+    """Change of the result by chance [%]: seeds, or the last bit of the load; None if not tried."""
+    scene = LAST_BIT if rows[0]["group"] == "blast" else rows[0]["scene"]
+    return next((row["change_percent"] for row in rows if row["scene"] == scene), None)
+
+
+def figures_of(tables, elastic):
     """Overhead of what is absent; for each effect what it adds, and what its absence changes."""
-    times = jobs[-1].first
     # Each against its neighbour in time: a machine is never equally fast for long.
-    ratio = np.array(times["composed"]) / np.array(times["by_hand"])
+    ratio = np.array(elastic["composed"]) / np.array(elastic["by_hand"])
     low, middle, high = 100.0 * (np.percentile(ratio, [25, 50, 75]) - 1.0)
-    figures = {
-        "overhead_absent_percent": figure(float(middle), "%"),
-        "overhead_absent_low_percent": figure(float(low), "%"),
-        "overhead_absent_high_percent": figure(float(high), "%"),
-        "blast_seconds": figure(blast[0]["run_s"], "s"),
+    found = {
+        "overhead_absent_percent": (middle, "%"),
+        "overhead_absent_low_percent": (low, "%"),
+        "overhead_absent_high_percent": (high, "%"),
+        "blast_seconds": (tables["blast"][0]["run_s"], "s"),
     }
-    if _chance(blast) is not None:
-        figures["blast_chance_percent"] = figure(_chance(blast), "%")
-    for row in blast:
-        if row["scene"].startswith("without "):
-            name = row["scene"].split()[1]
-            _add(figures, name, row, blast[0])
-            change = None if row["failed"] else row["broken_faces"] - blast[0]["broken_faces"]
-            figures[f"{name}_broken_faces_change"] = figure(change, "1")
-    for row in damper:
-        if row["scene"] in VARIANTS:
-            complete = next(r for r in damper if r["group"] == row["group"])
-            _add(figures, f"{row['group']}_{row['scene'].replace(' ', '_')}", row, complete)
-    return figures
-
-
-def _add(figures, name, row, complete):
-    """Seconds, memory and kernels that an effect adds, and the change of the result."""
-    sign = -1.0 if row["scene"] in ADDED else 1.0
-    for key, unit in (("run_s", "s"), ("memory_MB", "MB"), ("compiled_kB", "kB")):
-        more = None if row["failed"] else sign * (complete[key] - row[key])
-        figures[f"{name}_{'seconds' if key == 'run_s' else key}"] = figure(more, unit)
-    what = "displacement" if row["group"] == "blast" else "response"
-    figures[f"{name}_{what}_change_percent"] = figure(row["change_percent"], "%")
+    if chance_in(tables["blast"]) is not None:
+        found["blast_chance_percent"] = chance_in(tables["blast"]), "%"
+    for group, rows in tables.items():
+        for name, row, sign in effects_in(rows):
+            own, known = group == "blast", not row["failed"]
+            key = name.split()[0] if own else f"{group}_{name.replace(' ', '_')}"
+            for column, word, unit in ADDS:
+                more = sign * (rows[0][column] - row[column]) if known else None
+                found[f"{key}_{word}"] = more, unit
+            what = "displacement" if own else "response"
+            found[f"{key}_{what}_change_percent"] = row["change_percent"], "%"
+            if own:
+                more = row["broken_faces"] - rows[0]["broken_faces"] if known else None
+                found[f"{key}_broken_faces_change"] = more, "1"
+    return {key: study.figure(value, unit) for key, (value, unit) in found.items()}
 
 
 def show(rows, title):
-    """Print the rows that did not fail, and why the others did."""
+    """Print the rows, and why some of them failed."""
     print(f"\n{title}")
     names = [name for name in rows[0] if name not in HIDDEN]
-    cells = [{name: _cell(row[name]) for name in names} for row in rows]
-    show_rows(cells, {name: (name, "") for name in names})
+    plain = ("scene", "broken_faces")
+    study.show_rows(rows, {name: (name, "" if name in plain else ".3g") for name in names})
     for row in rows:
         if row["failed"]:
             print(f"{row['scene']}: {row['failed']}")
 
 
-def _cell(value):
-    return value if isinstance(value, (str, int, type(None))) else f"{value:.3g}"
+def picture_effects(path, tables):
+    """Bars, a row of panels for each table: what an effect costs, what changes without it."""
+    titles = ("Blast of the paper's block", "Damper, spheres", "Damper, automaton")
+    shown = [[one for one in effects_in(rows) if not one[1]["failed"]] for rows in tables.values()]
+    heights = [max(1, len(effects)) for effects in shown]
+    size = (9.4, 1.6 + 0.42 * sum(heights) + 0.7 * len(heights))
+    ratios = {"height_ratios": heights, "width_ratios": [1, 1.25]}
+    with picture(path, len(heights), 2, size, squeeze=False, gridspec_kw=ratios) as (figure, axes):
+        for (left, right), title, effects, rows in zip(axes, titles, shown, tables.values()):
+            left.set_title(title, fontweight="bold")
+            left.sharex(axes[0, 0])
+            draw_costs(left, effects)
+            draw_changes(right, effects, chance_in(rows) or 0.0)
+        marks = [
+            line_key("range of the repeats", color=BLACK, lw=1.0),
+            area_key("cost below the spread: that range holds 0", fc=SKY),
+            area_key("change by chance alone (round-off, seeds)", fc=GREY, alpha=0.3),
+        ]
+        figure.legend(handles=marks, loc="outside lower right", ncols=3)
+        figure.suptitle("What does an effect cost, and what is it good for?")
+
+
+def draw_costs(axes, effects):
+    """Bars with the range of the repeats; pale where that holds 0, so that no cost is told."""
+    for place, (_, row, sign) in enumerate(effects):
+        cost, *ends = (sign * row[f"spared_{end}percent"] for end in ("", "least_", "most_"))
+        least, most = sorted(ends)
+        hidden = least <= 0.0 <= most
+        axes.barh(place, cost, color=SKY if hidden else BLUE, height=0.6)
+        axes.plot([least, most], [place, place], color=BLACK, linewidth=1.0)
+        words = f"  {cost:.0f} %, below the spread" if hidden else f"  {cost:.0f} %"
+        axes.text(max(most, 0.0), place, words, va="center", fontsize=8.5)
+    names = [f"{name} (added)" if sign < 0.0 else name for name, _, sign in effects]
+    names = [name.replace("_", " ").replace(" and ", "\nand ") for name in names]
+    axes.set(yticks=range(len(names)), yticklabels=names)
+    axes.set_xlabel("cost: share of a step's time [%], below 0: slower without it")
+    axes.axvline(0.0, color=GREY, linewidth=0.8)
+    axes.invert_yaxis()
+    axes.grid(axis="y", visible=False)
+
+
+def draw_changes(axes, effects, chance):
+    """Bars on a logarithmic scale, over a stripe of what chance changes."""
+    changes = [row["change_percent"] for _, row, _ in effects]
+    axes.axvspan(TICKS[0], max(chance, TICKS[0]), color=GREY, alpha=0.3, linewidth=0)
+    bars = axes.barh(range(len(changes)), np.maximum(changes, TICKS[0]), color=RED, height=0.6)
+    words = [f"{value:.0f} %" if value >= 10.0 else f"{value:.2g} %" for value in changes]
+    axes.bar_label(bars, words, padding=3, fontsize=8.5)
+    axes.set(xscale="log", xlim=(TICKS[0], 2e3), yticks=[])
+    axes.set_xticks(TICKS, [f"{tick:g}" for tick in TICKS])
+    axes.set_xticks([], minor=True)
+    axes.invert_yaxis()
+    axes.set_xlabel("use: change of the result without it [%]")
 
 
 if __name__ == "__main__":
-    sys.exit(main(run, options_parser()))
+    sys.exit(study.main(run, options_parser()))

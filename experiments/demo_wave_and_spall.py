@@ -34,17 +34,15 @@ SETTINGS = {
     "ratios": ((1.25, 1.5, 1.75, 2.0), (1.5, 2.0)),
 }
 options_parser = partial(parser, NAME, __doc__, settings=SETTINGS)
-#: Time step [s], and steps from look to look.
-STEP, LOOK = 1e-6, 20
-#: Tail and front of the pulse [m], and the share of the dashpots that is left.
-TAIL, FRONT, DAMPING = 2.4, 0.4, 0.05
+#: Time step [s], steps between looks; tail and front of the pulse [m], share of dashpots left.
+STEP, LOOK, TAIL, FRONT, DAMPING = 1e-6, 20, 2.4, 0.4, 0.05
 
 
 def push(cells, progress):
     """A weak push on the left end of an elastic bar."""
     load = dem.effects.GasPressure("left", peak=1e4, rise=2e-4, decay_ratio=1.0)
-    scene = dem.Scene(bar(LENGTH, WIDTH, (cells, 1, 1)), dem.CONCRETE, [load])
-    return followed(dem.Simulation(scene, dem.Uniform(STEP)), 1, cells, 2.6e-3, progress)
+    elastic = dem.Scene(bar(LENGTH, WIDTH, (cells, 1, 1)), dem.CONCRETE, [load])
+    return followed(dem.Simulation(elastic, dem.Uniform(STEP)), 1, cells, 2.6e-3, progress)
 
 
 def spall(cells, ratios, speed, progress):

@@ -3,7 +3,12 @@
 from ca_damper.plot.animation import moving_picture
 from ca_damper.plot.box import Box, DrawnBox, frame_panel
 from ca_damper.plot.hanging import Hanging, film_hanging
-from ca_damper.plot.response import picture_hysteresis, picture_measures, picture_responses
+from ca_damper.plot.response import (
+    picture_compared,
+    picture_hysteresis,
+    picture_measures,
+    picture_responses,
+)
 
 __all__ = [
     "Box",
@@ -12,6 +17,7 @@ __all__ = [
     "film_hanging",
     "frame_panel",
     "moving_picture",
+    "picture_compared",
     "picture_hysteresis",
     "picture_measures",
     "picture_responses",

@@ -46,6 +46,24 @@ def picture_of_response(response, rows):
         return png_of(figure)
 
 
+def picture_compared(path, curves, oscillator):
+    """Curves of several fillings: mean over seeds as lines, their range as bars; empty dotted.
+
+    curves: (ratios f/f0, RMS displacement [m] as (ratios, seeds)) by label.
+    """
+    styles = styles_of(curves)
+    with picture(path, 1, 1, (7.0, 4.6)) as (_, axis):
+        for label, (ratios, rms) in curves.items():
+            style, middle = styles[label], 1e3 * rms.mean(axis=1)
+            bars = [middle - 1e3 * rms.min(axis=1), 1e3 * rms.max(axis=1) - middle]
+            look = {"color": style.colour, "marker": style.marker, "ms": 4, "lw": 1.2}
+            axis.errorbar(ratios, middle, yerr=bars, label=style.label, **look)
+        top = 1.15e3 * max(rms.max() for _, rms in curves.values())
+        _draw_empty(axis, oscillator, np.concatenate([ratios for ratios, _ in curves.values()]))
+        axis.set(title="mean over seeds; bars: their range", ylim=(0.0, top))
+        axis.legend()
+
+
 def _draw_curves(axis, response, rows=None):
     """Median over seeds as lines, lowest and highest as bands; the empty container dotted.
 
@@ -54,13 +72,14 @@ def _draw_curves(axis, response, rows=None):
     for k in range(len(response.particles)) if rows is None else rows:
         label = f"{response.particles[k]} particles"
         _band(axis, response.ratios, 1e3 * response.rms[k], _shade(response, k), label)
-    oscillator = response.oscillator
-    fine = np.linspace(response.ratios[0], response.ratios[-1], _FINE)
-    empty = oscillator.base_amplitude * np.abs(
-        oscillator.transfer(fine * oscillator.natural_frequency)
-    )
+    _draw_empty(axis, response.oscillator, response.ratios)
+
+
+def _draw_empty(axis, oscillator, ratios):
+    """The empty container over the range of the ratios; labels of both axes."""
+    fine = np.linspace(min(ratios), max(ratios), _FINE)
     look = {"color": GREY, "ls": ":", "lw": 1.0, "label": STYLES["empty"].label}
-    axis.plot(fine, 1e3 * empty / np.sqrt(2.0), **look)
+    axis.plot(fine, 1e3 * oscillator.rms(fine * oscillator.natural_frequency), **look)
     axis.set(xlabel="frequency f / f$_0$ [1]", ylabel="RMS displacement [mm]")
 
 

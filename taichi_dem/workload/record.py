@@ -1,4 +1,4 @@
-"""What a run by the paper's rule evaluates, body by body and interval by interval.
+"""Evaluations of a run, counted body by body and interval by interval.
 
 A body is charged with the bonds of which it is the master and the contact pairs of which it is the
 first, as the paper charges its master elements.

@@ -1,7 +1,7 @@
-"""What workers would take for a recorded workload, by how it is shared among them.
+"""Time of simulated workers for a recorded workload, by the way in which they share it.
 
 All workers wait for the slowest at the end of every tick, as a body's step needs the impulses of
-all that touch it; what waiting itself costs is left out.
+all that touch it; the cost of waiting itself is left out.
 """
 
 from dataclasses import dataclass

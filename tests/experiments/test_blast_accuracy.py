@@ -3,15 +3,19 @@
 import csv
 import json
 
+import numpy as np
 import pytest
 
-from _blast_accuracy import (
+from taichi_dem import ImplicitDashpots, Uniform, simulate
+from taichi_dem.outcome import (
     SPLIT,
     Outcome,
     displacement_error,
     energy_error,
     faces_error,
+    outcome_of,
 )
+from tests.bar_blast import bar_scene
 
 
 def outcome(moved=((3.0, 0.0, 0.0), (0.0, 4.0, 0.0)), broken=(1, 2), **energy):
@@ -42,6 +46,34 @@ def test_energy_moved_from_one_term_to_another_counts_once():
     """1 J of 10 J is booked as kinetic instead of as strain: 10 %."""
     run = outcome(kinetic=3.0, bond_strain=1.0)
     assert energy_error(run, outcome(kinetic=2.0, bond_strain=2.0)) == pytest.approx(0.1)
+
+
+@pytest.fixture(scope="module")
+def ends():
+    """Outcomes of the blown bar, undisturbed and disturbed, and by a step that is too long."""
+    scene, method = bar_scene(), ImplicitDashpots(8e-7)
+    small = outcome_of(scene, method, 5.6e-5, disturbance=1e-12)
+    return outcome_of(scene, method, 5.6e-5), small, outcome_of(scene, Uniform(1e-6), 5.6e-5)
+
+
+def test_outcome_is_that_of_the_run_and_survives_a_file(ends):
+    plain, *_ = ends
+    result = simulate(bar_scene(), method=ImplicitDashpots(8e-7), until=5.6e-5, progress=None)
+    assert plain.broken == np.flatnonzero(~np.isnan(result.broken_time)).tolist() != []
+    assert plain.energy == result.report.energy_balance and plain.failure == ""
+    assert Outcome(**json.loads(json.dumps(plain.as_dict()))) == plain
+    assert plain.reached_s == pytest.approx(5.6e-5)
+
+
+def test_runs_that_differ_by_round_off_end_near_each_other(ends):
+    plain, disturbed, _ = ends
+    assert 0.0 < displacement_error(disturbed, plain) < 1e-6
+
+
+def test_a_run_that_diverges_has_an_outcome_too(ends):
+    *_, failed = ends
+    assert "diverged" in failed.failure
+    assert failed.reached_s < 5.6e-5
 
 
 @pytest.mark.slow

@@ -9,21 +9,21 @@ import pytest
 
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects
 from taichi_dem.engine.capacity import LEAST
-from taichi_dem.mesh.shapes import pair
+from taichi_dem.measured_overhead import elastic_step_seconds
+from taichi_dem.mesh.shapes import bar, pair
 from tests.scenes import ROOT
 
 #: Opening beyond the tensile strength [m].
 PAST = 20e-6
 
 _COUNT = """
-import glob, json, os, re, sys
+import glob, json, os, re
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects, runtime
 from taichi_dem.kit.allocation import field_bytes
 from taichi_dem.mesh.shapes import pair
 from taichi_dem.step.advance import Advance
 import taichi as ti
-sys.path.insert(0, os.environ["EXPERIMENTS"])
-from _stripped import ByHand
+from taichi_dem.measured_overhead import ByHand
 
 os.environ["TI_OFFLINE_CACHE"] = "0"
 os.environ["TI_PRINT_KERNEL_LLVM_IR_OPTIMIZED"] = "1"
@@ -98,13 +98,12 @@ def count(tmp_path_factory):
     folder = tmp_path_factory.mktemp("count")
     script = folder / "count.py"
     script.write_text(_COUNT)
-    paths = {"PYTHONPATH": ROOT, "EXPERIMENTS": os.path.join(ROOT, "experiments")}
     done = subprocess.run(
         [sys.executable, str(script)],
         capture_output=True,
         text=True,
         cwd=folder,
-        env={**os.environ, **paths},
+        env={**os.environ, "PYTHONPATH": ROOT},
     )
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout.splitlines()[-1])
@@ -115,6 +114,12 @@ def test_a_step_without_effects_compiles_to_the_code_written_by_hand(count, what
     """Optimised LLVM instructions: composed without effects = stripped by hand."""
     assert count["by hand"][what] < count["all"][what]
     assert count["composed"][what] == count["by hand"][what]
+
+
+def test_both_steps_are_timed_in_turns():
+    seconds = elastic_step_seconds(bar(0.1, 0.05, (3, 2, 2)), substeps=5, repeats=3)
+    assert {name: len(found) for name, found in seconds.items()} == {"composed": 3, "by_hand": 3}
+    assert min(map(min, seconds.values())) > 0.0
 
 
 def test_a_scene_without_effects_allocates_what_is_listed_by_hand(count):

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from taichi_dem.kit import runtime, study
+from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.study.machine import busiest_seconds, thread_seconds
 
 TABLE = study.Table(
@@ -66,3 +67,11 @@ def test_threads_of_this_process_have_spent_time():
     if not found:
         pytest.skip("this system does not tell")
     assert max(found.values()) > 0.0
+
+
+def test_output_paths_lie_in_a_folder_that_is_made(tmp_path):
+    at = study.output_paths(str(tmp_path / "a" / "b"))
+    assert at("table.csv") == str(tmp_path / "a" / "b" / "table.csv")
+    assert (tmp_path / "a" / "b").is_dir()
+    with pytest.raises(InputError, match="must be the name of a folder"):
+        study.output_paths("")

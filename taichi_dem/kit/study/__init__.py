@@ -1,5 +1,6 @@
 """Tools of a study: options, tables, figures of a summary, timings, kept results, workers."""
 
+from taichi_dem.kit.study.answers import cheapest_figures, figures_by_method, give_answers
 from taichi_dem.kit.study.cached_result import cached, digest
 from taichi_dem.kit.study.command_line import (
     Parser,
@@ -45,14 +46,17 @@ __all__ = [
     "cached",
     "call_in_process",
     "call_rounds",
+    "cheapest_figures",
     "checkpoint_of",
     "clock",
     "columns_of",
     "digest",
     "exit_code",
     "figure",
+    "figures_by_method",
     "figures_from",
     "finish",
+    "give_answers",
     "interval",
     "main",
     "number",

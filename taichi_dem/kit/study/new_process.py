@@ -34,7 +34,11 @@ def call_in_process(
     """
     folder, file = os.path.split(os.path.abspath(str(sys.modules[work.__module__].__file__)))
     settings: Any = runtime.settings()
-    job = {"folder": folder, "module": os.path.splitext(file)[0], "function": work.__name__}
+    job: dict[str, Any] = {
+        "folder": folder,
+        "module": os.path.splitext(file)[0],
+        "function": work.__name__,
+    }
     job.update(arch=settings.arch, threads=threads, arguments=arguments)
     if cache:
         os.makedirs(cache, exist_ok=True)

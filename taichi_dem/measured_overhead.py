@@ -1,11 +1,59 @@
-"""What happens to a bond and a body without any effect, stripped by hand, to compare with."""
+"""Measured overhead of what is absent: a step without effects beside one stripped by hand.
 
+An effect that is left out of a scene must cost nothing. The stripped step holds elastic bonds and
+free bodies and nothing that an effect could hook into, so that the promise can be checked on any
+machine.
+"""
+
+from typing import Any, Callable
+
+import numpy as np
 import taichi as ti
 
+from taichi_dem.kit.study.timing import seconds_of
 from taichi_dem.kit.types import vec3
+from taichi_dem.materials import CONCRETE
+from taichi_dem.mesh.mesh import Mesh
+from taichi_dem.methods import Uniform
 from taichi_dem.physics.bond import unit_arm, unit_opening
 from taichi_dem.physics.rotation import mean_spin, rotation_matrix, spin_of, turned, zero3
+from taichi_dem.scene import Scene
+from taichi_dem.simulation import Simulation
 from taichi_dem.step.advance import Advance
+from taichi_dem.step.drivers import Resident, Step
+
+#: Step of the elastic block [s], far below its limit.
+STEP = 1e-8
+
+
+def elastic_step_seconds(mesh: Mesh, substeps: int, repeats: int) -> dict[str, list[float]]:
+    """CPU seconds of some substeps of an elastic block in motion, in turns.
+
+    Returns "composed", of the step as the package composes it, and "by_hand", of ``ByHand``.
+    """
+    runs = {"composed": _elastic(mesh, None), "by_hand": _elastic(mesh, ByHand)}
+    seconds: dict[str, list[float]] = {name: [] for name in runs}
+    for _ in range(repeats):
+        for name, run in runs.items():
+            seconds[name].append(seconds_of(run, substeps))
+    return seconds
+
+
+def _elastic(mesh: Mesh, stripped: Any) -> Callable[[int], Any]:
+    """A function that takes an elastic block, its bodies shaken, some substeps on."""
+    simulation: Any = Simulation(Scene(mesh, CONCRETE, []), Uniform(STEP), "resident")
+    centre = simulation.model.centre
+    turn = np.tile([1.0, 0.0, 0.0, 0.0], (len(centre), 1))
+    velocity = np.random.default_rng(1).normal(size=centre.shape)
+    simulation.state.set_motion(centre, turn, velocity)
+    simulation.start()
+    driver = simulation.driver
+    if stripped is not None:
+        engine = simulation.loan.engine
+        advance = stripped(engine.tables, engine.state, engine.schedule, None)
+        driver = Resident(Step(advance, engine.schedule, None))
+    driver.prepare()
+    return lambda substeps: driver._run(1 << 60, substeps)
 
 
 @ti.data_oriented

@@ -1,0 +1,76 @@
+"""Runs that ``cost_of_effects.py`` makes in processes of their own, and what they cost."""
+
+import time
+
+import numpy as np
+
+from _blast import EFFECTS
+from ca_damper import Automaton, Batch, Oscillator, SceneTable, Spheres
+from taichi_dem import (
+    CONCRETE,
+    PAPER_BLOCK,
+    ImplicitDashpots,
+    Scene,
+    SimulationDiverged,
+    read_mesh,
+    simulate,
+)
+from taichi_dem.kit.allocation import field_bytes
+from taichi_dem.measured_overhead import elastic_step_seconds
+
+FILLINGS = {"spheres": Spheres, "automaton": Automaton}
+PEAK = 575e6
+
+
+def blast(names, until, step, ulps):
+    """The paper's block with some effects.
+
+    ulps: by which the peak of the gas pressure differs; nobody would notice but a chaotic run.
+    """
+    peak = PEAK + ulps * np.spacing(PEAK)
+    acting = [EFFECTS[n](peak=peak) if n == "gas_pressure" else EFFECTS[n]() for n in names]
+    scene = Scene(read_mesh(PAPER_BLOCK), CONCRETE, acting)
+    started = time.process_time()
+    try:
+        result = simulate(scene, method=ImplicitDashpots(step), until=until, samples=25)
+    except SimulationDiverged as error:
+        return {"failed": str(error)}
+    report = result.report
+    return {
+        "compile_s": time.process_time() - started - report.run_cpu_seconds,
+        "run_s": report.run_cpu_seconds,
+        "steps": report.substeps,
+        "memory_MB": 1e-6 * field_bytes(),
+        "hole_mm": float(result.history["hole_radial_displacement_mm"][-1]),
+        "broken_faces": report.broken_faces,
+        "shares": {use.effect: use.share for use in report.effect_activity},
+    }
+
+
+def damper(filling, options, particles, step, ratios, seeds, cycles):
+    """A response curve; cycles: before measuring, and measured."""
+    oscillator = Oscillator()
+    frequency, seed = np.meshgrid(np.array(ratios) * oscillator.natural_frequency, seeds)
+    scenes = particles, seed.ravel(), step, frequency.ravel(), oscillator.base_amplitude
+    made = FILLINGS[filling](**options)
+    started = time.process_time()
+    batch = Batch(made, SceneTable(*scenes), measured_cycles=cycles[1])
+    batch.start("rigid")
+    batch.advance(0)
+    ready = time.process_time()
+    try:
+        measured = batch.run(*cycles)
+    except SimulationDiverged as error:
+        return {"failed": str(error)}
+    return {
+        "compile_s": ready - started,
+        "run_s": time.process_time() - ready,
+        "steps": batch.report().scene_steps,
+        "memory_MB": 1e-6 * field_bytes(),
+        "rms_mm": (1e3 * measured.rms).reshape(len(seeds), len(ratios)).tolist(),
+    }
+
+
+def absent(substeps, repeats):
+    """Seconds of some substeps of an elastic block: as composed, and with what is by hand."""
+    return elastic_step_seconds(read_mesh(PAPER_BLOCK), substeps, repeats)
