@@ -20,7 +20,8 @@ from taichi_dem.plot.bodies import draw_bodies
 from taichi_dem.result import Result
 from taichi_dem.simulate import result_of, simulate
 
-LENGTH, WIDTH, CELLS = 0.3, 0.1, (3, 2, 2)
+LENGTH = 0.3
+BAR = bar(LENGTH, 0.1, (3, 2, 2))
 STEP, UNTIL, LOOKS = 2e-8, 9e-4, 20
 #: The right end goes with v cos(2 pi f t), and sideways at half of it: v [m/s] to choose, f [Hz].
 SPEEDS = (0.05, 0.2, 0.5, 0.75, 1.0, 1.5, 2.0)
@@ -78,19 +79,16 @@ class Answer:
 def allowed(names):
     """The effects that can be listed out of names, in order: friction acts in contacts only."""
     kept = set(names)
-    if "sphere_contact" not in kept:
-        kept.discard("friction")
+    kept -= set() if "sphere_contact" in kept else {"friction"}
     return tuple(name for name in ALL if name in kept)
 
 
 def scene(names, program, speed):
     """The bar, held on the left and moved on the right; effects not named are silent."""
     moved = dem.effects.PrescribedMotion("right", (speed, SIDEWAYS * speed, 0.0), FREQUENCY)
-    made = [(name, EFFECTS[name][0]()) for name in program]
-    listed = [effect if name in names else effect.silent() for name, effect in made]
-    return dem.Scene(
-        bar(LENGTH, WIDTH, CELLS), dem.CONCRETE, [*listed, dem.effects.Fixed("left"), moved]
-    )
+    made = {name: EFFECTS[name][0]() for name in program}
+    listed = [effect if name in names else effect.silent() for name, effect in made.items()]
+    return dem.Scene(BAR, dem.CONCRETE, [*listed, dem.effects.Fixed("left"), moved])
 
 
 def moved(names, program, speed):
@@ -139,11 +137,8 @@ def verdicts(answer):
 def words(answer):
     """The outcome in sentences, with what the program said."""
     spared = 1.0 - answer.step_s[0] / answer.step_s[1]
-    spares = (
-        f"spares **{percent(max(0.0, spared))}** of a step"
-        if answer.measured
-        else ("is not measured")
-    )
+    spares = f"spares **{percent(max(0.0, spared))}** of a step"
+    spares = spares if answer.measured else "is not measured"
     change = "no comparison" if answer.change is None else percent(answer.change)
     chosen = answer.chosen
     said = [f"The program says: *{chosen.diverged}.*"] if chosen.diverged else []
@@ -189,17 +184,13 @@ def _pulled(axes, answer, result, number, magnify):
 
 def _prices(above, below, answer):
     """Time of a step of both, where it has been measured, and their broken bonds."""
-    change = answer.change
-    words = (
-        "one of both did not end" if change is None else f"bodies end {percent(change)} elsewhere"
-    )
+    far, words = answer.change, "one of both did not end"
+    words = words if far is None else f"bodies end {percent(far)} elsewhere"
     above.set(xlabel="time of a step [µs]", title="what it costs")
     below.set(xlabel="broken bonds [1]", title=words)
-    broken = [int(np.isfinite(one.broken_time).sum()) for one in (answer.chosen, answer.complete)]
-    for axes, values, form in (
-        (above, 1e6 * np.array(answer.step_s), "%.3g"),
-        (below, broken, "%d"),
-    ):
+    broken = [one.report.broken_faces for one in (answer.chosen, answer.complete)]
+    costs = 1e6 * np.array(answer.step_s)
+    for axes, values, form in ((above, costs, "%.3g"), (below, broken, "%d")):
         if np.isfinite(values).all():
             names = ["your choice", "all effects"]
             bars = axes.barh(names, values, color=[BLUE, GREY], height=0.5)
