@@ -108,6 +108,25 @@ class Cycles:
         """Mean power that the filling takes [W], and i times its reactive power."""
         return -0.5 * self.harmonic("f") * np.conj(self.harmonic("v"))
 
+    def powers(
+        self, base_amplitude: FloatOrArray, stiffness: FloatOrArray, damping: FloatOrArray
+    ) -> dict[str, np.ndarray]:
+        """Mean power that "base" gives and that "dashpot" and "filling" take [W], first harmonics.
+
+        base_amplitude [m], stiffness [N/m] and damping [N s/m] of the primary structure. The base
+        moves as y = -i y0 and pulls the container with K (y - x) + C (y' - x'). In the steady state
+        the dashpot and the filling take together what the base gives.
+        """
+        base = -1j * base_amplitude * np.ones(len(self.omega))
+        stretch, speed = base - self.harmonic("x"), 1j * self.omega * base
+        drag = speed - self.harmonic("v")
+        pull = stiffness * stretch + damping * drag
+        return {
+            "base": 0.5 * (pull * np.conj(speed)).real,
+            "dashpot": 0.5 * damping * np.abs(drag) ** 2,
+            "filling": self.complex_power.real,
+        }
+
     def loss_factor(self, mass: FloatOrArray) -> np.ndarray:
         """Energy that the filling takes a radian per energy in motion, c / (w (M + m)).
 

@@ -46,11 +46,23 @@ class Oscillator:
         """Share of critical damping, with the container empty."""
         return self.damping / (2.0 * math.sqrt(self.stiffness * self.mass))
 
+    def energy(self, x: FloatOrArray, v: FloatOrArray, y: FloatOrArray = 0.0) -> Any:
+        """Energy of the container's motion and of its spring [J].
+
+        x, y: displacement of container and base [m]; v: velocity of the container [m/s].
+        """
+        return 0.5 * (self.mass * v**2 + self.stiffness * (x - y) ** 2)
+
     def transfer(self, frequency: ArrayLike, added_mass: FloatOrArray = 0.0) -> Any:
         """Complex x / y of the steady state at a frequency [Hz] with more mass [kg]; or arrays."""
         omega = 2.0 * np.pi * np.asarray(frequency, dtype=np.float64)
         held = self.stiffness + 1j * omega * self.damping
         return held / (held - (self.mass + added_mass) * omega**2)
+
+    def scaled(self, mass: float, base_amplitude: float) -> "Oscillator":
+        """The same frequency and damping ratio with another mass [kg] and base motion [m]."""
+        share = mass / self.mass
+        return Oscillator(mass, share * self.stiffness, share * self.damping, base_amplitude)
 
     def peak(self, added_mass: float = 0.0) -> tuple[float, float]:
         """Where the steady state peaks with more mass [kg], and how high: (ratio, RMS [m]).

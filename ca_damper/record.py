@@ -82,7 +82,7 @@ def film(
             if mark in samples:
                 rows.append(present)
             if mark in frames:
-                shots.append([_frame(batch, present, s) for s in range(batch.count)])
+                shots.append(frames_of(batch, present))
     history = {name: np.stack([row[name] for row in rows]) for name in rows[0]}
     return Film(history, tuple(zip(*shots)))
 
@@ -97,7 +97,15 @@ def _marks(name, every, steps):
     return set(range(0, steps + 1, every))
 
 
-def _frame(batch, present, s):
-    time_s, x, y = (float(present[name][s]) for name in ("time_s", "x", "y"))
-    shot = batch.snapshot(s)
-    return Frame(time_s, x, y, shot["position"], shot["velocity"])
+def frames_of(batch: Any, present: Optional[dict[str, np.ndarray]] = None) -> tuple[Frame, ...]:
+    """A Frame of every scene of a batch as it is now.
+
+    present: what ``Batch.sample`` has just given, if it has been asked.
+    """
+    found = batch.sample() if present is None else present
+    time_s, x, y = (found[name].tolist() for name in ("time_s", "x", "y"))
+    shots = [batch.snapshot(s) for s in range(batch.count)]
+    return tuple(
+        Frame(time_s[s], x[s], y[s], shot["position"], shot["velocity"])
+        for s, shot in enumerate(shots)
+    )

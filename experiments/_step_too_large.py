@@ -1,67 +1,52 @@
-"""Runs of ``demo_step_too_large.py``: what is seen of them, tables and words."""
+"""Runs of ``demo_step_too_large.py``: what is seen of them, tables, pictures and words."""
 
-import os
+import textwrap
 
 import numpy as np
 
-from taichi_dem import CONCRETE, quality_report
 from taichi_dem.kit.files import write_csv
-from taichi_dem.kit.study import figure, show_rows, write_rows
+from taichi_dem.kit.plot_style import BLACK, GREEN, GREY, ORANGE, RED, picture, seconds
+from taichi_dem.kit.study import Table, write_rows
+from taichi_dem.plot.film_runs import FilmedRun, film_runs
 
-TABLE = {
-    "limited by": ("limited_by", ""),
-    "step / limit": ("share_of_limit", "g"),
-    "step [s]": ("step_s", ".3g"),
-    "reached [s]": ("reached_s", ".3g"),
-    "unexplained / put in": ("unexplained", ".2g"),
-    "end": ("end", ""),
-}
-
-
-def longest_step(mesh, limit):
-    """Longest safe step of the worst body [s], by what sets it."""
-    report = quality_report(mesh, CONCRETE)
-    found = {"dashpots": report.dashpot_step_s, "springs": report.spring_step_s}
-    return float(found[limit].min())
+TABLE = Table(
+    limited_by=("limit", "limited by"),
+    share_of_limit=("share", "step / limit", "g"),
+    step_s=("step", "step [s]", ".3g"),
+    diverged=(lambda made: int(bool(made.sentence)), "", "", "1"),
+    reached_s=(lambda made: float(made.time[-1]), "reached [s]", ".3g", "s"),
+    unexplained=(lambda made: float(made.residual[-1]), "unexplained / put in", ".2g", "1"),
+    end=(lambda made: "diverged" if made.sentence else "done", "end"),
+    sentence=("sentence",),
+)
+#: Colours of the runs of a limit; axes of the unexplained energy.
+COLOURS = (GREEN, ORANGE, RED)
+UNEXPLAINED = {"yscale": "log", "ylim": (1e-5, 1e3)}
 
 
 class Struck:
-    """A run, and its observer.
+    """A run with a share of a limit as its step [s]; an entry a look.
 
-    limit: what sets it; share: of it that the step [s] has. frames: snapshots; speeds: bounds of
-    the speed of every body's corners in them [m/s], (frames, bodies). sentence: what the program
-    said, "" when the run reached its end.
+    speeds: bounds of the speed of every body's corners, (looks, bodies). residual: energy that the
+    account cannot explain over that put in by then. sentence: of the program where it ended the
+    run, "" when it reached its end.
     """
 
-    def __init__(self, limit, share, step):
-        self.limit, self.share, self.step, self.sentence = limit, share, step, ""
-        self.frames, self._speeds, self._time, self._account = [], [], [], []
+    def __init__(self, limit, share, step, seen, result):
+        self.limit, self.share, self.step = limit, share, step
+        self.result, self.sentence = result, result.diverged
+        self.time, self.frames, self.speeds = seen["time"], seen.rows["frame"], seen["speed"]
+        given, found = np.abs(
+            [[row["load_work"], row["residual"]] for row in seen.rows["energy"]]
+        ).T
+        self.residual = found / np.where(given > 0.0, given, np.inf)
 
-    def observe(self, view):
-        """Keep the bar and its energy balance as they are now."""
-        self.view, self.model, motion = view, view.model, view.motion()
-        spin = self.model.body_radius * np.linalg.norm(motion["spin"], axis=1)
-        self.frames.append(view.frame())
-        self._speeds.append(np.linalg.norm(motion["velocity"], axis=1) + spin)
-        self._time.append(view.time_s)
-        self._account.append(view.energy_balance())
 
-    @property
-    def time(self):
-        """Time of every frame [s]."""
-        return np.array(self._time)
-
-    @property
-    def speeds(self):
-        """Speeds of all frames."""
-        return np.array(self._speeds)
-
-    @property
-    def residual(self):
-        """Energy that the account cannot explain over that put in by then, at every time."""
-        given = np.array([abs(row["load_work"]) for row in self._account])
-        found = np.array([abs(row["residual"]) for row in self._account])
-        return found / np.where(given > 0.0, given, np.inf)
+def corner_speed(view):
+    """Bound of the speed of every body's corners [m/s]."""
+    motion = view.motion()
+    spin = view.model.body_radius * np.linalg.norm(motion["spin"], axis=1)
+    return np.linalg.norm(motion["velocity"], axis=1) + spin
 
 
 def caption(runs):
@@ -71,7 +56,7 @@ def caption(runs):
         f"{ended(made)}"
         for made in runs[:2]
     )
-    return f"The same blow on the same bar. Left: {left}. Right: {right}."
+    return f"The same blow on the same bar. Above: {left}. Below: {right}."
 
 
 def ended(made):
@@ -82,51 +67,67 @@ def ended(made):
         return f"{missed} the energy put in is unexplained after {steps} steps"
     return (
         "neighbours shake against each other, ever more, until the program ends the run after "
-        f"{steps} steps, when {missed} the energy put in has come from nowhere: "
-        f'"{made.sentence}"'
+        f'{steps} steps, when {missed} the energy put in has come from nowhere: "{made.sentence}"'
     )
 
 
-def row_of(made):
-    """Row of the table."""
-    return {
-        "limited_by": made.limit,
-        "share_of_limit": made.share,
-        "step_s": made.step,
-        "reached_s": float(made.time[-1]),
-        "unexplained": float(made.residual[-1]),
-        "end": "diverged" if made.sentence else "done",
-    }
-
-
-def print_runs(runs):
-    """The runs as a table, and every sentence word for word."""
-    show_rows([row_of(made) for made in runs], TABLE)
-    print("What the program said:")
-    for made in runs:
-        if made.sentence:
-            print(f"  {made.limit}, {made.share:g}: {made.sentence}")
-    print()
-
-
-def figures_of(runs, limits):
-    """Figures for summary.json."""
-    figures = {f"limit_{limit}_s": figure(step, "s") for limit, step in limits.items()}
-    for made in runs:
-        row, key = row_of(made), f"{made.limit}_{made.share:g}"
-        figures[f"{key}_diverged"] = figure(int(bool(made.sentence)), "1")
-        figures[f"{key}_reached_s"] = figure(row["reached_s"], "s")
-        figures[f"{key}_unexplained"] = figure(row["unexplained"], "1")
-    return figures
-
-
-def write(runs, folder):
-    """Tables of all that is plotted."""
+def write(runs, rows, at):
+    """Write the tables of all that is plotted, the picture, and the film."""
     for made in runs:
         columns = {"time_s": made.time, "unexplained_over_put_in": made.residual}
-        name = f"history_{made.limit}_{made.share:g}.csv"
-        write_csv(os.path.join(folder, name), columns)
-    rows = [{**row_of(made), "sentence": made.sentence} for made in runs]
-    for row in rows:
-        del row["unexplained"], row["end"]
-    write_rows(os.path.join(folder, "steps.csv"), rows)
+        write_csv(at(f"history_{made.limit}_{made.share:g}.csv"), columns)
+    names = ("limited_by", "share_of_limit", "step_s", "reached_s", "sentence")
+    write_rows(at("steps.csv"), [{name: row[name] for name in names} for row in rows])
+    picture_energy(at("energy.png"), runs)
+    film(at("shaken.gif"), *runs[:2])
+
+
+def picture_energy(path, runs):
+    """Energy that the account cannot explain over time, a panel a limit; the sentences below."""
+    limits = list(dict.fromkeys(made.limit for made in runs))
+    said = [f"{m.limit}, {m.share:g} × limit: “{m.sentence}”" for m in runs if m.sentence]
+    size = (4.6 * len(limits) + 0.6, 3.4 + 0.55 * len(said))
+    with picture(path, 1, len(limits), size, squeeze=False) as (drawn, panels):
+        for axes, limit in zip(panels[0], limits):
+            for made, colour in zip((m for m in runs if m.limit == limit), COLOURS):
+                label = f"{made.share:g} × limit = {seconds(made.step)}"
+                axes.plot(1e6 * made.time, positive(made.residual), color=colour, label=label)
+                if made.sentence:
+                    end = 1e6 * made.time[-1], made.residual[-1]
+                    axes.plot(*end, "X", color=colour, ms=7, clip_on=False)
+            axes.axhline(1.0, color=GREY, ls=":", lw=1.0, label="all that was put in")
+            axes.plot([], [], "X", color=BLACK, ms=7, ls="none", label="ended by the program")
+            axes.set(title=f"limited by its {limit}", xlabel="time [µs]", **UNEXPLAINED)
+            axes.legend(loc="upper right", title="step")
+        panels[0, 0].set_ylabel("unexplained energy / energy put in [1]")
+        words = "\n".join(textwrap.fill(text, 62 * len(limits)) for text in said)
+        drawn.supxlabel(words, x=0.02, ha="left", fontsize=7.5, family="monospace")
+
+
+def positive(values):
+    """Values, NaN where a logarithmic axis cannot show them."""
+    return np.where(values > 0.0, values, np.nan)
+
+
+def film(path, safe, bad, count=40, held=8):
+    """A safe run and a diverging one; count: of pictures, the last ones of which are held."""
+    end, fastest, runs = float(bad.time[-1]), float(safe.speeds.max()), []
+    for made, colour in ((safe, GREEN), (bad, ORANGE)):
+        name = f"{made.share:g} × limit"
+        titles = [f"{name}, t = {1e6 * time:.1f} µs" for time in made.time]
+        shown = made.result.model, made.frames, made.speeds, titles
+        runs.append(FilmedRun(*shown, positive(made.residual), name, colour))
+    # Closer together towards the end, where all happens at once.
+    moving = end * (1.0 - np.linspace(1.0, 0.0, count - held) ** 1.5)
+    look = {"cmap": "YlOrRd", "norm": "log", "clim": (1e-4 * fastest, 1e2 * fastest)}
+    film_runs(
+        *(path, runs, [*moving, *[end] * held]),
+        words="speed of a body [m/s]",
+        curve={"ylabel": "unexplained\nenergy /\nput in [1]", **UNEXPLAINED},
+        magnify=6000.0,
+        # Oblique enough to show two sides and the struck end.
+        axis=(-0.35, 0.45, 1.0),
+        footers=[""] * (count - held - 1) + [textwrap.fill(bad.sentence, 66)] * (held + 1),
+        milliseconds=130,
+        **look,
+    )

@@ -1,18 +1,16 @@
-"""Bars of ``demo_wave_and_spall.py`` over time, what is measured on them, and words."""
-
-import os
+"""Bars of ``demo_wave_and_spall.py`` over time: their pictures, tables and words."""
 
 import numpy as np
 
-from taichi_dem import CONCRETE, Every
+from taichi_dem import CONCRETE
 from taichi_dem.kit.files import write_csv
-from taichi_dem.kit.study import figure, figures_from, write_rows
-from taichi_dem.plot.wave import film_spall, picture_spall, picture_wave
-from taichi_dem.simulate import run_simulation
+from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, RED, picture
+from taichi_dem.kit.study import write_rows
+from taichi_dem.output.profile import Profile, travel_time
+from taichi_dem.plot.bars import draw_space_time, film_bar
 
-LENGTH = 4.0
-#: Bodies a cell; pictures of the film.
-CELL, FRAMES = 6, 40
+#: Length of a bar [m]; bodies a cell.
+LENGTH, CELL = 4.0, 6
 #: Places where the wave's passing is timed, as shares of the bar.
 GATES = (0.25, 0.625)
 TABLE = {
@@ -25,97 +23,53 @@ TABLE = {
 }
 
 
-class Bars:
-    """Bars over time, kept by observing a run.
+class Bars(Profile):
+    """Bars over time, in cells as slices: arrays (looks, bars, cells)."""
 
-    time (rows,) [s]; displacement [m] and velocity [m/s] of the cells (rows, bars, cells); joints:
-    whether the bonds between two cells have broken, (rows, bars, cells - 1).
-    """
+    def __init__(self, when, bars, cells):
+        super().__init__(when, np.arange(CELL * bars * cells).reshape(bars, cells, CELL))
+        self.cell = LENGTH / cells
+        self.place = self.cell * (np.arange(cells) + 0.5)
+        self.gates = [round(share * cells) for share in GATES]
 
-    when = Every(steps=20)
-
-    def __init__(self, bars, cells):
-        self.shape, self.rows = (bars, cells, CELL), []
-
-    def observe(self, view):
-        """Keep all cells as they are now."""
-        motion = view.motion()
-        moved = motion["position"][:, 0] - view.model.centre[:, 0]
-        both = (x.reshape(self.shape).mean(axis=2) for x in (moved, motion["velocity"][:, 0]))
-        broken = view.broken[self._crossing(view.model.topology)]
-        self.rows.append((view.time_s, *both, broken.all(axis=2)))
-
-    def _crossing(self, topology):
-        """Bonds between neighbouring cells: their numbers (bars, cells - 1, 2)."""
-        first, second = topology.master // CELL, topology.slave // CELL
-        bonds = np.flatnonzero(first != second)
-        bonds = bonds[np.argsort(np.minimum(first, second)[bonds], kind="stable")]
-        return bonds.reshape(self.shape[0], self.shape[1] - 1, -1)
-
-    def follow(self, simulation, until, progress):
-        """Step to the last look before a time [s]; returns itself, and the Report of the run."""
-        step, steps = simulation.method.dt0, self.when.steps
-        until = round(until / step) // steps * steps * step
-        looks = {"samples": 1, "progress": progress, "observers": [self]}
-        return self, run_simulation(simulation, until=until, **looks).report
-
-    def __getattr__(self, name):
-        names = ("time", "displacement", "velocity", "joints")
-        if name not in names:
-            raise AttributeError(name)
-        return np.array([row[names.index(name)] for row in self.rows])
-
-    def stress(self, modulus):
-        """Stress of every joint [Pa], tension positive, zero where broken; modulus [Pa]."""
-        strain = np.diff(self.displacement, axis=2) / (LENGTH / self.shape[1])
-        return np.where(self.joints, 0.0, modulus * strain)
+    def speed(self, step):
+        """Speed [m/s] at which a push passes the gates."""
+        first, second = (self.velocity[:, 0, k] for k in self.gates)
+        way = (self.gates[1] - self.gates[0]) * self.cell
+        return way / travel_time(self.time, first, second, step)
 
     def spalled(self, ratios, speed, tail):
         """A row for every bar: the stress that arrived, depth of the first break, the formula's."""
-        rows, velocity, joints = [], self.velocity, self.joints
-        for k, ratio in enumerate(ratios):
-            row = int(joints[:, k].any(axis=1).argmax())
-            first = np.flatnonzero(joints[row, k])
-            cell = LENGTH / self.shape[1]
-            arrived = 0.5 * CONCRETE.density * speed * velocity[: row + 1, k, -1].max()
-            found = {
-                "ratio": ratio,
-                "arrived_MPa": 1e-6 * arrived,
-                "time_ms": 1e3 * self.time[row],
-                "depth_m": LENGTH - cell * (first.mean() + 1.0) if len(first) else np.nan,
-                "formula_m": tail * CONCRETE.tensile_strength / (2.0 * arrived),
-                "spall_speed_m_s": velocity[-1, k, -1],
-                "joints_broken": int(joints[-1, k].sum()),
-            }
-            rows.append(found)
-        return rows
+        return [self._spalled(k, ratio, speed, tail) for k, ratio in enumerate(ratios)]
 
+    def _spalled(self, k, ratio, speed, tail):
+        joints, velocity = self.joints[:, k], self.velocity[:, k, -1]
+        row = int(joints.any(axis=1).argmax())
+        first = np.flatnonzero(joints[row])
+        arrived = 0.5 * CONCRETE.density * speed * velocity[: row + 1].max()
+        return {
+            "ratio": ratio,
+            "arrived_MPa": 1e-6 * arrived,
+            "time_ms": 1e3 * self.time[row],
+            "depth_m": LENGTH - self.cell * (first.mean() + 1.0) if len(first) else np.nan,
+            "formula_m": tail * CONCRETE.tensile_strength / (2.0 * arrived),
+            "spall_speed_m_s": velocity[-1],
+            "joints_broken": int(joints[-1].sum()),
+        }
 
-def gates(made):
-    """Cells at which the wave's passing is timed."""
-    return [round(share * made.shape[1]) for share in GATES]
-
-
-def wave_speed(made, step):
-    """Speed [m/s] at which the push passes from gate to gate: where the two records agree best."""
-    places, fine = gates(made), np.arange(0.0, made.time[-1], step)
-    first, second = (np.interp(fine, made.time, made.velocity[:, 0, k]) for k in places)
-    likeness = np.correlate(second, first, mode="full")[len(fine) - 1 :]
-    return (places[1] - places[0]) * LENGTH / made.shape[1] / (likeness.argmax() * step)
-
-
-def doubling(made):
-    """Peak velocity of the free end's last cell over that of the wave at the second gate."""
-    velocity = made.velocity[:, 0]
-    return float(velocity[:, -1].max() / velocity[:, gates(made)[1]].max())
+    @property
+    def doubling(self):
+        """Peak velocity of the free end's last cell over that of the wave at the second gate."""
+        velocity = self.velocity[:, 0]
+        return float(velocity[:, -1].max() / velocity[:, self.gates[1]].max())
 
 
 def caption(rows, wave):
-    """Words on what to see; rows: of ``spalled``."""
+    """Words on what to see; rows: of the table."""
     one = rows[shown(rows)]
     return (
         "A compressive pulse (blue) reaches the free end on the right and comes back as tension "
-        f"(red); that end moves {doubling(wave):.2f} times as fast as the wave behind it, measured "
+        f"(red); that end moves {wave.doubling:.2f} times as fast as the wave behind it, measured "
         "in a weak one. Where the sum first reaches the strength the bar breaks: at "
         f"{one['depth_m']:.2f} m from the end for a pulse of {one['ratio']:g} times the strength, "
         f"the formula says {one['formula_m']:.2f} m. The piece flies off with the momentum that is "
@@ -130,32 +84,69 @@ def shown(rows):
 
 def figures_of(wave, rows, speed):
     """Figures for summary.json."""
-    cell = LENGTH / wave.shape[1]
     figures = {
-        "wave_speed_m_s": figure(float(speed), "m/s"),
-        "free_end_over_wave": figure(doubling(wave), "1"),
-        "cell_m": figure(cell, "m"),
+        "wave_speed_m_s": (float(speed), "m/s"),
+        "free_end_over_wave": (wave.doubling, "1"),
+        "cell_m": (wave.cell, "m"),
     }
     for row in rows:
         key, apart = f"spall_{row['ratio']:g}", float(row["depth_m"] - row["formula_m"])
-        figures.update(figures_from(row, {"depth_m": "m", "formula_m": "m"}, f"{key}_{{}}"))
-        figures[f"{key}_error_cells"] = figure(apart / cell, "1")
+        figures.update({f"{key}_{name}": (row[name], "m") for name in ("depth_m", "formula_m")})
+        figures[f"{key}_error_cells"] = (apart / wave.cell, "1")
     return figures
 
 
-def write(wave, made, rows, speed, folder):
+def write(wave, made, rows, speed, at):
     """Write the pictures, their tables and the film."""
-
-    def at(name):
-        return os.path.join(folder, name)
-
-    stress, places = made.stress(CONCRETE.density * speed**2), gates(wave)
-    velocity = wave.velocity[:, 0]
-    names = [f"at_{LENGTH * (k + 0.5) / wave.shape[1]:g}_m" for k in places]
-    columns = dict(zip([*names, "free_end"], velocity[:, [*places, -1]].T))
+    names = [f"at_{wave.place[k]:g}_m" for k in wave.gates]
+    columns = dict(zip([*names, "free_end"], wave.velocity[:, 0, [*wave.gates, -1]].T))
     write_csv(at("wave.csv"), {"time_s": wave.time, **columns})
-    write_rows(os.path.join(folder, "spall.csv"), rows)
-    picture_wave(at("wave.png"), LENGTH, wave.time, velocity, places)
-    picture_spall(at("spall.png"), LENGTH, made, stress, rows)
-    strength = CONCRETE.tensile_strength
-    film_spall(at("spall.gif"), LENGTH, made, stress, shown(rows), strength, FRAMES)
+    write_rows(at("spall.csv"), rows)
+    picture_wave(at("wave.png"), wave)
+    stress = made.stress(CONCRETE.density * speed**2, made.cell)
+    picture_spall(at("spall.png"), made, 1e-6 * stress, rows)
+    look = {"length": LENGTH, "strength_pa": CONCRETE.tensile_strength}
+    film_bar(at("spall.gif"), made, stress, bar=shown(rows), **look)
+
+
+def picture_wave(path, wave):
+    """A push runs along a bar: velocity over place and time, and what three places see of it."""
+    velocity, time = 1e3 * wave.velocity[:, 0], 1e3 * wave.time
+    with picture(path, 1, 2, size=(10.0, 3.8)) as (_, (along, over)):
+        draw_space_time(along, wave.place, wave.time, velocity, "velocity [mm/s]")
+        for cell, colour in zip((*wave.gates, -1), (BLUE, GREEN, RED)):
+            name = f"at {wave.place[cell]:.2f} m" if cell >= 0 else "free end"
+            over.plot(time, velocity[:, cell], color=colour, label=name)
+            along.axvline(wave.place[cell], color=colour, lw=0.8, ls="--", label=name)
+        along.set(title="it runs, comes back, runs again")
+        along.legend(loc="upper left", title="seen on the right", frameon=True, framealpha=0.9)
+        twice = 2.0 * velocity[:, wave.gates[1]].max()
+        over.axhline(twice, color=GREY, ls=":", label="twice the wave's peak")
+        over.set(xlabel="time [ms]", ylabel="velocity [mm/s]", title="the free end doubles it")
+        over.legend(loc="upper left")
+
+
+def picture_spall(path, made, stress, rows):
+    """Stress [MPa] over place and time in the first bars, and depths beside the formula's."""
+    count, joint = min(2, len(rows)), made.place[:-1] + 0.5 * made.cell
+    top = np.abs(stress[:, :count]).max()
+    with picture(path, 1, 1 + count, size=(4.2 * (1 + count), 3.8)) as (figure, panels):
+        for k, (row, axes) in enumerate(zip(rows[:count], panels)):
+            drawn = draw_space_time(axes, joint, made.time, stress[:, k], top=top)
+            when, where = np.nonzero(np.diff(made.joints[:, k].astype(int), axis=0, prepend=0) > 0)
+            axes.plot(joint[where], 1e3 * made.time[when], "x", color=BLACK, ms=6, label="breaks")
+            look = {"color": BLACK, "ls": ":", "lw": 1.0, "label": "first break by the formula"}
+            axes.axvline(LENGTH - row["formula_m"], **look)
+            axes.set_title(f"pulse of {row['ratio']:g} × strength")
+            axes.legend(loc="lower left")
+        figure.colorbar(drawn, ax=axes, label="stress, tension positive [MPa]")
+        arrived, depth = ([row[key] for row in rows] for key in ("arrived_MPa", "depth_m"))
+        line = np.linspace(0.8 * min(arrived), 1.1 * max(arrived), 100)
+        formula = rows[0]["formula_m"] * rows[0]["arrived_MPa"] / line
+        axes = panels[-1]
+        axes.plot(line, formula, color=GREY, label="pulse length × strength / (2 s$_0$)")
+        look = {"fmt": "o", "color": RED, "ms": 5, "label": "broke, ± one cell"}
+        axes.errorbar(arrived, depth, yerr=made.cell, **look)
+        axes.set(xlabel="pulse s$_0$ that arrived [MPa]", ylabel="depth of the first break [m]")
+        axes.set(ylim=(0.0, None), title="the stronger, the thinner")
+        axes.legend(loc="upper right")

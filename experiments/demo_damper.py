@@ -12,56 +12,53 @@ swings most) and amplitudes of the shaking base.
 Writes damper.gif, motion.png, motion.csv, caption.txt and summary.json to results/demo_damper/.
 """
 
-import os
 import sys
+from functools import partial
 
 import numpy as np
 
-import _demo_damper_pictures as pictures
+import _demo_damper as shown
 from ca_damper import Automaton, Batch, Empty, Oscillator, SceneTable, Spheres, film
 from ca_damper.progress import Stages
-from taichi_dem.kit.files import output_folder
+from taichi_dem.kit import study
+from taichi_dem.kit.files import write_text
 from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.kit.study import figure, finish, main, number, parser, whole
 
 NAME = "demo_damper"
-QUICK, FULL = {"begin": 10, "measured": 5}, {"begin": 40, "measured": 20}
 FILLINGS = {"automaton": Automaton, "spheres": Spheres}
+SETTINGS = {
+    "particles": (30, 30, study.whole(0, 160), "0 to 160, 30"),
+    "frequency": (1.0, 1.0, study.number(0.2, 3), "by the container's, 1"),
+    "amplitude": (0.6, 0.6, study.number(0, 10), "of the base [mm], 0.6"),
+    "filling": ("automaton", "automaton", study.one_of(FILLINGS), "automaton"),
+    "dt": (None, None, study.number(0, 1), "step [s], 1e-4 or 2e-5 of spheres"),
+    "seed": (1, 1, study.whole(0, 2**31 - 1), "of the first places, 1"),
+    "begin": (40, 10),
+    "measured": (20, 5),
+}
+options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
 #: Cycles of the animation, the first ones, and frames in each; samples a cycle of the curves.
 SHOWN, FRAMES, SAMPLES = 3, 13, 40
 
 
-def options_parser():
-    """Options of this demonstration."""
-    made = parser(NAME, __doc__)
-    made.add_argument("--particles", type=whole(0, 160), default=30, help="0 to 160, 30")
-    made.add_argument("--frequency", type=number(0.2, 3), default=1.0, help="by the container's, 1")
-    made.add_argument("--amplitude", type=number(0, 10), default=0.6, help="of the base [mm], 0.6")
-    made.add_argument("--filling", choices=FILLINGS, default="automaton", help="automaton")
-    made.add_argument("--dt", type=number(0, 1), help="step [s], 1e-4 or 2e-5 of spheres")
-    made.add_argument("--seed", type=whole(0, 2**31 - 1), default=1, help="of the first places, 1")
-    return made
-
-
 def run(options):
     """Let the full and the empty container swing, compare, picture."""
-    settings = QUICK if options.quick else FULL
     filling, o = FILLINGS[options.filling](), Oscillator(base_amplitude=1e-3 * options.amplitude)
     shaken = options.dt or filling.default_dt, options.frequency * o.natural_frequency
     shaken += o.base_amplitude, o.mass, o.stiffness, o.damping
     batches = {}
     for title, one, particles in (("full", filling, options.particles), ("empty", Empty(), 0)):
         table = SceneTable(particles, options.seed, *shaken)
-        batches[title] = Batch(one, table, measured_cycles=settings["measured"])
-    out = output_folder(options.out)
-    runs = {title: swing(title, batch, **settings) for title, batch in batches.items()}
+        batches[title] = Batch(one, table, measured_cycles=options.measured)
+    at, cycles = study.output_paths(options.out), (options.begin, options.measured)
+    runs = {title: swing(title, batch, *cycles) for title, batch in batches.items()}
     figures = figures_of(runs["full"][1], runs["empty"][1], o)
-    pictures.picture(out, runs, o, filling, options)
-    sentences = pictures.write_caption(out, figures, filling, o, options)
-    report = batches["full"].report()
-    report.write(os.path.join(out, "report.json"))
-    print(*sentences, f"\n{report}", sep="\n")
-    finish(options, NAME, figures, batches.values(), show=False)
+    shown.write(at, runs, o, filling, options)
+    words, report = shown.sentences(figures, filling, o, options), batches["full"].report()
+    report.write(at("report.json"))
+    write_text(at("caption.txt"), " ".join(words) + "\n")
+    print(*words, f"\n{report}", sep="\n")
+    study.finish(options, NAME, figures, batches.values(), show=False)
 
 
 def swing(title, batch, begin, measured):
@@ -71,12 +68,11 @@ def swing(title, batch, begin, measured):
     with ProgressBar(f"{title} container") as progress:
         tell = Stages(progress, ends / ends[-1])
         every = {"sample_every": steps // SAMPLES, "progress": tell}
-        shown = film(batch, SHOWN * steps, frame_every=steps // FRAMES, **every)
-        later = film(batch, (begin - SHOWN) * steps, **every)
+        early = film(batch, SHOWN * steps, frame_every=steps // FRAMES, **every)
+        late = film(batch, (begin - SHOWN) * steps, **every)
         cycles = batch.run(0, measured, tell)
-    parts = zip(shown.history, shown.history.values(), later.history.values())
-    history = {name: np.concatenate([early, late])[:, 0] for name, early, late in parts}
-    return history, cycles, shown.frames[0][: SHOWN * FRAMES]
+    history = {k: np.concatenate([v, late.history[k]])[:, 0] for k, v in early.history.items()}
+    return history, cycles, early.frames[0][: SHOWN * FRAMES]
 
 
 def figures_of(cycles, empty, o):
@@ -93,8 +89,8 @@ def figures_of(cycles, empty, o):
         "damping_ratio_empty": ([o.damping_ratio], "1"),
         "loss_factor": (cycles.loss_factor(o.mass), "1"),
     }
-    return {name: figure(float(value[0]), unit) for name, (value, unit) in figures.items()}
+    return {name: (float(value[0]), unit) for name, (value, unit) in figures.items()}
 
 
 if __name__ == "__main__":
-    sys.exit(main(run, options_parser()))
+    sys.exit(study.main(run, options_parser()))

@@ -14,29 +14,24 @@ law.gif, law.png, tension.csv, shear.csv and summary.json to results/demo_fractu
 """
 
 import sys
+from functools import partial
 
 import numpy as np
 
 import _fracture_law as law
 from taichi_dem import CONCRETE, Every, Scene, Simulation, Uniform, effects
-from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.kit.study import finish, main, parser, show_rows, whole
+from taichi_dem.kit.study import finish, main, output_paths, parser, show_rows, whole
 from taichi_dem.mesh.mesh import group_area
 from taichi_dem.mesh.shapes import pair, placed_together, single
 from taichi_dem.simulate import run_simulation
 
-NAME, QUICK, FULL = "demo_fracture_law", 1000, 5000
+NAME = "demo_fracture_law"
+SETTINGS = {"steps": (5000, 1000, whole(200, 100000), "samples along the way, 5000")}
+options_parser = partial(parser, NAME, __doc__, settings=SETTINGS)
 EDGE, APART = 0.05, 0.2
 #: Bodies are driven, so the step decides only how finely the law is sampled.
 STEP = 1e-8
-
-
-def options_parser():
-    """Options of this demonstration."""
-    made = parser(NAME, __doc__)
-    made.add_argument("--steps", type=whole(200, 100000), help="samples along the way, 5000")
-    return made
 
 
 def bench():
@@ -57,7 +52,7 @@ class Bench:
     def __init__(self, simulation, steps):
         self.state, self.steps = simulation.state, steps
         self.drives = [one for one in simulation.tables.supports if one.name == "prescribed_motion"]
-        self.plans = law.plans(steps, STEP)
+        self.plans = [law.velocities(corners, steps, STEP) for corners in law.ways()]
         self.moved, self.given = [], []
 
     def observe(self, view):
@@ -72,26 +67,25 @@ class Bench:
 
 
 def measure(steps):
-    """Drive the bench; returns the measured curves and the Report of the run."""
+    """Drive the bench; returns the measured curves and the Result of the run."""
     with ProgressBar("bench") as bar:
         simulation = Simulation(bench(), Uniform(STEP))
         cells = Bench(simulation, steps)
         looks = {"samples": 1, "progress": bar, "observers": [cells]}
         result = run_simulation(simulation, until=(steps + 1) * STEP, **looks)
     traction = -np.diff(cells.given, axis=0) / (group_area(single(EDGE), "base") * STEP)
-    made = law.Measured(np.array(cells.moved[:-1]), traction, round(result.broken_time[0] / STEP))
-    return made, result.report
+    return law.curves_of(np.array(cells.moved[:-1]), traction), result
 
 
 def run(options):
     """Measure all specimens, compare with the law, picture."""
-    steps = options.steps or (QUICK if options.quick else FULL)
-    folder = output_folder(options.out)
-    made, report = measure(steps)
-    rows = law.comparison(made)
-    law.write(made, pair(EDGE).points, folder)
+    at = output_paths(options.out)
+    curves, result = measure(options.steps)
+    rows = law.comparison(curves, round(result.broken_time[0] / STEP))
+    law.write(curves, pair(EDGE).points, at)
     show_rows(rows, law.TABLE)
-    finish(options, NAME, law.figures_of(rows), [report], caption=law.caption(rows, steps))
+    caption = law.caption(rows, options.steps)
+    finish(options, NAME, law.figures_of(rows), [result.report], caption=caption)
 
 
 if __name__ == "__main__":

@@ -15,47 +15,41 @@ run ends as diverged; the paper's 1e-8 m merely makes all steps short).
 Writes blow.gif, blow.png, blow.csv, levels_*.csv and summary.json to results/demo_multirate/.
 """
 
-import os
 import sys
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from _blast import BLAST_DRIVERS, Costs
+import taichi_dem as dem
+from _blast import BLAST_DRIVERS
 from _demo import set_moving
-from _multirate import TABLE, Impact, caption, check_speed, compared, figures_of, write
-from taichi_dem import CONCRETE, Multirate, Scene, Simulation, Uniform, effects
-from taichi_dem.kit.files import output_folder
+from _multirate import TABLE, Impact, caption, check_speed, figures_of, write
+from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import styles_of
 from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.kit.study import finish, main, number, parser, show_rows
 from taichi_dem.mesh.shapes import bar, placed_together
-from taichi_dem.plot.impact import film_impact, picture_impact
 from taichi_dem.simulate import run_simulation
 
 NAME = "demo_multirate"
 #: All methods, made in one place; the first is what the others are compared with.
 METHODS = {
-    "uniform": Uniform,
-    "held": Multirate,
-    "drifted": lambda dt0, distance: Multirate(dt0, distance, "drifted"),
+    "uniform": dem.Uniform,
+    "held": dem.Multirate,
+    "drifted": lambda dt0, distance: dem.Multirate(dt0, distance, "drifted"),
 }
-QUICK = {"methods": ("uniform", "held"), "until": 4e-5}
-FULL = {"methods": tuple(METHODS), "until": 2e-4}
+SETTINGS = {
+    "speed": (20.0, 20.0, study.number(0, 50), "of the fragment [m/s], 20"),
+    "methods": (tuple(METHODS), ("uniform", "held")),
+    "until": (2e-4, 4e-5),
+}
+options_parser = partial(study.parser, NAME, __doc__, BLAST_DRIVERS, settings=SETTINGS)
 DT0, DISTANCE = 4e-8, 5e-8
 #: Bar and fragment [m], and the gap between them.
 LENGTH, WIDTH, CELLS = 0.9, 0.1, (18, 2, 2)
 FRAGMENT, GAP = 0.1, 2e-5
 #: Share of the sphere dashpots that is left.
-CONTACT_DAMPING = 0.05
-SAMPLES, FRAMES = 80, 40
-
-
-def options_parser():
-    """Options of this demonstration."""
-    made = parser(NAME, __doc__, BLAST_DRIVERS)
-    made.add_argument("--speed", type=number(0, 50), default=20.0, help="of the fragment [m/s], 20")
-    return made
+CONTACT_DAMPING, SAMPLES = 0.05, 80
 
 
 def built_scene():
@@ -64,36 +58,36 @@ def built_scene():
         "bar": (bar(LENGTH, WIDTH, CELLS), (0.0, 0.0, 0.0)),
         "fragment": (bar(FRAGMENT, WIDTH, (2, 2, 2)), (LENGTH + GAP, 0.0, 0.0)),
     }
-    bonds = [effects.BondDamping(), effects.Softening(), effects.ShearSlip()]
-    acting = [*bonds, effects.SphereContact(outer_faces=True), effects.Friction()]
-    soft = replace(CONCRETE, contact_damping=CONTACT_DAMPING * CONCRETE.contact_damping)
-    return Scene(placed_together(parts), soft, acting)
+    bonds = [dem.effects.BondDamping(), dem.effects.Softening(), dem.effects.ShearSlip()]
+    acting = [*bonds, dem.effects.SphereContact(outer_faces=True), dem.effects.Friction()]
+    soft = replace(dem.CONCRETE, contact_damping=CONTACT_DAMPING * dem.CONCRETE.contact_damping)
+    return dem.Scene(placed_together(parts), soft, acting)
 
 
-def hit(name, until, options):
+def hit(name, options):
     """Run one impact with a method; returns Impact."""
-    costs = Costs()
+    cost = dem.Collector(dem.Every(samples=1), evaluations=lambda view: view.evaluations)
     with ProgressBar(styles_of([name])[name].label) as shown:
-        made = Simulation(built_scene(), METHODS[name](DT0, DISTANCE), options.driver)
+        made = dem.Simulation(built_scene(), METHODS[name](DT0, DISTANCE), options.driver)
         set_moving(made, np.outer(made.model.centre[:, 0] > LENGTH, (-options.speed, 0.0, 0.0)))
-        looks = {"samples": SAMPLES, "frames": SAMPLES, "observers": [costs]}
-        return Impact(name, run_simulation(made, until=until, progress=shown, **looks), costs)
+        looks = {"samples": SAMPLES, "frames": SAMPLES, "observers": [cost], "progress": shown}
+        return Impact(name, run_simulation(made, until=options.until, **looks), cost["evaluations"])
 
 
 def run(options):
     """Hit the bar with every method, compare, picture."""
-    settings = QUICK if options.quick else FULL
-    check_speed(options.speed, GAP, settings["until"])
-    output_folder(options.out)
-    impacts = [hit(name, settings["until"], options) for name in settings["methods"]]
-    rows = compared(impacts, DT0)
-    show_rows(rows, TABLE)
-    write(impacts, options.out)
-    picture_impact(os.path.join(options.out, "blow.png"), impacts, DT0)
-    film_impact(os.path.join(options.out, "blow.gif"), impacts[0], impacts[1], DT0, FRAMES)
+    check_speed(options.speed, GAP, options.until)
+    at = study.output_paths(options.out)
+    impacts = [hit(name, options) for name in options.methods]
+    for impact in impacts:
+        impact.compare(impacts[0])
+    rows = TABLE.rows(impacts)
+    TABLE.show(rows)
+    write(impacts, DT0, at)
     reports = [impact.result.report for impact in impacts]
-    finish(options, NAME, figures_of(rows), reports, caption=caption(rows, impacts[1], LENGTH))
+    words = caption(rows, impacts[1], LENGTH)
+    study.finish(options, NAME, figures_of(rows), reports, caption=words)
 
 
 if __name__ == "__main__":
-    sys.exit(main(run, options_parser()))
+    sys.exit(study.main(run, options_parser()))

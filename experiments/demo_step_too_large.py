@@ -13,57 +13,61 @@ diverges lies a little above. Writes shaken.gif, energy.png, steps.csv, history_
 summary.json to results/demo_step_too_large/.
 """
 
-import os
 import sys
+from functools import partial
 
 import _step_too_large as shown
-from taichi_dem import CONCRETE, At, Scene, SimulationDiverged, Uniform, effects, simulate
-from taichi_dem.kit.files import output_folder
+import taichi_dem as dem
+from taichi_dem.kit import study
 from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.kit.study import finish, main, number, parser
 from taichi_dem.mesh.shapes import bar
-from taichi_dem.plot.shaken import film_shaken, picture_energy
+from taichi_dem.simulate import result_of
 from taichi_dem.simulation import macro_steps
 
 NAME = "demo_step_too_large"
-#: Steps as shares of the limit, by what sets it; the first is safe, the second just too large.
-QUICK = {"dashpots": (0.9, 1.3)}
-FULL = {"dashpots": (0.9, 1.3, 2.0), "springs": (0.9, 1.1, 1.3)}
-#: Simulated time [s], looks on the way, pictures of the film.
-UNTIL = {"dashpots": 4e-5, "springs": 2e-4}
-SAMPLES, FRAMES = 200, 40
+SETTINGS = {
+    "peak": (1e6, 1e6, study.number(0, 1e8), "of the blow [Pa], 1e6"),
+    # Steps as shares of the limit; the first is safe, the second just too large.
+    "shares": (
+        {"dashpots": (0.9, 1.3, 2.0), "springs": (0.9, 1.1, 1.3)},
+        {"dashpots": (0.9, 1.3)},
+    ),
+}
+options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
+#: Simulated time [s], looks on the way.
+UNTIL, SAMPLES = {"dashpots": 4e-5, "springs": 2e-4}, 200
+BAR = bar(0.4, 0.1, (8, 2, 2))
 #: Steps before the first look: until then the blow has given too little for the account to close.
 UNHEEDED = 5
 
 
-def options_parser():
-    """Options of this demonstration."""
-    made = parser(NAME, __doc__)
-    made.add_argument("--peak", type=number(0, 1e8), default=1e6, help="of the blow [Pa], 1e6")
-    return made
-
-
 def struck_bar(limit, peak):
     """The scene: a bar under a short blow on its left end, with or without dashpots."""
-    blow = effects.GasPressure("left", peak=peak, rise=5e-6, decay_ratio=2.0)
-    damping = [effects.BondDamping()] if limit == "dashpots" else []
-    return Scene(bar(0.4, 0.1, (8, 2, 2)), CONCRETE, [blow, *damping])
+    blow = dem.effects.GasPressure("left", peak=peak, rise=5e-6, decay_ratio=2.0)
+    damping = [dem.effects.BondDamping()] if limit == "dashpots" else []
+    return dem.Scene(BAR, dem.CONCRETE, [blow, *damping])
 
 
 def strike(limit, share, peak):
     """Run the bar with a share of the limit as its step, to its end or as far as it goes."""
     scene = struck_bar(limit, peak)
-    step = share * shown.longest_step(scene.mesh, limit)
-    made = shown.Struck(limit, share, step)
-    made.when = At([step * mark for mark in marks(macro_steps(UNTIL[limit], step))])
+    step = share * longest_step(limit)
+    when = dem.At([step * mark for mark in marks(macro_steps(UNTIL[limit], step))])
+    energy = {"energy": dem.RunView.energy_balance, "frame": dem.RunView.frame}
+    seen = dem.Collector(when, time=lambda view: view.time_s, speed=shown.corner_speed, **energy)
     with ProgressBar(f"{share:g} x the limit of {limit}") as bar_shown:
-        run_once = {"method": Uniform(step), "until": UNTIL[limit], "samples": 1}
-        try:
-            made.report = simulate(scene, progress=bar_shown, observers=[made], **run_once).report
-        except SimulationDiverged as diverged:
-            made.sentence, made.report = str(diverged), diverged.result.report
-            made.observe(made.view)
-    return made
+        looks = {"samples": 1, "progress": bar_shown, "observers": [seen]}
+        until = UNTIL[limit]
+        result = result_of(dem.simulate, scene, method=dem.Uniform(step), until=until, **looks)
+    if result.diverged:
+        seen.observe(seen.view)
+    return shown.Struck(limit, share, step, seen, result)
+
+
+def longest_step(limit):
+    """Longest safe step of the bar's worst body [s], by what sets it."""
+    report = dem.quality_report(BAR, dem.CONCRETE)
+    return float({"dashpots": report.dashpot_step_s, "springs": report.spring_step_s}[limit].min())
 
 
 def marks(last):
@@ -74,17 +78,19 @@ def marks(last):
 
 def run(options):
     """Strike the bar with every step, compare, picture."""
-    cases = (QUICK if options.quick else FULL).items()
-    output_folder(options.out)
+    at, cases = study.output_paths(options.out), options.shares.items()
     runs = [strike(limit, share, options.peak) for limit, shares in cases for share in shares]
-    limits = {limit: shown.longest_step(bar(0.4, 0.1, (8, 2, 2)), limit) for limit in UNTIL}
-    shown.print_runs(runs)
-    shown.write(runs, options.out)
-    picture_energy(os.path.join(options.out, "energy.png"), runs)
-    film_shaken(os.path.join(options.out, "shaken.gif"), runs[0], runs[1], FRAMES)
-    reports = [made.report for made in runs]
-    finish(options, NAME, shown.figures_of(runs, limits), reports, caption=shown.caption(runs))
+    rows = shown.TABLE.rows(runs)
+    shown.TABLE.show(rows)
+    said = [f"  {made.limit}, {made.share:g}: {made.sentence}" for made in runs if made.sentence]
+    print("What the program said:", *said, "", sep="\n")
+    shown.write(runs, rows, at)
+    figures = {f"limit_{limit}_s": (longest_step(limit), "s") for limit in UNTIL}
+    for row in rows:
+        figures.update(shown.TABLE.figures(row, "{limited_by}_{share_of_limit:g}_{key}"))
+    reports = [made.result.report for made in runs]
+    study.finish(options, NAME, figures, reports, caption=shown.caption(runs))
 
 
 if __name__ == "__main__":
-    sys.exit(main(run, options_parser()))
+    sys.exit(study.main(run, options_parser()))

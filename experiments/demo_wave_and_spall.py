@@ -16,51 +16,54 @@ wave.png, spall.png, wave.csv, spall.csv and summary.json to results/demo_wave_a
 
 import sys
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
+import taichi_dem as dem
 from _demo import set_moving
-from _wave_and_spall import CELL, LENGTH, TABLE, Bars, caption, figures_of, wave_speed, write
-from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects
-from taichi_dem.kit.files import output_folder
+from _wave_and_spall import CELL, LENGTH, TABLE, Bars, caption, figures_of, write
 from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.kit.study import finish, main, parser, show_rows, whole
+from taichi_dem.kit.study import finish, main, output_paths, parser, show_rows, whole
 from taichi_dem.mesh.shapes import bar, placed_together
+from taichi_dem.simulate import run_simulation
 
-NAME = "demo_wave_and_spall"
-WIDTH, CELLS = 0.1, 40
-QUICK, FULL = (1.5, 2.0), (1.25, 1.5, 1.75, 2.0)
-STEP = 1e-6
-#: Tail and front of the pulse [m], and the share of the dashpots that is left.
-TAIL, FRONT, DAMPING = 2.4, 0.4, 0.05
-#: How long the bars are watched, over the time that the pulse takes to turn.
-WATCHED = 1.9
-
-
-def options_parser():
-    """Options of this demonstration."""
-    made = parser(NAME, __doc__)
-    made.add_argument("--cells", type=whole(20, 160), help="boxes along a bar, 40")
-    return made
+NAME, WIDTH = "demo_wave_and_spall", 0.1
+SETTINGS = {
+    "cells": (40, 40, whole(20, 160), "boxes along a bar, 40"),
+    "ratios": ((1.25, 1.5, 1.75, 2.0), (1.5, 2.0)),
+}
+options_parser = partial(parser, NAME, __doc__, settings=SETTINGS)
+#: Time step [s], steps between looks; tail and front of the pulse [m], share of dashpots left.
+STEP, LOOK, TAIL, FRONT, DAMPING = 1e-6, 20, 2.4, 0.4, 0.05
 
 
 def push(cells, progress):
     """A weak push on the left end of an elastic bar."""
-    load = effects.GasPressure("left", peak=1e4, rise=2e-4, decay_ratio=1.0)
-    scene = Scene(bar(LENGTH, WIDTH, (cells, 1, 1)), CONCRETE, [load])
-    return Bars(1, cells).follow(Simulation(scene, Uniform(STEP)), 2.6e-3, progress)
+    load = dem.effects.GasPressure("left", peak=1e4, rise=2e-4, decay_ratio=1.0)
+    elastic = dem.Scene(bar(LENGTH, WIDTH, (cells, 1, 1)), dem.CONCRETE, [load])
+    return followed(dem.Simulation(elastic, dem.Uniform(STEP)), 1, cells, 2.6e-3, progress)
 
 
 def spall(cells, ratios, speed, progress):
     """Bars with a pulse of each strength under way."""
-    damping = {k: DAMPING * getattr(CONCRETE, k) for k in ("normal_damping", "shear_damping")}
+    damping = {k: DAMPING * getattr(dem.CONCRETE, k) for k in ("normal_damping", "shear_damping")}
     one, places = bar(LENGTH, WIDTH, (cells, 1, 1)), range(len(ratios))
     mesh = placed_together({f"bar{k}": (one, (0.0, 0.0, 3 * WIDTH * k)) for k in places})
-    acting = [effects.Softening(), effects.BondDamping()]
-    simulation = Simulation(Scene(mesh, replace(CONCRETE, **damping), acting), Uniform(STEP))
+    acting = [dem.effects.Softening(), dem.effects.BondDamping()]
+    simulation = dem.Simulation(
+        dem.Scene(mesh, replace(dem.CONCRETE, **damping), acting), dem.Uniform(STEP)
+    )
     lay_pulse(simulation, np.repeat(ratios, CELL * cells), speed)
-    until = WATCHED * (FRONT + TAIL / 2.0) / speed
-    return Bars(len(ratios), cells).follow(simulation, until, progress)
+    return followed(simulation, len(ratios), cells, 1.9 * (FRONT + TAIL / 2.0) / speed, progress)
+
+
+def followed(simulation, bars, cells, until, progress):
+    """Step to the last look before a time [s]; returns Bars over time, and the Report."""
+    seen = Bars(dem.Every(steps=LOOK), bars, cells)
+    until = round(until / STEP) // LOOK * LOOK * STEP
+    looks = {"samples": 1, "progress": progress, "observers": [seen]}
+    return seen, run_simulation(simulation, until=until, **looks).report
 
 
 def lay_pulse(simulation, ratio, speed):
@@ -70,31 +73,27 @@ def lay_pulse(simulation, ratio, speed):
     the velocity is v(x) and the strain -v / c.
     """
     centre = simulation.model.centre
-    peak = ratio * CONCRETE.tensile_strength / (CONCRETE.density * speed)
+    peak = ratio * dem.CONCRETE.tensile_strength / (dem.CONCRETE.density * speed)
     depth, grid = LENGTH - centre[:, 0], np.linspace(0.0, LENGTH, 4001)
     shape = np.interp(grid, [0.0, FRONT, FRONT + TAIL], [0.0, 1.0, 0.0])
-    behind = np.cumsum(shape) * grid[1]
-    moved, along = np.zeros((2, len(centre), 3))
-    moved[:, 0] = peak / speed * np.interp(depth, grid, behind)
-    along[:, 0] = peak * np.interp(depth, grid, shape)
-    set_moving(simulation, along, moved)
+    velocity = peak * np.interp(depth, grid, shape)
+    moved = peak / speed * np.interp(depth, grid, np.cumsum(shape) * grid[1])
+    set_moving(simulation, *(np.outer(values, (1.0, 0.0, 0.0)) for values in (velocity, moved)))
 
 
 def run(options):
     """Push, measure, spall, picture."""
-    cells, ratios = options.cells or CELLS, QUICK if options.quick else FULL
-    output_folder(options.out)
+    at = output_paths(options.out)
     with ProgressBar("wave") as shown:
-        wave, first = push(cells, shown)
-    speed = wave_speed(wave, STEP)
+        wave, first = push(options.cells, shown)
+    speed = wave.speed(STEP)
     with ProgressBar("spall") as shown:
-        made, second = spall(cells, ratios, speed, shown)
-    rows = made.spalled(ratios, speed, TAIL)
+        made, second = spall(options.cells, options.ratios, speed, shown)
+    rows = made.spalled(options.ratios, speed, TAIL)
     show_rows(rows, TABLE)
-    write(wave, made, rows, speed, options.out)
-    finish(
-        options, NAME, figures_of(wave, rows, speed), [first, second], caption=caption(rows, wave)
-    )
+    write(wave, made, rows, speed, at)
+    figures = figures_of(wave, rows, speed)
+    finish(options, NAME, figures, [first, second], caption=caption(rows, wave))
 
 
 if __name__ == "__main__":

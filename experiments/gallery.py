@@ -6,7 +6,8 @@
     python experiments/gallery.py --only demo_damper   # one anew, the others from what is there
 
 Open results/index.html: it needs no server. Ends with exit code 1 and a list when an experiment
-failed or is missing from the page.
+failed or is missing from the page. A new experiment gets an entry in _gallery_pages.txt; --readme
+then renews the table of README.md.
 """
 
 import json
@@ -17,17 +18,27 @@ import sys
 import time
 from pathlib import Path
 
-from PIL import Image
-
-from _gallery_html import CAPTION, RUN, THUMBNAILS, shown, write_page
-from _gallery_pages import SMALL_PICTURES, TOOLS, pages, readme_table
 from taichi_dem import InputError
-from taichi_dem.kit.files import output_folder, write_text, write_whole
+from taichi_dem.kit.files import output_folder, write_text
 from taichi_dem.kit.study import bare_parser, exit_code, several
+from taichi_dem.kit.study.results_page import (
+    CAPTION,
+    RUN,
+    read_entries,
+    shrink_picture,
+    write_page,
+)
 
 HERE = Path(__file__).resolve().parent
-#: Small pictures for the repository and for the page's list: widest side [pixels] and colours.
-SMALL, THUMBNAIL = (960, 256), (480, 64)
+PAGES = read_entries(HERE / "_gallery_pages.txt")
+#: Scripts that are no experiment of their own, and why.
+TOOLS = {
+    "bench": "measures speed, `make bench`",
+    "gallery": "builds the page",
+    "make_meshes": "makes the meshes, `make mesh`",
+}
+#: Small pictures for the repository: widest side [pixels] and colours.
+SMALL_PICTURES, SMALL = "docs/pictures", (960, 256)
 
 
 def options_parser():
@@ -60,6 +71,11 @@ def _work(options):
     return 1 if amiss else 0
 
 
+def pages():
+    """The entries whose script is there, in order."""
+    return tuple(page for page in PAGES if (HERE / f"{page.name}.py").is_file())
+
+
 def build(options):
     """Run the experiments asked for and write the page; returns a line for each thing amiss."""
     known = {page.name: page for page in pages()}
@@ -68,18 +84,11 @@ def build(options):
             raise InputError(f"only must name experiments out of {', '.join(known)}, got {name!r}")
     out = output_folder(options.out)
     wanted = [known[name] for name in options.only or known]
-    failed = run_all(wanted, options)
-    write_thumbnails(out)
-    items = [shown(page, out, failed.get(page.name, "")) for page in pages()]
-    path = os.path.join(out, "index.html")
-    write_page(path, items)
-    print(f"The page is {path}: open it in any browser.")
+    items = write_page(out, pages(), run_all(wanted, options))
+    print(f"The page is {os.path.join(out, 'index.html')}: open it in any browser.")
+    failed = [item for item in items if item.failed and item.page in wanted]
     return [
-        *(
-            f"{item.page.name}: {item.failed}"
-            for item in items
-            if item.failed and item.page in wanted
-        ),
+        *(f"{item.page.name}: {item.failed}" for item in failed),
         *(f"{name}: has no entry in _gallery_pages.txt" for name in without_entry()),
     ]
 
@@ -121,43 +130,19 @@ def without_entry():
     return sorted(names - set(TOOLS) - {page.name for page in pages()})
 
 
-def write_thumbnails(out):
-    """Small pictures for the page's list; none of a picture that cannot be read."""
-    folder = output_folder(os.path.join(out, THUMBNAILS))
-    for page in pages():
-        try:
-            shrink_picture(page, out, folder, THUMBNAIL)
-        except InputError:
-            Path(folder, f"{page.name}.png").unlink(missing_ok=True)
-
-
 def shrink_pictures(out, folder):
     """Small copies of each experiment's first picture for the repository; the names written."""
-    return list(filter(None, (shrink_picture(page, out, folder, SMALL) for page in pages())))
+    return list(filter(None, (shrink_picture(page, out, folder, *SMALL) for page in pages())))
 
 
-def shrink_picture(page, out, folder, size):
-    """Small copy of an experiment's first picture; its name, None without a picture. size: SMALL.
-
-    Raises InputError when the picture cannot be read or the copy not be written.
-    """
-    source = Path(out, page.name, page.pictures[0])
-    target = os.path.join(folder, f"{page.name}.png")
-    if not source.is_file():
-        return None
-    write_whole(target, lambda name: write_small(name, source, *size))
-    return target
-
-
-def write_small(name, source, side, colours):
-    """Write a picture, the last image of a film, within a side [pixels] as PNG."""
-    with Image.open(source) as image:
-        image.seek(getattr(image, "n_frames", 1) - 1)
-        made = image.convert("RGB")
-    made.thumbnail((side, side))
-    # With too few colours, or without the means, thin lines take those of their neighbours.
-    made = made.quantize(colours, kmeans=3, dither=Image.Dither.NONE)
-    made.save(name, format="PNG", optimize=True)
+def readme_table():
+    """The table of all experiments for README.md, with a small picture where there is one."""
+    lines = ["| question | command | time on two cores | picture |", "|---|---|---|---|"]
+    for page in pages():
+        small = f"{SMALL_PICTURES}/{page.name}.png"
+        link = f"[picture]({small})" if (HERE.parent / small).is_file() else ""
+        lines.append(f"| {page.question} | `{page.command}` | {page.time} | {link} |")
+    return "\n".join(lines) + "\n"
 
 
 def renew_readme(root):

@@ -30,7 +30,7 @@ from taichi_dem.mesh.reorder import in_space_order
 from taichi_dem.meshes import PAPER_BLOCK
 from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
 from taichi_dem.needed_effects import needed_effects
-from taichi_dem.observers import At, Every, Observer, RunView
+from taichi_dem.observers import At, Collector, Every, Observer, RunView
 from taichi_dem.output.record import write_paraview
 from taichi_dem.scene import Scene
 from taichi_dem.simulate import simulate
@@ -44,6 +44,7 @@ __all__ = [
     "PAPER_BLOCK",
     "At",
     "Checkpoint",
+    "Collector",
     "Every",
     "ImplicitDashpots",
     "InputError",

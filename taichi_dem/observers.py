@@ -4,7 +4,7 @@ import inspect
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, Optional, Protocol, Union
+from typing import Any, Callable, Optional, Protocol, Union
 
 import numpy as np
 
@@ -102,6 +102,29 @@ class Observer(Protocol):
 
     def observe(self, view: "RunView") -> None:
         """Measure; an exception here ends the run, and no result is written."""
+
+
+class Collector:
+    """Observer that keeps what functions of the view give, in lists by name.
+
+    when: of its calls. read: functions by name, such as ``cost=lambda view: view.cpu_seconds``.
+    rows: what they gave, by name; ``collector[name]`` is an array of it. view: of the last call,
+    for one more look at a run that diverged.
+    """
+
+    def __init__(self, when: Union[Every, At], **read: Callable[["RunView"], Any]):
+        self.when, self.read = when, read
+        self.rows: dict[str, list] = {name: [] for name in read}
+        self.view: Optional[RunView] = None
+
+    def observe(self, view: "RunView") -> None:
+        """Keep a value of every function."""
+        self.view = view
+        for name, read in self.read.items():
+            self.rows[name].append(read(view))
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return np.array(self.rows[name])
 
 
 class RunView:

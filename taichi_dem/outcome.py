@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from taichi_dem.kit.errors import SimulationDiverged
 from taichi_dem.result import Result
 from taichi_dem.scene import Scene
-from taichi_dem.simulate import run_simulation
+from taichi_dem.simulate import result_of, run_simulation
 from taichi_dem.simulation import Simulation
 
 #: Where the work of the loads goes; together with the rest they are the energy split.
@@ -87,10 +86,7 @@ def outcome_of(
         turn = np.tile([1.0, 0.0, 0.0, 0.0], (len(centre), 1))
         simulation.state.set_motion(centre + noise, turn)
     looks: Any = {"samples": 1, "frames": 1, "progress": progress}
-    try:
-        return Outcome.of(run_simulation(simulation, until=until, **looks))
-    except SimulationDiverged as error:
-        return Outcome.of(error.result)  # type: ignore[attr-defined]
+    return Outcome.of(result_of(run_simulation, simulation, until=until, **looks))
 
 
 def displacement_error(run: Outcome, reference: Outcome) -> float:

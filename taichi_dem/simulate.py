@@ -1,7 +1,7 @@
 """The loop of a run: step, sample, keep frames, and return all as one result."""
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Optional, Union
 
@@ -108,6 +108,17 @@ def run_simulation(
         error.result = result
         raise error
     return result
+
+
+def result_of(run: Callable[..., Result], *arguments: Any, **options: Any) -> Result:
+    """Result of ``simulate`` or ``run_simulation``, also of a run that diverged.
+
+    Its ``diverged`` is then the sentence of the program, else "". arguments, options: of run.
+    """
+    try:
+        return run(*arguments, **options)
+    except SimulationDiverged as diverged:
+        return diverged.result
 
 
 def _started(simulation):

@@ -3,6 +3,7 @@
 from ca_damper.plot.animation import moving_picture
 from ca_damper.plot.box import Box, DrawnBox, frame_panel
 from ca_damper.plot.film_strip import animate_films, picture_film_strips
+from ca_damper.plot.hanging import Hanging, film_hanging
 from ca_damper.plot.response import (
     picture_compared,
     picture_hysteresis,
@@ -13,7 +14,9 @@ from ca_damper.plot.response import (
 __all__ = [
     "Box",
     "DrawnBox",
+    "Hanging",
     "animate_films",
+    "film_hanging",
     "frame_panel",
     "moving_picture",
     "picture_compared",

@@ -1,16 +1,18 @@
 """Why a box of grains damps: one box on its spring, shaken at several frequencies at once.
 
-The grains are those of the automaton with static contact. All runs on the engine's thread.
+The grains are those of the automaton with static contact. All runs on the thread of the session.
 """
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from _engine import engine
 from ca_damper import Automaton, Batch, Oscillator, SceneTable
-from ca_damper.record import Frame
+from ca_damper.measures import Cycles
+from ca_damper.plot import Box, DrawnBox, frame_panel
+from ca_damper.record import frames_of
+from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, STYLES, png_of, styled
+from taichi_dem.kit.session_thread import session
 
 #: Frequencies by the natural one of the empty box, and the cycles before and while measuring.
 RATIOS = (0.88, 0.9, 0.92, 0.94, 0.95, 0.96, 0.97, 0.98, 0.99, 1.0, 1.02, 1.05)
@@ -24,7 +26,7 @@ CHOICES = {
 }
 #: Pictures of one cycle.
 PICTURES = 4
-FILLING = Automaton()
+FILLING, PAPER = Automaton(), Oscillator()
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,38 +34,47 @@ class Answer:
     """Motion and energies for one choice.
 
     grains, share (of their mass in the box's), ratio: the choice. oscillator: the box and its
-    spring. rms: of the box at all RATIOS [m]. place: of the chosen ratio in RATIOS. amplitude: of
-    the box there [m]. energy: J a cycle that "base" gives and that "dashpot" and "grains" take.
-    damping_ratio: there, of dashpot and grains together. frames: of one cycle.
+    spring. cycles: measured, at all RATIOS. frames: of one cycle at the chosen one.
     """
 
     grains: int
     share: float
     ratio: float
     oscillator: Oscillator
-    rms: np.ndarray
-    place: int
-    amplitude: float
-    energy: dict
-    damping_ratio: float
+    cycles: Cycles
     frames: tuple
 
+    def at_ratio(self, values):
+        """The chosen one of values at all RATIOS."""
+        return float(values[RATIOS.index(self.ratio)])
+
     @property
-    def frequency(self):
-        """Of the base [Hz]."""
-        return self.ratio * self.oscillator.natural_frequency
+    def energy(self):
+        """J a cycle that "base" gives and that "dashpot" and "filling" take, first harmonics."""
+        o, cycles = self.oscillator, self.cycles
+        powers = cycles.powers(o.base_amplitude, o.stiffness, o.damping)
+        return {name: self.at_ratio(power / cycles.frequency) for name, power in powers.items()}
+
+    @property
+    def damping_ratio(self):
+        """Of dashpot and grains together."""
+        o = self.oscillator
+        return self.at_ratio(self.cycles.damping_ratio(o.mass, o.stiffness, o.damping))
+
+    @property
+    def swing(self):
+        """Amplitude of the box [m]."""
+        return self.at_ratio(self.cycles.amplitude)
+
+    @property
+    def omega(self):
+        """Angular frequency of the base [rad/s]."""
+        return self.at_ratio(self.cycles.omega)
 
     @property
     def throw(self):
         """Largest acceleration of the box by that of gravity: above 1 it throws its grains."""
-        return (2.0 * math.pi * self.frequency) ** 2 * self.amplitude / FILLING.gravity
-
-    def without(self, added=0.0):
-        """RMS of the box with a fixed mass [kg] in place of the grains: (fine ratios, [m])."""
-        fine = np.linspace(RATIOS[0], RATIOS[-1], 300)
-        o = self.oscillator
-        response = np.abs(o.transfer(fine * o.natural_frequency, added))
-        return fine, o.base_amplitude * response / math.sqrt(2.0)
+        return self.omega**2 * self.swing / FILLING.gravity
 
 
 def structure(grains, share, base):
@@ -72,42 +83,25 @@ def structure(grains, share, base):
     Only ratios matter to how grains and box move, so the box is made heavier and not the grains
     lighter.
     """
-    paper = Oscillator()
-    mass = grains * FILLING.particle_mass / share
-    scale = mass / paper.mass
-    return Oscillator(mass, scale * paper.stiffness, scale * paper.damping, base)
+    return PAPER.scaled(grains * FILLING.particle_mass / share, base)
 
 
-@engine.remember
+@session.remember
 def compiled():
     """The batch, a scene a ratio."""
-    frequency = np.array(RATIOS) * Oscillator().natural_frequency
+    frequency = np.array(RATIOS) * PAPER.natural_frequency
     table = SceneTable(CHOICES["grains"][1], 1, FILLING.default_dt, frequency)
     return Batch(FILLING, table, measured_cycles=MEASURED)
 
 
-def answer_to(choice):
-    """The Answer to the values of the sliders."""
-    share, base = 0.01 * choice["share"], 1e-3 * choice["base"]
-    return answer(choice["grains"], share, base, choice["ratio"])
-
-
 def answer(grains, share, base, ratio):
     """The Answer to a choice: grains, their share of the box's mass, base [m], ratio of RATIOS."""
-    place, o = RATIOS.index(ratio), structure(grains, share, base)
+    o = structure(grains, share, base)
     cycles, frames = shaken(grains, o)
-    return Answer(
-        *(grains, share, ratio, o),
-        rms=cycles.rms,
-        place=place,
-        amplitude=float(cycles.amplitude[place]),
-        energy={name: float(value[place]) for name, value in energies(cycles, o).items()},
-        damping_ratio=float(cycles.damping_ratio(o.mass, o.stiffness, o.damping)[place]),
-        frames=frames[place],
-    )
+    return Answer(grains, share, ratio, o, cycles, frames[RATIOS.index(ratio)])
 
 
-@engine.remember
+@session.remember
 def shaken(grains, o):
     """Shake until all is as it will stay; returns Cycles at all RATIOS, and Frames of each."""
     batch = compiled()
@@ -117,31 +111,56 @@ def shaken(grains, o):
     batch.run(TRANSIENT, 0)
     marks, shots = [batch.steps_per_cycle * k // PICTURES for k in range(PICTURES + 1)], []
     for steps in np.diff(marks, axis=0):
-        present = batch.sample()
-        shots.append([frame(batch, present, s) for s in range(batch.count)])
+        shots.append(frames_of(batch))
         batch.advance(steps)
     return batch.run(0, MEASURED), tuple(zip(*shots))
 
 
-def frame(batch, present, s):
-    """A Frame of a scene as it is."""
-    shot = batch.snapshot(s)
-    numbers = (float(present[name][s]) for name in ("time_s", "x", "y"))
-    return Frame(*numbers, shot["position"], shot["velocity"])
+def picture(answer):
+    """Response, energy a cycle, and the box through one cycle; PNG bytes."""
+    with styled(0, size=(10.0, 6.2)) as (figure, _):
+        above, below = figure.subfigures(2, 1, height_ratios=(1.0, 1.15))
+        response, energy = above.subplots(1, 2, width_ratios=(1.7, 1.0))
+        _response(response, answer)
+        _energy(energy, answer)
+        _boxes(below, answer)
+        return png_of(figure)
 
 
-def energies(cycles, o):
-    """Energy a cycle by where it comes from and goes to [J], arrays (scenes,); first harmonics.
+def _response(axes, answer):
+    """RMS of the box over frequency, with grains, empty, and with the grains glued to it."""
+    fine, o = np.linspace(RATIOS[0], RATIOS[-1], 300), answer.oscillator
+    glued = answer.share * o.mass, "--", "grains glued to the floor"
+    for mass, line, label in ((0.0, ":", STYLES["empty"].label), glued):
+        rms = 1e3 * o.rms(fine * o.natural_frequency, mass)
+        axes.plot(fine, rms, color=GREY, ls=line, lw=1.2, label=label)
+    rms, look = 1e3 * answer.cycles.rms, {"color": STYLES[FILLING.label].colour, "ms": 4}
+    axes.plot(RATIOS, rms, "o-", label=f"{answer.grains} grains", **look)
+    axes.plot(answer.ratio, answer.at_ratio(rms), "o", ms=12, mfc="none", mec=BLACK, mew=1.5)
+    axes.set(xlabel="frequency of the base / own frequency of the empty box [1]", ylim=(0.0, None))
+    axes.set(ylabel="RMS displacement [mm]", title="how far the box swings")
+    axes.legend()
 
-    The base moves as y = -i y0 and pulls the box with K (y - x) + C (y' - x').
-    """
-    base = -1j * o.base_amplitude * np.ones(len(cycles.omega))
-    stretch, speed = base - cycles.harmonic("x"), 1j * cycles.omega * base
-    drag = speed - cycles.harmonic("v")
-    pull = o.stiffness * stretch + o.damping * drag
-    power = {
-        "base": 0.5 * (pull * np.conj(speed)).real,
-        "dashpot": 0.5 * o.damping * np.abs(drag) ** 2,
-        "grains": cycles.complex_power.real,
-    }
-    return {name: value / cycles.frequency for name, value in power.items()}
+
+def _energy(axes, answer):
+    shown = {"base gives": GREEN, "dashpot takes": GREY, "grains take": BLUE}
+    values = [1e3 * value for value in answer.energy.values()]
+    bars = axes.bar(list(shown), values, color=list(shown.values()))
+    axes.bar_label(bars, fmt="%.3g", fontsize=8.5)
+    axes.set(ylabel="energy a cycle [mJ]", title=f"at {answer.ratio:g} × own frequency")
+    axes.margins(y=0.15)
+    axes.axhline(0.0, color=BLACK, lw=0.8)
+    axes.grid(False, axis="x")
+
+
+def _boxes(figure, answer):
+    """The box at even parts of a cycle."""
+    box, panels = Box.of_automaton(FILLING), figure.subplots(1, PICTURES)
+    swing = max(0.5 * box.diameter, *(abs(frame.x) for frame in answer.frames))
+    for k, (axes, frame) in enumerate(zip(panels, answer.frames)):
+        frame_panel(axes, box, swing)
+        drawn = DrawnBox(axes, box, max(0.05, answer.omega * answer.swing))
+        drawn.show(frame)
+        axes.set_title(f"{k}/{PICTURES} of a cycle", loc="center")
+    words = "grains: blue rise, red fall [m/s]"
+    figure.colorbar(drawn.particles, ax=panels, label=words, aspect=18, pad=0.01)

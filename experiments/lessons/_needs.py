@@ -1,119 +1,55 @@
 """Effects that a scene needs: a bar is pulled open and pressed together, with any effects.
 
 Every choice of effects is a program of its own, and to compile one takes seconds. So answers come
-from two programs, with contact and without, in which the numbers of the other effects are such that
-they never act: the same bits (a test demands it). The cost of a choice is measured with its own
-program, on demand. All runs on the engine's thread.
+from two programs, with contact and without, in which the other effects are silent: the same bits.
+The cost of a choice is measured with its own program, on demand. All runs on the thread of the
+session.
 """
 
 import math
-import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from _engine import engine
-from taichi_dem import (
-    CONCRETE,
-    Scene,
-    Simulation,
-    SimulationDiverged,
-    Uniform,
-    effects,
-    needed_effects,
-)
-from taichi_dem.diagnostics.missing_effects import unserved
-from taichi_dem.engine.model import Model
+import taichi_dem as dem
+from _page import percent
+from taichi_dem.kit.plot_style import BLUE, GREY, RED, png_of, styled
+from taichi_dem.kit.session_thread import session
 from taichi_dem.mesh.shapes import bar
+from taichi_dem.plot.bodies import draw_bodies
+from taichi_dem.result import Result
+from taichi_dem.simulate import result_of, simulate
 
-LENGTH, WIDTH, CELLS = 0.3, 0.1, (3, 2, 2)
+LENGTH = 0.3
+BAR = bar(LENGTH, 0.1, (3, 2, 2))
 STEP, UNTIL, LOOKS = 2e-8, 9e-4, 20
 #: The right end goes with v cos(2 pi f t), and sideways at half of it: v [m/s] to choose, f [Hz].
 SPEEDS = (0.05, 0.2, 0.5, 0.75, 1.0, 1.5, 2.0)
 SIDEWAYS, FREQUENCY = 0.5, 900.0
 #: Looks at which the bar is drawn: pulled open, and pressed together.
 SHOWN = {"pulled open": 6, "pressed together": LOOKS}
+#: Effects to choose from and their words; the first three act without contact.
 EFFECTS = {
-    "bond_damping": effects.BondDamping,
-    "softening": effects.Softening,
-    "shear_slip": effects.ShearSlip,
-    "sphere_contact": effects.SphereContact,
-    "friction": effects.Friction,
+    "bond_damping": (dem.effects.BondDamping, "dashpots of the bonds"),
+    "softening": (dem.effects.Softening, "fracture"),
+    "shear_slip": (dem.effects.ShearSlip, "slip in shear"),
+    "sphere_contact": (dem.effects.SphereContact, "contact of fragments"),
+    "friction": (dem.effects.Friction, "friction of fragments"),
 }
-ALL = tuple(EFFECTS)
-WITHOUT_CONTACT = ALL[:3]
-#: Times the strength that no effect left out shall reach.
-_STRONGER = 2.0**40
-WORDS = {
-    "bond_damping": "dashpots of the bonds",
-    "softening": "fracture",
-    "shear_slip": "slip in shear",
-    "sphere_contact": "contact of fragments",
-    "friction": "friction of fragments",
-}
-
-#: Questions of the notebook, and what unfolds below them.
-QUESTIONS = {
-    "Pull gently, with 0.2 m/s. Which effects can you switch off, and how do you know?": (
-        "All but the dashpots. The table says *never acted*: without an effect that never "
-        "acted **not a bit** of the answer differs. Switch off fracture, slip, contact and "
-        "friction, and the change stays zero."
-    ),
-    "Pull with 2 m/s and switch off the contact. What do you see, what does the program say?": (
-        "The pieces pass through each other when the bar is pressed together. The run ends "
-        "without a word of error: **every figure looks fine**. Only the last row tells: "
-        "bodies overlap, *list it*. A program that stays silent here would be dangerous."
-    ),
-    "Switch off fracture. Why is contact then never missed?": (
-        "Nothing breaks, so nothing comes loose that could touch. Effects hang together: ask "
-        "for one, and others follow."
-    ),
-    "A hard pull makes the program warn of sphere dashpots. How wrong is it?": (
-        "By 0.2 %: so far do the bodies end elsewhere when the step is halved, and the "
-        "warning stays. Twice as long a step would be wrong by 2 %. A warning is a reason to "
-        "try a shorter step, and not yet an error."
-    ),
-    "Which effect is dear, and is it the one that matters most?": (
-        "Leave out one at a time and press the button. Dear and important are two things: "
-        "look at the share of the energy in the table, and at where the bodies end."
-    ),
-    "Fracture takes 2 % of the energy. Can it go?": (
-        "No. It *steers*: it takes little and decides where everything goes. The program "
-        "never drops such an effect because its energy is small, only because it never acted."
-    ),
-}
-
-
-@dataclass(frozen=True, eq=False)
-class Outcome:
-    """A run with some effects.
-
-    names: of the effects. motions: of all bodies, by the names of SHOWN, so far as the run came.
-    broken: which bonds at the end, bool. step_s: CPU seconds of a step, NaN where that was not
-    measured. advice: of ``needed_effects``. sentence: of the program where it ended the run, or "".
-    unresolved: its sentences about processes for which the step is too long.
-    """
-
-    names: tuple
-    motions: dict
-    broken: np.ndarray
-    step_s: float
-    advice: object
-    sentence: str
-    unresolved: tuple
+ALL, WITHOUT_CONTACT = tuple(EFFECTS), tuple(EFFECTS)[:3]
 
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """Runs for one choice: the Outcome chosen and that with all effects; model: of the bar.
+    """Results for one choice, of the effects chosen and of all; speed: of the right end [m/s].
 
-    speed: at which the right end begins [m/s].
+    measured: whether each ran with a program of its own, which knows the cost of a step.
     """
 
     speed: float
-    chosen: Outcome
-    complete: Outcome
-    model: object
+    chosen: Result
+    complete: Result
+    measured: bool = False
 
     @property
     def stroke(self):
@@ -126,70 +62,45 @@ class Answer:
 
         None where the chosen run did not come to its end.
         """
-        if self.chosen.sentence or self.complete.sentence:
+        if self.chosen.diverged or self.complete.diverged:
             return None
-        here, there = (
-            made.motions["pressed together"]["position"] for made in (self.chosen, self.complete)
-        )
-        way = np.linalg.norm(there - self.model.centre, axis=1).mean()
-        return float(np.linalg.norm(here - there, axis=1).mean() / way)
+        here, there = (made.frames[LOOKS].displacement for made in (self.chosen, self.complete))
+        apart, way = (np.linalg.norm(one, axis=1).mean() for one in (here - there, there))
+        return float(apart / way)
+
+    @property
+    def step_s(self):
+        """CPU seconds of a step, of the choice and with all effects; NaN if not measured."""
+        reports = self.chosen.report, self.complete.report
+        seconds = [one.run_cpu_seconds / max(1, one.substeps) for one in reports]
+        return seconds if self.measured else [math.nan, math.nan]
 
 
 def allowed(names):
     """The effects that can be listed out of names, in order: friction acts in contacts only."""
     kept = set(names)
-    if "sphere_contact" not in kept:
-        kept.discard("friction")
+    kept -= set() if "sphere_contact" in kept else {"friction"}
     return tuple(name for name in ALL if name in kept)
 
 
-def scene(names):
-    """The bar, held on the left and moved on the right, with some effects."""
-    moved = effects.PrescribedMotion("right", (1.0, SIDEWAYS, 0.0), FREQUENCY)
-    listed = [EFFECTS[name]() for name in names]
-    return Scene(bar(LENGTH, WIDTH, CELLS), CONCRETE, [*listed, effects.Fixed("left"), moved])
+def scene(names, program, speed):
+    """The bar, held on the left and moved on the right; effects not named are silent."""
+    moved = dem.effects.PrescribedMotion("right", (speed, SIDEWAYS * speed, 0.0), FREQUENCY)
+    made = {name: EFFECTS[name][0]() for name in program}
+    listed = [effect if name in names else effect.silent() for name, effect in made.items()]
+    return dem.Scene(BAR, dem.CONCRETE, [*listed, dem.effects.Fixed("left"), moved])
 
 
-def ready(program):
-    """The bar at rest with all effects of a program, which is compiled once."""
-    made = Simulation(scene(program), Uniform(STEP))
-    made.start()
-    return made
+def moved(names, program, speed):
+    """Result of a program in which the effects named act; diverged ones too."""
+    looks = {"until": UNTIL, "samples": LOOKS, "frames": LOOKS, "progress": None}
+    return result_of(simulate, scene(names, program, speed), method=dem.Uniform(STEP), **looks)
 
 
-@engine.remember
-def model():
-    """Constants of the bar."""
-    return Model(scene(()).mesh, CONCRETE, [])
-
-
-def silenced(made, names):
-    """Set the numbers of the effects that are not named to what never acts; watch out for them."""
-    model = made.tables
-    laws = (model.dashpot, model.tension, model.shear, model.friction)
-    dashpot, tension, shear, friction = (bool(law.name) and law.name not in names for law in laws)
-    if dashpot:
-        model.dashpot.law.fill(0.0)
-    if tension:
-        # As strong as nothing is: strength, its opening, and the failure beyond, by a power of two.
-        model.tension.law[0] *= _STRONGER
-        limits = model.tension.unit.to_numpy()
-        limits[:, 0] *= _STRONGER
-        model.tension.unit.from_numpy(limits)
-        model.tension.law[1] = 2.0 * float(limits[:, 0].max())
-    if shear:
-        model.shear.law[0] *= _STRONGER
-    if friction:
-        model.friction.law[0] = 0.0
-    made.missing_effects.needed = unserved({EFFECTS[name].role for name in names})
-    return made
-
-
-@engine.remember
+@session.remember
 def outcome(names, speed):
-    """Move the bar with these effects; the Outcome knows no cost, as others stand silent by."""
-    program = ALL if "sphere_contact" in names else WITHOUT_CONTACT
-    return replace(moved(program, names, speed), step_s=math.nan)
+    """Result with these effects; others stand silent by."""
+    return moved(names, ALL if "sphere_contact" in names else WITHOUT_CONTACT, speed)
 
 
 def measured(names, speed):
@@ -197,66 +108,95 @@ def measured(names, speed):
     return moved(names, names, speed)
 
 
-def moved(program, names, speed):
-    """Outcome of a program with the effects named; the others in it never act."""
-    made = silenced(ready(program), names)
-    motion = made.tables.supports[1].law
-    motion[0], motion[1] = speed, SIDEWAYS * speed
-    every, motions, sentence, spent = round(UNTIL / LOOKS / STEP), {}, "", 0.0
-    try:
-        for k in range(1, LOOKS + 1):
-            started = time.thread_time()
-            made.advance_to(k * every)
-            spent += time.thread_time() - started
-            made.sample()
-            motions.update({name: made.state.motion() for name, at in SHOWN.items() if at == k})
-    except SimulationDiverged as diverged:
-        sentence = str(diverged)
-    report = made.report()
-    listed = tuple(use for use in report.effect_activity if use.effect in names)
-    return Outcome(
-        names=names,
-        motions=motions,
-        broken=made.state.broken_tick.to_numpy()[: made.model.bond_count] >= 0,
-        step_s=spent / max(1, report.substeps),
-        advice=needed_effects(replace(report, effect_activity=listed)),
-        sentence=sentence,
-        unresolved=report.unresolved,
-    )
-
-
 def answer(names, speed):
     """The Answer to a choice: effects by name, as ``allowed`` gives them, and one of SPEEDS."""
-    return Answer(speed, outcome(names, speed), outcome(ALL, speed), model())
+    return Answer(speed, outcome(names, speed), outcome(ALL, speed))
 
 
 def price(names, speed):
     """The Answer with costs: both programs run one after the other."""
-    ready(names)
-    chosen, complete = (measured(one, speed) for one in (names, ALL))
-    return replace(answer(names, speed), chosen=chosen, complete=complete)
+    dem.Simulation(scene(names, names, speed), dem.Uniform(STEP)).start()
+    return Answer(speed, measured(names, speed), measured(ALL, speed), measured=True)
 
 
 def compile_all():
     """Compile both programs that answers come from, so that no later answer has to wait."""
     for names in (ALL, WITHOUT_CONTACT):
-        ready(names)
+        dem.Simulation(scene(names, names, SPEEDS[0]), dem.Uniform(STEP)).start()
 
 
 def verdicts(answer):
     """A row for every effect: (words, whether listed, what it did, what the program advises)."""
-    advice = answer.chosen.advice
-    uses = {use.effect: use for use in advice.uses}
-    missed = {finding.effect: finding for finding in advice.missing}
-    rows = []
-    for name, words in WORDS.items():
-        finding = missed.get(EFFECTS[name].__name__)
-        if name in uses:
-            says = "drop it" if name in advice.droppable else "keep it"
-            rows.append((words, True, str(uses[name]), says))
-        elif finding is not None:
-            did = f"{finding.what}: up to {finding.most} at a time"
-            rows.append((words, False, did, "list it"))
+    advice, listed = dem.needed_effects(answer.chosen), answer.chosen.report.effects
+    return [
+        (words, name in listed, *advice.verdict(name, kind.__name__))
+        for name, (kind, words) in EFFECTS.items()
+    ]
+
+
+def words(answer):
+    """The outcome in sentences, with what the program said."""
+    spared = 1.0 - answer.step_s[0] / answer.step_s[1]
+    spares = f"spares **{percent(max(0.0, spared))}** of a step"
+    spares = spares if answer.measured else "is not measured"
+    change = "no comparison" if answer.change is None else percent(answer.change)
+    chosen = answer.chosen
+    said = [f"The program says: *{chosen.diverged}.*"] if chosen.diverged else []
+    said += [f"It warns: *{warning}.*" for warning in chosen.report.unresolved]
+    first = f"The end is pulled out by **{1e3 * answer.stroke:.2g} mm**. Your choice {spares}; "
+    return " ".join([f"{first}bodies end elsewhere by **{change}**.", *said])
+
+
+def picture(answer):
+    """The bar with all effects and with those chosen, and the cost of a step; PNG bytes."""
+    rows = {"all effects": answer.complete, "your choice": answer.chosen}
+    # The stroke looks like a twelfth of the bar, to one digit.
+    magnify = float(f"{LENGTH / 12.0 / answer.stroke:.1g}")
+    with styled(0, size=(10.0, 4.4)) as (figure, _):
+        places = [[f"{name}, {instant}" for instant in SHOWN] + [name] for name in rows]
+        panels = figure.subplot_mosaic(places, width_ratios=(1.0, 1.0, 0.75))
+        bars = [panels[title] for row in places for title in row[:2]]
+        for (name, result), row in zip(rows.items(), places):
+            for title, number in zip(row, SHOWN.values()):
+                drawn = _pulled(panels[title], answer, result, number, magnify)
+                panels[title].set_title(title if row is places[0] else name, loc="center")
+        words = f"moved to the right [mm], drawn × {magnify:.0f}"
+        figure.colorbar(drawn, ax=bars, label=words, location="bottom", aspect=50, pad=0.02)
+        _prices(*(panels[name] for name in rows), answer)
+        return png_of(figure)
+
+
+def _pulled(axes, answer, result, number, magnify):
+    """The bar at a look; words where the run did not get there."""
+    ended = number >= len(result.frames)
+    result = answer.complete if ended else result
+    frame, end = result.frames[number], 1e3 * answer.stroke
+    look = {"magnify": magnify, "cmap": "RdBu_r", "clim": (-end, end)}
+    look["broken"] = np.isfinite(result.broken_time)
+    drawn = draw_bodies(axes, result.model, frame, 1e3 * frame.displacement[:, 0], **look)
+    axes.set(xlim=(-0.01, 0.34), ylim=(-0.04, 0.15))
+    axes.set_axis_off()
+    if ended:
+        drawn.set_alpha(0.15)
+        axes.text(0.15, 0.05, "the program ended the run", ha="center", color=RED, weight="bold")
+    return drawn
+
+
+def _prices(above, below, answer):
+    """Time of a step of both, where it has been measured, and their broken bonds."""
+    far, words = answer.change, "one of both did not end"
+    words = words if far is None else f"bodies end {percent(far)} elsewhere"
+    above.set(xlabel="time of a step [µs]", title="what it costs")
+    below.set(xlabel="broken bonds [1]", title=words)
+    broken = [one.report.broken_faces for one in (answer.chosen, answer.complete)]
+    costs = 1e6 * np.array(answer.step_s)
+    for axes, values, form in ((above, costs, "%.3g"), (below, broken, "%d")):
+        if np.isfinite(values).all():
+            names = ["your choice", "all effects"]
+            bars = axes.barh(names, values, color=[BLUE, GREY], height=0.5)
+            axes.bar_label(bars, fmt=form, padding=3)
+            axes.set_xlim(0.0, 1.25 * max(values) or 1.0)
+            axes.grid(False, axis="y")
         else:
-            rows.append((words, False, "left out", "not missed"))
-    return rows
+            axes.set(xticks=[], yticks=[])
+            axes.text(0.5, 0.5, "not measured yet: press the button", ha="center", va="center")

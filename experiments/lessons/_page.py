@@ -16,3 +16,8 @@ def questions(mo, text):
     """Questions whose answers unfold; text: paragraphs, "Question? :: Answer" each."""
     pairs = (" ".join(part.split()).split(" :: ") for part in text.strip().split("\n\n"))
     return mo.accordion({question: mo.md(answer) for question, answer in pairs})
+
+
+def percent(share):
+    """A share in words: 0.0123 -> 1.2 %, 1.44 -> 144 %."""
+    return f"{100.0 * share:.0f} %" if share >= 0.1 else f"{100.0 * share:.2g} %"

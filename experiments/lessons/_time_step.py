@@ -1,196 +1,142 @@
 """Cost of a time step: a bar is struck with any step by any method, and compared with the truth.
 
-The bar has 12 cells of six tetrahedra. All runs on the engine's thread.
+The bar has 12 cells of six tetrahedra. All runs on the thread of the session.
 """
 
 import math
-import time
+import textwrap
 from dataclasses import dataclass, replace
-from typing import Optional
+from typing import NamedTuple
 
 import numpy as np
 
-from _engine import engine
-from taichi_dem import (
-    CONCRETE,
-    ImplicitDashpots,
-    Scene,
-    Simulation,
-    SimulationDiverged,
-    Uniform,
-    effects,
-    quality_report,
-)
-from taichi_dem.engine.model import Model
-from taichi_dem.kit.plot_style import styles_of
+import taichi_dem as dem
+from taichi_dem.kit.plot_style import BLACK, GREY, RED, png_of, seconds, styled, styles_of
+from taichi_dem.kit.session_thread import session
 from taichi_dem.mesh.shapes import bar
+from taichi_dem.plot.bodies import draw_bodies
+from taichi_dem.result import Result
+from taichi_dem.simulate import result_of, run_simulation
 
 LENGTH, WIDTH, CELLS = 0.4, 0.05, (12, 1, 1)
 #: Steps to choose from [s], and that of the truth.
-STEPS = tuple(4e-8 * 2**k for k in range(7))
-FINEST = 2e-8
-#: Samples after the first; each is a whole number of the longest steps after the one before.
-SAMPLES = 40
+STEPS, FINEST = tuple(4e-8 * 2**k for k in range(7)), 2e-8
+#: Samples after the first, three of the longest steps apart; the one that is drawn.
+SAMPLES, SHOWN = 40, 18
 UNTIL = SAMPLES * 3 * STEPS[-1]
+TIME_MS = 1e3 * np.linspace(0.0, UNTIL, SAMPLES + 1)
 #: Times to the peak of the blow [s], and the peak [Pa].
-RISES = (1e-5, 2e-5, 5e-5)
-PEAK = 1e6
-#: Sample at which the bar is drawn: the wave is on its way.
-SHOWN = 18
-#: Method by name, as a user writes it; in words.
+RISES, PEAK = (1e-5, 2e-5, 5e-5), 1e6
+#: Sliders of the page: steps [ns], rises [us]; the first, label.
+CHOICES = {
+    "step": ([round(1e9 * one) for one in STEPS], 80, "step [ns]"),
+    "rise": ([round(1e6 * one) for one in RISES], 20, "the blow rises in [µs]"),
+}
 METHODS = {
-    "explicit": Uniform(STEPS[0]),
-    "limited": Uniform(STEPS[0], dashpot="limited"),
-    "solved": ImplicitDashpots(STEPS[0], tolerance=1e-3),
+    "explicit": dem.Uniform(),
+    "limited": dem.Uniform(dashpot="limited"),
+    "solved": dem.ImplicitDashpots(tolerance=1e-3),
 }
-WORDS = {name: style.label for name, style in styles_of(METHODS).items()}
-
-#: Questions of the notebook, and what unfolds below them.
-QUESTIONS = {
-    "Explicit: go from 80 to 160 ns. Does the error grow, or does something else happen?": (
-        "The run diverges. At 80 ns it was wrong by 0.01 %: what bounds the step is "
-        "**stability**, not accuracy. You pay for small steps only because a larger one is "
-        "impossible."
-    ),
-    "How does each curve fall when the step is halved?": (
-        "Explicit: the error halves, **first order**. A dashpot takes the velocity of half a "
-        "step ago. Solved together: the error falls to about a quarter, **second order**. The "
-        "dashpots act in the middle of the step."
-    ),
-    "Limited dashpots do not diverge up to 1280 ns. Why not take them?": (
-        "A dashpot that the step does not bear is weakened until the step bears it. That is "
-        "another material: wrong by 4 % at 80 ns, by about half at 320. **Stable is not "
-        "right.** At 40 ns nothing is weakened, and both explicit runs agree."
-    ),
-    "You want 1 %. Which method, and which step?": (
-        "Dashpots solved together, with the longest step. One of its steps costs several "
-        "explicit ones, but it is 32 times as long as the longest explicit one here. Beyond "
-        "it the springs end the run: they are explicit in every method."
-    ),
-    "Make the blow gentler, from 10 to 50 µs. Which error falls?": (
-        "At 80 ns that of the solved dashpots, to a twentieth: what changes slowly needs few "
-        "steps. The explicit error hardly changes. Its dashpots lag by half a step, whatever "
-        "the blow."
-    ),
-}
+STYLES = styles_of(METHODS)
+#: Of the displacement of the drawn bar.
+MAGNIFY = 1500.0
 
 
 @dataclass(frozen=True, eq=False)
 class Strike:
-    """A run of the bar.
+    """A run of the bar with a step [s].
 
-    step [s]; moved: mean displacement of the far end [m], (SAMPLES + 1,), NaN after a divergence;
-    sentence: of the program where it ended the run, "" where it did not; motion: of all
-    bodies at sample SHOWN, None where the run ended before. seconds: of one core for the run
-    without looks on the way, NaN where that was not measured.
+    moved: mean displacement of the far end [m], (SAMPLES + 1,), NaN after a divergence. seconds: of
+    one core for the run without frames on the way, NaN where that was not measured.
     """
 
     step: float
     moved: np.ndarray
-    sentence: str
-    motion: Optional[dict]
+    result: Result
     seconds: float = math.nan
+
+    @property
+    def sentence(self):
+        """Of the program where it ended the run, or nothing."""
+        return self.result.diverged
+
+    @property
+    def motion(self):
+        """Frame that is drawn, None where the run ended before."""
+        return dict(enumerate(self.result.frames)).get(SHOWN)
 
     def error(self, truth):
         """Largest distance from the truth, over the largest displacement there; NaN if diverged."""
         return float(np.abs(self.moved - truth.moved).max() / np.abs(truth.moved).max())
 
 
-@dataclass(frozen=True, eq=False)
-class Answer:
-    """Runs for one choice.
-
-    method, rise [s]: the choice. chosen: its Strike. truth: that of the finest step. ladders: the
-    Strikes at all STEPS by method, of those asked for so far with this blow. model: of the bar.
-    """
+class Answer(NamedTuple):
+    """Strikes for one choice; ladders: those at all STEPS, by the methods tried with this blow."""
 
     method: str
-    rise: float
     chosen: Strike
     truth: Strike
     ladders: dict
-    model: object
-
-    @property
-    def time(self):
-        """Of the samples [s]."""
-        return np.linspace(0.0, UNTIL, SAMPLES + 1)
 
 
 def scene(rise=RISES[0]):
     """The bar under a short blow on its left end, with a rise [s]."""
-    blow = effects.GasPressure("left", peak=PEAK, rise=rise, decay_ratio=1.0)
-    return Scene(bar(LENGTH, WIDTH, CELLS), CONCRETE, [blow, effects.BondDamping()])
+    blow = dem.effects.GasPressure("left", peak=PEAK, rise=rise, decay_ratio=1.0)
+    return dem.Scene(bar(LENGTH, WIDTH, CELLS), dem.CONCRETE, [blow, dem.effects.BondDamping()])
 
 
 def limits():
     """Longest stable explicit step of the worst body [s]: by its dashpots, and by its springs."""
-    report = quality_report(scene().mesh, CONCRETE)
+    report = dem.quality_report(scene().mesh, dem.CONCRETE)
     return float(report.dashpot_step_s.min()), float(report.spring_step_s.min())
 
 
 def ready(method, step, rise):
     """The bar at rest, with a step and a rise of the blow [s]; a method is compiled once."""
-    chosen = METHODS[method]
-    name = "dt" if hasattr(chosen, "dt") else "dt0"
-    made = Simulation(scene(rise), replace(chosen, **{name: step}))
-    made.start()
-    return made
+    # The first field of every method is its step.
+    name = next(iter(vars(METHODS[method])))
+    return dem.Simulation(scene(rise), replace(METHODS[method], **{name: step}))
 
 
 def strike(method, step, rise):
-    """Run the bar with a step and a rise of the blow [s], and look on; returns a Strike."""
-    made = ready(method, step, rise)
-    every = round(UNTIL / SAMPLES / step)
-    moved, motion, sentence = np.full(SAMPLES + 1, np.nan), None, ""
-    end = made.model.centre[:, 0] > LENGTH * (1.0 - 1.0 / CELLS[0])
-    try:
-        for k in range(SAMPLES + 1):
-            made.advance_to(every * k)
-            found = made.state.motion()
-            moved[k] = (found["position"] - made.model.centre)[end, 0].mean()
-            motion = found if k == SHOWN else motion
-    except SimulationDiverged as diverged:
-        moved[k:], sentence = np.nan, str(diverged)
-    return Strike(step, moved, sentence, motion)
+    """Run the bar with a step and a rise of the blow [s]."""
+    looks = {"until": UNTIL, "samples": 1, "frames": SAMPLES, "progress": None}
+    result = result_of(run_simulation, ready(method, step, rise), **looks)
+    end = result.model.centre[:, 0] > LENGTH * (1.0 - 1.0 / CELLS[0])
+    moved = np.full(SAMPLES + 1, np.nan)
+    moved[: len(result.frames)] = [frame.displacement[end, 0].mean() for frame in result.frames]
+    return Strike(step, moved, result)
 
 
-@engine.remember
+@session.remember
 def timed(method, step, rise):
-    """The same with its cost, from a second run without looks on the way."""
+    """The same with its cost, from a second run without frames on the way."""
     found = strike(method, step, rise)
     if found.sentence:
         return found
-    made = ready(method, step, rise)
-    started = time.thread_time()
-    made.advance_to(round(UNTIL / step))
-    return replace(found, seconds=time.thread_time() - started)
+    bare = run_simulation(ready(method, step, rise), until=UNTIL, samples=1, progress=None)
+    return replace(found, seconds=bare.report.run_cpu_seconds)
 
 
-@engine.remember
+@session.remember
 def truth(rise):
     """The Strike that all others are compared with."""
     return strike("solved", FINEST, rise)
 
 
-@engine.remember
-def model():
-    """Constants of the bar."""
-    return Model(scene().mesh, CONCRETE, [])
-
-
-@engine.remember
-def tried(rise):
-    """Methods that have been asked for with a blow: a dict of the Strikes at all STEPS, to fill."""
-    return {}
-
-
 def answer(method, step, rise):
     """The Answer to a choice: method by name, step out of STEPS and rise out of RISES [s]."""
-    own = tried(rise)[method] = [timed(method, one, rise) for one in STEPS]
-    ladders = {name: tried(rise)[name] for name in METHODS if name in tried(rise)}
-    chosen = own[STEPS.index(step)]
-    return Answer(method, rise, chosen, truth(rise), ladders, model())
+    tried = session.kept(("ladders", rise), dict)
+    own = tried[method] = [timed(method, one, rise) for one in STEPS]
+    ladders = {name: tried[name] for name in METHODS if name in tried}
+    return Answer(method, own[STEPS.index(step)], truth(rise), ladders)
+
+
+def answer_to(method, chosen):
+    """The Answer to a method by name and the values of the sliders."""
+    return answer(
+        method, nearest(STEPS, 1e-9 * chosen["step"]), nearest(RISES, 1e-6 * chosen["rise"])
+    )
 
 
 def nearest(values, value):
@@ -201,4 +147,67 @@ def nearest(values, value):
 def compile_all():
     """Compile the bar of every method, so that no later answer has to wait for it."""
     for method in METHODS:
-        ready(method, STEPS[0], RISES[0])
+        ready(method, STEPS[0], RISES[0]).start()
+
+
+def picture(answer):
+    """The bar on its way, its far end over time, and error over cost of every step; PNG bytes."""
+    with styled(0, size=(10.0, 6.0)) as (figure, _):
+        places = [["bar", "bar"], ["end", "price"]]
+        panels = figure.subplot_mosaic(places, height_ratios=(0.5, 1.0))
+        _struck(figure, panels["bar"], answer)
+        _far_end(panels["end"], answer)
+        _price(panels["price"], answer)
+        return png_of(figure)
+
+
+def _struck(figure, axes, answer):
+    """The bar coloured by velocity when the wave is on its way, or the sentence of its end."""
+    chosen, model = answer.chosen, answer.truth.result.model
+    frame, high = chosen.motion or answer.truth.motion, model.mesh.points.max(axis=0)
+    top = 1e3 * float(np.abs(answer.truth.motion.velocity[:, 0]).max())
+    look = {"magnify": MAGNIFY, "clim": (-top, top), "cmap": "RdBu_r"}
+    drawn = draw_bodies(axes, model, frame, 1e3 * frame.velocity[:, 0], **look)
+    axes.set(xlim=(-0.02, high[0] + 0.03), ylim=(-0.02, high[1] + 0.02), xlabel="x [m]", yticks=[])
+    axes.set_title(f"t = {TIME_MS[SHOWN]:.2f} ms, displacement × {MAGNIFY:g}")
+    axes.spines["left"].set_visible(False)
+    figure.colorbar(drawn, ax=axes, label="velocity\n[mm/s]", aspect=8, pad=0.01)
+    if not chosen.motion:
+        drawn.set_alpha(0.15)
+        axes.set_title("the run did not get there")
+        look = {"ha": "center", "va": "center", "color": RED, "weight": "bold"}
+        words = textwrap.fill(chosen.sentence.split(";")[0], 60)
+        axes.text(0.5 * high[0], 0.5 * high[1], words, **look)
+
+
+def _far_end(axes, answer):
+    """Displacement of the far end, of the truth and of the chosen run."""
+    style, label = STYLES[answer.method], f"{seconds(answer.chosen.step)} a step"
+    axes.plot(TIME_MS, 1e6 * answer.truth.moved, color=GREY, lw=4.0, alpha=0.5, label="truth")
+    axes.plot(TIME_MS, 1e6 * answer.chosen.moved, color=style.colour, label=label)
+    axes.set(xlabel="time [ms]", ylabel="far end moved by [µm]", title=style.label)
+    axes.legend(loc="upper left")
+
+
+def _price(axes, answer):
+    """Error over seconds at every step of the methods tried so far, the chosen one ringed."""
+    axes.set(xscale="log", yscale="log", xlim=(7e-4, 1.0), ylim=(3e-8, 3.0))
+    axes.axhspan(1.0, 3.0, color="0.94", lw=0, label="× diverged: its cost, but no error")
+    axes.axhline(1e-2, color=GREY, ls=":", lw=1.0, label="error of 1 %")
+    for row, (method, strikes) in enumerate(answer.ladders.items()):
+        style = STYLES[method]
+        good = [(one.seconds, one.error(answer.truth)) for one in strikes if not one.sentence]
+        look = {"marker": style.marker, "color": style.colour, "ms": 5, "lw": 1.2}
+        axes.plot(*zip(*good), label=style.label, **look)
+        # A run that failed at once would have taken as long as the finest, by its steps.
+        cost = [strikes[0].seconds * STEPS[0] / one.step for one in strikes if one.sentence]
+        axes.plot(cost, [1.15 * 1.4**row] * len(cost), "x", color=style.colour, ms=5, mew=1.4)
+    chosen = answer.chosen
+    if not chosen.sentence:
+        place = chosen.seconds, chosen.error(answer.truth)
+        axes.plot(*place, "o", ms=14, mfc="none", mec=BLACK, mew=1.5)
+        look = {"textcoords": "offset points", "weight": "bold"}
+        axes.annotate(seconds(chosen.step), place, (10, 8), **look)
+    axes.set(xlabel="CPU time of one core [s]", ylabel="largest error of the far end [1]")
+    axes.set_title("lower left is better")
+    axes.legend(loc="lower left")

@@ -15,12 +15,11 @@ def _():
     import marimo as mo
 
     import _grains as lesson
-    from _engine import engine
-    from _page import questions, sliders
-    from _pictures import percent, picture_grains
+    from _page import percent, questions, sliders
+    from taichi_dem.kit.session_thread import session
 
     served = mo.app_meta().mode in ("run", "edit")
-    return engine, lesson, mo, percent, picture_grains, questions, served, sliders
+    return lesson, mo, percent, questions, served, session, sliders
 
 
 @app.cell
@@ -46,13 +45,14 @@ def _(lesson, mo, sliders):
 
 
 @app.cell
-def _(chosen, engine, lesson, mo, percent, picture_grains, served):
+def _(chosen, lesson, mo, percent, served, session):
     with mo.status.spinner("Shaking twelve boxes. The first time they are compiled, some seconds."):
-        _answer = engine.ask(lesson.answer_to, chosen.value)
-        _picture = engine.ask(picture_grains, _answer)
-    _taken = _answer.energy["grains"] / _answer.energy["base"]
+        _base, _ratio, _grains, _share = chosen.value.values()
+        _answer = session.ask(lesson.answer, _grains, 0.01 * _share, 1e-3 * _base, _ratio)
+        _picture = session.ask(lesson.picture, _answer)
+    _taken, _swing = _answer.energy["filling"] / _answer.energy["base"], _answer.swing
     _words = (
-        f"The box swings by **{1e3 * _answer.amplitude:.2g} mm** and is accelerated by up to "
+        f"The box swings by **{1e3 * _swing:.2g} mm** and is accelerated by up to "
         f"**{_answer.throw:.2g} g**. The grains take **{percent(max(0.0, _taken))}** of the energy "
         f"that the base gives; the damping ratio is {_answer.damping_ratio:.2g} instead of "
         f"{_answer.oscillator.damping_ratio:.2g}."

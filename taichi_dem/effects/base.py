@@ -18,6 +18,7 @@ from taichi.lang import impl
 
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.display import by_arguments
+from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.materials import Material
 
@@ -33,6 +34,8 @@ Travel = tuple[tuple[float, ...], tuple[float, ...]]
 #: Roles that take one effect, in the order in which effects are listed, bound and reported.
 SINGLE = ("tension", "shear", "dashpot", "friction", "contact")
 ROLES = (*SINGLE, *MANY)
+#: Times its strength that no bond reaches; a power of two, so that no digit changes.
+HARMLESS = 2.0**40
 
 
 class Effect:
@@ -53,6 +56,22 @@ class Effect:
 
     def __repr__(self):
         return by_arguments(self)
+
+    def silent(self) -> "Effect":
+        """A copy that is compiled like this effect and never acts.
+
+        All bits, reports and findings are those of a scene that does not list it, which would be
+        compiled anew. Raises InputError for an effect that cannot be silent.
+        """
+        if type(self).harmless is Effect.harmless:
+            raise InputError(f"effect {self.name} cannot be silent: leave it out of the scene")
+        made = copy.copy(self)
+        made.name, made.is_silent = "", True
+        return made
+
+    def harmless(self, material: Material) -> Material:
+        """The material with which the effect never acts, as ``silent`` needs it."""
+        return material
 
     def numbers(self, material: Material) -> tuple:
         """Numbers that kernels read as ``self.law[0]`` and on: to change them compiles nothing."""
@@ -87,7 +106,10 @@ class Effect:
             self.__dict__["_given"] = vars(given)
 
     def load_scene(self, model: "Model") -> None:
-        """Load the numbers of the scene's effect."""
+        """Load the numbers of the effect that this bound one stands for."""
+        if self._given.get("is_silent"):
+            model = copy.copy(model)
+            model.material = self.harmless(model.material)
         if self._count:
             assign(self.law, np.array(self.numbers(model.material), dtype=np.float64))
         self.load(model)
@@ -230,4 +252,4 @@ ABSENT: dict[str, Any] = {
     "contact": None,
 }
 
-__all__ = ["ABSENT", "MANY", "ROLES", "SINGLE", "Effect", "Travel", "along", "bound"]
+__all__ = ["ABSENT", "HARMLESS", "MANY", "ROLES", "SINGLE", "Effect", "Travel", "along", "bound"]

@@ -1,5 +1,7 @@
 """Dashpots of bonds (Konno et al., 2.1, end; Table 1)."""
 
+from dataclasses import replace
+
 import taichi as ti
 
 from taichi_dem.effects.base import Effect
@@ -17,6 +19,10 @@ class BondDamping(Effect):
     def numbers(self, material: Material) -> tuple[float, ...]:
         """Normal and tangential damping coefficient [Pa s/m]."""
         return material.normal_damping, material.shear_damping
+
+    def harmless(self, material):
+        """No damping."""
+        return replace(material, normal_damping=0.0, shear_damping=0.0)
 
     @ti.func
     def traction(self, velocity):

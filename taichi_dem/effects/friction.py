@@ -1,5 +1,7 @@
 """Sliding friction between contact spheres (Konno et al., 2.2)."""
 
+from dataclasses import replace
+
 import taichi as ti
 
 from taichi_dem.effects.base import Effect
@@ -17,6 +19,10 @@ class Friction(Effect):
     def numbers(self, material: Material) -> tuple[float, ...]:
         """Friction coefficient."""
         return (material.friction,)
+
+    def harmless(self, material):
+        """No friction."""
+        return replace(material, friction=0.0)
 
     @ti.func
     def limit(self, force_normal):

@@ -1,10 +1,11 @@
 """Coulomb slip of bonds (Konno et al., 2.1, eq. 1 and 2, Fig. 3)."""
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import taichi as ti
 
-from taichi_dem.effects.base import Effect
+from taichi_dem.effects.base import HARMLESS, Effect
 from taichi_dem.materials import Material
 from taichi_dem.physics.fracture import coulomb_limit, slip_beyond
 
@@ -26,6 +27,10 @@ class ShearSlip(Effect):
     def numbers(self, material: Material) -> tuple[float, ...]:
         """Cohesion [Pa] and friction coefficient."""
         return material.cohesion, material.friction
+
+    def harmless(self, material: Material) -> Material:
+        """Cohesion beyond any load."""
+        return replace(material, cohesion=HARMLESS * material.tensile_strength)
 
     def declare(self, capacity: "Capacity") -> None:
         """Residual slip of every contact unit."""

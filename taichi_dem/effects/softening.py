@@ -1,11 +1,12 @@
 """Softening and fracture of bonds in tension (Konno et al., 2.1, Fig. 4)."""
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import taichi as ti
 
-from taichi_dem.effects.base import Effect
+from taichi_dem.effects.base import HARMLESS, Effect
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.types import vec2
 from taichi_dem.materials import Material
@@ -31,6 +32,14 @@ class Softening(Effect):
     def numbers(self, material: Material) -> tuple[float, ...]:
         """Tensile strength [Pa] and opening at failure [m]."""
         return material.tensile_strength, material.failure_opening
+
+    def harmless(self, material: Material) -> Material:
+        """Stronger than any load, by a power of two."""
+        strength, energy = (
+            HARMLESS * material.tensile_strength,
+            HARMLESS**2 * material.fracture_energy,
+        )
+        return replace(material, tensile_strength=strength, fracture_energy=energy)
 
     def declare(self, capacity: "Capacity") -> None:
         """Elastic limit and secant stiffness of every contact unit."""

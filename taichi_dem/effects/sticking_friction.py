@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 import taichi as ti
 
+from taichi_dem.effects.base import Effect
 from taichi_dem.effects.friction import Friction
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.kit.validation import between
@@ -30,6 +31,9 @@ class StickingFriction(Friction):
 
     def __init__(self, stiffness_ratio: float = 0.8):
         self.stiffness_ratio = between("stiffness_ratio", stiffness_ratio, 1e-6, 1.0)
+
+    #: Its springs let bodies that touch remember: without a limit they would still slip.
+    harmless = Effect.harmless
 
     def numbers(self, material: Material) -> tuple[float, ...]:
         """Friction coefficient, and stiffness of the spring [N/m]."""

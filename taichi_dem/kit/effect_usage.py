@@ -86,6 +86,19 @@ class Advice:
         """Names of the effects that the scene could do without."""
         return self.inactive + self.negligible
 
+    def verdict(self, name: str, kind: str) -> tuple[str, str]:
+        """What an effect did, and "keep it", "drop it", "list it" or "not missed", in words.
+
+        name: of the effect in reports; kind: its class, as findings about missing effects name it.
+        """
+        for use in self.uses:
+            if use.effect == name:
+                return str(use), "drop it" if name in self.droppable else "keep it"
+        for finding in self.missing:
+            if finding.effect == kind:
+                return f"{finding.what}: up to {finding.most} at a time", "list it"
+        return "left out", "not missed"
+
     def __repr__(self):
         lists = {
             "keep": [use.effect for use in self.uses if use.effect not in self.droppable],

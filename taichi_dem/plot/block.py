@@ -3,10 +3,11 @@
 import matplotlib
 import numpy as np
 from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.colors import ListedColormap
 
-from taichi_dem.kit.plot_style import area_key, picture, seconds
+from taichi_dem.kit.plot_style import area_key, picture
 from taichi_dem.output.record import body_corners
+from taichi_dem.plot.levels import level_look, level_names
 from taichi_dem.plot.view import View, surface, traces
 
 _STONE, _JOINT, _INSIDE = "#E4E0D6", "#C9C3B5", "#B5AD9C"
@@ -124,8 +125,7 @@ def plot_steps(path, model, frames, dt0, broken_time=None, axis=(0.0, 0.0, 1.0))
     rows = 1 if len(frames) <= 3 else 2
     columns = -(-len(frames) // rows)
     top = max(1, *(int(frame.level.max()) for frame in frames))
-    shades = ListedColormap(matplotlib.colormaps["magma_r"](np.linspace(0.02, 0.92, top + 1)))
-    norm = BoundaryNorm(np.arange(-0.5, top + 1), top + 1)
+    look = level_look(top + 1)
     extent = np.ptp(view.project(model.mesh.points), axis=0)
     height = 2.9 * np.clip(extent[1] / extent[0], 0.15, 2.0)
     size = (2.9 * columns + 1.2, (height + 0.1) * rows + 0.6)
@@ -135,7 +135,7 @@ def plot_steps(path, model, frames, dt0, broken_time=None, axis=(0.0, 0.0, 1.0))
     ):
         figure.get_layout_engine().set(h_pad=0.08)
         for axes, frame in zip(panels.flat, frames):
-            drawn = _levels(axes, view, model, frame, broken_time, shades, norm)
+            drawn = _levels(axes, view, model, frame, broken_time, look)
         for axes in panels.flat[len(frames) :]:
             axes.set_axis_off()
         for axes in panels[-1]:
@@ -143,16 +143,16 @@ def plot_steps(path, model, frames, dt0, broken_time=None, axis=(0.0, 0.0, 1.0))
         for axes in panels[:, 0]:
             axes.set_ylabel(view.labels()[1])
         bar = figure.colorbar(drawn, ax=panels, ticks=range(top + 1), pad=0.02, aspect=30)
-        bar.ax.set_yticklabels([seconds(dt0 / 2.0**k) for k in range(top + 1)])
+        bar.ax.set_yticklabels(level_names(dt0, top + 1))
         bar.ax.tick_params(length=0)
         bar.ax.invert_yaxis()
         bar.set_label("step of a body")
 
 
-def _levels(axes, view, model, frame, broken_time, shades, norm):
+def _levels(axes, view, model, frame, broken_time, look):
     corners = body_corners(model, frame)
     polygons, body, _ = surface(model.topology, view, corners, broken_time <= frame.time_s)
-    drawn = PolyCollection(polygons, cmap=shades, norm=norm, edgecolor="#00000030", linewidth=0.3)
+    drawn = PolyCollection(polygons, edgecolor="#00000030", linewidth=0.3, **look)
     drawn.set_array(frame.level[body])
     axes.add_collection(drawn)
     smallest = int(frame.level.max())

@@ -1,5 +1,7 @@
 """Cracks of a block that is as deep as it is wide: in space, and in two sections."""
 
+import itertools
+
 import matplotlib
 import numpy as np
 from matplotlib.collections import LineCollection
@@ -47,8 +49,7 @@ def _in_space(axes, triangles, time_ms, low, high, look):
     faces = Poly3DCollection(turned, linewidth=0.0, alpha=0.45, **look)
     faces.set_array(time_ms)
     axes.add_collection3d(faces, autolim=False)
-    corners = np.array([[low, high][bit][axis] for bit in (0, 1) for axis in range(3)])
-    box = corners.reshape(2, 3)[:, [0, 2, 1]]
+    box = np.stack([low, high])[:, [0, 2, 1]]
     axes.add_collection3d(Line3DCollection(_edges(box), color=GREY, linewidth=0.8), autolim=False)
     axes.set(xlim=box[:, 0], ylim=box[:, 1], zlim=box[:, 2])
     axes.set_box_aspect(np.ptp(box, axis=0))
@@ -59,17 +60,8 @@ def _in_space(axes, triangles, time_ms, low, high, look):
 
 def _edges(box):
     """The twelve edges of a box, given its two corners (2, 3)."""
-    found = []
-    for axis in range(3):
-        for a, b in ((0, 0), (0, 1), (1, 0), (1, 1)):
-            ends = np.empty((2, 3))
-            ends[:, axis] = box[:, axis]
-            ends[:, (axis + 1) % 3], ends[:, (axis + 2) % 3] = (
-                box[a, (axis + 1) % 3],
-                box[b, (axis + 2) % 3],
-            )
-            found.append(ends)
-    return found
+    pairs = itertools.combinations(itertools.product(*box.T), 2)
+    return [pair for pair in pairs if sum(a != b for a, b in zip(*pair)) == 1]
 
 
 def _section(axes, triangles, time_ms, normal, place, bounds, look):

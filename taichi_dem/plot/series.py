@@ -1,9 +1,9 @@
 """Curves over time: pressure (Konno et al., Fig 11), motion, energy, levels."""
 
-import matplotlib
 import numpy as np
 
-from taichi_dem.kit.plot_style import BLUE, GREEN, PURPLE, RED, picture, seconds, styles_of
+from taichi_dem.kit.plot_style import BLUE, GREEN, PURPLE, RED, picture, styles_of
+from taichi_dem.plot.levels import draw_level_shares
 
 #: Energy terms from the bottom of the stack up: blue is held, red lost in bonds, green in contacts.
 _TERMS = {
@@ -142,16 +142,11 @@ def plot_levels(path, time_s, shares, dt0):
 
     shares: (sample_count, level_count), rows summing to 1. dt0: step of level 0 [s].
     """
-    depth = shares.shape[1]
-    shades = matplotlib.colormaps["magma_r"](np.linspace(0.02, 0.92, max(2, depth)))
     time = 1e3 * np.asarray(time_s)
     with picture(path, size=(6.4, 3.6)) as (figure, axes):
-        areas = axes.stackplot(time, 100.0 * shares.T, colors=shades)
-        axes.set(xlabel="time [ms]", ylabel="share of bodies [%]")
-        axes.set(ylim=(0.0, 100.0))
+        draw_level_shares(figure, axes, time, shares, dt0)
+        axes.set(xlabel="time [ms]")
         _span(axes, time)
-        names = [seconds(dt0 / 2.0**level) for level in range(depth)]
-        figure.legend(areas[::-1], names[::-1], title="step", loc="outside right center")
 
 
 #: Displacements that methods may be compared by, and how they are called.

@@ -2,7 +2,6 @@
 
 import math
 
-import matplotlib
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
@@ -97,11 +96,11 @@ def _draw_displaced(axes, view, model, frame, moved):
     drawn = draw_bodies(
         axes,
         model,
-        {"position": frame.position, "rotation": frame.rotation},
+        frame,
         factor * moved,
         magnify=magnify,
-        limits=(0.0, factor * moved.max() or 1.0),
-        colours="viridis",
+        clim=(0.0, factor * moved.max() or 1.0),
+        cmap="viridis",
         axis=view.toward,
     )
     axes.autoscale()
@@ -114,15 +113,13 @@ def _draw_displaced(axes, view, model, frame, moved):
 def _draw_speeds(axes, view, model, peak_speed):
     """The block at rest, coloured by the largest speed of each body."""
     factor, unit = scale(_largest(peak_speed), "m/s")
-    rest = {"position": model.centre, "rotation": np.tile(np.eye(3), (model.body_count, 1, 1))}
     drawn = draw_bodies(
         axes,
         model,
-        rest,
+        None,
         factor * np.ma.masked_invalid(peak_speed),
-        magnify=1.0,
-        limits=(0.0, factor * _largest(peak_speed) or 1.0),
-        colours=matplotlib.colormaps["viridis"],
+        clim=(0.0, factor * _largest(peak_speed) or 1.0),
+        cmap="viridis",
         axis=view.toward,
     )
     axes.set_title("no broken bonds, block undeformed")

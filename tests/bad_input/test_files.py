@@ -207,8 +207,8 @@ def test_a_damaged_checkpoint_is_refused_or_unharmed(tmp_path_factory, share, bi
 )
 def test_a_kept_result_that_is_none_is_refused_and_left_alone(tmp_path, monkeypatch, content):
     monkeypatch.syspath_prepend(os.path.join(ROOT, "experiments"))
-    from _gallery_html import read_json
     from taichi_dem.kit import study
+    from taichi_dem.kit.study.results_page import read_json
 
     path = tmp_path / f"job-{study.digest((), ())}.json"
     path.write_bytes(content)

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from ca_damper import Oscillator
 from ca_damper.measures import COLUMNS, Cycles, peak
 
 STEPS, COUNT, OMEGA = 500, 4, 2.0 * math.pi * 6.0
@@ -75,6 +76,22 @@ def test_apparent_mass_and_damping_are_those_of_a_mass_and_a_dashpot(mass, dampi
     assert cycles.loss_factor(0.086) == pytest.approx(loss, rel=1e-11, abs=1e-12)
     ratio = (0.08 + damping) / (2.0 * math.sqrt(123.4 * (0.086 + mass)))
     assert cycles.damping_ratio(0.086, 123.4, 0.08) == pytest.approx(ratio, rel=1e-11)
+
+
+def test_what_the_base_gives_the_dashpot_and_the_filling_take():
+    """In the steady state of the empty container, by its transfer function."""
+    o, frequency = Oscillator(), 6.3
+    x, w = o.base_amplitude * o.transfer(frequency), 2.0 * np.pi * frequency
+    record = np.zeros((1, 1, len(COLUMNS)))
+    for name, value in (("x", -1j * x), ("v", w * x)):
+        record[0, 0, COLUMNS.index(f"{name}_cos")] = 50.0 * value.real
+        record[0, 0, COLUMNS.index(f"{name}_sin")] = -50.0 * value.imag
+    cycles = Cycles(np.array([frequency]), np.array([100]), record)
+    powers = cycles.powers(o.base_amplitude, o.stiffness, o.damping)
+    assert (
+        powers["base"][0] == pytest.approx(powers["dashpot"][0], rel=1e-12) and powers["base"] > 0
+    )
+    assert powers["filling"][0] == 0.0
 
 
 def test_a_container_at_rest_has_no_impedance():

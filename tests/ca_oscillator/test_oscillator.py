@@ -47,6 +47,22 @@ def test_below_and_far_above_resonance():
     assert PAPER.transfer(1e6) == pytest.approx(-1j * 0.08 / (0.086 * omega), rel=1.1 * share)
 
 
+def test_energy_is_that_of_the_mass_and_the_stretched_spring():
+    o = Oscillator(2.0, 50.0, 0.1, 1e-3)
+    # 2 * 3^2 / 2 + 50 * 0.2^2 / 2
+    assert o.energy(0.3, 3.0, 0.1) == pytest.approx(10.0, rel=1e-14)
+
+
+def test_a_scaled_one_swings_alike():
+    o, scaled = Oscillator(), Oscillator().scaled(0.5, 0.6e-3)
+    assert scaled.mass == 0.5
+    for frequency in (3.0, 6.0, 9.0):
+        assert scaled.transfer(frequency) == pytest.approx(o.transfer(frequency), rel=1e-12)
+        # At rest in the mean: the root mean square is the amplitude over the root of 2.
+        high = 0.6e-3 * abs(o.transfer(frequency)) / math.sqrt(2.0)
+        assert scaled.rms(frequency) == pytest.approx(high, rel=1e-12)
+
+
 def test_series_of_sine_and_cosine_reach_round_off():
     # Over a step's angle, at most 2 pi / 40: half a unit in the last place each operation.
     angle = np.linspace(-1.0, 1.0, 1001) * 2.0 * math.pi / LEAST_STEPS_PER_CYCLE

@@ -8,10 +8,10 @@ from urllib.parse import unquote, urlsplit
 import pytest
 from PIL import Image
 
-import _gallery_html
-import _gallery_pages
 import gallery
-from _gallery_pages import PAGES, TOOLS, Page
+from gallery import PAGES, TOOLS
+from taichi_dem.kit.study import results_page
+from taichi_dem.kit.study.results_page import Entry
 from tests.scenes import ROOT
 
 VOID = {"meta", "img", "br", "link", "input", "hr"}
@@ -85,12 +85,11 @@ def stand_ins(tmp_path, monkeypatch):
         for name in names:
             (tmp_path / f"{name}.py").write_text(SCRIPT)
         made = [
-            Page(n, "Part", f"What of {n}?", "Look.", "1 s", ("first.png",), ("steps",))
+            Entry(n, "Part", f"What of {n}?", "Look.", "1 s", ("first.png",), ("steps",))
             for n in names
         ]
         monkeypatch.setattr(gallery, "HERE", tmp_path)
-        monkeypatch.setattr(_gallery_pages, "HERE", tmp_path)
-        monkeypatch.setattr(_gallery_pages, "PAGES", tuple(made[: entries or len(made)]))
+        monkeypatch.setattr(gallery, "PAGES", tuple(made[: entries or len(made)]))
         return tmp_path / "results"
 
     return make
@@ -253,7 +252,7 @@ def test_figures_with_a_papers_value_are_never_folded_away():
     """15 figures that match, the last alone with a paper's value: it comes first of 12."""
     figures = {f"f{k}": {"value": k, "unit": "1", "paper": None} for k in range(14)}
     figures["known"] = {"value": 2702.0, "unit": "s", "paper": 3897}
-    key, rest = _gallery_html.figure_rows(figures, ("f*",))
+    key, rest = results_page.figure_rows(figures, ("f*",))
     assert key[0] == ("known", "2702 s", "3,897 s")
     assert len(key) == 12 and len(rest) == 3
 
@@ -270,4 +269,4 @@ def test_figures_with_a_papers_value_are_never_folded_away():
     ],
 )
 def test_a_unit_stands_beside_a_figure_and_not_in_its_name(name, unit, words):
-    assert _gallery_html.in_words(name, unit) == words
+    assert results_page.in_words(name, unit) == words

@@ -10,8 +10,7 @@ import meshio
 import pytest
 
 import taichi_dem
-from _gallery_pages import SMALL_PICTURES, readme_table
-from gallery import renew_readme
+from gallery import SMALL_PICTURES, readme_table, renew_readme
 from tests.docs.pages import FOLDER, PAGES, blocks, links, run_pasted, words
 
 README = FOLDER / "README.md"

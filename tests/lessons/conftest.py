@@ -8,7 +8,7 @@ from taichi_dem import runtime
 @pytest.fixture(scope="module")
 def engine(taichi_session):
     """The engine that the lessons share, with two threads; compiled programs last for a file."""
-    from _engine import engine as shared
+    from taichi_dem.kit.session_thread import session as shared
 
     runtime.stop()
     shared.threads = 2

@@ -4,15 +4,15 @@ import threading
 
 import pytest
 
-from _engine import Engine
 from taichi_dem import InputError, runtime
+from taichi_dem.kit.session_thread import SessionThread
 
 
 @pytest.fixture
 def own():
     """An engine of its own; Taichi is free for it."""
     runtime.stop()
-    made = Engine(threads=1)
+    made = SessionThread(threads=1)
     yield made
     made.close()
 

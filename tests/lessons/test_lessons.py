@@ -17,10 +17,9 @@ from PIL import Image
 import _grains
 import _needs
 import _page
-import _pictures
 import _time_step
 from ca_damper import Batch, Empty, Oscillator, SceneTable
-from taichi_dem import ImplicitDashpots, InputError, Simulation, Uniform, effects
+from taichi_dem import ImplicitDashpots, InputError, Simulation, Uniform, effects, needed_effects
 from taichi_dem.materials import CONCRETE
 from taichi_dem.scene import Scene
 from tests.scenes import ROOT
@@ -44,8 +43,7 @@ def fresh_far_end(method, rise, macro_steps):
 def test_another_step_and_blow_give_the_bits_of_a_simulation_made_for_them(engine, name):
     """After a run with other numbers, one that diverges included, nothing of it is left."""
     step, rise, count = 6.4e-7 if name == "solved" else 8e-8, 5e-5, 300
-    blocks = round(_time_step.METHODS["solved"].refresh / _time_step.STEPS[0])
-    solved = ImplicitDashpots(step, tolerance=1e-3, refresh=blocks * step)
+    solved = ImplicitDashpots(step, tolerance=1e-3)
 
     def again():
         _time_step.strike(name, 2.56e-6, 1e-5)
@@ -92,8 +90,8 @@ def test_what_the_base_gives_is_what_dashpot_and_grains_take(engine):
     """
     answer = engine.ask(_grains.answer, 30, 0.07, 0.6e-3, 0.97)
     given = answer.energy["base"]
-    assert answer.energy["dashpot"] + answer.energy["grains"] == pytest.approx(given, rel=0.02)
-    assert answer.energy["grains"] > 0.2 * given
+    assert answer.energy["dashpot"] + answer.energy["filling"] == pytest.approx(given, rel=0.02)
+    assert answer.energy["filling"] > 0.2 * given
     assert answer.throw > 1.0 and len(answer.frames) == _grains.PICTURES
 
 
@@ -108,8 +106,8 @@ def test_grains_that_are_not_thrown_are_a_fixed_mass(engine):
     o = answer.oscillator
     glued = [o.transfer(r * o.natural_frequency, 0.07 * o.mass) for r in _grains.RATIOS]
     expected = o.base_amplitude * np.abs(glued) / math.sqrt(2.0)
-    assert answer.rms == pytest.approx(expected, rel=0.03)
-    assert abs(answer.energy["grains"]) < 0.01 * answer.energy["base"]
+    assert answer.cycles.rms == pytest.approx(expected, rel=0.03)
+    assert abs(answer.energy["filling"]) < 0.01 * answer.energy["base"]
 
 
 def test_questions_and_answers_are_read_off_a_text():
@@ -170,13 +168,21 @@ def test_a_changed_batch_has_the_bits_of_a_new_one(engine):
 def test_effects_that_are_silenced_give_the_bits_of_a_program_without_them(engine, names):
     """Under a pull that breaks the bar where it can break; all that the program says included."""
     silent, own = (engine.ask(work, names, 2.0) for work in (_needs.outcome, _needs.measured))
-    assert silent.motions.keys() == own.motions.keys() == _needs.SHOWN.keys()
-    for name in _needs.SHOWN:
-        for key, values in own.motions[name].items():
-            assert values.tobytes() == silent.motions[name][key].tobytes(), (name, key)
-    assert [str(use) for use in silent.advice.uses] == [str(use) for use in own.advice.uses]
-    assert silent.advice.missing == own.advice.missing != ()
-    assert math.isnan(silent.step_s) and own.step_s > 0.0
+    assert len(silent.frames) == len(own.frames) == _needs.LOOKS + 1
+    for number in _needs.SHOWN.values():
+        for key, values in vars(own.frames[number]).items():
+            there = vars(silent.frames[number])[key]
+            assert np.asarray(values).tobytes() == np.asarray(there).tobytes(), (number, key)
+    advice, other = needed_effects(silent), needed_effects(own)
+    assert [str(use) for use in advice.uses] == [str(use) for use in other.uses]
+    assert advice.missing == other.missing != ()
+    assert silent.report.effects == own.report.effects
+    assert silent.report.energy_balance == own.report.energy_balance
+
+
+def test_what_a_choice_costs_is_known_once_it_was_measured(engine):
+    unknown, known = (engine.ask(work, _needs.ALL, 0.2) for work in (_needs.answer, _needs.price))
+    assert all(map(math.isnan, unknown.step_s)) and min(known.step_s) > 0.0
 
 
 @pytest.mark.slow
@@ -184,27 +190,27 @@ def test_effects_that_never_act_change_no_bit(engine):
     """A gentle pull breaks nothing: dashpots alone give the bits of all effects."""
     answer = engine.ask(_needs.answer, ("bond_damping",), 0.2)
     assert answer.change == 0.0
-    for name in _needs.SHOWN:
-        ends = [made.motions[name]["position"] for made in (answer.chosen, answer.complete)]
+    for number in _needs.SHOWN.values():
+        ends = [made.frames[number].position for made in (answer.chosen, answer.complete)]
         assert ends[0].tobytes() == ends[1].tobytes()
     rows = {words: says for words, _, _, says in _needs.verdicts(answer)}
     assert rows == {
         words: "keep it" if name == "bond_damping" else "not missed"
-        for name, words in _needs.WORDS.items()
+        for name, (_, words) in _needs.EFFECTS.items()
     }
 
 
 def test_a_hard_pull_misses_what_is_left_out(engine):
     """The end is pulled out by v / (2 pi f); what would break says so, and what it did counts."""
     answer = engine.ask(_needs.answer, ("bond_damping",), 2.0)
-    moved = answer.chosen.motions["pulled open"]["position"] - answer.model.centre
+    moved = answer.chosen.frames[_needs.SHOWN["pulled open"]].displacement
     when = _needs.UNTIL * _needs.SHOWN["pulled open"] / _needs.LOOKS
     place = 2.0 * math.pi * _needs.FREQUENCY * when
     # The sum of velocities at the ends of steps is off by a step of the cycle at most.
     late = 2.0 * math.pi * _needs.FREQUENCY * _needs.STEP
     assert moved[:, 0].max() == pytest.approx(answer.stroke * math.sin(place), rel=late)
-    assert answer.change > 0.1 and answer.complete.broken.sum() > 0
-    assert answer.chosen.broken.sum() == 0
+    assert answer.change > 0.1 and answer.complete.report.broken_faces > 0
+    assert answer.chosen.report.broken_faces == 0
     said = {words: says for words, _, _, says in _needs.verdicts(answer)}
     assert said["fracture"] == "list it" and said["slip in shear"] == "list it"
 
@@ -245,6 +251,6 @@ def test_pictures_are_drawn_of_runs_that_end_and_of_those_that_do_not(engine, se
     step = 1.6e-7 if sentence else 8e-8
     answer = engine.ask(_time_step.answer, "explicit", step, 1e-5)
     assert answer.chosen.sentence.startswith(sentence)
-    with Image.open(io.BytesIO(engine.ask(_pictures.picture_time_step, answer))) as image:
+    with Image.open(io.BytesIO(engine.ask(_time_step.picture, answer))) as image:
         assert 900 <= image.width <= 1300 and 500 <= image.height <= 800
         assert len(np.unique(np.asarray(image.convert("L")))) > 20

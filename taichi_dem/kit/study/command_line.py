@@ -7,7 +7,8 @@ import re
 import sys
 import time
 from argparse import ArgumentParser, Namespace
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from types import MappingProxyType
 from typing import Any, Callable, NoReturn, Optional
 
 from taichi_dem.kit import runtime
@@ -15,13 +16,19 @@ from taichi_dem.kit.checkpoint import Checkpoint, Interrupted
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.progress.lasting_output import lasting_output
+from taichi_dem.kit.study.settings import Settings, add_settings, take_settings
 from taichi_dem.kit.validation import shown
 
 _INTERVALS = {None: "every_wall_s", "s": "every_wall_s", "steps": "every_steps", "sim": "every_s"}
 
 
 class Parser(argparse.ArgumentParser):
-    """An argument parser whose complaints are one sentence."""
+    """An argument parser whose complaints are one sentence.
+
+    settings: of the study, for ``main``.
+    """
+
+    settings: Settings = MappingProxyType({})
 
     def error(self, message: str) -> NoReturn:
         """Turn a wrong command line into an InputError."""
@@ -37,6 +44,11 @@ def number(low: float, high: float, *, open_low: bool = True) -> Callable[[str],
 def whole(low: int, high: int) -> Callable[[str], int]:
     """Type of an option that is a whole number in a range."""
     return _checked(int, f"a whole number from {low} to {high}", lambda x: low <= x <= high)
+
+
+def one_of(names: Collection[str]) -> Callable[[str], str]:
+    """Type of an option that is one of some names."""
+    return _checked(str, f"one of {', '.join(names)}", lambda x: x in names)
 
 
 def _checked(kind, words, allowed):
@@ -82,8 +94,16 @@ def several(kind: Callable[[str], Any]) -> Callable[[str], list]:
     return parse
 
 
-def parser(name: str, description: Optional[str], drivers: Sequence[str] = ()) -> Parser:
-    """Parser with the options every experiment has; drivers: to choose from, where there are."""
+def parser(
+    name: str,
+    description: Optional[str],
+    drivers: Sequence[str] = (),
+    settings: Settings = MappingProxyType({}),
+) -> Parser:
+    """Parser with the options every experiment has; drivers: to choose from, where there are.
+
+    settings: further options, and numbers of the full and of the quick job, as of ``add_settings``.
+    """
     made = bare_parser(name, description)
     made.add_argument("--quick", action="store_true", help="a smaller job of under a minute")
     place: Any = {"type": os.path.expanduser, "default": os.path.join("results", name)}
@@ -92,6 +112,8 @@ def parser(name: str, description: Optional[str], drivers: Sequence[str] = ()) -
     if drivers:
         made.add_argument("--driver", default=drivers[0], choices=drivers)
     made.add_argument("--threads", type=whole(1, 1024), default=None, help="CPU threads")
+    made.settings = settings
+    add_settings(made, settings)
     return made
 
 
@@ -145,11 +167,13 @@ def main(
 ) -> int:
     """Parse, start Taichi, run; returns the exit code of ``exit_code``.
 
+    The settings of its parser have their values of the full or of the quick job in options.
     options.started: when, on ``time.perf_counter``.
     """
 
     def work():
         options = made.parse_args(arguments)
+        take_settings(options, getattr(made, "settings", {}))
         options.started = time.perf_counter()
         runtime.start(options.arch, options.threads)
         run(options)

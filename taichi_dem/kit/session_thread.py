@@ -1,28 +1,32 @@
-"""The one thread that owns Taichi, for every page and every session of the lessons.
+"""One thread that owns Taichi, for programs that serve several users: pages, notebooks, sliders.
 
-Each browser that opens a lesson is served by a thread of its own, in one process. Taichi makes
-fields only on the thread that started it, and two starts would take each other's fields away. So
-all work is handed to this thread, which keeps its results for the next session.
+Each browser that opens a page is served by a thread of its own, in one process. Taichi makes fields
+only on the thread that started it, and two starts would take each other's fields away. So all work
+is handed to this thread, which keeps its results for the next user.
 """
 
 import functools
 import threading
+from collections.abc import Hashable
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any, Callable, Optional
 
-from taichi_dem import runtime
+from taichi_dem.kit import runtime
 
 
-class Engine:
+class SessionThread:
     """A thread that does work one piece after the other; it starts Taichi with its first piece.
 
     threads: of the CPU, as in ``runtime.start``.
     """
 
-    def __init__(self, threads=None):
+    def __init__(self, threads: Optional[int] = None):
         self.threads, self._lock = threads, threading.Lock()
-        self._pool, self._thread, self._kept = None, None, {}
+        self._pool: Optional[ThreadPoolExecutor] = None
+        self._thread: Optional[threading.Thread] = None
+        self._kept: dict[Hashable, Any] = {}
 
-    def ask(self, work, *arguments):
+    def ask(self, work: Callable, *arguments: Any) -> Any:
         """Do work(*arguments) on the thread, in its turn; returns or raises its outcome."""
         if threading.current_thread() is self._thread:
             return work(*arguments)
@@ -32,13 +36,13 @@ class Engine:
             answer = self._pool.submit(self._do, work, arguments)
         return answer.result()
 
-    def kept(self, key, make):
-        """Result of make(), called once under a key; on the engine's thread."""
+    def kept(self, key: Hashable, make: Callable[[], Any]) -> Any:
+        """Result of make(), called once under a key; on this thread."""
         if key not in self._kept:
             self._kept[key] = make()
         return self._kept[key]
 
-    def remember(self, work):
+    def remember(self, work: Callable) -> Callable:
         """Decorate a function so that it is called once with the same arguments, as by ``kept``."""
 
         @functools.wraps(work)
@@ -47,7 +51,7 @@ class Engine:
 
         return recall
 
-    def close(self):
+    def close(self) -> None:
         """End Taichi and the thread, after what has been asked for; another ask begins anew."""
         with self._lock:
             pool, self._pool = self._pool, None
@@ -69,4 +73,4 @@ class Engine:
 
 
 #: That of this process.
-engine = Engine()
+session = SessionThread()

@@ -1,0 +1,242 @@
+"""One static page of the results of several studies: pictures, figures, and their reading.
+
+Every study has an ``Entry`` of texts, and a folder of results as ``finish`` leaves it.
+"""
+
+import json
+import os
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, Optional, Union
+from urllib.parse import quote
+
+from jinja2 import Environment, FileSystemLoader
+from PIL import Image
+
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.files import output_folder, write_text, write_whole
+from taichi_dem.kit.study.summary import value_in_words
+
+_HERE = Path(__file__).resolve().parent
+#: Notes of the program that ran a study, beside its output: seconds, and what it printed.
+RUN = "gallery.json"
+#: Folder of the small pictures of the list, beside the page; their widest side [pixels], colours.
+THUMBNAILS, _THUMBNAIL = "thumbnails", (480, 64)
+#: Words of a run about its own pictures, where there are any.
+CAPTION = "caption.txt"
+#: Key figures shown unfolded; all others are one touch away.
+_MOST_KEY_FIGURES = 12
+#: Text of a table: name, value, paper's value.
+Row = tuple[str, str, str]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Description of one study.
+
+    name: of the script. part: heading under which it stands. question: that it answers. look:
+    what to read off its pictures. time: of the full run on two cores, in words. pictures: names
+    of its pictures and films, the most telling first; what else it writes is linked. figures:
+    patterns of the key figures in summary.json; figures with a paper's value are always shown.
+    paper: what the paper says of it, empty where it does not ask this. options: of the command.
+    """
+
+    name: str
+    part: str
+    question: str
+    look: str
+    time: str
+    pictures: tuple
+    figures: tuple = ()
+    paper: str = ""
+    options: str = ""
+
+    @property
+    def command(self) -> str:
+        """Command line of a user."""
+        return " ".join(filter(None, [f"python experiments/{self.name}.py", self.options]))
+
+
+def read_entries(path: Union[str, Path]) -> tuple[Entry, ...]:
+    """Entries of a text file: "# part", "## name", and lines "field: text", indented to go on."""
+    part, found = "", []
+    for block in Path(path).read_text(encoding="utf-8").split("\n\n"):
+        head, *lines = re.sub(r"\n  +", " ", block).strip().split("\n")
+        if head.startswith("# "):
+            part = head[2:]
+        elif head.startswith("## "):
+            fields: Any = dict(line.split(": ", 1) for line in lines)
+            words = {name: tuple(fields.get(name, "").split()) for name in ("pictures", "figures")}
+            found.append(Entry(name=head[3:], part=part, **{**fields, **words}))
+    return tuple(found)
+
+
+def write_page(root: str, entries: Sequence[Entry], failed: Mapping[str, str]) -> list:
+    """Write root/index.html, the page of all entries, whose results stand in root/NAME.
+
+    failed: why studies of these names did not end well. Returns the items shown, each with its
+    entry as page, and as failed why it has no result, or "". Raises InputError when it cannot be
+    written.
+    """
+    for entry in entries:
+        _write_thumbnail(root, entry)
+    items = [_shown(entry, root, failed.get(entry.name, "")) for entry in entries]
+    summaries = [read_json(Path(root, entry.name, "summary.json")) for entry in entries]
+    options: Any = {"autoescape": True, "trim_blocks": True, "lstrip_blocks": True}
+    environment = Environment(loader=FileSystemLoader(_HERE), **options)
+    parts = list(dict.fromkeys(entry.part for entry in entries))
+    text = environment.get_template("results_page.html").render(
+        parts=[(part, [item for item in items if item.page.part == part]) for part in parts],
+        machines=_machines(summaries),
+        quick=sum(item.quick for item in items if not item.failed),
+        count=sum(not item.failed for item in items),
+    )
+    write_text(os.path.join(root, "index.html"), text)
+    return items
+
+
+def _write_thumbnail(root, entry):
+    """Small picture for the page's list; none of a picture that cannot be read."""
+    folder = output_folder(os.path.join(root, THUMBNAILS))
+    try:
+        shrink_picture(entry, root, folder, *_THUMBNAIL)
+    except InputError:
+        Path(folder, f"{entry.name}.png").unlink(missing_ok=True)
+
+
+def shrink_picture(
+    entry: Entry, root: str, folder: Union[str, Path], side: int, colours: int
+) -> Optional[str]:
+    """Small copy of a study's first picture in a folder; its path, None without a picture.
+
+    side: the widest [pixels]. Raises InputError when the picture cannot be read or the copy not be
+    written.
+    """
+    source = Path(root, entry.name, entry.pictures[0])
+    target = os.path.join(folder, f"{entry.name}.png")
+    if not source.is_file():
+        return None
+    write_whole(target, lambda name: _write_small(name, source, side, colours))
+    return target
+
+
+def _write_small(name, source, side, colours):
+    """Write a picture, the last image of a film, within a side [pixels] as PNG."""
+    with Image.open(source) as image:
+        image.seek(getattr(image, "n_frames", 1) - 1)
+        made = image.convert("RGB")
+    made.thumbnail((side, side))
+    # With too few colours, or without the means, thin lines take those of their neighbours.
+    made = made.quantize(colours, kmeans=3, dither=Image.Dither.NONE)
+    made.save(name, format="PNG", optimize=True)
+
+
+def _shown(page, root, failed):
+    """Content of the page for an experiment, by the names that the template uses.
+
+    page: its entry. root: folder of the page, in which its results stand in root/NAME. failed: why
+    it did not end well, or "". quick: whether it was the smaller job. pictures, more: files shown,
+    and files linked. caption: words of the run about its own pictures. key, rest: rows of figures
+    (name, value, paper).
+    """
+    folder = Path(root, page.name)
+    summary, run = read_json(folder / "summary.json"), read_json(folder / RUN)
+    files = sorted(path.name for path in folder.glob("*") if path.is_file())
+    pictures = [name for name in page.pictures if name in files]
+    command = summary.get("command", page.command.split(" ", 1)[1])
+    key, rest = figure_rows(summary.get("figures", {}), page.figures)
+    small = Path(root, THUMBNAILS, f"{page.name}.png").is_file() and page.pictures[0] in files
+    return SimpleNamespace(
+        page=page,
+        folder=quote(page.name),
+        command=f"python {command}",
+        # Summaries of older versions have the command alone.
+        quick=summary.get("quick", "--quick" in command.split()),
+        pictures=pictures,
+        more=[name for name in files if name not in (*pictures, RUN, CAPTION)],
+        thumbnail=f"{THUMBNAILS}/{quote(page.name)}.png" if small else "",
+        caption=read_text(folder / CAPTION),
+        key=key,
+        rest=rest,
+        seconds=_seconds(summary, run),
+        output=run.get("output", ""),
+        failed=failed or ("" if summary else "it has not been run"),
+    )
+
+
+def read_text(path: Union[str, Path]) -> str:
+    """Text of a file, "" where there is none that can be read."""
+    try:
+        return Path(path).read_text(encoding="utf-8").strip()
+    except (OSError, ValueError):
+        return ""
+
+
+def read_json(path: Union[str, Path]) -> dict:
+    """Content of a JSON file, an empty dict where there is none that can be read."""
+    try:
+        content = json.loads(read_text(path))
+    except (ValueError, RecursionError):
+        content = {}
+    return content if isinstance(content, dict) else {}
+
+
+def figure_rows(
+    figures: Mapping[str, dict], patterns: Sequence[str]
+) -> tuple[tuple[Row, ...], tuple[Row, ...]]:
+    """Rows (name, value, paper) of the key figures, and of all others; paper: "" without a value.
+
+    figures: of summary.json. Key are those with a paper's value and those that match a pattern.
+    """
+    key: list[Row] = []
+    rest: list[Row] = []
+    for name, item in figures.items():
+        value, paper = (with_unit(item[k], item["unit"]) for k in ("value", "paper"))
+        known = item["paper"] is not None
+        row = (in_words(name, item["unit"]), value, paper if known else "")
+        wanted = known or any(fnmatchcase(name, pattern) for pattern in patterns)
+        (key if wanted else rest).append(row)
+    # Those with a paper's value first, so that the cut never takes them.
+    key.sort(key=lambda row: not row[2])
+    return tuple(key[:_MOST_KEY_FIGURES]), tuple(key[_MOST_KEY_FIGURES:] + rest)
+
+
+def in_words(name: str, unit: str) -> str:
+    """A key of summary.json without underscores, and without the unit at its end.
+
+    A number before that keeps it: plateau_at_5_MPa is that at 5 MPa.
+    """
+    bare = name.removesuffix("_" + re.sub("[ /]", "_", unit))
+    kept = unit == "1" or re.search(r"_[0-9.]+$", bare)
+    return (name if kept else bare).replace("_", " ")
+
+
+def with_unit(value: Any, unit: str) -> str:
+    """A figure in words, with its unit unless it is a pure number, a name or was not found."""
+    words = value_in_words(value)
+    return words if unit in ("", "1") or value is None else f"{words} {unit}"
+
+
+def _seconds(summary, run):
+    spent = summary.get("seconds", {})
+    parts = [f"{run['seconds']:.0f} s in all"] if "seconds" in run else []
+    parts += [f"{spent['compile']:.1f} s compiling"] if "compile" in spent else []
+    parts += [f"{spent['run']:.1f} s computing"] if "run" in spent else []
+    return ", ".join(parts)
+
+
+def _machines(summaries):
+    """Machines and versions of the results in words, each only once."""
+    words = []
+    for summary in filter(None, summaries):
+        machine, versions = summary["machine"], summary["versions"]
+        words.append(
+            f"{machine['processor']}, {machine['cores']} cores, {machine['arch']}; "
+            f"taichi {versions['taichi']}, numpy {versions['numpy']}, "
+            f"commit {versions.get('commit') or 'unknown'}"
+        )
+    return list(dict.fromkeys(words))

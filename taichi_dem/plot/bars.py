@@ -1,0 +1,69 @@
+"""Waves in bars: diagrams over place and time, and films of a bar that may break."""
+
+import matplotlib
+import numpy as np
+
+from taichi_dem.kit.plot_style import BLACK, GREEN, ORANGE, RED
+from taichi_dem.plot.film import moving_picture
+
+#: Below zero, at zero, above: pressed, at rest, pulled.
+_COLOURS = "RdBu_r"
+
+
+def draw_space_time(axes, place, time_s, values, label=None, top=None):
+    """Draw values over place and time: red above zero, blue below; returns the ``QuadMesh``.
+
+    place: (places,) [m]. time_s: (times,) [s]. values: (times, places). label: of a colour bar,
+    without one for None. top: end of the colour scale, the largest size of the values if None.
+    """
+    top = np.abs(values).max() if top is None else top
+    look = {"cmap": _COLOURS, "vmin": -top, "vmax": top, "shading": "auto", "rasterized": True}
+    drawn = axes.pcolormesh(place, 1e3 * np.asarray(time_s), values, **look)
+    axes.set(xlabel="place [m]", ylabel="time [ms]")
+    if label is not None:
+        axes.figure.colorbar(drawn, ax=axes, label=label)
+    return drawn
+
+
+def film_bar(path, profile, stress_pa, *, length, strength_pa, bar=(), count=40, magnify=150.0):
+    """Write a GIF of a bar: velocity and stress along it, and itself, broken joints as gaps.
+
+    profile: a ``Profile`` of slices of one length. stress_pa: between them, as ``Profile.stress``
+    gives it. length: of the bar [m]. strength_pa: drawn beside the stress. bar: which one, index
+    of a profile of several. count: of pictures. magnify: of the displacement.
+    """
+    chosen = (slice(None), *np.atleast_1d(bar).astype(int))
+    speed, stress, moved, joints = (
+        values[chosen]
+        for values in (profile.velocity, stress_pa, profile.displacement, profile.joints)
+    )
+    cell, stress = length / speed.shape[1], 1e-6 * stress
+    place, joint = cell * (np.arange(speed.shape[1]) + 0.5), cell * np.arange(1, speed.shape[1])
+    with moving_picture(path, (4.0, 3.8), 110) as (figure, shoot):
+        fast, tight, whole = figure.subplots(3, 1, sharex=True, height_ratios=(1.0, 1.0, 0.55))
+        (moving,) = fast.plot(place, speed[0], color=GREEN)
+        fast.set(ylabel="velocity [m/s]", ylim=(1.1 * speed.min(), 1.1 * speed.max()))
+        (loaded,) = tight.plot(joint, stress[0], color=BLACK)
+        tight.axhline(1e-6 * strength_pa, color=RED, ls="--", label="strength")
+        (breaks,) = tight.plot([], [], "x", color=ORANGE, ms=6, mew=1.6, label="broken face")
+        tight.set(ylabel="stress [MPa]", ylim=(1.1 * stress.min(), 1.1 * stress.max()))
+        tight.legend(loc="lower left")
+        boxes = whole.bar(place, 1.0, cell, linewidth=0.0)
+        whole.set(xlim=(-0.05 * length, 1.16 * length), ylim=(0.0, 1.0), yticks=[])
+        whole.set(xlabel=f"place [m]; displacement × {magnify:g}, red: tension, blue: pressure")
+        whole.grid(False)
+        lefts, shades = place - 0.5 * cell + magnify * (moved - moved[:, :1]), _shades(stress)
+        for row in np.linspace(0, len(profile.time) - 1, count).round().astype(int):
+            moving.set_ydata(speed[row])
+            loaded.set_ydata(stress[row])
+            breaks.set_data(joint[joints[row]], np.zeros(joints[row].sum()))
+            for box, left, shade in zip(boxes, lefts[row], shades[row]):
+                box.set(x=left, facecolor=shade)
+            fast.set_title(f"t = {1e3 * profile.time[row]:.2f} ms")
+            shoot()
+
+
+def _shades(stress):
+    """Colours of cells; each has the mean stress of its two joints, ends are free."""
+    own = 0.5 * (np.pad(stress, ((0, 0), (0, 1))) + np.pad(stress, ((0, 0), (1, 0))))
+    return matplotlib.colormaps[_COLOURS](0.5 + 0.5 * own / np.abs(stress).max())
