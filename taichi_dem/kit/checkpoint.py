@@ -7,13 +7,14 @@ Nothing here knows what is simulated.
 import hashlib
 import json
 import math
+import numbers
 import os
 import signal
 import threading
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Optional
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any, Optional
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,7 +34,7 @@ _MOST_MARKS = 1_000_000
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """Where a run saves itself, and when besides at its end and on Ctrl-C.
+    """Where a run saves itself, and when besides at its end and on Ctrl-C or another stop signal.
 
     path: file, replaced whole. every_steps: largest steps between two of them (steps of a scene
     in a batch). every_s: simulated time [s]. every_wall_s: time on the wall [s].
@@ -90,39 +91,56 @@ class SaveTimer:
         )
 
 
+#: What asks a run to end: Ctrl-C, and what batch systems and closed terminals send.
+STOP_SIGNALS = tuple(
+    getattr(signal, name)
+    for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGXCPU", "SIGUSR1")
+    if hasattr(signal, name)
+)
+
+
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C, after the run has been saved. path: of the checkpoint."""
+    """Ctrl-C or another stop signal, after the run has been saved.
 
-    def __init__(self, time_s: float, path: FileName):
+    path: of the checkpoint. number: of the signal.
+    """
+
+    def __init__(self, time_s: float, path: FileName, number: int = signal.SIGINT):
         super().__init__(f"interrupted at t = {time_s:.6g} s, saved in {path}")
-        self.path = os.fspath(path)
+        self.path, self.number = os.fspath(path), number
 
 
-class CtrlC:
-    """In its block the first Ctrl-C is only noted, in ``asked``; the second one interrupts.
+class StopRequests:
+    """In its block the first stop signal is only noted, in ``asked``; the second one interrupts.
 
-    Python lets the main thread alone listen: in others Ctrl-C is what it was.
+    asked: number of the signal, 0 for none. One that is ignored, as SIGHUP under nohup, stays so,
+    but for Ctrl-C. Python lets the main thread alone listen: in others signals do
+    as before.
     """
 
     def __init__(self) -> None:
-        self.asked = False
+        self.asked = 0
+        self._before: dict[int, Any] = {}
 
-    def __enter__(self) -> "CtrlC":
-        self.listens = threading.current_thread() is threading.main_thread()
-        if self.listens:
-            self.before = signal.signal(signal.SIGINT, self._note)
+    def __enter__(self) -> "StopRequests":
+        if threading.current_thread() is threading.main_thread():
+            for number in STOP_SIGNALS:
+                ignored = signal.getsignal(number) in (signal.SIG_IGN, None)
+                if number == signal.SIGINT or not ignored:
+                    self._before[number] = signal.signal(number, self._note)
         return self
 
     def __exit__(self, kind, *_):
-        if self.listens:
-            signal.signal(signal.SIGINT, self.before)
+        for number, before in self._before.items():
+            signal.signal(number, before)
+        self._before = {}
         if self.asked and kind is None:
             raise KeyboardInterrupt
 
     def _note(self, number, frame):
         if self.asked:
             raise KeyboardInterrupt
-        self.asked = True
+        self.asked = number
 
 
 def digest(*arrays: ArrayLike) -> str:
@@ -132,6 +150,30 @@ def digest(*arrays: ArrayLike) -> str:
         made.update(f"{array.dtype} {array.shape}".encode())
         made.update(array.tobytes())
     return made.hexdigest()[:12]
+
+
+def identity_of(value: Any) -> str:
+    """Words for a value that are the same for equal ones: 1, 1.0 and ``np.float64(1)`` are one.
+
+    Dataclasses and containers are looked into, an array is given by its ``digest``; of anything
+    else its ``repr`` counts.
+    """
+    if isinstance(value, (bool, np.bool_)):
+        return repr(bool(value))
+    if isinstance(value, numbers.Integral) and abs(int(value)) > 2**53:
+        return repr(int(value))
+    if isinstance(value, numbers.Real):
+        return repr(float(value))
+    if isinstance(value, np.ndarray):
+        return f"array {digest(value)}"
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(f'{key}: {identity_of(value[key])}' for key in value)}}}"
+    if isinstance(value, (tuple, list)):
+        return f"({', '.join(map(identity_of, value))})"
+    if is_dataclass(value) and not isinstance(value, type):
+        named = {field.name: getattr(value, field.name) for field in fields(value)}
+        return f"{type(value).__name__}{identity_of(named)}"
+    return repr(value)
 
 
 def version_text() -> str:

@@ -12,7 +12,14 @@ import taichi as ti
 
 from taichi_dem import Checkpoint, InputError
 from taichi_dem.kit.allocation import FieldTree
-from taichi_dem.kit.checkpoint import CtrlC, SaveTimer, digest, read_checkpoint, write_checkpoint
+from taichi_dem.kit.checkpoint import (
+    STOP_SIGNALS,
+    SaveTimer,
+    StopRequests,
+    digest,
+    read_checkpoint,
+    write_checkpoint,
+)
 from taichi_dem.kit.field_memory import FieldMemory, fields_of, without_end
 from taichi_dem.kit.restart import CheckpointWriter
 from taichi_dem.kit.sealed_file import write_sealed
@@ -182,20 +189,33 @@ def listening():
     signal.signal(signal.SIGINT, before)
 
 
-def test_ctrl_c_is_noted_first_and_interrupts_then(listening):
-    with pytest.raises(KeyboardInterrupt), CtrlC() as ctrl_c:
-        os.kill(os.getpid(), signal.SIGINT)
-        assert ctrl_c.asked
-        ctrl_c.noted = True
-        os.kill(os.getpid(), signal.SIGINT)
+@pytest.mark.parametrize("number", STOP_SIGNALS)
+def test_a_stop_signal_is_noted_first_and_interrupts_then(listening, number):
+    before = signal.getsignal(number)
+    with pytest.raises(KeyboardInterrupt), StopRequests() as stop:
+        os.kill(os.getpid(), number)
+        assert stop.asked == number
+        stop.noted = True
+        os.kill(os.getpid(), number)
         pytest.fail("the second one must interrupt")
-    assert ctrl_c.noted
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert stop.noted
+    assert signal.getsignal(number) is before
 
 
-def test_ctrl_c_that_nobody_saw_interrupts_at_the_end(listening):
-    with pytest.raises(KeyboardInterrupt), CtrlC():
+def test_a_stop_signal_that_nobody_saw_interrupts_at_the_end(listening):
+    with pytest.raises(KeyboardInterrupt), StopRequests():
         os.kill(os.getpid(), signal.SIGINT)
+
+
+def test_a_signal_that_is_ignored_stays_ignored():
+    """As SIGHUP under nohup."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with StopRequests() as stop:
+            os.kill(os.getpid(), signal.SIGHUP)
+        assert stop.asked == 0
+    finally:
+        signal.signal(signal.SIGHUP, before)
 
 
 def test_a_digest_tells_bits_types_and_shapes_apart():
