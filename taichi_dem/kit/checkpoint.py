@@ -102,12 +102,15 @@ STOP_SIGNALS = tuple(
 class Interrupted(KeyboardInterrupt):
     """Ctrl-C or another stop signal, after the run has been saved.
 
-    path: of the checkpoint. number: of the signal.
+    time_s: where the run stands. path: of the checkpoint. number: of the signal.
     """
 
     def __init__(self, time_s: float, path: FileName, number: int = signal.SIGINT):
         super().__init__(f"interrupted at t = {time_s:.6g} s, saved in {path}")
-        self.path, self.number = os.fspath(path), number
+        self.time_s, self.path, self.number = time_s, os.fspath(path), number
+
+    def __reduce__(self):
+        return type(self), (self.time_s, self.path, self.number)
 
 
 class StopRequests:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from taichi_dem.mesh.mesh import Mesh, group_area, volumes
+from taichi_dem.mesh.mesh import Mesh, checked_mesh, group_area, volumes
 from taichi_dem.mesh.reorder import in_space_order
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.mesh.topology import topology_of
@@ -53,5 +53,5 @@ def test_neighbours_are_near_in_number(shuffled):
 
 def test_one_body_is_in_order():
     mesh = bar(1.0, 1.0, (1, 1, 1))
-    alone = Mesh(mesh.points, mesh.tetrahedra[:1], {})
+    alone = checked_mesh(mesh.points, mesh.tetrahedra[:1], {})
     assert np.array_equal(in_space_order(alone).tetrahedra, alone.tetrahedra)
