@@ -20,9 +20,10 @@ from ca_damper.progress import BatchProgress
 from ca_damper.report import RK45_STAGES, Report
 from ca_damper.scenes.table import SceneTable, dealt
 from taichi_dem.kit import runtime
-from taichi_dem.kit.checkpoint import version_text
+from taichi_dem.kit.checkpoint import identity_of, version_text
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.files import claiming
 from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.restart import CheckpointWriter, NoCheckpointWriter, RunSnapshot, opened
 from taichi_dem.kit.validation import choice, whole
@@ -153,10 +154,14 @@ class Batch(LoadedScenes):
         Raises InputError.
         """
         self._check_started()
-        own = {"version": version_text(), "filling": repr(self.filling)}
-        arrays = opened(checkpoint, resume, lambda: {**own, **identity})
+        own = {"version": version_text(), "filling": identity_of(self.filling)}
+        with claiming():
+            yield from self._checkpointed(checkpoint, resume, {**own, **identity}, owners)
+
+    def _checkpointed(self, checkpoint, resume, identity, owners):
+        arrays = opened(checkpoint, resume, lambda: identity)
         self._compile()
-        saved = RunSnapshot({**own, **identity}, self.memory, {"batch": self, **dict(owners)})
+        saved = RunSnapshot(identity, self.memory, {"batch": self, **dict(owners)})
         if arrays:
             saved.restore(arrays, resume)
         writer: Union[CheckpointWriter, NoCheckpointWriter] = NoCheckpointWriter()

@@ -1,5 +1,6 @@
 """When a run is sampled, photographed, observed and reported; all of these are observers of it."""
 
+import numbers
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Optional, Union
@@ -134,7 +135,7 @@ class _Reporter:
 
 
 def _check_count(name, value, least):
-    wanted = isinstance(value, int) and not isinstance(value, bool)
+    wanted = isinstance(value, numbers.Integral) and not isinstance(value, bool)
     if not wanted or not least <= value <= _MOST_RECORDS:
         raise InputError(
             f"{name} must be a whole number of at least {least} and at most {_MOST_RECORDS}, "

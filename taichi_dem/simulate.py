@@ -3,15 +3,15 @@
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Optional, Union
+from typing import Any, Optional, Union
 
 import numpy as np
 
 from taichi_dem.effects.gas_pressure import GasPressure
-from taichi_dem.kit.checkpoint import Checkpoint, digest, version_text
+from taichi_dem.kit.checkpoint import Checkpoint, digest, identity_of, version_text
 from taichi_dem.kit.engine_pool import LoanMemory
 from taichi_dem.kit.errors import InputError, SimulationDiverged
-from taichi_dem.kit.files import output_folder
+from taichi_dem.kit.files import claiming, output_folder
 from taichi_dem.kit.progress.progress import Listener, compiling
 from taichi_dem.kit.progress.progress_bar import reporting
 from taichi_dem.kit.restart import CheckpointWriter, NoCheckpointWriter, Owner, RunSnapshot, opened
@@ -27,6 +27,7 @@ from taichi_dem.simulation import Simulation, macro_steps
 from taichi_dem.timeline import MACRO_TICKS
 
 
+@claiming()
 def simulate(
     scene: Scene,
     *,
@@ -52,13 +53,13 @@ def simulate(
     title: of the progress bar.
     output: folder for the result, written at the end, or up to the last good sample when the
     run diverges. checkpoint: a Checkpoint that says where and when the run saves itself, besides
-    at its end and on Ctrl-C. resume: a checkpoint file to go on from, of the same scene and method;
-    the bits are those of a run that was never stopped.
+    at its end and on Ctrl-C, SIGTERM, SIGHUP, SIGXCPU and SIGUSR1. resume: a checkpoint file to go
+    on from, of the same scene and method; the bits are those of a run that was never stopped.
     observers: called on the way with a ``RunView``, see ``Observer``; after a resume, at the times
     that are left.
     Raises InputError for bad arguments, SimulationDiverged when the run leaves its bounds,
-    Interrupted when Ctrl-C has saved the run. Warns, as a UserWarning before the first step, of
-    parts of the mesh that can pass through each other (``outer_faces_warnings``).
+    Interrupted when one of these signals has saved the run. Warns, as a UserWarning before the
+    first step, of parts of the mesh that can pass through each other (``outer_faces_warnings``).
     """
     instance("scene", scene, Scene)
     check_method(method)
@@ -135,7 +136,7 @@ def _opened(scene, method, checkpoint, resume, last):
     if isinstance(checkpoint, Checkpoint):
         # Refuses too many of them, before anything is done.
         checkpoint.marks(last, method.dt0)
-    arrays = opened(checkpoint, resume, lambda: identity_of(scene, method))
+    arrays = opened(checkpoint, resume, lambda: run_identity(scene, method))
     begin = int(np.asarray(arrays.get("field/state.tick", 0)).max(initial=0)) if arrays else 0
     if begin > last * MACRO_TICKS:
         seconds = method.dt0 / MACRO_TICKS
@@ -173,11 +174,11 @@ def saved_run(simulation: Simulation, recorder: Recorder) -> RunSnapshot:
         "recorder": recorder,
     }
     return RunSnapshot(
-        identity_of(simulation.scene, simulation.method), LoanMemory(simulation.loan), parts
+        run_identity(simulation.scene, simulation.method), LoanMemory(simulation.loan), parts
     )
 
 
-def identity_of(scene: Scene, method: Method) -> dict[str, str]:
+def run_identity(scene: Scene, method: Method) -> dict[str, str]:
     """Properties that a resumed run must share with the saved one, in words by name.
 
     Driver, threads, and how long a run goes and what it records may differ.
@@ -188,10 +189,12 @@ def identity_of(scene: Scene, method: Method) -> dict[str, str]:
     return {
         "version": version_text(),
         "mesh": f"{mesh.body_count} tetrahedra ({content})",
-        "material": repr(scene.material),
-        "effects": ", ".join(f"{effect.name} {vars(effect)}" for effect in scene.effects),
-        "max_speed": repr(scene.max_speed),
-        "method": repr(method),
+        "material": identity_of(scene.material),
+        "effects": ", ".join(
+            f"{effect.name} {identity_of(vars(effect))}" for effect in scene.effects
+        ),
+        "max_speed": identity_of(scene.max_speed),
+        "method": identity_of(method),
     }
 
 

@@ -7,14 +7,13 @@ Nothing here depends on the physics.
 import hashlib
 import json
 import math
+import numbers
 import os
 import signal
 import threading
 import time
-import zipfile
-import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from typing import Any, Optional
 
 import numpy as np
@@ -22,11 +21,12 @@ from numpy.typing import ArrayLike
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import renamed_when_done
-from taichi_dem.kit.validation import FileName, path_name, positive, whole
+from taichi_dem.kit.sealed_file import read_sealed, write_sealed
+from taichi_dem.kit.validation import FileName, path_name, positive, shown, whole
 from taichi_dem.kit.version import __version__, taichi_version
 
 #: Of the file; another one cannot be read.
-FORMAT = 2
+FORMAT = 3
 _ABOUT = "about"
 _MOST_STEPS = 2**53
 _MOST_MARKS = 1_000_000
@@ -34,7 +34,7 @@ _MOST_MARKS = 1_000_000
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """Where a run saves itself, and when besides at its end and on Ctrl-C.
+    """Where a run saves itself, and when besides at its end and on Ctrl-C or another stop signal.
 
     path: file, replaced whole. every_steps: largest steps between two of them (steps of a scene
     in a batch). every_s: simulated time [s]. every_wall_s: time on the wall [s].
@@ -91,39 +91,58 @@ class SaveTimer:
         )
 
 
+#: What asks a run to end: Ctrl-C, and what batch systems and closed terminals send.
+STOP_SIGNALS = tuple(
+    getattr(signal, name)
+    for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGXCPU", "SIGUSR1")
+    if hasattr(signal, name)
+)
+
+
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C, after the run has been saved. path: of the checkpoint."""
+    """Ctrl-C or another stop signal, after the run has been saved.
 
-    def __init__(self, time_s: float, path: FileName):
+    time_s: where the run stands. path: of the checkpoint. number: of the signal.
+    """
+
+    def __init__(self, time_s: float, path: FileName, number: int = signal.SIGINT):
         super().__init__(f"interrupted at t = {time_s:.6g} s, saved in {path}")
-        self.path = os.fspath(path)
+        self.time_s, self.path, self.number = time_s, os.fspath(path), number
+
+    def __reduce__(self):
+        return type(self), (self.time_s, self.path, self.number)
 
 
-class CtrlC:
-    """Notes the first Ctrl-C in its block, in ``asked``; the second one interrupts.
+class StopRequests:
+    """Notes the first stop signal in its block, in ``asked``; the second one interrupts.
 
-    Python delivers signals to the main thread only: in others Ctrl-C is unchanged.
+    asked: number of the signal, 0 for none. One that is ignored, as SIGHUP under nohup, stays so,
+    except for Ctrl-C. Python delivers signals to the main thread only: in others nothing changes.
     """
 
     def __init__(self) -> None:
-        self.asked = False
+        self.asked = 0
+        self._before: dict[int, Any] = {}
 
-    def __enter__(self) -> "CtrlC":
-        self.listens = threading.current_thread() is threading.main_thread()
-        if self.listens:
-            self.before = signal.signal(signal.SIGINT, self._note)
+    def __enter__(self) -> "StopRequests":
+        if threading.current_thread() is threading.main_thread():
+            for number in STOP_SIGNALS:
+                ignored = signal.getsignal(number) in (signal.SIG_IGN, None)
+                if number == signal.SIGINT or not ignored:
+                    self._before[number] = signal.signal(number, self._note)
         return self
 
     def __exit__(self, kind, *_):
-        if self.listens:
-            signal.signal(signal.SIGINT, self.before)
+        for number, before in self._before.items():
+            signal.signal(number, before)
+        self._before = {}
         if self.asked and kind is None:
             raise KeyboardInterrupt
 
     def _note(self, number, frame):
         if self.asked:
             raise KeyboardInterrupt
-        self.asked = True
+        self.asked = number
 
 
 def digest(*arrays: ArrayLike) -> str:
@@ -133,6 +152,30 @@ def digest(*arrays: ArrayLike) -> str:
         made.update(f"{array.dtype} {array.shape}".encode())
         made.update(array.tobytes())
     return made.hexdigest()[:12]
+
+
+def identity_of(value: Any) -> str:
+    """Words for a value that are the same for equal ones: 1, 1.0 and ``np.float64(1)`` are one.
+
+    Dataclasses and containers are looked into, an array is given by its ``digest``; of anything
+    else its ``repr`` counts.
+    """
+    if isinstance(value, (bool, np.bool_)):
+        return repr(bool(value))
+    if isinstance(value, numbers.Integral) and abs(int(value)) > 2**53:
+        return repr(int(value))
+    if isinstance(value, numbers.Real):
+        return repr(float(value))
+    if isinstance(value, np.ndarray):
+        return f"array {digest(value)}"
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(f'{key}: {identity_of(value[key])}' for key in value)}}}"
+    if isinstance(value, (tuple, list)):
+        return f"({', '.join(map(identity_of, value))})"
+    if is_dataclass(value) and not isinstance(value, type):
+        named = {field.name: getattr(value, field.name) for field in fields(value)}
+        return f"{type(value).__name__}{identity_of(named)}"
+    return repr(value)
 
 
 def version_text() -> str:
@@ -148,30 +191,27 @@ def write_checkpoint(
     Raises InputError when the file cannot be written; one that was there stays as it was.
     """
     about = json.dumps({"format": FORMAT, "identity": identity})
-    named: dict[str, Any] = {_ABOUT: np.array(about), **arrays}
     with renamed_when_done(path) as temporary:
-        with open(temporary, "wb") as file:
-            np.savez(file, **named)
-            file.flush()
-            os.fsync(file.fileno())
+        write_sealed(temporary, {_ABOUT: np.array(about), **arrays})
 
 
 def read_checkpoint(path: FileName, identity: Mapping[str, str]) -> dict[str, np.ndarray]:
     """Arrays by name from a checkpoint of the same identity.
 
-    Raises InputError for a file that is absent, damaged or none of ours, and for one of another
-    identity, naming what differs.
+    Raises InputError for a file that is absent, none of ours or not to the last bit as it was
+    written, and for one of another identity, naming what differs.
     """
     about, arrays = _read(path)
     if about["format"] != FORMAT:
         raise InputError(
-            f"checkpoint {path} must have format {FORMAT}, got {about['format']!r}: "
+            f"checkpoint {path} must have format {FORMAT}, got {shown(about['format'])}: "
             "it is of another version"
         )
     for name, mine in identity.items():
         theirs = about["identity"].get(name, "nothing")
         if theirs != mine:
-            raise InputError(f"checkpoint {path} is of another {name}: {theirs}, not {mine}")
+            theirs = theirs if isinstance(theirs, str) and theirs.isprintable() else shown(theirs)
+            raise InputError(f"checkpoint {path} is of another {name}: {theirs[:200]}, not {mine}")
     return arrays
 
 
@@ -182,17 +222,15 @@ def _read(path):
         what = "it is a folder" if os.path.isdir(path) else "it is no file"
         raise InputError(f"cannot read checkpoint {path}: {what}")
     try:
-        with zipfile.ZipFile(path) as file:
-            if file.testzip() is not None:
-                raise ValueError("a sum does not fit")
-        with np.load(path, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
+        arrays = read_sealed(path)
         about = json.loads(str(arrays.pop(_ABOUT)))
         if not isinstance(about, dict) or not isinstance(about["identity"], dict):
             raise ValueError("it says nothing of itself")
         about["format"]
     except OSError as error:
         raise InputError(f"cannot read checkpoint {path}: {error.strerror or error}") from None
-    except (ValueError, KeyError, EOFError, NotImplementedError, zipfile.BadZipFile, zlib.error):
-        raise InputError(f"{path} must be a whole checkpoint: it is damaged or none") from None
+    except (ValueError, KeyError, RecursionError, MemoryError):
+        raise InputError(
+            f"{path} must be a whole checkpoint: it is damaged, none, or of an earlier version"
+        ) from None
     return about, arrays

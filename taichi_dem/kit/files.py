@@ -3,8 +3,10 @@
 import contextlib
 import csv
 import os
+import platform
 import re
 from collections.abc import Callable, Iterator, Mapping
+from typing import Optional
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,11 +14,24 @@ from numpy.typing import ArrayLike
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import FileName, path_name, shown
 
+try:
+    import fcntl
+except ImportError:  # not on Windows: there folders are not claimed
+    fcntl = None  # type: ignore[assignment]
+
+#: This machine in the names of temporary files: a process number says nothing on another.
+_HOST = re.sub(r"[^A-Za-z0-9]", "", platform.node())[:32] or "here"
+_TEMPORARY = re.compile(rf"\..*\.{_HOST}-(\d+)\.part(\.[^.]*)?")
+
+_claims: Optional[dict[str, int]] = None
+
 
 def output_folder(path: FileName) -> str:
     """Make a folder for output and return its path, with a leading "~" as the user's home.
 
-    Raises InputError when it cannot be made or written to.
+    Temporary files that a killed run has left there are removed. Inside ``claiming`` the folder
+    belongs to this process.
+    Raises InputError when it cannot be made or written to, or belongs to another.
     """
     name = os.fspath(path) if isinstance(path, (str, os.PathLike)) else ""
     if not isinstance(name, str) or not name or "\0" in name:
@@ -31,7 +46,67 @@ def output_folder(path: FileName) -> str:
     except OSError as error:
         reason = error.strerror or error
         raise InputError(f"output folder {path} must be writable: {reason}") from None
+    if _claims is not None:
+        _claim(path, _claims)
+    _remove_leftovers(path)
     return path
+
+
+@contextlib.contextmanager
+def claiming() -> Iterator[None]:
+    """In its block folders that ``output_folder`` gives belong to this process alone.
+
+    Blocks may nest; the outermost counts. A folder is free again when its process ends, however.
+    """
+    global _claims
+    if _claims is not None:
+        yield
+        return
+    _claims = {}
+    try:
+        yield
+    finally:
+        for lock in _claims.values():
+            os.close(lock)
+        _claims = None
+
+
+def _claim(path: str, claims: dict[str, int]) -> None:
+    """Claim a folder, unless its file system knows no locks; InputError where another has it."""
+    place = os.path.realpath(path)
+    if fcntl is None or place in claims:
+        return
+    lock = os.open(place, os.O_RDONLY)
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(lock)
+        raise InputError(
+            f"output folder {path} must be of one run alone: another one is writing there"
+        ) from None
+    except OSError:
+        os.close(lock)
+        return
+    claims[place] = lock
+
+
+def _remove_leftovers(folder):
+    """Remove temporary files of processes of this machine that are no more."""
+    for name in os.listdir(folder):
+        found = _TEMPORARY.fullmatch(name)
+        if found and not _is_alive(int(found[1])):
+            with contextlib.suppress(OSError):
+                os.remove(os.path.join(folder, name))
+
+
+def _is_alive(process):
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except OSError:
+        return True
+    return True
 
 
 @contextlib.contextmanager
@@ -42,7 +117,7 @@ def renamed_when_done(path: FileName) -> Iterator[str]:
     if not os.path.isdir(folder or "."):
         raise InputError(f"cannot write {path}: there is no folder {folder}")
     root, ending = os.path.splitext(name)  # kept, since some writers derive the format from it
-    temporary = os.path.join(folder, f".{root}.{os.getpid()}.part{ending}")
+    temporary = os.path.join(folder, f".{root}.{_HOST}-{os.getpid()}.part{ending}")
     try:
         yield temporary
         os.replace(temporary, path)

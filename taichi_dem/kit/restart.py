@@ -8,9 +8,9 @@ import numpy as np
 
 from taichi_dem.kit.checkpoint import (
     Checkpoint,
-    CtrlC,
     Interrupted,
     SaveTimer,
+    StopRequests,
     read_checkpoint,
     write_checkpoint,
 )
@@ -82,7 +82,7 @@ def _under(part, arrays):
 
 
 class CheckpointWriter:
-    """Saves a run when its checkpoint is due, and on Ctrl-C within its block.
+    """Saves a run when its checkpoint is due, and on a stop signal within its block.
 
     checkpoint: a Checkpoint. snapshot: of the run, a ``RunSnapshot``. now: gives its present step
     and time [s]. All methods are called between two steps only.
@@ -92,28 +92,28 @@ class CheckpointWriter:
         self, checkpoint: Checkpoint, snapshot: RunSnapshot, now: Callable[[], tuple[int, float]]
     ):
         self.checkpoint, self.snapshot, self.now = checkpoint, snapshot, now
-        self.timer, self.ctrl_c = SaveTimer(checkpoint), CtrlC()
+        self.timer, self.stop = SaveTimer(checkpoint), StopRequests()
         self.saved_s: Optional[float] = None
         self.timer.saved_at(*now())
 
     def __enter__(self) -> "CheckpointWriter":
-        self.ctrl_c.__enter__()
+        self.stop.__enter__()
         return self
 
     def __exit__(self, *error):
-        self.ctrl_c.__exit__(*error)
+        self.stop.__exit__(*error)
 
     def marks(self, last: int, dt: float) -> set[int]:
         """Steps of dt [s] up to the last at which a save may be due, a set."""
         return self.checkpoint.marks(last, dt)
 
     def save_if_needed(self) -> None:
-        """Save the run if a save is due. Raises Interrupted after Ctrl-C, InputError."""
+        """Save the run if a save is due. Raises Interrupted after a stop signal, InputError."""
         step, time_s = self.now()
-        if self.ctrl_c.asked or self.timer.now(step, time_s):
+        if self.stop.asked or self.timer.now(step, time_s):
             self.save()
-        if self.ctrl_c.asked:
-            raise Interrupted(time_s, self.checkpoint.path)
+        if self.stop.asked:
+            raise Interrupted(time_s, self.checkpoint.path, self.stop.asked)
 
     def save(self) -> None:
         """Save the run. Raises InputError that names the last good checkpoint."""

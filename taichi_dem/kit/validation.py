@@ -51,7 +51,7 @@ def positive(name: str, value: Any, zero_allowed: bool = False) -> float:
     if not finite(value) or value < 0.0 or (value == 0.0 and not zero_allowed):
         limit = "zero or a positive" if zero_allowed else "a positive"
         raise InputError(f"{name} must be {limit} finite number, got {shown(value)}")
-    if value != 0.0 and not SMALLEST <= value <= LARGEST:
+    if value != 0.0 and not SMALLEST <= float(value) <= LARGEST:
         zero = "zero or " if zero_allowed else ""
         raise InputError(
             f"{name} must be {zero}a number from {SMALLEST:g} to {LARGEST:g}, got {shown(value)}"
@@ -61,7 +61,7 @@ def positive(name: str, value: Any, zero_allowed: bool = False) -> float:
 
 def between(name: str, value: Any, least: float, most: float) -> float:
     """The value as a float; InputError unless it is a number from least to most."""
-    if not finite(value) or not least <= value <= most:
+    if not finite(value) or not least <= float(value) <= most:
         raise InputError(f"{name} must be a number from {least:g} to {most:g}, got {shown(value)}")
     return float(value)
 

@@ -5,6 +5,7 @@ x points to the right, y up, z towards the viewer.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -20,13 +21,19 @@ from taichi_dem.mesh.weld import COINCIDENT, weld_labels
 #: Share of (longest edge)^3 below which a volume counts as zero, as it may be round-off.
 FLAT = 1e-12
 
+#: First words of the notes on what has been mended.
+_MENDING = ("welded", "dropped", "turned")
+
 #: The extent of a mesh lies between these [m]: a moment of inertia is its fifth power.
 _LEAST_EXTENT, _MOST_EXTENT = 1e-30, 1e30
 
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Tetrahedra and named groups of outer faces; build it with ``checked_mesh``.
+    """Tetrahedra and named groups of outer faces, as ``checked_mesh`` makes them: for good.
+
+    Made directly from arrays it is checked alike, but nothing is mended. The arrays and the groups
+    cannot be changed; ``dataclasses.replace`` gives another mesh.
 
     points: (point_count, 3) float64 [m].
     tetrahedra: (body_count, 4) int32 point indices, all of positive volume.
@@ -34,14 +41,37 @@ class Mesh:
     notes: sentences about what the checks mended or found remarkable.
     source: name of the file, "" for a mesh built in memory.
     unread: groups of the file that are not of faces, pairs of name and what they are of.
+    Raises InputError for arrays that ``checked_mesh`` would refuse or mend.
     """
 
     points: np.ndarray
     tetrahedra: np.ndarray
-    groups: dict[str, np.ndarray]
+    groups: Mapping[str, np.ndarray]
     notes: tuple[str, ...] = ()
     source: str = ""
     unread: tuple[tuple[str, str], ...] = ()
+
+    def __post_init__(self) -> None:
+        notes: list[str] = []
+        self._hold(*_checked(self.points, self.tetrahedra, self.groups, 0.0, notes))
+        mended = [note for note in notes if note.split()[0] in _MENDING]
+        if mended:
+            raise InputError(f"a Mesh takes what checked_mesh gives, which here {mended[0]}")
+
+    def _hold(self, points, tetrahedra, groups):
+        """Keep arrays that cannot be written to."""
+        for array in (points, tetrahedra, *groups.values()):
+            array.setflags(write=False)
+        for name, value in zip(("points", "tetrahedra"), (points, tetrahedra)):
+            object.__setattr__(self, name, value)
+        object.__setattr__(self, "groups", MappingProxyType(dict(groups)))
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "groups": dict(self.groups)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._hold(self.points, self.tetrahedra, self.groups)
 
     def __repr__(self):
         groups = f"groups {', '.join(self.groups)}" if self.groups else "no groups"
@@ -97,10 +127,20 @@ def checked_mesh(
     Repaired: negative volumes, points without a tetrahedron, faces twice in a group.
     Raises InputError, with the numbers (counted from 0) of the defects.
     """
+    notes: list[str] = []
+    parts = _checked(points, tetrahedra, groups, weld_tolerance, notes)
+    _note_parts(parts[1], notes)
+    made = object.__new__(Mesh)
+    made.__dict__.update(notes=tuple(notes), source=str(source), unread=())
+    made._hold(*parts)
+    return made
+
+
+def _checked(points, tetrahedra, groups, weld_tolerance, notes):
+    """Points, tetrahedra and groups as ``checked_mesh`` wants them; notes: of what was mended."""
     places = _checked_points(points)
     corners = _checked_indices("tetrahedra", tetrahedra, 4, len(places))
     faces = _checked_groups(groups, len(places))
-    notes: list[str] = []
     label = welded_numbers(places, corners, weld_tolerance, notes)
     corners, faces = label[corners], {name: label[faces[name]] for name in faces}
     places, corners, faces = _without_loose_points(places, corners, faces, notes)
@@ -108,9 +148,7 @@ def checked_mesh(
     _refuse_coincident(places)
     corners = _positive(places, corners, notes)
     _refuse_bad_sharing(corners)
-    faces = _outer_groups(corners, faces, notes)
-    _note_parts(corners, notes)
-    return Mesh(places, corners, faces, tuple(notes), str(source))
+    return places, corners, _outer_groups(corners, faces, notes)
 
 
 def welded_numbers(

@@ -12,7 +12,8 @@ class HoleMonitor:
 
     axis_point (3,) [m] and axis (3,): of the hole. bodies: those with a face on it. outward
     (n, 3): in-plane unit direction from the axis to each body's first centre. monitored_body: the
-    one of these that is nearest to the closest free face, at mid depth.
+    one of these that is nearest to the closest free face, at mid depth, or at mid depth alone
+    where no face along the axis is free.
     """
 
     def __init__(self, model: Model, group: str):
@@ -28,7 +29,9 @@ class HoleMonitor:
         self.bodies = np.unique(body)
         self.first = model.centre[self.bodies]
         away = self._in_plane(self.first - self.axis_point)
-        self.outward = away / np.linalg.norm(away, axis=1, keepdims=True)
+        # A body in the middle of what is loaded, where that is no hole, has no way outward.
+        length = np.linalg.norm(away, axis=1, keepdims=True)
+        self.outward = np.divide(away, length, out=np.zeros_like(away), where=length > 0.0)
         self.monitored_body = self._nearest_to_free_face(model, body, face)
 
     def _in_plane(self, vectors):
@@ -38,14 +41,17 @@ class HoleMonitor:
         mesh, topology = model.mesh, model.topology
         on_hole = set(zip(hole_body.tolist(), hole_face.tolist()))
         pairs = zip(topology.outer_body.tolist(), topology.outer_face.tolist())
-        free = np.array([pair for pair in pairs if pair not in on_hole], dtype=np.int32)
+        others = [pair for pair in pairs if pair not in on_hole]
+        free = np.array(others, dtype=np.int32).reshape(-1, 2)
         corners = face_vertices(mesh, free[:, 0], free[:, 1])
         normal = area_vectors(mesh.points, corners)
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         distance = np.einsum("ij,ij->i", mesh.points[corners[:, 0]] - self.axis_point, normal)
         distance[np.abs(normal @ self.axis) > 0.5] = np.inf
-        toward = normal[distance.argmin()]
         depth = np.abs((self.first - self.axis_point) @ self.axis)
+        if not np.isfinite(distance).any():
+            return int(self.bodies[depth.argmin()])
+        toward = normal[distance.argmin()]
         score = (self.first - self.axis_point) @ toward - depth
         return int(self.bodies[score.argmax()])
 

@@ -5,7 +5,6 @@ import errno
 import json
 import os
 import signal
-import zipfile
 
 import numpy as np
 import pytest
@@ -13,9 +12,17 @@ import taichi as ti
 
 from taichi_dem import Checkpoint, InputError
 from taichi_dem.kit.allocation import FieldTree
-from taichi_dem.kit.checkpoint import CtrlC, SaveTimer, digest, read_checkpoint, write_checkpoint
+from taichi_dem.kit.checkpoint import (
+    STOP_SIGNALS,
+    SaveTimer,
+    StopRequests,
+    digest,
+    read_checkpoint,
+    write_checkpoint,
+)
 from taichi_dem.kit.field_memory import FieldMemory, fields_of, without_end
 from taichi_dem.kit.restart import CheckpointWriter
+from taichi_dem.kit.sealed_file import write_sealed
 
 IDENTITY = {"version": "1", "mesh": "a cube"}
 ARRAYS = {"field/a.b": np.arange(12.0).reshape(4, 3), "part/none": np.zeros((0, 2))}
@@ -47,8 +54,8 @@ def test_another_format_is_refused(path):
     with np.load(path) as file:
         arrays = dict(file)
     arrays["about"] = np.array(json.dumps({"format": 99, "identity": IDENTITY}))
-    np.savez(path, **arrays)
-    with pytest.raises(InputError, match="must have format 2, got 99"):
+    write_sealed(path, arrays)
+    with pytest.raises(InputError, match="must have format 3, got 99"):
         read_checkpoint(path, IDENTITY)
 
 
@@ -57,11 +64,9 @@ def cut(path):
 
 
 def flip(path):
-    """One bit within the numbers of the first array, which the sums must notice."""
-    with zipfile.ZipFile(path) as file:
-        start = file.getinfo("field/a.b.npy").header_offset
+    """One bit within the numbers of the first array."""
     data = bytearray(path.read_bytes())
-    data[start + 220] ^= 1
+    data[len(data) // 2] ^= 1
     path.write_bytes(data)
 
 
@@ -69,7 +74,13 @@ def stranger(path):
     np.savez(path, a=np.zeros(3))
 
 
-@pytest.mark.parametrize("harm", [cut, flip, stranger, lambda p: p.write_text("x"), os.truncate])
+def sealed_stranger(path):
+    write_sealed(path, {"a": np.zeros(3)})
+
+
+@pytest.mark.parametrize(
+    "harm", [cut, flip, stranger, sealed_stranger, lambda p: p.write_text("x"), os.truncate]
+)
 def test_damaged_and_foreign_files_are_refused(path, harm):
     harm(path, 0) if harm is os.truncate else harm(path)
     with pytest.raises(InputError, match="must be a whole checkpoint"):
@@ -178,20 +189,33 @@ def listening():
     signal.signal(signal.SIGINT, before)
 
 
-def test_ctrl_c_is_noted_first_and_interrupts_then(listening):
-    with pytest.raises(KeyboardInterrupt), CtrlC() as ctrl_c:
-        os.kill(os.getpid(), signal.SIGINT)
-        assert ctrl_c.asked
-        ctrl_c.noted = True
-        os.kill(os.getpid(), signal.SIGINT)
+@pytest.mark.parametrize("number", STOP_SIGNALS)
+def test_a_stop_signal_is_noted_first_and_interrupts_then(listening, number):
+    before = signal.getsignal(number)
+    with pytest.raises(KeyboardInterrupt), StopRequests() as stop:
+        os.kill(os.getpid(), number)
+        assert stop.asked == number
+        stop.noted = True
+        os.kill(os.getpid(), number)
         pytest.fail("the second one must interrupt")
-    assert ctrl_c.noted
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert stop.noted
+    assert signal.getsignal(number) is before
 
 
-def test_ctrl_c_that_nobody_saw_interrupts_at_the_end(listening):
-    with pytest.raises(KeyboardInterrupt), CtrlC():
+def test_a_stop_signal_that_nobody_saw_interrupts_at_the_end(listening):
+    with pytest.raises(KeyboardInterrupt), StopRequests():
         os.kill(os.getpid(), signal.SIGINT)
+
+
+def test_a_signal_that_is_ignored_stays_ignored():
+    """As SIGHUP under nohup."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with StopRequests() as stop:
+            os.kill(os.getpid(), signal.SIGHUP)
+        assert stop.asked == 0
+    finally:
+        signal.signal(signal.SIGHUP, before)
 
 
 def test_a_digest_tells_bits_types_and_shapes_apart():

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects
+from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects, simulate
 from taichi_dem.mesh.mesh import checked_mesh
+from taichi_dem.mesh.shapes import bar, pair, single
+from taichi_dem.mesh.topology import face_vertices, topology_of
 from tests.turns import matrix, quaternion
 
 EPS = np.finfo(float).eps
@@ -84,3 +86,24 @@ def test_pressure_turns_with_the_body(body):
     assert np.abs(gained).max() < 4 * error * impulse * np.linalg.norm(torque)
     booked = body.state.load_impulse.to_numpy()[0]
     assert np.abs(booked[:3] - impulse * force).max() < error * impulse * np.linalg.norm(force)
+
+
+def outer_groups(mesh):
+    """The mesh with groups of outer faces: all, one, one to each side, a random half."""
+    top = topology_of(mesh)
+    faces = face_vertices(mesh, top.outer_body, top.outer_face)
+    half = np.random.default_rng(5).random(len(faces)) < 0.5
+    half[0] = True
+    groups = {"all": faces, "one": faces[:1], "half": faces[half], **mesh.groups}
+    return checked_mesh(mesh.points, mesh.tetrahedra, groups)
+
+
+@pytest.mark.parametrize("make", [single, pair, lambda: bar(0.2, 0.05, (2, 1, 1))])
+def test_any_group_of_outer_faces_may_be_loaded_and_is_monitored(make):
+    """What is loaded need be no hole: its displacements are finite numbers all the same."""
+    mesh = outer_groups(make())
+    for name in mesh.groups:
+        scene = Scene(mesh, CONCRETE, [effects.GasPressure(name)])
+        result = simulate(scene, method=Uniform(1e-8), until=3e-8, samples=1)
+        for column, values in result.history.items():
+            assert np.isfinite(values).all(), (name, column)

@@ -14,7 +14,7 @@ from typing import Any, Callable, NoReturn, Optional
 from taichi_dem.kit import runtime
 from taichi_dem.kit.checkpoint import Checkpoint, Interrupted
 from taichi_dem.kit.errors import InputError, SimulationDiverged
-from taichi_dem.kit.files import output_folder
+from taichi_dem.kit.files import claiming, output_folder
 from taichi_dem.kit.progress.lasting_output import lasting_output
 from taichi_dem.kit.study.settings import Settings, add_settings, take_settings
 from taichi_dem.kit.validation import shown
@@ -176,7 +176,8 @@ def main(
         take_settings(options, getattr(made, "settings", {}))
         options.started = time.perf_counter()
         runtime.start(options.arch, options.threads)
-        run(options)
+        with claiming():
+            run(options)
 
     return exit_code(work)
 
@@ -184,8 +185,9 @@ def main(
 def exit_code(work: Callable[[], Optional[int]]) -> int:
     """Exit code of a program that does work(): 0 done, or what work returns.
 
-    2 bad input, 3 diverged, 130 interrupted: each with one line on stderr. The reader of the output
-    may leave before its end (``| head -1``): the files are still written.
+    2 bad input, 3 diverged, 130 interrupted by Ctrl-C, 128 + its number by another signal that left
+    a checkpoint: each with one line on stderr. The reader of the output may leave before its end
+    (``| head -1``): the files are still written.
     """
     with lasting_output():
         try:
@@ -193,7 +195,7 @@ def exit_code(work: Callable[[], Optional[int]]) -> int:
         except (InputError, SimulationDiverged) as error:
             code, words = (2 if isinstance(error, InputError) else 3), str(error)
         except Interrupted as error:
-            code, words = 130, f"{error}: go on with --resume"
+            code, words = 128 + error.number, f"{error}: go on with --resume"
         except KeyboardInterrupt:
             code, words = 130, "interrupted"
         print(" ".join(words.split()), file=sys.stderr)
