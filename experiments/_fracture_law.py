@@ -156,10 +156,8 @@ def film_law(path, curves, points, count=40):
     with moving_picture(path, (4.0, 3.6), 120) as (figure, shoot):
         above, below = figure.subplots(2, 2, height_ratios=(1.0, 1.9))
         marks = draw(below, curves, size=1.8)
-        heads = [
-            axes.plot([], [], "o", ms=5.5, color=colour, mec=BLACK)[0]
-            for axes, colour in zip((below[0], *[below[1]] * 4), COLOURS)
-        ]
+        look = {"marker": "o", "ms": 5.5, "mec": BLACK}
+        heads = [mark.axes.plot([], [], color=mark.get_color(), **look)[0] for mark in marks]
         below[0].set_title("tension")
         below[1].set_title("shear under pressure")
         # Openings and slidings are drawn so much larger.
