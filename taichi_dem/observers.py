@@ -117,6 +117,9 @@ class Collector:
         self.rows: dict[str, list] = {name: [] for name in read}
         self.view: Optional[RunView] = None
 
+    def __repr__(self) -> str:
+        return in_brief(self, ", ".join(self.rows))
+
     def observe(self, view: "RunView") -> None:
         """Keep a value of every function."""
         self.view = view

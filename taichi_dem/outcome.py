@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from taichi_dem.kit.display import by_fields
 from taichi_dem.result import Result
 from taichi_dem.scene import Scene
 from taichi_dem.simulate import result_of, run_simulation
@@ -41,6 +42,9 @@ class Outcome:
     residual: float
     reached_s: float
     failure: str = ""
+
+    def __repr__(self) -> str:
+        return by_fields(self)
 
     @classmethod
     def of(cls, result: Result) -> "Outcome":

@@ -20,7 +20,7 @@ class BondDamping(Effect):
         """Normal and tangential damping coefficient [Pa s/m]."""
         return material.normal_damping, material.shear_damping
 
-    def harmless(self, material):
+    def harmless(self, material: Material) -> Material:
         """No damping."""
         return replace(material, normal_damping=0.0, shear_damping=0.0)
 

@@ -20,7 +20,7 @@ class Friction(Effect):
         """Friction coefficient."""
         return (material.friction,)
 
-    def harmless(self, material):
+    def harmless(self, material: Material) -> Material:
         """No friction."""
         return replace(material, friction=0.0)
 

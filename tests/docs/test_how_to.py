@@ -1,9 +1,17 @@
 """Python blocks of all pages but the first: run as they stand, judged by their formulas."""
 
+import json
+import os
+import shutil
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
 from tests.docs.pages import PAGES, blocks, run_pasted
+from tests.processes import users_environment
+from tests.scenes import ROOT
 
 #: What the tests below look at, in the program of the one block of a page.
 WANTED = {
@@ -16,8 +24,10 @@ WANTED = {
     "docs/add_a_time_integrator.md": "dict(area=model.bonds['area'][0], mass=model.body_mass[0],"
     " step=step, count=count, euler=euler, leapfrog=leapfrog)",
 }
+#: Pages whose blocks have tests of their own.
+APART = ("README.md", "docs/hard_cases.md")
 BLOCKS = [
-    (page, number) for page in PAGES if page != "README.md" for number in range(len(blocks(page)))
+    (page, number) for page in PAGES if page not in APART for number in range(len(blocks(page)))
 ]
 
 
@@ -49,6 +59,20 @@ def test_each_how_to_has_a_block():
 @pytest.mark.parametrize(("page", "number"), BLOCKS)
 def test_a_block_runs_as_it_stands_and_says_something(program, page, number):
     assert program(page, number).said.strip()
+
+
+def test_the_hard_case_is_found_in_its_file_and_passes(tmp_path):
+    """The block as a file beside the others, asked for by its name."""
+    experiments = tmp_path / "experiments"
+    shutil.copytree(os.path.join(ROOT, "experiments"), experiments)
+    (block,) = blocks("docs/hard_cases.md")
+    (experiments / "_hard_cases" / "mine.py").write_text(block)
+    line = [sys.executable, str(experiments / "hard_cases.py"), "--quick", "--only"]
+    line += ["straight_flight", "--out", str(tmp_path / "out")]
+    done = subprocess.run(line, env=users_environment(), capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    figures = json.loads((tmp_path / "out" / "summary.json").read_text())["figures"]
+    assert figures["failed"]["value"] == 0 and figures["passed"]["value"] > 0
 
 
 def test_the_effect_moves_a_body_as_the_leapfrog_must(left_by):

@@ -64,6 +64,7 @@ def of_the_blast():
     yield from (taichi_dem.step_report(scene), taichi_dem.quality_report(mesh, CONCRETE))
     yield from (taichi_dem.Checkpoint("run.npz"), taichi_dem.Every(steps=10), taichi_dem.At([0.0]))
     yield taichi_dem.RunView(simulation, None)
+    yield taichi_dem.Collector(taichi_dem.Every(steps=1), time_s=lambda view: view.time_s)
 
 
 def of_the_damper():

@@ -12,6 +12,7 @@ from typing import Any, Callable, NamedTuple, Optional
 
 import numpy as np
 
+from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.validation import choice
 
@@ -62,6 +63,9 @@ class Case:
     run: Callable[["Trial"], None]
     methods: tuple[str, ...] = ()
     refused: dict[str, str] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        return in_brief(self, self.name, self.package)
 
     @property
     def asked(self) -> tuple[str, ...]:
@@ -122,6 +126,9 @@ class Trial:
     words: str = ""
     worst: Optional[Limit] = None
     seconds: float = 0.0
+
+    def __repr__(self) -> str:
+        return in_brief(self, self.case.name, self.method, self.status)
 
     def limit(self, name: str, value: Any, bound: float, formula: str) -> None:
         """Add a figure, or the largest of an array, and its bound."""
