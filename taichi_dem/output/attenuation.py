@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichi_dem.engine.model import Model
+from taichi_dem.kit.display import by_fields
 from taichi_dem.output.hole_monitor import HoleMonitor
 
 #: Bodies below which no power is fitted.
@@ -24,6 +25,9 @@ class Attenuation:
     distance: np.ndarray
     speed: np.ndarray
     inner: np.ndarray
+
+    def __repr__(self) -> str:
+        return by_fields(self)
 
     @classmethod
     def of(

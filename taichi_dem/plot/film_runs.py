@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from taichi_dem.kit.display import by_fields
 from taichi_dem.plot.block import frame_block
 from taichi_dem.plot.bodies import draw_bodies, move_bodies
 from taichi_dem.plot.film import moving_picture
@@ -29,6 +30,9 @@ class FilmedRun:
     curve: np.ndarray
     label: str
     colour: str
+
+    def __repr__(self) -> str:
+        return by_fields(self)
 
 
 def film_runs(

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import taichi as ti
 
+from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.validation import AUTO
 from taichi_dem.observers import Every
 from taichi_dem.scene import Scene
@@ -38,6 +39,9 @@ class Workload:
     ticks: np.ndarray
     seconds: np.ndarray
     searches: np.ndarray
+
+    def __repr__(self) -> str:
+        return by_fields(self)
 
     def prices(self) -> np.ndarray:
         """Seconds a bond, a pair, a pair of spheres, a tick, and a search, fitted to the intervals.

@@ -9,6 +9,7 @@ from typing import Optional
 
 import numpy as np
 
+from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.validation import choice
 from taichi_dem.mesh.partition import even_cuts, imbalance, recut, share_costs
 from taichi_dem.workload.record import Workload
@@ -35,6 +36,9 @@ class SharedWork:
     seconds: np.ndarray
     elapsed: float
     cuts: Optional[np.ndarray] = None
+
+    def __repr__(self) -> str:
+        return by_fields(self)
 
     @property
     def workers(self) -> int:
