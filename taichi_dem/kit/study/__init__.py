@@ -33,7 +33,6 @@ from taichi_dem.kit.study.summary import (
 from taichi_dem.kit.study.table import Table
 from taichi_dem.kit.study.tables import columns_of, print_table, show_rows, write_rows
 from taichi_dem.kit.study.timing import Timing, clock, on_device, seconds_of
-from taichi_dem.kit.study.worker import ask_worker, read_job
 
 __all__ = [
     "Parser",
@@ -41,7 +40,6 @@ __all__ = [
     "Timing",
     "add_checkpoints",
     "add_settings",
-    "ask_worker",
     "bare_parser",
     "begin",
     "cached",
@@ -68,7 +66,6 @@ __all__ = [
     "print_figures",
     "print_table",
     "processor",
-    "read_job",
     "seconds_of",
     "several",
     "show_rows",
