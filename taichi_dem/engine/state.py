@@ -1,5 +1,7 @@
 """Everything that changes in a run; checkpoints hold this and the effects' own state."""
 
+from typing import Optional
+
 import numpy as np
 import taichi as ti
 from numpy.typing import ArrayLike
@@ -75,17 +77,20 @@ class State:
     def set_motion(
         self,
         position: ArrayLike,
-        orientation: ArrayLike = (1.0, 0.0, 0.0, 0.0),
-        velocity: ArrayLike = 0.0,
-        spin: ArrayLike = 0.0,
+        orientation: Optional[ArrayLike] = None,
+        velocity: Optional[ArrayLike] = None,
+        spin: Optional[ArrayLike] = None,
     ) -> None:
         """Set the motion of all bodies, arrays of a row each or one row for all.
 
         position [m], orientation (unit quaternions, not turned by default), velocity [m/s] and
         spin [rad/s] in world axes, zero by default.
         """
-        parts = zip((position, orientation, velocity, spin), (3, 4, 3, 3))
-        shaped = [np.broadcast_to(part, (self.body_count, width)) for part, width in parts]
+        given = (position, orientation, velocity, spin)
+        rest = ([0.0] * 3, [1.0, 0.0, 0.0, 0.0], [0.0] * 3, [0.0] * 3)
+        rows = [still if part is None else part for part, still in zip(given, rest)]
+        shapes = [(self.body_count, len(still)) for still in rest]
+        shaped = [np.broadcast_to(part, shape) for part, shape in zip(rows, shapes)]
         self._write_motion(*(np.ascontiguousarray(part, dtype=np.float64) for part in shaped))
 
     @ti.func
