@@ -59,6 +59,14 @@ class Result:
             warning=self.diverged,
         )
 
+    def mean_displacement(self, bodies: np.ndarray) -> np.ndarray:
+        """Mean displacement of some bodies [m], (frames, 3).
+
+        bodies: their numbers, or a mask of all.
+        """
+        ways = (frame.displacement[bodies].T for frame in self.frames)
+        return np.array([[along.mean() for along in way] for way in ways]).reshape(-1, 3)
+
     def _figures(self):
         """The main figures of the run, (name, text) each."""
         report, model, history = self.report, self.model, self.history

@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from _demo import set_moving
 from taichi_dem import CONCRETE, Scene, Simulation, StepControl, effects
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import bar, pair, placed_together, single
@@ -63,10 +62,11 @@ class Run(MotionRecord):
         shift=0.0, spin=0.0, **scene,
     ):  # fmt: skip
         super().__init__(bodies)
-        method, shape = methods[trial.method], (mesh.body_count, 3)
+        method = methods[trial.method]
         scene = Scene(mesh, **{"material": CONCRETE, "effects": contact_effects(), **scene})
         simulation = self.simulation = Simulation(scene, method)
-        set_moving(simulation, *(np.broadcast_to(each, shape) for each in (velocity, shift, spin)))
+        place = simulation.model.centre + shift
+        simulation.state.set_motion(place, velocity=velocity, spin=spin)
         until = until or soon(trial)
         run_simulation(simulation, until=until, samples=SAMPLES, progress=None, observers=[self])
         trial.compile_s += simulation.compile_seconds

@@ -3,12 +3,9 @@
 The grains are those of the automaton with static contact. All runs on the thread of the session.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ca_damper import Automaton, Batch, Oscillator, SceneTable
-from ca_damper.measures import Cycles
 from ca_damper.plot import Box, DrawnBox, frame_panel
 from ca_damper.record import frames_of
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, STYLES, png_of, styled
@@ -29,52 +26,31 @@ PICTURES = 4
 FILLING, PAPER = Automaton(), Oscillator()
 
 
-@dataclass(frozen=True, eq=False)
 class Answer:
-    """Motion and energies for one choice.
+    """Motion and energies for one choice: grains, their share of the box's mass, base [m], ratio.
 
-    grains, share (of their mass in the box's), ratio: the choice. oscillator: the box and its
-    spring. cycles: measured, at all RATIOS. frames: of one cycle at the chosen one.
+    oscillator: the box and its spring. cycles: measured, at all RATIOS; the rest is at the chosen
+    one. frames: of one cycle. omega: of the base [rad/s]. swing: amplitude of the box [m]. throw:
+    its largest acceleration by that of gravity, above 1 it throws its grains. energy: J a cycle
+    that "base" gives and that "dashpot" and "filling" take, first harmonics. damping_ratio: of
+    dashpot and grains together.
     """
 
-    grains: int
-    share: float
-    ratio: float
-    oscillator: Oscillator
-    cycles: Cycles
-    frames: tuple
+    def __init__(self, grains, share, base, ratio):
+        self.grains, self.share, self.ratio = grains, share, ratio
+        o = self.oscillator = structure(grains, share, base)
+        self.cycles, frames = shaken(grains, o)
+        self.frames = frames[RATIOS.index(ratio)]
+        powers = self.cycles.powers(o.base_amplitude, o.stiffness, o.damping)
+        self.energy = {k: self.at_ratio(v / self.cycles.frequency) for k, v in powers.items()}
+        damping_ratio = self.cycles.damping_ratio(o.mass, o.stiffness, o.damping)
+        values = damping_ratio, self.cycles.amplitude, self.cycles.omega
+        self.damping_ratio, self.swing, self.omega = map(self.at_ratio, values)
+        self.throw = self.omega**2 * self.swing / FILLING.gravity
 
     def at_ratio(self, values):
         """The chosen one of values at all RATIOS."""
         return float(values[RATIOS.index(self.ratio)])
-
-    @property
-    def energy(self):
-        """J a cycle that "base" gives and that "dashpot" and "filling" take, first harmonics."""
-        o, cycles = self.oscillator, self.cycles
-        powers = cycles.powers(o.base_amplitude, o.stiffness, o.damping)
-        return {name: self.at_ratio(power / cycles.frequency) for name, power in powers.items()}
-
-    @property
-    def damping_ratio(self):
-        """Of dashpot and grains together."""
-        o = self.oscillator
-        return self.at_ratio(self.cycles.damping_ratio(o.mass, o.stiffness, o.damping))
-
-    @property
-    def swing(self):
-        """Amplitude of the box [m]."""
-        return self.at_ratio(self.cycles.amplitude)
-
-    @property
-    def omega(self):
-        """Angular frequency of the base [rad/s]."""
-        return self.at_ratio(self.cycles.omega)
-
-    @property
-    def throw(self):
-        """Largest acceleration of the box by that of gravity: above 1 it throws its grains."""
-        return self.omega**2 * self.swing / FILLING.gravity
 
 
 def structure(grains, share, base):
@@ -87,24 +63,17 @@ def structure(grains, share, base):
 
 
 @session.remember
-def compiled():
+def compile_all():
     """The batch, a scene a ratio."""
     frequency = np.array(RATIOS) * PAPER.natural_frequency
     table = SceneTable(CHOICES["grains"][1], 1, FILLING.default_dt, frequency)
     return Batch(FILLING, table, measured_cycles=MEASURED)
 
 
-def answer(grains, share, base, ratio):
-    """The Answer to a choice: grains, their share of the box's mass, base [m], ratio of RATIOS."""
-    o = structure(grains, share, base)
-    cycles, frames = shaken(grains, o)
-    return Answer(grains, share, ratio, o, cycles, frames[RATIOS.index(ratio)])
-
-
 @session.remember
 def shaken(grains, o):
     """Shake until all is as it will stay; returns Cycles at all RATIOS, and Frames of each."""
-    batch = compiled()
+    batch = compile_all()
     numbers = {"mass": o.mass, "stiffness": o.stiffness, "damping": o.damping}
     batch.change(particles=grains, base_amplitude=o.base_amplitude, **numbers)
     batch.start("rigid")
@@ -155,7 +124,7 @@ def _energy(axes, answer):
 
 def _boxes(figure, answer):
     """The box at even parts of a cycle."""
-    box, panels = Box.of_automaton(FILLING), figure.subplots(1, PICTURES)
+    box, panels = Box.of(FILLING), figure.subplots(1, PICTURES)
     swing = max(0.5 * box.diameter, *(abs(frame.x) for frame in answer.frames))
     for k, (axes, frame) in enumerate(zip(panels, answer.frames)):
         frame_panel(axes, box, swing)

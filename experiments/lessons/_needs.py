@@ -7,7 +7,6 @@ session.
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,7 +16,6 @@ from taichi_dem.kit.plot_style import BLUE, GREY, RED, png_of, styled
 from taichi_dem.kit.session_thread import session
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.plot.bodies import draw_bodies
-from taichi_dem.result import Result
 from taichi_dem.simulate import result_of, simulate
 
 LENGTH = 0.3
@@ -39,41 +37,25 @@ EFFECTS = {
 ALL, WITHOUT_CONTACT = tuple(EFFECTS), tuple(EFFECTS)[:3]
 
 
-@dataclass(frozen=True, eq=False)
 class Answer:
     """Results for one choice, of the effects chosen and of all; speed: of the right end [m/s].
 
-    measured: whether each ran with a program of its own, which knows the cost of a step.
+    stroke: largest displacement of that end [m]. change: mean distance of the bodies from where all
+    effects bring them, by how far that is; None where a run did not come to its end. measured:
+    whether each ran with a program of its own, which knows the cost. step_s: CPU seconds of a step
+    of both; NaN if not measured.
     """
 
-    speed: float
-    chosen: Result
-    complete: Result
-    measured: bool = False
-
-    @property
-    def stroke(self):
-        """Largest displacement of the right end [m]."""
-        return self.speed / (2.0 * np.pi * FREQUENCY)
-
-    @property
-    def change(self):
-        """Mean distance of the bodies from where all effects bring them, by how far that is.
-
-        None where the chosen run did not come to its end.
-        """
-        if self.chosen.diverged or self.complete.diverged:
-            return None
-        here, there = (made.frames[LOOKS].displacement for made in (self.chosen, self.complete))
-        apart, way = (np.linalg.norm(one, axis=1).mean() for one in (here - there, there))
-        return float(apart / way)
-
-    @property
-    def step_s(self):
-        """CPU seconds of a step, of the choice and with all effects; NaN if not measured."""
-        reports = self.chosen.report, self.complete.report
-        seconds = [one.run_cpu_seconds / max(1, one.substeps) for one in reports]
-        return seconds if self.measured else [math.nan, math.nan]
+    def __init__(self, speed, chosen, complete, measured=False):
+        self.chosen, self.complete, self.measured = chosen, complete, measured
+        self.stroke, self.change = speed / (2.0 * np.pi * FREQUENCY), None
+        both = chosen, complete
+        seconds = [one.report.run_cpu_seconds / max(1, one.report.substeps) for one in both]
+        self.step_s = seconds if measured else [math.nan, math.nan]
+        if not any(one.diverged for one in both):
+            here, there = (one.frames[LOOKS].displacement for one in both)
+            apart, way = (np.linalg.norm(one, axis=1).mean() for one in (here - there, there))
+            self.change = float(apart / way)
 
 
 def allowed(names):
@@ -91,21 +73,17 @@ def scene(names, program, speed):
     return dem.Scene(BAR, dem.CONCRETE, [*listed, dem.effects.Fixed("left"), moved])
 
 
-def moved(names, program, speed):
-    """Result of a program in which the effects named act; diverged ones too."""
+def measured(names, speed, program=None):
+    """Result with these effects, also of a run that diverged; program: of theirs alone, if None."""
     looks = {"until": UNTIL, "samples": LOOKS, "frames": LOOKS, "progress": None}
-    return result_of(simulate, scene(names, program, speed), method=dem.Uniform(STEP), **looks)
+    pulled = scene(names, program or names, speed)
+    return result_of(simulate, pulled, method=dem.Uniform(STEP), **looks)
 
 
 @session.remember
 def outcome(names, speed):
-    """Result with these effects; others stand silent by."""
-    return moved(names, ALL if "sphere_contact" in names else WITHOUT_CONTACT, speed)
-
-
-def measured(names, speed):
-    """The same by the program of these effects alone, which knows its cost."""
-    return moved(names, names, speed)
+    """The same by a program that is there already, in which other effects stand silent by."""
+    return measured(names, speed, ALL if "sphere_contact" in names else WITHOUT_CONTACT)
 
 
 def answer(names, speed):
@@ -191,12 +169,11 @@ def _prices(above, below, answer):
     broken = [one.report.broken_faces for one in (answer.chosen, answer.complete)]
     costs = 1e6 * np.array(answer.step_s)
     for axes, values, form in ((above, costs, "%.3g"), (below, broken, "%d")):
-        if np.isfinite(values).all():
-            names = ["your choice", "all effects"]
-            bars = axes.barh(names, values, color=[BLUE, GREY], height=0.5)
-            axes.bar_label(bars, fmt=form, padding=3)
-            axes.set_xlim(0.0, 1.25 * max(values) or 1.0)
-            axes.grid(False, axis="y")
-        else:
+        if not np.isfinite(values).all():
             axes.set(xticks=[], yticks=[])
             axes.text(0.5, 0.5, "not measured yet: press the button", ha="center", va="center")
+            continue
+        bars = axes.barh(["your choice", "all effects"], values, color=[BLUE, GREY], height=0.5)
+        axes.bar_label(bars, fmt=form, padding=3)
+        axes.set_xlim(0.0, 1.25 * max(values) or 1.0)
+        axes.grid(False, axis="y")

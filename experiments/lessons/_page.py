@@ -1,4 +1,6 @@
-"""Parts of a page: sliders, and questions whose answers unfold."""
+"""Parts of a page: sliders, an answer with its picture, and questions that unfold."""
+
+from taichi_dem.kit.session_thread import session
 
 
 def sliders(mo, choices):
@@ -10,6 +12,30 @@ def sliders(mo, choices):
             for name, (steps, first, label) in choices.items()
         }
     )
+
+
+def is_served(mo):
+    """Whether somebody sees the page."""
+    return mo.app_meta().mode in ("run", "edit")
+
+
+def ask(mo, words, lesson, work, *choice):
+    """Answer of a lesson to a choice, and the picture of it; words: while one waits.
+
+    On a page that is served all is compiled first, so that no later answer has to wait for it.
+    """
+    with mo.status.spinner(f"{words} When a lesson is first opened it compiles, some seconds."):
+        if is_served(mo):
+            session.ask(lesson.compile_all)
+        answer = session.ask(work, *choice)
+        return answer, session.ask(lesson.picture, answer)
+
+
+def tell(mo, picture, alt, words, *more):
+    """Picture with words, printed where nobody sees the page; more: Markdown below them."""
+    if not is_served(mo):
+        print(words)
+    return mo.vstack([mo.image(picture, alt=alt), *map(mo.md, (words, *more))])
 
 
 def questions(mo, text):

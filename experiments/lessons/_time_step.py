@@ -5,7 +5,7 @@ The bar has 12 cells of six tetrahedra. All runs on the thread of the session.
 
 import math
 import textwrap
-from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +15,6 @@ from taichi_dem.kit.plot_style import BLACK, GREY, RED, png_of, seconds, styled,
 from taichi_dem.kit.session_thread import session
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.plot.bodies import draw_bodies
-from taichi_dem.result import Result
 from taichi_dem.simulate import result_of, run_simulation
 
 LENGTH, WIDTH, CELLS = 0.4, 0.05, (12, 1, 1)
@@ -33,37 +32,35 @@ CHOICES = {
     "rise": ([round(1e6 * one) for one in RISES], 20, "the blow rises in [µs]"),
 }
 METHODS = {
-    "explicit": dem.Uniform(),
-    "limited": dem.Uniform(dashpot="limited"),
-    "solved": dem.ImplicitDashpots(tolerance=1e-3),
+    "explicit": dem.Uniform,
+    "limited": partial(dem.Uniform, dashpot="limited"),
+    "solved": partial(dem.ImplicitDashpots, tolerance=1e-3),
 }
 STYLES = styles_of(METHODS)
 #: Of the displacement of the drawn bar.
 MAGNIFY = 1500.0
 
 
-@dataclass(frozen=True, eq=False)
 class Strike:
     """A run of the bar with a step [s].
 
-    moved: mean displacement of the far end [m], (SAMPLES + 1,), NaN after a divergence. seconds: of
-    one core for the run without frames on the way, NaN where that was not measured.
+    moved: mean displacement of the far end [m], (SAMPLES + 1,), NaN after a divergence. motion:
+    frame that is drawn, None where the run ended before. sentence: of the program where it ended
+    the run, or "". seconds: of one core for the run without frames on the way, NaN where that was
+    not measured.
     """
 
-    step: float
-    moved: np.ndarray
-    result: Result
-    seconds: float = math.nan
-
-    @property
-    def sentence(self):
-        """Of the program where it ended the run, or nothing."""
-        return self.result.diverged
-
-    @property
-    def motion(self):
-        """Frame that is drawn, None where the run ended before."""
-        return dict(enumerate(self.result.frames)).get(SHOWN)
+    def __init__(self, step, result):
+        self.step, self.result, self.seconds, self.sentence = (
+            step,
+            result,
+            math.nan,
+            result.diverged,
+        )
+        end, frames = result.model.centre[:, 0] > LENGTH * (1.0 - 1.0 / CELLS[0]), result.frames
+        self.moved = np.full(SAMPLES + 1, np.nan)
+        self.moved[: len(frames)] = result.mean_displacement(end)[:, 0]
+        self.motion = frames[SHOWN] if len(frames) > SHOWN else None
 
     def error(self, truth):
         """Largest distance from the truth, over the largest displacement there; NaN if diverged."""
@@ -93,29 +90,23 @@ def limits():
 
 def ready(method, step, rise):
     """The bar at rest, with a step and a rise of the blow [s]; a method is compiled once."""
-    # The first field of every method is its step.
-    name = next(iter(vars(METHODS[method])))
-    return dem.Simulation(scene(rise), replace(METHODS[method], **{name: step}))
+    return dem.Simulation(scene(rise), METHODS[method](step))
 
 
 def strike(method, step, rise):
     """Run the bar with a step and a rise of the blow [s]."""
     looks = {"until": UNTIL, "samples": 1, "frames": SAMPLES, "progress": None}
-    result = result_of(run_simulation, ready(method, step, rise), **looks)
-    end = result.model.centre[:, 0] > LENGTH * (1.0 - 1.0 / CELLS[0])
-    moved = np.full(SAMPLES + 1, np.nan)
-    moved[: len(result.frames)] = [frame.displacement[end, 0].mean() for frame in result.frames]
-    return Strike(step, moved, result)
+    return Strike(step, result_of(run_simulation, ready(method, step, rise), **looks))
 
 
 @session.remember
 def timed(method, step, rise):
     """The same with its cost, from a second run without frames on the way."""
     found = strike(method, step, rise)
-    if found.sentence:
-        return found
-    bare = run_simulation(ready(method, step, rise), until=UNTIL, samples=1, progress=None)
-    return replace(found, seconds=bare.report.run_cpu_seconds)
+    if not found.sentence:
+        bare = run_simulation(ready(method, step, rise), until=UNTIL, samples=1, progress=None)
+        found.seconds = bare.report.run_cpu_seconds
+    return found
 
 
 @session.remember
@@ -125,18 +116,12 @@ def truth(rise):
 
 
 def answer(method, step, rise):
-    """The Answer to a choice: method by name, step out of STEPS and rise out of RISES [s]."""
+    """The Answer to a choice: method by name, step and rise nearest to these [s]."""
+    step, rise = nearest(STEPS, step), nearest(RISES, rise)
     tried = session.kept(("ladders", rise), dict)
     own = tried[method] = [timed(method, one, rise) for one in STEPS]
     ladders = {name: tried[name] for name in METHODS if name in tried}
     return Answer(method, own[STEPS.index(step)], truth(rise), ladders)
-
-
-def answer_to(method, chosen):
-    """The Answer to a method by name and the values of the sliders."""
-    return answer(
-        method, nearest(STEPS, 1e-9 * chosen["step"]), nearest(RISES, 1e-6 * chosen["rise"])
-    )
 
 
 def nearest(values, value):

@@ -15,16 +15,9 @@ def _():
     import marimo as mo
 
     import _time_step as lesson
-    from _page import percent, questions, sliders
+    from _page import ask, percent, questions, sliders, tell
     from taichi_dem.kit.plot_style import seconds
-    from taichi_dem.kit.session_thread import session
 
-    served = mo.app_meta().mode in ("run", "edit")
-    return lesson, mo, percent, questions, seconds, served, session, sliders
-
-
-@app.cell
-def _(lesson, mo, seconds):
     _dashpots, _springs = map(seconds, lesson.limits())
     mo.md(f"""
     # What does a time step cost?
@@ -37,7 +30,7 @@ def _(lesson, mo, seconds):
     Two limits are known before any run: the dashpots of the stiffest body bear an explicit step of
     **{_dashpots}**, its springs one of **{_springs}**.
     """)
-    return
+    return ask, lesson, mo, percent, questions, seconds, sliders, tell
 
 
 @app.cell
@@ -50,20 +43,15 @@ def _(lesson, mo, sliders):
 
 
 @app.cell
-def _(chosen, lesson, method, mo, percent, seconds, served, session):
-    with mo.status.spinner("Striking. When a lesson is first opened it compiles, some seconds."):
-        if served:
-            session.ask(lesson.compile_all)
-        _answer = session.ask(lesson.answer_to, method.value, chosen.value)
-        _picture = session.ask(lesson.picture, _answer)
+def _(ask, chosen, lesson, method, mo, percent, seconds, tell):
+    _choice = method.value, 1e-9 * chosen.value["step"], 1e-6 * chosen.value["rise"]
+    _answer, _picture = ask(mo, "Striking.", lesson, lesson.answer, *_choice)
     _strike, _error = _answer.chosen, percent(_answer.chosen.error(_answer.truth))
     _words = f"The program says: *{_strike.sentence}.*"
     if not _strike.sentence:
         _words = f"With {seconds(_strike.step)} a step the far end is wrong by **{_error}** at most"
         _words += f", for **{seconds(_strike.seconds)}** of one core."
-    if not served:
-        print(_words)
-    mo.vstack([mo.image(_picture, alt="Bar, far end, error over cost"), mo.md(_words)])
+    tell(mo, _picture, "Bar, far end, error over cost", _words)
     return
 
 

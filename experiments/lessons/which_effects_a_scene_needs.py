@@ -15,15 +15,8 @@ def _():
     import marimo as mo
 
     import _needs as lesson
-    from _page import questions, sliders
-    from taichi_dem.kit.session_thread import session
+    from _page import ask, questions, sliders, tell
 
-    served = mo.app_meta().mode in ("run", "edit")
-    return lesson, mo, questions, served, session, sliders
-
-
-@app.cell
-def _(mo):
     mo.md("""
     # Which effects does my scene need?
 
@@ -31,7 +24,7 @@ def _(mo):
     in. Switch effects off: what is not listed is not computed, not stored, not compiled. A good
     scene lists what it needs, and nothing else.
     """)
-    return
+    return ask, lesson, mo, questions, sliders, tell
 
 
 @app.cell
@@ -47,21 +40,15 @@ def _(lesson, mo, sliders):
 
 
 @app.cell
-def _(chosen, lesson, listed, measure, mo, served, session):
+def _(ask, chosen, lesson, listed, measure, mo, tell):
     _names = lesson.allowed(name for name, on in listed.value.items() if on)
-    with mo.status.spinner("Pulling. When a lesson is first opened it compiles, some seconds."):
-        if served:
-            session.ask(lesson.compile_all)
-        _work = lesson.price if measure.value else lesson.answer
-        _answer = session.ask(_work, _names, chosen.value["speed"])
-        _picture = session.ask(lesson.picture, _answer)
+    _work = lesson.price if measure.value else lesson.answer
+    _answer, _picture = ask(mo, "Pulling.", lesson, _work, _names, chosen.value["speed"])
     _rows = ["| effect | listed | what it did | the program says |", "|---|---|---|---|"]
     for _name, _on, _did, _says in lesson.verdicts(_answer):
         _rows.append(f"| {_name} | {'yes' if _on else 'no'} | {_did} | **{_says}** |")
-    if not served:
-        print(lesson.words(_answer))
-    _image = mo.image(_picture, alt="Bar with all effects and with those chosen, cost of a step")
-    mo.vstack([_image, mo.md(lesson.words(_answer)), mo.md("\n".join(_rows))])
+    _alt = "Bar with all effects and with those chosen, cost of a step"
+    tell(mo, _picture, _alt, lesson.words(_answer), "\n".join(_rows))
     return
 
 

@@ -15,15 +15,8 @@ def _():
     import marimo as mo
 
     import _grains as lesson
-    from _page import percent, questions, sliders
-    from taichi_dem.kit.session_thread import session
+    from _page import ask, percent, questions, sliders, tell
 
-    served = mo.app_meta().mode in ("run", "edit")
-    return lesson, mo, percent, questions, served, session, sliders
-
-
-@app.cell
-def _(mo):
     mo.md("""
     # Why does a box of grains damp?
 
@@ -33,7 +26,7 @@ def _(mo):
     Nothing in the box is sticky, and still the box swings less. Where does the energy go, and
     when?
     """)
-    return
+    return ask, lesson, mo, percent, questions, sliders, tell
 
 
 @app.cell
@@ -45,11 +38,10 @@ def _(lesson, mo, sliders):
 
 
 @app.cell
-def _(chosen, lesson, mo, percent, served, session):
-    with mo.status.spinner("Shaking twelve boxes. The first time they are compiled, some seconds."):
-        _base, _ratio, _grains, _share = chosen.value.values()
-        _answer = session.ask(lesson.answer, _grains, 0.01 * _share, 1e-3 * _base, _ratio)
-        _picture = session.ask(lesson.picture, _answer)
+def _(ask, chosen, lesson, mo, percent, tell):
+    _base, _ratio, _grains, _share = chosen.value.values()
+    _choice = _grains, 0.01 * _share, 1e-3 * _base, _ratio
+    _answer, _picture = ask(mo, "Shaking twelve boxes.", lesson, lesson.Answer, *_choice)
     _taken, _swing = _answer.energy["filling"] / _answer.energy["base"], _answer.swing
     _words = (
         f"The box swings by **{1e3 * _swing:.2g} mm** and is accelerated by up to "
@@ -57,9 +49,7 @@ def _(chosen, lesson, mo, percent, served, session):
         f"that the base gives; the damping ratio is {_answer.damping_ratio:.2g} instead of "
         f"{_answer.oscillator.damping_ratio:.2g}."
     )
-    if not served:
-        print(_words)
-    mo.vstack([mo.image(_picture, alt="Response, energy a cycle, box"), mo.md(_words)])
+    tell(mo, _picture, "Response, energy a cycle, box", _words)
     return
 
 

@@ -72,25 +72,26 @@ class State:
         assign(self.max_speed2, max_speed**2)
         assign(self.broken_tick, np.full(model.bond_count, NEVER))
         assign(self.bad_body, n)
-        self.set_motion(model.centre, np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)))
+        self.set_motion(model.centre)
 
     def set_motion(
         self,
         position: ArrayLike,
-        orientation: ArrayLike,
+        orientation: Optional[ArrayLike] = None,
         velocity: Optional[ArrayLike] = None,
         spin: Optional[ArrayLike] = None,
     ) -> None:
-        """Set the motion of all bodies.
+        """Set the motion of all bodies, arrays of a row each or one row for all.
 
-        position (n, 3) [m], orientation (n, 4) unit quaternions, velocity (n, 3) [m/s] and spin
-        (n, 3) [rad/s] in world axes, zero by default.
+        position [m], orientation (unit quaternions, not turned by default), velocity [m/s] and
+        spin [rad/s] in world axes, zero by default.
         """
-        still = np.zeros((self.body_count, 3))
-        velocity = still if velocity is None else velocity
-        spin = still if spin is None else spin
-        arrays = (position, orientation, velocity, spin)
-        self._write_motion(*(np.ascontiguousarray(a, dtype=np.float64) for a in arrays))
+        given = (position, orientation, velocity, spin)
+        rest = ([0.0] * 3, [1.0, 0.0, 0.0, 0.0], [0.0] * 3, [0.0] * 3)
+        rows = [still if part is None else part for part, still in zip(given, rest)]
+        shapes = [(self.body_count, len(still)) for still in rest]
+        shaped = [np.broadcast_to(part, shape) for part, shape in zip(rows, shapes)]
+        self._write_motion(*(np.ascontiguousarray(part, dtype=np.float64) for part in shaped))
 
     @ti.func
     def body_motion(self, i, time, step):

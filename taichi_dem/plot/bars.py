@@ -3,7 +3,7 @@
 import matplotlib
 import numpy as np
 
-from taichi_dem.kit.plot_style import BLACK, GREEN, ORANGE, RED
+from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, RED, picture
 from taichi_dem.plot.film import moving_picture
 
 #: Below zero, at zero, above: pressed, at rest, pulled.
@@ -23,6 +23,32 @@ def draw_space_time(axes, place, time_s, values, label=None, top=None):
     if label is not None:
         axes.figure.colorbar(drawn, ax=axes, label=label)
     return drawn
+
+
+def picture_wave(path, place, time_s, values, *, cells, label, titles=("", ""), level=None):
+    """A picture of a wave: values over place and time, and over time in some cells.
+
+    place: of the cells (places,) [m]. time_s: (times,) [s]. values: (times, places). cells:
+    numbers of those to follow, name -> number. label: of the values. titles: of both panels.
+    level: words and value of a dotted line.
+    """
+    with picture(path, 1, 2, size=(10.0, 3.8)) as (_, (along, over)):
+        draw_space_time(along, place, time_s, values, label)
+        for (name, cell), colour in zip(cells.items(), (BLUE, GREEN, RED, ORANGE, PURPLE)):
+            over.plot(1e3 * time_s, values[:, cell], color=colour, label=name)
+            along.axvline(place[cell], color=colour, lw=0.8, ls="--", label=name)
+        along.set_title(titles[0])
+        along.legend(loc="upper left", title="seen on the right", frameon=True, framealpha=0.9)
+        if level:
+            over.axhline(level[1], color=GREY, ls=":", label=level[0])
+        over.set(xlabel="time [ms]", ylabel=label, title=titles[1])
+        over.legend(loc="upper left")
+
+
+def draw_breaks(axes, place, time_s, joints):
+    """Mark where and when joints broke; place: of the joints [m], joints: (times, joints)."""
+    when, where = np.nonzero(np.diff(joints.astype(int), axis=0, prepend=0) > 0)
+    axes.plot(place[where], 1e3 * time_s[when], "x", color=BLACK, ms=6, label="breaks")
 
 
 def film_bar(path, profile, stress_pa, *, length, strength_pa, bar=(), count=40, magnify=150.0):

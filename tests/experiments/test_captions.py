@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from _multirate import short_steps
-from _step_too_large import ended
+from demo_multirate import short_steps
+from demo_step_too_large import ended
 from taichi_dem.kit import study
 
 
@@ -121,4 +121,4 @@ def test_the_bar_is_looked_at_once_the_blow_has_given_energy(script, last):
 def test_grains_give_what_they_do_not_take(script, power, words):
     names = ("apparent_damping_N_s_m", "damping_ratio", "damping_ratio_empty", "apparent_mass_g")
     value = {"power_mW": power, **dict.fromkeys(names, 1.0)}
-    assert words in script("_demo_damper").taken(value)[0]
+    assert words in script("demo_damper").taken(value)[0]

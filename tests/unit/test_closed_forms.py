@@ -7,7 +7,13 @@ import numpy as np
 import pytest
 
 from taichi_dem import CONCRETE
-from taichi_dem.closed_forms import LinearBonds, damped_opening, velocity_after_impact
+from taichi_dem.closed_forms import (
+    LinearBonds,
+    bond_shear,
+    bond_tension,
+    damped_opening,
+    velocity_after_impact,
+)
 from taichi_dem.mesh.shapes import bar, pair, single
 from taichi_dem.mesh.topology import body_properties
 
@@ -71,3 +77,25 @@ def test_state_matrix_is_that_of_the_damped_opening():
     wanted = math.log(slow) / 1e-3
     # The opening's slow root; the fast one adds its part at the start, 1e-4 of the whole.
     assert abs(values.real / wanted - 1.0).min() < 1e-3
+
+
+def test_a_pulled_bond_softens_unloads_to_the_origin_and_is_gone_once_failed():
+    """Strength at the onset, half of it half-way, a secant back, full stiffness when pressed."""
+    onset, failure = CONCRETE.onset_opening, CONCRETE.failure_opening
+    middle, strength = 0.5 * (onset + failure), CONCRETE.tensile_strength
+    way = np.array([0.5 * onset, onset, middle, 0.5 * middle, -onset, middle, failure, -onset])
+    expected = np.array([0.5, 1.0, 0.5, 0.25, -1.0, 0.5, 0.0, 0.0]) * strength
+    assert bond_tension(CONCRETE, way) == pytest.approx(expected, abs=1e-9 * strength)
+    fine = np.linspace(0.0, failure, 100_001)
+    energy = bond_tension(CONCRETE, fine).sum() * fine[1]
+    assert energy == pytest.approx(CONCRETE.fracture_energy, rel=1e-4)
+
+
+def test_a_sheared_bond_slips_at_coulombs_bound_and_goes_back_elastically():
+    bound = CONCRETE.cohesion + 5e6 * CONCRETE.friction
+    reach = bound / CONCRETE.shear_stiffness
+    way = reach * np.array([0.5, 1.0, 3.0, 2.5, 1.0, 0.0, 2.0])
+    expected = bound * np.array([0.5, 1.0, 1.0, 0.5, -1.0, -1.0, 1.0])
+    assert bond_shear(CONCRETE, way, 5e6) == pytest.approx(expected, rel=1e-12)
+    # So strong a pull leaves nothing to hold it by.
+    assert not bond_shear(CONCRETE, way, -2.0 * CONCRETE.cohesion / CONCRETE.friction).any()

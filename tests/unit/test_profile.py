@@ -9,7 +9,7 @@ from taichi_dem import CONCRETE, Collector, Every, Scene, Uniform, effects, simu
 from taichi_dem.kit.plot_style import styled
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.output.profile import Profile, travel_time
-from taichi_dem.plot.bars import draw_space_time, film_bar
+from taichi_dem.plot.bars import draw_breaks, draw_space_time, film_bar, picture_wave
 from taichi_dem.plot.film_runs import FilmedRun, film_runs
 from taichi_dem.simulate import result_of
 
@@ -70,6 +70,31 @@ def test_a_diagram_and_a_film_are_drawn_of_it(seen, tmp_path):
     stress = profile.stress(1e10, 0.1)
     film_bar(tmp_path / "a.gif", profile, stress, length=0.3, strength_pa=6e6, bar=0, count=3)
     assert (tmp_path / "a.gif").stat().st_size > 1000
+
+
+def test_a_wave_is_drawn_over_place_and_time_and_as_some_cells_see_it(seen, tmp_path):
+    profile, *_ = seen
+    options = {"cells": {"first": 0, "end": -1}, "label": "velocity [m/s]", "level": ("pull", 10.0)}
+    place = np.array([0.05, 0.15, 0.25])
+    picture_wave(tmp_path / "a.png", place, profile.time, profile.velocity[:, 0], **options)
+    assert (tmp_path / "a.png").stat().st_size > 1000
+
+
+def test_breaks_are_marked_when_and_where_they_came():
+    joints = np.array([[False, False], [False, True], [True, True]])
+    with styled() as (_, axes):
+        draw_breaks(axes, np.array([0.1, 0.2]), np.array([0.0, 1e-3, 2e-3]), joints)
+        assert sorted(axes.lines[0].get_xydata().tolist()) == [[0.1, 2.0], [0.2, 1.0]]
+
+
+def test_mean_displacements_of_a_result_are_those_of_its_frames(seen):
+    *_, result = seen
+    moved = result.mean_displacement(np.arange(6))
+    assert moved.shape == (7, 3) and np.abs(moved[-1]).max() > 0.0
+    for row, frame in zip(moved, result.frames):
+        assert row == pytest.approx(frame.displacement[:6].mean(axis=0), rel=1e-12, abs=1e-20)
+    mask = np.arange(18) < 6
+    assert result.mean_displacement(mask).tobytes() == moved.tobytes()
 
 
 def test_a_film_shows_each_run_at_or_before_the_time_of_the_picture(seen, tmp_path, monkeypatch):

@@ -28,6 +28,14 @@ def test_rows_have_all_columns_in_order():
     ]
 
 
+def test_subjects_may_be_tuples():
+    table = study.Table(end=(1,), sum=(sum,), begin=(0,))
+    assert table.rows([(3, 4), (5, 6)]) == [
+        {"end": 4, "sum": 7, "begin": 3},
+        {"end": 6, "sum": 11, "begin": 5},
+    ]
+
+
 def test_columns_with_a_header_are_printed(capsys):
     TABLE.show(TABLE.rows(RUNS))
     lines = [line.split("  ") for line in capsys.readouterr().out.splitlines()]

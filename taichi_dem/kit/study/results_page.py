@@ -75,6 +75,19 @@ def read_entries(path: Union[str, Path]) -> tuple[Entry, ...]:
     return tuple(found)
 
 
+def markdown_table(entries: Sequence[Entry], root: Union[str, Path], pictures: str) -> str:
+    """Table of all entries for a file of a folder root, each with its picture where there is one.
+
+    pictures: folder of theirs, as NAME.png, from root.
+    """
+    lines = ["| question | command | time on two cores | picture |", "|---|---|---|---|"]
+    for entry in entries:
+        small = f"{pictures}/{entry.name}.png"
+        link = f"[picture]({small})" if Path(root, small).is_file() else ""
+        lines.append(f"| {entry.question} | `{entry.command}` | {entry.time} | {link} |")
+    return "\n".join(lines) + "\n"
+
+
 def write_page(root: str, entries: Sequence[Entry], failed: Mapping[str, str]) -> list:
     """Write root/index.html, the page of all entries, whose results stand in root/NAME.
 

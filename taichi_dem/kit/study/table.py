@@ -14,11 +14,12 @@ Row = dict[str, Any]
 class Column(NamedTuple):
     """A column: value, header and format of the printed table, unit of the figure.
 
-    value: dotted name of an attribute of the subject of a row, or a function of it. A column
-    without a header is not printed, one without a unit is no figure. format: as of ``show_rows``.
+    value: dotted name of an attribute of the subject of a row, place in a subject that is a tuple,
+    or a function of it. A column without a header is not printed, one without a unit is no figure.
+    format: as of ``show_rows``.
     """
 
-    value: Union[str, Callable[[Any], Any]]
+    value: Union[str, int, Callable[[Any], Any]]
     header: str = ""
     format: str = ""
     unit: str = ""
@@ -26,6 +27,8 @@ class Column(NamedTuple):
     def of(self, subject: Any) -> Any:
         """Value for the subject of a row."""
         value = self.value
+        if isinstance(value, int):
+            return subject[value]
         return attrgetter(value)(subject) if isinstance(value, str) else value(subject)
 
 
