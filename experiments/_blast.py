@@ -3,7 +3,7 @@
 import numpy as np
 
 from taichi_dem import CONCRETE, PAPER_BLOCK, Scene, effects, quality_report, read_mesh
-from taichi_dem.kit.study import add_checkpoints, add_settings, checkpoint_of, parser
+from taichi_dem.kit.study import add_checkpoints, checkpoint_of, parser
 from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
 from taichi_dem.observers import Every
 from taichi_dem.stability.step_control import StepControl
@@ -21,18 +21,16 @@ EFFECTS = {
 }
 
 
-def blast_parser(
-    name, description, drivers=BLAST_DRIVERS, settings=(), mesh=PAPER_BLOCK, saves=False
-):
-    """Parser of an experiment on a mesh; settings: as of ``add_settings``.
+def blast_parser(name, description, drivers=BLAST_DRIVERS, mesh=PAPER_BLOCK, saves=False, **given):
+    """Parser of an experiment on a mesh; given: settings and defaults, as of ``parser``.
 
     saves: whether its run is written whole, and saves itself on the way.
     """
-    made = parser(name, description, drivers)
+    made = parser(name, description, drivers, **given)
     made.add_argument("--mesh", default=mesh, help="tetrahedra with a face group hole")
     if saves:
         add_checkpoints(made)
-    return add_settings(made, dict(settings))
+    return made
 
 
 def run_options(options):

@@ -86,7 +86,6 @@ def chosen_method(name, dt0, distance):
 
 def run(options):
     """Run, picture, print."""
-    study.take_settings(options, SETTINGS)
     method = chosen_method(options.method, options.dt0, options.l)
     acting = chosen_effects(options.added, options.without)
     scene = Scene(read_mesh(options.mesh), CONCRETE, acting)

@@ -93,7 +93,6 @@ def largest_stable_step(scene, run, exact, options):
 
 def run(options):
     """Run the reference and all methods, compare, picture."""
-    study.take_settings(options, SETTINGS)
     scene, at = paper_scene(options.mesh), study.output_paths(options.out)
     reference = follow(scene, *REFERENCE, options)
     runs = [follow(scene, name, *METHODS[name], options) for name in options.methods]

@@ -59,12 +59,11 @@ TABLE = study.Table(
     whole=(lambda one: one.acceleration(PAPER_SERIAL), "whole", ".3g"),
     imbalance=("imbalance", "slowest/fastest", ".3g"),
 )
-options_parser = partial(blast_parser, NAME, __doc__, (), SETTINGS)
+options_parser = partial(blast_parser, NAME, __doc__, (), settings=SETTINGS)
 
 
 def run(options):
     """Record, simulate, measure, picture."""
-    study.take_settings(options, SETTINGS)
     scene, at = paper_scene(options.mesh), study.output_paths(options.out)
     counting = {"until": options.until, "every": options.every, "title": "blast"}
     workload, simulation = record_workload(scene, Multirate(DT0, options.l), **counting)

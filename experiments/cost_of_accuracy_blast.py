@@ -15,6 +15,7 @@ alone, without compiling.
 """
 
 import sys
+from functools import partial
 
 import numpy as np
 
@@ -82,17 +83,14 @@ COLUMNS = (
     "method step disturbed displacement_error faces_error energy_error broken_faces evaluations "
     f"cpu_s wall_s compile_s residual reached_s {' '.join(f'{term}_J' for term in SPLIT)} failure"
 )
-
-
-def options_parser():
-    """Options of this experiment; times are of one thread."""
-    return study.add_settings(blast_parser(NAME, __doc__), {}, threads=1)
+#: Times are of one thread.
+options_parser = partial(blast_parser, NAME, __doc__, settings=SETTINGS, threads=1)
 
 
 def run(options):
     """Run all methods, write pictures and tables, answer what an error costs."""
     scene = paper_scene(options.mesh)
-    folder = study.begin(options, SETTINGS)
+    folder = study.begin(options)
     reference, kept = reference_of(scene, options, folder)
     runs = {}
     for name, steps in options.steps.items():

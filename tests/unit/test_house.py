@@ -47,6 +47,7 @@ LAYERS = {
         ("plot",),
         ("response",),
         ("sweep", "force_check"),
+        ("step_study",),
         ("__init__",),
         ("__main__",),
     ),
