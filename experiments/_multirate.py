@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from _blast import level_columns, level_shares
 from taichi_dem import InputError
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.plot_style import GREY, line_key, picture, styles_of
 from taichi_dem.kit.study import Table
 from taichi_dem.mesh.topology import faces_of_group
+from taichi_dem.output.run_costs import level_columns, level_shares
 from taichi_dem.plot.film_runs import FilmedRun, film_runs
 from taichi_dem.plot.levels import draw_level_shares, level_look, level_names
 

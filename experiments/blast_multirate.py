@@ -17,12 +17,13 @@ import sys
 from functools import partial
 from types import SimpleNamespace
 
-from _blast import Costs, blast_parser, level_columns, level_shares, paper_scene, run_options
+from _blast import blast_parser, paper_scene, run_options
 from taichi_dem import At, InputError, Multirate, Uniform, plot, simulate
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.plot_style import styles_of
 from taichi_dem.output.hole_monitor import HoleMonitor
+from taichi_dem.output.run_costs import RunCosts, level_columns, level_shares
 
 NAME = "blast_multirate"
 METHODS = {
@@ -83,7 +84,7 @@ class Instant:
 
 def follow(name, options, scene):
     """One run of a method: what is measured early and late, its series, levels of its bodies."""
-    method, costs = METHODS[name](options.dt0, options.l), Costs()
+    method, costs = METHODS[name](options.dt0, options.l), RunCosts()
     made = {"early": Instant(options.early), "late": Instant(options.until)}
     looks = {"title": styles_of([name])[name].label, "observers": [costs, *made.values()]}
     try:
