@@ -32,7 +32,7 @@ LAYERS = {
         ("plot",),
         ("result",),
         ("simulate", "needed_effects", "outcome"),
-        ("workload",),
+        ("workload", "step_study"),
         ("__init__",),
         ("__main__",),
     ),
