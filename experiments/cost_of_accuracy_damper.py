@@ -13,21 +13,22 @@ with the transfer function of the empty container.
 
 import os
 import sys
+import time
 from functools import partial
 
 import numpy as np
 
-from _cost_rk45 import OSCILLATOR, rk45_points
-from ca_damper import Automaton, ProgressBar, Spheres
+from ca_damper import Automaton, Batch, Empty, Oscillator, ProgressBar, SceneTable, Spheres, rk45
 from ca_damper.measures import curve_distance
 from ca_damper.plot import picture_compared
 from ca_damper.step_study import StepStudy
 from taichi_dem.kit import study
-from taichi_dem.kit.plot_style import seconds, styles_of
-from taichi_dem.kit.study.work_precision import answers, write_points
+from taichi_dem.kit.plot_style import power, seconds, styles_of
+from taichi_dem.kit.study.work_precision import Point, answers, write_points
 from taichi_dem.kit.study.work_precision_picture import picture_work_precision
 
 NAME = "cost_of_accuracy_damper"
+OSCILLATOR = Oscillator()
 TARGETS = (0.1, 0.01, 0.001)
 PARTICLES, SPHERES = 30, "dem_tsuji"
 CA_STEPS = (2e-3, 1.1e-3, 7e-4, 5e-4, 3e-4, 2e-4, 1e-4, 5e-5)
@@ -53,6 +54,14 @@ SETTINGS = {
 }
 #: Repeats of a point end when they took so long together [s].
 ENOUGH = 1.5
+#: RK45 on the empty container: relative tolerances in the kernel and in Python.
+TOLERANCES = (1e-6, 1e-8, 1e-10, 1e-12)
+PYTHON_TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8)
+#: A Batch takes at least 40 steps a cycle: the first is the longest [s].
+RK45_STEPS = (3.9e-3, 1e-3, 2e-4)
+RK45_CYCLES = 30
+#: Samples a cycle from which the RMS of a sine is exact.
+SAMPLES = 8
 #: Times are of one thread.
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS, threads=1)
 
@@ -98,6 +107,53 @@ def sweep_of(name, options, bar):
     if name in options.twins and made.runs:
         made.measure_roundoff(max(made.runs))
     return made
+
+
+def rk45_points(frequency, repeats, quick):
+    """(Points of all ways, seconds of compiling) at frequencies [Hz]; quick: every other point."""
+    every = 2 if quick else 1
+    jobs = [
+        ("rk45_tolerance", rtol, power(rtol), RK45_STEPS[0], rtol) for rtol in TOLERANCES[::every]
+    ]
+    jobs += [("rk45_step", dt, f"{1e3 * dt:g} ms", dt, 1e-2) for dt in RK45_STEPS[::every]]
+    points, compiling = [], 0.0
+    for method, swept, label, dt, rtol in jobs:
+        found, seconds = rk45_in_kernel(frequency, repeats, dt, rtol)
+        points.append(Point(method, swept, label, *found))
+        compiling += seconds
+    for rtol in PYTHON_TOLERANCES[::every]:
+        points.append(Point("rk45_python", rtol, power(rtol), *rk45_in_python(frequency, rtol)))
+    return points, compiling
+
+
+def rk45_in_kernel(frequency, repeats, dt, rtol):
+    """(Evaluations, error, timing) of a Batch, and its seconds of compiling."""
+    table = SceneTable(0, 1, dt, frequency, OSCILLATOR.base_amplitude)
+    batch = Batch(Empty(), table, measured_cycles=1, rtol=rtol, atol=1e-3 * rtol)
+    seconds = []
+    # The first run compiles.
+    for _ in range(1 + repeats):
+        started = time.perf_counter()
+        batch.start("empty")
+        rms = batch.run(RK45_CYCLES - 1, 1).rms
+        seconds.append(time.perf_counter() - started)
+    evaluations = 6 * int(batch.attempts().sum())
+    error = curve_distance(rms, OSCILLATOR.rms(frequency))
+    return (evaluations, error, study.Timing.of(seconds[1:])), batch.compile_seconds
+
+
+def rk45_in_python(frequency, rtol):
+    """(Evaluations, error, timing) of the last cycle, begun in the steady state."""
+    started, x, evaluations = time.perf_counter(), [], 0
+    for f in frequency:
+        span, at = (0.0, RK45_CYCLES / f), (RK45_CYCLES - 1 + np.arange(SAMPLES) / SAMPLES) / f
+        job = OSCILLATOR.right_hand_side(f), span, OSCILLATOR.steady_state(f)
+        solution = rk45.solve(*job, rtol=rtol, atol=1e-3 * rtol, at=at)
+        x.append(solution.y[:SAMPLES, 0])
+        evaluations += solution.evaluations
+    rms = np.sqrt(np.square(x).mean(axis=1) - np.mean(x, axis=1) ** 2)
+    spent = study.Timing.of([time.perf_counter() - started])
+    return evaluations, curve_distance(rms, OSCILLATOR.rms(frequency)), spent
 
 
 def draw_all(folder, options, made, own, toward, empty, shared):

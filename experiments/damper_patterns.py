@@ -61,7 +61,10 @@ def options_parser():
 def run(options):
     """Shake both fillings, compare, picture."""
     jobs = {"ca": (Automaton(accounting=options.accounting), CA_DT), "dem": (Spheres(), options.dt)}
-    scenes = np.repeat(PARTICLES, options.seeds), np.tile(np.arange(options.seeds) + 1, 2)
+    scenes = (
+        np.repeat(PARTICLES, options.seeds),
+        np.tile(np.arange(options.seeds) + 1, len(PARTICLES)),
+    )
     motion = 1e-3 * options.amplitude, options.frequency
     batches = {
         name: Batch(filling, SceneTable(*scenes, dt, motion[1], motion[0]), mount="base")

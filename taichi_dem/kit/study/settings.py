@@ -33,6 +33,6 @@ def take_settings(options: Namespace, settings: Settings) -> None:
 
 
 def begin(options: Namespace, settings: Settings = MappingProxyType({})) -> Path:
-    """Take settings that ``main`` does not know; make the folder for the output, return its path."""
+    """Take settings that ``main`` does not know; make the folder for the output."""
     take_settings(options, settings)
     return Path(output_folder(options.out))
