@@ -1,11 +1,8 @@
 """The paper's blast, and the methods by which its experiments run it."""
 
-import numpy as np
-
 from taichi_dem import CONCRETE, PAPER_BLOCK, Scene, effects, quality_report, read_mesh
-from taichi_dem.kit.study import add_checkpoints, add_settings, checkpoint_of, parser
+from taichi_dem.kit.study import add_checkpoints, checkpoint_of, parser
 from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
-from taichi_dem.observers import Every
 from taichi_dem.stability.step_control import StepControl
 
 #: Drivers of a blast, the first the default.
@@ -21,18 +18,16 @@ EFFECTS = {
 }
 
 
-def blast_parser(
-    name, description, drivers=BLAST_DRIVERS, settings=(), mesh=PAPER_BLOCK, saves=False
-):
-    """Parser of an experiment on a mesh; settings: as of ``add_settings``.
+def blast_parser(name, description, drivers=BLAST_DRIVERS, mesh=PAPER_BLOCK, saves=False, **given):
+    """Parser of an experiment on a mesh; given: settings and defaults, as of ``parser``.
 
     saves: whether its run is written whole, and saves itself on the way.
     """
-    made = parser(name, description, drivers)
+    made = parser(name, description, drivers, **given)
     made.add_argument("--mesh", default=mesh, help="tetrahedra with a face group hole")
     if saves:
         add_checkpoints(made)
-    return add_settings(made, dict(settings))
+    return made
 
 
 def run_options(options):
@@ -40,33 +35,6 @@ def run_options(options):
     names = ("until", "driver", "samples", "frames")
     kept = {"output": options.out, **checkpoint_of(options)} if "resume" in options else {}
     return {**kept, **{name: value for name, value in vars(options).items() if name in names}}
-
-
-class Costs:
-    """Observer that keeps what a run has cost at every sample, and the levels of its bodies."""
-
-    when = Every(samples=1)
-
-    def __init__(self):
-        self.columns, self.levels, self.view = {"cpu_s": [], "evaluations": []}, [], None
-
-    def observe(self, view):
-        """Take a row."""
-        self.view = view
-        self.columns["cpu_s"].append(view.cpu_seconds)
-        self.columns["evaluations"].append(view.evaluations)
-        self.levels.append(view.motion()["level"])
-
-
-def level_shares(levels):
-    """Share of bodies on each level: rows (sample, level) that sum to 1."""
-    count = max(int(level.max()) for level in levels) + 1
-    return np.array([np.bincount(level, minlength=count) / len(level) for level in levels])
-
-
-def level_columns(shares):
-    """Columns of a table, by name, of what ``level_shares`` gave."""
-    return {f"level_{k}": share for k, share in enumerate(shares.T)}
 
 
 def paper_effects():

@@ -188,6 +188,4 @@ PARTS = (damper, _bench_start.measure, blast, block)
 
 
 if __name__ == "__main__":
-    made = study.parser(NAME, __doc__)
-    made.set_defaults(out="results", threads=1)
-    sys.exit(study.main(run, made))
+    sys.exit(study.main(run, study.parser(NAME, __doc__, out="results", threads=1)))

@@ -108,7 +108,6 @@ def figures_of(result, exponent):
 
 def run(options):
     """Run, picture, print."""
-    study.take_settings(options, SETTINGS)
     scene = Scene(mesh_of(options), CONCRETE, paper_effects())
     print_quality(scene)
     looks = {"title": "blasting", "observers": [ProgressLines(options.until)]}

@@ -22,13 +22,14 @@ from functools import partial
 
 import numpy as np
 
-from _blast import EFFECTS, blast_parser, level_columns, level_shares, print_quality, run_options
+from _blast import EFFECTS, blast_parser, print_quality, run_options
 from _blast import METHODS as BLAST_METHODS
 from taichi_dem import CONCRETE, InputError, Scene, SimulationDiverged, plot, read_mesh, simulate
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv
 from taichi_dem.methods import Multirate, Uniform
 from taichi_dem.output.record import write_bodies
+from taichi_dem.output.run_costs import level_columns, level_shares
 
 NAME = "blast_fracture"
 #: Methods of the paper, made of the largest step dt0 [s] and the displacement limit l [m].
@@ -86,7 +87,6 @@ def chosen_method(name, dt0, distance):
 
 def run(options):
     """Run, picture, print."""
-    study.take_settings(options, SETTINGS)
     method = chosen_method(options.method, options.dt0, options.l)
     acting = chosen_effects(options.added, options.without)
     scene = Scene(read_mesh(options.mesh), CONCRETE, acting)

@@ -23,11 +23,12 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from _blast import METHODS, Costs, blast_parser, paper_scene, run_options
+from _blast import METHODS, blast_parser, paper_scene, run_options
 from taichi_dem import ImplicitDashpots, ProgressBar, SimulationDiverged, plot, simulate
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.validation import choice
+from taichi_dem.output.run_costs import RunCosts
 
 NAME = "blast_methods"
 REFERENCE = "reference", partial(ImplicitDashpots, sweeps=(6, 40)), 2.5e-8
@@ -60,7 +61,7 @@ options_parser = partial(blast_parser, NAME, __doc__, settings=SETTINGS)
 
 def follow(scene, name, make, step, options):
     """One run of a method with a step [s]; writes its time series."""
-    costs, method = Costs(), make(step)
+    costs, method = RunCosts(), make(step)
     result = simulate(scene, method=method, title=name, observers=[costs], **run_options(options))
     series = {**result.history, **costs.columns}
     write_csv(f"{options.out}/history_{name}.csv", series)
@@ -93,7 +94,6 @@ def largest_stable_step(scene, run, exact, options):
 
 def run(options):
     """Run the reference and all methods, compare, picture."""
-    study.take_settings(options, SETTINGS)
     scene, at = paper_scene(options.mesh), study.output_paths(options.out)
     reference = follow(scene, *REFERENCE, options)
     runs = [follow(scene, name, *METHODS[name], options) for name in options.methods]

@@ -17,12 +17,13 @@ import sys
 from functools import partial
 from types import SimpleNamespace
 
-from _blast import Costs, blast_parser, level_columns, level_shares, paper_scene, run_options
+from _blast import blast_parser, paper_scene, run_options
 from taichi_dem import At, InputError, Multirate, Uniform, plot, simulate
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.plot_style import styles_of
 from taichi_dem.output.hole_monitor import HoleMonitor
+from taichi_dem.output.run_costs import RunCosts, level_columns, level_shares
 
 NAME = "blast_multirate"
 METHODS = {
@@ -33,7 +34,7 @@ METHODS = {
 SETTINGS = {
     "l": (1e-7, 1e-7, study.number(0, 1), "largest way of a body in a step [m], 1e-7"),
     "dt0": (1e-8, 1e-8, study.number(0, 1), "largest step [s], 1e-8"),
-    "early": (5e-5, 2e-5, study.number(0, 1), "first instant compared [s], 5e-5"),
+    "early": (None, None, study.number(0, 1), "first instant compared [s], 5e-5"),
     "until": (5e-4, 6e-5, study.number(0, 1), "second instant compared [s], 5e-4"),
     "samples": (100, 12, study.whole(1, 100000), "rows of the time series, 100"),
     "repeats": (1, 1, study.whole(1, 100), "runs of every method, 1"),
@@ -83,7 +84,7 @@ class Instant:
 
 def follow(name, options, scene):
     """One run of a method: what is measured early and late, its series, levels of its bodies."""
-    method, costs = METHODS[name](options.dt0, options.l), Costs()
+    method, costs = METHODS[name](options.dt0, options.l), RunCosts()
     made = {"early": Instant(options.early), "late": Instant(options.until)}
     looks = {"title": styles_of([name])[name].label, "observers": [costs, *made.values()]}
     try:
@@ -98,11 +99,10 @@ def follow(name, options, scene):
 
 def run(options):
     """Run all methods, compare, picture."""
-    asked = options.early is not None
-    study.take_settings(options, SETTINGS)
-    if asked and options.early > options.until:
+    early = 2e-5 if options.quick else 5e-5
+    options.early = options.early or min(early, options.until)
+    if options.early > options.until:
         raise InputError(f"early must be at most until, {options.until:g} s, got {options.early:g}")
-    options.early = min(options.early, options.until)
     scene, at = paper_scene(options.mesh), study.output_paths(options.out)
     runs = {
         name: [follow(name, options, scene) for _ in range(options.repeats)] for name in METHODS

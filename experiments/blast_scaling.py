@@ -30,8 +30,9 @@ from _scaling_threads import ROUNDS, thread_gain
 from taichi_dem import Multirate, ProgressBar
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv
-from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, PURPLE, RED, picture
+from taichi_dem.kit.plot_style import BLACK, PURPLE, RED, picture
 from taichi_dem.workload import WAYS, Workers, record_workload
+from taichi_dem.workload.picture import draw_acceleration, draw_cuts, draw_shares
 
 NAME = "blast_scaling"
 SETTINGS = {
@@ -51,7 +52,6 @@ PAPER_WORKERS, PAPER_SERIAL = 24, 0.05
 #: over those of 24 (4.3, 4.4).
 PAPER_IMBALANCE = {"static": 20381.0 / 3493.0, "rebalanced": 9787.0 / 9023.0}
 PAPER_SPEEDUP = {"static": 2702.0 / 541.0, "rebalanced": 2702.0 / 501.0}
-LOOK = dict(zip(WAYS, ((RED, "-"), (PURPLE, "--"), (BLUE, "-"), (GREEN, "-"))))
 TABLE = study.Table(
     workers=("workers", "workers"),
     way=("way", "way of sharing"),
@@ -59,12 +59,11 @@ TABLE = study.Table(
     whole=(lambda one: one.acceleration(PAPER_SERIAL), "whole", ".3g"),
     imbalance=("imbalance", "slowest/fastest", ".3g"),
 )
-options_parser = partial(blast_parser, NAME, __doc__, (), SETTINGS)
+options_parser = partial(blast_parser, NAME, __doc__, (), settings=SETTINGS)
 
 
 def run(options):
     """Record, simulate, measure, picture."""
-    study.take_settings(options, SETTINGS)
     scene, at = paper_scene(options.mesh), study.output_paths(options.out)
     counting = {"until": options.until, "every": options.every, "title": "blast"}
     workload, simulation = record_workload(scene, Multirate(DT0, options.l), **counting)
@@ -128,41 +127,15 @@ def draw(path, shared, chosen, workload, measured):
         axes["whole"].set(xlim=(0, PAPER_WORKERS + 1), ylim=(0, None), title=words)
         handles = axes["whole"].get_legend_handles_labels()
         figure.legend(*handles, loc="outside lower center", ncols=3)
-        draw_acceleration(axes["contact"], shared, np.inf, 0.0)
+        draw_acceleration(axes["contact"], shared)
         words = "Contact calculation alone, many simulated workers"
         axes["contact"].set(xscale="log", yscale="log", title=words)
         draw_shares(axes["shares"], chosen)
-        time_ms = 1e3 * workload.time
-        axes["cuts"].plot(time_ms, chosen["rebalanced"].cuts[:, 1:-1], color=BLUE, linewidth=0.5)
-        axes["cuts"].set(xlabel="time [ms]", ylabel="number of the body [1]")
-        axes["cuts"].set(xlim=(0.0, time_ms[-1]), ylim=(0, workload.counts.shape[1]))
+        axes["shares"].set_title("Simulated workers: slowest over fastest in the run (Fig 15)")
+        draw_cuts(axes["cuts"], chosen["rebalanced"], workload.time)
         axes["cuts"].set_title("Lines: where simulated workers' shares begin (Fig 9)")
         words = "Lines: simulated workers that share the work of one recorded run"
         figure.suptitle(f"{words}; points: measured times of processes or threads")
-
-
-def draw_acceleration(axes, shared, most, serial):
-    """Acceleration over the number of workers, and what nobody can exceed."""
-    for way, (colour, line) in LOOK.items():
-        counts = np.array([count for count in shared[way] if count <= most])
-        gains = [shared[way][count].acceleration(serial) for count in counts]
-        axes.plot(counts, gains, line, color=colour, label=WAYS[way])
-    bound = counts / (1.0 + serial * (counts - 1.0))
-    axes.plot(counts, bound, ":", color=GREY, label="bound: nobody ever waits")
-    axes.set(xlabel="workers [1]", ylabel="acceleration [1]")
-
-
-def draw_shares(axes, chosen):
-    """Time of every worker over the mean (Fig 15)."""
-    numbers = np.arange(1, PAPER_WORKERS + 1)
-    for way, (colour, line) in LOOK.items():
-        if way != "due":
-            share, words = chosen[way].seconds, f"{WAYS[way]}: {chosen[way].imbalance:.3g}"
-            axes.step(numbers, share / share.mean(), line, where="mid", color=colour, label=words)
-    axes.set(xlabel="number of the worker [1]", ylabel="time of its work / mean [1]")
-    axes.set(xlim=(0.5, PAPER_WORKERS + 0.5), ylim=(0.0, 1.4 * axes.get_ylim()[1]))
-    axes.set_title("Simulated workers: slowest over fastest in the run (Fig 15)")
-    axes.legend(loc="upper right")
 
 
 if __name__ == "__main__":

@@ -28,7 +28,7 @@ from taichi_dem.kit.plot_style import BROWN, GREY, STYLES, VIOLET, picture
 from taichi_dem.simulate import run_simulation
 
 NAME = "blast_sweeps"
-TIMES, QUICK_TIMES = (2e-5, 1e-4, 2e-4, 4e-4), (5e-6, 2e-5)
+SETTINGS = {"times": ((2e-5, 1e-4, 2e-4, 4e-4), (5e-6, 2e-5))}
 #: Way -> (words, colour); the first is that of the method with solved dashpots.
 WAYS = {
     "gauss_seidel": ("Gauss-Seidel by colours", STYLES["implicit"].colour),
@@ -37,7 +37,7 @@ WAYS = {
 }
 TOLERANCES = (0.05, 0.01, 1e-3)
 KICK, SWEEPS = 0.05, 30
-options_parser = partial(blast_parser, NAME, __doc__, ())
+options_parser = partial(blast_parser, NAME, __doc__, (), settings=SETTINGS)
 
 
 class Solving:
@@ -91,11 +91,10 @@ def draw(path, found):
 def run(options):
     """Go from time to time, solve in every way, compare."""
     scene, at = paper_scene(options.mesh), study.output_paths(options.out)
-    times = QUICK_TIMES if options.quick else TIMES
     simulation = Simulation(scene, ImplicitDashpots(refresh=4e-7))
-    solving = Solving(simulation, times)
+    solving = Solving(simulation, options.times)
     looks = {"samples": 1, "title": "blast", "observers": [solving]}
-    report = run_simulation(simulation, until=times[-1], **looks).report
+    report = run_simulation(simulation, until=options.times[-1], **looks).report
     errors = [
         {"time_s": time_s, "sweeps": k, **{way: found[way][k] for way in WAYS}}
         for time_s, found in solving.found.items()

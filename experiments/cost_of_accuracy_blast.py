@@ -15,6 +15,7 @@ alone, without compiling.
 """
 
 import sys
+from functools import partial
 
 import numpy as np
 
@@ -22,15 +23,14 @@ from _blast import blast_parser, paper_scene
 from taichi_dem import ImplicitDashpots, Multirate, ProgressBar, StepControl, Uniform, outcome
 from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import power, seconds, styles_of
-from taichi_dem.kit.study.work_precision import Point, percent
+from taichi_dem.kit.study.work_precision import percent
 from taichi_dem.kit.study.work_precision_picture import picture_errors, picture_work_precision
+from taichi_dem.step_study import StepStudy
 
 NAME = "cost_of_accuracy_blast"
 TARGETS = (0.1, 0.01, 0.001)
 #: The paper's largest step [s], and its largest way in a step [m].
 PAPER_DT0, PAPER_L = 1e-8, 1e-8
-#: How far bodies are displaced at the start of a run that differs by round-off only [m].
-DISTURBANCE = 1e-12
 #: A run that took longer is not made a second time [s].
 ENOUGH = 4.0
 TIME = "CPU time of one thread [s], least of its runs"
@@ -82,48 +82,37 @@ COLUMNS = (
     "method step disturbed displacement_error faces_error energy_error broken_faces evaluations "
     f"cpu_s wall_s compile_s residual reached_s {' '.join(f'{term}_J' for term in SPLIT)} failure"
 )
-
-
-def options_parser():
-    """Options of this experiment; times are of one thread."""
-    return study.add_settings(blast_parser(NAME, __doc__), {}, threads=1)
+#: Times are of one thread.
+options_parser = partial(blast_parser, NAME, __doc__, settings=SETTINGS, threads=1)
 
 
 def run(options):
     """Run all methods, write pictures and tables, answer what an error costs."""
     scene = paper_scene(options.mesh)
-    folder = study.begin(options, SETTINGS)
+    folder = study.begin(options)
     reference, kept = reference_of(scene, options, folder)
-    runs = {}
-    for name, steps in options.steps.items():
-        for step in steps:
-            runs.update(twin_runs(name, step, scene, options))
-    apart = {
-        (name, step): outcome.displacement_error(one, runs[name, step, 0])
-        for (name, step, disturbed), one in runs.items()
-        if disturbed
-    }
-    # The finest comes last.
-    floors = {name: apart[name, step] for name, step in apart}
-    points = [point_of(key, runs, reference, options.until) for key in runs if not key[2]]
-    titles = {name: style.label for name, style in styles_of(options.steps).items()}
-    check = outcome.displacement_error(runs[CHECK, options.steps[CHECK][-1], 0], reference)
+    studies = {name: study_of(name, steps, scene, options) for name, steps in options.steps.items()}
+    points = [point for one in studies.values() for point in one.points(reference)]
+    floors = {name: one.floor for name, one in studies.items() if one.twins}
+    titles = {name: style.label for name, style in styles_of(studies).items()}
+    check = outcome.displacement_error([*studies[CHECK].runs.values()][-1], reference)
     study.give_answers(options.out, points, TARGETS, floors, titles)
-    order = sorted(runs, key=lambda key: (list(options.steps).index(key[0]), key[2]))
     rows = [row_of(("reference", np.nan, 0), reference, reference)]
-    rows += [row_of(key, runs[key], reference) for key in order]
+    for name, one in studies.items():
+        for disturbed, some in enumerate((one.runs, one.twins)):
+            rows += [row_of((name, step, disturbed), some[step], reference) for step in some]
     study.write_rows(folder / "runs.csv", rows, COLUMNS)
-    picture_all(folder, options, runs, points, floors, reference, check, titles)
+    picture_all(folder, options, studies, points, floors, reference, check, titles)
     figures = {
         **study.cheapest_figures(points, 0.01, floors, "cheapest_seconds"),
         **study.cheapest_figures(points, 0.001, floors, "seconds"),
-        **figures_of(points, runs, reference),
-        "chaos_floor": study.figure(max(floors.values()), "1"),
-        "chaos_at_any_step": study.figure(max(apart.values()), "1"),
-        "reference_check": study.figure(check, "1"),
+        **figures_of(points, studies, reference),
+        "chaos_floor": (max(floors.values()), "1"),
+        "chaos_at_any_step": (max(max(studies[name].spread.values()) for name in floors), "1"),
+        "reference_check": (check, "1"),
         **study.figures_by_method(points, 0.01, floors),
     }
-    made = [*runs.values()] + ([] if kept else [reference])
+    made = [run for one in studies.values() for run in one.outcomes] + [reference] * (not kept)
     study.finish(options, NAME, figures, float(sum(one.compile_seconds for one in made)))
 
 
@@ -134,49 +123,27 @@ def reference_of(scene, options, folder):
     mesh = scene.mesh
     settings = (method, options.until, mesh.points.tobytes(), mesh.tetrahedra.tobytes())
     place = folder / "references", "implicit", settings, ("taichi_dem",)
-    found, kept = study.cached(*place, lambda: blast(scene, method, options, "reference").as_dict())
+    with ProgressBar("reference") as bar:
+        job = {"driver": options.driver, "progress": bar}
+        made = partial(outcome.outcome_of, scene, method, options.until, **job)
+        found, kept = study.cached(*place, lambda: made().as_dict())
     return outcome.Outcome(**found), kept
 
 
-def blast(scene, method, options, title, **disturbance):
-    """Outcome of the paper's blast by a method."""
-    with ProgressBar(title) as bar:
-        looks = {"driver": options.driver, "progress": bar, **disturbance}
-        return outcome.outcome_of(scene, method, options.until, **looks)
-
-
-def twin_runs(name, step, scene, options):
-    """Outcome of a method at a step, by (name, step, 0); and by 1 of its disturbed twin."""
-    job = scene, METHODS[name](step), options, f"{name}, {label_of(name, step)}"
-    runs = {(name, step, 0): blast(*job)}
-    steps, made = options.steps[name], runs[name, step, 0]
-    # The coarsest of several is too coarse for its spread to matter.
-    again = name in options.twins and (step != steps[0] or len(steps) == 1)
-    if again and not made.failure and made.cpu_s < ENOUGH:
-        runs[name, step, 1] = blast(*job, disturbance=DISTURBANCE)
-    return runs
+def study_of(name, steps, scene, options):
+    """Runs of a method at all steps, with their disturbed twins."""
+    job = {"driver": options.driver, "label": partial(label_of, name)}
+    made = StepStudy(name, METHODS[name], scene, options.until, **job)
+    for step in steps:
+        # The coarsest of several is too coarse for its spread to matter.
+        again = name in options.twins and (step != steps[0] or len(steps) == 1)
+        made.run(step, ENOUGH if again else 0.0)
+    return made
 
 
 def label_of(name, step):
     """A step in words."""
     return f"l = {1e6 * step:g} µm" if name in BY_WAY else seconds(step)
-
-
-def point_of(key, runs, reference, until):
-    """Point of a run; a failed one has the evaluations of the next finer, by steps."""
-    name, step, _ = key
-    run, label = runs[key], label_of(name, step)
-    if run.failure:
-        good = [at for at in runs if at[0] == name and not runs[at].failure]
-        work = run.evaluations * until / run.reached_s
-        if good:
-            near = max(good, key=lambda at: at[1])
-            work = runs[near].evaluations * near[1] / step
-        words = f"diverged at {1e6 * run.reached_s:.0f} µs"
-        return Point(name, step, label, work, failure=words)
-    timing = study.Timing.of([one.cpu_s for at, one in runs.items() if at[:2] == key[:2]])
-    error = outcome.displacement_error(run, reference)
-    return Point(name, step, label, run.evaluations, error, timing, run.residual)
 
 
 def row_of(key, run, reference):
@@ -188,7 +155,7 @@ def row_of(key, run, reference):
     return (*key, *errors, len(run.broken), *cost, *energy, run.failure.replace(",", ";"))
 
 
-def picture_all(folder, options, runs, points, floors, reference, check, titles):
+def picture_all(folder, options, studies, points, floors, reference, check, titles):
     """The work-precision diagram, and the same for broken faces and energy."""
     scene = (
         f"Paper's block, {len(reference.moved)} bodies to {1e6 * options.until:.0f} µs, "
@@ -215,7 +182,7 @@ def picture_all(folder, options, runs, points, floors, reference, check, titles)
     own = {name: [p for p in points if p.method == name and not p.failure] for name in titles}
     errors = {
         words: {
-            name: [(p.low, error(runs[name, p.step, 0], reference)) for p in good]
+            name: [(p.low, error(studies[name].runs[p.step], reference)) for p in good]
             for name, good in own.items()
         }
         for words, error in MEASURES.items()
@@ -224,17 +191,17 @@ def picture_all(folder, options, runs, points, floors, reference, check, titles)
     picture_errors(folder / "errors.png", errors, titles, time_name=TIME, caption=caption)
 
 
-def figures_of(points, runs, reference):
+def figures_of(points, studies, reference):
     """Price of the paper's rule, and the longest step that full dashpots bear."""
-    figures, paper = {}, runs.get(("uniform", PAPER_L, 0))
+    figures = {}
+    paper = studies["uniform"].runs.get(PAPER_L) if "uniform" in studies else None
     if paper:
         error = outcome.displacement_error(paper, reference)
-        figures["paper_rule_seconds"] = study.figure(paper.cpu_s, "s")
-        figures["paper_rule_error"] = study.figure(error, "1")
+        figures = {"paper_rule_seconds": (paper.cpu_s, "s"), "paper_rule_error": (error, "1")}
     fixed = [point for point in points if point.method == "fixed"]
     if fixed:
         longest = max((point.step for point in fixed if not point.failure), default=None)
-        figures["longest_fixed_step_full_dashpots"] = study.figure(longest, "s")
+        figures["longest_fixed_step_full_dashpots"] = (longest, "s")
     return figures
 
 

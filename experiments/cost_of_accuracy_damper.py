@@ -13,29 +13,22 @@ with the transfer function of the empty container.
 
 import os
 import sys
-from dataclasses import replace
-from operator import attrgetter
+import time
+from functools import partial
 
 import numpy as np
 
-from _cost_rk45 import OSCILLATOR, rk45_points
-from ca_damper import (
-    Automaton,
-    InputError,
-    ProgressBar,
-    SimulationDiverged,
-    Spheres,
-    frequency_response,
-)
-from ca_damper.force_check import checked_response
-from ca_damper.measures import curve_distance, seed_variance
+from ca_damper import Automaton, Batch, Empty, Oscillator, ProgressBar, SceneTable, Spheres, rk45
+from ca_damper.measures import curve_distance
 from ca_damper.plot import picture_compared
+from ca_damper.step_study import StepStudy
 from taichi_dem.kit import study
-from taichi_dem.kit.plot_style import seconds, styles_of
+from taichi_dem.kit.plot_style import power, seconds, styles_of
 from taichi_dem.kit.study.work_precision import Point, answers, write_points
 from taichi_dem.kit.study.work_precision_picture import picture_work_precision
 
 NAME = "cost_of_accuracy_damper"
+OSCILLATOR = Oscillator()
 TARGETS = (0.1, 0.01, 0.001)
 PARTICLES, SPHERES = 30, "dem_tsuji"
 CA_STEPS = (2e-3, 1.1e-3, 7e-4, 5e-4, 3e-4, 2e-4, 1e-4, 5e-5)
@@ -61,23 +54,24 @@ SETTINGS = {
 }
 #: Repeats of a point end when they took so long together [s].
 ENOUGH = 1.5
-run_seconds = attrgetter("report.run_seconds")
-
-
-def options_parser():
-    """Options of this experiment; times are of one thread."""
-    return study.add_settings(study.parser(NAME, __doc__), {}, threads=1)
+#: RK45 on the empty container: relative tolerances in the kernel and in Python.
+TOLERANCES = (1e-6, 1e-8, 1e-10, 1e-12)
+PYTHON_TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8)
+#: A Batch takes at least 40 steps a cycle: the first is the longest [s].
+RK45_STEPS = (3.9e-3, 1e-3, 2e-4)
+RK45_CYCLES = 30
+#: Samples a cycle from which the RMS of a sine is exact.
+SAMPLES = 8
+#: Times are of one thread.
+options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS, threads=1)
 
 
 def run(options):
     """Measure all methods, write pictures and tables, find the cheapest method for an error."""
-    folder = study.begin(options, SETTINGS)
+    folder = study.begin(options)
     with ProgressBar("sweep") as bar:
-        made = {
-            name: Sweep(name, options, bar)
-            for name, (_, _, quick, *_) in METHODS.items()
-            if quick or not options.quick
-        }
+        names = [name for name, one in METHODS.items() if one[2] or not options.quick]
+        made = {name: sweep_of(name, options, bar) for name in names}
     frequency = np.array(options.ratios) * OSCILLATOR.natural_frequency
     empty, compiling = rk45_points(frequency, options.repeats, options.quick)
     compiling += sum(sweep.compile_s for sweep in made.values())
@@ -96,108 +90,70 @@ def run(options):
     study.finish(options, NAME, figures_of(made, own, toward, empty, floors), compiling)
 
 
-class Sweep:
-    """All runs of one method.
+def sweep_of(name, options, bar):
+    """All runs of a method: a ``StepStudy``."""
+    filling, steps, quick, finest, count = METHODS[name]
+    steps = quick if options.quick else steps
+    finest, count = (0.5 * min(steps), 2) if options.quick else (finest, count)
+    cycles = dict(zip(("transient_cycles", "measured_cycles"), options.cycles))
+    job = {"ratios": options.ratios, "start": "rigid", "progress": bar, **cycles}
+    made = StepStudy(name, filling, PARTICLES, options.seeds, **job)
+    settings = filling, OSCILLATOR, options.ratios, options.cycles, finest, count
+    place = os.path.join(options.out, "references"), name, settings, ("ca_damper",)
+    made.reference, kept = study.cached(*place, lambda: made.make_reference(finest, count))
+    made.compile_s += 0.0 if kept else made.reference["compile_s"]
+    for dt in steps:
+        made.run(dt, options.repeats, ENOUGH)
+    if name in options.twins and made.runs:
+        made.measure_roundoff(max(made.runs))
+    return made
 
-    runs: Responses by step, one a repeat; failures: the reason by step. reference: dict of the
-    curve at the finest step: rms [m], (ratios, seeds), step, compile_s, force_check. mean: of it
-    over the seeds. roundoff: spread of runs that differ by the last bit of the base's amplitude,
-    None if not asked for. compile_s: of everything.
-    """
 
-    def __init__(self, name, options, bar):
-        self.name, self.options = name, options
-        self.filling, steps, quick, finest, count = METHODS[name]
-        steps = quick if options.quick else steps
-        finest, count = (0.5 * min(steps), 2) if options.quick else (finest, count)
-        transient, measured = options.cycles
-        job = {"particles": PARTICLES, "ratios": options.ratios, "start": "rigid", "progress": bar}
-        self.job = {**job, "transient_cycles": transient, "measured_cycles": measured}
-        settings = self.filling, OSCILLATOR, options.ratios, options.cycles, finest, count
-        place = os.path.join(options.out, "references"), name, settings, ("ca_damper",)
-        self.reference, kept = study.cached(*place, lambda: self.checked(finest, count))
-        self.rms = np.array(self.reference["rms"])
-        self.mean, self.roundoff = self.rms.mean(axis=1), None
-        self.runs, self.failures = {}, {}
-        for dt in steps:
-            self.run(dt)
-        twins = self.twins(max(self.runs)) if name in options.twins and self.runs else []
-        if twins:
-            self.roundoff = seed_variance(np.hstack([one.rms[0] for one in twins])) ** 0.5
-        every = [*twins, *(one for repeats in self.runs.values() for one in repeats)]
-        self.compile_s = sum(one.report.compile_seconds for one in every)
-        self.compile_s += 0.0 if kept else self.reference["compile_s"]
+def rk45_points(frequency, repeats, quick):
+    """(Points of all ways, seconds of compiling) at frequencies [Hz]; quick: every other point."""
+    every = 2 if quick else 1
+    jobs = [
+        ("rk45_tolerance", rtol, power(rtol), RK45_STEPS[0], rtol) for rtol in TOLERANCES[::every]
+    ]
+    jobs += [("rk45_step", dt, f"{1e3 * dt:g} ms", dt, 1e-2) for dt in RK45_STEPS[::every]]
+    points, compiling = [], 0.0
+    for method, swept, label, dt, rtol in jobs:
+        found, seconds = rk45_in_kernel(frequency, repeats, dt, rtol)
+        points.append(Point(method, swept, label, *found))
+        compiling += seconds
+    for rtol in PYTHON_TOLERANCES[::every]:
+        points.append(Point("rk45_python", rtol, power(rtol), *rk45_in_python(frequency, rtol)))
+    return points, compiling
 
-    def checked(self, dt, count):
-        """The reference; its seeds are its own: a run that shares them would look too good."""
-        seeds = range(1001, 1001 + count)
-        found, mismatch = checked_response(self.filling, dt=dt, seeds=seeds, **self.job)
-        spent = found.report.compile_seconds
-        rms = found.rms[0].tolist()
-        return {"rms": rms, "step": dt, "compile_s": spent, "force_check": mismatch}
 
-    def run(self, dt):
-        """Run a step of the sweep, again and again for its timing, or note why it failed."""
-        repeats, job = [], {"dt": dt, "seeds": self.options.seeds, **self.job}
-        try:
-            self.filling.check(PARTICLES, dt)
-            while len(repeats) < self.options.repeats and sum(map(run_seconds, repeats)) < ENOUGH:
-                repeats.append(frequency_response(self.filling, **job))
-            self.runs[dt] = repeats
-        except (InputError, SimulationDiverged) as error:
-            self.failures[dt] = "refused" if isinstance(error, InputError) else "diverged"
+def rk45_in_kernel(frequency, repeats, dt, rtol):
+    """(Evaluations, error, timing) of a Batch, and its seconds of compiling."""
+    table = SceneTable(0, 1, dt, frequency, OSCILLATOR.base_amplitude)
+    batch = Batch(Empty(), table, measured_cycles=1, rtol=rtol, atol=1e-3 * rtol)
+    seconds = []
+    # The first run compiles.
+    for _ in range(1 + repeats):
+        started = time.perf_counter()
+        batch.start("empty")
+        rms = batch.run(RK45_CYCLES - 1, 1).rms
+        seconds.append(time.perf_counter() - started)
+    evaluations = 6 * int(batch.attempts().sum())
+    error = curve_distance(rms, OSCILLATOR.rms(frequency))
+    return (evaluations, error, study.Timing.of(seconds[1:])), batch.compile_seconds
 
-    def twins(self, dt):
-        """Responses to bases whose amplitudes differ by their last bits."""
-        bit = np.spacing(OSCILLATOR.base_amplitude)
-        bases = [
-            replace(OSCILLATOR, base_amplitude=OSCILLATOR.base_amplitude + k * bit)
-            for k in range(3)
-        ]
-        job = {"dt": dt, "seeds": 1, **self.job}
-        return [frequency_response(self.filling, oscillator=base, **job) for base in bases]
 
-    def curve(self, dt):
-        """Mean over the seeds at a step [m]."""
-        return self.runs[dt][0].rms[0].mean(axis=1)
-
-    def points(self, truth):
-        """Points with errors against a curve [m]."""
-        weight = PARTICLES * self.filling.particle_mass * self.filling.gravity
-        scenes = PARTICLES * len(self.options.seeds) * sum(self.options.cycles)
-        frequency, found = np.array(self.options.ratios) * OSCILLATOR.natural_frequency, []
-        for dt in sorted([*self.runs, *self.failures], reverse=True):
-            work = scenes * int(np.ceil(1.0 / (frequency * dt) * (1.0 - 1e-12)).sum())
-            point = Point(self.name, dt, seconds(dt), work, failure=self.failures.get(dt, ""))
-            if dt in self.runs:
-                timing = study.Timing.of(map(run_seconds, self.runs[dt]))
-                missing = abs(float(self.runs[dt][0].mean_force.mean()) + weight) / weight
-                error = curve_distance(self.curve(dt), truth)
-                point = replace(point, error=error, seconds=timing, residual=missing)
-            found.append(point)
-        return found
-
-    def rows(self):
-        """A row a step, ratio and seed."""
-        runs = [(dt, repeats[0].rms[0], 0, 1) for dt, repeats in self.runs.items()]
-        for dt, rms, is_reference, first in [*runs, (self.reference["step"], self.rms, 1, 1001)]:
-            for (k, j), value in np.ndenumerate(rms):
-                yield self.name, self.options.ratios[k], dt, first + j, value, is_reference
-
-    @property
-    def floor(self):
-        """Error expected from seeds alone, of a run against a reference of the same method.
-
-        The variance from seed to seed is the mean over all runs of the method, as a single run may
-        see one of several steady motions only.
-        """
-        return self.seed_spread * (1.0 / len(self.options.seeds) + 1.0 / self.rms.shape[1]) ** 0.5
-
-    @property
-    def seed_spread(self):
-        """Standard deviation from seed to seed of a response, as a share of the peak."""
-        runs = [self.rms, *(repeats[0].rms[0] for repeats in self.runs.values())]
-        return float(np.mean([seed_variance(rms) for rms in runs]) ** 0.5)
+def rk45_in_python(frequency, rtol):
+    """(Evaluations, error, timing) of the last cycle, begun in the steady state."""
+    started, x, evaluations = time.perf_counter(), [], 0
+    for f in frequency:
+        span, at = (0.0, RK45_CYCLES / f), (RK45_CYCLES - 1 + np.arange(SAMPLES) / SAMPLES) / f
+        job = OSCILLATOR.right_hand_side(f), span, OSCILLATOR.steady_state(f)
+        solution = rk45.solve(*job, rtol=rtol, atol=1e-3 * rtol, at=at)
+        x.append(solution.y[:SAMPLES, 0])
+        evaluations += solution.evaluations
+    rms = np.sqrt(np.square(x).mean(axis=1) - np.mean(x, axis=1) ** 2)
+    spent = study.Timing.of([time.perf_counter() - started])
+    return evaluations, curve_distance(rms, OSCILLATOR.rms(frequency)), spent
 
 
 def draw_all(folder, options, made, own, toward, empty, shared):
@@ -253,22 +209,21 @@ def figures_of(made, own, toward, empty, floors):
             toward, 0.02, floors, "cheapest_seconds", "to_spheres_within_2_percent"
         ),
         **study.figures_by_method(own, 0.01, floors),
-        "chaos_floor": study.figure(min(floors.values()), "1"),
+        "chaos_floor": (min(floors.values()), "1"),
     }
     for label, sweep in made.items():
         values = {
             "chaos_floor": sweep.floor,
             "roundoff_spread": sweep.roundoff,
             "seed_spread": sweep.seed_spread,
-            "check_step": curve_distance(sweep.curve(min(sweep.runs)), sweep.mean),
+            "check_step": curve_distance(sweep.curve(), sweep.mean),
             "check_force": sweep.reference["force_check"],
             "distance_to_spheres": curve_distance(sweep.mean, made[SPHERES].mean),
         }
-        known = {f"{name}_{label}": value for name, value in values.items() if value is not None}
-        figures.update({name: study.figure(value, "1") for name, value in known.items()})
+        known = {name: value for name, value in values.items() if value is not None}
+        figures.update({f"{name}_{label}": (value, "1") for name, value in known.items()})
     evaluations = answers(empty, 1e-6, {})[0].point.evaluations
-    figures["rk45_evaluations_at_1e-6"] = study.figure(evaluations, "1")
-    return figures
+    return {**figures, "rk45_evaluations_at_1e-6": (evaluations, "1")}
 
 
 if __name__ == "__main__":

@@ -16,6 +16,7 @@ Writes effects.png, blast.csv, damper.csv and summary.json to results/cost_of_ef
 
 import os
 import sys
+from functools import partial
 
 import numpy as np
 
@@ -61,16 +62,13 @@ ADDED = ("rotation",)
 #: Columns of what an effect adds, and their units.
 ADDS = {"run_s": "s", "memory_MB": "MB", "compiled_kB": "kB"}
 HIDDEN = ("group", "failed", "run_s", "spared_least_percent", "spared_most_percent")
-
-
-def options_parser():
-    """Options of this experiment; threads: processes side by side."""
-    return study.add_settings(study.parser(NAME, __doc__), SETTINGS)
+#: Threads are processes side by side.
+options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
 
 
 def run(options):
     """Measure, then write and print."""
-    folder = study.begin(options, SETTINGS)
+    folder = study.begin(options)
     calls = {**blasts(options), **dampers(options)}
     workers = options.threads or min(2, os.cpu_count() or 1)
     with ProgressBar("measuring") as bar:

@@ -10,6 +10,7 @@ apart. Then every filling is run at longer and longer steps until it refuses or 
 """
 
 import sys
+from functools import partial
 from statistics import median
 
 import numpy as np
@@ -47,16 +48,13 @@ VARIANTS = {
 }
 #: Marker of each outcome of a run.
 OUTCOMES = {"runs": "o", "diverges": "X", "refused": "|"}
-
-
-def options_parser():
-    """Options of this experiment; times are of one thread."""
-    return study.add_settings(study.parser(NAME, __doc__), SETTINGS, threads=1)
+#: Times are of one thread.
+options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS, threads=1)
 
 
 def run(options):
     """Time all variants, find their longest steps, write tables and pictures."""
-    folder = study.begin(options, SETTINGS)
+    folder = study.begin(options)
     with ca_damper.ProgressBar("timing") as bar:
         costs, compiling = {}, 0.0
         for k, label in enumerate(VARIANTS):

@@ -14,21 +14,27 @@ Writes rebound.png, heights.csv, impacts.csv and summary.json to results/damper_
 """
 
 import math
-import os
 import sys
+from functools import partial
 
 import numpy as np
 
 from ca_damper import Automaton, Batch, SceneTable, Spheres, film
 from ca_damper.automaton.accumulator import READINGS
 from ca_damper.bouncing import Fall, RecordedFall
-from taichi_dem.kit.files import output_folder
+from taichi_dem.kit import study
 from taichi_dem.kit.plot_style import BLACK, VIOLET, picture, styles_of
 from taichi_dem.kit.progress.progress_bar import ProgressBar
-from taichi_dem.kit.study import figure, finish, main, number, parser, print_table, write_rows
 
 NAME = "damper_rebound"
-QUICK, FULL = {"impacts": 4, "every_s": 1e-3}, {"impacts": 6, "every_s": 4e-4}
+SETTINGS = {
+    "restitution": (0.75, 0.75, study.number(0.3, 1), "0.75"),
+    "ca_dt": (1e-4, 1e-4, study.number(0, 1), "automaton's step [s], 1e-4"),
+    "dt": (2e-5, 2e-5, study.number(0, 1), "spheres' step [s], 2e-5"),
+    "impacts": (6, 4),
+    # Between two samples [s].
+    "every": (4e-4, 1e-3),
+}
 #: Impacts that the figures speak of, and how far off the default reading may be.
 COUNTED, ALLOWED_MS = 4, 2.0
 #: The base stands still; its frequency [Hz] only makes whole steps of 1e-4 s and 2e-5 s.
@@ -47,35 +53,29 @@ TITLES = {
 SHORTEST = 5e-3
 #: First impact to fourth: light to dark, as no colour of a filling is meant.
 SHADES = ("#D0D0D0", "#A0A0A0", "#6A6A6A", "#2A2A2A")
-
-
-def options_parser():
-    """Options of this experiment."""
-    made = parser(NAME, __doc__)
-    made.add_argument("--restitution", type=number(0.3, 1), default=0.75, help="0.75")
-    made.add_argument("--ca-dt", type=number(0, 1), default=1e-4, help="automaton's step [s], 1e-4")
-    made.add_argument("--dt", type=number(0, 1), default=2e-5, help="spheres' step [s], 2e-5")
-    return made
+options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
 
 
 def run(options):
     """Drop the particle in every filling, compare, picture."""
-    batches = {
-        title: (Batch(filling, SceneTable(1, 1, dt, FREQUENCY, 0.0), mount="base"), height)
+    jobs = {
+        title: (
+            Batch(filling, SceneTable(1, 1, dt, FREQUENCY, 0.0), mount="base"),
+            Fall(height, options.restitution, filling.gravity),
+        )
         for title, filling, dt, height in fillings(options)
     }
-    output_folder(options.out)
-    runs = {}
-    for title, (batch, height) in batches.items():
-        fall = Fall(height, options.restitution, batch.filling.gravity)
+    folder, runs = study.begin(options), {}
+    for title, job in jobs.items():
         with ProgressBar(title) as progress:
-            runs[title] = drop(batch, fall, QUICK if options.quick else FULL, progress)
+            runs[title] = drop(*job, options, progress)
     errors = {title: 1e3 * np.array(made.errors(COUNTED)) for title, made in runs.items()}
-    picture_rebound(os.path.join(options.out, "rebound.png"), runs, errors)
-    write_tables(runs, options.out)
+    picture_rebound(folder / "rebound.png", runs, errors)
+    write_tables(folder, runs)
     print_errors(errors)
-    used = [batch for batch, _ in batches.values()]
-    finish(options, NAME, figures_of(errors), used, show=False)
+    study.finish(
+        options, NAME, figures_of(errors), [batch for batch, _ in jobs.values()], show=False
+    )
 
 
 def fillings(options):
@@ -91,12 +91,12 @@ def fillings(options):
     yield "dem", filling, options.dt, spheres.height - spheres.diameter
 
 
-def drop(batch, fall, settings, progress):
+def drop(batch, fall, options, progress):
     """Let the particle make its impacts and rise once more; returns a RecordedFall."""
     batch.start()
-    dt, last = batch.table.row(0)["dt"], settings["impacts"]
+    dt, last = batch.table.row(0)["dt"], options.impacts
     until = 0.5 * (fall.impact_s(last) + fall.impact_s(last + 1)) + 0.1 * fall.first_s
-    every = max(1, round(settings["every_s"] / dt))
+    every = max(1, round(options.every / dt))
     steps = every * math.ceil(until / (every * dt))
     history = film(batch, steps, sample_every=every, progress=progress).history
     columns = {name: values[:, 0] for name, values in history.items()}
@@ -106,17 +106,13 @@ def drop(batch, fall, settings, progress):
 def figures_of(errors):
     """Largest errors over the impacts compared: of the default reading, and of all."""
     figures = {}
-    for end, own in {
-        "": errors[DEFAULT],
-        **{f"_{name}": own for name, own in errors.items()},
-    }.items():
-        impact, apex = abs(own).max(axis=1).tolist()
-        figures[f"impact_error_ms{end}"] = figure(impact, "ms")
-        figures[f"apex_error_mm{end}"] = figure(apex, "mm")
+    for name, own in {"": errors[DEFAULT], **errors}.items():
+        most = zip(("impact_error_ms", "apex_error_mm"), abs(own).max(axis=1).tolist())
+        figures.update({f"{key}_{name}".rstrip("_"): (value, key[-2:]) for key, value in most})
     return figures
 
 
-def write_tables(runs, folder):
+def write_tables(folder, runs):
     """A row a sample of every run, and a row an impact."""
     samples, impacts = [], []
     for title, made in runs.items():
@@ -125,9 +121,9 @@ def write_tables(runs, folder):
         for k, (time, apex) in enumerate(zip(made.impacts_s, made.apexes_m), start=1):
             impacts.append((title, k, time, made.fall.impact_s(k), apex, made.fall.apex_m(k)))
     names = "filling time_s height_m closed_form_m"
-    write_rows(os.path.join(folder, "heights.csv"), samples, names)
+    study.write_rows(folder / "heights.csv", samples, names)
     names = "filling impact time_s closed_form_s apex_m closed_form_apex_m"
-    write_rows(os.path.join(folder, "impacts.csv"), impacts, names)
+    study.write_rows(folder / "impacts.csv", impacts, names)
 
 
 def picture_rebound(path, runs, errors):
@@ -175,8 +171,8 @@ def print_errors(errors):
     for title, own in errors.items():
         cells = [f"{late:+.3f} / {high:+.3f}" for late, high in own.T]
         rows.append((title, *cells, *["at rest"] * (COUNTED - len(cells))))
-    print_table(rows, ["filling", *(str(k + 1) for k in range(COUNTED))])
+    study.print_table(rows, ["filling", *(str(k + 1) for k in range(COUNTED))])
 
 
 if __name__ == "__main__":
-    sys.exit(main(run, options_parser()))
+    sys.exit(study.main(run, options_parser()))

@@ -30,7 +30,6 @@ from ca_damper import (
 from ca_damper.plot import picture_hysteresis, picture_measures, picture_responses
 from ca_damper.response import Grid
 from taichi_dem.kit import study
-from taichi_dem.kit.files import output_folder
 from taichi_dem.kit.study import number, several, whole
 
 NAME = "damper_response"
@@ -60,21 +59,20 @@ SETTINGS = {
 
 def options_parser():
     """Options of this experiment."""
-    made = study.add_settings(study.parser(NAME, __doc__), SETTINGS)
+    made = study.parser(NAME, __doc__, settings=SETTINGS)
     study.add_checkpoints(made)
     return made
 
 
 def run(options):
     """Measure all fillings, write tables and pictures."""
-    study.take_settings(options, SETTINGS)
     for label in options.fillings:
         if label not in FILLINGS:
             raise InputError(f"fillings must be some of {', '.join(FILLINGS)}, got {label!r}")
     if options.resume and not any(Path(options.out).glob("checkpoint_*.npz")):
         raise InputError(f"resume must be left out: there is no checkpoint in {options.out}")
     jobs = {label: jobs_of(FILLINGS[label], options) for label in options.fillings}
-    folder = Path(output_folder(options.out))
+    folder = study.begin(options)
     responses, sweeps = {}, {}
     for label, (response, sweep) in jobs.items():
         responses[label] = made(frequency_response, response, f"{label}_response", options)

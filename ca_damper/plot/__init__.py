@@ -2,6 +2,7 @@
 
 from ca_damper.plot.animation import moving_picture
 from ca_damper.plot.box import Box, DrawnBox, frame_panel
+from ca_damper.plot.cycle import FilmMeasures, picture_cycle
 from ca_damper.plot.film_strip import animate_films, picture_film_strips
 from ca_damper.plot.hanging import Hanging, film_hanging
 from ca_damper.plot.response import (
@@ -14,12 +15,14 @@ from ca_damper.plot.response import (
 __all__ = [
     "Box",
     "DrawnBox",
+    "FilmMeasures",
     "Hanging",
     "animate_films",
     "film_hanging",
     "frame_panel",
     "moving_picture",
     "picture_compared",
+    "picture_cycle",
     "picture_film_strips",
     "picture_hysteresis",
     "picture_measures",

@@ -108,22 +108,6 @@ class Run(MotionRecord):
         return gap
 
 
-def grown(edge, heights):
-    """A regular body with a neighbour on some faces; heights: over that of a regular one, by face.
-
-    Returns the mesh and the directions (n, 3) in which the neighbours lie.
-    """
-    corners = single(edge).points[single(edge).tetrahedra[0]]
-    points, bodies, outward = [*corners], [[0, 1, 2, 3]], []
-    for k, height in heights.items():
-        face = [j for j in range(4) if j != k]
-        bodies.append([*face, len(points)])
-        away = corners[face].mean(axis=0) - corners[k]
-        points.append(corners[face].mean(axis=0) + height * away)
-        outward.append(away / np.linalg.norm(away))
-    return checked_mesh(points, bodies, {}), np.array(outward)
-
-
 def right_half():
     """The second body of a pair, alone."""
     return checked_mesh(pair().points[[0, 1, 2, 4]], [[3, 0, 2, 1]], {})

@@ -7,12 +7,12 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from _hard_cases._blast_run import ACCURACY, AREA, EPS, FREE, TOUCHING, Run, grown
+from _hard_cases._blast_run import ACCURACY, AREA, EPS, FREE, TOUCHING, Run
 from taichi_dem import CONCRETE, ImplicitDashpots, Multirate, StepControl, Uniform, effects
 from taichi_dem.closed_forms import LinearBonds, damped_opening
 from taichi_dem.kit.study.cases import Cases
 from taichi_dem.mesh.mesh import checked_mesh
-from taichi_dem.mesh.shapes import bar, pair, placed_together, single
+from taichi_dem.mesh.shapes import bar, pair, placed_together, single, with_neighbours
 from taichi_dem.mesh.topology import faces_of_group, topology_of
 
 case = CASES = Cases("blast")
@@ -181,7 +181,7 @@ def zero_gap_on_breakage(trial):
 @case(TOUCHING)
 def four_broken_faces(trial):
     """All four neighbours are torn off one body: it stays in the middle, by symmetry."""
-    mesh, outward = grown(0.05, dict.fromkeys(range(4), 1.0))
+    mesh, outward = with_neighbours(0.05, dict.fromkeys(range(4), 1.0))
     run = Run(trial, mesh, velocity=[np.zeros(3), *TEARING * outward])
     torn(run, 4, run.mass[1], TEARING)
     # Four outward impulses cancel; what is left is the order in which they act.
@@ -269,7 +269,9 @@ def scan(trial, ratio):
     motion = {"methods": {trial.method: Multirate(dt0, 0.05 * dt0, neighbour, control=control)}}
     motion["velocity"] = [[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [0.0, 0.05, 0.0]]
     until, heights = (500 if trial.quick else 20000) * dt0, {0: LIGHT, 1: 1.0}
-    runs = [Run(trial, grown(edge, heights)[0], until, effects=(), **motion) for edge in SCAN]
+    runs = [
+        Run(trial, with_neighbours(edge, heights)[0], until, effects=(), **motion) for edge in SCAN
+    ]
     gain = [run.energy().max() - 1.0 for run in runs[::-1]]
     jump = max(np.ptp(run["level"], axis=1).max() for run in runs)
     # An explicit step of w dt makes the energy beat by (w dt)^2 / 4.

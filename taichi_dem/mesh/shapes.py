@@ -1,7 +1,7 @@
 """Small meshes of known shape, built without a mesh generator: for tests, demos, wave bars."""
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Optional
 
 import numpy as np
@@ -51,6 +51,24 @@ def pair(edge: float = 0.05, height: Optional[float] = None) -> Mesh:
         "right": [[4, a, b] for a, b in around],
     }
     return checked_mesh(points, [[3, 0, 1, 2], [4, 0, 2, 1]], groups)
+
+
+def with_neighbours(edge: float, heights: Mapping[int, float]) -> tuple[Mesh, np.ndarray]:
+    """A regular tetrahedron with a neighbour on some of its faces, bodies in the order of the dict.
+
+    edge: [m]. heights: of the neighbours over that of a regular one, by the corner opposite to the
+    face. Returns the mesh and the unit vectors (n, 3) from body 0 towards the neighbours.
+    """
+    alone = single(edge)
+    corners = alone.points[alone.tetrahedra[0]]
+    points, bodies, outward = [*corners], [[0, 1, 2, 3]], []
+    for k, height in heights.items():
+        face = [j for j in range(4) if j != k]
+        bodies.append([*face, len(points)])
+        away = corners[face].mean(axis=0) - corners[k]
+        points.append(corners[face].mean(axis=0) + height * away)
+        outward.append(away / np.linalg.norm(away))
+    return checked_mesh(points, bodies, {}), np.array(outward)
 
 
 def bar(length: float, width: float, cells: Sequence[int]) -> Mesh:

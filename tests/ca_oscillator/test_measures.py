@@ -7,6 +7,8 @@ import pytest
 
 from ca_damper import Oscillator
 from ca_damper.measures import COLUMNS, Cycles, peak
+from ca_damper.plot import Box, FilmMeasures
+from ca_damper.record import Frame
 
 STEPS, COUNT, OMEGA = 500, 4, 2.0 * math.pi * 6.0
 
@@ -120,3 +122,21 @@ def test_peak_at_an_end_beside_nan_and_on_a_plateau(response, wanted):
 
 def test_no_peak_without_numbers():
     assert np.isnan(peak([1.0, 2.0], [math.nan, math.nan])).all()
+
+
+def test_film_measures_of_particles_on_the_floor_and_below_the_ceiling():
+    box = Box(0.05, 0.02, 0.004)
+    low = np.column_stack([np.linspace(0.01, 0.04, 3), np.full(3, 0.002)])
+    high = low + np.array([0.0, 0.016])
+    frames = [Frame(0.0, x, 0.0, place, 0.0 * place) for x, place in ((0.003, low), (0.0, high))]
+    found = FilmMeasures.of(box, [frames, frames], np.array([0.0, 0.5]))
+    assert found.height_mm == pytest.approx(np.array([[3.0, 16.0]] * 2))
+    assert found.above_floor_mm == pytest.approx(np.array([[0.0, 16.0]] * 2))
+    assert found.floor.tolist() == [[1.0, 0.0]] * 2 and found.ceiling.tolist() == [[0.0, 1.0]] * 2
+
+
+def test_the_swing_of_filmed_particles_is_that_of_their_mean():
+    phase = np.arange(8) / 8.0
+    height = 5.0 + 3.0 * np.sin(2.0 * np.pi * (phase - 0.125))
+    cycles = np.array([height + 1.0, height - 1.0])
+    assert FilmMeasures(phase, cycles, cycles, cycles, cycles).swing() == pytest.approx((3.0, 45.0))

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from taichi_dem.outcome import (
     faces_error,
     outcome_of,
 )
+from taichi_dem.step_study import StepStudy
 from tests.bar_blast import bar_scene
 
 
@@ -46,6 +48,42 @@ def test_energy_moved_from_one_term_to_another_counts_once():
     """1 J of 10 J is booked as kinetic instead of as strain: 10 %."""
     run = outcome(kinetic=3.0, bond_strain=1.0)
     assert energy_error(run, outcome(kinetic=2.0, bond_strain=2.0)) == pytest.approx(0.1)
+
+
+@pytest.fixture
+def study():
+    """Runs at steps of 4, 2 and 1 s; the first diverged half way, the others have twins."""
+    made = StepStudy("some", None, None, 2.0)
+    failed = replace(outcome(), failure="diverged", evaluations=3)
+    made.runs = {4.0: failed, 2.0: replace(outcome(), evaluations=8, cpu_s=3.0), 1.0: outcome()}
+    near = ((3.0, 0.0, 0.0), (0.0, 4.0, 0.5))
+    made.twins = {2.0: replace(outcome(near), cpu_s=2.0), 1.0: outcome()}
+    return made
+
+
+def test_the_floor_is_the_distance_of_the_finest_twin(study):
+    assert study.spread == pytest.approx({2.0: 0.1, 1.0: 0.0})
+    del study.twins[1.0]
+    assert study.floor == pytest.approx(0.1)
+    study.twins.clear()
+    assert study.floor == 0.0
+
+
+def test_points_have_the_times_of_twins_and_failed_ones_the_work_of_the_next(study):
+    failed, coarse, fine = study.points(outcome())
+    assert (failed.failure, failed.evaluations) == ("diverged at 1000000 µs", 4.0)
+    assert (coarse.seconds.low, coarse.seconds.high, coarse.seconds.count) == (2.0, 3.0, 2)
+    assert (fine.error, fine.label, fine.evaluations) == (0.0, "1 s", 1)
+    study.runs = {4.0: study.runs[4.0]}
+    assert study.points(outcome())[0].evaluations == 6.0
+
+
+def test_a_twin_is_run_where_the_first_was_fast_enough():
+    made = StepStudy("implicit", ImplicitDashpots, bar_scene(), 1.6e-5)
+    made.run(1.6e-6)
+    made.run(8e-7, enough=1e3)
+    assert [*made.runs] == [1.6e-6, 8e-7] and [*made.twins] == [8e-7]
+    assert 0.0 < made.floor < 1e-6 and len(made.outcomes) == 3
 
 
 @pytest.fixture(scope="module")

@@ -36,6 +36,13 @@ def test_a_setting_without_a_type_is_no_option_and_defaults_are_set():
         made.parse_args(["--ratios", "1"])
 
 
+def test_a_parser_takes_settings_and_defaults_at_once(tmp_path):
+    made = study.parser("some", "", settings=TABLE, threads=1, out=str(tmp_path / "new"))
+    options = made.parse_args(["--most-seeds", "9"])
+    assert (options.threads, options.most_seeds, made.settings) == (1, 9, TABLE)
+    assert study.begin(options) == tmp_path / "new" and (tmp_path / "new").is_dir()
+
+
 def test_a_job_that_the_interruption_came_before_begins_anew(tmp_path):
     options = SimpleNamespace(out=str(tmp_path), resume=True, checkpoint_every={})
     path = tmp_path / "some.npz"

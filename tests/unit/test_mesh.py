@@ -8,7 +8,8 @@ import pytest
 from taichi_dem import PAPER_BLOCK, InputError, checked_mesh, read_mesh
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.mesh import group_area, volumes
-from taichi_dem.mesh.shapes import bar, pair, single
+from taichi_dem.mesh.shapes import bar, pair, single, with_neighbours
+from taichi_dem.mesh.topology import topology_of
 
 # Two tetrahedra on both sides of the triangle 0 1 2, apexes 3 (z > 0) and 4 (z < 0).
 POINTS = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.2, 0.2, 1], [0.2, 0.2, -1]]
@@ -313,3 +314,13 @@ def test_paper_blocks_faces_belong_to_one_group_each():
     faces = np.vstack(list(mesh.groups.values()))
     outer = 4 * mesh.body_count - 2 * len(geometry.shared_faces(mesh.tetrahedra))
     assert len(np.unique(np.sort(faces, axis=1), axis=0)) == len(faces) == outer
+
+
+def test_neighbours_stand_on_the_faces_opposite_to_corners_as_high_as_told():
+    mesh, outward = with_neighbours(0.1, {0: 1.0, 2: 0.5})
+    own, full, half = volumes(mesh)
+    assert full == pytest.approx(own) and half == pytest.approx(0.5 * own)
+    assert topology_of(mesh).bond_count == 2
+    centre = mesh.points[mesh.tetrahedra].mean(axis=1)
+    away = centre[1:] - centre[0]
+    assert outward == pytest.approx(away / np.linalg.norm(away, axis=1)[:, None])

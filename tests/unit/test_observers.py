@@ -23,6 +23,7 @@ from taichi_dem import (
 )
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.output.progress_lines import ProgressLines
+from taichi_dem.output.run_costs import RunCosts, level_columns, level_shares
 from taichi_dem.simulate import run_simulation
 
 STEP, UNTIL = 4e-7, 8e-6
@@ -205,3 +206,22 @@ def test_what_is_no_observer_is_refused_before_anything_is_built(observers, word
 def test_a_time_of_calls_that_is_none_is_refused(make, words):
     with pytest.raises(InputError, match=words):
         make()
+
+
+def test_costs_of_a_run_grow_from_sample_to_sample():
+    costs = RunCosts()
+    report = run(costs).report
+    assert len(costs.levels) == len(costs.columns["cpu_s"]) == 5
+    assert (np.diff(costs.columns["cpu_s"]) >= 0.0).all()
+    assert costs.columns["evaluations"][-1] == report.contact_evaluations
+    assert costs.view.step == UNTIL / STEP
+
+
+def test_level_shares_count_the_bodies_of_each_level():
+    shares = level_shares([np.array([0, 0, 1, 1]), np.array([2, 0, 0, 0])])
+    assert shares.tolist() == [[0.5, 0.5, 0.0], [0.75, 0.0, 0.25]]
+    assert {k: v.tolist() for k, v in level_columns(shares).items()} == {
+        "level_0": [0.5, 0.75],
+        "level_1": [0.5, 0.0],
+        "level_2": [0.0, 0.25],
+    }

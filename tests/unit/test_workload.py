@@ -6,8 +6,10 @@ from scipy.optimize import nnls
 
 from taichi_dem import CONCRETE, Multirate, Scene, Simulation, effects
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.plot_style import styled
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.workload import Workers, Workload, record_workload
+from taichi_dem.workload.picture import draw_acceleration, draw_cuts, draw_shares
 
 # Two classes of ticks: all are due at the first, the last quarter also at three ticks between.
 BODIES, INTERVALS, TICKS = 40, 5, (10, 30)
@@ -125,3 +127,19 @@ def test_counted_run_counts_what_the_schedule_does_and_changes_no_bit():
     assert [made.ticks.sum(), bonds, pairs] == evaluations[[0, 2, 3]].tolist()
     assert spheres >= pairs > 0 and made.counts.shape[2] > 1
     assert len(made.time) == 8 and made.time[-1] == pytest.approx(4e-6, rel=1e-12)
+
+
+def test_pictures_show_accelerations_shares_and_cuts(workers):
+    made, _ = workers
+    shared = {way: {n: made.share(way, n) for n in (1, 2, 5)} for way in ("static", "rebalanced")}
+    chosen = {way: by_count[5] for way, by_count in shared.items()}
+    with styled(1, 3) as (_, (gain, share, cut)):
+        draw_acceleration(gain, shared, most=2, serial=0.5)
+        draw_shares(share, chosen)
+        draw_cuts(cut, chosen["static"], made.workload.time)
+    static, _, bound = gain.lines
+    assert static.get_xdata().tolist() == [1, 2] and static.get_ydata()[0] == pytest.approx(1.0)
+    # Half of the time is not shared: two workers need three quarters of it at least.
+    assert bound.get_ydata() == pytest.approx([1.0, 4.0 / 3.0])
+    assert [line.get_ydata().mean() for line in share.lines] == pytest.approx([1.0, 1.0])
+    assert len(cut.lines) == 4 and cut.get_ylim() == (0, BODIES)

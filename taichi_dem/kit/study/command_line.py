@@ -99,10 +99,12 @@ def parser(
     description: Optional[str],
     drivers: Sequence[str] = (),
     settings: Settings = MappingProxyType({}),
+    **defaults: Any,
 ) -> Parser:
     """Parser with the options every experiment has; drivers: to choose from, where there are.
 
     settings: further options, and numbers of the full and of the quick job, as of ``add_settings``.
+    defaults: of options that every experiment has.
     """
     made = bare_parser(name, description)
     made.add_argument("--quick", action="store_true", help="a smaller job of under a minute")
@@ -113,7 +115,7 @@ def parser(
         made.add_argument("--driver", default=drivers[0], choices=drivers)
     made.add_argument("--threads", type=whole(1, 1024), default=None, help="CPU threads")
     made.settings = settings
-    add_settings(made, settings)
+    add_settings(made, settings, **defaults)
     return made
 
 

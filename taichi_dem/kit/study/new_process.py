@@ -1,6 +1,8 @@
 """Functions called in processes of their own, with Taichi started and a cache of kernels."""
 
+import json
 import os
+import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping
@@ -9,7 +11,7 @@ from pathlib import Path
 from typing import Any, Callable
 
 from taichi_dem.kit import runtime
-from taichi_dem.kit.study.worker import answer_of
+from taichi_dem.kit.errors import InputError
 
 _CHILD = """
 import importlib, json, sys
@@ -43,7 +45,21 @@ def call_in_process(
     if cache:
         os.makedirs(cache, exist_ok=True)
     own = {"TI_OFFLINE_CACHE": "1", "TI_OFFLINE_CACHE_FILE_PATH": cache} if cache else {}
-    return answer_of(["-c", _CHILD], job, title or f"of {work.__name__}", own)
+    return _answer(job, title or f"of {work.__name__}", own)
+
+
+def _answer(job: dict, title: str, environment: Mapping[str, str]) -> Any:
+    """Last line that the new process prints, from JSON; the job reaches it in a file."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "job.json")
+        with open(path, "w", encoding="utf-8") as handle:
+            json.dump(job, handle)
+        line = [sys.executable, "-c", _CHILD, path]
+        options: Any = {"capture_output": True, "text": True, "env": {**os.environ, **environment}}
+        done = subprocess.run(line, **options)
+    if done.returncode != 0:
+        raise InputError(f"the run {title} ended with: {done.stderr.strip()[-300:]}")
+    return json.loads(done.stdout.splitlines()[-1])
 
 
 def call_rounds(

@@ -3,6 +3,7 @@
 from argparse import ArgumentParser, Namespace
 from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from taichi_dem.kit.files import output_folder
@@ -31,7 +32,7 @@ def take_settings(options: Namespace, settings: Settings) -> None:
             setattr(options, name, quick if options.quick else full)
 
 
-def begin(options: Namespace, settings: Settings) -> Path:
-    """Take the settings and make the folder for the output; returns its path."""
+def begin(options: Namespace, settings: Settings = MappingProxyType({})) -> Path:
+    """Take settings that ``main`` does not know; make the folder for the output."""
     take_settings(options, settings)
     return Path(output_folder(options.out))
