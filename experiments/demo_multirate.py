@@ -22,13 +22,14 @@ from functools import partial
 import numpy as np
 
 import taichi_dem as dem
-from _blast import BLAST_DRIVERS, level_columns, level_shares
+from _blast import BLAST_DRIVERS
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.plot_style import GREY, line_key, picture, styles_of
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.mesh.shapes import bar, placed_together
 from taichi_dem.mesh.topology import faces_of_group
+from taichi_dem.output.run_costs import level_columns, level_shares
 from taichi_dem.plot.film_runs import FilmedRun, film_runs
 from taichi_dem.plot.levels import draw_level_shares, level_look, level_names
 from taichi_dem.simulate import run_simulation

@@ -52,14 +52,6 @@ def test_a_summary_says_whether_its_run_was_quick_and_is_valid_json(
     assert summary["figures"]["a"]["value"] is None
 
 
-def test_options_left_out_take_the_values_of_the_job_and_others_keep_theirs():
-    full, quick = {"seeds": 5, "particles": [1], "cycles": 2}, {"seeds": 7, "cycles": 1}
-    for job, given in ((full, False), (quick, True)):
-        options = SimpleNamespace(quick=given, seeds=3, particles=None)
-        study.take_defaults(options, full, quick)
-        assert vars(options) == {"quick": given, "particles": None, **job, "seeds": 3}
-
-
 @pytest.mark.parametrize(
     ("rows", "text"), [([(1, "a"), (2, "b")], "x,y\n1,a\n2,b\n"), ([], "x,y\n")]
 )

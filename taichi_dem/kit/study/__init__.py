@@ -15,14 +15,12 @@ from taichi_dem.kit.study.command_line import (
     output_paths,
     parser,
     several,
-    take_defaults,
     whole,
 )
 from taichi_dem.kit.study.new_process import call_in_process, call_rounds
 from taichi_dem.kit.study.settings import add_settings, begin, take_settings
 from taichi_dem.kit.study.summary import (
     figure,
-    figures_from,
     finish,
     print_figures,
     processor,
@@ -53,7 +51,6 @@ __all__ = [
     "exit_code",
     "figure",
     "figures_by_method",
-    "figures_from",
     "finish",
     "give_answers",
     "interval",
@@ -69,7 +66,6 @@ __all__ = [
     "seconds_of",
     "several",
     "show_rows",
-    "take_defaults",
     "take_settings",
     "value_in_words",
     "versions",

@@ -125,13 +125,6 @@ def bare_parser(name: str, description: Optional[str]) -> Parser:
     return Parser(prog=f"python experiments/{name}.py", description=description, **plain)
 
 
-def take_defaults(options: Namespace, full: dict, quick: dict) -> None:
-    """Give options that are not set the value of the full or of the quick job."""
-    for name, value in (quick if options.quick else full).items():
-        if getattr(options, name, None) is None:
-            setattr(options, name, value)
-
-
 def output_paths(folder: str) -> Callable[[str], str]:
     """Make the folder of the output; returns a function: path of a file in it, by its name.
 

@@ -35,11 +35,6 @@ def figure(value: Any, unit: str, paper: Any = None) -> dict:
     return {"value": value, "unit": unit, "paper": paper}
 
 
-def figures_from(row: Mapping[str, Any], units: Mapping[str, str], name: str = "{}") -> dict:
-    """Figures of summary.json from a row; units: by key. name: of a figure, by the key."""
-    return {name.format(key): figure(row[key], unit) for key, unit in units.items()}
-
-
 def finish(
     options: Namespace,
     name: str,
