@@ -106,16 +106,16 @@ def _stack(axes, time, history, terms):
 
 def _lines(axes, time, history, terms):
     for key, (label, colour) in terms.items():
-        axes.plot(time, _positive(history[key]), color=colour, label=label, linewidth=2.0)
+        axes.plot(time, positive(history[key]), color=colour, label=label, linewidth=2.0)
     for key, (label, colour, line) in _GIVEN.items():
         if np.abs(history[key]).max() > 0.0:
-            axes.plot(time, _positive(history[key]), color=colour, label=label, linestyle=line)
+            axes.plot(time, positive(history[key]), color=colour, label=label, linestyle=line)
     largest = max(1e-12, *(float(history[key].max()) for key in (*terms, *_GIVEN)))
     axes.set(yscale="log", ylim=(1e-6 * largest, 2.0 * largest))
     axes.set(ylabel="energy [J]", title="Every term of the account")
 
 
-def _positive(values):
+def positive(values: np.ndarray) -> np.ndarray:
     """Values for a logarithmic axis, NaN where there is nothing to show."""
     return np.where(values > 0.0, values, np.nan)
 

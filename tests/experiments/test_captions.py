@@ -8,8 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from demo_multirate import short_steps
-from demo_step_too_large import ended
+from _demo_damper import taken
+from _multirate import short_steps
+from _step_too_large import ended
 from taichi_dem.kit import study
 
 
@@ -110,7 +111,7 @@ def test_the_bar_is_looked_at_once_the_blow_has_given_energy(script, last):
 
 
 @pytest.mark.parametrize(("power", "words"), [(3.0, "take 3 mW from"), (-0.5, "give 0.5 mW to")])
-def test_grains_give_what_they_do_not_take(script, power, words):
+def test_grains_give_what_they_do_not_take(power, words):
     names = ("apparent_damping_N_s_m", "damping_ratio", "damping_ratio_empty", "apparent_mass_g")
     value = {"power_mW": power, **dict.fromkeys(names, 1.0)}
-    assert words in script("demo_damper").taken(value)[0]
+    assert words in taken(value)[0]

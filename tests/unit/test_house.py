@@ -5,6 +5,7 @@ that each rule refuses a small bad source and lets a good one pass.
 """
 
 import ast
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import NamedTuple
 
@@ -67,6 +68,9 @@ STARTER = "taichi_dem/kit/runtime.py"
 ATOMIC_SUMS = ("atomic_add", "atomic_sub")
 FILE_LINES = 400
 FUNCTION_LINES = 60
+# Scripts that are read to learn: the science stands in them, words and pictures in a helper _x.py.
+SHOWN = ("experiments/demo_*.py", "experiments/lessons/[!_]*.py")
+SHOWN_LINES = 100
 PYTHON = (3, 9)
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 
@@ -230,6 +234,15 @@ def files_stay_short(source):
         yield count, f"{count} lines, at most {FILE_LINES} are allowed"
 
 
+def shown_scripts_stay_short(source):
+    count = len(source.text.splitlines())
+    if count > SHOWN_LINES and any(fnmatchcase(source.path, pattern) for pattern in SHOWN):
+        yield (
+            count,
+            f"{count} lines, at most {SHOWN_LINES}: words and pictures go to a helper _x.py",
+        )
+
+
 def functions_stay_short(source):
     for node in ast.walk(source.tree):
         if isinstance(node, FUNCTIONS):
@@ -258,6 +271,7 @@ RULES = (
     fast_math_stays_off,
     no_atomic_sums,
     files_stay_short,
+    shown_scripts_stay_short,
     functions_stay_short,
     public_names_have_docstrings,
 )
@@ -292,6 +306,7 @@ def test_layer_table_names_each_module_once(package):
 # Self-tests: (rule, path, source, part of the sentence).
 PHYSICS = "taichi_dem/physics/bond.py"
 SCRIPT = "experiments/blast.py"
+DEMO, LESSON = "experiments/demo_bar.py", "experiments/lessons/why_it_damps.py"
 BAD = [
     (modules_have_a_layer, "taichi_dem/novelty.py", "", "'novelty' is not in LAYERS"),
     (imports_go_one_way, PHYSICS, "import taichi_dem.engine.model", "later layer"),
@@ -338,6 +353,8 @@ BAD = [
     (no_atomic_sums, PHYSICS, "ti.atomic_add(x[0], y)", "atomic_add"),
     (no_atomic_sums, PHYSICS, "from taichi import atomic_sub as s", "atomic_sub"),
     (files_stay_short, SCRIPT, "x = 1\n" * (FILE_LINES + 1), "401 lines"),
+    (shown_scripts_stay_short, DEMO, "x = 1\n" * (SHOWN_LINES + 1), "101 lines"),
+    (shown_scripts_stay_short, LESSON, "x = 1\n" * (SHOWN_LINES + 1), "101 lines"),
     (functions_stay_short, SCRIPT, "def f():\n" + "    x = 1\n" * FUNCTION_LINES, "61 lines"),
     (public_names_have_docstrings, PHYSICS, "def f():\n    return 1", "f has no docstring"),
     (public_names_have_docstrings, PHYSICS, "class C:\n    x = 1", "C has no docstring"),
@@ -361,6 +378,9 @@ GOOD = {
     "taichi_dem/__init__.py": "from taichi_dem.simulate import simulate",
     "ca_damper/batch.py": "from taichi_dem.kit import runtime\nfrom ca_damper.lattice import x",
     SCRIPT: "import _cli\nfrom taichi_dem import CONCRETE, plot\nimport scipy\nplot.init()",
+    DEMO: "x = 1\n" * SHOWN_LINES,
+    "experiments/_demo_bar.py": "x = 1\n" * (SHOWN_LINES + 1),
+    "experiments/lessons/_bar.py": "x = 1\n" * (SHOWN_LINES + 1),
     "taichi_dem/step/parallel.py": "def f():\n    " + DOCUMENTED + "    x = 1\n" * 59,
 }
 
