@@ -183,10 +183,13 @@ def test_a_checkpoint_is_due_by_steps_by_time_and_by_the_wall(monkeypatch):
 
 @pytest.fixture
 def listening():
-    """Ctrl-C interrupts, as at a terminal; a shell may have left it ignored for background jobs."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    """Stop signals interrupt, as at a terminal; a shell may have told some to be ignored."""
+    before = {number: signal.getsignal(number) for number in STOP_SIGNALS}
+    for number in STOP_SIGNALS:
+        signal.signal(number, signal.default_int_handler)
     yield
-    signal.signal(signal.SIGINT, before)
+    for number, handler in before.items():
+        signal.signal(number, handler)
 
 
 @pytest.mark.parametrize("number", STOP_SIGNALS)

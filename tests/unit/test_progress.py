@@ -132,7 +132,7 @@ def response(progress):
 
 
 @pytest.mark.parametrize("job", [blast, response])
-def test_a_callback_hears_of_compiling_first_and_then_of_the_run(job):
+def test_a_callback_hears_of_compiling_first_and_then_of_the_run(job, compiled_anew):
     told = []
     job(told.append)
     phases = [progress.phase for progress in told]
