@@ -1,6 +1,6 @@
 """What accuracy costs in the blast: the paper's rule, step control, limited and solved dashpots.
 
-    python experiments/cost_of_accuracy_blast.py          # about ten minutes on one core
+    python experiments/cost_of_accuracy_blast.py          # about four minutes on one core
     python experiments/cost_of_accuracy_blast.py --quick
 
 Every method runs the paper's block over a sweep of its step, up to an instant at which all methods

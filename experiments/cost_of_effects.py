@@ -1,6 +1,6 @@
 """What does each effect cost, and what does the result lose without it?
 
-    python experiments/cost_of_effects.py          # about five minutes on two cores
+    python experiments/cost_of_effects.py          # about three minutes on two cores
     python experiments/cost_of_effects.py --quick
 
 The paper's block is blasted with its effects added one by one, and left out one by one; so is a
