@@ -1,11 +1,13 @@
 """The container as it is drawn: its walls, its particles, and where it stands in the room."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.collections import EllipseCollection
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 
+from ca_damper.record import Frame
 from taichi_dem.kit.plot_style import BLACK, BLUE, RED
 
 #: Vertical speed of particles: falling, at rest, rising.
@@ -26,37 +28,37 @@ class Box:
     staggered: bool = False
 
     @classmethod
-    def of_automaton(cls, automaton):
+    def of_automaton(cls, automaton: Any) -> Any:
         """Of an Automaton."""
         cell = automaton.width
         return cls(automaton.columns * cell, automaton.rows * cell, cell, True)
 
     @classmethod
-    def of_spheres(cls, spheres):
+    def of_spheres(cls, spheres: Any) -> Any:
         """Of Spheres."""
         return cls(spheres.width, spheres.height, spheres.diameter)
 
     @classmethod
-    def of(cls, filling):
+    def of(cls, filling: Any) -> Any:
         """Of an Automaton or Spheres."""
         return (cls.of_automaton if hasattr(filling, "columns") else cls.of_spheres)(filling)
 
-    def lift(self, x):
+    def lift(self, x: Any) -> Any:
         """Height of the box [m] when the container is displaced by x [m]."""
         cell = self.diameter
         return np.floor(np.asarray(x) / cell + 0.5) * cell if self.staggered else np.asarray(x)
 
-    def floor_at(self, horizontal):
+    def floor_at(self, horizontal: Any) -> Any:
         """Height of the floor [m] at places counted from the left wall [m]."""
         column = np.floor(np.asarray(horizontal) / self.diameter)
         return 0.5 * self.diameter * (self.staggered & (column % 2 == 0))
 
-    def gaps(self, position):
+    def gaps(self, position: np.ndarray) -> Any:
         """Room below and above each particle [m], two arrays, for positions (particles, 2) [m]."""
         height = position[:, 1] - 0.5 * self.diameter - self.floor_at(position[:, 0])
         return height, self.height - self.diameter - height
 
-    def outline(self):
+    def outline(self) -> Any:
         """Corners of the walls [m], (n, 2), a closed line."""
         edges = np.array([0.0, self.width])
         if self.staggered:
@@ -71,7 +73,7 @@ class Box:
 class DrawnBox:
     """Walls and particles in a panel, in millimetres; ``show`` moves them."""
 
-    def __init__(self, axes, box, fastest, offset=0.0):
+    def __init__(self, axes: Any, box: "Box", fastest: float, offset: float = 0.0):
         self.box, self.offset = box, offset
         (self.walls,) = axes.plot([], [], color=BLACK, linewidth=1.2, solid_joinstyle="miter")
         size = 1e3 * box.diameter
@@ -82,7 +84,7 @@ class DrawnBox:
         )  # fmt: skip
         axes.add_collection(self.particles)
 
-    def show(self, frame):
+    def show(self, frame: Frame) -> None:
         """Draw a ``record.Frame``."""
         shift = np.array([self.offset, self.box.lift(frame.x)])
         walls = 1e3 * (self.box.outline() + shift)
@@ -91,7 +93,7 @@ class DrawnBox:
         self.particles.set_array(frame.velocity[:, 1])
 
 
-def frame_panel(axes, box, amplitude, margin=3.0):
+def frame_panel(axes: Any, box: "Box", amplitude: float, margin: float = 3.0) -> None:
     """Limits of a panel in which the box moves by an amplitude [m]; equal scales, no axes."""
     top = 1e3 * (box.height + amplitude) + margin
     if box.staggered:

@@ -2,12 +2,14 @@
 
 import itertools
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ca_damper.measures import first_harmonic
 from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.plot_style import BLACK, GREY, area_key, line_key, picture, styles_of
+from taichi_dem.kit.validation import FileName
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +31,7 @@ class FilmMeasures:
         return by_fields(self)
 
     @classmethod
-    def of(cls, box, cycles, phase):
+    def of(cls, box: Any, cycles: Any, phase: Any) -> Any:
         """Measures of a Box with at least one particle; cycles: each a list of record.Frame."""
         rows, near = [], 0.5 * box.diameter
         for frame in itertools.chain(*cycles):
@@ -40,16 +42,16 @@ class FilmMeasures:
         return cls(phase, *np.array(rows).T.reshape(4, len(cycles), len(phase)))
 
     @property
-    def mean_height_mm(self):
+    def mean_height_mm(self) -> Any:
         """Mean of height_mm over the cycles, (frames,)."""
         return self.height_mm.mean(axis=0)
 
-    def swing(self):
+    def swing(self) -> Any:
         """Amplitude [mm] of the mean height, and its lag [degrees] behind the container."""
         return first_harmonic(self.phase, self.mean_height_mm)
 
 
-def picture_cycle(path, measures, amplitude):
+def picture_cycle(path: FileName, measures: Any, amplitude: float) -> None:
     """Mean height of the particles and how many touch floor and ceiling, over one closed cycle.
 
     measures: by title of a panel, FilmMeasures by label of the filling. amplitude: of the container

@@ -1,10 +1,14 @@
 """Frames of shaken containers: side by side as a picture, and one after the other as a GIF."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
 from ca_damper.plot.animation import moving_picture
 from ca_damper.plot.box import DrawnBox, frame_panel
 from taichi_dem.kit.plot_style import BLACK, picture, styles_of
+from taichi_dem.kit.validation import FileName
 
 #: A container slower than this share of its fastest gets no arrow; ends of the colour scale as a
 #: share of the container's largest speed.
@@ -12,7 +16,9 @@ _SLOW, _SCALE = 0.1, 1.2
 _SPEED = "vertical speed of particles [m/s]"
 
 
-def picture_film_strips(path, films, amplitude, frequency):
+def picture_film_strips(
+    path: FileName, films: Mapping[str, Any], amplitude: float, frequency: float
+) -> None:
     """A row of frames for every filling, from left to right through one cycle of the container.
 
     films: (Box, ``record.Frame``s evenly spaced over one cycle) by label of the filling, as many
@@ -48,7 +54,9 @@ def _mark_motion(axes, box, lift, share):
         axes.annotate("", *ends, arrowprops=look, annotation_clip=False)
 
 
-def animate_films(path, films, amplitude, frequency):
+def animate_films(
+    path: FileName, films: Mapping[str, Any], amplitude: float, frequency: float
+) -> None:
     """Containers side by side through one cycle, as a GIF below a megabyte.
 
     films: (Box, ``record.Frame``s) by title, as many frames in each. amplitude [m], frequency [Hz]:

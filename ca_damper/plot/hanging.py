@@ -9,6 +9,7 @@ from ca_damper.plot.animation import moving_picture
 from ca_damper.plot.box import Box, DrawnBox
 from ca_damper.record import Frame
 from taichi_dem.kit.plot_style import BLACK
+from taichi_dem.kit.validation import FileName
 
 #: The spring hangs from the base, this far over a box in its middle [mm]; its coils, half width and
 #: straight ends [mm], which reach over the steps of a staggered box.
@@ -25,7 +26,7 @@ class Hanging:
     colour: str
 
 
-def film_hanging(path, containers: Sequence[Hanging], fastest: float) -> None:
+def film_hanging(path: FileName, containers: Sequence[Hanging], fastest: float) -> None:
     """Write a GIF of containers side by side, with their displacement over time.
 
     containers: with frames at the same times. fastest: end of the colour scale of the particles'

@@ -1,15 +1,20 @@
 """Pictures of responses over frequency: curves with bands over seeds, measures, hysteresis."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 from matplotlib import colormaps
 
+from ca_damper.oscillator import Oscillator
 from taichi_dem.kit.plot_style import GREY, STYLES, area_key, picture, png_of, styled, styles_of
+from taichi_dem.kit.validation import FileName
 
 _SHADES = colormaps["viridis"]
 _FINE = 400
 
 
-def picture_responses(path, responses, particle_mass):
+def picture_responses(path: FileName, responses: Mapping[str, Any], particle_mass: float) -> None:
     """A panel a filling: RMS over frequency for every particle number (Figs. 3 and 11); the peaks.
 
     responses: Response by label. particle_mass [kg], for the rigid mass drawn for scale.
@@ -30,7 +35,7 @@ def picture_responses(path, responses, particle_mass):
             axis.set_axis_off()
 
 
-def picture_of_response(response, rows):
+def picture_of_response(response: Any, rows: Any) -> Any:
     """PNG, in bytes: RMS over frequency; rows: which of the particle numbers are drawn."""
     with styled(size=(7.2, 4.0)) as (figure, axis):
         # Without damping the empty container has no end at its natural frequency.
@@ -46,7 +51,7 @@ def picture_of_response(response, rows):
         return png_of(figure)
 
 
-def picture_compared(path, curves, oscillator):
+def picture_compared(path: FileName, curves: Any, oscillator: Oscillator) -> None:
     """Curves of several fillings: mean over seeds as lines, their range as bars; empty dotted.
 
     curves: (ratios f/f0, RMS displacement [m] as (ratios, seeds)) by label.
@@ -133,7 +138,7 @@ def _draw_peaks(place, height, responses, particle_mass):
         axis.set_xticks(first.particles)
 
 
-def picture_measures(path, responses, particle_mass):
+def picture_measures(path: FileName, responses: Mapping[str, Any], particle_mass: float) -> None:
     """Apparent mass and loss factor over frequency: a column a filling, a line a particle number.
 
     Apparent mass as a share of the particles' own: 1 for a rigid mass.
@@ -161,7 +166,7 @@ def _draw_measures(column, response, k, particle_mass):
     _band(column[1], response.ratios, response.loss_factor[k], colour, None)
 
 
-def picture_hysteresis(path, sweeps):
+def picture_hysteresis(path: FileName, sweeps: Mapping[str, Any]) -> None:
     """Sweeps up and down, the state carried on: a column a filling, a row a particle number."""
     particles = next(iter(sweeps.values())).up.particles
     count = len(sweeps)

@@ -1,13 +1,18 @@
 """Animations small enough for a web page."""
 
 import math
+from collections.abc import Sequence
+from typing import Optional
 
 import matplotlib
 import numpy as np
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap
 
+from taichi_dem.engine.model import Model
 from taichi_dem.kit.plot_style import STYLE, filming, write_gif
+from taichi_dem.kit.validation import FileName
+from taichi_dem.output.record import Frame
 from taichi_dem.plot.block import break_times, displaced, frame_block
 from taichi_dem.plot.view import View, surface, traces
 
@@ -16,14 +21,14 @@ _STEPS = 7
 
 
 def save_animation(
-    path,
-    model,
-    frames,
-    broken_time=None,
-    magnify=5.0,
-    axis=(0.0, 0.0, 1.0),
-    milliseconds=100,
-):
+    path: FileName,
+    model: Model,
+    frames: Sequence[Frame],
+    broken_time: Optional[np.ndarray] = None,
+    magnify: float = 5.0,
+    axis: Sequence[float] = (0.0, 0.0, 1.0),
+    milliseconds: float = 100,
+) -> None:
     """Write the deforming block, coloured by speed, as a GIF below a megabyte.
 
     frames: at least one. broken_time: (bond_count,) [s], NaN while a bond holds; its

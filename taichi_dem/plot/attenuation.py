@@ -1,11 +1,14 @@
 """Peak particle velocities over the distance from a blast hole."""
 
+from typing import Any
+
 import numpy as np
 
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREY, picture
+from taichi_dem.kit.validation import FileName
 
 
-def plot_attenuation(path, attenuation, nearest):
+def plot_attenuation(path: FileName, attenuation: Any, nearest: Any) -> None:
     """Peak speed of every body, and the power law fitted from the nearest distance on [radii].
 
     attenuation: an ``Attenuation``.

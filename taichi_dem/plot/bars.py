@@ -1,16 +1,27 @@
 """Waves in bars: diagrams over place and time, and films of a bar that may break."""
 
+from collections.abc import Mapping
+from typing import Any, Optional
+
 import matplotlib
 import numpy as np
 
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, RED, picture
+from taichi_dem.kit.validation import FileName
 from taichi_dem.plot.film import moving_picture
 
 #: Below zero, at zero, above: pressed, at rest, pulled.
 _COLOURS = "RdBu_r"
 
 
-def draw_space_time(axes, place, time_s, values, label=None, top=None):
+def draw_space_time(
+    axes: Any,
+    place: np.ndarray,
+    time_s: np.ndarray,
+    values: np.ndarray,
+    label: Optional[str] = None,
+    top: Optional[float] = None,
+) -> Any:
     """Draw values over place and time: red above zero, blue below; returns the ``QuadMesh``.
 
     place: (places,) [m]. time_s: (times,) [s]. values: (times, places). label: of a colour bar,
@@ -25,7 +36,17 @@ def draw_space_time(axes, place, time_s, values, label=None, top=None):
     return drawn
 
 
-def picture_wave(path, place, time_s, values, *, cells, label, titles=("", ""), level=None):
+def picture_wave(
+    path: FileName,
+    place: np.ndarray,
+    time_s: np.ndarray,
+    values: np.ndarray,
+    *,
+    cells: Mapping[str, int],
+    label: str,
+    titles: Any = ("", ""),
+    level: Optional[tuple[str, float]] = None,
+) -> None:
     """A picture of a wave: values over place and time, and over time in some cells.
 
     place: of the cells (places,) [m]. time_s: (times,) [s]. values: (times, places). cells:
@@ -45,13 +66,23 @@ def picture_wave(path, place, time_s, values, *, cells, label, titles=("", ""), 
         over.legend(loc="upper left")
 
 
-def draw_breaks(axes, place, time_s, joints):
+def draw_breaks(axes: Any, place: np.ndarray, time_s: np.ndarray, joints: np.ndarray) -> None:
     """Mark where and when joints broke; place: of the joints [m], joints: (times, joints)."""
     when, where = np.nonzero(np.diff(joints.astype(int), axis=0, prepend=0) > 0)
     axes.plot(place[where], 1e3 * time_s[when], "x", color=BLACK, ms=6, label="breaks")
 
 
-def film_bar(path, profile, stress_pa, *, length, strength_pa, bar=(), count=40, magnify=150.0):
+def film_bar(
+    path: FileName,
+    profile: Any,
+    stress_pa: np.ndarray,
+    *,
+    length: float,
+    strength_pa: float,
+    bar: Any = (),
+    count: int = 40,
+    magnify: float = 150.0,
+) -> None:
     """Write a GIF of a bar: velocity and stress along it, and itself, broken joints as gaps.
 
     profile: a ``Profile`` of slices of one length. stress_pa: between them, as ``Profile.stress``

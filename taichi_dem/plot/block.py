@@ -1,30 +1,35 @@
 """Pictures of the block: cracks (Konno et al., Fig 12) and steps (Fig 13)."""
 
+from collections.abc import Sequence
+from typing import Any, Optional
+
 import matplotlib
 import numpy as np
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import ListedColormap
 
+from taichi_dem.engine.model import Model
 from taichi_dem.kit.plot_style import area_key, picture
-from taichi_dem.output.record import body_corners
+from taichi_dem.kit.validation import FileName
+from taichi_dem.output.record import Frame, body_corners
 from taichi_dem.plot.levels import level_look, level_names
 from taichi_dem.plot.view import View, surface, traces
 
 _STONE, _JOINT, _INSIDE = "#E4E0D6", "#C9C3B5", "#B5AD9C"
 
 
-def displaced(model, frame, magnify):
+def displaced(model: Model, frame: Frame, magnify: float) -> np.ndarray:
     """Corners of all bodies (body_count, 4, 3) [m], their displacement magnified."""
     rest = model.mesh.points[model.mesh.tetrahedra]
     return rest + magnify * (body_corners(model, frame) - rest)
 
 
-def break_times(model, broken_time):
+def break_times(model: Model, broken_time: Optional[np.ndarray]) -> np.ndarray:
     """The times of breaking [s], (bond_count,); all NaN, unbroken, where none are given."""
     return np.full(model.bond_count, np.nan) if broken_time is None else broken_time
 
 
-def frame_block(axes, view, model, margin=0.05):
+def frame_block(axes: Any, view: View, model: Model, margin: float = 0.05) -> None:
     """Limits, equal scales and labels of a view of the whole block; margin: share of its size."""
     flat = view.project(model.mesh.points)
     low, high = flat.min(axis=0), flat.max(axis=0)
@@ -35,7 +40,14 @@ def frame_block(axes, view, model, margin=0.05):
     axes.grid(False)
 
 
-def plot_cracks(path, model, frame, broken_time, magnify=5.0, axis=(0.0, 0.0, 1.0)):
+def plot_cracks(
+    path: FileName,
+    model: Model,
+    frame: Frame,
+    broken_time: np.ndarray,
+    magnify: float = 5.0,
+    axis: Sequence[float] = (0.0, 0.0, 1.0),
+) -> None:
     """Broken faces by time of breaking, in the block at rest and as it is (Konno et al., Fig 12).
 
     frame: the block at one time. broken_time: (bond_count,) [s], NaN while a bond holds. magnify:
@@ -64,7 +76,7 @@ def plot_cracks(path, model, frame, broken_time, magnify=5.0, axis=(0.0, 0.0, 1.
         figure.colorbar(drawn, ax=panels, label="time of breaking [ms]", shrink=0.8, aspect=25)
 
 
-def draw_breaks(axes, view, model, broken_time):
+def draw_breaks(axes: Any, view: View, model: Model, broken_time: np.ndarray) -> Any:
     """Every broken face of the block at rest, also inside it; the earliest on top."""
     rest = model.mesh.points[model.mesh.tetrahedra]
     polygons, _, _ = surface(model.topology, view, rest, np.zeros(model.bond_count, dtype=bool))
@@ -111,7 +123,14 @@ def _close_up(axes, view, model, frame, broken_time):
     axes.set(xlim=(middle[0] - half, middle[0] + half), ylim=(middle[1] - half, middle[1] + half))
 
 
-def plot_steps(path, model, frames, dt0, broken_time=None, axis=(0.0, 0.0, 1.0)):
+def plot_steps(
+    path: FileName,
+    model: Model,
+    frames: Sequence[Frame],
+    dt0: float,
+    broken_time: Optional[np.ndarray] = None,
+    axis: Sequence[float] = (0.0, 0.0, 1.0),
+) -> None:
     """Step of every body at several times (Konno et al., Fig 13).
 
     frames: of more than six, six are drawn, evenly up to the last. dt0: step of level 0 [s].

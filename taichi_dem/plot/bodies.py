@@ -1,15 +1,28 @@
 """Bodies coloured by a value, in a panel that may have other things to show too."""
 
+from collections.abc import Sequence
+from typing import Any, Optional
+
 import numpy as np
 from matplotlib.collections import PolyCollection
 
+from taichi_dem.engine.model import Model
+from taichi_dem.output.record import Frame
 from taichi_dem.plot.block import displaced
 from taichi_dem.plot.view import View, surface
 
 
 def draw_bodies(
-    axes, model, frame, values, *, magnify=1.0, broken=None, axis=(0.0, 0.0, 1.0), **look
-):
+    axes: Any,
+    model: Model,
+    frame: Optional[Frame],
+    values: np.ndarray,
+    *,
+    magnify: float = 1.0,
+    broken: Any = None,
+    axis: Sequence[float] = (0.0, 0.0, 1.0),
+    **look: Any,
+) -> Any:
     """Draw the bodies where they are, coloured by a value each; returns the collection.
 
     frame: a ``Frame``, None for the bodies at rest. values: (n,). magnify: of the displacement.
@@ -24,7 +37,16 @@ def draw_bodies(
     return drawn
 
 
-def move_bodies(drawn, model, frame, values, *, magnify=1.0, broken=None, axis=(0.0, 0.0, 1.0)):
+def move_bodies(
+    drawn: Any,
+    model: Model,
+    frame: Optional[Frame],
+    values: np.ndarray,
+    *,
+    magnify: float = 1.0,
+    broken: Any = None,
+    axis: Sequence[float] = (0.0, 0.0, 1.0),
+) -> None:
     """Change what ``draw_bodies`` has drawn to another frame: arguments as there."""
     corners = model.mesh.points[model.mesh.tetrahedra]
     if frame is not None:

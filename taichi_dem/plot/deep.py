@@ -1,6 +1,7 @@
 """Cracks of a block that is as deep as it is wide: in space, and in two sections."""
 
 import itertools
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -9,11 +10,21 @@ from matplotlib.colors import ListedColormap
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
 from taichi_dem.kit.plot_style import GREY, picture
+from taichi_dem.kit.validation import FileName
+from taichi_dem.mesh.mesh import Mesh
+from taichi_dem.mesh.topology import Topology
 
 _AXES = "xyz"
 
 
-def plot_deep_cracks(path, mesh, topology, broken_time, time_s, hole):
+def plot_deep_cracks(
+    path: FileName,
+    mesh: Mesh,
+    topology: Topology,
+    broken_time: np.ndarray,
+    time_s: np.ndarray,
+    hole: Any,
+) -> None:
     """Broken faces of the block at rest by time of breaking: in space and cut by two planes.
 
     broken_time: (bond_count,) [s], NaN while a bond holds. time_s: of the picture. hole: point on
@@ -83,7 +94,7 @@ def _section(axes, triangles, time_ms, normal, place, bounds, look):
     return lines
 
 
-def crossings(triangles, normal, place):
+def crossings(triangles: np.ndarray, normal: np.ndarray, place: np.ndarray) -> Any:
     """Where triangles (n, 3, 3) [m] cross the plane at a place on an axis.
 
     Returns the ends of the lines (m, 2, 3) [m] and which triangle each belongs to (m,). One with a

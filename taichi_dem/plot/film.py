@@ -4,9 +4,12 @@ import contextlib
 import os
 import shutil
 import subprocess
+from collections.abc import Iterator
+from typing import Any
 
 from taichi_dem.kit.files import renamed_when_done
 from taichi_dem.kit.plot_style import STYLE, filming, write_gif
+from taichi_dem.kit.validation import FileName
 
 #: Pixels an inch of the MP4; the GIF has half as many each way.
 _DPI = 200
@@ -23,7 +26,9 @@ _SMALL = {
 
 
 @contextlib.contextmanager
-def moving_picture(path, size, milliseconds, colours=48):
+def moving_picture(
+    path: FileName, size: tuple[float, float], milliseconds: float, colours: int = 48
+) -> Iterator[Any]:
     """A figure, and a function that takes it as the next frame; files when the block ends well.
 
     path: of the GIF; the MP4 lies beside it. size: in inches, at most 4 each way for a GIF of
@@ -36,7 +41,7 @@ def moving_picture(path, size, milliseconds, colours=48):
     write_mp4(os.path.splitext(path)[0] + ".mp4", images, milliseconds)
 
 
-def write_mp4(path, images, milliseconds):
+def write_mp4(path: FileName, images: Any, milliseconds: float) -> Any:
     """Write RGB images of one size as H.264; does nothing and returns False without ffmpeg.
 
     milliseconds: a frame. A size that is odd loses a row or a column, as the format asks for.

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from taichi_dem.kit.display import by_fields
+from taichi_dem.kit.validation import FileName
 from taichi_dem.plot.block import frame_block
 from taichi_dem.plot.bodies import draw_bodies, move_bodies
 from taichi_dem.plot.film import moving_picture
@@ -36,20 +37,20 @@ class FilmedRun:
 
 
 def film_runs(
-    path,
-    runs,
-    times,
+    path: FileName,
+    runs: Any,
+    times: Any,
     *,
-    words,
-    curve,
-    magnify=1.0,
-    axis=(0.0, 0.0, 1.0),
-    margin=0.1,
-    ticks=None,
-    footers=None,
-    milliseconds=120,
-    **look,
-):
+    words: Any,
+    curve: Any,
+    magnify: float = 1.0,
+    axis: Sequence[float] = (0.0, 0.0, 1.0),
+    margin: float = 0.1,
+    ticks: Any = None,
+    footers: Any = None,
+    milliseconds: float = 120,
+    **look: Any,
+) -> None:
     """Write a GIF of runs over the same time, and an MP4 where ffmpeg is found.
 
     runs: FilmedRuns. times: of the pictures [s]; each run shows its frame at or before. words: of

@@ -1,5 +1,7 @@
 """Steps of bodies by level: their colours, their names, and their shares over time."""
 
+from typing import Any
+
 import matplotlib
 import numpy as np
 from matplotlib.colors import BoundaryNorm, ListedColormap
@@ -7,23 +9,25 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from taichi_dem.kit.plot_style import seconds
 
 
-def level_shades(count):
+def level_shades(count: int) -> Any:
     """Colours of so many levels, the coarsest first and lightest."""
     return matplotlib.colormaps["magma_r"](np.linspace(0.02, 0.92, max(2, count)))
 
 
-def level_look(count):
+def level_look(count: int) -> Any:
     """Arguments cmap and norm of a collection whose values are levels."""
     norm = BoundaryNorm(np.arange(count + 1) - 0.5, count)
     return {"cmap": ListedColormap(level_shades(count)[:count]), "norm": norm}
 
 
-def level_names(dt0, count):
+def level_names(dt0: float, count: int) -> Any:
     """Step of each level in words; dt0: of level 0 [s]."""
     return [seconds(dt0 / 2.0**level) for level in range(count)]
 
 
-def draw_level_shares(figure, axes, time, shares, dt0):
+def draw_level_shares(
+    figure: Any, axes: Any, time: np.ndarray, shares: np.ndarray, dt0: float
+) -> None:
     """Share of bodies on each level over time, the coarsest at the bottom, with its legend.
 
     time: in the unit of the axis. shares: (sample_count, level_count), rows summing to 1. dt0: step

@@ -1,8 +1,12 @@
 """Curves over time: pressure (Konno et al., Fig 11), motion, energy, levels."""
 
+from collections.abc import Mapping
+from typing import Optional
+
 import numpy as np
 
 from taichi_dem.kit.plot_style import BLUE, GREEN, PURPLE, RED, picture, styles_of
+from taichi_dem.kit.validation import FileName
 from taichi_dem.plot.levels import draw_level_shares
 
 #: Energy terms from the bottom of the stack up: blue is held, red lost in bonds, green in contacts.
@@ -28,7 +32,9 @@ def _span(axes, time):
     axes.set_xlim(0.0, time[-1] if time[-1] > 0.0 else 1.0)
 
 
-def plot_pressure(path, time_s, pressure_pa, until_s=None):
+def plot_pressure(
+    path: FileName, time_s: np.ndarray, pressure_pa: np.ndarray, until_s: Optional[float] = None
+) -> None:
     """Pressure of the blast gas over time (Konno et al., Fig 11); until_s: end of the run."""
     with picture(path, size=(5.6, 3.2)) as (_, axes):
         time_ms, pressure = 1e3 * np.asarray(time_s), 1e-6 * np.asarray(pressure_pa)
@@ -48,7 +54,7 @@ def plot_pressure(path, time_s, pressure_pa, until_s=None):
         axes.set(xlim=(0.0, time_ms[-1]), ylim=(0.0, 1.12 * pressure[peak]))
 
 
-def plot_history(path, history):
+def plot_history(path: FileName, history: Mapping[str, np.ndarray]) -> None:
     """Displacement at the hole, broken faces and the smallest step over time."""
     time = 1e3 * history["time_s"]
     with picture(path, 3, 1, size=(6.2, 6.6), sharex=True) as (_, (top, middle, bottom)):
@@ -75,7 +81,7 @@ def plot_history(path, history):
         _span(bottom, time)
 
 
-def plot_energy(path, history):
+def plot_energy(path: FileName, history: Mapping[str, np.ndarray]) -> None:
     """Energy account: where the work went, every term by size, and what is unexplained."""
     time = 1e3 * history["time_s"]
     terms = {key: look for key, look in _TERMS.items() if np.abs(history[key]).max() > 0.0}
@@ -137,7 +143,7 @@ def _momentary(axes, time, history):
     axes.set(ylabel="unexplained\n[% of work so far]", ylim=(0.0, None))
 
 
-def plot_levels(path, time_s, shares, dt0):
+def plot_levels(path: FileName, time_s: np.ndarray, shares: np.ndarray, dt0: float) -> None:
     """Share of bodies on each level over time, the coarsest at the bottom.
 
     shares: (sample_count, level_count), rows summing to 1. dt0: step of level 0 [s].
@@ -153,7 +159,9 @@ def plot_levels(path, time_s, shares, dt0):
 _COMPARED = {"hole_radial_displacement_mm": "hole", "monitor_displacement_mm": "body watched"}
 
 
-def plot_methods(path, series, column):
+def plot_methods(
+    path: FileName, series: Mapping[str, Mapping[str, np.ndarray]], column: str
+) -> None:
     """What methods cost over time, and how far their displacement lies apart.
 
     series: method -> columns time_s, cpu_s, evaluations and the one compared, a displacement of the

@@ -1,11 +1,15 @@
 """One picture of a run for a notebook: the block, and energy and events over time."""
 
 import math
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
+from taichi_dem.engine.model import Model
 from taichi_dem.kit.plot_style import BLACK, BLUE, png_of, styled
+from taichi_dem.output.record import Frame
 from taichi_dem.plot.block import draw_breaks, frame_block
 from taichi_dem.plot.bodies import draw_bodies
 from taichi_dem.plot.view import View
@@ -22,7 +26,7 @@ _BROKEN = "broken bonds"
 _PREFIXES = ("p", "n", "µ", "m", "", "k", "M", "G", "T")
 #: Energies by what they are: terms of the account that add up to them, and look; the colours are
 #: near those of ``series.plot_energy``.
-_ENERGIES = {
+_ENERGIES: dict[str, Any] = {
     # Above the curve that it may lie on.
     "work put in": (
         ("load_work", "support_work"),
@@ -37,7 +41,13 @@ _ENERGIES = {
 }
 
 
-def picture_of_run(model, history, frames, broken_time, peak_speed):
+def picture_of_run(
+    model: Model,
+    history: Mapping[str, np.ndarray],
+    frames: Sequence[Frame],
+    broken_time: np.ndarray,
+    peak_speed: np.ndarray,
+) -> Any:
     """PNG, in bytes: the block beside energy and broken bonds over time.
 
     history, frames, broken_time, peak_speed: as in ``Result``. Where no bond broke, the block shows
@@ -59,7 +69,7 @@ def picture_of_run(model, history, frames, broken_time, peak_speed):
         return png_of(figure)
 
 
-def viewed_along(points):
+def viewed_along(points: np.ndarray) -> Any:
     """Direction to the viewer: z, or the shortest side where the block is long in z."""
     sides = np.ptp(points, axis=0)
     return np.eye(3)[int(sides.argmin()) if sides[2] > _DEEP * sides.min() else 2]
@@ -175,7 +185,7 @@ def _largest(values):
     return float(values[np.isfinite(values)].max(initial=0.0))
 
 
-def scale(largest, unit):
+def scale(largest: float, unit: str) -> Any:
     """Factor and name of the unit in which a value has one to three digits before the point."""
     power = math.floor(math.log10(largest) / 3.0 + 1e-9) if largest > 0.0 else 0
     power = min(max(power, -4), len(_PREFIXES) - 5)

@@ -3,9 +3,14 @@
 NumPy only. Corners are world positions (body_count, 4, 3) [m], as ``record.body_corners`` gives.
 """
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 
+from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.tetrahedra import LOCAL_FACES
+from taichi_dem.mesh.topology import Topology
 
 #: Faces that lean away from the viewer by less than this sine count as seen edge on.
 _EDGE_ON = 1e-6
@@ -18,19 +23,19 @@ class View:
     of the picture, right-handed; looking down a coordinate axis, the next two are right and up.
     """
 
-    def __init__(self, axis=(0.0, 0.0, 1.0)):
-        axis = np.asarray(axis, dtype=float)
-        main = int(np.abs(axis).argmax())
-        self.toward = axis / np.linalg.norm(axis) * np.sign(axis[main])
+    def __init__(self, axis: Sequence[float] = (0.0, 0.0, 1.0)):
+        along = np.asarray(axis, dtype=float)
+        main = int(np.abs(along).argmax())
+        self.toward = along / np.linalg.norm(along) * np.sign(along[main])
         right = np.cross(np.eye(3)[(main + 2) % 3], self.toward)
         self.right = right / np.linalg.norm(right)
         self.up = np.cross(self.toward, self.right)
 
-    def project(self, points):
+    def project(self, points: np.ndarray) -> np.ndarray:
         """Picture coordinates [m] of points (..., 3), shape (..., 2)."""
         return points @ np.column_stack([self.right, self.up])
 
-    def labels(self):
+    def labels(self) -> Any:
         """Labels of the two picture axes: a coordinate's name where the axis is one."""
         return tuple(self._label(vector) for vector in (self.right, self.up))
 
@@ -39,7 +44,7 @@ class View:
         along = abs(vector[axis]) > 1.0 - 1e-6
         return f"{'xyz'[axis]} [m]" if along else "in the picture [m]"
 
-    def facing(self, triangles):
+    def facing(self, triangles: np.ndarray) -> np.ndarray:
         """Indices of triangles (n, 3, 3) whose normal points to the viewer, the farthest first."""
         normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         seen = np.flatnonzero(normal @ self.toward > _EDGE_ON * np.linalg.norm(normal, axis=1))
@@ -47,7 +52,7 @@ class View:
         return seen[np.argsort(depth, kind="stable")]
 
 
-def skin(topology, broken):
+def skin(topology: Topology, broken: Any) -> Any:
     """Faces that show: outer ones and both sides of broken bonds.
 
     broken: (bond_count,) bool. Returns body, local face (n,) and whether it is a crack face (n,).
@@ -58,7 +63,7 @@ def skin(topology, broken):
     return body, np.concatenate(faces), np.arange(len(body)) >= topology.outer_count
 
 
-def surface(topology, view, corners, broken):
+def surface(topology: Topology, view: View, corners: np.ndarray, broken: Any) -> Any:
     """Visible polygons (n, 3, 2) [m] from back to front, their bodies, which are crack faces."""
     body, face, crack = skin(topology, broken)
     triangles = corners[body[:, None], LOCAL_FACES[face]]
@@ -66,7 +71,7 @@ def surface(topology, view, corners, broken):
     return view.project(triangles[seen]), body[seen], crack[seen]
 
 
-def traces(mesh, topology, view, broken_time):
+def traces(mesh: Mesh, topology: Topology, view: View, broken_time: np.ndarray) -> Any:
     """Where broken faces reach the outer faces that the viewer sees of the block at rest.
 
     broken_time: (bond_count,) [s], NaN while a bond holds. A crack has two lips, each an edge of
