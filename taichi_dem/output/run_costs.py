@@ -1,32 +1,35 @@
 """Costs of a run over its time, and the levels of its bodies."""
 
 from collections.abc import Iterable
-from typing import Any, Optional
 
 import numpy as np
 
-from taichi_dem.observers import Every, RunView
+from taichi_dem.observers import Collector, Every
 
 
-class RunCosts:
+class RunCosts(Collector):
     """Observer that keeps what a run has cost at every sample, and the levels of its bodies.
 
-    columns: cpu_s [s] and evaluations so far. levels: (body_count,) of each sample. view: the last.
+    view: of the last sample.
     """
 
-    when = Every(samples=1)
-
     def __init__(self):
-        self.columns: dict[str, list] = {"cpu_s": [], "evaluations": []}
-        self.levels: list[np.ndarray] = []
-        self.view: Optional[RunView] = None
+        super().__init__(
+            Every(samples=1),
+            cpu_s=lambda view: view.cpu_seconds,
+            evaluations=lambda view: view.evaluations,
+            level=lambda view: view.motion()["level"],
+        )
 
-    def observe(self, view: Any) -> None:
-        """Take a row."""
-        self.view = view
-        self.columns["cpu_s"].append(view.cpu_seconds)
-        self.columns["evaluations"].append(view.evaluations)
-        self.levels.append(view.motion()["level"])
+    @property
+    def columns(self) -> dict[str, list]:
+        """CPU seconds and evaluations so far, of each sample."""
+        return {name: self.rows[name] for name in ("cpu_s", "evaluations")}
+
+    @property
+    def levels(self) -> list[np.ndarray]:
+        """Levels of the bodies of each sample, (body_count,) each."""
+        return self.rows["level"]
 
 
 def level_shares(levels: Iterable[np.ndarray]) -> np.ndarray:
