@@ -39,6 +39,9 @@ def output_folder(path: FileName) -> str:
     path = os.path.expanduser(name)
     try:
         os.makedirs(path, exist_ok=True)
+        # First: runs that begin at once would take away each other's test file.
+        if _claims is not None:
+            _claim(path, _claims)
         probe = os.path.join(path, ".write-test")
         with open(probe, "w") as handle:
             handle.write("x")
@@ -46,8 +49,6 @@ def output_folder(path: FileName) -> str:
     except OSError as error:
         reason = error.strerror or error
         raise InputError(f"output folder {path} must be writable: {reason}") from None
-    if _claims is not None:
-        _claim(path, _claims)
     _remove_leftovers(path)
     return path
 
@@ -72,11 +73,14 @@ def claiming() -> Iterator[None]:
 
 
 def _claim(path: str, claims: dict[str, int]) -> None:
-    """Claim a folder, unless its file system knows no locks; InputError where another has it."""
+    """Claim a folder, unless it cannot be locked; InputError where another process has it."""
     place = os.path.realpath(path)
     if fcntl is None or place in claims:
         return
-    lock = os.open(place, os.O_RDONLY)
+    try:
+        lock = os.open(place, os.O_RDONLY)
+    except PermissionError:  # a folder may be written to and not be read
+        return
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -92,7 +96,10 @@ def _claim(path: str, claims: dict[str, int]) -> None:
 
 def _remove_leftovers(folder):
     """Remove temporary files of processes of this machine that are no more."""
-    for name in os.listdir(folder):
+    names: list[str] = []
+    with contextlib.suppress(PermissionError):
+        names = os.listdir(folder)
+    for name in names:
         found = _TEMPORARY.fullmatch(name)
         if found and not _is_alive(int(found[1])):
             with contextlib.suppress(OSError):

@@ -65,6 +65,26 @@ def test_the_second_run_in_a_folder_is_refused_until_the_first_has_ended(held):
     assert "report.json" in os.listdir(folder) or len(os.listdir(folder)) > 0
 
 
+def test_runs_that_begin_at_once_do_not_take_each_others_test_file(held, monkeypatch):
+    """The claim comes first: the second run writes nothing in the folder of the first."""
+    monkeypatch.setattr("builtins.open", pytest.fail)
+    with claiming():
+        assert_refused(lambda: output_folder(held[0]), "another one is writing there")
+
+
+def test_a_folder_that_may_be_written_to_and_not_be_read_will_do(tmp_path, monkeypatch):
+    """An administrator may read everything, so the system's refusals are made here."""
+
+    def refused(*_):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(files.os, "open", refused)
+    monkeypatch.setattr(files.os, "listdir", refused)
+    with claiming():
+        assert output_folder(tmp_path) == str(tmp_path)
+        assert files._claims == {}
+
+
 def test_a_folder_may_be_asked_for_again_by_its_own_run(tmp_path):
     with claiming(), claiming():
         assert output_folder(tmp_path / "a") == output_folder(tmp_path / "a")
