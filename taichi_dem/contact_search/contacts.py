@@ -30,8 +30,9 @@ class Contacts:
     """Candidate pairs of bodies with broken faces; p: a slot of the ``PairStore``, called store.
 
     exposed_faces: bit f for a broken face f. travel: bound of the displacement of any point of a
-    body since it was last searched [m]. body_skin: travel at which it is searched again [m]; a pair
-    holds the spheres whose gap is below the body skin of both. pace: largest step [s], and steps of
+    body since it was last searched [m]. skin: least gap up to which its spheres are listed [m].
+    body_skin: travel at which it is searched again [m]; a pair holds the spheres whose gap is below
+    the body skin of both. pace: largest step [s], and steps of
     a body by which its contacts are counted before they touch. search_requested: 1 when the list
     may miss one of them.
     """
@@ -48,13 +49,13 @@ class Contacts:
         self.exposed_faces = ti.field(ti.i32, shape=n)
         self.travel = ti.field(real, shape=n)
         self.body_skin = ti.field(real, shape=n)
-        self.skin = ti.field(real, shape=())
+        self.skin = ti.field(real, shape=n)
         self.search_requested = ti.field(ti.i32, shape=())
 
     def load(self, model: "Model", method: Method) -> None:
         """Load the numbers of a scene and a method; no pairs exist yet."""
         effect, n = model.contact, model.body_count
-        assign(self.skin, effect.skin)
+        assign(self.skin, effect.skin * model.spheres.extent)
         assign(self.pace, np.array([method.dt0, method.steps_ahead]))
         assign(self.store.slot_limit, n * effect.pairs_per_body + SPARE_PAIRS)
         assign(self.store.sphere_limit, n * effect.spheres_per_body + SPARE_SPHERES)
@@ -170,7 +171,7 @@ class Contacts:
         """
         speed = self._speed(i, self.state.velocity[i], self.state.spin[i])
         way = ti.min(STEPS * self.pace[0] * speed, FARTHEST * self.tables.extent[i])
-        self.body_skin[i] = ti.max(0.5 * self.skin[None], way)
+        self.body_skin[i] = ti.max(0.5 * self.skin[i], way)
 
     @ti.func
     def _speed(self, i, velocity, spin):

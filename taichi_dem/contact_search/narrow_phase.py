@@ -48,7 +48,7 @@ class NarrowPhase:
         margin = self.contacts.margin(i, j)
         count, hits, least = 0, 0, margin
         if not write:
-            least += OUTLOOK * self.contacts.skin[None]
+            least += 0.5 * OUTLOOK * (self.contacts.skin[i] + self.contacts.skin[j])
         for fg in range(16):
             if (faces >> fg) & 1 == 1:
                 face_i, face_j = 4 * i + fg // 4, 4 * j + fg % 4

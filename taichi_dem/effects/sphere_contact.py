@@ -3,7 +3,7 @@
 import taichi as ti
 
 from taichi_dem.effects.base import Effect
-from taichi_dem.kit.validation import flag, positive, whole
+from taichi_dem.kit.validation import between, flag, whole
 from taichi_dem.materials import Material
 from taichi_dem.physics.sphere_pair import normal_force
 
@@ -17,8 +17,8 @@ class SphereContact(Effect):
 
     divisions: equal parts of a face's edges; 5 gives the paper's six spheres a face.
     outer_faces: free outer faces carry spheres from the start too (the paper: no).
-    skin: gap up to which spheres enter the candidate list, at least; more where bodies are fast
-    [m]. It changes time, not results.
+    skin: gap up to which spheres enter the candidate list, at least, as a share of a body's radius;
+    more where bodies are fast. It changes time, not results.
     neighbours_per_body, pairs_per_body, spheres_per_body: capacity of the lists, on average; that
     of the spheres includes those of the next search, before those that they replace are freed.
     """
@@ -30,14 +30,14 @@ class SphereContact(Effect):
         self,
         divisions: int = 5,
         outer_faces: bool = False,
-        skin: float = 1.2e-3,
+        skin: float = 0.015,
         neighbours_per_body: int = 64,
         pairs_per_body: int = 24,
         spheres_per_body: int = 160,
     ):
         self.divisions = whole("divisions", divisions, 3, 20)
         self.outer_faces = flag("outer_faces", outer_faces)
-        self.skin = positive("skin", skin)
+        self.skin = between("skin", skin, 1e-6, 1.0)
         self.neighbours_per_body = whole("neighbours_per_body", neighbours_per_body, 1, _MOST)
         self.pairs_per_body = whole("pairs_per_body", pairs_per_body, 1, _MOST)
         self.spheres_per_body = whole("spheres_per_body", spheres_per_body, 1, _MOST)

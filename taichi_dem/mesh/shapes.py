@@ -118,7 +118,9 @@ def mirrored_copies(mesh: Mesh, copies: int) -> Mesh:
     points[1::2, :, 2] = depth - points[1::2, :, 2]
     points[:, :, 2] += depth * np.arange(copies)[:, None]
     # Mirrored points differ from their originals in the last bit.
-    points, place = np.unique(np.round(points.reshape(-1, 3), 12), axis=0, return_inverse=True)
+    unit = 2.0 ** np.ceil(np.log2(np.ptp(mesh.points, axis=0).max()))
+    rounded = unit * np.round(points.reshape(-1, 3) / unit, 12)
+    points, place = np.unique(rounded, axis=0, return_inverse=True)
     place = place.reshape(copies, -1)
     groups = {name: place[:, faces].reshape(-1, 3) for name, faces in mesh.groups.items()}
     groups["back"] = place[0][mesh.groups["back"]]

@@ -43,7 +43,7 @@ def drawn_scene(random):
     contact = effects.SphereContact(
         divisions=int(random.integers(3, 6)),
         outer_faces=bool(random.integers(2)),
-        skin=float(10.0 ** random.uniform(-4, -3)),
+        skin=float(10.0 ** random.uniform(-3, -1)),
     )
     left = effects.GasPressure("left", peak=2e9, rise=float(random.uniform(5e-6, 2e-5)))
     listed = [

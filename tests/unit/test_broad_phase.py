@@ -39,7 +39,7 @@ def scattered(again, skin, spread):
     state.exposed_tick.from_numpy(exposed)
     # What has been broken from the start injects nothing.
     state.injected_tick[None] = 0
-    simulation.contacts.skin[None] = skin
+    simulation.contacts.skin.fill(skin)
     again.search_anew()
     return simulation
 

@@ -80,9 +80,9 @@ def test_positions_are_of_second_order_before_anything_breaks(block, until, boun
 def test_touching_pairs_of_a_colour_share_no_body(block):
     """Those listed are just those that touch, each once, in the order of their colours."""
     pairs, contacts, counts = block.simulation.advance.solver.pairs, block.simulation.contacts, []
-    skin = contacts.skin[None]
+    skin = contacts.skin.to_numpy()
     block.restart(STEP)
-    contacts.skin[None] = 4e-3
+    contacts.skin.fill(4e-3)
     block.search_anew()
     block.run(50)
     for step in range(50, 250):
@@ -103,7 +103,7 @@ def test_touching_pairs_of_a_colour_share_no_body(block):
         assert order.tolist() == np.argsort(colours, kind="stable").tolist()
         first = pairs.colour_first.to_numpy()[: COLOURS + 1]
         assert first.tolist() == np.searchsorted(colours[order], np.arange(COLOURS + 1)).tolist()
-    contacts.skin[None] = skin
+    contacts.skin.from_numpy(skin)
     assert len(counts) > 20 and max(counts) > 50 and colours.max() > 0
 
 

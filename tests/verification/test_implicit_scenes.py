@@ -254,7 +254,7 @@ def test_one_fast_fragment_keeps_the_list_of_neighbours_right(implicit):
     """
     simulation, fragment = implicit.again.simulation, implicit.bodies["fragment"][0]
     implicit.restart(STEP)
-    neighbours, skin = simulation.broad_phase.neighbours, simulation.contacts.skin[None]
+    neighbours, skin = simulation.broad_phase.neighbours, simulation.contacts.skin[fragment]
     reach = (BODY_SKINS + 2.0 * SKINS) * skin
     rooms, place, still = neighbours.first.to_numpy(), implicit.place.copy(), implicit.spin * 0.0
     turn = np.tile([1.0, 0.0, 0.0, 0.0], (len(place), 1))
