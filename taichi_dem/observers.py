@@ -187,7 +187,7 @@ class RunView:
 
     def motion(self) -> dict:
         """Arrays of the bodies' motion by name, as in ``State.motion``."""
-        return {name: _locked(array) for name, array in self._parts[0].state.motion().items()}
+        return {name: _locked(array) for name, array in self._parts[0].motion().items()}
 
     def energy_balance(self) -> dict:
         """Terms of the energy balance by name [J]."""

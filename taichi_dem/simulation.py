@@ -174,6 +174,7 @@ class Simulation:
         self.driver.prepare()
         self._check_capacity()
         compiling("energy balance", 0.85)
+        self.readings.step_back(self.readings.pushes())
         self._open_balance()
         self.sample()
         self.divergence_check.check()
@@ -189,6 +190,15 @@ class Simulation:
         )
         self.missing_effects = MissingEffects(*read, self.outer_overlaps)
         self.step_resolution = StepResolution(*read, self.schedule, self.advance)
+
+    def motion(self) -> dict[str, np.ndarray]:
+        """Arrays of ``State.motion``, with velocities and spins at the time of the positions."""
+        motion = self.state.motion()
+        table = np.zeros((self.model.body_count, 9))
+        self.readings.motion(self.readings.pushes(), table)
+        for place, name in enumerate(("velocity", "spin", "angular_momentum")):
+            motion[name] = table[:, 3 * place : 3 * place + 3].copy()
+        return motion
 
     def sample(self) -> None:
         """Sample missing effects, and bonds that the step does not resolve.
@@ -277,6 +287,7 @@ class Simulation:
         levels = self.state.level.to_numpy()
         tables = self.energy_balance.tables()
         account = self.energy_balance.account(tables)
+        unconverged, worst = self.step_resolution.unconverged
         return Report(
             method=self.method.name,
             driver=self.driver.name,
@@ -291,6 +302,8 @@ class Simulation:
             bond_evaluations=counts[2],
             pair_evaluations=counts[3],
             sweeps=self.sweeps(),
+            unconverged_steps=unconverged,
+            worst_residual=worst,
             uniform_evaluations=counts[4],
             searches=self.searches,
             energy_balance=account,

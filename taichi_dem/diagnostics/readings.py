@@ -2,10 +2,14 @@
 
 from typing import TYPE_CHECKING
 
+import numpy as np
 import taichi as ti
 
+from taichi_dem.kit.allocation import values
+from taichi_dem.kit.types import vec3
 from taichi_dem.physics.fracture import coulomb_limit
 from taichi_dem.step.advance import Advance
+from taichi_dem.step.half_step import HalfStep
 
 if TYPE_CHECKING:
     from taichi_dem.engine.state import State
@@ -21,19 +25,78 @@ class Readings:
 
     def __init__(self, tables: "Tables", state: "State", advance: Advance):
         self.tables, self.state, self.advance = tables, state, advance
-        self.contacts = advance.contacts
+        self.contacts, self.half_step = advance.contacts, HalfStep(advance)
+
+    def pushes(self) -> np.ndarray:
+        """Forces [N] and moments [N m] of contacts on every body now, (body_count, 6).
+
+        Summed in the order of the pairs, so that no thread changes a bit.
+        """
+        pushed = np.zeros((int(values(self.tables.body_count)), 6))
+        if self.contacts is not None and int(values(self.contacts.store.near_count)):
+            bodies = self.contacts.store.near_table()[0]
+            table = np.zeros((len(bodies), 12))
+            self._push(table)
+            for side in range(2):
+                np.add.at(pushed, bodies[:, side], table[:, 6 * side : 6 * side + 6])
+        return pushed
 
     @ti.kernel
-    def bodies(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
+    def _push(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
+        """Force and moment of every pair's contacts on its first and on its second body."""
+        for a in range(self.contacts.store.near_count[None]):
+            found = self.advance.touch_now(self.contacts.store.near_slot[a])
+            for k in ti.static(range(3)):
+                table[a, k], table[a, 3 + k] = -found.force[k], found.moment_i[k]
+                table[a, 6 + k], table[a, 9 + k] = found.force[k], found.moment_j[k]
+
+    @ti.func
+    def _pushed(self, pushed: ti.template(), i):
+        """Force and moment of the contacts of body i, rows of ``pushes``."""
+        force, moment = vec3(0.0), vec3(0.0)
+        for k in ti.static(range(3)):
+            force[k], moment[k] = pushed[i, k], pushed[i, 3 + k]
+        return force, moment
+
+    @ti.kernel
+    def motion(
+        self,
+        pushed: ti.types.ndarray(dtype=ti.f64, ndim=2),
+        table: ti.types.ndarray(dtype=ti.f64, ndim=2),
+    ):
+        """Velocity, spin and angular momentum of every body at the time of its position."""
+        for i in range(self.tables.body_count[None]):
+            force, moment = self._pushed(pushed, i)
+            velocity, momentum = self.half_step.motion(i, force, moment)
+            spin = self.advance.spin(i, momentum)
+            for k in ti.static(range(3)):
+                table[i, k], table[i, 3 + k], table[i, 6 + k] = velocity[k], spin[k], momentum[k]
+
+    @ti.kernel
+    def step_back(self, pushed: ti.types.ndarray(dtype=ti.f64, ndim=2)):
+        """Set the velocities, which are given at time zero, half a step back."""
+        for i in range(self.tables.body_count[None]):
+            force, moment = self._pushed(pushed, i)
+            self.half_step.step_back(i, force, moment)
+
+    @ti.kernel
+    def bodies(
+        self,
+        pushed: ti.types.ndarray(dtype=ti.f64, ndim=2),
+        table: ti.types.ndarray(dtype=ti.f64, ndim=2),
+    ):
         """Kinetic energy, work of loads and supports, contact heats of every body [J]."""
         for i in range(self.tables.body_count[None]):
-            momentum = self.state.angular_momentum[i]
+            force, moment = self._pushed(pushed, i)
+            velocity, momentum = self.half_step.motion(i, force, moment)
             turning = momentum.dot(self.advance.spin(i, momentum))
-            moving = self.tables.mass[i] * self.state.velocity[i].norm_sqr()
+            moving = self.tables.mass[i] * velocity.norm_sqr()
             table[i, 0] = 0.5 * (moving + turning)
+            works = self.half_step.works(i, force, moment)
             for e in ti.static(range(len(self.tables.loads))):
-                table[i, 1] = table[i, 1] + self.state.load_work[i][e]
-            table[i, 2] = self.state.load_work[i][ti.static(len(self.tables.loads))]
+                table[i, 1] = table[i, 1] + (self.state.load_work[i][e] + works[e])
+            held = ti.static(len(self.tables.loads))
+            table[i, 2] = self.state.load_work[i][held] + works[held]
             if ti.static(self.tables.has_contact):
                 for k in ti.static(range(3)):
                     table[i, 3 + k] = self.state.contact_heat[i][k]
@@ -46,6 +109,7 @@ class Readings:
             if ti.static(self.tables.has_bond_heat):
                 for k in ti.static(range(3)):
                     table[b, 1 + k] = self.state.bond_heat[b][k]
+                table[b, 1] = table[b, 1] + self.half_step.bond_heat(b)
             for q in range(3):
                 spent = self.tables.tension.spent(b, 3 * b + q)
                 table[b, 4] = table[b, 4] + self.tables.unit_area[b] * spent
@@ -56,24 +120,31 @@ class Readings:
         for a in range(self.contacts.store.near_count[None]):
             p = self.contacts.store.near_slot[a]
             table[a, 0] = self.contacts.pair_energy(p)
+            found, half = self.advance.touch_now(p), self.half_step.pair_step(p)
+            heat = self.contacts.store.heat[p] + half * vec3(found.dragged, found.rubbed, 0.0)
             for k in ti.static(range(3)):
-                table[a, 1 + k] = self.contacts.store.heat[p][k]
+                table[a, 1 + k] = heat[k]
 
     @ti.kernel
-    def load_work(self, index: ti.i32, work: ti.types.ndarray(dtype=ti.f64, ndim=1)):
-        """Work of one load on every body [J]."""
+    def works(
+        self,
+        pushed: ti.types.ndarray(dtype=ti.f64, ndim=2),
+        work: ti.types.ndarray(dtype=ti.f64, ndim=2),
+    ):
+        """Work of each load, and of all supports last, on every body [J]."""
         for i in range(self.tables.body_count[None]):
-            for e in ti.static(range(len(self.tables.loads))):
-                if e == index:
-                    work[i] = self.state.load_work[i][e]
+            force, moment = self._pushed(pushed, i)
+            works = self.half_step.works(i, force, moment)
+            for e in ti.static(range(len(self.tables.loads) + 1)):
+                work[i, e] = self.state.load_work[i][e] + works[e]
 
     @ti.kernel
-    def support_work(self, index: ti.i32, work: ti.types.ndarray(dtype=ti.f64, ndim=1)):
-        """Work [J] of all supports on the bodies that one of them holds; other entries stay."""
+    def supported(self, index: ti.i32, marks: ti.types.ndarray(dtype=ti.i32, ndim=1)):
+        """Mark the bodies on which one of the supports acts."""
         for i in range(self.tables.body_count[None]):
             for e in ti.static(range(len(self.tables.supports))):
                 if e == index and self.tables.supports[e].acts_on(i):
-                    work[i] = self.state.load_work[i][ti.static(len(self.tables.loads))]
+                    marks[i] = 1
 
     @ti.kernel
     def momentum(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):

@@ -18,7 +18,9 @@ class Report:
     bonds and pairs that one step for all would have evaluated in the same substeps. sweeps: over
     all dashpots where they are solved, else 0. ideal_gain: bodies times substeps over body updates,
     the saving by different steps if a pair cost nothing; boundary_gain: uniform over actual
-    evaluations, the saving with every pair evaluated at the finer body's step. searches: updates of
+    evaluations, the saving with every pair evaluated at the finer body's step. unconverged_steps:
+    those whose sweeps ended before impulses agreed; worst_residual: their largest residual, as a
+    share of the fastest body's speed. searches: updates of
     the contact lists.
     energy_balance: energy terms [J]; energy_residual_fraction: residual over the work put in.
     linear_momentum_error, angular_momentum_error: unexplained momentum, as shares of that
@@ -57,6 +59,8 @@ class Report:
     unresolved: tuple
     bound_by: dict
     round_off_J: float = 0.0
+    unconverged_steps: int = 0
+    worst_residual: float = 0.0
     measured_speedup: Optional[float] = None
 
     def __repr__(self):
@@ -141,7 +145,8 @@ class Report:
         """Row with the sweeps over all dashpots, for methods that solve them."""
         if not self.sweeps:
             return ()
-        return (("sweeps", f"{self.sweeps:,}, {self.sweeps / self.substeps:.2f} a substep"),)
+        words = f"{self.sweeps:,}, {self.sweeps / self.substeps:.2f} a substep"
+        return (("sweeps", f"{words}, {self.unconverged_steps:,} substeps unconverged"),)
 
     def __str__(self):
         """A table of some twenty lines, then one line for every effect that was missed."""

@@ -46,7 +46,7 @@ class StepResolution:
     ):
         self.model, self.state, self.readings, self.contacts = model, state, readings, contacts
         self.schedule, self.solves, self.limited = schedule, advance.solves, advance.limited
-        self.has_dashpot = advance.has_dashpot
+        self.has_dashpot, self.solver = advance.has_dashpot, advance.solver
         self.share = np.ones(model.bond_count)
         self.pair_share, self.taken = np.ones(model.body_count), np.zeros(model.body_count)
         self.step = np.full(model.body_count, np.inf)
@@ -86,7 +86,29 @@ class StepResolution:
         bodies: which to judge, booleans (body_count,), all by default.
         """
         bodies = np.ones(self.model.body_count, dtype=bool) if bodies is None else bodies
-        return (*self._bonds(bodies[self.model.topology.master]), *self._pairs(bodies))
+        bonds = self._bonds(bodies[self.model.topology.master])
+        return (*bonds, *self._pairs(bodies), *self._sweeps())
+
+    @property
+    def unconverged(self) -> tuple[int, float]:
+        """Steps whose sweeps ended before impulses agreed, and the worst residual.
+
+        The residual is a share of the fastest body's speed.
+        """
+        if self.solver is None:
+            return 0, 0.0
+        return int(self.solver.unconverged[None]), float(self.solver.worst[None])
+
+    def _sweeps(self):
+        steps, worst = self.unconverged
+        if not steps:
+            return ()
+        allowed = float(self.solver.tolerance[None])
+        return (
+            f"the dashpots of {steps} steps were not solved: sweeps ended with changes of up to "
+            f"{100 * worst:.2g} % of the largest speed, where {100 * allowed:.2g} % is asked; "
+            f"allow more sweeps than {int(self.solver.bounds[1])}, or take a shorter step",
+        )
 
     def _bonds(self, inside):
         share = np.where(inside, self.share, 1.0)

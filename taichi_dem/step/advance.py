@@ -27,7 +27,13 @@ if TYPE_CHECKING:
 
 @ti.data_oriented
 class Advance(ContactForce):
-    """The order in which physics and effects act; see the module."""
+    """The order in which physics and effects act; see the module.
+
+    staggered: whether velocities are half a step behind positions, as the leapfrog's are. An order
+    of one's own that keeps both at one time sets it to False.
+    """
+
+    staggered = True
 
     def __init__(
         self,
@@ -185,6 +191,20 @@ class Advance(ContactForce):
             motion = self._motion(b, self.tables.bond_slots[b])
             energy = self.tables.unit_area[b] * self._stored(b, motion)
         return energy
+
+    @ti.func
+    def bond_power(self, b):
+        """Power that the dashpots of an intact bond take now [W]."""
+        slots, power, scale = self.tables.bond_slots[b], 0.0, 1.0
+        motion = self._motion(b, slots)
+        if ti.static(self.limited):
+            scale = self.bond_share(b)
+        if ti.static(self.solves_bonds):
+            motion = self.solver.bonds.mean(b, motion)
+        for q in range(3):
+            velocity = unit_velocity(motion, unit_arm(motion, self.tables.vertex_slave[3 * b + q]))
+            power += scale * self.tables.dashpot.traction(velocity).dot(velocity)
+        return power * self.tables.unit_area[b]
 
     @ti.func
     def bond_opening(self, b):

@@ -2,10 +2,29 @@
 
 import taichi as ti
 
-from taichi_dem.kit.types import vec3
+from taichi_dem.kit.types import real, vec3
 from taichi_dem.physics.rotation import zero3
 from taichi_dem.physics.sphere_pair import add_within, meeting
 from taichi_dem.stability.body_limits import HIT
+
+
+@ti.dataclass
+class Touch:
+    """Forces between two bodies in contact, in world axes.
+
+    force: on the second [N]. moment_i, moment_j: about the centre of each [N m]. dragged, rubbed:
+    power that dashpots and friction take [W]. slipped: energy of springs that slipped or parted
+    [J]. deepest: largest overlap over the sum of the radii. near: spheres within a margin.
+    """
+
+    force: vec3
+    moment_i: vec3
+    moment_j: vec3
+    dragged: real
+    rubbed: real
+    slipped: real
+    deepest: real
+    near: ti.i32
 
 
 @ti.data_oriented
@@ -17,20 +36,47 @@ class ContactForce:
         """Evaluate the sphere contacts of a pair of bodies: repulsion and friction."""
         pair = self.contacts.store.body[p]
         i, j = pair[0], pair[1]
+        elapsed, margin = 0.0, 0.0
+        if ti.static(self.springs.present):
+            elapsed = self.springs.elapsed(p)
+        if ti.static(self.has_limits):
+            margin = self.limits.contact_limits.margin(i, j)
+        found = self.touch(p, elapsed, margin, True)
+        if found.deepest > 0.0:
+            dt = self._pair_step(p, i, j)
+            self.contacts.add_impulse(p, 0, -found.force * dt, found.moment_i * dt)
+            self.contacts.add_impulse(p, 1, found.force * dt, found.moment_j * dt)
+            heat = dt * vec3(found.dragged, found.rubbed, 0.0)
+            self.contacts.store.heat[p] = self.contacts.store.heat[p] + heat
+        if ti.static(self.springs.present):
+            self.contacts.book_friction(p, found.slipped)
+        self.contacts.store.deepest[p] = found.deepest
+        if ti.static(self.has_limits):
+            self.limits.notice_pair(p, found.near, HIT)
+
+    @ti.func
+    def touch_now(self, p):
+        """Forces of a pair's contacts at the present time, a ``Touch``; nothing changes."""
+        return self.touch(p, 0.0, 0.0, False)
+
+    @ti.func
+    def touch(self, p, elapsed, margin, stepping: ti.template()):
+        """Forces of a pair's sphere contacts now, a ``Touch``.
+
+        elapsed: since springs between spheres were followed [s]. margin: gap up to which spheres
+        count as near [m]. stepping: whether springs follow and slip; else they stay as they are.
+        """
+        pair = self.contacts.store.body[p]
+        i, j = pair[0], pair[1]
         branch = self.state.position[j] - self.state.position[i]
         # Most candidates do not touch: tested in the first body's frame, at half the cost.
         back = self.state.rotation[i].transpose()
         turn, offset = back @ self.state.rotation[j], back @ branch
         force, moment_i, moment_j = zero3(), zero3(), zero3()
         dragged, rubbed, slipped, deepest = 0.0, 0.0, 0.0, 0.0
-        scale, margin, near = 1.0, 0.0, 0
+        scale, near = 1.0, 0
         if ti.static(self.limited):
             scale = self.contact_share(i, j)
-        if ti.static(self.has_limits):
-            margin = self.limits.contact_limits.margin(i, j)
-        elapsed = 0.0
-        if ti.static(self.springs.present):
-            elapsed = self.springs.elapsed(p)
         for k in range(self.contacts.store.first[p], self.contacts.store.last[p]):
             a, b = self.contacts.store.sphere[k][0], self.contacts.store.sphere[k][1]
             first, second = self.tables.sphere[a], self.tables.sphere[b]
@@ -46,7 +92,7 @@ class ContactForce:
                 slide = velocity - rate * normal
                 push = self.contacts.law.normal(overlap, self._limited(rate, scale))
                 drag = self._limited(self.contacts.law.damping(), scale)
-                rub, stuck, spent = self._rub(k, i, normal, push, drag, slide, elapsed)
+                rub, stuck, spent = self._rub(k, i, normal, push, drag, slide, elapsed, stepping)
                 pushed = push * normal + rub
                 force += pushed
                 moment_i -= arm.cross(pushed)
@@ -55,28 +101,28 @@ class ContactForce:
                 rubbed -= (rub - stuck).dot(slide)
                 slipped += spent
                 deepest = ti.max(deepest, overlap / reach)
-            else:
+            elif ti.static(stepping):
                 slipped += self.springs.part(k)
-        if deepest > 0.0:
-            dt = self._pair_step(p, i, j)
-            self.contacts.add_impulse(p, 0, -force * dt, moment_i * dt)
-            self.contacts.add_impulse(p, 1, force * dt, moment_j * dt)
-            heat = dt * vec3(dragged, rubbed, 0.0)
-            self.contacts.store.heat[p] = self.contacts.store.heat[p] + heat
-        if ti.static(self.springs.present):
-            self.contacts.book_friction(p, slipped)
-        self.contacts.store.deepest[p] = deepest
-        if ti.static(self.has_limits):
-            self.limits.notice_pair(p, near, HIT)
+        return Touch(
+            force=force,
+            moment_i=moment_i,
+            moment_j=moment_j,
+            dragged=dragged,
+            rubbed=rubbed,
+            slipped=slipped,
+            deepest=deepest,
+            near=near,
+        )
 
     @ti.func
-    def _rub(self, k, i, normal, push, drag, slide, elapsed):
+    def _rub(self, k, i, normal, push, drag, slide, elapsed, stepping: ti.template()):
         """Friction on the second sphere and the spring's part of it [N]; energy of slipping [J]."""
         rub, stuck, spent = zero3(), zero3(), 0.0
         if ti.static(self.springs.present):
             rotation, bound = self.state.rotation[i], self.tables.friction.limit(push)
-            self.springs.follow(k, rotation, normal, elapsed * slide)
-            spent = self.springs.slip(k, rotation, bound, elapsed * slide)
+            if ti.static(stepping):
+                self.springs.follow(k, rotation, normal, elapsed * slide)
+                spent = self.springs.slip(k, rotation, bound, elapsed * slide)
             stuck = self.springs.force(k, rotation)
             rub = add_within(stuck, -drag * slide, bound)
         else:
