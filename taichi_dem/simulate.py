@@ -104,7 +104,7 @@ def run_simulation(
         simulation, recorder = _started(simulation)
         writer = NoCheckpointWriter()
         error = _run_saved(simulation, recorder, writer, plan, report_progress)
-    result = _result(simulation, recorder, error)
+    result = replace(_result(simulation, recorder, error), start=simulation.first_motion)
     if error is not None:
         error.result = result
         raise error
@@ -170,6 +170,7 @@ def saved_run(simulation: Simulation, recorder: Recorder) -> RunSnapshot:
         "simulation": simulation,
         "energy balance": simulation.energy_balance,
         "missing effects": simulation.missing_effects,
+        "shared volume": simulation.shared_volume,
         "step resolution": simulation.step_resolution,
         "recorder": recorder,
     }

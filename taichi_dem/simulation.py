@@ -8,11 +8,12 @@ from typing import Any, Optional
 import numpy as np
 
 from taichi_dem.diagnostics.divergence import DivergenceCheck
-from taichi_dem.diagnostics.effect_activity import effect_activity
+from taichi_dem.diagnostics.effect_activity import bond_rounding, effect_activity
 from taichi_dem.diagnostics.energy_balance import EnergyBalance
 from taichi_dem.diagnostics.missing_effects import MissingEffects
 from taichi_dem.diagnostics.readings import Readings
 from taichi_dem.diagnostics.report import Report
+from taichi_dem.diagnostics.shared_volume import SharedVolume
 from taichi_dem.diagnostics.step_resolution import StepResolution
 from taichi_dem.effects.gas_pressure import GasPressure
 from taichi_dem.engine.capacity import capacity_of
@@ -69,7 +70,6 @@ class Simulation:
     # None without contact.
     contacts: Any
     broad_phase: Any
-    outer_overlaps: Any
     # None before the start.
     energy_balance: Any
 
@@ -101,7 +101,7 @@ class Simulation:
         """Name the parts of the engine as this simulation sees them."""
         for name in ("tables", "state", "schedule", "advance", "step", "readings"):
             setattr(self, name, PartView(self.loan, (name,)))
-        for name in ("contacts", "broad_phase", "outer_overlaps"):
+        for name in ("contacts", "broad_phase"):
             present = self.model.has_contact
             setattr(self, name, PartView(self.loan, (name,)) if present else None)
 
@@ -113,6 +113,7 @@ class Simulation:
         self.energy_balance = None
         self.run_seconds = self.run_cpu_seconds = 0.0
         self.started = None
+        self.first_motion: dict[str, np.ndarray] = {}
 
     def _driver(self, name):
         """Driver of the engine, or one that measures both."""
@@ -165,6 +166,9 @@ class Simulation:
             return
         started = time.perf_counter()
         compiling("first step", 0.2)
+        motion = self.state.motion()
+        names = ("position", "orientation", "velocity", "spin")
+        self.first_motion = {name: motion[name] for name in names}
         if self.model.has_contact and self.model.contact.outer_faces:
             self.state.expose(self.model.topology)
         self.step.prime()
@@ -188,7 +192,10 @@ class Simulation:
         self.divergence_check = DivergenceCheck(
             self.model, self.state, self.schedule, self.contacts, self.energy_balance, self.solves
         )
-        self.missing_effects = MissingEffects(*read, self.outer_overlaps)
+        self.shared_volume = SharedVolume(self.model, self.state)
+        self.missing_effects = MissingEffects(
+            self.model, self.state, self.readings, self.shared_volume, self.schedule.tick_seconds
+        )
         self.step_resolution = StepResolution(*read, self.schedule, self.advance)
 
     def motion(self) -> dict[str, np.ndarray]:
@@ -206,6 +213,7 @@ class Simulation:
         Called at recording times, as the step itself does not check them.
         """
         self.missing_effects.sample(self.time_s)
+        self.divergence_check.check_shared(self.shared_volume)
         self.step_resolution.sample()
 
     def advance_to(self, macro_step: int, on_call: Optional[Callable[[], object]] = None) -> None:
@@ -282,6 +290,7 @@ class Simulation:
 
     def report(self) -> Report:
         """Report of the run so far."""
+        self.shared_volume.sample(self.time_s, finished=True)
         counts = [int(value) for value in self.schedule.evaluations.to_numpy()]
         linear, angular = self.energy_balance.momentum_errors()
         levels = self.state.level.to_numpy()
@@ -313,10 +322,17 @@ class Simulation:
             run_seconds=self.run_seconds,
             run_cpu_seconds=self.run_cpu_seconds,
             effect_activity=effect_activity(
-                self.model, self.energy_balance, tables, account, self.missing_effects, counts[0]
+                self.model, self.energy_balance, self.readings, tables, account, counts[0]
             ),
-            missing_effects=self.missing_effects.findings(),
-            unresolved=self.step_resolution.findings(),
+            missing_effects=self.missing_effects.findings(
+                bond_rounding(self.model, self.state, counts[0])
+            ),
+            unresolved=(
+                *self.step_resolution.findings(),
+                *self.missing_effects.unseen(),
+                *self.shared_volume.findings(),
+            ),
+            interpenetration=self.shared_volume.worst,
             bound_by=counted_criteria(self.state.bound.to_numpy()),
             round_off_J=self.divergence_check.round_off(),
         )

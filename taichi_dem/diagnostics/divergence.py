@@ -7,6 +7,7 @@ import numpy as np
 
 from taichi_dem.contact_search.contacts import Contacts
 from taichi_dem.diagnostics.energy_balance import EnergyBalance
+from taichi_dem.diagnostics.shared_volume import SharedVolume
 from taichi_dem.kit.errors import SimulationDiverged
 from taichi_dem.stability.contact_limits import contact_rates
 from taichi_dem.stability.quality import quality_report
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
 #: Unexplained energy beyond which a run counts as diverged, as a share of the energy present.
 ENERGY_FROM_NOWHERE = 0.5
 #: Overlap of two contact spheres beyond recovery, as a share of the distance at which they touch:
+#: Share of the smaller body at which two bodies, whose faces all carry spheres, count as one
+#: within the other.
+DEEPEST_SHARE = 0.5
 #: their centres are about to pass each other. A small sphere may be inside a large one.
 DEEPEST_OVERLAP = 0.95
 #: Share of the time that a hurried check may take: it reads every bond, a tenth of a call of the
@@ -83,6 +87,17 @@ class DivergenceCheck:
             body, other = bodies[pair].tolist()
             share = f"{100 * deepest[pair]:.0f} % of their radii"
             what = f"has a contact sphere inside one of body {other} ({share})"
+            raise SimulationDiverged(self._sentence(body, self.state.motion(), what))
+
+    def check_shared(self, volume: SharedVolume) -> None:
+        """Raise SimulationDiverged where contact of all faces has not kept two bodies apart."""
+        contact = self.model.contact
+        if contact is None or not contact.outer_faces or not len(volume.share):
+            return
+        place = int(volume.share.argmax())
+        if volume.share[place] > DEEPEST_SHARE:
+            body, other = volume.pairs[place].tolist()
+            what = f"shares {100 * volume.share[place]:.0f} % of its volume with body {other}"
             raise SimulationDiverged(self._sentence(body, self.state.motion(), what))
 
     def _check_energy(self):

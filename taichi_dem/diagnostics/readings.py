@@ -7,7 +7,6 @@ import taichi as ti
 
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.types import vec3
-from taichi_dem.physics.fracture import coulomb_limit
 from taichi_dem.step.advance import Advance
 from taichi_dem.step.half_step import HalfStep
 
@@ -158,27 +157,21 @@ class Readings:
                 table[i, 6 + k] = self.state.load_impulse[i][k]
 
     @ti.kernel
-    def beyond_limits(
-        self,
-        strength: ti.f64,
-        cohesion: ti.f64,
-        friction: ti.f64,
-        marks: ti.types.ndarray(dtype=ti.i32, ndim=2),
-    ):
-        """Mark bonds stretched past their strength, sheared past their Coulomb limit, overlapping.
-
-        The last is asked of released bonds, the others of those that hold.
-        """
+    def pressed(self, marks: ti.types.ndarray(dtype=ti.i32, ndim=1)):
+        """Mark released bonds of which the faces overlap."""
         for b in range(self.tables.bond_count[None]):
-            opening = self.advance.bond_opening(b)
-            stiffness = self.tables.bond_stiffness[b]
-            if self.state.broken_tick[b] < 0:
-                pull = stiffness[0] * opening[0]
-                limit = coulomb_limit(cohesion, friction, -pull)
-                marks[b, 0] = ti.cast(pull > strength, ti.i32)
-                marks[b, 1] = ti.cast(stiffness[1] * opening[1] > limit, ti.i32)
-            else:
-                marks[b, 2] = ti.cast(opening[0] < 0.0, ti.i32)
+            if self.state.broken_tick[b] >= 0:
+                marks[b] = ti.cast(self.advance.bond_opening(b)[0] < 0.0, ti.i32)
+
+    @ti.kernel
+    def acted(self, marks: ti.types.ndarray(dtype=ti.i32, ndim=2)):
+        """Mark bonds of which a unit has softened, and of which one has slipped."""
+        for b in range(self.tables.bond_count[None]):
+            for u in range(3 * b, 3 * b + 3):
+                if ti.static(hasattr(self.tables.tension, "acted")):
+                    marks[b, 0] |= self.tables.tension.acted(b, u)
+                if ti.static(hasattr(self.tables.shear, "acted")):
+                    marks[b, 1] |= self.tables.shear.acted(b, u)
 
     @ti.kernel
     def damage(self, damage: ti.types.ndarray(dtype=ti.f64, ndim=1)):

@@ -3,6 +3,7 @@
 from dataclasses import asdict, dataclass
 from typing import Any, Optional
 
+from taichi_dem.diagnostics.shared_volume import Interpenetration
 from taichi_dem.kit.display import in_brief
 
 #: Keys of the JSON file that differ from the attribute's name.
@@ -20,8 +21,8 @@ class Report:
     the saving by different steps if a pair cost nothing; boundary_gain: uniform over actual
     evaluations, the saving with every pair evaluated at the finer body's step. unconverged_steps:
     those whose sweeps ended before impulses agreed; worst_residual: their largest residual, as a
-    share of the fastest body's speed. searches: updates of
-    the contact lists.
+    share of the fastest body's speed. interpenetration: volume that bodies shared, where it was
+    looked for. searches: updates of the contact lists.
     energy_balance: energy terms [J]; energy_residual_fraction: residual over the work put in.
     linear_momentum_error, angular_momentum_error: unexplained momentum, as shares of that
     exchanged. compile_seconds, run_seconds, run_cpu_seconds: cost. effect_activity: an
@@ -61,6 +62,7 @@ class Report:
     round_off_J: float = 0.0
     unconverged_steps: int = 0
     worst_residual: float = 0.0
+    interpenetration: Optional[Interpenetration] = None
     measured_speedup: Optional[float] = None
 
     def __repr__(self):
@@ -168,6 +170,7 @@ class Report:
             *self._gain_row(),
             *self._sweeps_row(),
             ("contact searches", f"{self.searches:,}"),
+            ("interpenetration", str(self.interpenetration or "not looked for")),
             (
                 "work put in",
                 f"{self.energy_balance['load_work'] + self.energy_balance['support_work']:.6g} J",

@@ -56,6 +56,11 @@ class ShearSlip(Effect):
         return stiffness * elastic, spent
 
     @ti.func
+    def acted(self, b, u):
+        """1 for a unit that has slipped, else 0."""
+        return ti.cast(self.slip[u].norm_sqr() > 0.0, ti.i32)
+
+    @ti.func
     def stored(self, b, u, sliding):
         """Elastic energy per area [J/m^2]."""
         elastic = sliding - self.slip[u]

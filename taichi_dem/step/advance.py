@@ -78,6 +78,7 @@ class Advance(ContactForce):
                 pull = self.tables.tension.traction(stiffness[0], u, opening[0])
                 sliding = vec2(opening[1], opening[2])
                 shear, spent = self.tables.shear.traction(stiffness[1], u, sliding, -pull)
+                self.state.note_passed(b, pull, shear.norm_sqr())
                 traction = vec3(pull, shear[0], shear[1])
                 if ti.static(self.has_dashpot):
                     velocity = unit_velocity(motion, arm)
@@ -322,6 +323,10 @@ class Advance(ContactForce):
         """
         return self.schedule.seconds(self.state.tick[None]) - elapsed
 
+    def _support_bit(self, effect):
+        """Bit of a support in ``State.acted``."""
+        return ti.i64(1 << len(self.tables.loads) + self.tables.supports.index(effect))
+
     @ti.func
     def _book_loads(self, i, kick, velocity, momentum):
         """Book work and impulse of the loads on body i, at a mean velocity and angular momentum."""
@@ -329,6 +334,8 @@ class Advance(ContactForce):
             if self.tables.loads[e].acts_on(i):
                 push = vec3(kick[e, 0], kick[e, 1], kick[e, 2])
                 twist = vec3(kick[e, 3], kick[e, 4], kick[e, 5])
+                if push.norm_sqr() + twist.norm_sqr() > 0.0:
+                    self.state.note_acted(i, ti.i64(1 << e))
                 work = push.dot(velocity) + twist.dot(self.spin(i, momentum))
                 self._book(i, e, work, push, twist)
 
@@ -349,10 +356,13 @@ class Advance(ContactForce):
         half = self.schedule.seconds(self.state.tick[None]) - 0.5 * elapsed
         for effect in ti.static(self.tables.supports):
             if effect.acts_on(i):
+                before, spun = velocity, momentum
                 velocity, momentum = effect.held(
                     i, half, self.state.rotation[i], velocity, momentum
                 )
                 held = 1
+                if (velocity - before).norm_sqr() + (momentum - spun).norm_sqr() > 0.0:
+                    self.state.note_acted(i, ti.static(self._support_bit(effect)))
         mean = 0.5 * (self.state.velocity[i] + velocity)
         mean_momentum = 0.5 * (self.state.angular_momentum[i] + momentum)
         self._book_loads(i, kick, mean, mean_momentum)

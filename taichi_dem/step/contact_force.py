@@ -2,6 +2,7 @@
 
 import taichi as ti
 
+from taichi_dem.engine.state import CONTACT, RUBBED
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.physics.rotation import zero3
 from taichi_dem.physics.sphere_pair import add_within, meeting
@@ -14,7 +15,8 @@ class Touch:
 
     force: on the second [N]. moment_i, moment_j: about the centre of each [N m]. dragged, rubbed:
     power that dashpots and friction take [W]. slipped: energy of springs that slipped or parted
-    [J]. deepest: largest overlap over the sum of the radii. near: spheres within a margin.
+    [J]. deepest: largest overlap over the sum of the radii. near: spheres within a margin. acted:
+    CONTACT and RUBBED, where spheres push and rub.
     """
 
     force: vec3
@@ -25,6 +27,18 @@ class Touch:
     slipped: real
     deepest: real
     near: ti.i32
+    acted: ti.i64
+
+
+@ti.func
+def acts(push, rub):
+    """CONTACT for a repulsion that is not zero, with RUBBED for such friction; both of one unit."""
+    acted = ti.i64(0)
+    if push > 0.0:
+        acted = ti.i64(CONTACT)
+        if rub.norm_sqr() > 0.0:
+            acted = ti.i64(CONTACT | RUBBED)
+    return acted
 
 
 @ti.data_oriented
@@ -42,6 +56,9 @@ class ContactForce:
         if ti.static(self.has_limits):
             margin = self.limits.contact_limits.margin(i, j)
         found = self.touch(p, elapsed, margin, True)
+        if found.acted != 0:
+            self.state.note_acted(i, found.acted)
+            self.state.note_acted(j, found.acted)
         if found.deepest > 0.0:
             dt = self._pair_step(p, i, j)
             self.contacts.add_impulse(p, 0, -found.force * dt, found.moment_i * dt)
@@ -74,7 +91,7 @@ class ContactForce:
         turn, offset = back @ self.state.rotation[j], back @ branch
         force, moment_i, moment_j = zero3(), zero3(), zero3()
         dragged, rubbed, slipped, deepest = 0.0, 0.0, 0.0, 0.0
-        scale, near = 1.0, 0
+        scale, near, acted = 1.0, 0, ti.i64(0)
         if ti.static(self.limited):
             scale = self.contact_share(i, j)
         for k in range(self.contacts.store.first[p], self.contacts.store.last[p]):
@@ -94,6 +111,7 @@ class ContactForce:
                 drag = self._limited(self.contacts.law.damping(), scale)
                 rub, stuck, spent = self._rub(k, i, normal, push, drag, slide, elapsed, stepping)
                 pushed = push * normal + rub
+                acted |= acts(push, rub)
                 force += pushed
                 moment_i -= arm.cross(pushed)
                 moment_j += (arm - branch).cross(pushed)
@@ -112,6 +130,7 @@ class ContactForce:
             slipped=slipped,
             deepest=deepest,
             near=near,
+            acted=acted,
         )
 
     @ti.func

@@ -9,7 +9,7 @@ from taichi_dem.contact_search.contacts import Contacts
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.physics.rotation import unit3, zero3
 from taichi_dem.physics.sphere_pair import add_within, cut_to, meeting
-from taichi_dem.step.contact_force import Touch
+from taichi_dem.step.contact_force import Touch, acts
 from taichi_dem.step.implicit.velocities import Velocities
 from taichi_dem.step.tangential_springs import TangentialSprings
 
@@ -260,18 +260,22 @@ class PairDashpots:
             linear = 0.5 * (after + before)
             angular = 0.5 * (turned + self.state.spin[j] - spin)
             start = self.store.first[p]
-            dragged, rubbed = 0.0, 0.0
+            dragged, rubbed, acted = 0.0, 0.0, ti.i64(0)
             for c in range(start, start + self.touching[p]):
                 velocity, normal = linear + angular.cross(self.arm[c]), self.normal[c]
                 impulse = self._answer(c, after + turned.cross(self.arm[c]), damping)
                 pressed, rate = impulse.dot(normal), velocity.dot(normal)
                 dragged += (ti.max(self.push[c], 0.0) - pressed) * rate
                 rub = impulse - pressed * normal
+                acted |= acts(pressed, rub)
                 if ti.static(self.springs.present):
                     stuck, spent = self._slip(p, c, i, j, pressed)
                     rub -= stuck
                     rubbed += spent
                 rubbed -= rub.dot(velocity)
+            if acted != 0:
+                self.state.note_acted(i, acted)
+                self.state.note_acted(j, acted)
             self.store.heat[p] = self.store.heat[p] + vec3(dragged, rubbed, 0.0)
 
     @ti.func
@@ -311,6 +315,7 @@ class PairDashpots:
             slipped=0.0,
             deepest=0.0,
             near=0,
+            acted=0,
         )
 
     @ti.func
