@@ -1,5 +1,7 @@
 """The paper's blast, and the methods by which its experiments run it."""
 
+from functools import partial
+
 from taichi_dem import CONCRETE, PAPER_BLOCK, Scene, effects, quality_report, read_mesh
 from taichi_dem.kit.study import add_checkpoints, checkpoint_of, parser
 from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
@@ -11,11 +13,16 @@ EFFECTS = {
     "bond_damping": effects.BondDamping,
     "softening": effects.Softening,
     "shear_slip": effects.ShearSlip,
-    "sphere_contact": effects.SphereContact,
+    # The paper's reading: faces carry spheres once they break, outer faces never.
+    "sphere_contact": partial(effects.SphereContact, outer_faces=False),
+    "surface_contact": effects.SphereContact,
     "friction": effects.Friction,
     "gas_pressure": effects.GasPressure,
     "gravity": effects.Gravity,
 }
+#: Those that the paper's scene does not have: weight, and contact of all surfaces in place of that
+#: of broken faces.
+OPTIONAL = ("gravity", "surface_contact")
 
 
 def blast_parser(name, description, drivers=BLAST_DRIVERS, mesh=PAPER_BLOCK, saves=False, **given):
@@ -39,7 +46,7 @@ def run_options(options):
 
 def paper_effects():
     """All effects of the paper's scene."""
-    return [make() for name, make in EFFECTS.items() if name != "gravity"]
+    return [make() for name, make in EFFECTS.items() if name not in OPTIONAL]
 
 
 def paper_scene(mesh=PAPER_BLOCK):

@@ -8,12 +8,12 @@ ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 
 
 def paper_effects(peak=575e6, rise=1.33e-4, **contact):
-    """All effects of the paper; contact: options of SphereContact."""
+    """All effects of the paper; contact: options of SphereContact, of broken faces by default."""
     return [
         effects.BondDamping(),
         effects.Softening(),
         effects.ShearSlip(),
-        effects.SphereContact(**contact),
+        effects.SphereContact(**{"outer_faces": False, **contact}),
         effects.Friction(),
         effects.GasPressure(peak=peak, rise=rise),
     ]

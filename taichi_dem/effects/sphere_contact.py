@@ -13,10 +13,11 @@ _MOST = 100_000
 
 @ti.data_oriented
 class SphereContact(Effect):
-    """Spheres inscribed behind broken faces repel each other, without attraction.
+    """Spheres inscribed behind free faces repel each other, without attraction.
 
     divisions: equal parts of a face's edges; 5 gives the paper's six spheres a face.
-    outer_faces: free outer faces carry spheres from the start too (the paper: no).
+    outer_faces: outer faces carry spheres from the start, beside those that break. Without, as in
+    the paper, bodies pass through each other there.
     skin: gap up to which spheres enter the candidate list, at least, as a share of a body's radius;
     more where bodies are fast. It changes time, not results.
     neighbours_per_body, pairs_per_body, spheres_per_body: capacity of the lists, on average; that
@@ -29,7 +30,7 @@ class SphereContact(Effect):
     def __init__(
         self,
         divisions: int = 5,
-        outer_faces: bool = False,
+        outer_faces: bool = True,
         skin: float = 0.015,
         neighbours_per_body: int = 64,
         pairs_per_body: int = 24,
