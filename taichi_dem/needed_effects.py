@@ -21,4 +21,6 @@ def needed_effects(result: object, tolerance: float = 1e-3) -> Advice:
     if not isinstance(report, Report):
         kind = type(result).__name__
         raise InputError(f"result must be a Result of simulate or its report, got {kind}")
-    return Advice(report.effect_activity, report.missing_effects, fraction("tolerance", tolerance))
+    slipped = (slip for slip in report.bond_slip if slip.excessive and not slip.weakens)
+    missing = (*report.missing_effects, *slipped)
+    return Advice(report.effect_activity, missing, fraction("tolerance", tolerance))

@@ -39,6 +39,8 @@ class Scene:
         _check_types(self)
         _check_roles(self.effects)
         for effect in self.effects:
+            effect.check_material(self.material)
+        for effect in self.effects:
             if hasattr(effect, "group"):
                 self.mesh.group_faces(effect.group)
         positive("max_speed", self.max_speed)

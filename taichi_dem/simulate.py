@@ -170,6 +170,7 @@ def saved_run(simulation: Simulation, recorder: Recorder) -> RunSnapshot:
         "simulation": simulation,
         "energy balance": simulation.energy_balance,
         "missing effects": simulation.missing_effects,
+        "bond slips": simulation.bond_slips,
         "step resolution": simulation.step_resolution,
         "recorder": recorder,
     }

@@ -7,6 +7,7 @@ from typing import Any, Optional
 
 import numpy as np
 
+from taichi_dem.diagnostics.bond_slip import BondSlips
 from taichi_dem.diagnostics.divergence import DivergenceCheck
 from taichi_dem.diagnostics.effect_activity import effect_activity
 from taichi_dem.diagnostics.energy_balance import EnergyBalance
@@ -188,15 +189,17 @@ class Simulation:
             self.model, self.state, self.schedule, self.contacts, self.energy_balance, self.solves
         )
         self.missing_effects = MissingEffects(*read, self.outer_overlaps)
+        self.bond_slips = BondSlips(self.model, self.readings)
         self.step_resolution = StepResolution(*read, self.schedule, self.advance)
 
     def sample(self) -> None:
-        """Sample missing effects, and bonds that the step does not resolve.
+        """Sample missing effects, slip of bonds, and bonds that the step does not resolve.
 
         Called at recording times, as the step itself does not check them.
         """
         self.missing_effects.sample(self.time_s)
         self.step_resolution.sample()
+        self.bond_slips.sample(self.time_s)
 
     def advance_to(self, macro_step: int, on_call: Optional[Callable[[], object]] = None) -> None:
         """Step until a number of largest steps; on_call() is called about five times a second.
@@ -305,6 +308,7 @@ class Simulation:
             missing_effects=self.missing_effects.findings(),
             unresolved=self.step_resolution.findings(),
             bound_by=counted_criteria(self.state.bound.to_numpy()),
+            bond_slip=self.bond_slips.finding(),
             round_off_J=self.divergence_check.round_off(),
         )
 
