@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 #: has slid by a share s of an edge along it, (1 - s)^2 still lies on the other: at 5 % a tenth of
 #: the area that the bond acts on is gone, more than an error that a user would accept.
 MOST_SLIP = 0.05
-_FULL = "at full cohesion: list SlipWeakening in place of ShearSlip, with which cohesion degrades"
-_WEAKENED = "and acts on the whole of it: compare with a coarser mesh"
+_FULL = "the cohesion is undiminished: SlipWeakening in place of ShearSlip degrades it with slip"
+_WEAKENED = "friction acts on the whole of it: compare with a coarser mesh"
 
 
 @dataclass(frozen=True)
@@ -57,9 +57,9 @@ class BondSlip:
         place = ", ".join(f"{x:.3g}" for x in self.place_m)
         remedy = _WEAKENED if self.weakens else _FULL
         return (
-            f"up to {self.most} {self.what} of their face, bond {self.bond} at {place} m by "
-            f"{100 * self.share:.3g} % at t = {self.time_s:.4g} s: a bond does not notice that "
-            f"less of the face lies on the other, {remedy}"
+            f"up to {self.most} {self.what} of their face, bond {self.bond} (at {place} m) by "
+            f"{100 * self.share:.3g} % at t = {self.time_s:.4g} s: less of the face lies on the "
+            f"other, but {remedy}"
         )
 
 
