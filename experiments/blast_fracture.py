@@ -22,7 +22,7 @@ from functools import partial
 
 import numpy as np
 
-from _blast import EFFECTS, blast_parser, print_quality, run_options
+from _blast import ADDED, EFFECTS, blast_parser, print_quality, run_options
 from _blast import METHODS as BLAST_METHODS
 from taichi_dem import CONCRETE, InputError, Scene, SimulationDiverged, plot, read_mesh, simulate
 from taichi_dem.kit import study
@@ -65,12 +65,12 @@ def options_parser():
 
 
 def chosen_effects(added, without):
-    """All effects but gravity, with those named in one list and without those of the other."""
+    """All effects of the paper, with those named in one list and without those of the other."""
     added, without = ([name for name in text.split(",") if name] for text in (added, without))
     for name in (*added, *without):
         if name not in EFFECTS:
             raise InputError(f"effect must be one of {', '.join(EFFECTS)}, got {name!r}")
-    names = (name for name in EFFECTS if name != "gravity" or name in added)
+    names = (name for name in EFFECTS if name not in ADDED or name in added)
     return [EFFECTS[name]() for name in names if name not in without]
 
 
