@@ -23,7 +23,8 @@ class SlipWeakening(Effect):
     In place of ``ShearSlip``, by which cohesion does not degrade. The cohesion c of the material is
     gone at the critical slip d_c = 2 G_II / c; the friction of the bond remains. A unit without
     cohesion that is not pressed transmits nothing and releases the face, as one that failed in
-    tension does; pressed faces rub until they open. Slip to and fro accumulates.
+    tension does; pressed faces rub until they open. Slip to and fro accumulates; the strength in
+    tension does not fall with it.
 
     fracture_energy: G_II, of mode II [J/m^2], the area under the cohesion over the slip. A scene
     refuses one of c^2 / (2 shear stiffness) or less, with which a unit would fail at once.
