@@ -40,7 +40,8 @@ def needed_effects(result: object, tolerance: float = ROUNDING) -> Advice:
     shown: dict[str, float] = {}
     if isinstance(result, Result) and not result.diverged:
         shown = differences(result, tried, tolerance)
-    return Advice(uses, report.missing_effects, tolerance, shown)
+    slipped = (slip for slip in report.bond_slip if slip.excessive and not slip.weakens)
+    return Advice(uses, (*report.missing_effects, *slipped), tolerance, shown)
 
 
 def differences(result: Result, names: Iterable[str], tolerance: float) -> dict[str, float]:

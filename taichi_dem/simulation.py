@@ -7,6 +7,7 @@ from typing import Any, Optional
 
 import numpy as np
 
+from taichi_dem.diagnostics.bond_slip import BondSlips
 from taichi_dem.diagnostics.divergence import DivergenceCheck
 from taichi_dem.diagnostics.effect_activity import bond_rounding, effect_activity
 from taichi_dem.diagnostics.energy_balance import EnergyBalance
@@ -196,6 +197,7 @@ class Simulation:
         self.missing_effects = MissingEffects(
             self.model, self.state, self.readings, self.shared_volume, self.schedule.tick_seconds
         )
+        self.bond_slips = BondSlips(self.model, self.readings)
         self.step_resolution = StepResolution(*read, self.schedule, self.advance)
 
     def motion(self) -> dict[str, np.ndarray]:
@@ -208,13 +210,14 @@ class Simulation:
         return motion
 
     def sample(self) -> None:
-        """Sample missing effects, and bonds that the step does not resolve.
+        """Sample missing effects, slip of bonds, and bonds that the step does not resolve.
 
         Called at recording times, as the step itself does not check them.
         """
         self.missing_effects.sample(self.time_s)
         self.divergence_check.check_shared(self.shared_volume)
         self.step_resolution.sample()
+        self.bond_slips.sample(self.time_s)
 
     def advance_to(self, macro_step: int, on_call: Optional[Callable[[], object]] = None) -> None:
         """Step until a number of largest steps; on_call() is called about five times a second.
@@ -334,6 +337,7 @@ class Simulation:
             ),
             interpenetration=self.shared_volume.worst,
             bound_by=counted_criteria(self.state.bound.to_numpy()),
+            bond_slip=self.bond_slips.finding(),
             round_off_J=self.divergence_check.round_off(),
         )
 

@@ -174,6 +174,21 @@ class Readings:
                     marks[b, 1] |= self.tables.shear.acted(b, u)
 
     @ti.kernel
+    def residual_slip(self, slip: ti.types.ndarray(dtype=ti.f64, ndim=1)):
+        """Largest residual slip [m] of the units of every bond that holds.
+
+        Zero for released bonds, and for shear laws that keep none.
+        """
+        for b in range(self.tables.bond_count[None]):
+            largest = 0.0
+            if ti.static(self.tables.shear.remembers_slip):
+                if self.state.broken_tick[b] < 0:
+                    for q in range(3):
+                        found = self.tables.shear.residual_slip(3 * b + q).norm()
+                        largest = ti.max(largest, found)
+            slip[b] = largest
+
+    @ti.kernel
     def damage(self, damage: ti.types.ndarray(dtype=ti.f64, ndim=1)):
         """Mean damage of the units of every bond, 1 once it is released."""
         for b in range(self.tables.bond_count[None]):

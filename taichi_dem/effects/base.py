@@ -50,6 +50,10 @@ class Effect:
     name = ""
     #: Whether a friction law keeps a spring for each sphere pair (``roles.FrictionMemory``).
     remembers = False
+    #: Whether a shear law keeps a residual slip of each unit (``roles.SlipMemory``).
+    remembers_slip = False
+    #: Whether a shear law may release a face (``roles.ShearFailure``).
+    releases = False
     law: ti.Field
     tables: "Tables"
     _count: int
@@ -72,6 +76,9 @@ class Effect:
     def harmless(self, material: Material) -> Material:
         """The material with which the effect never acts, as ``silent`` needs it."""
         return material
+
+    def check_material(self, material: Material) -> None:
+        """Raise InputError for a material that the effect cannot act with; a scene asks."""
 
     def numbers(self, material: Material) -> tuple:
         """Numbers that kernels read as ``self.law[0]`` and on: to change them compiles nothing."""

@@ -23,6 +23,7 @@ class ShearSlip(Effect):
 
     role = "shear"
     name = "shear_slip"
+    remembers_slip = True
 
     def numbers(self, material: Material) -> tuple[float, ...]:
         """Cohesion [Pa] and friction coefficient."""
@@ -59,6 +60,10 @@ class ShearSlip(Effect):
     def acted(self, b, u):
         """1 for a unit that has slipped, else 0."""
         return ti.cast(self.slip[u].norm_sqr() > 0.0, ti.i32)
+
+    def residual_slip(self, u):
+        """Residual slip of a unit in the face frame [m]."""
+        return self.slip[u]
 
     @ti.func
     def stored(self, b, u, sliding):

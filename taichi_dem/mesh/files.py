@@ -42,11 +42,19 @@ _PATIENCE_S = 20.0
 _SLOWEST_BYTES_PER_S = 1e5
 
 
-def read_mesh(path: FileName, *, scale: float = 1.0, weld_tolerance: float = 0.0) -> Mesh:
+def read_mesh(
+    path: FileName,
+    *,
+    scale: float = 1.0,
+    weld_tolerance: float = 0.0,
+    keep_coincident: bool = False,
+) -> Mesh:
     """Read solid cells and named face groups from a file (Gmsh 2.2 or 4.1, VTK, VTU, ...).
 
     scale: length of one unit of the file [m], e.g. 0.001 for a drawing in mm.
     weld_tolerance: points not farther apart [m] become one; 0 welds nothing.
+    keep_coincident: accept distinct points at one place, and leave the faces on them unbonded, as
+    at a joint or a crack (see ``checked_mesh``).
     Groups come from Gmsh's physical surfaces ("physical_TAG" where they have no name); in other
     formats from integer data on triangles, as "data name_value".
     Elements of higher order are read as linear ones; hexahedra, prisms and pyramids are cut into
@@ -65,7 +73,7 @@ def read_mesh(path: FileName, *, scale: float = 1.0, weld_tolerance: float = 0.0
         refuse_without_tetrahedra(raw, path, printed)
     unread = (*unread_groups(raw), *surfaces_of_abaqus(path))
     try:
-        mesh = _mesh(raw, scale, weld_tolerance)
+        mesh = _mesh(raw, scale, weld_tolerance, keep_coincident)
     except InputError as error:
         cells = _cell_at_fault(raw) if "tetrahedra " in str(error) else ""
         raise InputError(f"mesh file {path}: {error}{cells}") from None
@@ -151,7 +159,7 @@ def _meshio_read(path):
         return meshio.read(path)
 
 
-def _mesh(raw, scale, weld_tolerance):
+def _mesh(raw, scale, weld_tolerance, keep_coincident):
     """The mesh of a file's cells, cut once their points are welded; raw gets the welded numbers."""
     notes: list[str] = []
     welding: list[str] = []
@@ -163,7 +171,8 @@ def _mesh(raw, scale, weld_tolerance):
         _renumber(raw, label)
         notes.clear()
         tetrahedra = _tetrahedra(raw, notes)
-    mesh = checked_mesh(points, tetrahedra, _groups(raw))
+    kept = {"keep_coincident": keep_coincident}
+    mesh = checked_mesh(points, tetrahedra, _groups(raw), **kept)
     return replace(mesh, notes=(*notes, *welding, *mesh.notes))
 
 

@@ -55,6 +55,7 @@ class Advance(ContactForce):
         self.limits, self.retimes = schedule.limits, schedule.retimes
         self.has_limits = schedule.has_limits
         self.limited = self.has_limits and schedule.limits.limited
+        self.shear_releases = tables.shear.releases
         self.has_heat = self.has_dashpot or bool(tables.shear.name)
 
     @ti.func
@@ -91,6 +92,8 @@ class Advance(ContactForce):
                 torque += arm.cross(traction)
                 slipped += spent
                 failed |= self.tables.tension.failed(u)
+                if ti.static(self.shear_releases):
+                    failed |= self.tables.shear.failed(u, -pull)
             dt = self._bond_step(b, slots[0] >> 2, slots[1] >> 2)
             area = self.tables.unit_area[b]
             if failed == 0:

@@ -5,10 +5,10 @@ import warnings
 
 import numpy as np
 import pytest
+from taichi_dem.diagnostics.outer_faces import LEAST_OVERLAP, OuterFaces
 
 from taichi_dem import CONCRETE, Scene, Uniform, checked_mesh, effects, simulate
 from taichi_dem.diagnostics.missing_effects import MissingEffects
-from taichi_dem.diagnostics.outer_faces import LEAST_OVERLAP, OuterFaces
 from taichi_dem.mesh.shapes import bar, pair, single
 from taichi_dem.scene import outer_faces_warnings
 from taichi_dem.simulation import Simulation

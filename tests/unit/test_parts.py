@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from taichi_dem.diagnostics.part_overlaps import PartOverlaps
 
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, checked_mesh, effects
-from taichi_dem.diagnostics.part_overlaps import PartOverlaps
 from taichi_dem.effects.base import Effect
 from taichi_dem.mesh.parts import any_overlap, part_boxes, parts_of
 from taichi_dem.mesh.shapes import bar, single
