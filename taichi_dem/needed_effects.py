@@ -56,7 +56,8 @@ def differences(result: Result, names: Iterable[str], tolerance: float) -> dict[
     together = _difference(result, names)
     if together <= tolerance or len(names) == 1:
         return dict.fromkeys(names, together)
-    found, left_out = {}, ()
+    found: dict[str, float] = {}
+    left_out: tuple[str, ...] = ()
     # Friction first: contact can be left out only with it.
     for name in sorted(names, key=lambda name: _role(result, name) != "friction"):
         found[name] = _difference(result, (*left_out, name))
