@@ -1,8 +1,8 @@
 """Results of all methods have the bits that they had before the last redesign.
 
-``digests.json`` holds a digest of each run and of the tables it was computed from. Both are the same
-on every processor (``kit/fixed_order.py``, ``kit/elementary.py``). A change that is meant to change
-bits writes the file anew: ``python -m tests.equivalence.test_digests``.
+``digests.json`` holds a digest of each run and of the tables it was computed from. Both are the
+same on every processor (``kit/fixed_order.py``, ``kit/elementary.py``). A change that is meant to
+change bits writes the file anew: ``python -m tests.equivalence.test_digests``.
 """
 
 import hashlib

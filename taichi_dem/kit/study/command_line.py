@@ -1,6 +1,7 @@
 """Options, endings and exit codes of a study that is run as a program."""
 
 import argparse
+import contextlib
 import functools
 import os
 import re
@@ -177,6 +178,12 @@ def main(
     return exit_code(work)
 
 
+def say(words: str) -> None:
+    """Say a sentence on stderr, as one line, where that can be written to."""
+    with contextlib.suppress(OSError):
+        print(" ".join(words.split()), file=sys.stderr, flush=True)
+
+
 def exit_code(work: Callable[[], Optional[int]]) -> int:
     """Exit code of a program that does work(): 0 done, or what work returns.
 
@@ -193,5 +200,5 @@ def exit_code(work: Callable[[], Optional[int]]) -> int:
             code, words = 128 + error.number, f"{error}: go on with --resume"
         except KeyboardInterrupt:
             code, words = 130, "interrupted"
-        print(" ".join(words.split()), file=sys.stderr)
+        say(words)
         return code
