@@ -10,6 +10,7 @@ import atexit
 import contextlib
 import importlib
 import io
+import mmap
 import os
 import shutil
 import signal
@@ -24,6 +25,11 @@ from pathlib import Path
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import shown
 
+try:
+    import resource
+except ImportError:  # not on Windows
+    resource = None  # type: ignore[assignment]
+
 #: What a user may choose; all other variables of Taichi are removed.
 _CACHE, _CACHE_FOLDER = "TI_OFFLINE_CACHE", "TI_OFFLINE_CACHE_FILE_PATH"
 _KEPT = (_CACHE, _CACHE_FOLDER, "TI_VISIBLE_DEVICE")
@@ -31,6 +37,9 @@ _KEPT = (_CACHE, _CACHE_FOLDER, "TI_VISIBLE_DEVICE")
 _LEAST_SPACE = 64e6
 # Taichi holds the lock of its kernel cache for well under a second.
 _STALE_LOCK_S = 10.0
+
+#: Address space that is reserved when Taichi starts, and what kernels and libraries take [bytes].
+_LEAST_TO_START, _LEAST_TO_IMPORT = 1_500_000_000, 500_000_000
 
 _own: list[Path] = []
 
@@ -111,6 +120,7 @@ def kernel_cache(default_folder: str) -> tuple[bool, str]:
     default_folder: where it would, unless a variable names another. Where neither can be used, it
     is a folder that goes with this process. Raises InputError for what would end Taichi.
     """
+    _check_address_space(_LEAST_TO_START)
     wanted = os.environ.get(_CACHE, "")
     if wanted not in ("", "0", "1"):
         raise InputError(f"{_CACHE} must be 0 or 1, got {shown(wanted)}")
@@ -125,6 +135,19 @@ def kernel_cache(default_folder: str) -> tuple[bool, str]:
         ) from None
     _remove_stale_lock(folder)
     return wanted != "0", str(folder)
+
+
+def _check_address_space(least):
+    """Raise InputError where a limit leaves less than that many bytes; Taichi would abort."""
+    if resource is None or resource.getrlimit(resource.RLIMIT_AS)[0] == resource.RLIM_INFINITY:
+        return
+    try:
+        mmap.mmap(-1, least).close()
+    except (OSError, ValueError, MemoryError):
+        raise InputError(
+            f"Taichi needs {1e-9 * least:.1f} GB more of address space than the limit of this "
+            "process (ulimit -v) leaves"
+        ) from None
 
 
 def _own_folder():
@@ -177,9 +200,10 @@ def _remove_stale_lock(folder):
 def _import_taichi():
     """Import Taichi; where it cannot be, a program ends with one line and exit code 2."""
     try:
+        _check_address_space(_LEAST_TO_IMPORT)
         with interrupts_deferred(), _import_conditions(), contextlib.redirect_stdout(io.StringIO()):
             importlib.import_module("taichi")
-    except (ImportError, OSError, MemoryError) as error:
+    except (InputError, ImportError, OSError, MemoryError) as error:
         reason = " ".join(str(error).split()) or "out of memory"
         sentence = f"Taichi cannot be imported: {reason}"
         if not _is_program():

@@ -209,9 +209,7 @@ def _failures_in_words():
         yield
     except (RuntimeError, MemoryError) as error:
         reason = " ".join(str(error).split()) or "out of memory"
-        raise InputError(
-            f"Taichi could not start: {reason}; it needs about 2 GB of address space (ulimit -v)"
-        ) from None
+        raise InputError(f"Taichi could not start: {reason}") from None
 
 
 def cuda_present() -> bool:
