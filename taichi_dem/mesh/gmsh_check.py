@@ -39,6 +39,11 @@ def refuse_bad_gmsh(path: str) -> None:
         _check_ends(path, content)
         return
     reader.find_sections()
+    if "PhysicalNames" in reader.sections:
+        reader.begin("PhysicalNames")
+        (count,) = reader.head(("the number of names",))
+        reader.rows(count)
+        reader.finish("PhysicalNames")
     if version.startswith("2"):
         _check_version_2(reader)
     elif version == "4.1":
@@ -233,10 +238,12 @@ def _check_places(reader, rows, width) -> None:
     for k, row in enumerate(rows):
         if len(row) != width:
             reader.refuse(f"must hold {width} coordinates, got {len(row)}", len(rows) - 1 - k)
-    try:
-        np.array(rows, dtype=object).astype(np.float64)
-    except ValueError:
-        reader.refuse("some of the coordinates above are no numbers")
+        try:
+            list(map(float, row))
+        except ValueError:
+            reader.refuse(
+                f"coordinates must be numbers, got {shown(' '.join(row))}", len(rows) - 1 - k
+            )
 
 
 def _check_known(reader, corners: np.ndarray, points: np.ndarray) -> None:

@@ -51,7 +51,7 @@ SURROUNDINGS = {
     "warnings are errors": ({}, "-bb -W error", "", ""),
     "without docstrings": ({}, "-OO", "", ""),
     "ascii": ({"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONIOENCODING": "ascii"}, "", "", ""),
-    "unknown locale": ({"LC_ALL": "xx_YY.zz"}, "", "", "2>/dev/null"),
+    "unknown locale": ({}, "", "with='LC_ALL=xx_YY.zz'", ""),
     "time zone": ({"TZ": "../../x"}, "", "", ""),
     "umask": ({}, "", "umask 0777", ""),
     "few files": ({}, "", "ulimit -n 24", ""),
@@ -89,7 +89,7 @@ runpy.run_path(sys.argv.pop(1), run_name="__main__")
 
 def program(folder, variables, words="", before="", behind="", options=""):
     """Run the program by a shell in a folder; returns what it ended with."""
-    run = f"exec {sys.executable} {words} {PROGRAM} --out {folder}/out {options}"
+    run = f"exec env $with {sys.executable} {words} {PROGRAM} --out {folder}/out {options}"
     line = f"{before or ':'}; ( {run} ) {behind}"
     environment = users_environment(PYTHONPATH=ROOT, **variables)
     return subprocess.run(
