@@ -161,7 +161,7 @@ def older_files(folder: FileName, since: float) -> list[str]:
     since: as of ``time.time``; clocks of file systems may lag behind by two seconds.
     """
     found = []
-    with contextlib.suppress(OSError), os.scandir(folder) as entries:
+    with contextlib.suppress(OSError), os.scandir(os.fspath(folder)) as entries:
         for entry in entries:
             ours = entry.name.lower().endswith(_WRITTEN) and not entry.name.startswith(".")
             if ours and entry.is_file() and entry.stat().st_mtime < since - 2.0:
