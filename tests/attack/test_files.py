@@ -123,11 +123,11 @@ def test_binary_files_are_read_whole_or_refused(tmp_path, version, seed):
 
 
 def test_files_of_an_earlier_run_are_named_and_stay(tmp_path):
-    """A picture of before, a hidden file, notes of the user, and a file of this very run."""
+    """A picture of before; a hidden file, notes of the user, and files of this very run are none."""
     for name in ("old.png", ".hidden.csv", "notes.odt", "digest.txt", "new.csv"):
         (tmp_path / name).write_text("x")
-        if name != "new.csv":
-            os.utime(tmp_path / name, (time.time() - 3600.0,) * 2)
+        age = -100.0 if name == "new.csv" else 3600.0
+        os.utime(tmp_path / name, (time.time() - age,) * 2)
     program = os.path.join(ROOT, "tests", "attack", "short_run.py")
     command = [sys.executable, program, "--out", str(tmp_path)]
     environment = users_environment(PYTHONPATH=ROOT)
