@@ -123,7 +123,7 @@ def test_binary_files_are_read_whole_or_refused(tmp_path, version, seed):
 
 
 def test_files_of_an_earlier_run_are_named_and_stay(tmp_path):
-    """A picture of before; a hidden file, notes of the user, and files of this very run are none."""
+    """Hidden files, notes of the user, and files of this very run are not."""
     for name in ("old.png", ".hidden.csv", "notes.odt", "digest.txt", "new.csv"):
         (tmp_path / name).write_text("x")
         age = -100.0 if name == "new.csv" else 3600.0
