@@ -71,7 +71,8 @@ class _Lines:
 
     def refuse(self, words: str, back: int = 0) -> NoReturn:
         """Raise InputError that names the line taken last, or one before it."""
-        raise InputError(f"mesh file {self.path}, line {self.at - back}: {words}")
+        line = self.at - back
+        raise InputError(f"mesh file {self.path} cannot be read, line {line}: {words}")
 
     def find_sections(self) -> None:
         """Find all sections, each closed before the next begins."""
