@@ -1,31 +1,25 @@
 """The only place that starts Taichi: architecture, threads, and the settings that keep bits equal.
 
 Imported before any other module of the package, because some environment variables must stand
-before the first ``import taichi``: HOME (Taichi aborts without it), and the switches that keep it
-from asking the network for a newer version and from talking.
+before the first ``import taichi`` (``environment``).
 """
 
 import atexit
 import contextlib
 import io
 import os
-import tempfile
 import threading
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Optional
 
-os.environ.setdefault("TI_SKIP_VERSION_CHECK", "ON")
-os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
-# TI_ARCH would silently overrule the architecture that the caller requests.
-os.environ.pop("TI_ARCH", None)
-if not os.environ.get("HOME"):
-    os.environ["HOME"] = tempfile.mkdtemp(prefix="taichi-home-")
+# First, out of order: it prepares the environment for ``import taichi``.
+from taichi_dem.kit.environment import (  # isort: skip
+    interrupts_deferred,
+    kernel_cache,
+    settings_hidden,
+)
 
-# In Jupyter Taichi would say when it is imported that it found a graphical shell.
-os.environ.setdefault("TI_LOG_LEVEL", "error")
 import taichi as ti
 from taichi.lang import impl
 
@@ -47,9 +41,6 @@ class Settings:
     threads: int
     debug: bool
 
-
-# Taichi holds the lock of its kernel cache for well under a second.
-_STALE_LOCK_S = 10.0
 
 _current: Optional[Settings] = None
 _session: Optional["Session"] = None
@@ -182,11 +173,9 @@ def _initialise(wanted):
     # Taichi falls back to the CPU with a mere warning: check first, and read back its choice.
     if wanted.arch == "cuda" and not cuda_present():
         raise InputError("arch 'cuda' was asked for, but no CUDA device answers here: use 'cpu'")
-    _remove_stale_lock()
+    keeps, folder = kernel_cache(impl.default_cfg().offline_cache_file_path)
     remember()
-    # ti.init would warn that its argument overrules this switch, which only its import needed.
-    os.environ.pop("TI_LOG_LEVEL", None)
-    with contextlib.redirect_stdout(io.StringIO()):
+    with settings_hidden(), _quietly(), interrupts_deferred(), _failures_in_words():
         ti.init(
             arch=ti.cuda if wanted.arch == "cuda" else ti.cpu,
             default_fp=ti.f64,
@@ -199,6 +188,8 @@ def _initialise(wanted):
             debug=wanted.debug,
             # Below errors Taichi only reports a cache that another process is writing.
             log_level=ti.ERROR,
+            offline_cache=keeps,
+            offline_cache_file_path=folder,
             random_seed=0,
         )
     got = impl.current_cfg().arch
@@ -207,17 +198,18 @@ def _initialise(wanted):
         raise InputError(f"arch {wanted.arch!r} was asked for, Taichi started {got}")
 
 
-def _remove_stale_lock():
-    """Remove the lock that a killed process left on Taichi's kernel cache.
+def _quietly():
+    return contextlib.redirect_stdout(io.StringIO())
 
-    With it, every later process would compile all its kernels anew and say so on stderr.
-    """
-    default = impl.default_cfg().offline_cache_file_path
-    folder = os.environ.get("TI_OFFLINE_CACHE_FILE_PATH", default)
-    lock = Path(folder, "ticache.lock")
-    with contextlib.suppress(OSError):
-        if time.time() - lock.stat().st_mtime > _STALE_LOCK_S:
-            lock.unlink()
+
+@contextlib.contextmanager
+def _failures_in_words():
+    """Name the reason where Taichi does not start, such as too little memory."""
+    try:
+        yield
+    except (RuntimeError, MemoryError) as error:
+        reason = " ".join(str(error).split()) or "out of memory"
+        raise InputError(f"Taichi could not start: {reason}") from None
 
 
 def cuda_present() -> bool:

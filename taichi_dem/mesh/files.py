@@ -32,6 +32,7 @@ from taichi_dem.mesh.content import (
     surfaces_of_abaqus,
     unread_groups,
 )
+from taichi_dem.mesh.gmsh_check import refuse_bad_gmsh
 from taichi_dem.mesh.mesh import Mesh, checked_mesh, welded_numbers
 from taichi_dem.mesh.parts_in_files import unbonded_places
 from taichi_dem.mesh.split import folded_or_flat, shape_of, tetrahedra_in, triangles_in
@@ -143,6 +144,7 @@ def _read_raw(path):
         problem = "is no file" if os.path.lexists(path) else "does not exist"
         problem = "is a folder" if os.path.isdir(path) else problem
         raise InputError(f"mesh file {path} {problem}")
+    _refuse_if_gmsh(path)
     said = io.StringIO()
     seconds = _PATIENCE_S + os.path.getsize(path) / _SLOWEST_BYTES_PER_S
     sentence = f"its reader found no end in {seconds:.3g} s, as in a file that was cut off"
@@ -152,6 +154,16 @@ def _read_raw(path):
     except (Exception, SystemExit) as error:  # meshio raises anything, and exits on some files
         reason = reason_of(error, said.getvalue())
         raise InputError(f"mesh file {path} cannot be read: {reason}") from None
+
+
+def _refuse_if_gmsh(path):
+    """Check a Gmsh file before it is read."""
+    if path.lower().endswith(".msh"):
+        try:
+            refuse_bad_gmsh(path)
+        except OSError as error:
+            reason = error.strerror or error
+            raise InputError(f"mesh file {path} cannot be read: {reason}") from None
 
 
 def _meshio_read(path):

@@ -134,10 +134,9 @@ def _base(edge, height):
     """Equilateral triangle in x = 0 about the origin, normal +x, and the apex height [m]."""
     edge = positive("edge", edge)
     height = positive("height", edge * np.sqrt(2.0 / 3.0) if height is None else height)
-    angle = 2.0 * np.pi / 3.0 * np.arange(3)
-    radius = edge / np.sqrt(3.0)
-    triangle = np.column_stack([np.zeros(3), radius * np.cos(angle), radius * np.sin(angle)])
-    return triangle, height
+    radius, half = edge / np.sqrt(3.0), 0.5 * edge
+    triangle = [[0.0, radius, 0.0], [0.0, -0.5 * radius, half], [0.0, -0.5 * radius, -half]]
+    return np.array(triangle), height
 
 
 def _checked_cells(length, width, cells):

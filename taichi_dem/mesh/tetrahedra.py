@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from taichi_dem.kit.fixed_order import dot, length
+
 #: Local vertices of the four faces, in the order whose right-hand normal points outward
 #: for a tetrahedron of positive volume.
 LOCAL_FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]], dtype=np.int32)
@@ -20,13 +22,13 @@ def signed_volumes(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
     """Signed volumes det(p1 - p0, p2 - p0, p3 - p0) / 6 [m3], shape (body_count,)."""
     corners = points[tetrahedra]
     a, b, c = (corners[:, k] - corners[:, 0] for k in (1, 2, 3))
-    return np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0
+    return dot(a, np.cross(b, c)) / 6.0
 
 
 def edge_lengths(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
     """Lengths of the six edges [m], shape (body_count, 6)."""
     ends = points[tetrahedra[:, LOCAL_EDGES]]
-    return np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=-1)
+    return length(ends[:, :, 1] - ends[:, :, 0])
 
 
 def area_vectors(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
@@ -103,6 +105,6 @@ def _pairs_in_cells(points, cell_index, distance):
         if len(same) == 0:
             break
         pair = np.sort(np.column_stack([order[same], order[same + step]]), axis=1)
-        gap = np.linalg.norm(points[pair[:, 0]] - points[pair[:, 1]], axis=1)
+        gap = length(points[pair[:, 0]] - points[pair[:, 1]])
         found.append(pair[gap <= distance])
     return np.vstack(found)
