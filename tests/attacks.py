@@ -64,11 +64,12 @@ def pytest_generate_tests(metafunc):
 def pytest_collection_modifyitems(config, items):
     """All attacks of a seed before the next one, where time may run out."""
     if config.getoption("--attack-minutes") is not None:
-        items.sort(key=lambda item: getattr(item, "callspec", _NoSeed).params.get("seed", -1))
+        items.sort(key=_seed)
 
 
-class _NoSeed:
-    params = {}
+def _seed(item):
+    """Seed of a test; those without one come first."""
+    return item.callspec.params.get("seed", -1) if hasattr(item, "callspec") else -1
 
 
 @pytest.hookimpl(wrapper=True)
@@ -90,7 +91,7 @@ def pytest_runtest_setup(item):
         pytest.skip("no time left")
 
 
-@functools.lru_cache(maxsize=None)
+@functools.cache
 def class_of(file):
     """The class of attacks of a module, which may be one that cannot be imported; else None."""
     for node in ast.parse(file.read_text(encoding="utf-8")).body:
