@@ -20,6 +20,7 @@ from taichi.lang.matrix import MatrixField
 from taichi.lang.snode import SNode
 from taichi.lang.util import to_numpy_type
 
+from taichi_dem.kit.declarations import Declarations
 from taichi_dem.kit.errors import InputError
 
 #: Trees beyond which no new one is begun; a few more complete those begun.
@@ -44,19 +45,41 @@ class FieldTree:
 
     def __enter__(self) -> "FieldTree":
         check_capacity()
-        self._before, self._builder = impl._root_fb, FieldsBuilder()
-        impl._root_fb = self._builder
-        self._anchor = ti.field(ti.i64, shape=1)
+        self._before = Declarations()
+        try:
+            self._builder = FieldsBuilder()
+            impl._root_fb = self._builder
+            self._anchor = ti.field(ti.i64, shape=1)
+        except BaseException:
+            self._before.restore_trees()
+            self._before.restore_fields()
+            raise
         return self
 
-    def __exit__(self, kind, *_):
-        impl._root_fb = self._before
-        # Taichi would refuse every later kernel while it knows of a builder that is not finalized.
-        impl.get_runtime().finalize_fields_builder(self._builder)
-        if kind is not None:
+    def __exit__(self, kind, error, _):
+        used = self._builder.finalized
+        self._before.restore_trees()
+        if kind is None and not used:
+            try:
+                self._allocate()
+            except BaseException:
+                self._before.restore_fields(self._builder)
+                raise
             return
+        self._before.restore_fields()
+        if used and not isinstance(error, InputError):
+            raise InputError(
+                "fields must not be read or written before all are declared: fill them in load"
+            ) from error
+
+    def _allocate(self):
+        """Take the memory of the declared fields."""
+        for field in impl.get_runtime().global_vars:
+            if field.ptr.snode() is None:
+                raise InputError("a field must be declared with a shape, got one without")
         self.bytes = _declared_bytes(self._builder.root.ptr)
         check_memory(self.bytes, self.advice)
+        # Taichi takes it off its list of trees that are not finalized, and expects it there.
         impl.get_runtime().initialize_fields_builder(self._builder)
         self._tree = self._builder.finalize(raise_warning=False)
         if impl.current_cfg().arch != ti.cuda:
