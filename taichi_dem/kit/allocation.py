@@ -22,6 +22,7 @@ from taichi.lang.util import to_numpy_type
 
 from taichi_dem.kit.declarations import Declarations
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.uncopied import Uncopied
 
 #: Trees beyond which no new one is begun; a few more complete those begun.
 MOST_TREES = 480
@@ -29,7 +30,11 @@ MOST_TREES = 480
 _SHARE = 0.9
 
 
-class FieldTree:
+class CapacityError(InputError):
+    """The machine's memory, or Taichi's room for field trees, is used up."""
+
+
+class FieldTree(Uncopied):
     """Fields declared in its ``with`` block; memory is taken at the end of the block, all at once.
 
     advice: what to do where the machine lacks the memory, as the end of a sentence. bytes: size of
@@ -205,7 +210,7 @@ def check_memory(needed: float, advice: str) -> None:
     """Raise InputError, which ends with an advice, where the memory needed [bytes] is not free."""
     free = available_bytes()
     if needed > _SHARE * free:
-        raise InputError(
+        raise CapacityError(
             f"this needs {needed / 1e9:.3g} GB of memory, of which {free / 1e9:.3g} GB are free: "
             f"{advice}"
         )
@@ -264,23 +269,26 @@ def check_capacity() -> None:
     """Raise InputError when the session has no room for more fields."""
     trees = tree_count()
     if trees > MOST_TREES:
-        raise InputError(
+        raise CapacityError(
             f"groups of fields in a Taichi session must stay below {MOST_TREES}, got {trees}: "
             "call runtime.clear() after some hundred kinds of scenes"
         )
 
 
 def tree_count() -> int:
-    """Field trees of the session."""
-    program = impl.get_runtime().prog
-    return program.get_snode_tree_size() if program is not None else 0
+    """Field trees of the session whose memory has not been freed."""
+    return len(_live_roots()) if impl.get_runtime().prog is not None else 0
 
 
 def field_bytes() -> int:
     """Bytes of all fields that the session has used so far."""
+    return sum(root._cell_size_bytes for root in _live_roots())
+
+
+def _live_roots() -> list:
     _forget_other_sessions()
     roots = FieldsBuilder._finalized_roots()
-    return sum(root._cell_size_bytes for root in roots if root.ptr.id not in _destroyed)
+    return [root for root in roots if root.ptr.id not in _destroyed]
 
 
 @ti.func

@@ -31,6 +31,7 @@ from taichi.lang import impl
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.kernel_source_cache import remember
+from taichi_dem.kit.uncopied import Uncopied
 from taichi_dem.kit.validation import choice, flag, whole
 
 ARCHITECTURES = ("cpu", "cuda")
@@ -56,7 +57,7 @@ _session: Optional["Session"] = None
 _on_clear: list[Callable[[], object]] = []
 
 
-class Session:
+class Session(Uncopied):
     """One start of Taichi; objects that own fields remember theirs.
 
     program: Taichi's own object of it. thread, process: those that started it, the only ones that
