@@ -16,7 +16,8 @@ class Sealing(ABCMeta):
     @property
     def __signature__(cls) -> inspect.Signature:
         """That of ``__init__``, without self, as for any class."""
-        found = inspect.signature(cls.__init__)
+        made: Any = cls
+        found = inspect.signature(made.__init__)
         return found.replace(parameters=list(found.parameters.values())[1:])
 
     def __call__(cls, *arguments: Any, **options: Any) -> Any:
