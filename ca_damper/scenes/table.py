@@ -88,7 +88,9 @@ class SceneTable:
 
 def _kept(name: str, column: np.ndarray) -> np.ndarray:
     """A copy of a column of 64 bits, which refuses to be written."""
-    kept = column.astype(np.int64 if name in ("particles", "seed") else np.float64)
+    # A number of more bits may become infinite here, which a Batch refuses.
+    with np.errstate(over="ignore"):
+        kept = column.astype(np.int64 if name in ("particles", "seed") else np.float64)
     kept.flags.writeable = False
     return kept
 

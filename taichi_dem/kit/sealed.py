@@ -17,6 +17,8 @@ class Sealing(ABCMeta):
     def __signature__(cls) -> inspect.Signature:
         """That of ``__init__``, without self, as for any class."""
         made: Any = cls
+        if made.__init__ is object.__init__:
+            return inspect.Signature()
         found = inspect.signature(made.__init__)
         return found.replace(parameters=list(found.parameters.values())[1:])
 
@@ -26,8 +28,7 @@ class Sealing(ABCMeta):
         for name, value in vars(made).items():
             if isinstance(value, np.ndarray):
                 vars(made)[name] = value.copy()
-                vars(made)[name].flags.writeable = False
-        object.__setattr__(made, "_sealed", True)
+        _seal(made)
         return made
 
 
@@ -40,6 +41,12 @@ class Sealed(metaclass=Sealing):
     # Beside the attributes, of which digests and representations are made.
     __slots__ = ("__dict__", "__weakref__", "_sealed")
 
+    def __setstate__(self, state: Any) -> None:
+        attributes, slots = state if isinstance(state, tuple) else (state, None)
+        vars(self).update(attributes or {})
+        if slots:
+            _seal(self)
+
     def __setattr__(self, name: str, value: Any) -> None:
         _check_open(self, f"{name} = {shown(value)}")
         object.__setattr__(self, name, value)
@@ -47,6 +54,13 @@ class Sealed(metaclass=Sealing):
     def __delattr__(self, name: str) -> None:
         _check_open(self, f"del {name}")
         object.__delattr__(self, name)
+
+
+def _seal(thing):
+    for value in vars(thing).values():
+        if isinstance(value, np.ndarray):
+            value.flags.writeable = False
+    object.__setattr__(thing, "_sealed", True)
 
 
 _mark: Any = vars(Sealed)["_sealed"]
