@@ -9,6 +9,7 @@ the others at most one.
 """
 
 import copy
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Optional
 
@@ -43,9 +44,10 @@ HARMLESS = 2.0**40
 class Effect(Sealed):
     """Base of all effects; one that has been made cannot be changed.
 
-    role: its place in the step. name: the word used in reports and on the command line. Kernels of
-    a bound effect read its numbers in the field ``self.law``, constants of the scene in
-    ``self.tables`` (engine.tables.Tables), and the fields that ``declare`` has declared.
+    role: its place in the step. name: the word used in reports and on the command line, by default
+    that of the class. Kernels of a bound effect read its numbers in the field ``self.law``,
+    constants of the scene in ``self.tables`` (engine.tables.Tables), and the fields that
+    ``declare`` has declared.
     """
 
     role = ""
@@ -55,6 +57,15 @@ class Effect(Sealed):
     law: ti.Field
     tables: "Tables"
     _count: int
+
+    #: Whether it stands for no effect, which no report lists.
+    is_null = False
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Name a class that has no name: reports list effects by it."""
+        super().__init_subclass__(**options)
+        if not cls.name and not cls.is_null:
+            cls.name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).strip("_").lower()
 
     def __repr__(self):
         return by_arguments(self)
@@ -194,6 +205,7 @@ class ElasticTension(Effect):
     """No softening: a unit stays elastic in tension and compression and never fails."""
 
     role = "tension"
+    is_null = True
 
     @ti.func
     def traction(self, stiffness, u, opening):
@@ -226,6 +238,7 @@ class ElasticShear(Effect):
     """No slip: a unit stays elastic in shear."""
 
     role = "shear"
+    is_null = True
 
     @ti.func
     def traction(self, stiffness, u, sliding, pressure):
@@ -243,6 +256,7 @@ class NoDashpot(Effect):
     """Bonds without damping."""
 
     role = "dashpot"
+    is_null = True
 
     @ti.func
     def traction(self, velocity):
@@ -255,6 +269,7 @@ class NoFriction(Effect):
     """Frictionless sphere contacts."""
 
     role = "friction"
+    is_null = True
 
     @ti.func
     def limit(self, force_normal):
