@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 import taichi as ti
 
+from ca_damper import Batch, SceneTable
+from ca_damper.fixed_mass import RigidMass
 from taichi_dem import CONCRETE, InputError, Scene, Simulation, Uniform, effects, runtime, simulate
 from taichi_dem.engine.engine import ENGINES
 from taichi_dem.kit import allocation
@@ -233,6 +235,28 @@ def test_any_order_of_operations_works_with_the_same_bits_or_is_refused(seed):
         getattr(session, operation)()
     session.make()
     session.run()
+
+
+def cycles_of(batch, **options):
+    return batch.run(3, 2, **options).record.tobytes()
+
+
+def test_a_batch_that_was_interrupted_begins_again_to_the_same_bits(seed):
+    rng = np.random.default_rng(seed)
+    table = SceneTable(particles=3, seed=[1, 2], dt=1e-3, base_amplitude=1e-3)
+    batch, other = (Batch(RigidMass(), table, measured_cycles=2) for _ in range(2))
+    batch.start()
+    undisturbed = cycles_of(batch)
+    batch.start()
+    with pytest.raises(ZeroDivisionError):
+        cycles_of(batch, progress=raising(0, ZeroDivisionError))
+    with pytest.raises(InputError, match="cannot be copied"):
+        (copy.copy, copy.deepcopy, pickle.dumps)[rng.integers(3)](batch)
+    with pytest.raises(InputError, match="no state yet"):
+        cycles_of(other)
+    batch.start()
+    assert cycles_of(batch) == undisturbed
+    assert "on the thread that called" in str(in_thread(batch.start))
 
 
 _INTERRUPTED = """
