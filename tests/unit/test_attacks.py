@@ -2,10 +2,11 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
-from tests.attacks import BEGIN, END, table_rows, write_table
+from tests.attacks import BEGIN, END, class_of, table_rows, write_table
 from tests.processes import users_environment
 from tests.scenes import ROOT
 
@@ -97,3 +98,10 @@ def test_classes_that_were_not_attacked_keep_their_rows(tmp_path):
     assert page.read_text().count("Last run") == 1
     with pytest.raises(pytest.UsageError, match=BEGIN):
         write_table(tmp_path / "none.md", {}, range(1))
+
+
+def test_every_module_names_its_class_and_every_row_of_the_page_is_one():
+    classes = {class_of(file) for file in Path(ROOT, "tests/attack").glob("test_*.py")}
+    assert None not in classes
+    page = Path(ROOT, "docs/reliability.md").read_text(encoding="utf-8")
+    assert {title for title, _ in table_rows(page)} <= classes
