@@ -33,7 +33,9 @@ class Scene:
     max_speed: float = 1e4
 
     def __post_init__(self):
-        if not hasattr(self.effects, "__iter__") or getattr(self.effects, "ndim", 1) == 0:
+        unordered = isinstance(self.effects, (set, frozenset))
+        listed = hasattr(self.effects, "__iter__") and getattr(self.effects, "ndim", 1) != 0
+        if unordered or not listed:
             raise InputError(f"effects must be a list of effects, got {shown(self.effects)}")
         object.__setattr__(self, "effects", tuple(self.effects))
         _check_types(self)
@@ -43,7 +45,7 @@ class Scene:
         for effect in self.effects:
             if hasattr(effect, "group"):
                 self.mesh.group_faces(effect.group)
-        positive("max_speed", self.max_speed)
+        object.__setattr__(self, "max_speed", positive("max_speed", self.max_speed))
 
     def __repr__(self):
         effects = ", ".join(effect.name or type(effect).__name__ for effect in self.effects)

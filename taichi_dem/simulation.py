@@ -1,8 +1,9 @@
 """A scene on the device, ready to step: builds every part once and ties them together."""
 
+import contextlib
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Optional
 
 import numpy as np
@@ -27,6 +28,7 @@ from taichi_dem.kit import runtime
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.progress.progress import compiling
+from taichi_dem.kit.uncopied import Uncopied
 from taichi_dem.kit.validation import choice, instance, positive, whole
 from taichi_dem.methods import Method, check_method
 from taichi_dem.scene import Scene
@@ -48,7 +50,7 @@ RESIDENT_BELOW, PARALLEL_FROM = 4000, 100000
 _MEASURED = "measured"
 
 
-class Simulation:
+class Simulation(Uncopied):
     """One scene, one method, one driver, on an engine of the session.
 
     driver: "resident", "parallel", or "auto": parallel on a GPU and for large scenes; for those of
@@ -56,7 +58,8 @@ class Simulation:
     brute_force: contact search without cells, for tests.
     model: the scene's arrays. tables, state, schedule, contacts, broad_phase, advance, step: parts
     of the engine, with the data of this simulation (``engine.view``); contacts and broad_phase are
-    None without contact.
+    None without contact. cut_short: what an exception or Ctrl-C interrupted, in words, so that its
+    bits would not be those of an undisturbed run; "" otherwise.
     Raises InputError for a wrong scene or method, an unknown driver, "resident" on a GPU, or a
     scene that exceeds the machine's memory.
     """
@@ -108,13 +111,29 @@ class Simulation:
 
     def _load(self):
         """Put the scene into the engine, at rest and at time zero."""
-        self.loan.activate()
-        engine: Any = self.loan.engine
-        engine.load(self.model, self.method, self.scene.max_speed)
-        self.energy_balance = None
-        self.run_seconds = self.run_cpu_seconds = 0.0
-        self.started = None
-        self.first_motion: dict[str, np.ndarray] = {}
+        with self._undivided("its scene was loaded"):
+            self.loan.activate()
+            engine: Any = self.loan.engine
+            engine.load(self.model, self.method, self.scene.max_speed)
+            self.energy_balance = None
+            self.run_seconds = self.run_cpu_seconds = 0.0
+            self.started = None
+            self.first_motion: dict[str, np.ndarray] = {}
+
+    @contextlib.contextmanager
+    def _undivided(self, what: str) -> Iterator[None]:
+        """In its block an exception leaves a simulation that can only be reset."""
+        self.cut_short = what
+        yield
+        self.cut_short = ""
+
+    def _check_whole(self):
+        """Raise InputError where something was interrupted that cannot be gone on with."""
+        if self.cut_short:
+            raise InputError(
+                f"this simulation was interrupted while {self.cut_short}, and cannot be gone on "
+                "with: reset it, or make a new one"
+            )
 
     def _driver(self, name):
         """Driver of the engine, or one that measures both."""
@@ -163,10 +182,16 @@ class Simulation:
 
         Compiles everything, so that the time of the run is that of stepping alone.
         """
+        self._check_whole()
         if self.energy_balance is not None:
             return
         started = time.perf_counter()
         compiling("first step", 0.2)
+        with self._undivided("it was started"):
+            self._start()
+        self.compile_seconds += time.perf_counter() - started
+
+    def _start(self):
         motion = self.state.motion()
         names = ("position", "orientation", "velocity", "spin")
         self.first_motion = {name: motion[name] for name in names}
@@ -184,7 +209,6 @@ class Simulation:
         self.sample()
         self.divergence_check.check()
         self.evaluation_rate()
-        self.compile_seconds += time.perf_counter() - started
 
     def _open_balance(self):
         """Begin the energy balance and the other diagnostics."""
@@ -231,8 +255,9 @@ class Simulation:
         self.started, self.started_cpu = time.perf_counter(), time.process_time()
         try:
             while self.state.tick[None] < end:
-                self.driver.run(end)
-                self._check_capacity()
+                with self._undivided("it stepped"):
+                    self.driver.run(end)
+                    self._check_capacity()
                 self.divergence_check.check(hurried=self.state.tick[None] < end)
                 if on_call is not None:
                     on_call()

@@ -25,6 +25,7 @@ from taichi.lang import impl
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.kernel_source_cache import remember
+from taichi_dem.kit.uncopied import Uncopied
 from taichi_dem.kit.validation import choice, flag, whole
 
 ARCHITECTURES = ("cpu", "cuda")
@@ -47,15 +48,16 @@ _session: Optional["Session"] = None
 _on_clear: list[Callable[[], object]] = []
 
 
-class Session:
+class Session(Uncopied):
     """One start of Taichi; objects that own fields remember theirs.
 
-    program: Taichi's own object of it. thread: the one that started it, the only one that may use
-    it. cleared: whether its engines have been given back since.
+    program: Taichi's own object of it. thread, process: those that started it, the only ones that
+    may use it. cleared: whether its engines have been given back since.
     """
 
     def __init__(self):
         self.program, self.thread = impl.get_runtime().prog, threading.get_ident()
+        self.process = os.getpid()
         self.cleared = False
 
 
@@ -65,10 +67,12 @@ def start(arch: str = "cpu", threads: Optional[int] = None, debug: bool = False)
     arch: "cpu" or "cuda". threads: number of CPU threads, all cores by default. debug: check
     array bounds inside kernels (about three times slower).
     Returns the settings in force. Raises InputError for an unknown or absent architecture, a
-    thread count below one, or a second start with other settings in the same process.
+    thread count below one, a second start with other settings in the same process, or one in a
+    fork of the process that runs Taichi.
     """
     global _current, _session
     wanted = _checked(arch, threads, debug)
+    _check_process()
     if _current and _session and impl.get_runtime().prog is _session.program:
         if wanted != _current:
             raise InputError(
@@ -81,8 +85,15 @@ def start(arch: str = "cpu", threads: Optional[int] = None, debug: bool = False)
 
 
 def stop() -> None:
-    """End the Taichi session; every model, state and result field made in it becomes invalid."""
+    """End the Taichi session; every simulation and batch made in it becomes invalid.
+
+    Raises InputError on another thread while the one that started Taichi is alive.
+    """
     global _current, _session
+    _check_process()
+    others = {thread.ident for thread in threading.enumerate()} - {threading.get_ident()}
+    if _session is not None and _session.thread in others:
+        check_thread("session")
     ti.reset()
     _current = _session = None
 
@@ -114,7 +125,17 @@ def session() -> Session:
     """
     if _session is None:
         raise InputError("Taichi is not started: call runtime.start() first")
+    _check_process()
     return _session
+
+
+def _check_process():
+    """Raise InputError in a fork of the process that started Taichi."""
+    if _session is not None and _session.process != os.getpid():
+        raise InputError(
+            "Taichi was started before this process was forked, and would hang in it: begin "
+            'processes by multiprocessing.get_context("spawn"), or start Taichi in them only'
+        )
 
 
 def check_session(made_in: Session, what: str) -> None:
@@ -124,6 +145,7 @@ def check_session(made_in: Session, what: str) -> None:
     """
     if made_in.cleared:
         raise InputError(f"the memory of this {what} has been given back by runtime.clear()")
+    _check_process()
     if made_in is not _session:
         raise InputError(f"this {what} belongs to a Taichi session that has been stopped")
     if impl.get_runtime().prog is not made_in.program:
@@ -138,8 +160,8 @@ def check_thread(what: str) -> None:
     """Raise InputError on another thread than the one that started Taichi."""
     if threading.get_ident() != session().thread:
         raise InputError(
-            f"a {what} must be made and used on the thread that called runtime.start(): Taichi "
-            "would crash on another"
+            f"a {what} must be made, used and ended on the thread that called runtime.start(): "
+            "Taichi would crash on another"
         )
 
 
@@ -155,7 +177,7 @@ def _end_session():
     Later it is lost wherever something still refers to a class with kernels, as the caches of
     ``typing`` do for the classes of an annotation.
     """
-    if _session and _session.thread == threading.get_ident():
+    if _session and _session.thread == threading.get_ident() and _session.process == os.getpid():
         if impl.get_runtime().prog is _session.program:
             ti.reset()
 
