@@ -10,7 +10,7 @@ import numpy as np
 
 from taichi_dem.diagnostics.bond_slip import BondSlips
 from taichi_dem.diagnostics.divergence import DivergenceCheck
-from taichi_dem.diagnostics.effect_activity import bond_rounding, effect_activity
+from taichi_dem.diagnostics.effect_activity import effect_activity
 from taichi_dem.diagnostics.energy_balance import EnergyBalance
 from taichi_dem.diagnostics.missing_effects import MissingEffects
 from taichi_dem.diagnostics.readings import Readings
@@ -219,7 +219,7 @@ class Simulation(Uncopied):
         )
         self.shared_volume = SharedVolume(self.model, self.state)
         self.missing_effects = MissingEffects(
-            self.model, self.state, self.readings, self.shared_volume, self.schedule.tick_seconds
+            self.model, self.state, self.readings, self.shared_volume, self.schedule
         )
         self.bond_slips = BondSlips(self.model, self.readings)
         self.step_resolution = StepResolution(*read, self.schedule, self.advance)
@@ -352,9 +352,7 @@ class Simulation(Uncopied):
             effect_activity=effect_activity(
                 self.model, self.energy_balance, self.readings, tables, account, counts[0]
             ),
-            missing_effects=self.missing_effects.findings(
-                bond_rounding(self.model, self.state, counts[0])
-            ),
+            missing_effects=self.missing_effects.findings(),
             unresolved=(
                 *self.step_resolution.findings(),
                 *self.missing_effects.unseen(),

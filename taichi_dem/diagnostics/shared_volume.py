@@ -58,7 +58,7 @@ class SharedVolume:
     """Finds bodies within each other, at recording times after which some body has moved.
 
     worst: the ``Interpenetration`` so far. Of the last look: pairs (n, 2) and their share (n,),
-    near (m, 2) all pairs that no plane of a face parts.
+    near_pairs (m, 2) all pairs that no plane of a face parts.
     """
 
     def __init__(self, model: "Model", state: "State"):
@@ -68,7 +68,7 @@ class SharedVolume:
         self.worst = Interpenetration()
         self.seen = model.centre, np.tile(np.eye(3), (model.body_count, 1, 1))
         self.pairs, self.share = np.zeros((0, 2), dtype=np.int32), np.zeros(0)
-        self.near = self.pairs
+        self.near_pairs = self.pairs
 
     def sample(self, time_s: float, finished: bool = False) -> bool:
         """Compare the bodies where one has moved, or at the end; whether they were compared."""
@@ -159,7 +159,7 @@ class SharedVolume:
         first = np.concatenate([[0], np.cumsum(count)[:-1]]).astype(np.int32)
         places = np.zeros((max(1, int(count.sum())), 2), dtype=np.int32)
         _near_pairs(*args, first, places, True)
-        self.near = np.sort(body[places[: int(count.sum())]], axis=1)
+        self.near_pairs = np.sort(body[places[: int(count.sum())]], axis=1)
         volume = np.ascontiguousarray(self.model.body_mass[body])
         places, share = places[: int(count.sum())], np.ones(int(count.sum()))
         for middles in self.middles:

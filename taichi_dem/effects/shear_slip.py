@@ -57,10 +57,11 @@ class ShearSlip(Effect):
         return stiffness * elastic, spent
 
     @ti.func
-    def acted(self, b, u):
+    def is_active(self, b, u):
         """1 for a unit that has slipped, else 0."""
         return ti.cast(self.slip[u].norm_sqr() > 0.0, ti.i32)
 
+    @ti.func
     def residual_slip(self, u):
         """Residual slip of a unit in the face frame [m]."""
         return self.slip[u]

@@ -99,7 +99,7 @@ class SlipWeakening(Effect):
         return ti.cast(self.unit[u][2] >= self.law[2] and pressure <= 0.0, ti.i32)
 
     @ti.func
-    def acted(self, b, u):
+    def is_active(self, b, u):
         """1 for a unit that has slipped, else 0."""
         return ti.cast(self.unit[u][2] > 0.0, ti.i32)
 
