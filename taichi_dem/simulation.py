@@ -1,6 +1,7 @@
 """A scene on the device, ready to step: builds every part once and ties them together."""
 
 import contextlib
+import copy
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -318,7 +319,9 @@ class Simulation(Uncopied):
 
     def report(self) -> Report:
         """Report of the run so far."""
-        self.shared_volume.sample(self.time_s, finished=True)
+        # A look of its own: to report changes nothing of what later samples find.
+        shared_volume = copy.copy(self.shared_volume)
+        shared_volume.sample(self.time_s, finished=True)
         counts = [int(value) for value in self.schedule.evaluations.to_numpy()]
         linear, angular = self.energy_balance.momentum_errors()
         levels = self.state.level.to_numpy()
@@ -356,9 +359,9 @@ class Simulation(Uncopied):
             unresolved=(
                 *self.step_resolution.findings(),
                 *self.missing_effects.unseen(),
-                *self.shared_volume.findings(),
+                *shared_volume.findings(),
             ),
-            interpenetration=self.shared_volume.worst,
+            interpenetration=shared_volume.worst,
             bound_by=counted_criteria(self.state.bound.to_numpy()),
             bond_slip=self.bond_slips.finding(),
             round_off_J=self.divergence_check.round_off(),

@@ -205,25 +205,24 @@ class MissingEffects:
 
     def findings(self) -> tuple[MissingEffect, ...]:
         """A ``MissingEffect`` for each effect that would have acted; a tuple, empty for none."""
+        needed = {name: replace(finding) for name, finding in self.needed.items()}
         ticks = self.state.passed.to_numpy()[: self.model.bond_count]
         for column, name in enumerate(("tension", "shear")):
-            if name in self.needed:
-                self._see_passed(self.needed[name], ticks[:, column])
-        if "dashpot" in self.needed:
+            if name in needed:
+                self._see_passed(needed[name], ticks[:, column])
+        if "dashpot" in needed:
             substeps = int(self.schedule.evaluations[0])
             rounding = bond_rounding(self.model, self.state, substeps)
-            places = np.flatnonzero(self.strain > rounding)
-            self.needed["dashpot"].see(places, self.last_s)
-        found = [finding for finding in self.needed.values() if finding.count]
+            needed["dashpot"].see(np.flatnonzero(self.strain > rounding), self.last_s)
+        found = [finding for finding in needed.values() if finding.count]
         return tuple(replace(one, place_m=self._position_of(one)) for one in found)
 
     def _see_passed(self, finding, ticks):
         """Take in the ticks at which bonds first exceeded a limit."""
         places = np.flatnonzero(ticks != NEVER)
         order = places[np.argsort(ticks[places], kind="stable")]
-        finding.see(
-            order, float(ticks[order[0]]) * self.schedule.tick_seconds if len(order) else 0.0
-        )
+        first = float(ticks[order[0]]) if len(order) else 0.0
+        finding.see(order, first * self.schedule.tick_seconds)
 
     def unseen(self) -> tuple[str, ...]:
         """A sentence where bodies may have passed through each other between two recordings."""
