@@ -258,8 +258,9 @@ class Simulation(Uncopied):
             while self.state.tick[None] < end:
                 with self._undivided("it stepped"):
                     self.driver.run(end)
-                    self._check_capacity()
+                    # Runaways fill the lists: they are named first.
                 self.divergence_check.check(hurried=self.state.tick[None] < end)
+                self._check_capacity()
                 if on_call is not None:
                     on_call()
         finally:

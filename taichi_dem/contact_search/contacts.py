@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
 #: Largest steps that a fast body makes before it is searched again.
 STEPS = 16.0
-#: Share of its extent beyond which it is searched again whatever its speed.
+#: Share of its extent beyond which it is searched again whatever its speed, and further than which
+#: no step may carry it: spheres would pass each other unseen.
 FARTHEST = 0.25
 
 
@@ -155,9 +156,14 @@ class Contacts:
 
     @ti.func
     def moved(self, i, velocity, spin, elapsed):
-        """Add to the displacement of body i; request a search once it may exceed the body skin."""
+        """Add to the displacement of body i; request a search once it may exceed the body skin.
+
+        A body that leaps too far in one step for its contacts to be followed is out of bounds.
+        """
         if self.exposed_faces[i] != 0:
             speed = self._speed(i, velocity, spin)
+            if elapsed * speed > FARTHEST * self.tables.extent[i]:
+                ti.atomic_min(self.state.bad_body[None], i)
             way = self.travel[i] + speed * elapsed
             self.travel[i] = way
             if way + self.pace[1] * elapsed * speed > self.body_skin[i]:

@@ -9,7 +9,7 @@ from taichi_dem.contact_search.contacts import Contacts
 from taichi_dem.diagnostics.readings import Readings
 from taichi_dem.step.advance import Advance
 from taichi_dem.step.schedule import Schedule
-from taichi_dem.timeline import NEVER
+from taichi_dem.timeline import MAX_LEVEL, NEVER
 
 if TYPE_CHECKING:
     from taichi_dem.engine.model import Model
@@ -87,7 +87,16 @@ class StepResolution:
         """
         bodies = np.ones(self.model.body_count, dtype=bool) if bodies is None else bodies
         bonds = self._bonds(bodies[self.model.topology.master])
-        return (*bonds, *self._pairs(bodies), *self._sweeps())
+        return (*bonds, *self._pairs(bodies), *self._sweeps(), *self._levels())
+
+    def _levels(self):
+        if not self.schedule.undivided[None]:
+            return ()
+        least = self.schedule.dt0 / 2.0**MAX_LEVEL
+        return (
+            f"the shortest step of all, {least:.3g} s or 2^-{MAX_LEVEL} of the largest, was "
+            "reached: steps are not divided further; take a shorter largest step",
+        )
 
     @property
     def unconverged(self) -> tuple[int, float]:
