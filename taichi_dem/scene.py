@@ -87,6 +87,26 @@ def _check_roles(effects):
         raise InputError("effect friction acts in sphere contacts: list SphereContact too")
 
 
+def scene_warnings(scene: Any) -> tuple[str, ...]:
+    """Sentences about what a scene lists or leaves out in vain; before a run.
+
+    scene: a Scene, or a Model, which has the same mesh, material and effects.
+    """
+    return (*outer_faces_warnings(scene), *_friction_warnings(scene))
+
+
+def _friction_warnings(scene):
+    """Friction without springs is a drag up to its limit, so without a dashpot it is none."""
+    rubs = [effect for effect in scene.effects if effect.role == "friction"]
+    material = scene.material
+    if not rubs or rubs[0].remembers or material.contact_damping or not material.friction:
+        return ()
+    return (
+        f"{rubs[0].name} never acts: it is at most contact_damping times the sliding speed, and "
+        "contact_damping of the material is 0; StickingFriction acts by springs instead",
+    )
+
+
 def outer_faces_warnings(scene: Any) -> tuple[str, ...]:
     """Sentences about parts of a scene that may meet where they carry no spheres; before a run.
 

@@ -14,7 +14,7 @@ from taichi_dem.mesh.contact_spheres import spheres_of_faces
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.tetrahedra import all_faces, area_vectors
 from taichi_dem.mesh.topology import body_properties, topology_of
-from taichi_dem.scene import Scene, outer_faces_warnings
+from taichi_dem.scene import Scene, scene_warnings
 from taichi_dem.stability.body_limits import LIMITED
 from taichi_dem.stability.mesh_limits import (
     bond_rates,
@@ -209,7 +209,7 @@ def step_report(scene: Union[Scene, Mesh], material: Optional[Material] = None) 
     if isinstance(scene, Scene) and material is None:
         damped, friction, contact = map(scene.effect, ("dashpot", "friction", "contact"))
         divisions = contact.divisions if contact is not None else None
-        warnings = outer_faces_warnings(scene)
+        warnings = scene_warnings(scene)
         return _report(scene.mesh, scene.material, damped, friction, divisions, warnings)
     if isinstance(scene, Mesh) and isinstance(material, Material):
         return _report(scene, material, True, True, 5)

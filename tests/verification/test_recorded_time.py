@@ -15,7 +15,7 @@ def solved(step):
     return ImplicitDashpots(step, sweeps=(2, 400), tolerance=1e-12)
 
 
-#: Method of a step, its largest step [s], and whether dashpots act: explicit ones are of first order.
+#: Method of a step, its largest step [s], and whether dashpots act: explicit ones are of order 1.
 SCHEMES = {
     "implicit": (solved, 2e-7, True),
     "uniform": (Uniform, 4e-7, False),
@@ -24,7 +24,7 @@ SCHEMES = {
 
 
 def recorded(method, damped, weight):
-    """Energies and a velocity at the end of a blow on a bar; weight: acceleration from the start."""
+    """Energies and a velocity at the end of a blow on a bar; weight: acceleration [m/s^2]."""
     listed = [effects.GasPressure("left", peak=5e6, rise=1e-5), effects.Gravity((weight, 0.0, 0.0))]
     listed += [effects.BondDamping()] * damped
     scene = Scene(bar(0.2, 0.05, (4, 1, 1)), CONCRETE, listed)
