@@ -160,6 +160,8 @@ class MissingEffects:
         bare: whether only pairs count of which a touching sphere is on a bare outer face.
         """
         pairs = self.volume.near_pairs[:_MOST_PAIRS]
+        if not len(pairs):
+            return pairs[:, 0]
         place, turn = self.volume.seen
         spheres, top = self.spheres, self.model.topology
         broken = self.state.broken_tick.to_numpy()[: self.model.bond_count] != NEVER
