@@ -325,7 +325,7 @@ class Advance(ContactForce):
 
     def _support_bit(self, effect):
         """Bit of a support in ``State.acted``."""
-        return ti.i64(1 << len(self.tables.loads) + self.tables.supports.index(effect))
+        return 1 << len(self.tables.loads) + self.tables.supports.index(effect)
 
     @ti.func
     def _book_loads(self, i, kick, velocity, momentum):
@@ -362,7 +362,7 @@ class Advance(ContactForce):
                 )
                 held = 1
                 if (velocity - before).norm_sqr() + (momentum - spun).norm_sqr() > 0.0:
-                    self.state.note_acted(i, ti.static(self._support_bit(effect)))
+                    self.state.note_acted(i, ti.i64(ti.static(self._support_bit(effect))))
         mean = 0.5 * (self.state.velocity[i] + velocity)
         mean_momentum = 0.5 * (self.state.angular_momentum[i] + momentum)
         self._book_loads(i, kick, mean, mean_momentum)
