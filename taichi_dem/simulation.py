@@ -290,7 +290,7 @@ class Simulation:
 
     def report(self) -> Report:
         """Report of the run so far."""
-        self.shared_volume.sample(self.time_s, finished=True)
+        self.missing_effects.compare(self.time_s, finished=True)
         counts = [int(value) for value in self.schedule.evaluations.to_numpy()]
         linear, angular = self.energy_balance.momentum_errors()
         levels = self.state.level.to_numpy()

@@ -122,11 +122,7 @@ class MissingEffects:
         if time_s == self.last_s:
             return
         self.last_s = time_s
-        self.leap = max(self.leap, self.volume.way())
-        looked = self.volume.sample(time_s)
-        for name in {"bodies", "bare"} & set(self.needed):
-            if looked:
-                self.needed[name].see(self._within(name == "bare"), time_s)
+        self.compare(time_s)
         if self.model.bond_count and "contact" in self.needed:
             marks = np.zeros(self.model.bond_count, dtype=np.int32)
             self.readings.pressed(marks)
@@ -139,12 +135,21 @@ class MissingEffects:
             acted = self.state.acted.to_numpy()[: self.model.body_count]
             self.needed["friction"].see(np.flatnonzero(acted & CONTACT), time_s)
 
+    def compare(self, time_s: float, finished: bool = False) -> None:
+        """Look for bodies within each other where one has moved, at the end by any way."""
+        self.leap = max(self.leap, self.volume.way())
+        if self.volume.sample(time_s, finished):
+            for name in {"bodies", "bare"} & set(self.needed):
+                self.needed[name].see(self._within(name == "bare"), time_s)
+
     def _within(self, bare):
         """First bodies of pairs near each other whose spheres would touch.
 
         bare: whether only pairs count of which a touching sphere is on a bare outer face.
         """
         pairs = self.volume.near[:_MOST_PAIRS]
+        if not len(pairs):
+            return pairs[:, 0]
         place, turn = self.volume.seen
         spheres, top = self.spheres, self.model.topology
         broken = self.state.broken_tick.to_numpy()[: self.model.bond_count] != NEVER
