@@ -9,6 +9,8 @@ from taichi_dem.stability.step_control import StepControl
 
 #: Drivers of a blast, the first the default.
 BLAST_DRIVERS = ("auto", "resident", "parallel")
+#: Fracture energy of mode II [J/m^2], ten times that of mode I.
+MODE_TWO = 1000.0
 EFFECTS = {
     "bond_damping": effects.BondDamping,
     "softening": effects.Softening,
@@ -19,10 +21,11 @@ EFFECTS = {
     "friction": effects.Friction,
     "gas_pressure": effects.GasPressure,
     "gravity": effects.Gravity,
+    "slip_weakening": partial(effects.SlipWeakening, MODE_TWO),
 }
-#: Those that the paper's scene does not have: weight, and contact of all surfaces in place of that
-#: of broken faces.
-OPTIONAL = ("gravity", "surface_contact")
+#: Those that the paper's scene does not have: weight, contact of all surfaces in place of that of
+#: broken faces, and cohesion that slip degrades.
+OPTIONAL = ("gravity", "surface_contact", "slip_weakening")
 
 
 def blast_parser(name, description, drivers=BLAST_DRIVERS, mesh=PAPER_BLOCK, saves=False, **given):

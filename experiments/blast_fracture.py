@@ -24,7 +24,16 @@ import numpy as np
 
 from _blast import EFFECTS, OPTIONAL, blast_parser, print_quality, run_options
 from _blast import METHODS as BLAST_METHODS
-from taichi_dem import CONCRETE, InputError, Scene, SimulationDiverged, plot, read_mesh, simulate
+from taichi_dem import (
+    CONCRETE,
+    InputError,
+    Scene,
+    SimulationDiverged,
+    effects,
+    plot,
+    read_mesh,
+    simulate,
+)
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv
 from taichi_dem.methods import Multirate, Uniform
@@ -133,7 +142,7 @@ def picture(result, folder):
     frames, model, history = result.frames, result.model, result.history
     dt0, broken_time = result.method.dt0, result.broken_time
     write_bodies(at("bodies.csv"), frames)
-    for gas in (load for load in model.loads if load.name == "gas_pressure"):
+    for gas in (load for load in model.loads if isinstance(load, effects.GasPressure)):
         time_s = np.linspace(0.0, 1.1 * gas.duration, 400)
         pressure = gas.pressure_at(time_s)
         plot.plot_pressure(at("pressure.png"), time_s, pressure, history["time_s"][-1])

@@ -40,7 +40,8 @@ def needed_effects(result: object, tolerance: float = ROUNDING) -> Advice:
     shown: dict[str, float] = {}
     if isinstance(result, Result) and not result.diverged:
         shown = differences(result, tried, tolerance)
-    return Advice(uses, report.missing_effects, tolerance, shown)
+    slipped = (slip for slip in report.bond_slip if slip.excessive and not slip.weakens)
+    return Advice(uses, (*report.missing_effects, *slipped), tolerance, shown)
 
 
 def differences(result: Result, names: Iterable[str], tolerance: float) -> dict[str, float]:
@@ -55,7 +56,8 @@ def differences(result: Result, names: Iterable[str], tolerance: float) -> dict[
     together = _difference(result, names)
     if together <= tolerance or len(names) == 1:
         return dict.fromkeys(names, together)
-    found, left_out = {}, ()
+    found: dict[str, float] = {}
+    left_out: tuple[str, ...] = ()
     # Friction first: contact can be left out only with it.
     for name in sorted(names, key=lambda name: _role(result, name) != "friction"):
         found[name] = _difference(result, (*left_out, name))

@@ -33,15 +33,19 @@ class Scene:
     max_speed: float = 1e4
 
     def __post_init__(self):
-        if not hasattr(self.effects, "__iter__") or getattr(self.effects, "ndim", 1) == 0:
+        unordered = isinstance(self.effects, (set, frozenset))
+        listed = hasattr(self.effects, "__iter__") and getattr(self.effects, "ndim", 1) != 0
+        if unordered or not listed:
             raise InputError(f"effects must be a list of effects, got {shown(self.effects)}")
         object.__setattr__(self, "effects", tuple(self.effects))
         _check_types(self)
         _check_roles(self.effects)
         for effect in self.effects:
+            effect.check_material(self.material)
+        for effect in self.effects:
             if hasattr(effect, "group"):
                 self.mesh.group_faces(effect.group)
-        positive("max_speed", self.max_speed)
+        object.__setattr__(self, "max_speed", positive("max_speed", self.max_speed))
 
     def __repr__(self):
         effects = ", ".join(effect.name or type(effect).__name__ for effect in self.effects)
@@ -89,7 +93,8 @@ def outer_faces_warnings(scene: Any) -> tuple[str, ...]:
     A solid in one piece meets nothing until it breaks, which is detected in the run. Scenes with
     contact are expected to have meeting bodies: any with several parts is reported. Scenes without
     contact may hold independent solids: they are not reported where they stay at rest, fall alike,
-    or are too far from each other (``parts.may_meet``).
+    or are too far from each other (``parts.may_meet``). Faces that lie on each other without a bond
+    (``Mesh.keep_coincident``) meet in a solid of one piece too.
     scene: a Scene, or a Model, which has the same mesh and effects.
     """
     contact = [effect for effect in scene.effects if effect.role == "contact"]
@@ -97,9 +102,15 @@ def outer_faces_warnings(scene: Any) -> tuple[str, ...]:
         return ()
     part = parts_of(scene.mesh)
     count = part.max() + 1
-    if count == 1 or not (contact or may_meet(scene, part)):
+    apart = count > 1 and (contact or may_meet(scene, part))
+    if not (apart or scene.mesh.keep_coincident):
         return ()
     lack = "their outer faces carry no contact spheres" if contact else "no contact is listed"
+    if not apart:
+        return (
+            f"coincident points of the mesh are kept apart, no bond joins the faces on them, and "
+            f"{lack}: bodies pass through each other there; {REMEDY} lets them touch",
+        )
     return (
         f"the mesh has {count} parts that no bond joins, and {lack}: "
         f"where these parts meet they pass through each other; {REMEDY} lets them touch",

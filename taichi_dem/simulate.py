@@ -171,6 +171,7 @@ def saved_run(simulation: Simulation, recorder: Recorder) -> RunSnapshot:
         "energy balance": simulation.energy_balance,
         "missing effects": simulation.missing_effects,
         "shared volume": simulation.shared_volume,
+        "bond slips": simulation.bond_slips,
         "step resolution": simulation.step_resolution,
         "recorder": recorder,
     }

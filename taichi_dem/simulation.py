@@ -1,14 +1,17 @@
 """A scene on the device, ready to step: builds every part once and ties them together."""
 
+import contextlib
+import copy
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Optional
 
 import numpy as np
 
+from taichi_dem.diagnostics.bond_slip import BondSlips
 from taichi_dem.diagnostics.divergence import DivergenceCheck
-from taichi_dem.diagnostics.effect_activity import bond_rounding, effect_activity
+from taichi_dem.diagnostics.effect_activity import effect_activity
 from taichi_dem.diagnostics.energy_balance import EnergyBalance
 from taichi_dem.diagnostics.missing_effects import MissingEffects
 from taichi_dem.diagnostics.readings import Readings
@@ -26,6 +29,7 @@ from taichi_dem.kit import runtime
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.progress.progress import compiling
+from taichi_dem.kit.uncopied import Uncopied
 from taichi_dem.kit.validation import choice, instance, positive, whole
 from taichi_dem.methods import Method, check_method
 from taichi_dem.scene import Scene
@@ -47,7 +51,7 @@ RESIDENT_BELOW, PARALLEL_FROM = 4000, 100000
 _MEASURED = "measured"
 
 
-class Simulation:
+class Simulation(Uncopied):
     """One scene, one method, one driver, on an engine of the session.
 
     driver: "resident", "parallel", or "auto": parallel on a GPU and for large scenes; for those of
@@ -55,7 +59,8 @@ class Simulation:
     brute_force: contact search without cells, for tests.
     model: the scene's arrays. tables, state, schedule, contacts, broad_phase, advance, step: parts
     of the engine, with the data of this simulation (``engine.view``); contacts and broad_phase are
-    None without contact.
+    None without contact. cut_short: what an exception or Ctrl-C interrupted, in words, so that its
+    bits would not be those of an undisturbed run; "" otherwise.
     Raises InputError for a wrong scene or method, an unknown driver, "resident" on a GPU, or a
     scene that exceeds the machine's memory.
     """
@@ -107,13 +112,29 @@ class Simulation:
 
     def _load(self):
         """Put the scene into the engine, at rest and at time zero."""
-        self.loan.activate()
-        engine: Any = self.loan.engine
-        engine.load(self.model, self.method, self.scene.max_speed)
-        self.energy_balance = None
-        self.run_seconds = self.run_cpu_seconds = 0.0
-        self.started = None
-        self.first_motion: dict[str, np.ndarray] = {}
+        with self._undivided("its scene was loaded"):
+            self.loan.activate()
+            engine: Any = self.loan.engine
+            engine.load(self.model, self.method, self.scene.max_speed)
+            self.energy_balance = None
+            self.run_seconds = self.run_cpu_seconds = 0.0
+            self.started = None
+            self.first_motion: dict[str, np.ndarray] = {}
+
+    @contextlib.contextmanager
+    def _undivided(self, what: str) -> Iterator[None]:
+        """In its block an exception leaves a simulation that can only be reset."""
+        self.cut_short = what
+        yield
+        self.cut_short = ""
+
+    def _check_whole(self):
+        """Raise InputError where something was interrupted that cannot be gone on with."""
+        if self.cut_short:
+            raise InputError(
+                f"this simulation was interrupted while {self.cut_short}, and cannot be gone on "
+                "with: reset it, or make a new one"
+            )
 
     def _driver(self, name):
         """Driver of the engine, or one that measures both."""
@@ -162,10 +183,16 @@ class Simulation:
 
         Compiles everything, so that the time of the run is that of stepping alone.
         """
+        self._check_whole()
         if self.energy_balance is not None:
             return
         started = time.perf_counter()
         compiling("first step", 0.2)
+        with self._undivided("it was started"):
+            self._start()
+        self.compile_seconds += time.perf_counter() - started
+
+    def _start(self):
         motion = self.state.motion()
         names = ("position", "orientation", "velocity", "spin")
         self.first_motion = {name: motion[name] for name in names}
@@ -183,7 +210,6 @@ class Simulation:
         self.sample()
         self.divergence_check.check()
         self.evaluation_rate()
-        self.compile_seconds += time.perf_counter() - started
 
     def _open_balance(self):
         """Begin the energy balance and the other diagnostics."""
@@ -194,8 +220,9 @@ class Simulation:
         )
         self.shared_volume = SharedVolume(self.model, self.state)
         self.missing_effects = MissingEffects(
-            self.model, self.state, self.readings, self.shared_volume, self.schedule.tick_seconds
+            self.model, self.state, self.readings, self.shared_volume, self.schedule
         )
+        self.bond_slips = BondSlips(self.model, self.readings)
         self.step_resolution = StepResolution(*read, self.schedule, self.advance)
 
     def motion(self) -> dict[str, np.ndarray]:
@@ -208,13 +235,14 @@ class Simulation:
         return motion
 
     def sample(self) -> None:
-        """Sample missing effects, and bonds that the step does not resolve.
+        """Sample missing effects, slip of bonds, and bonds that the step does not resolve.
 
         Called at recording times, as the step itself does not check them.
         """
         self.missing_effects.sample(self.time_s)
         self.divergence_check.check_shared(self.shared_volume)
         self.step_resolution.sample()
+        self.bond_slips.sample(self.time_s)
 
     def advance_to(self, macro_step: int, on_call: Optional[Callable[[], object]] = None) -> None:
         """Step until a number of largest steps; on_call() is called about five times a second.
@@ -228,8 +256,9 @@ class Simulation:
         self.started, self.started_cpu = time.perf_counter(), time.process_time()
         try:
             while self.state.tick[None] < end:
-                self.driver.run(end)
-                self._check_capacity()
+                with self._undivided("it stepped"):
+                    self.driver.run(end)
+                    self._check_capacity()
                 self.divergence_check.check(hurried=self.state.tick[None] < end)
                 if on_call is not None:
                     on_call()
@@ -290,7 +319,9 @@ class Simulation:
 
     def report(self) -> Report:
         """Report of the run so far."""
-        self.missing_effects.compare(self.time_s, finished=True)
+        # A look of its own: to report changes nothing of what later samples find.
+        shared_volume = copy.copy(self.shared_volume)
+        shared_volume.sample(self.time_s, finished=True)
         counts = [int(value) for value in self.schedule.evaluations.to_numpy()]
         linear, angular = self.energy_balance.momentum_errors()
         levels = self.state.level.to_numpy()
@@ -324,16 +355,15 @@ class Simulation:
             effect_activity=effect_activity(
                 self.model, self.energy_balance, self.readings, tables, account, counts[0]
             ),
-            missing_effects=self.missing_effects.findings(
-                bond_rounding(self.model, self.state, counts[0])
-            ),
+            missing_effects=self.missing_effects.findings(shared_volume),
             unresolved=(
                 *self.step_resolution.findings(),
                 *self.missing_effects.unseen(),
-                *self.shared_volume.findings(),
+                *shared_volume.findings(),
             ),
-            interpenetration=self.shared_volume.worst,
+            interpenetration=shared_volume.worst,
             bound_by=counted_criteria(self.state.bound.to_numpy()),
+            bond_slip=self.bond_slips.finding(),
             round_off_J=self.divergence_check.round_off(),
         )
 

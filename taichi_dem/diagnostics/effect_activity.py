@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from taichi_dem.diagnostics.energy_balance import EnergyBalance, EnergyTables
+from taichi_dem.diagnostics.missing_effects import bond_rounding
 from taichi_dem.diagnostics.readings import Readings
-from taichi_dem.engine.state import CONTACT, RUBBED
 from taichi_dem.kit.effect_usage import EffectUse
+from taichi_dem.physics.sphere_pair import CONTACT, RUBBED
 
 if TYPE_CHECKING:
     from taichi_dem.engine.model import Model
-    from taichi_dem.engine.state import State
 
 _EPSILON = np.finfo(np.float64).eps
 #: Terms of the account that pass through bonds; dashpots are compared with their sum.
@@ -49,10 +49,10 @@ def effect_activity(
     given = abs(account["load_work"]) + abs(account["support_work"]) + energy_balance.start_energy
     rounding = _Rounding(substeps * _EPSILON * given, bond_rounding(model, state, substeps))
     marks = np.zeros((model.bond_count, 2), dtype=np.int32)
-    readings.acted(marks)
-    acted = state.acted.to_numpy()[: model.body_count], marks
+    readings.active_bonds(marks)
+    active = state.active_effects.to_numpy()[: model.body_count], marks
     found = [
-        _by_role(model, energy_balance, tables, acted, rounding, effect)
+        _by_role(model, energy_balance, tables, active, rounding, effect)
         for effect in _listed(model)
     ]
     return tuple(_use(account, given, model, rounding, *entry) for entry in found)
@@ -65,26 +65,13 @@ class _Rounding(NamedTuple):
     heat: np.ndarray
 
 
-def bond_rounding(model: "Model", state: "State", substeps: int) -> np.ndarray:
-    """Heat that rounding alone may leave in each bond's dashpots [J], (bond_count,).
-
-    A bond's opening is the difference of coordinates of up to X [m], so it is known to eps X. In
-    every substep rounding may thus put into the bond the energy of such an opening,
-    A (k_n + k_s) (eps X)^2 / 2, which its dashpots then take.
-    """
-    reach = max(np.abs(model.mesh.points).max(), np.abs(state.position.to_numpy()).max())
-    area = 3.0 * model.bonds["area"]
-    stiffness = model.bond_stiffness.sum(axis=1)
-    return 0.5 * substeps * area * stiffness * (_EPSILON * reach) ** 2
-
-
 def _listed(model):
     return [effect for effect in model.effects if effect.name]
 
 
-def _by_role(model, energy_balance, tables, acted, rounding, effect):
+def _by_role(model, energy_balance, tables, active, rounding, effect):
     """The effect, its counted events in words, their number, and terms of the account or [J]."""
-    bond, (bits, marks) = tables[1], acted
+    bond, (bits, marks) = tables[1], active
     if effect.role == "load":
         place = model.loads.index(effect)
         work = energy_balance.load_works(place)

@@ -9,15 +9,17 @@ import numpy as np
 
 from taichi_dem.diagnostics.readings import Readings
 from taichi_dem.diagnostics.shared_volume import SharedVolume
-from taichi_dem.engine.state import CONTACT
 from taichi_dem.mesh.contact_spheres import ContactSpheres, spheres_of_faces
+from taichi_dem.physics.sphere_pair import CONTACT
 from taichi_dem.scene import REMEDY
+from taichi_dem.step.schedule import Schedule
 from taichi_dem.timeline import NEVER
 
 if TYPE_CHECKING:
     from taichi_dem.engine.model import Model
-    from taichi_dem.engine.state import State
+    from taichi_dem.physics.sphere_pair import State
 
+_EPSILON = np.finfo(np.float64).eps
 #: Overlap of two spheres, as a share of the distance at which they touch, below which they count
 #: as apart: coordinates of a mesh file may be rounded to seven digits.
 LEAST_OVERLAP = 1e-4
@@ -27,6 +29,19 @@ _DIVISIONS = 5
 _MOST_PAIRS = 2000
 #: Way of a body between two looks, as a share of its radius, that may hide a passage.
 _LEAP = 1.0
+
+
+def bond_rounding(model: "Model", state: "State", substeps: int) -> np.ndarray:
+    """Heat that rounding alone may leave in each bond's dashpots [J], (bond_count,).
+
+    A bond's opening is the difference of coordinates of up to X [m], so it is known to eps X. In
+    every substep rounding may thus put into the bond the energy of such an opening,
+    A (k_n + k_s) (eps X)^2 / 2, which its dashpots then take.
+    """
+    reach = max(np.abs(model.mesh.points).max(), np.abs(state.position.to_numpy()).max())
+    area = 3.0 * model.bonds["area"]
+    stiffness = model.bond_stiffness.sum(axis=1)
+    return 0.5 * substeps * area * stiffness * (_EPSILON * reach) ** 2
 
 
 @dataclass
@@ -110,10 +125,10 @@ class MissingEffects:
         state: "State",
         readings: Readings,
         volume: SharedVolume,
-        tick_s: float,
+        schedule: Schedule,
     ):
         self.model, self.state, self.readings = model, state, readings
-        self.volume, self.tick_s, self.last_s = volume, tick_s, -1.0
+        self.volume, self.schedule, self.last_s = volume, schedule, -1.0
         self.needed = unserved(model)
         self.strain, self.leap = np.zeros(model.bond_count), 0.0
 
@@ -122,7 +137,9 @@ class MissingEffects:
         if time_s == self.last_s:
             return
         self.last_s = time_s
-        self.compare(time_s)
+        self.leap = max(self.leap, self.volume.way())
+        if self.volume.sample(time_s):
+            self._see_bodies(self.needed, self.volume, time_s)
         if self.model.bond_count and "contact" in self.needed:
             marks = np.zeros(self.model.bond_count, dtype=np.int32)
             self.readings.pressed(marks)
@@ -132,25 +149,24 @@ class MissingEffects:
             self.readings.bonds(table)
             self.strain = np.maximum(self.strain, table[:, 0])
         if "friction" in self.needed:
-            acted = self.state.acted.to_numpy()[: self.model.body_count]
-            self.needed["friction"].see(np.flatnonzero(acted & CONTACT), time_s)
+            active = self.state.active_effects.to_numpy()[: self.model.body_count]
+            self.needed["friction"].see(np.flatnonzero(active & CONTACT), time_s)
 
-    def compare(self, time_s: float, finished: bool = False) -> None:
-        """Look for bodies within each other where one has moved, at the end by any way."""
-        self.leap = max(self.leap, self.volume.way())
-        if self.volume.sample(time_s, finished):
-            for name in {"bodies", "bare"} & set(self.needed):
-                self.needed[name].see(self._within(name == "bare"), time_s)
+    def _see_bodies(self, needed, volume, time_s):
+        """Take in the bodies within each other of a look."""
+        for name in {"bodies", "bare"} & set(needed):
+            needed[name].see(self._overlapping(volume, name == "bare"), time_s)
 
-    def _within(self, bare):
+    def _overlapping(self, volume, bare):
         """First bodies of pairs near each other whose spheres would touch.
 
-        bare: whether only pairs count of which a touching sphere is on a bare outer face.
+        volume: what has looked for them. bare: whether only pairs count of which a touching sphere
+        is on a bare outer face.
         """
-        pairs = self.volume.near[:_MOST_PAIRS]
+        pairs = volume.near_pairs[:_MOST_PAIRS]
         if not len(pairs):
             return pairs[:, 0]
-        place, turn = self.volume.seen
+        place, turn = volume.seen
         spheres, top = self.spheres, self.model.topology
         broken = self.state.broken_tick.to_numpy()[: self.model.bond_count] != NEVER
         # Bond -1 stands for an outer face, which is as free as a broken one.
@@ -193,38 +209,43 @@ class MissingEffects:
         self.last_s, self.leap = saved["looks"].tolist()
         self.strain = saved["strain"].copy()
 
-    def findings(self, rounding: np.ndarray) -> tuple[MissingEffect, ...]:
+    def findings(self, volume: SharedVolume) -> tuple[MissingEffect, ...]:
         """A ``MissingEffect`` for each effect that would have acted; a tuple, empty for none.
 
-        rounding: energy that rounding alone may leave in each bond [J].
+        volume: a look at the end, which also finds bodies that have moved by little.
         """
+        needed = {name: replace(finding) for name, finding in self.needed.items()}
+        self._see_bodies(needed, volume, int(self.state.tick[None]) * self.schedule.tick_seconds)
         ticks = self.state.passed.to_numpy()[: self.model.bond_count]
         for column, name in enumerate(("tension", "shear")):
-            if name in self.needed:
-                self._see_passed(self.needed[name], ticks[:, column])
-        if "dashpot" in self.needed:
-            places = np.flatnonzero(self.strain > rounding)
-            self.needed["dashpot"].see(places, self.last_s)
-        found = [finding for finding in self.needed.values() if finding.count]
-        return tuple(replace(one, place_m=self._place(one)) for one in found)
+            if name in needed:
+                self._see_passed(needed[name], ticks[:, column])
+        if "dashpot" in needed:
+            substeps = int(self.schedule.evaluations[0])
+            rounding = bond_rounding(self.model, self.state, substeps)
+            needed["dashpot"].see(np.flatnonzero(self.strain > rounding), self.last_s)
+        found = [finding for finding in needed.values() if finding.count]
+        return tuple(replace(one, place_m=self._position_of(one)) for one in found)
 
     def _see_passed(self, finding, ticks):
         """Take in the ticks at which bonds first exceeded a limit."""
         places = np.flatnonzero(ticks != NEVER)
         order = places[np.argsort(ticks[places], kind="stable")]
-        finding.see(order, float(ticks[order[0]]) * self.tick_s if len(order) else 0.0)
+        first = float(ticks[order[0]]) if len(order) else 0.0
+        finding.see(order, first * self.schedule.tick_seconds)
 
     def unseen(self) -> tuple[str, ...]:
         """A sentence where bodies may have passed through each other between two recordings."""
         open_roles = {"bodies", "bare"} & set(self.needed)
-        if not open_roles or self.leap <= _LEAP or self.volume.fragments() == 1:
+        leap = max(self.leap, self.volume.way())
+        if not open_roles or leap <= _LEAP or self.volume.fragments() == 1:
             return ()
         return (
-            f"bodies without contact spheres moved up to {self.leap:.2g} times their radius "
+            f"bodies without contact spheres moved up to {leap:.2g} times their radius "
             f"between two samples: whether they passed through each other was not seen",
         )
 
-    def _place(self, finding):
+    def _position_of(self, finding):
         if finding.unit == "body":
             return tuple(self.model.centre[finding.where].tolist())
         corners = self.model.topology.vertices[finding.where]

@@ -44,7 +44,7 @@ class Readings:
     def _push(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
         """Force and moment of every pair's contacts on its first and on its second body."""
         for a in range(self.contacts.store.near_count[None]):
-            found = self.advance.touch_now(self.contacts.store.near_slot[a])
+            found = self.advance.forces_now(self.contacts.store.near_slot[a])
             for k in ti.static(range(3)):
                 table[a, k], table[a, 3 + k] = -found.force[k], found.moment_i[k]
                 table[a, 6 + k], table[a, 9 + k] = found.force[k], found.moment_j[k]
@@ -119,7 +119,7 @@ class Readings:
         for a in range(self.contacts.store.near_count[None]):
             p = self.contacts.store.near_slot[a]
             table[a, 0] = self.contacts.pair_energy(p)
-            found, half = self.advance.touch_now(p), self.half_step.pair_step(p)
+            found, half = self.advance.forces_now(p), self.half_step.pair_step(p)
             heat = self.contacts.store.heat[p] + half * vec3(found.dragged, found.rubbed, 0.0)
             for k in ti.static(range(3)):
                 table[a, 1 + k] = heat[k]
@@ -164,14 +164,29 @@ class Readings:
                 marks[b] = ti.cast(self.advance.bond_opening(b)[0] < 0.0, ti.i32)
 
     @ti.kernel
-    def acted(self, marks: ti.types.ndarray(dtype=ti.i32, ndim=2)):
+    def active_bonds(self, marks: ti.types.ndarray(dtype=ti.i32, ndim=2)):
         """Mark bonds of which a unit has softened, and of which one has slipped."""
         for b in range(self.tables.bond_count[None]):
             for u in range(3 * b, 3 * b + 3):
-                if ti.static(hasattr(self.tables.tension, "acted")):
-                    marks[b, 0] |= self.tables.tension.acted(b, u)
-                if ti.static(hasattr(self.tables.shear, "acted")):
-                    marks[b, 1] |= self.tables.shear.acted(b, u)
+                if ti.static(hasattr(self.tables.tension, "is_active")):
+                    marks[b, 0] = marks[b, 0] | self.tables.tension.is_active(b, u)
+                if ti.static(hasattr(self.tables.shear, "is_active")):
+                    marks[b, 1] = marks[b, 1] | self.tables.shear.is_active(b, u)
+
+    @ti.kernel
+    def residual_slip(self, slip: ti.types.ndarray(dtype=ti.f64, ndim=1)):
+        """Largest residual slip [m] of the units of every bond that holds.
+
+        Zero for released bonds, and for shear laws that keep none.
+        """
+        for b in range(self.tables.bond_count[None]):
+            largest = 0.0
+            if ti.static(self.tables.shear.remembers_slip):
+                if self.state.broken_tick[b] < 0:
+                    for q in range(3):
+                        found = self.tables.shear.residual_slip(3 * b + q).norm()
+                        largest = ti.max(largest, found)
+            slip[b] = largest
 
     @ti.kernel
     def damage(self, damage: ti.types.ndarray(dtype=ti.f64, ndim=1)):

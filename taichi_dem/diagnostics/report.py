@@ -30,8 +30,9 @@ class Report:
     effect that was left out and needed. unresolved: sentences about bonds and contacts for which
     the step was too long. bound_by: number of bodies at the end by the criterion that bounds their
     step, see ``step_control.CRITERIA``. round_off_J: energies below this may be round-off
-    (``DivergenceCheck.round_off``). measured_speedup: CPU time of one step for all over that of the
-    run, where it was measured.
+    (``DivergenceCheck.round_off``). bond_slip: the ``bond_slip.BondSlip`` of the bond that slipped
+    farthest, empty where none slipped. measured_speedup: CPU time of one step for all over that of
+    the run, where it was measured.
     """
 
     method: str
@@ -63,6 +64,7 @@ class Report:
     unconverged_steps: int = 0
     worst_residual: float = 0.0
     interpenetration: Optional[Interpenetration] = None
+    bond_slip: tuple = ()
     measured_speedup: Optional[float] = None
 
     def __repr__(self):
@@ -77,8 +79,10 @@ class Report:
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """Sentences about effects that were missed, and about a step that was too long."""
-        return (*(str(missing) for missing in self.missing_effects), *self.unresolved)
+        """Sentences about effects that were missed, slip of bonds, and a step that was too long."""
+        slipped = (str(slip) for slip in self.bond_slip if slip.excessive)
+        missing = (str(missing) for missing in self.missing_effects)
+        return (*missing, *slipped, *self.unresolved)
 
     @property
     def contact_evaluations(self) -> int:
@@ -167,6 +171,7 @@ class Report:
                 f"{self.bond_evaluations:,} bonds, {self.pair_evaluations:,} pairs, "
                 f"{self.body_updates:,} bodies",
             ),
+            *(("largest bond slip", slip.figure) for slip in self.bond_slip),
             *self._gain_row(),
             *self._sweeps_row(),
             ("contact searches", f"{self.searches:,}"),

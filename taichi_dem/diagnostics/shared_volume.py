@@ -12,7 +12,7 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem.kit.types import vec3, vec4
-from taichi_dem.mesh.tetrahedra import components
+from taichi_dem.mesh.tetrahedra import components, points_of_parts
 from taichi_dem.scene import REMEDY
 from taichi_dem.timeline import NEVER
 
@@ -29,8 +29,6 @@ MOVED = 0.25
 #: Halvings of a body's edges, for a first look and for the figure: each part stands for its volume
 #: by a point.
 _HALVINGS = 2, 3
-#: Powers of the root of x^4 = x + 1, of which multiples fill the unit cube evenly.
-_SPREAD = 1.2207440846057596 ** -np.arange(1.0, 4.0)
 
 
 @dataclass(frozen=True)
@@ -60,17 +58,17 @@ class SharedVolume:
     """Finds bodies within each other, at recording times after which some body has moved.
 
     worst: the ``Interpenetration`` so far. Of the last look: pairs (n, 2) and their share (n,),
-    near (m, 2) all pairs that no plane of a face parts, those that share most first.
+    near_pairs (m, 2) all pairs that no plane of a face parts, those that share most first.
     """
 
     def __init__(self, model: "Model", state: "State"):
         self.model, self.state = model, state
         self.arms = model.mesh.points[model.mesh.tetrahedra] - model.centre[:, None]
-        self.points = [_points(halvings) for halvings in _HALVINGS]
+        self.points = [points_of_parts(halvings) for halvings in _HALVINGS]
         self.worst = Interpenetration()
         self.seen = model.centre, np.tile(np.eye(3), (model.body_count, 1, 1))
         self.pairs, self.share = np.zeros((0, 2), dtype=np.int32), np.zeros(0)
-        self.near = self.pairs
+        self.near_pairs = self.pairs
 
     def sample(self, time_s: float, finished: bool = False) -> bool:
         """Compare the bodies where one has moved, or at the end; whether they were compared."""
@@ -169,7 +167,7 @@ class SharedVolume:
             found = np.zeros(len(left))
             _shares(own, np.ascontiguousarray(places[left]), volume, points, found)
             share[left] = found
-        self.near = near[np.argsort(-share, kind="stable")]
+        self.near_pairs = near[np.argsort(-share, kind="stable")]
         self.pairs, self.share = near[left], found
 
 
@@ -179,34 +177,6 @@ def _in_rows(corners):
     begin, end = corners[..., axis].min(axis=1), corners[..., axis].max(axis=1)
     order = np.argsort(begin, kind="stable")
     return order, np.searchsorted(begin[order], end[order]).astype(np.int32)
-
-
-def _points(halvings):
-    """A point in each of the equal parts of a tetrahedron, as shares of its corners, (parts, 4).
-
-    Their middles would lie in layers along every face, and a body that is pressed in by less than
-    a layer would hold none: Roberts's sequence spreads the points over their parts.
-    """
-    parts = [np.eye(4)]
-    for _ in range(halvings):
-        parts = [piece for whole in parts for piece in _eighths(whole)]
-    cuts = np.sort(np.arange(1, len(parts) + 1)[:, None] * _SPREAD % 1.0, axis=1)
-    shares = np.diff(cuts, axis=1, prepend=0.0, append=1.0)
-    return np.einsum("pc,pck->pk", shares, np.array(parts))
-
-
-def _eighths(corners):
-    """Eight parts of equal volume: one at each corner and four around an inner diagonal."""
-    middle = {(a, b): 0.5 * (corners[a] + corners[b]) for a in range(4) for b in range(a)}
-
-    def between(a, b):
-        return middle[max(a, b), min(a, b)]
-
-    for a in range(4):
-        yield np.array([corners[a] if b == a else between(a, b) for b in range(4)])
-    ring = [between(0, 2), between(0, 3), between(1, 3), between(1, 2)]
-    for k in range(4):
-        yield np.array([between(0, 1), between(2, 3), ring[k], ring[(k + 1) % 4]])
 
 
 @ti.kernel

@@ -5,6 +5,7 @@ from taichi_dem.effects.friction import Friction
 from taichi_dem.effects.gas_pressure import GasPressure
 from taichi_dem.effects.gravity import Gravity
 from taichi_dem.effects.shear_slip import ShearSlip
+from taichi_dem.effects.slip_weakening import SlipWeakening
 from taichi_dem.effects.softening import Softening
 from taichi_dem.effects.sphere_contact import SphereContact
 from taichi_dem.effects.sticking_friction import StickingFriction
@@ -19,6 +20,7 @@ __all__ = [
     "PrescribedMotion",
     "Roller",
     "ShearSlip",
+    "SlipWeakening",
     "Softening",
     "SphereContact",
     "StickingFriction",

@@ -79,7 +79,7 @@ class Softening(Effect):
         return ti.cast(self.unit[u][0] >= self.law[1], ti.i32)
 
     @ti.func
-    def acted(self, b, u):
+    def is_active(self, b, u):
         """1 for a unit that has been opened beyond its elastic limit, else 0."""
         return ti.cast(self.unit[u][0] > self._onset(b), ti.i32)
 

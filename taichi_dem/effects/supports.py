@@ -9,7 +9,9 @@ import taichi as ti
 
 from taichi_dem.effects.base import Effect, Travel, along
 from taichi_dem.kit.allocation import assign
+from taichi_dem.kit.elementary import sine_and_cosine
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.fixed_order import length
 from taichi_dem.kit.types import vec3
 from taichi_dem.kit.validation import direction, positive, shown, word
 from taichi_dem.materials import Material
@@ -75,9 +77,9 @@ class Roller(_Support):
     def __init__(self, group: str, normal: Sequence[float]):
         super().__init__(group)
         numbers = np.array(direction("normal", normal))
-        if not np.linalg.norm(numbers) > 0.0:
+        if not length(numbers) > 0.0:
             raise InputError(f"normal must be longer than zero, got {shown(normal)}")
-        self._normal = numbers / np.linalg.norm(numbers)
+        self._normal = numbers / length(numbers)
 
     def numbers(self, material: Material) -> tuple[float, ...]:
         """Unit normal, three components."""
@@ -123,4 +125,5 @@ class PrescribedMotion(_Support):
     def held(self, i, t, rotation, velocity, angular_momentum):
         """The prescribed velocity at time t [s] and no spin."""
         amplitude = vec3(self.law[0], self.law[1], self.law[2])
-        return amplitude * ti.cos(self.law[3] * t), zero3()
+        _, swing = sine_and_cosine(self.law[3] * t)
+        return amplitude * swing, zero3()

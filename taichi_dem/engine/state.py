@@ -16,11 +16,6 @@ from taichi_dem.physics.fracture import coulomb_limit
 from taichi_dem.physics.rotation import rotation_matrix, spin_of
 from taichi_dem.timeline import NEVER
 
-#: Bits of ``State.acted`` beside those of loads and supports: of sphere contact and its friction.
-CONTACT, RUBBED = 1 << 61, 1 << 60
-#: Loads and supports of a scene that have a bit of their own.
-MOST_COUNTED = 60
-
 
 def unserved_limits(model: Model) -> tuple[float, float, float]:
     """Tensile strength, cohesion [Pa] and friction that no effect of a model serves, else inf."""
@@ -51,10 +46,10 @@ class State:
     load_work: work [J], one component a load and a last one for supports; load_impulse: total
     impulse of all of them on a body (linear, and angular about the origin). tick: present time.
     bad_body: lowest body out of bounds, body_count if none.
-    acted: bits of each body: of the loads and then the supports that changed its motion, CONTACT
-    and RUBBED. limits: tensile strength, cohesion [Pa] and friction coefficient whose excess in a
-    bond is noted, without bound where an effect serves them; passed: ticks at which a bond first
-    exceeded its tensile and its shear limit, NEVER before.
+    active_effects: bits of each body: of the loads and then the supports that changed its motion,
+    CONTACT and RUBBED. limits: tensile strength, cohesion [Pa] and friction coefficient whose
+    excess in a bond is noted, without bound where an effect serves them; passed: ticks at which a
+    bond first exceeded its tensile and its shear limit, NEVER before.
     """
 
     def __init__(self, tables: Tables):
@@ -77,7 +72,7 @@ class State:
             self.exposed_tick = ti.field(ti.i64, shape=tables.capacity.faces)
             self.contact_heat = ti.Vector.field(3, real, shape=n)
             self.injected_tick = ti.field(ti.i64, shape=())
-        self.acted = ti.field(ti.i64, shape=n)
+        self.active_effects = ti.field(ti.i64, shape=n)
         self.limits = ti.Vector.field(3, real, shape=())
         self.passed = ti.Vector.field(2, ti.i64, shape=bonds)
         self.load_work = ti.Vector.field(len(tables.loads) + 1, real, shape=n)
@@ -118,11 +113,11 @@ class State:
         self._write_motion(*(np.ascontiguousarray(part, dtype=np.float64) for part in shaped))
 
     @ti.func
-    def note_acted(self, i, bits):
+    def note_active(self, i, bits):
         """Note that effects, given as bits, have changed the motion of body i."""
         # Seldom news: a comparison spares the atomic operation, which parallel pairs need.
-        if self.acted[i] & bits != bits:
-            ti.atomic_or(self.acted[i], bits)
+        if self.active_effects[i] & bits != bits:
+            ti.atomic_or(self.active_effects[i], bits)
 
     @ti.func
     def note_passed(self, b, pull, shear2):

@@ -2,6 +2,10 @@
 
 import taichi as ti
 
+#: Bits of ``State.active_effects`` beside those of loads and supports: of sphere contact and of its
+#: friction.
+CONTACT, RUBBED = 1 << 61, 1 << 60
+
 
 @ti.func
 def normal_force(stiffness, damping, overlap, opening_rate):
@@ -79,3 +83,14 @@ def meeting(first, reach, apart, rotation):
     normal = rotation @ apart / distance
     arm = rotation @ first.xyz + (first[3] - 0.5 * overlap) * normal
     return Meeting(overlap=overlap, normal=normal, arm=arm)
+
+
+@ti.func
+def active_bits(push, rub):
+    """CONTACT for a repulsion that is not zero, with RUBBED for such friction; both of one unit."""
+    active = ti.i64(0)
+    if push > 0.0:
+        active = ti.i64(CONTACT)
+        if rub.norm_sqr() > 0.0:
+            active = ti.i64(CONTACT | RUBBED)
+    return active

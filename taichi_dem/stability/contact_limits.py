@@ -47,7 +47,10 @@ def largest_eigenvalue(a, b, c):
         for _ in range(SQUARINGS):
             across = b.transpose()
             a, b, c = a @ a + across @ b, b @ a + c @ b, b @ across + c @ c
-        bound = scale * ti.pow(a.trace() + c.trace(), 0.5**SQUARINGS)
+        root = a.trace() + c.trace()
+        for _ in range(SQUARINGS):
+            root = ti.sqrt(root)
+        bound = scale * root
     return bound
 
 

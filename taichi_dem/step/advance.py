@@ -55,6 +55,7 @@ class Advance(ContactForce):
         self.limits, self.retimes = schedule.limits, schedule.retimes
         self.has_limits = schedule.has_limits
         self.limited = self.has_limits and schedule.limits.limited
+        self.shear_releases = tables.shear.releases
         self.has_heat = self.has_dashpot or bool(tables.shear.name)
 
     @ti.func
@@ -91,6 +92,8 @@ class Advance(ContactForce):
                 torque += arm.cross(traction)
                 slipped += spent
                 failed |= self.tables.tension.failed(u)
+                if ti.static(self.shear_releases):
+                    failed |= self.tables.shear.failed(u, -pull)
             dt = self._bond_step(b, slots[0] >> 2, slots[1] >> 2)
             area = self.tables.unit_area[b]
             if failed == 0:
@@ -324,7 +327,7 @@ class Advance(ContactForce):
         return self.schedule.seconds(self.state.tick[None]) - elapsed
 
     def _support_bit(self, effect):
-        """Bit of a support in ``State.acted``."""
+        """Bit of a support in ``State.active_effects``."""
         return 1 << len(self.tables.loads) + self.tables.supports.index(effect)
 
     @ti.func
@@ -335,7 +338,7 @@ class Advance(ContactForce):
                 push = vec3(kick[e, 0], kick[e, 1], kick[e, 2])
                 twist = vec3(kick[e, 3], kick[e, 4], kick[e, 5])
                 if push.norm_sqr() + twist.norm_sqr() > 0.0:
-                    self.state.note_acted(i, ti.i64(1 << e))
+                    self.state.note_active(i, ti.i64(1 << e))
                 work = push.dot(velocity) + twist.dot(self.spin(i, momentum))
                 self._book(i, e, work, push, twist)
 
@@ -362,7 +365,7 @@ class Advance(ContactForce):
                 )
                 held = 1
                 if (velocity - before).norm_sqr() + (momentum - spun).norm_sqr() > 0.0:
-                    self.state.note_acted(i, ti.i64(ti.static(self._support_bit(effect))))
+                    self.state.note_active(i, ti.i64(ti.static(self._support_bit(effect))))
         mean = 0.5 * (self.state.velocity[i] + velocity)
         mean_momentum = 0.5 * (self.state.angular_momentum[i] + momentum)
         self._book_loads(i, kick, mean, mean_momentum)

@@ -2,21 +2,20 @@
 
 import taichi as ti
 
-from taichi_dem.engine.state import CONTACT, RUBBED
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.physics.rotation import zero3
-from taichi_dem.physics.sphere_pair import add_within, meeting
+from taichi_dem.physics.sphere_pair import active_bits, add_within, meeting
 from taichi_dem.stability.body_limits import HIT
 
 
 @ti.dataclass
-class Touch:
+class PairForces:
     """Forces between two bodies in contact, in world axes.
 
     force: on the second [N]. moment_i, moment_j: about the centre of each [N m]. dragged, rubbed:
     power that dashpots and friction take [W]. slipped: energy of springs that slipped or parted
-    [J]. deepest: largest overlap over the sum of the radii. near: spheres within a margin. acted:
-    CONTACT and RUBBED, where spheres push and rub.
+    [J]. deepest: largest overlap over the sum of the radii. near_count: spheres within a margin.
+    active: CONTACT and RUBBED, where spheres push and rub.
     """
 
     force: vec3
@@ -26,19 +25,8 @@ class Touch:
     rubbed: real
     slipped: real
     deepest: real
-    near: ti.i32
-    acted: ti.i64
-
-
-@ti.func
-def acts(push, rub):
-    """CONTACT for a repulsion that is not zero, with RUBBED for such friction; both of one unit."""
-    acted = ti.i64(0)
-    if push > 0.0:
-        acted = ti.i64(CONTACT)
-        if rub.norm_sqr() > 0.0:
-            acted = ti.i64(CONTACT | RUBBED)
-    return acted
+    near_count: ti.i32
+    active: ti.i64
 
 
 @ti.data_oriented
@@ -55,10 +43,10 @@ class ContactForce:
             elapsed = self.springs.elapsed(p)
         if ti.static(self.has_limits):
             margin = self.limits.contact_limits.margin(i, j)
-        found = self.touch(p, elapsed, margin, True)
-        if found.acted != 0:
-            self.state.note_acted(i, found.acted)
-            self.state.note_acted(j, found.acted)
+        found = self.forces_of(p, elapsed, margin, True)
+        if found.active != 0:
+            self.state.note_active(i, found.active)
+            self.state.note_active(j, found.active)
         if found.deepest > 0.0:
             dt = self._pair_step(p, i, j)
             self.contacts.add_impulse(p, 0, -found.force * dt, found.moment_i * dt)
@@ -69,16 +57,16 @@ class ContactForce:
             self.contacts.book_friction(p, found.slipped)
         self.contacts.store.deepest[p] = found.deepest
         if ti.static(self.has_limits):
-            self.limits.notice_pair(p, found.near, HIT)
+            self.limits.notice_pair(p, found.near_count, HIT)
 
     @ti.func
-    def touch_now(self, p):
-        """Forces of a pair's contacts at the present time, a ``Touch``; nothing changes."""
-        return self.touch(p, 0.0, 0.0, False)
+    def forces_now(self, p):
+        """Forces of a pair's contacts at the present time, a ``PairForces``; nothing changes."""
+        return self.forces_of(p, 0.0, 0.0, False)
 
     @ti.func
-    def touch(self, p, elapsed, margin, stepping: ti.template()):
-        """Forces of a pair's sphere contacts now, a ``Touch``.
+    def forces_of(self, p, elapsed, margin, stepping: ti.template()):
+        """Forces of a pair's sphere contacts now, a ``PairForces``.
 
         elapsed: since springs between spheres were followed [s]. margin: gap up to which spheres
         count as near [m]. stepping: whether springs follow and slip; else they stay as they are.
@@ -91,7 +79,7 @@ class ContactForce:
         turn, offset = back @ self.state.rotation[j], back @ branch
         force, moment_i, moment_j = zero3(), zero3(), zero3()
         dragged, rubbed, slipped, deepest = 0.0, 0.0, 0.0, 0.0
-        scale, near, acted = 1.0, 0, ti.i64(0)
+        scale, near, active = 1.0, 0, ti.i64(0)
         if ti.static(self.limited):
             scale = self.contact_share(i, j)
         for k in range(self.contacts.store.first[p], self.contacts.store.last[p]):
@@ -111,7 +99,7 @@ class ContactForce:
                 drag = self._limited(self.contacts.law.damping(), scale)
                 rub, stuck, spent = self._rub(k, i, normal, push, drag, slide, elapsed, stepping)
                 pushed = push * normal + rub
-                acted |= acts(push, rub)
+                active |= active_bits(push, rub)
                 force += pushed
                 moment_i -= arm.cross(pushed)
                 moment_j += (arm - branch).cross(pushed)
@@ -121,7 +109,7 @@ class ContactForce:
                 deepest = ti.max(deepest, overlap / reach)
             elif ti.static(stepping):
                 slipped += self.springs.part(k)
-        return Touch(
+        return PairForces(
             force=force,
             moment_i=moment_i,
             moment_j=moment_j,
@@ -129,8 +117,8 @@ class ContactForce:
             rubbed=rubbed,
             slipped=slipped,
             deepest=deepest,
-            near=near,
-            acted=acted,
+            near_count=near,
+            active=active,
         )
 
     @ti.func

@@ -103,7 +103,8 @@ class HalfStep:
             turning = self.advance.spin(i, 0.5 * (spun + momentum))
             for e in ti.static(range(len(self.tables.loads))):
                 for k in ti.static(range(3)):
-                    account[e] += kick[e, k] * mean[k] + kick[e, 3 + k] * turning[k]
+                    work = kick[e, k] * mean[k] + kick[e, 3 + k] * turning[k]
+                    account[e] = account[e] + work
             if ti.static(len(self.tables.supports) > 0):
                 push = self.tables.mass[i] * (velocity - free)
                 work = push.dot(mean) + (momentum - loose).dot(turning)

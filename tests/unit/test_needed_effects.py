@@ -19,9 +19,9 @@ from taichi_dem import (
 from taichi_dem.diagnostics.effect_activity import effect_activity
 from taichi_dem.diagnostics.energy_balance import TERMS
 from taichi_dem.engine.model import Model
-from taichi_dem.engine.state import CONTACT, RUBBED
 from taichi_dem.kit.effect_usage import Advice, EffectUse
 from taichi_dem.mesh.shapes import bar, pair
+from taichi_dem.physics.sphere_pair import CONTACT, RUBBED
 
 #: Far below the strength of concrete: a block of some 1 kg that falls from rest for 1e-5 s.
 STEP, UNTIL = 1e-7, 1e-5
@@ -102,18 +102,18 @@ def column(values):
 def used(listed, bits=0, marked=0, heat=0.0, mesh=None, works=None, **account):
     """What is said of effects whose account holds these terms [J]; every effect by its name.
 
-    bits: of ``State.acted``, of the first body. marked: bonds softened and slipped. heat: in each
-    bond [J]. works: of the supports, by body [J].
+    bits: of ``State.active_effects``, of the first body. marked: bonds softened and slipped.
+    heat: in each bond [J]. works: of the supports, by body [J].
     """
     model = Model(mesh or pair(), CONCRETE, listed)
-    acted = np.zeros(model.body_count, dtype=np.int64)
-    acted[0] = bits
-    state = SimpleNamespace(acted=column(acted), position=column(model.centre))
+    active = np.zeros(model.body_count, dtype=np.int64)
+    active[0] = bits
+    state = SimpleNamespace(active_effects=column(active), position=column(model.centre))
     tables = np.zeros((model.body_count, 6)), np.full((model.bond_count, 5), heat), None
     balance = SimpleNamespace(state=state, start_energy=0.0)
     balance.support_works = lambda index: works
     balance.load_works = lambda index: np.zeros(model.body_count)
-    readings = SimpleNamespace(acted=lambda marks: marks[: min(1, marked)].fill(1))
+    readings = SimpleNamespace(active_bonds=lambda marks: marks[: min(1, marked)].fill(1))
     filled = {**dict.fromkeys(TERMS, 0.0), **account}
     return {u.effect: u for u in effect_activity(model, balance, readings, tables, filled, 100)}
 

@@ -6,8 +6,9 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection
 
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, checked_mesh, effects
-from taichi_dem.diagnostics.shared_volume import DEEP, NOTABLE, SharedVolume, _eighths, _points
+from taichi_dem.diagnostics.shared_volume import DEEP, NOTABLE, SharedVolume
 from taichi_dem.mesh.shapes import bar, pair, single
+from taichi_dem.mesh.tetrahedra import eighths, points_of_parts
 from tests.scenes import apart, beside, quaternions
 
 EDGE = 1.0
@@ -54,13 +55,13 @@ def parts_of_body():
     """Corners of the 512 equal parts as shares of the body's corners, (512, 4, 4)."""
     parts = [np.eye(4)]
     for _ in range(3):
-        parts = [piece for whole in parts for piece in _eighths(whole)]
+        parts = [piece for whole in parts for piece in eighths(whole)]
     return np.array(parts)
 
 
 def test_parts_fill_a_body_and_each_holds_one_point():
     """Of equal volume; a random point of the body lies in exactly one of them."""
-    parts, points = parts_of_body(), _points(3)
+    parts, points = parts_of_body(), points_of_parts(3)
     assert len(parts) == len(points) == PARTS and (points > 0.0).all()
     np.testing.assert_allclose(np.abs(np.linalg.det(parts)), 1.0 / PARTS, rtol=1e-12)
     within = np.einsum("pk,pkc->pc", points, np.linalg.inv(parts))
@@ -91,7 +92,7 @@ def test_shares_are_those_of_the_intersections_of_all_pairs(seed):
     found = heap.shares(position, turn)
     corners = position[:, None] + np.einsum("nij,ncj->nci", rotation, heap.volume.arms)
     whole = heap.model.body_mass[0] / CONCRETE.density
-    near = set(map(tuple, heap.volume.near.tolist()))
+    near = set(map(tuple, heap.volume.near_pairs.tolist()))
     missed, cuts = 0.0, 0
     for i in range(count):
         for j in range(i + 1, count):

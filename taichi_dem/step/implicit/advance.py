@@ -42,9 +42,9 @@ class SolvedAdvance(Advance):
         self.schedule.choose_level(i, velocity.norm_sqr())
 
     @ti.func
-    def touch_now(self, p):
-        """Forces of a pair's contacts in the last step, a ``Touch``."""
-        return self.solver.pairs.last_touch(p)
+    def forces_now(self, p):
+        """Forces of a pair's contacts in the last step, a ``PairForces``."""
+        return self.solver.pairs.last_forces(p)
 
     @ti.func
     def allowed(self, i, velocity, momentum):

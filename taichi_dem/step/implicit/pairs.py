@@ -8,8 +8,8 @@ from taichi_dem.contact_search.cell_grid import group
 from taichi_dem.contact_search.contacts import Contacts
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.physics.rotation import unit3, zero3
-from taichi_dem.physics.sphere_pair import add_within, cut_to, meeting
-from taichi_dem.step.contact_force import Touch, acts
+from taichi_dem.physics.sphere_pair import active_bits, add_within, cut_to, meeting
+from taichi_dem.step.contact_force import PairForces
 from taichi_dem.step.implicit.velocities import Velocities
 from taichi_dem.step.tangential_springs import TangentialSprings
 
@@ -260,27 +260,27 @@ class PairDashpots:
             linear = 0.5 * (after + before)
             angular = 0.5 * (turned + self.state.spin[j] - spin)
             start = self.store.first[p]
-            dragged, rubbed, acted = 0.0, 0.0, ti.i64(0)
+            dragged, rubbed, active = 0.0, 0.0, ti.i64(0)
             for c in range(start, start + self.touching[p]):
                 velocity, normal = linear + angular.cross(self.arm[c]), self.normal[c]
                 impulse = self._answer(c, after + turned.cross(self.arm[c]), damping)
                 pressed, rate = impulse.dot(normal), velocity.dot(normal)
                 dragged += (ti.max(self.push[c], 0.0) - pressed) * rate
                 rub = impulse - pressed * normal
-                acted |= acts(pressed, rub)
+                active |= active_bits(pressed, rub)
                 if ti.static(self.springs.present):
                     stuck, spent = self._slip(p, c, i, j, pressed)
                     rub -= stuck
                     rubbed += spent
                 rubbed -= rub.dot(velocity)
-            if acted != 0:
-                self.state.note_acted(i, acted)
-                self.state.note_acted(j, acted)
+            if active != 0:
+                self.state.note_active(i, active)
+                self.state.note_active(j, active)
             self.store.heat[p] = self.store.heat[p] + vec3(dragged, rubbed, 0.0)
 
     @ti.func
-    def last_touch(self, p):
-        """Mean forces of the last step, at the spheres' present places, a ``Touch``."""
+    def last_forces(self, p):
+        """Mean forces of the last step, at the spheres' present places, a ``PairForces``."""
         pair, dt = self.store.body[p], self.schedule.step_seconds[0]
         i, j = pair[0], pair[1]
         back = self.state.rotation[i].transpose()
@@ -306,7 +306,7 @@ class PairDashpots:
             if ti.static(self.springs.present):
                 rub -= self.springs.force(k, self.state.rotation[i])
             rubbed -= rub.dot(velocity)
-        return Touch(
+        return PairForces(
             force=force,
             moment_i=moment_i,
             moment_j=moment_j,
@@ -314,8 +314,8 @@ class PairDashpots:
             rubbed=rubbed,
             slipped=0.0,
             deepest=0.0,
-            near=0,
-            acted=0,
+            near_count=0,
+            active=0,
         )
 
     @ti.func

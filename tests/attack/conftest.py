@@ -1,6 +1,0 @@
-"""Stub."""
-
-
-def pytest_generate_tests(metafunc):
-    if "seed" in metafunc.fixturenames:
-        metafunc.parametrize("seed", [0, 1])
