@@ -104,11 +104,15 @@ def unserved(model: "Model") -> dict[str, MissingEffect]:
         "bodies": "contact" not in roles,
         "bare": "contact" in roles and not model.contact.outer_faces,
     }
-    return {
+    found = {
         name: MissingEffect(effect, what, unit=unit)
         for name, (effect, what, unit) in _NEEDS.items()
         if listed[name]
     }
+    if "friction" in found and material.contact_damping == 0.0:
+        # Friction is a dashpot's force up to a limit: without a dashpot springs alone hold.
+        found["friction"].effect = "StickingFriction"
+    return found
 
 
 class MissingEffects:
