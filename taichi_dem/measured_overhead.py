@@ -66,12 +66,11 @@ class ByHand(Advance):
         if self.state.broken_tick[b] < 0:
             slots = self.tables.bond_slots[b]
             motion = self._motion(b, slots)
-            force, torque = zero3(), zero3()
+            k, force, torque = self.tables.bond_stiffness[b], zero3(), zero3()
             for q in range(3):
                 u = 3 * b + q
                 arm = unit_arm(motion, self.tables.vertex_slave[u])
                 opening = unit_opening(motion, arm, self.tables.vertex_master[u])
-                k = self.tables.bond_stiffness[b]
                 traction = vec3(k[0] * opening[0], k[1] * opening[1], k[1] * opening[2])
                 # What would have acted is watched in every scene.
                 shear = vec2(traction[1], traction[2])

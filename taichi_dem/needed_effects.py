@@ -72,7 +72,7 @@ def _role(result, name):
 
 def _difference(result, names):
     """Largest relative difference of a run without some effects; infinite where it fails."""
-    kept = [effect for effect in result.scene.effects if effect.name not in names]
+    kept = _without(result.scene.effects, names)
     try:
         scene = replace(result.scene, effects=kept)
         simulation = Simulation(scene, result.method, result.report.driver.split("+")[0])
@@ -86,33 +86,65 @@ def _difference(result, names):
     return recorded_difference(result, again)
 
 
+def _without(effects, names):
+    """Effects of a list without those of some names; silent friction goes with its contact."""
+    kept = [effect for effect in effects if effect.name not in names]
+    if any(effect.role == "contact" for effect in kept):
+        return kept
+    return [effect for effect in kept if effect.name or effect.role != "friction"]
+
+
 def recorded_difference(first: Result, second: Result) -> float:
     """Largest difference of all columns, speeds and times of fracture of two runs.
 
-    A share of the largest value of each; of energies, of the largest of all of them. Infinite where
-    other bonds broke, or columns have other lengths.
+    A share of the largest value of each; of energies, of the largest of all of them; zero where
+    rounding explains it. Infinite where columns have other lengths.
     """
-    pairs = [(first.peak_speed, second.peak_speed), (_broken(first), _broken(second))]
     joules = [name for name in first.history if name.endswith("_J") and name != "residual_J"]
     energy = max((np.abs(first.history[name]).max(initial=0.0) for name in joules), default=0.0)
-    energy = max(energy, first.report.round_off_J / ROUNDING)
-    found = [_apart(*pair) for pair in pairs]
+    rounding = _rounding(first)
+    found = [
+        _apart(first.peak_speed, second.peak_speed, rounding["_m_s"]),
+        _broken_apart(first.broken_time, second.broken_time),
+    ]
     for name in first.history:
-        other = second.history.get(name)
         if name != "residual_J":
-            found.append(_apart(first.history[name], other, energy if name in joules else None))
+            unexplained = next((rounding[unit] for unit in rounding if name.endswith(unit)), 0.0)
+            columns = first.history[name], second.history.get(name)
+            found.append(_apart(*columns, unexplained, energy if name in joules else None))
     return float(max(found, default=0.0))
 
 
-def _broken(result):
-    """Times of fracture [s], -1 for bonds that hold."""
-    return np.where(np.isnan(result.broken_time), -1.0, result.broken_time)
+def _rounding(result):
+    """Differences that rounding alone explains, by the unit at the end of a column's name.
+
+    The energy that rounding may have put into the bonds moves the lightest body at most so fast,
+    and over the run so far.
+    """
+    energy = result.report.round_off_J
+    speed = float(np.sqrt(2.0 * energy / result.model.body_mass.min()))
+    return {"_J": energy, "_m_s": speed, "_mm": 1e3 * speed * result.report.until_s}
 
 
-def _apart(one: np.ndarray, other: Optional[np.ndarray], scale: Optional[float] = None) -> float:
-    """Largest difference of two arrays, over the largest value of the first or a given scale."""
+def _broken_apart(one: np.ndarray, other: np.ndarray) -> float:
+    """Largest difference of times of fracture [s], over the latest; NaN for bonds that hold."""
+    if not np.array_equal(np.isnan(one), np.isnan(other)):
+        return np.inf
+    return _apart(np.nan_to_num(one), np.nan_to_num(other))
+
+
+def _apart(
+    one: np.ndarray,
+    other: Optional[np.ndarray],
+    rounding: float = 0.0,
+    scale: Optional[float] = None,
+) -> float:
+    """Largest difference of two arrays, over the largest value of the first or a given scale.
+
+    Zero up to the difference that rounding explains.
+    """
     if other is None or np.shape(one) != np.shape(other):
         return np.inf
     largest = np.abs(one).max(initial=0.0) if scale is None else scale
     apart = np.abs(np.asarray(one, dtype=np.float64) - other).max(initial=0.0)
-    return 0.0 if apart == 0.0 else float(apart / max(largest, 1e-300))
+    return 0.0 if apart <= rounding else float(apart / max(largest, 1e-300))

@@ -356,7 +356,7 @@ class Simulation(Uncopied):
             effect_activity=effect_activity(
                 self.model, self.energy_balance, self.readings, tables, account, counts[0]
             ),
-            missing_effects=self.missing_effects.findings(),
+            missing_effects=self.missing_effects.findings(shared_volume),
             unresolved=(
                 *self.step_resolution.findings(),
                 *self.missing_effects.unseen(),

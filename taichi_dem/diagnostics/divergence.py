@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 
 #: Unexplained energy beyond which a run counts as diverged, as a share of the energy present.
 ENERGY_FROM_NOWHERE = 0.5
-#: Overlap of two contact spheres beyond recovery, as a share of the distance at which they touch:
 #: Share of the smaller body at which two bodies, whose faces all carry spheres, count as one
 #: within the other.
 DEEPEST_SHARE = 0.5
+#: Overlap of two contact spheres beyond recovery, as a share of the distance at which they touch:
 #: their centres are about to pass each other. A small sphere may be inside a large one.
 DEEPEST_OVERLAP = 0.95
 #: Share of the time that a hurried check may take: it reads every bond, a tenth of a call of the

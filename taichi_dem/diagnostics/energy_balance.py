@@ -50,20 +50,23 @@ class EnergyBalance:
     ):
         self.model, self.state, self.readings, self.contacts = model, state, readings, contacts
         self.start_energy, self.start = 0.0, np.zeros(len(TERMS))
+        self.start_works = np.zeros((model.body_count, len(model.loads) + 1))
         first = self.account()
         self.start_energy = first["kinetic"] + first["bond_strain"] + first["sphere_strain"]
         # Half a step of what acts from the start is booked at time zero.
         self.start = np.array([0.0 if name in _HELD else first[name] for name in TERMS])
+        self.start_works = self._works()
         self.start_momentum = self.momentum()
 
     def saved(self) -> dict[str, np.ndarray]:
         """Data for a checkpoint, arrays by name."""
-        return {"start": np.array([self.start_energy, *self.start_momentum, *self.start])}
+        start = np.array([self.start_energy, *self.start_momentum, *self.start])
+        return {"start": start, "works": self.start_works.copy()}
 
     def resume(self, saved: Mapping[str, np.ndarray]) -> None:
         """Restore the data that ``saved`` returned."""
         self.start_energy, self.start_momentum = float(saved["start"][0]), saved["start"][1:7]
-        self.start = saved["start"][7:]
+        self.start, self.start_works = saved["start"][7:], saved["works"].copy()
 
     def account(self, tables: Optional[EnergyTables] = None) -> dict[str, float]:
         """All terms in J by name; residual is the unexplained remainder.
@@ -122,10 +125,10 @@ class EnergyBalance:
         return self._works()[:, index]
 
     def _works(self):
-        """Work of each load, and of all supports last, on every body [J]."""
-        works = np.zeros((self.model.body_count, len(self.model.loads) + 1))
+        """Work of each load, and of all supports last, on every body since the start [J]."""
+        works = np.zeros_like(self.start_works)
         self.readings.works(self.readings.pushes(), works)
-        return works
+        return works - self.start_works
 
     def support_works(self, index: int) -> np.ndarray:
         """Work [J] of all supports on the bodies that one of them holds, (body_count,).

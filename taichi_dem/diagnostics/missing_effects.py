@@ -104,11 +104,15 @@ def unserved(model: "Model") -> dict[str, MissingEffect]:
         "bodies": "contact" not in roles,
         "bare": "contact" in roles and not model.contact.outer_faces,
     }
-    return {
+    found = {
         name: MissingEffect(effect, what, unit=unit)
         for name, (effect, what, unit) in _NEEDS.items()
         if listed[name]
     }
+    if "friction" in found and material.contact_damping == 0.0:
+        # Friction is a dashpot's force up to a limit: without a dashpot springs alone hold.
+        found["friction"].effect = "StickingFriction"
+    return found
 
 
 class MissingEffects:
@@ -138,10 +142,8 @@ class MissingEffects:
             return
         self.last_s = time_s
         self.leap = max(self.leap, self.volume.way())
-        looked = self.volume.sample(time_s)
-        for name in {"bodies", "bare"} & set(self.needed):
-            if looked:
-                self.needed[name].see(self._overlapping(name == "bare"), time_s)
+        if self.volume.sample(time_s):
+            self._see_bodies(self.needed, self.volume, time_s)
         if self.model.bond_count and "contact" in self.needed:
             marks = np.zeros(self.model.bond_count, dtype=np.int32)
             self.readings.pressed(marks)
@@ -154,15 +156,21 @@ class MissingEffects:
             active = self.state.active_effects.to_numpy()[: self.model.body_count]
             self.needed["friction"].see(np.flatnonzero(active & CONTACT), time_s)
 
-    def _overlapping(self, bare):
+    def _see_bodies(self, needed, volume, time_s):
+        """Take in the bodies within each other of a look."""
+        for name in {"bodies", "bare"} & set(needed):
+            needed[name].see(self._overlapping(volume, name == "bare"), time_s)
+
+    def _overlapping(self, volume, bare):
         """First bodies of pairs near each other whose spheres would touch.
 
-        bare: whether only pairs count of which a touching sphere is on a bare outer face.
+        volume: what has looked for them. bare: whether only pairs count of which a touching sphere
+        is on a bare outer face.
         """
-        pairs = self.volume.near_pairs[:_MOST_PAIRS]
+        pairs = volume.near_pairs[:_MOST_PAIRS]
         if not len(pairs):
             return pairs[:, 0]
-        place, turn = self.volume.seen
+        place, turn = volume.seen
         spheres, top = self.spheres, self.model.topology
         broken = self.state.broken_tick.to_numpy()[: self.model.bond_count] != NEVER
         # Bond -1 stands for an outer face, which is as free as a broken one.
@@ -205,9 +213,13 @@ class MissingEffects:
         self.last_s, self.leap = saved["looks"].tolist()
         self.strain = saved["strain"].copy()
 
-    def findings(self) -> tuple[MissingEffect, ...]:
-        """A ``MissingEffect`` for each effect that would have acted; a tuple, empty for none."""
+    def findings(self, volume: SharedVolume) -> tuple[MissingEffect, ...]:
+        """A ``MissingEffect`` for each effect that would have acted; a tuple, empty for none.
+
+        volume: a look at the end, which also finds bodies that have moved by little.
+        """
         needed = {name: replace(finding) for name, finding in self.needed.items()}
+        self._see_bodies(needed, volume, int(self.state.tick[None]) * self.schedule.tick_seconds)
         ticks = self.state.passed.to_numpy()[: self.model.bond_count]
         for column, name in enumerate(("tension", "shear")):
             if name in needed:
@@ -229,10 +241,11 @@ class MissingEffects:
     def unseen(self) -> tuple[str, ...]:
         """A sentence where bodies may have passed through each other between two recordings."""
         open_roles = {"bodies", "bare"} & set(self.needed)
-        if not open_roles or self.leap <= _LEAP or self.volume.fragments() == 1:
+        leap = max(self.leap, self.volume.way())
+        if not open_roles or leap <= _LEAP or self.volume.fragments() == 1:
             return ()
         return (
-            f"bodies without contact spheres moved up to {self.leap:.2g} times their radius "
+            f"bodies without contact spheres moved up to {leap:.2g} times their radius "
             f"between two samples: whether they passed through each other was not seen",
         )
 

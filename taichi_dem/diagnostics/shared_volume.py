@@ -1,4 +1,4 @@
-"""Volume that bodies share: the measure of interpenetration, exact to one part in 512.
+"""Volume that bodies share: the measure of interpenetration, counted in 512 parts of a body.
 
 Bodies are rigid, so two of them that are not bonded may share volume only where nothing keeps them
 apart: no contact, faces without spheres, or contact that is too soft or too sparse.
@@ -12,7 +12,7 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem.kit.types import vec3, vec4
-from taichi_dem.mesh.tetrahedra import components
+from taichi_dem.mesh.tetrahedra import components, points_of_parts
 from taichi_dem.scene import REMEDY
 from taichi_dem.timeline import NEVER
 
@@ -27,7 +27,7 @@ NOTABLE = 0.25
 #: Way of a body, as a share of its radius, after which all are compared again.
 MOVED = 0.25
 #: Halvings of a body's edges, for a first look and for the figure: each part stands for its volume
-#: by its middle.
+#: by a point.
 _HALVINGS = 2, 3
 
 
@@ -58,13 +58,13 @@ class SharedVolume:
     """Finds bodies within each other, at recording times after which some body has moved.
 
     worst: the ``Interpenetration`` so far. Of the last look: pairs (n, 2) and their share (n,),
-    near_pairs (m, 2) all pairs that no plane of a face parts.
+    near_pairs (m, 2) all pairs that no plane of a face parts, those that share most first.
     """
 
     def __init__(self, model: "Model", state: "State"):
         self.model, self.state = model, state
         self.arms = model.mesh.points[model.mesh.tetrahedra] - model.centre[:, None]
-        self.middles = [_middles(halvings) for halvings in _HALVINGS]
+        self.points = [points_of_parts(halvings) for halvings in _HALVINGS]
         self.worst = Interpenetration()
         self.seen = model.centre, np.tile(np.eye(3), (model.body_count, 1, 1))
         self.pairs, self.share = np.zeros((0, 2), dtype=np.int32), np.zeros(0)
@@ -159,13 +159,16 @@ class SharedVolume:
         first = np.concatenate([[0], np.cumsum(count)[:-1]]).astype(np.int32)
         places = np.zeros((max(1, int(count.sum())), 2), dtype=np.int32)
         _near_pairs(*args, first, places, True)
-        self.near_pairs = np.sort(body[places[: int(count.sum())]], axis=1)
+        near = np.sort(body[places[: int(count.sum())]], axis=1)
         volume = np.ascontiguousarray(self.model.body_mass[body])
-        places, share = places[: int(count.sum())], np.ones(int(count.sum()))
-        for middles in self.middles:
-            places, share = places[share > 0.0], np.zeros((share > 0.0).sum())
-            _shares(own, np.ascontiguousarray(places), volume, middles, share)
-        self.pairs, self.share = np.sort(body[places], axis=1), share
+        share = np.ones(len(near))
+        for points in self.points:
+            left = np.flatnonzero(share > 0.0)
+            found = np.zeros(len(left))
+            _shares(own, np.ascontiguousarray(places[left]), volume, points, found)
+            share[left] = found
+        self.near_pairs = near[np.argsort(-share, kind="stable")]
+        self.pairs, self.share = near[left], found
 
 
 def _in_rows(corners):
@@ -174,28 +177,6 @@ def _in_rows(corners):
     begin, end = corners[..., axis].min(axis=1), corners[..., axis].max(axis=1)
     order = np.argsort(begin, kind="stable")
     return order, np.searchsorted(begin[order], end[order]).astype(np.int32)
-
-
-def _middles(halvings):
-    """Middles of the equal parts of a tetrahedron, as shares of its corners, (parts, 4)."""
-    parts = [np.eye(4)]
-    for _ in range(halvings):
-        parts = [piece for whole in parts for piece in _eighths(whole)]
-    return np.array([part.mean(axis=0) for part in parts])
-
-
-def _eighths(corners):
-    """Eight parts of equal volume: one at each corner and four around an inner diagonal."""
-    middle = {(a, b): 0.5 * (corners[a] + corners[b]) for a in range(4) for b in range(a)}
-
-    def between(a, b):
-        return middle[max(a, b), min(a, b)]
-
-    for a in range(4):
-        yield np.array([corners[a] if b == a else between(a, b) for b in range(4)])
-    ring = [between(0, 2), between(0, 3), between(1, 3), between(1, 2)]
-    for k in range(4):
-        yield np.array([between(0, 1), between(2, 3), ring[k], ring[(k + 1) % 4]])
 
 
 @ti.kernel
@@ -274,7 +255,7 @@ def _shares(
     corners: ti.types.ndarray(dtype=ti.f64, ndim=3),
     pairs: ti.types.ndarray(dtype=ti.i32, ndim=2),
     volume: ti.types.ndarray(dtype=ti.f64, ndim=1),
-    middles: ti.types.ndarray(dtype=ti.f64, ndim=2),
+    points: ti.types.ndarray(dtype=ti.f64, ndim=2),
     share: ti.types.ndarray(dtype=ti.f64, ndim=1),
 ):
     """Share of the smaller body of every pair whose parts lie within the other."""
@@ -288,10 +269,10 @@ def _shares(
             plane = _plane(corners, large, f)
             for k in ti.static(range(4)):
                 planes[f, k] = plane[k]
-        for m in range(middles.shape[0]):
+        for m in range(points.shape[0]):
             point = vec3(0.0)
             for c in ti.static(range(4)):
-                point += middles[m, c] * _corner(corners, small, c)
+                point += points[m, c] * _corner(corners, small, c)
             height = planes @ vec4(point[0], point[1], point[2], 1.0)
             count += ti.cast(height.min() > 0.0, ti.i32)
-        share[a] = count / ti.cast(middles.shape[0], ti.f64)
+        share[a] = count / ti.cast(points.shape[0], ti.f64)

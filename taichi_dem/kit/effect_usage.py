@@ -101,7 +101,8 @@ class Advice:
         if use.effect not in self.shown:
             return "; no run without it was made"
         if self.shown[use.effect] == 0.0:
-            return "; a run without it is the same"
+            same = "the same but for rounding" if use.rounding else "the same"
+            return f"; a run without it is {same}"
         return f"; a run without it differs by {100.0 * self.shown[use.effect]:.2g} %"
 
     def verdict(self, name: str, kind: str) -> tuple[str, str]:

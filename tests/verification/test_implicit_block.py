@@ -48,14 +48,13 @@ def test_momentum_is_kept_through_fracture_and_contact(reports):
 
 
 def test_ledger_residual_halves_with_the_step(reports):
-    """Strain is that of positions half a step after the velocities: power times dt / 2.
+    """Fracture and contact are met up to a step late, and sweeps end within their tolerance.
 
-    First order through fracture and contact. The mean power is the work of the gas over the time;
-    it grows, and a few times the mean bounds what it is in the end.
+    Energies are of one time: no half step of power is left, which was STEP / UNTIL / 2 of the work.
     """
-    coarse, fine = (report.energy_balance["residual"] for report in reports)
-    assert fine / coarse == pytest.approx(0.5, abs=0.02)
-    assert reports[0].energy_residual_fraction < 4.0 * 0.5 * STEP / UNTIL
+    coarse, fine = (abs(report.energy_balance["residual"]) for report in reports)
+    assert fine < coarse
+    assert reports[0].energy_residual_fraction < 0.25 * 0.5 * STEP / UNTIL
 
 
 @pytest.mark.parametrize("until, bound", [(8e-6, 0.002), (1.44e-5, 0.02)])

@@ -242,7 +242,7 @@ def test_one_fast_fragment_keeps_the_list_of_neighbours_right(implicit):
     implicit.restart(STEP)
     neighbours, skin = simulation.broad_phase.neighbours, 1.2e-3
     simulation.contacts.skin.fill(skin)
-    simulation.broad_phase.clear()
+    implicit.again.search_anew()
     reach = (BODY_SKINS + 2.0 * SKINS) * skin
     rooms, place, still = neighbours.first.to_numpy(), implicit.place.copy(), implicit.spin * 0.0
     turn = np.tile([1.0, 0.0, 0.0, 0.0], (len(place), 1))
