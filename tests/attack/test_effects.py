@@ -273,7 +273,7 @@ def test_shared_volume_does_not_depend_on_place_direction_or_order(seed):
     bodies = apart(count, 1.0)
     points = bodies.points + 0.2 * draw.normal(size=bodies.points.shape)
     mesh = checked_mesh(points, bodies.tetrahedra, {})
-    position, (turn, rotation) = 0.8 * draw.random((count, 3)), quaternions(draw, count)
+    position, (turn, _) = 0.8 * draw.random((count, 3)), quaternions(draw, count)
     first = shares(mesh, position, turn)
     about, turned = (each[0] for each in quaternions(draw, 1))
     order = draw.permutation(count)
