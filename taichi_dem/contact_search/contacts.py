@@ -48,6 +48,7 @@ class Contacts:
         for effect in tables.effects:
             effect.declare_columns(self.store)
         self.exposed_faces = ti.field(ti.i32, shape=n)
+        self.law.follow(self.exposed_faces)
         self.travel = ti.field(real, shape=n)
         self.body_skin = ti.field(real, shape=n)
         self.skin = ti.field(real, shape=n)
@@ -68,7 +69,19 @@ class Contacts:
 
     @ti.func
     def gap(self, i, j, a, b):
-        """Distance between the surfaces of spheres a of body i and b of body j [m]."""
+        """Gap between bodies i and j by an entry (a, b) of the pair store [m]."""
+        gap = 0.0
+        if ti.static(self.law.meets_faces):
+            back = self.state.rotation[i].transpose()
+            offset = back @ (self.state.position[j] - self.state.position[i])
+            near = self.law.nearest(a, b, back @ self.state.rotation[j], offset)
+            gap = near.apart.norm() - near.reach
+        else:
+            gap = self._gap_of_spheres(i, j, a, b)
+        return gap
+
+    @ti.func
+    def _gap_of_spheres(self, i, j, a, b):
         on_first = self.state.rotation[i] @ self.tables.sphere[a].xyz
         on_second = self.state.rotation[j] @ self.tables.sphere[b].xyz
         apart = self.state.position[j] + on_second - self.state.position[i] - on_first

@@ -1,6 +1,7 @@
 """Effects that a scene may list; all others are not computed, allocated or compiled."""
 
 from taichi_dem.effects.bond_damping import BondDamping
+from taichi_dem.effects.face_contact import FaceContact
 from taichi_dem.effects.friction import Friction
 from taichi_dem.effects.gas_pressure import GasPressure
 from taichi_dem.effects.gravity import Gravity
@@ -13,6 +14,7 @@ from taichi_dem.effects.supports import Fixed, PrescribedMotion, Roller
 
 __all__ = [
     "BondDamping",
+    "FaceContact",
     "Fixed",
     "Friction",
     "GasPressure",

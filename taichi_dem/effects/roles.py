@@ -83,6 +83,12 @@ class ContactLaw(Protocol):
     def stored(self, overlap: float) -> float:
         """Energy [J]."""
 
+    def nearest(self, a: int, b: int, turn: ti.Matrix, offset: ti.Vector) -> Any:
+        """Where two bodies are nearest by an entry of the pair store (``SphereContact``)."""
+
+    def face_of(self, a: int) -> int:
+        """Face of one side of an entry of the pair store."""
+
 
 class FrictionLaw(Protocol):
     """Tangential law of contact spheres; role "friction".

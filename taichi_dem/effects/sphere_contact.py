@@ -1,11 +1,17 @@
 """Contact of fragments through spheres on their broken faces (Konno et al., 2.2, Fig. 5)."""
 
+from typing import TYPE_CHECKING
+
 import taichi as ti
 
 from taichi_dem.effects.base import Effect
 from taichi_dem.kit.validation import between, flag, whole
 from taichi_dem.materials import Material
-from taichi_dem.physics.sphere_pair import normal_force
+from taichi_dem.mesh.contact_spheres import ContactSpheres, spheres_of_faces
+from taichi_dem.physics.sphere_pair import Nearest, normal_force
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.model import Model
 
 #: Entries of a list for each body: a thousand tetrahedra with as many take some GiB.
 _MOST = 100_000
@@ -26,6 +32,8 @@ class SphereContact(Effect):
 
     role = "contact"
     name = "sphere_contact"
+    #: Whether spheres meet the faces of other bodies, instead of their spheres.
+    meets_faces = False
 
     def __init__(
         self,
@@ -56,6 +64,28 @@ class SphereContact(Effect):
     def numbers(self, material: Material) -> tuple[float, ...]:
         """Stiffness [N/m] and damping [N s/m] of a contact."""
         return material.contact_stiffness, material.contact_damping
+
+    def spheres(self, model: "Model") -> ContactSpheres:
+        """Spheres of a model, in balls that hold all of a face, or of a body, that can touch."""
+        return spheres_of_faces(model.mesh, model.centre, self.divisions)
+
+    def follow(self, exposed_faces: ti.Field) -> None:
+        """Take note of the field with a bit for each face of a body that is free."""
+
+    @ti.func
+    def nearest(self, a, b, turn, offset):
+        """Where two bodies are nearest by an entry (a, b) of the pair store, a ``Nearest``.
+
+        turn, offset: rotation and place of the second body in the frame of the first [m].
+        """
+        first, second = self.tables.sphere[a], self.tables.sphere[b]
+        apart = turn @ second.xyz + offset - first.xyz
+        return Nearest(first=first, apart=apart, reach=first[3] + second[3])
+
+    @ti.func
+    def face_of(self, a):
+        """Face 4 * body + f of one side of an entry of the pair store."""
+        return a // self.tables.face_spheres[None]
 
     @ti.func
     def normal(self, overlap, opening_rate):

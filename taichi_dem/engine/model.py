@@ -10,7 +10,7 @@ from taichi_dem.effects.base import ROLES, Effect
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.fixed_order import length, product, transposed
 from taichi_dem.materials import Material
-from taichi_dem.mesh.contact_spheres import ContactSpheres, spheres_of_faces
+from taichi_dem.mesh.contact_spheres import ContactSpheres
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.mesh.topology import body_properties, topology_of
@@ -58,7 +58,7 @@ class Model:
     @cached_property
     def spheres(self) -> ContactSpheres:
         """``ContactSpheres`` of every face; with contact only."""
-        return spheres_of_faces(self.mesh, self.centre, self.contact.divisions)
+        return self.contact.spheres(self)
 
     @cached_property
     def bonds(self) -> dict[str, np.ndarray]:

@@ -59,6 +59,19 @@ def add_within(held, more, bound):
 
 
 @ti.dataclass
+class Nearest:
+    """Two bodies' surfaces where they are nearest, in the first body's frame.
+
+    first: centre of the first's sphere and its radius [m], or a point of its face and 0. apart:
+    from there to the second's centre or point [m]. reach: their distance when they touch [m].
+    """
+
+    first: ti.types.vector(4, ti.f64)
+    apart: ti.types.vector(3, ti.f64)
+    reach: ti.f64
+
+
+@ti.dataclass
 class Meeting:
     """Where two spheres meet: overlap [m], negative while they are apart.
 
@@ -73,10 +86,9 @@ class Meeting:
 
 @ti.func
 def meeting(first, reach, apart, rotation):
-    """Meeting of two spheres.
+    """Meeting of two spheres, or of a sphere and a face; all but rotation as in ``Nearest``.
 
-    first: centre of the first in its body's frame and radius [m]. reach: sum of both radii [m].
-    apart: from the first to the second centre, in the first body's frame [m]. rotation: of that.
+    rotation: of the first body.
     """
     distance = ti.max(apart.norm(), 1e-30)
     overlap = reach - distance

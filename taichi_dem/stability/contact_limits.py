@@ -121,17 +121,22 @@ class ContactLimits:
         turn = back @ self.state.rotation[j]
         offset = back @ (self.state.position[j] - self.state.position[i])
         for k in range(self.store.first[p], self.store.last[p]):
-            spheres = self.store.sphere[k]
-            mine, other = self.tables.sphere[spheres[0]], self.tables.sphere[spheres[1]]
-            if side == 1:
-                mine, other = other, mine
-            apart = turn @ other.xyz + offset - mine.xyz
-            reach = mine[3] + other[3] + margin
+            near = self._nearest(k, side, turn, offset)
+            apart, reach = near.apart, near.reach + margin
             if apart.norm_sqr() < reach * reach:
                 normal = apart / ti.max(apart.norm(), 1e-30)
-                da, db, dc = self._contact(i, mine.xyz + mine[3] * normal, normal)
+                da, db, dc = self._contact(i, near.first.xyz + near.first[3] * normal, normal)
                 a, b, c = a + da, b + db, c + dc
         return a, b, c
+
+    @ti.func
+    def _nearest(self, k, side, turn, offset):
+        """Entry k of the pair store as its first (0) or second (1) body sees it, a ``Nearest``."""
+        entry = self.store.sphere[k]
+        a, b = entry[0], entry[1]
+        if side == 1:
+            a, b = b, a
+        return self.contacts.law.nearest(a, b, turn, offset)
 
     @ti.func
     def _contact(self, i, arm, normal):

@@ -84,13 +84,12 @@ class ContactForce:
             scale = self.contact_share(i, j)
         for k in range(self.contacts.store.first[p], self.contacts.store.last[p]):
             a, b = self.contacts.store.sphere[k][0], self.contacts.store.sphere[k][1]
-            first, second = self.tables.sphere[a], self.tables.sphere[b]
-            apart = turn @ second.xyz + offset - first.xyz
-            reach = first[3] + second[3]
+            near_by = self.contacts.law.nearest(a, b, turn, offset)
+            apart, reach = near_by.apart, near_by.reach
             if ti.static(self.has_limits):
                 near += ti.cast(apart.norm_sqr() < (reach + margin) * (reach + margin), ti.i32)
             if apart.norm_sqr() < reach * reach:
-                met = meeting(first, reach, apart, self.state.rotation[i])
+                met = meeting(near_by.first, reach, apart, self.state.rotation[i])
                 overlap, normal, arm = met.overlap, met.normal, met.arm
                 velocity = self._velocity_at(j, arm - branch) - self._velocity_at(i, arm)
                 rate = velocity.dot(normal)

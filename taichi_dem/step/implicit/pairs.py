@@ -134,11 +134,10 @@ class PairDashpots:
         end = start
         for k in range(start, self.store.last[p]):
             a, b = self.store.sphere[k][0], self.store.sphere[k][1]
-            first, second = self.tables.sphere[a], self.tables.sphere[b]
-            apart = turn @ second.xyz + offset - first.xyz
-            reach = first[3] + second[3]
+            near = self.contacts.law.nearest(a, b, turn, offset)
+            apart, reach = near.apart, near.reach
             if apart.norm_sqr() < (reach + ahead) * (reach + ahead):
-                met = meeting(first, reach, apart, self.state.rotation[i])
+                met = meeting(near.first, reach, apart, self.state.rotation[i])
                 overlap, normal, arm = met.overlap, met.normal, met.arm - branch
                 self.entry[end], self.normal[end], self.arm[end] = k, normal, arm
                 # Spheres still apart may approach until they touch, at the end of the step.
@@ -289,10 +288,9 @@ class PairDashpots:
         force, moment_i, moment_j, dragged, rubbed = zero3(), zero3(), zero3(), 0.0, 0.0
         for k in range(self.store.first[p], self.store.last[p]):
             pushed = self.impulse[k] / dt
-            first = self.tables.sphere[self.store.sphere[k][0]]
-            second = self.tables.sphere[self.store.sphere[k][1]]
-            apart, reach = turn @ second.xyz + offset - first.xyz, first[3] + second[3]
-            met = meeting(first, reach, apart, self.state.rotation[i])
+            a, b = self.store.sphere[k][0], self.store.sphere[k][1]
+            near = self.contacts.law.nearest(a, b, turn, offset)
+            met = meeting(near.first, near.reach, near.apart, self.state.rotation[i])
             arm = met.arm - branch
             force += pushed
             moment_i -= met.arm.cross(pushed)
