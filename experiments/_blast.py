@@ -18,14 +18,15 @@ EFFECTS = {
     # The paper's reading: faces carry spheres once they break, outer faces never.
     "sphere_contact": partial(effects.SphereContact, outer_faces=False),
     "surface_contact": effects.SphereContact,
+    "face_contact": effects.FaceContact,
     "friction": effects.Friction,
     "gas_pressure": effects.GasPressure,
     "gravity": effects.Gravity,
     "slip_weakening": partial(effects.SlipWeakening, MODE_TWO),
 }
 #: Those that the paper's scene does not have: weight, contact of all surfaces in place of that of
-#: broken faces, and cohesion that slip degrades.
-OPTIONAL = ("gravity", "surface_contact", "slip_weakening")
+#: broken faces, through spheres or of spheres with faces, and cohesion that slip degrades.
+OPTIONAL = ("gravity", "surface_contact", "face_contact", "slip_weakening")
 
 
 def blast_parser(name, description, drivers=BLAST_DRIVERS, mesh=PAPER_BLOCK, saves=False, **given):

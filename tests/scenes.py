@@ -11,13 +11,16 @@ from tests.turns import matrix
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 
 
-def paper_effects(peak=575e6, rise=1.33e-4, **contact):
-    """All effects of the paper; contact: options of SphereContact, of broken faces by default."""
+def paper_effects(peak=575e6, rise=1.33e-4, kind=effects.SphereContact, **contact):
+    """All effects of the paper; contact: options of SphereContact, of broken faces by default.
+
+    kind: its class.
+    """
     return [
         effects.BondDamping(),
         effects.Softening(),
         effects.ShearSlip(),
-        effects.SphereContact(**{"outer_faces": False, **contact}),
+        kind(**{"outer_faces": False, **contact}),
         effects.Friction(),
         effects.GasPressure(peak=peak, rise=rise),
     ]

@@ -31,8 +31,8 @@ class FaceContact(SphereContact):
     In place of ``SphereContact``, whose spheres meet on their flanks. The overlap is the radius
     less the distance from the centre to the closest point of the face; the force acts along this
     line and derives from the energy. Outer faces that continue each other are one flat side,
-    without edges between them. A sphere whose centre is inside a body is pushed back through the
-    free face that is nearest.
+    without edges between them. A sphere whose centre is inside a body, by less than its radius, is
+    pushed back through the free face that is nearest.
 
     divisions, outer_faces, skin and the capacity of the lists: as of ``SphereContact``.
     Source of the closest point: Ericson, Real-Time Collision Detection, 5.1.5; not in the paper.
@@ -40,6 +40,7 @@ class FaceContact(SphereContact):
 
     name = "face_contact"
     meets_faces = True
+    constant_fields = ("plane", "corner", "end", "rim")
 
     def spheres(self, model: "Model") -> ContactSpheres:
         """Spheres of a model; the balls around them also hold the corners of the faces."""

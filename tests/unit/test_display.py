@@ -39,6 +39,7 @@ IDENTIFYING = (
 UNSHOWN = {Displacement, FixedStep}
 EFFECTS = (
     *(effects.BondDamping(), effects.Softening(), effects.ShearSlip(), effects.SphereContact()),
+    effects.FaceContact(),
     *(effects.Friction(), effects.StickingFriction(), effects.Gravity()),
     effects.SlipWeakening(1000.0),
     *(effects.GasPressure("left"), effects.Fixed("left")),

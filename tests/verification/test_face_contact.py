@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects
+from taichi_dem import CONCRETE, Scene, Simulation, Uniform, checked_mesh, effects
 from taichi_dem.mesh.face_rims import face_rims
 from taichi_dem.mesh.shapes import bar, single
 from taichi_dem.mesh.tetrahedra import all_faces
 from taichi_dem.mesh.topology import topology_of
-from tests.faces import AtABlock, triangle_distance
+from tests.faces import AtABlock
 
 EPS = np.finfo(float).eps
 LOSSLESS = replace(CONCRETE, contact_damping=0.0)
@@ -64,3 +64,78 @@ def test_energy_is_that_of_six_flat_sides_and_four_triangles(at_a_block):
         # Distances of 0.1 m are known to some roundings.
         error = CONCRETE.contact_stiffness * (overlap * 100 * EPS * 0.1).sum()
         assert at_a_block.energy() == pytest.approx(wanted, abs=error)
+
+
+def test_the_force_is_the_gradient_of_the_energy_and_conserves_momentum(at_a_block):
+    """Central differences are off by h times the sum of stiffnesses, where contacts begin."""
+    random, h, dt = np.random.default_rng(2), 1e-9, 1e-9
+    for place, orientation in touching(at_a_block, random, 10):
+        slope = np.zeros(3)
+        for axis in range(3):
+            for sign in (-1.0, 1.0):
+                at_a_block.put(place + sign * h * np.eye(3)[axis], orientation)
+                slope[axis] += sign * at_a_block.energy() / (2.0 * h)
+        at_a_block.simulation.reset()
+        at_a_block.put(place, orientation)
+        at_a_block.simulation.start()
+        at_a_block.simulation.advance_to(1)
+        velocity, mass = at_a_block.state.velocity.to_numpy(), at_a_block.model.body_mass
+        own = mass[-1] * velocity[at_a_block.model.body_count - 1]
+        # A run begins half a step back: the first kick is of half a step.
+        count = at_a_block.simulation.contacts.store.sphere_count[None]
+        error = CONCRETE.contact_stiffness * h * count
+        assert np.abs(own / (0.5 * dt) + slope).max() < error < 0.2 * np.linalg.norm(slope)
+        # Sums of some hundred impulses at arms of 0.1 m.
+        linear, angular = np.split(at_a_block.simulation.energy_balance.momentum(), 2)
+        assert np.abs(linear).max() < 100 * EPS * np.linalg.norm(own)
+        assert np.abs(angular).max() < 100 * EPS * np.linalg.norm(own) * 0.1
+
+
+def facing(gap):
+    """Two tetrahedra, mirror images, whose faces are a gap [m] apart along x."""
+    left = single()
+    right = left.points * [-1.0, 1.0, 1.0] + [gap, 0.0, 0.0]
+    return checked_mesh(np.vstack([left.points, right]), [[0, 1, 2, 3], [4, 5, 7, 6]], {})
+
+
+def test_a_centre_behind_a_face_is_pushed_back():
+    """Energy of a face pressed into another grows until centres are behind by nearly a radius."""
+    simulation = Simulation(Scene(facing(1e-9), LOSSLESS, [effects.FaceContact()]), Uniform(1e-9))
+    simulation.start()
+    model = simulation.model
+    still, energies = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1)), []
+    for depth in np.linspace(0.0, 1.9 * model.spheres.radius[0, 0].min(), 30):
+        simulation.state.set_motion(model.centre - [[0.0] * 3, [depth, 0.0, 0.0]], still)
+        simulation.broad_phase.search()
+        energies.append(simulation.energy_balance.account()["sphere_strain"])
+    assert energies[0] < 1e-9 * energies[-1]
+    assert (np.diff(energies) > 0.0).all()
+
+
+def test_faces_that_meet_leave_as_fast_as_they_came():
+    """Thirty springs: 30 k D^2 / 2 = m v^2; kicks and drifts change the speed by (w dt)^2.
+
+    Six spheres of each body lie behind its face, and nine behind the others touch it too.
+    """
+    gap, speed, dt = 1e-6, 1.0, 1e-7
+    simulation = Simulation(
+        Scene(facing(gap), LOSSLESS, [effects.FaceContact()]), Uniform(dt0=dt)
+    )
+    model = simulation.model
+    still = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
+    simulation.state.set_motion(model.centre, still, [[speed, 0, 0], [-speed, 0, 0]])
+    distance, residual = [], []
+    for step in range(1, 801):
+        simulation.advance_to(step)
+        motion = simulation.state.motion()
+        distance.append(motion["position"][1, 0] - motion["position"][0, 0])
+        residual.append(abs(simulation.energy_balance.account()["residual"]))
+    mass = model.body_mass[0]
+    rate = np.sqrt(2.0 * 30.0 * CONCRETE.contact_stiffness / mass)
+    deepest = model.centre[1, 0] - model.centre[0, 0] - gap - min(distance)
+    expected = speed * np.sqrt(mass / (15.0 * CONCRETE.contact_stiffness))
+    assert 800 * dt > np.pi / rate + 2.0 * gap / speed
+    # Samples are up to half a step from the deepest point, where the overlap is a parabola.
+    assert deepest == pytest.approx(expected, rel=(rate * dt) ** 2)
+    assert motion["velocity"][1, 0] == pytest.approx(speed, rel=(rate * dt) ** 2)
+    assert residual[-1] < (rate * dt) ** 2 * mass * speed**2
