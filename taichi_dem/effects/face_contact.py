@@ -34,13 +34,26 @@ class FaceContact(SphereContact):
     without edges between them. A sphere whose centre is inside a body, by less than its radius, is
     pushed back through the free face that is nearest.
 
-    divisions, outer_faces, skin and the capacity of the lists: as of ``SphereContact``.
+    Arguments: as of ``SphereContact``. Faces reach farther than the spheres behind them, so the
+    lists are longer; a body's radius, of which the skin is a share, is that to its corners.
     Source of the closest point: Ericson, Real-Time Collision Detection, 5.1.5; not in the paper.
     """
 
     name = "face_contact"
     meets_faces = True
     constant_fields = ("plane", "corner", "end", "rim")
+
+    def __init__(
+        self,
+        divisions: int = 5,
+        outer_faces: bool = True,
+        skin: float = 0.0075,
+        neighbours_per_body: int = 192,
+        pairs_per_body: int = 48,
+        spheres_per_body: int = 320,
+    ):
+        room = neighbours_per_body, pairs_per_body, spheres_per_body
+        super().__init__(divisions, outer_faces, skin, *room)
 
     def spheres(self, model: "Model") -> ContactSpheres:
         """Spheres of a model; the balls around them also hold the corners of the faces."""
