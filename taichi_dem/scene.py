@@ -107,6 +107,11 @@ def _friction_warnings(scene):
     )
 
 
+def remedy(contact: Any) -> str:
+    """How bodies touch at their outer faces; contact: the effect of a scene, None without."""
+    return f"{type(contact).__name__}(outer_faces=True)" if contact else REMEDY
+
+
 def outer_faces_warnings(scene: Any) -> tuple[str, ...]:
     """Sentences about parts of a scene that may meet where they carry no spheres; before a run.
 
@@ -117,8 +122,8 @@ def outer_faces_warnings(scene: Any) -> tuple[str, ...]:
     (``Mesh.keep_coincident``) meet in a solid of one piece too.
     scene: a Scene, or a Model, which has the same mesh and effects.
     """
-    contact = [effect for effect in scene.effects if effect.role == "contact"]
-    if contact and contact[0].outer_faces:
+    contact = next((effect for effect in scene.effects if effect.role == "contact"), None)
+    if contact and contact.outer_faces:
         return ()
     part = parts_of(scene.mesh)
     count = part.max() + 1
@@ -129,9 +134,9 @@ def outer_faces_warnings(scene: Any) -> tuple[str, ...]:
     if not apart:
         return (
             f"coincident points of the mesh are kept apart, no bond joins the faces on them, and "
-            f"{lack}: bodies pass through each other there; {REMEDY} lets them touch",
+            f"{lack}: bodies pass through each other there; {remedy(contact)} lets them touch",
         )
     return (
         f"the mesh has {count} parts that no bond joins, and {lack}: "
-        f"where these parts meet they pass through each other; {REMEDY} lets them touch",
+        f"where these parts meet they pass through each other; {remedy(contact)} lets them touch",
     )

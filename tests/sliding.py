@@ -41,10 +41,11 @@ def plate():
     return checked_mesh(made.points, made.tetrahedra, {"bottom": faces[below]})
 
 
-def sliding(body, speed, angle, friction, divisions=5):
+def sliding(body, speed, angle, friction, divisions=5, kind=effects.SphereContact, **other):
     """Simulation of a body that slides over a fixed plate at a speed [m/s], and its direction.
 
-    angle: of the direction against the edges of the plate's boxes.
+    angle: of the direction against the edges of the plate's boxes. kind: of the contact.
+    other: the method, and the law of friction, in place of those of the measurement.
     """
     low, high = body.points.min(axis=0), body.points.max(axis=0)
     place = np.array([0.13, 0.0, 0.13]) - 0.5 * (low + high)
@@ -52,13 +53,15 @@ def sliding(body, speed, angle, friction, divisions=5):
     mesh = placed_together({"plate": (plate(), (0.0, 0.0, 0.0)), "body": (body, place)})
     listed = [
         effects.BondDamping(),
-        effects.SphereContact(divisions, outer_faces=True, spheres_per_body=MOST[divisions]),
-        effects.Friction(),
+        kind(divisions, outer_faces=True, spheres_per_body=MOST[divisions]),
+        other.get("law", effects.Friction)(),
         effects.Gravity((0.0, -GRAVITY, 0.0)),
         effects.Fixed("plate_bottom"),
     ]
     material = replace(CONCRETE, friction=friction)
-    simulation = Simulation(Scene(mesh, material, listed), ImplicitDashpots(STEP))
+    simulation = Simulation(
+        Scene(mesh, material, listed), other.get("method", ImplicitDashpots(STEP))
+    )
     direction = np.array([np.cos(angle), 0.0, np.sin(angle)])
     velocity = np.zeros((mesh.body_count, 3))
     velocity[-body.body_count :] = speed * direction
@@ -66,12 +69,12 @@ def sliding(body, speed, angle, friction, divisions=5):
     return simulation, direction
 
 
-def deceleration(body, speed, angle, friction, divisions=5):
+def deceleration(body, speed, angle, friction, divisions=5, kind=effects.SphereContact):
     """Mean deceleration [m/s^2] over ``WAY``, or over 0.7 of the time to stop by Coulomb's law.
 
     Returns also the largest rise of the body [m], and the CPU time of a step [s].
     """
-    simulation, direction = sliding(body, speed, angle, friction, divisions)
+    simulation, direction = sliding(body, speed, angle, friction, divisions, kind)
     time = min(WAY / speed, 0.7 * speed / (CONCRETE.friction * GRAVITY))
     own = slice(-body.body_count, None)
     mass = simulation.model.body_mass[own]

@@ -24,6 +24,8 @@ STEPS = 16.0
 #: Share of its extent beyond which it is searched again whatever its speed, and further than which
 #: no step may carry it: spheres would pass each other unseen.
 FARTHEST = 0.25
+#: Gap where another face has the contact [m].
+AWAY = 1e30
 
 
 @ti.data_oriented
@@ -76,6 +78,8 @@ class Contacts:
             offset = back @ (self.state.position[j] - self.state.position[i])
             near = self.law.nearest(a, b, back @ self.state.rotation[j], offset)
             gap = near.apart.norm() - near.reach
+            if near.can_meet == 0:
+                gap = AWAY
         else:
             gap = self._gap_of_spheres(i, j, a, b)
         return gap

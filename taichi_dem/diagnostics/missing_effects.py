@@ -11,7 +11,7 @@ from taichi_dem.diagnostics.readings import Readings
 from taichi_dem.diagnostics.shared_volume import SharedVolume
 from taichi_dem.mesh.contact_spheres import ContactSpheres, spheres_of_faces
 from taichi_dem.physics.sphere_pair import CONTACT
-from taichi_dem.scene import REMEDY
+from taichi_dem.scene import REMEDY, remedy
 from taichi_dem.step.schedule import Schedule
 from taichi_dem.timeline import NEVER
 
@@ -109,6 +109,8 @@ def unserved(model: "Model") -> dict[str, MissingEffect]:
         for name, (effect, what, unit) in _NEEDS.items()
         if listed[name]
     }
+    if "bare" in found:
+        found["bare"].effect = remedy(model.contact)
     if "friction" in found and material.contact_damping == 0.0:
         # Friction is a dashpot's force up to a limit: without a dashpot springs alone hold.
         found["friction"].effect = "StickingFriction"

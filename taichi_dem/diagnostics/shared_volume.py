@@ -13,7 +13,7 @@ import taichi as ti
 
 from taichi_dem.kit.types import vec3, vec4
 from taichi_dem.mesh.tetrahedra import components, points_of_parts
-from taichi_dem.scene import REMEDY
+from taichi_dem.scene import remedy
 from taichi_dem.timeline import NEVER
 
 if TYPE_CHECKING:
@@ -96,14 +96,15 @@ class SharedVolume:
         contact, worst = self.model.contact, self.worst
         if contact is None or worst.share <= NOTABLE:
             return ()
-        remedy = "a larger contact_stiffness, or more divisions of SphereContact, keeps them apart"
+        law = type(contact).__name__
+        advice = f"a larger contact_stiffness, or more divisions of {law}, keeps them apart"
         if not contact.outer_faces:
-            remedy = f"{REMEDY} lets them touch there too"
+            advice = f"{remedy(contact)} lets them touch there too"
         first, second = worst.bodies
         return (
             f"bodies {first} and {second} share {100.0 * worst.share:.2g} % of the smaller one at "
             f"t = {worst.time_s:.4g} s, and {worst.deep} pairs more than {100.0 * DEEP:g} %: "
-            f"{remedy}",
+            f"{advice}",
         )
 
     def fragments(self) -> int:

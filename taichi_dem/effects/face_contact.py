@@ -20,9 +20,6 @@ if TYPE_CHECKING:
     from taichi_dem.engine.capacity import Capacity
     from taichi_dem.engine.model import Model
 
-#: Distance of a face to a sphere that meets the flat side of which the face is a part elsewhere.
-_AWAY = 1e30
-
 
 @ti.data_oriented
 class FaceContact(SphereContact):
@@ -97,17 +94,18 @@ class FaceContact(SphereContact):
     @ti.func
     def nearest(self, a, b, turn, offset):
         """Where a sphere, the index that is not negative, is nearest to face -1 - a or -1 - b."""
-        first, apart, reach = vec4(0.0), vec3(0.0), 0.0
+        first, apart, reach, can_meet = vec4(0.0), vec3(0.0), 0.0, 0
         if b < 0:
             first = self.tables.sphere[a]
             back = turn.transpose()
             found = self._nearest(back @ (first.xyz - offset), first[3], -1 - b)
-            apart, reach = -(turn @ found.apart), found.reach
+            apart, reach, can_meet = -(turn @ found.apart), found.reach, found.can_meet
         else:
             second = self.tables.sphere[b]
             found = self._nearest(turn @ second.xyz + offset, second[3], -1 - a)
-            first, apart, reach = found.first, found.apart, found.reach
-        return Nearest(first=first, apart=apart, reach=reach)
+            first, apart = found.first, found.apart
+            reach, can_meet = found.reach, found.can_meet
+        return Nearest(first=first, apart=apart, reach=reach, can_meet=can_meet)
 
     @ti.func
     def face_of(self, a):
@@ -123,16 +121,17 @@ class FaceContact(SphereContact):
         k = 3 * face
         found = closest_point(centre, self.corner[k], self.corner[k + 1], self.corner[k + 2])
         point, region = found.point, found.region
-        apart, reach = centre - point, radius
+        apart, reach, can_meet = centre - point, radius, True
         if region == INSIDE:
             depth = -apart.dot(self.plane[face].xyz)
             if 0.0 < depth and depth < radius:
                 if self._is_within(centre, depth, face):
                     # The mirror image of the centre in front of the face has the same overlap.
                     apart, reach = -apart, radius + 2.0 * depth
-        elif not self._is_met(found.region, apart, face):
-            apart = vec3(_AWAY, 0.0, 0.0)
-        return Nearest(first=vec4(point[0], point[1], point[2], 0.0), apart=apart, reach=reach)
+        else:
+            can_meet = self._is_met(region, apart, face)
+        first = vec4(point[0], point[1], point[2], 0.0)
+        return Nearest(first=first, apart=apart, reach=reach, can_meet=ti.cast(can_meet, ti.i32))
 
     @ti.func
     def _is_within(self, centre, depth, face):

@@ -64,11 +64,20 @@ class Nearest:
 
     first: centre of the first's sphere and its radius [m], or a point of its face and 0. apart:
     from there to the second's centre or point [m]. reach: their distance when they touch [m].
+    can_meet: 0 where another face has the contact instead.
     """
 
     first: ti.types.vector(4, ti.f64)
     apart: ti.types.vector(3, ti.f64)
     reach: ti.f64
+    can_meet: ti.i32
+
+
+@ti.func
+def is_within(near, margin):
+    """Whether the surfaces of a ``Nearest`` are nearer than a margin [m]."""
+    wide = near.reach + margin
+    return near.can_meet == 1 and near.apart.norm_sqr() < wide * wide
 
 
 @ti.dataclass

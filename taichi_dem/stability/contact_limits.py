@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.types import mat3, real
 from taichi_dem.physics.rotation import unit3
+from taichi_dem.physics.sphere_pair import is_within
 from taichi_dem.physics.wrench import cross_matrix
 from taichi_dem.stability.mesh_limits import inverse_root
 from taichi_dem.timeline import MAX_LEVEL
@@ -122,9 +123,8 @@ class ContactLimits:
         offset = back @ (self.state.position[j] - self.state.position[i])
         for k in range(self.store.first[p], self.store.last[p]):
             near = self._nearest(k, side, turn, offset)
-            apart, reach = near.apart, near.reach + margin
-            if apart.norm_sqr() < reach * reach:
-                normal = apart / ti.max(apart.norm(), 1e-30)
+            if is_within(near, margin):
+                normal = near.apart / ti.max(near.apart.norm(), 1e-30)
                 da, db, dc = self._contact(i, near.first.xyz + near.first[3] * normal, normal)
                 a, b, c = a + da, b + db, c + dc
         return a, b, c

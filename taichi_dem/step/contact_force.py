@@ -4,7 +4,7 @@ import taichi as ti
 
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.physics.rotation import zero3
-from taichi_dem.physics.sphere_pair import active_bits, add_within, meeting
+from taichi_dem.physics.sphere_pair import active_bits, add_within, is_within, meeting
 from taichi_dem.stability.body_limits import HIT
 
 
@@ -87,8 +87,8 @@ class ContactForce:
             near_by = self.contacts.law.nearest(a, b, turn, offset)
             apart, reach = near_by.apart, near_by.reach
             if ti.static(self.has_limits):
-                near += ti.cast(apart.norm_sqr() < (reach + margin) * (reach + margin), ti.i32)
-            if apart.norm_sqr() < reach * reach:
+                near += ti.cast(is_within(near_by, margin), ti.i32)
+            if is_within(near_by, 0.0):
                 met = meeting(near_by.first, reach, apart, self.state.rotation[i])
                 overlap, normal, arm = met.overlap, met.normal, met.arm
                 velocity = self._velocity_at(j, arm - branch) - self._velocity_at(i, arm)

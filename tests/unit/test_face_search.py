@@ -8,7 +8,7 @@ from taichi_dem.mesh.shapes import bar
 from taichi_dem.mesh.tetrahedra import all_faces
 from tests.again import Again
 from tests.faces import triangle_distance
-from tests.unit.test_broad_phase import DT, listed, scattered
+from tests.unit.test_broad_phase import DT, listed, near_slots, scattered
 
 
 @pytest.fixture(scope="module")
@@ -51,3 +51,22 @@ def test_the_search_lists_all_spheres_near_faces_and_no_others(again, skin, spre
     assert len(wanted) > 200
     assert len(found) == len(set(found))
     assert set(found) == wanted
+
+
+def test_a_break_injects_the_energy_of_the_overlaps_that_it_brings_once(again):
+    """Faces that break now bring what they overlap; a second search at the tick nothing."""
+    simulation = scattered(again, 2e-4, 0.02)
+    state, store = simulation.state, simulation.contacts.store
+    simulation.start()
+    before = simulation.energy_balance.account()
+    exposed = state.exposed_tick.to_numpy()
+    free = np.flatnonzero(exposed < 0)
+    exposed[free[: len(free) // 2]] = 7
+    state.exposed_tick.from_numpy(exposed)
+    state.tick[None] = 7
+    for _ in range(2):
+        simulation.broad_phase.search()
+        after = simulation.energy_balance.account()
+        brought = after["sphere_strain"] - before["sphere_strain"]
+        assert after["injected"] == pytest.approx(brought, rel=1e-9)
+        assert store.heat.to_numpy()[near_slots(store), 2].sum() > 0.0

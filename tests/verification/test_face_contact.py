@@ -5,12 +5,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE, Scene, Simulation, Uniform, checked_mesh, effects
+from taichi_dem import (
+    CONCRETE,
+    ImplicitDashpots,
+    Multirate,
+    Scene,
+    Simulation,
+    Uniform,
+    checked_mesh,
+    effects,
+)
 from taichi_dem.mesh.face_rims import face_rims
 from taichi_dem.mesh.shapes import bar, single
 from taichi_dem.mesh.tetrahedra import all_faces
 from taichi_dem.mesh.topology import topology_of
 from tests.faces import AtABlock
+from tests.sliding import GRAVITY, STEP, sliding, tetrahedron
 
 EPS = np.finfo(float).eps
 LOSSLESS = replace(CONCRETE, contact_damping=0.0)
@@ -118,9 +128,7 @@ def test_faces_that_meet_leave_as_fast_as_they_came():
     Six spheres of each body lie behind its face, and nine behind the others touch it too.
     """
     gap, speed, dt = 1e-6, 1.0, 1e-7
-    simulation = Simulation(
-        Scene(facing(gap), LOSSLESS, [effects.FaceContact()]), Uniform(dt0=dt)
-    )
+    simulation = Simulation(Scene(facing(gap), LOSSLESS, [effects.FaceContact()]), Uniform(dt0=dt))
     model = simulation.model
     still = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
     simulation.state.set_motion(model.centre, still, [[speed, 0, 0], [-speed, 0, 0]])
@@ -139,3 +147,46 @@ def test_faces_that_meet_leave_as_fast_as_they_came():
     assert deepest == pytest.approx(expected, rel=(rate * dt) ** 2)
     assert motion["velocity"][1, 0] == pytest.approx(speed, rel=(rate * dt) ** 2)
     assert residual[-1] < (rate * dt) ** 2 * mass * speed**2
+
+
+#: Method by name; explicit ones limit the dashpots of the bonds of the plate.
+SLIDES = {
+    "implicit": ImplicitDashpots(STEP),
+    "uniform": Uniform(4e-7, dashpot="limited"),
+    "multirate": Multirate(4e-7, 1e-6, dashpot="limited"),
+}
+
+
+def braking(friction, **other):
+    """Braking of a tetrahedron at 5 m/s over faces of the plate, over the impulse of the plate.
+
+    The impulse along the normal is that of the weight and of what the body bounces.
+    """
+    speed, time = 5.0, 0.01
+    simulation, way = sliding(tetrahedron(), speed, 0.4, friction, 5, effects.FaceContact, **other)
+    dt, ends = simulation.method.dt0, []
+    for part in (0.1, 1.0):
+        simulation.advance_to(round(part * time / dt))
+        velocity = simulation.state.velocity.to_numpy()[simulation.model.body_count - 1]
+        ends.append((velocity @ way, velocity[1]))
+    (first, up), (last, higher) = ends
+    return (first - last) / (GRAVITY * 0.9 * time + higher - up), simulation
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SLIDES)
+def test_a_face_slides_over_many_without_friction_unbraked(name):
+    found, _ = braking(0.0, method=SLIDES[name])
+    assert abs(found) < 1e-4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "law"),
+    [("implicit", effects.Friction), *((name, effects.StickingFriction) for name in SLIDES)],
+)
+def test_a_face_is_braked_by_coulomb_friction(name, law):
+    found, simulation = braking(CONCRETE.friction, method=SLIDES[name], law=law)
+    account = simulation.energy_balance.account()
+    assert found == pytest.approx(CONCRETE.friction, rel=1e-4)
+    assert abs(account["residual"]) < 1e-2 * account["friction"]

@@ -8,7 +8,7 @@ from taichi_dem.contact_search.cell_grid import group
 from taichi_dem.contact_search.contacts import Contacts
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.physics.rotation import unit3, zero3
-from taichi_dem.physics.sphere_pair import active_bits, add_within, cut_to, meeting
+from taichi_dem.physics.sphere_pair import active_bits, add_within, cut_to, is_within, meeting
 from taichi_dem.step.contact_force import PairForces
 from taichi_dem.step.implicit.velocities import Velocities
 from taichi_dem.step.tangential_springs import TangentialSprings
@@ -136,7 +136,7 @@ class PairDashpots:
             a, b = self.store.sphere[k][0], self.store.sphere[k][1]
             near = self.contacts.law.nearest(a, b, turn, offset)
             apart, reach = near.apart, near.reach
-            if apart.norm_sqr() < (reach + ahead) * (reach + ahead):
+            if is_within(near, ahead):
                 met = meeting(near.first, reach, apart, self.state.rotation[i])
                 overlap, normal, arm = met.overlap, met.normal, met.arm - branch
                 self.entry[end], self.normal[end], self.arm[end] = k, normal, arm
@@ -156,7 +156,7 @@ class PairDashpots:
                 end += 1
             else:
                 self.impulse[k] = zero3()
-            if apart.norm_sqr() >= reach * reach:
+            if not is_within(near, 0.0):
                 parted += self.springs.part(k)
         self.store.deepest[p], self.touching[p], self.branch[p] = deepest, end - start, branch
         if end > start:
