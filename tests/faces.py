@@ -17,7 +17,7 @@ def segment_distance(c, p, q):
 
 
 def triangle_distance(c, corners):
-    """Distance of points c (..., 3) from a triangle: from its plane where above it, or its edges."""
+    """Distance of points c (..., 3) from a triangle: its plane where above it, or its edges."""
     normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
     normal /= np.linalg.norm(normal)
     height = (c - corners[0]) @ normal

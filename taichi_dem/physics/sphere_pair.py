@@ -74,10 +74,10 @@ class Nearest:
 
 
 @ti.func
-def is_within(near, margin):
+def is_within(surfaces, margin):
     """Whether the surfaces of a ``Nearest`` are nearer than a margin [m]."""
-    wide = near.reach + margin
-    return near.can_meet == 1 and near.apart.norm_sqr() < wide * wide
+    wide = surfaces.reach + margin
+    return surfaces.can_meet == 1 and surfaces.apart.norm_sqr() < wide * wide
 
 
 @ti.dataclass
