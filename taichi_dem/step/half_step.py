@@ -80,46 +80,37 @@ class HalfStep:
         return velocity, momentum
 
     @ti.func
-    def motion(self, i, force, moment):
-        """Velocity [m/s] and angular momentum [kg m^2/s] of body i at the present time."""
-        velocity, momentum = self.state.velocity[i], self.state.angular_momentum[i]
-        if self.is_due(i) == 1:
-            linear, angular, _ = self.impulse(i, force, moment)
-            velocity, momentum = self.held(
-                i, velocity + linear * self.tables.mass_inverse[i], momentum + angular
-            )
-        return velocity, momentum
+    def visit(self, i, force, moment, back):
+        """Velocity [m/s] and angular momentum [kg m^2/s] of body i now, and works in half a step.
 
-    @ti.func
-    def works(self, i, force, moment):
-        """Work [J] of each load, and of all supports last, on body i in half a step."""
+        Works [J]: of each load, and of all supports last. back: 1 to set the body, whose motion is
+        given at time zero, half a step back instead; held bodies stay.
+        """
         account = ti.Vector.zero(real, ti.static(len(self.tables.loads) + 1))
+        before, spun = self.state.velocity[i], self.state.angular_momentum[i]
+        velocity, momentum = before, spun
         if self.is_due(i) == 1:
-            before, spun = self.state.velocity[i], self.state.angular_momentum[i]
             linear, angular, kick = self.impulse(i, force, moment)
-            free, loose = before + linear * self.tables.mass_inverse[i], spun + angular
-            velocity, momentum = self.held(i, free, loose)
-            mean = 0.5 * (before + velocity)
-            turning = self.advance.spin(i, 0.5 * (spun + momentum))
-            for e in ti.static(range(len(self.tables.loads))):
-                for k in ti.static(range(3)):
-                    work = kick[e, k] * mean[k] + kick[e, 3 + k] * turning[k]
-                    account[e] = account[e] + work
-            if ti.static(len(self.tables.supports) > 0):
-                push = self.tables.mass[i] * (velocity - free)
-                work = push.dot(mean) + (momentum - loose).dot(turning)
-                account[ti.static(len(self.tables.loads))] = work
-        return account
-
-    @ti.func
-    def step_back(self, i, force, moment):
-        """Set body i, which is given at time zero, half a step back; held bodies stay."""
-        if self.is_due(i) == 1:
-            linear, angular, _ = self.impulse(i, force, moment)
-            velocity = self.state.velocity[i] - linear * self.tables.mass_inverse[i]
-            momentum = self.state.angular_momentum[i] - angular
-            self.state.velocity[i], self.state.angular_momentum[i] = velocity, momentum
-            self.state.spin[i] = self.advance.spin(i, momentum)
+            linear *= self.tables.mass_inverse[i]
+            if back == 1:
+                self.state.velocity[i], self.state.angular_momentum[i] = (
+                    before - linear,
+                    spun - angular,
+                )
+                self.state.spin[i] = self.advance.spin(i, spun - angular)
+            else:
+                velocity, momentum = self.held(i, before + linear, spun + angular)
+                mean = 0.5 * (before + velocity)
+                turning = self.advance.spin(i, 0.5 * (spun + momentum))
+                for e in ti.static(range(len(self.tables.loads))):
+                    for k in ti.static(range(3)):
+                        work = kick[e, k] * mean[k] + kick[e, 3 + k] * turning[k]
+                        account[e] = account[e] + work
+                if ti.static(len(self.tables.supports) > 0):
+                    push = self.tables.mass[i] * (velocity - (before + linear))
+                    work = push.dot(mean) + (momentum - (spun + angular)).dot(turning)
+                    account[ti.static(len(self.tables.loads))] = work
+        return velocity, momentum, account
 
     @ti.func
     def bond_heat(self, b):
