@@ -227,22 +227,32 @@ def test_bodies_that_are_apart_miss_nothing(seed):
     assert missed(alone) == set() and alone.report.unresolved == ()
 
 
-def thrown(contact, material=CONCRETE):
-    """Two blocks of which one hits the other at 50 m/s, for the time of a passage by a third."""
+def softened(share):
+    """Concrete with so much of its contact stiffness and damping."""
+    return replace(
+        CONCRETE,
+        contact_stiffness=share * CONCRETE.contact_stiffness,
+        contact_damping=share * CONCRETE.contact_damping,
+    )
+
+
+def thrown(contact, material):
+    """Two blocks of which one hits the other at 50 m/s, for the time of two thirds of a passage."""
     bonds = [effects.BondDamping(), contact, effects.Friction()]
     mesh = beside(THROWN, THROWN, [CELL + 1e-4, 0.2 * CELL, 0.1 * CELL])
     simulation = Simulation(Scene(mesh, material, bonds), Uniform(STEP), driver="resident")
     second = np.arange(mesh.body_count) >= THROWN.body_count
     velocity = np.outer(second, [-50.0, 0.0, 0.0])
     simulation.state.set_motion(simulation.model.centre, None, velocity)
-    return run_simulation(simulation, until=CELL / 150.0, samples=SAMPLES, progress=None)
+    return run_simulation(simulation, until=CELL / 75.0, samples=SAMPLES, progress=None)
 
 
 def test_blocks_do_not_pass_through_each_other_unseen():
-    stopped = thrown(effects.SphereContact())
+    # A tenth, so that the step resolves the dashpots of all spheres of a body.
+    stopped = thrown(effects.SphereContact(), softened(0.1))
     assert stopped.report.interpenetration.share < NOTABLE
     assert missed(stopped) == set() and stopped.report.unresolved == ()
-    passed = thrown(effects.SphereContact(outer_faces=False))
+    passed = thrown(effects.SphereContact(outer_faces=False), softened(0.1))
     assert missed(passed) == {"SphereContact(outer_faces=True)"}
     assert passed.report.interpenetration.share > NOTABLE
     assert any(
@@ -251,13 +261,9 @@ def test_blocks_do_not_pass_through_each_other_unseen():
 
 
 def test_contact_that_is_too_soft_diverges_in_words_or_warns(seed):
+    """Spheres of 1.5 kN/m, a hundred by 5 mm, take 2 J of the 370 J: nothing is stopped."""
     draw = np.random.default_rng(seed)
-    softer = 10.0 ** draw.uniform(-7.0, -4.0)
-    soft = replace(
-        CONCRETE,
-        contact_stiffness=softer * CONCRETE.contact_stiffness,
-        contact_damping=softer * CONCRETE.contact_damping,
-    )
+    soft = softened(10.0 ** draw.uniform(-8.0, -6.0))
     try:
         report = thrown(effects.SphereContact(), soft).report
     except SimulationDiverged as error:
@@ -273,7 +279,7 @@ def test_shared_volume_does_not_depend_on_place_direction_or_order(seed):
     bodies = apart(count, 1.0)
     points = bodies.points + 0.2 * draw.normal(size=bodies.points.shape)
     mesh = checked_mesh(points, bodies.tetrahedra, {})
-    position, (turn, rotation) = 0.8 * draw.random((count, 3)), quaternions(draw, count)
+    position, (turn, _) = 0.8 * draw.random((count, 3)), quaternions(draw, count)
     first = shares(mesh, position, turn)
     about, turned = (each[0] for each in quaternions(draw, 1))
     order = draw.permutation(count)
