@@ -92,13 +92,16 @@ class AirDrag(Effect):
 
 @pytest.mark.parametrize("method", [Uniform(1e-4), ImplicitDashpots(1e-4)], ids=lambda m: m.name)
 def test_air_drag_is_a_load_of_one_class(method):
-    """v_n = v_0 (1 - rate dt)^n to round-off, as the force is taken at the beginning of a step."""
+    """v_n = v_0 (1 + rate dt / 2) (1 - rate dt)^n to round-off: forces act in the middle of steps.
+
+    The velocity that is given is at time zero, that of the step half a step before.
+    """
     rate, steps, speed = 30.0, 50, np.array([2.0, -1.0, 0.5])
     simulation = Simulation(Scene(single(), CONCRETE, [AirDrag(rate)]), method)
     simulation.state.set_motion(simulation.model.centre, [[1.0, 0.0, 0.0, 0.0]], [speed])
     simulation.advance_to(steps)
     velocity = simulation.state.motion()["velocity"][0]
-    expected = speed * (1.0 - rate * 1e-4) ** steps
+    expected = speed * (1.0 + 0.5 * rate * 1e-4) * (1.0 - rate * 1e-4) ** steps
     np.testing.assert_allclose(velocity, expected, rtol=4 * steps * np.finfo(float).eps)
     account = simulation.energy_balance.account()
     assert abs(account["residual"]) < 1e-12 * simulation.energy_balance.start_energy
