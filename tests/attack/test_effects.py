@@ -42,20 +42,20 @@ class Drawn:
 
     def __init__(self, seed):
         draw = np.random.default_rng(seed)
-        strength = CONCRETE.tensile_strength * 10.0 ** draw.uniform(-1.0, 1.0)
+        strength = CONCRETE.tensile_strength * 10.0 ** draw.uniform(-3.0, 0.5)
         failure = strength**2 / (2.0 * CONCRETE.normal_stiffness)
         self.material = replace(
             CONCRETE,
             tensile_strength=strength,
-            cohesion=CONCRETE.cohesion * 10.0 ** draw.uniform(-1.0, 1.0),
+            cohesion=CONCRETE.cohesion * 10.0 ** draw.uniform(-3.0, 0.5),
             fracture_energy=failure * (1.0 + 10.0 ** draw.uniform(-1.0, 1.0)),
             friction=draw.choice([0.0, 0.1, 0.6]),
             contact_damping=draw.choice([0.0, 0.01, 0.1]) * CONCRETE.contact_damping,
             **({"normal_damping": 0.0, "shear_damping": 0.0} if draw.random() < 0.3 else {}),
         )
-        self.gap = 10.0 ** draw.uniform(-5.0, -3.0)
+        self.gap = 10.0 ** draw.uniform(-5.0, -3.5)
         self.mesh = beside(TARGET, THROWN, [2 * CELL + self.gap, *(0.3 * CELL * draw.random(2))])
-        self.speed = 10.0 ** draw.uniform(-1.0, 2.0) * draw.choice([-1.0, -1.0, -1.0, 1.0])
+        self.speed = 10.0 ** draw.uniform(0.0, 1.7) * draw.choice([-1.0, -1.0, -1.0, 1.0])
         thrown = np.arange(self.mesh.body_count) >= TARGET.body_count
         self.velocity = np.outer(thrown, [self.speed, *draw.normal(size=2)])
         weight = effects.Gravity(tuple(10.0 ** draw.uniform(0.0, 4.0) * draw.normal(size=3)))
