@@ -319,10 +319,12 @@ class Simulation(Uncopied):
 
     def report(self) -> Report:
         """Report of the run so far."""
+        counts = [int(value) for value in self.schedule.evaluations.to_numpy()]
+        if self.energy_balance is None:
+            raise InputError("report must be asked for once the simulation was started, got none")
         # A look of its own: to report changes nothing of what later samples find.
         shared_volume = copy.copy(self.shared_volume)
         shared_volume.sample(self.time_s, finished=True)
-        counts = [int(value) for value in self.schedule.evaluations.to_numpy()]
         linear, angular = self.energy_balance.momentum_errors()
         levels = self.state.level.to_numpy()
         tables = self.energy_balance.tables()

@@ -27,7 +27,7 @@ class Readings:
         self.contacts, self.half_step = advance.contacts, HalfStep(advance)
 
     def pushes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Forces [N] and moments [N m] of contacts on every body now, (body_count, 6).
+        """Impulses [N s] and moments [N m s] of contacts in half a step, (body_count, 6).
 
         Summed in the order of the pairs, so that no thread changes a bit. Also the heat of each
         pair's dashpots and friction by which the booked one is behind [J], (pairs, 2).
@@ -44,13 +44,13 @@ class Readings:
 
     @ti.kernel
     def _push(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
-        """Force and moment of every pair's contacts on its first and second body, and heats."""
+        """Impulse and moment of every pair's contacts on both bodies in half a step, and heats."""
         for a in range(self.contacts.store.near_count[None]):
             p = self.contacts.store.near_slot[a]
             found, half = self.advance.forces_now(p), self.half_step.pair_step(p)
             for k in ti.static(range(3)):
-                table[a, k], table[a, 3 + k] = -found.force[k], found.moment_i[k]
-                table[a, 6 + k], table[a, 9 + k] = found.force[k], found.moment_j[k]
+                table[a, k], table[a, 3 + k] = -half * found.force[k], half * found.moment_i[k]
+                table[a, 6 + k], table[a, 9 + k] = half * found.force[k], half * found.moment_j[k]
             table[a, 12], table[a, 13] = half * found.dragged, half * found.rubbed
 
     def bodies(self) -> np.ndarray:
@@ -84,10 +84,10 @@ class Readings:
     ):
         """Bring what is recorded of bodies to the present, or set them back; one for all uses."""
         for i in range(self.tables.body_count[None]):
-            force, moment = vec3(0.0), vec3(0.0)
+            linear, angular = vec3(0.0), vec3(0.0)
             for k in ti.static(range(3)):
-                force[k], moment[k] = pushed[i, k], pushed[i, 3 + k]
-            velocity, momentum, works = self.half_step.visit(i, force, moment, back)
+                linear[k], angular[k] = pushed[i, k], pushed[i, 3 + k]
+            velocity, momentum, works = self.half_step.visit(i, linear, angular, back)
             spin = self.advance.spin(i, momentum)
             moving = self.tables.mass[i] * velocity.norm_sqr()
             table[i, 0] = 0.5 * (moving + momentum.dot(spin))
