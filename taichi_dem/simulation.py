@@ -205,7 +205,7 @@ class Simulation(Uncopied):
         self.driver.prepare()
         self._check_capacity()
         compiling("energy balance", 0.85)
-        self.readings.step_back(self.readings.pushes())
+        self.readings.step_back()
         self._open_balance()
         self.sample()
         self.divergence_check.check()
@@ -228,8 +228,7 @@ class Simulation(Uncopied):
     def motion(self) -> dict[str, np.ndarray]:
         """Arrays of ``State.motion``, with velocities and spins at the time of the positions."""
         motion = self.state.motion()
-        table = np.zeros((self.model.body_count, 9))
-        self.readings.motion(self.readings.pushes(), table)
+        table = self.readings.motion()
         for place, name in enumerate(("velocity", "spin", "angular_momentum")):
             motion[name] = table[:, 3 * place : 3 * place + 3].copy()
         return motion
@@ -320,10 +319,12 @@ class Simulation(Uncopied):
 
     def report(self) -> Report:
         """Report of the run so far."""
+        counts = [int(value) for value in self.schedule.evaluations.to_numpy()]
+        if self.energy_balance is None:
+            raise InputError("report must be asked for once the simulation was started, got none")
         # A look of its own: to report changes nothing of what later samples find.
         shared_volume = copy.copy(self.shared_volume)
         shared_volume.sample(self.time_s, finished=True)
-        counts = [int(value) for value in self.schedule.evaluations.to_numpy()]
         linear, angular = self.energy_balance.momentum_errors()
         levels = self.state.level.to_numpy()
         tables = self.energy_balance.tables()

@@ -99,14 +99,9 @@ class EnergyBalance:
         strain, dashpot, slip, release, softening. A row a pair: strain, dashpots, friction,
         injected, so far as its first body has not taken them.
         """
-        n, bonds = self.model.body_count, self.model.bond_count
-        body, bond = np.zeros((n, 6)), np.zeros((bonds, 5))
-        self.readings.bodies(self.readings.pushes(), body)
+        bond = np.zeros((self.model.bond_count, 5))
         self.readings.bonds(bond)
-        pair = np.zeros((self._pair_count(), 4))
-        if self.contacts is not None:
-            self.readings.pairs(pair)
-        return body, bond, pair
+        return self.readings.bodies(), bond, self.readings.pairs()
 
     def _residual(self, terms):
         given = terms["load_work"] + terms["support_work"] + terms["injected"] + self.start_energy
@@ -126,9 +121,7 @@ class EnergyBalance:
 
     def _works(self):
         """Work of each load, and of all supports last, on every body since the start [J]."""
-        works = np.zeros_like(self.start_works)
-        self.readings.works(self.readings.pushes(), works)
-        return works - self.start_works
+        return self.readings.works() - self.start_works
 
     def support_works(self, index: int) -> np.ndarray:
         """Work [J] of all supports on the bodies that one of them holds, (body_count,).
@@ -156,6 +149,3 @@ class EnergyBalance:
         sizes = [np.linalg.norm(rows[:, k : k + 3], axis=1).sum() for k in (0, 3, 6, 9)]
         linear, angular = max(sizes[0], sizes[2], 1e-300), max(sizes[1], sizes[3], 1e-300)
         return np.linalg.norm(lost[:3]) / linear, np.linalg.norm(lost[3:]) / angular
-
-    def _pair_count(self):
-        return self.contacts.store.near_count[None] if self.contacts is not None else 0

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Union
+from typing import TYPE_CHECKING, Optional, Union
 
 import numpy as np
 
@@ -215,12 +215,14 @@ class MissingEffects:
         self.last_s, self.leap = saved["looks"].tolist()
         self.strain = saved["strain"].copy()
 
-    def findings(self, volume: SharedVolume) -> tuple[MissingEffect, ...]:
+    def findings(self, volume: Optional[SharedVolume] = None) -> tuple[MissingEffect, ...]:
         """A ``MissingEffect`` for each effect that would have acted; a tuple, empty for none.
 
-        volume: a look at the end, which also finds bodies that have moved by little.
+        volume: a look at the end, which also finds bodies that have moved by little; the last look
+        by default.
         """
         needed = {name: replace(finding) for name, finding in self.needed.items()}
+        volume = self.volume if volume is None else volume
         self._see_bodies(needed, volume, int(self.state.tick[None]) * self.schedule.tick_seconds)
         ticks = self.state.passed.to_numpy()[: self.model.bond_count]
         for column, name in enumerate(("tension", "shear")):

@@ -26,79 +26,81 @@ class Readings:
         self.tables, self.state, self.advance = tables, state, advance
         self.contacts, self.half_step = advance.contacts, HalfStep(advance)
 
-    def pushes(self) -> np.ndarray:
-        """Forces [N] and moments [N m] of contacts on every body now, (body_count, 6).
+    def pushes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Impulses [N s] and moments [N m s] of contacts in half a step, (body_count, 6).
 
-        Summed in the order of the pairs, so that no thread changes a bit.
+        Summed in the order of the pairs, so that no thread changes a bit. Also the heat of each
+        pair's dashpots and friction by which the booked one is behind [J], (pairs, 2).
         """
         pushed = np.zeros((int(values(self.tables.body_count)), 6))
-        if self.contacts is not None and int(values(self.contacts.store.near_count)):
+        count = int(values(self.contacts.store.near_count)) if self.contacts is not None else 0
+        table = np.zeros((count, 14))
+        if count:
             bodies = self.contacts.store.near_table()[0]
-            table = np.zeros((len(bodies), 12))
             self._push(table)
             for side in range(2):
                 np.add.at(pushed, bodies[:, side], table[:, 6 * side : 6 * side + 6])
-        return pushed
+        return pushed, table[:, 12:]
 
     @ti.kernel
     def _push(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
-        """Force and moment of every pair's contacts on its first and on its second body."""
+        """Impulse and moment of every pair's contacts on both bodies in half a step, and heats."""
         for a in range(self.contacts.store.near_count[None]):
-            found = self.advance.forces_now(self.contacts.store.near_slot[a])
+            p = self.contacts.store.near_slot[a]
+            found, half = self.advance.forces_now(p), self.half_step.pair_step(p)
             for k in ti.static(range(3)):
-                table[a, k], table[a, 3 + k] = -found.force[k], found.moment_i[k]
-                table[a, 6 + k], table[a, 9 + k] = found.force[k], found.moment_j[k]
+                table[a, k], table[a, 3 + k] = -half * found.force[k], half * found.moment_i[k]
+                table[a, 6 + k], table[a, 9 + k] = half * found.force[k], half * found.moment_j[k]
+            table[a, 12], table[a, 13] = half * found.dragged, half * found.rubbed
 
-    @ti.func
-    def _pushed(self, pushed: ti.template(), i):
-        """Force and moment of the contacts of body i, rows of ``pushes``."""
-        force, moment = vec3(0.0), vec3(0.0)
-        for k in ti.static(range(3)):
-            force[k], moment[k] = pushed[i, k], pushed[i, 3 + k]
-        return force, moment
+    def bodies(self) -> np.ndarray:
+        """Kinetic energy, work of loads and supports, contact heats of every body [J], (n, 6)."""
+        return self._table()[:, :6]
 
-    @ti.kernel
-    def motion(
-        self,
-        pushed: ti.types.ndarray(dtype=ti.f64, ndim=2),
-        table: ti.types.ndarray(dtype=ti.f64, ndim=2),
-    ):
-        """Velocity, spin and angular momentum of every body at the time of its position."""
-        for i in range(self.tables.body_count[None]):
-            force, moment = self._pushed(pushed, i)
-            velocity, momentum = self.half_step.motion(i, force, moment)
-            spin = self.advance.spin(i, momentum)
-            for k in ti.static(range(3)):
-                table[i, k], table[i, 3 + k], table[i, 6 + k] = velocity[k], spin[k], momentum[k]
+    def motion(self) -> np.ndarray:
+        """Velocity, spin and angular momentum of every body at the time of its position, (n, 9)."""
+        return self._table()[:, 6:15]
 
-    @ti.kernel
-    def step_back(self, pushed: ti.types.ndarray(dtype=ti.f64, ndim=2)):
+    def works(self) -> np.ndarray:
+        """Work of each load, and of all supports last, on every body [J], (n, loads + 1)."""
+        return self._table()[:, 15:]
+
+    def step_back(self) -> None:
         """Set the velocities, which are given at time zero, half a step back."""
-        for i in range(self.tables.body_count[None]):
-            force, moment = self._pushed(pushed, i)
-            self.half_step.step_back(i, force, moment)
+        self._table(back=1)
+
+    def _table(self, back=0):
+        pushed, _ = self.pushes()
+        table = np.zeros((len(pushed), 16 + len(self.tables.loads)))
+        self._visit(pushed, back, table)
+        return table
 
     @ti.kernel
-    def bodies(
+    def _visit(
         self,
         pushed: ti.types.ndarray(dtype=ti.f64, ndim=2),
+        back: ti.i32,
         table: ti.types.ndarray(dtype=ti.f64, ndim=2),
     ):
-        """Kinetic energy, work of loads and supports, contact heats of every body [J]."""
+        """Bring what is recorded of bodies to the present, or set them back; one for all uses."""
         for i in range(self.tables.body_count[None]):
-            force, moment = self._pushed(pushed, i)
-            velocity, momentum = self.half_step.motion(i, force, moment)
-            turning = momentum.dot(self.advance.spin(i, momentum))
+            linear, angular = vec3(0.0), vec3(0.0)
+            for k in ti.static(range(3)):
+                linear[k], angular[k] = pushed[i, k], pushed[i, 3 + k]
+            velocity, momentum, works = self.half_step.visit(i, linear, angular, back)
+            spin = self.advance.spin(i, momentum)
             moving = self.tables.mass[i] * velocity.norm_sqr()
-            table[i, 0] = 0.5 * (moving + turning)
-            works = self.half_step.works(i, force, moment)
-            for e in ti.static(range(len(self.tables.loads))):
-                table[i, 1] = table[i, 1] + (self.state.load_work[i][e] + works[e])
-            held = ti.static(len(self.tables.loads))
-            table[i, 2] = self.state.load_work[i][held] + works[held]
-            if ti.static(self.tables.has_contact):
-                for k in ti.static(range(3)):
+            table[i, 0] = 0.5 * (moving + momentum.dot(spin))
+            for k in ti.static(range(3)):
+                table[i, 6 + k], table[i, 9 + k] = velocity[k], spin[k]
+                table[i, 12 + k] = momentum[k]
+                if ti.static(self.tables.has_contact):
                     table[i, 3 + k] = self.state.contact_heat[i][k]
+            for e in ti.static(range(len(self.tables.loads) + 1)):
+                table[i, 15 + e] = self.state.load_work[i][e] + works[e]
+            for e in ti.static(range(len(self.tables.loads))):
+                table[i, 1] = table[i, 1] + table[i, 15 + e]
+            table[i, 2] = table[i, ti.static(15 + len(self.tables.loads))]
 
     @ti.kernel
     def bonds(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
@@ -113,29 +115,22 @@ class Readings:
                 spent = self.tables.tension.spent(b, 3 * b + q)
                 table[b, 4] = table[b, 4] + self.tables.unit_area[b] * spent
 
+    def pairs(self) -> np.ndarray:
+        """Strain, and heats that the first body has not taken, of every pair [J], (pairs, 4)."""
+        _, heats = self.pushes()
+        table = np.zeros((len(heats), 4))
+        if len(heats):
+            self._pairs(table)
+            table[:, 1:3] += heats
+        return table
+
     @ti.kernel
-    def pairs(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
-        """Strain, and heats that the first body has not taken, of every pair [J]."""
+    def _pairs(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
         for a in range(self.contacts.store.near_count[None]):
             p = self.contacts.store.near_slot[a]
             table[a, 0] = self.contacts.pair_energy(p)
-            found, half = self.advance.forces_now(p), self.half_step.pair_step(p)
-            heat = self.contacts.store.heat[p] + half * vec3(found.dragged, found.rubbed, 0.0)
             for k in ti.static(range(3)):
-                table[a, 1 + k] = heat[k]
-
-    @ti.kernel
-    def works(
-        self,
-        pushed: ti.types.ndarray(dtype=ti.f64, ndim=2),
-        work: ti.types.ndarray(dtype=ti.f64, ndim=2),
-    ):
-        """Work of each load, and of all supports last, on every body [J]."""
-        for i in range(self.tables.body_count[None]):
-            force, moment = self._pushed(pushed, i)
-            works = self.half_step.works(i, force, moment)
-            for e in ti.static(range(len(self.tables.loads) + 1)):
-                work[i, e] = self.state.load_work[i][e] + works[e]
+                table[a, 1 + k] = self.contacts.store.heat[p][k]
 
     @ti.kernel
     def supported(self, index: ti.i32, marks: ti.types.ndarray(dtype=ti.i32, ndim=1)):

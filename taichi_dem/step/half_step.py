@@ -15,8 +15,8 @@ from taichi_dem.step.advance import Advance
 class HalfStep:
     """Reads what the first half of the coming step does; nothing changes in the run.
 
-    Forces of contacts come from the caller, as they are sums over pairs. Only bodies that stand at
-    the present time are brought forward: between two largest steps others wait for theirs.
+    Impulses of contacts come from the caller, as they are sums over pairs. Only bodies that stand
+    at the present time are brought forward: between two largest steps others wait for theirs.
     """
 
     def __init__(self, advance: Advance):
@@ -44,20 +44,17 @@ class HalfStep:
         return held
 
     @ti.func
-    def impulse(self, i, force, moment):
-        """Impulse and moment on body i in half a step, and those of each load, a row each.
+    def impulse(self, i, linear, angular):
+        """Impulse and moment on body i by which it is behind, and those of each load, a row each.
 
-        force [N], moment [N m]: of its contacts.
+        linear [N s], angular [N m s]: of its contacts, as ``pair`` gives them. Of a bond it is half
+        of what waits in the slot, also where the other body steps finer: earlier impulses of their
+        finer steps have been taken.
         """
-        half = 0.5 * self.schedule.own_step(i)
-        linear, angular = half * force, half * moment
         for f in range(4):
-            j = self.tables.neighbour[4 * i + f]
-            if j >= 0:
-                # A slot holds the impulse of the finer step of its two bodies.
-                share = half / self.schedule.pair_step(i, j)
-                linear += share * self.state.slot[4 * i + f][0:3]
-                angular += share * self.state.slot[4 * i + f][3:6]
+            linear += 0.5 * self.state.slot[4 * i + f][0:3]
+            angular += 0.5 * self.state.slot[4 * i + f][3:6]
+        half = 0.5 * self.schedule.own_step(i)
         kick = ti.Matrix.zero(real, ti.static(max(1, len(self.tables.loads))), 6)
         step = self.schedule.own_step(i)
         motion = self.state.body_motion(i, self.schedule.seconds(self.state.tick[None]), step)
@@ -80,46 +77,38 @@ class HalfStep:
         return velocity, momentum
 
     @ti.func
-    def motion(self, i, force, moment):
-        """Velocity [m/s] and angular momentum [kg m^2/s] of body i at the present time."""
-        velocity, momentum = self.state.velocity[i], self.state.angular_momentum[i]
-        if self.is_due(i) == 1:
-            linear, angular, _ = self.impulse(i, force, moment)
-            velocity, momentum = self.held(
-                i, velocity + linear * self.tables.mass_inverse[i], momentum + angular
-            )
-        return velocity, momentum
+    def visit(self, i, pushed, turned, back):
+        """Velocity [m/s] and angular momentum [kg m^2/s] of body i now, and works in half a step.
 
-    @ti.func
-    def works(self, i, force, moment):
-        """Work [J] of each load, and of all supports last, on body i in half a step."""
+        pushed, turned: impulse [N s] and moment [N m s] of its contacts in half a step. Works [J]:
+        of each load, and of all supports last. back: 1 to set the body, whose motion is
+        given at time zero, half a step back instead; held bodies stay.
+        """
         account = ti.Vector.zero(real, ti.static(len(self.tables.loads) + 1))
+        before, spun = self.state.velocity[i], self.state.angular_momentum[i]
+        velocity, momentum = before, spun
         if self.is_due(i) == 1:
-            before, spun = self.state.velocity[i], self.state.angular_momentum[i]
-            linear, angular, kick = self.impulse(i, force, moment)
-            free, loose = before + linear * self.tables.mass_inverse[i], spun + angular
-            velocity, momentum = self.held(i, free, loose)
-            mean = 0.5 * (before + velocity)
-            turning = self.advance.spin(i, 0.5 * (spun + momentum))
-            for e in ti.static(range(len(self.tables.loads))):
-                for k in ti.static(range(3)):
-                    work = kick[e, k] * mean[k] + kick[e, 3 + k] * turning[k]
-                    account[e] = account[e] + work
-            if ti.static(len(self.tables.supports) > 0):
-                push = self.tables.mass[i] * (velocity - free)
-                work = push.dot(mean) + (momentum - loose).dot(turning)
-                account[ti.static(len(self.tables.loads))] = work
-        return account
-
-    @ti.func
-    def step_back(self, i, force, moment):
-        """Set body i, which is given at time zero, half a step back; held bodies stay."""
-        if self.is_due(i) == 1:
-            linear, angular, _ = self.impulse(i, force, moment)
-            velocity = self.state.velocity[i] - linear * self.tables.mass_inverse[i]
-            momentum = self.state.angular_momentum[i] - angular
-            self.state.velocity[i], self.state.angular_momentum[i] = velocity, momentum
-            self.state.spin[i] = self.advance.spin(i, momentum)
+            linear, angular, kick = self.impulse(i, pushed, turned)
+            linear *= self.tables.mass_inverse[i]
+            if back == 1:
+                self.state.velocity[i], self.state.angular_momentum[i] = (
+                    before - linear,
+                    spun - angular,
+                )
+                self.state.spin[i] = self.advance.spin(i, spun - angular)
+            else:
+                velocity, momentum = self.held(i, before + linear, spun + angular)
+                mean = 0.5 * (before + velocity)
+                turning = self.advance.spin(i, 0.5 * (spun + momentum))
+                for e in ti.static(range(len(self.tables.loads))):
+                    for k in ti.static(range(3)):
+                        work = kick[e, k] * mean[k] + kick[e, 3 + k] * turning[k]
+                        account[e] = account[e] + work
+                if ti.static(len(self.tables.supports) > 0):
+                    push = self.tables.mass[i] * (velocity - (before + linear))
+                    work = push.dot(mean) + (momentum - (spun + angular)).dot(turning)
+                    account[ti.static(len(self.tables.loads))] = work
+        return velocity, momentum, account
 
     @ti.func
     def bond_heat(self, b):

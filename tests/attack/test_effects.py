@@ -42,20 +42,20 @@ class Drawn:
 
     def __init__(self, seed):
         draw = np.random.default_rng(seed)
-        strength = CONCRETE.tensile_strength * 10.0 ** draw.uniform(-1.0, 1.0)
+        strength = CONCRETE.tensile_strength * 10.0 ** draw.uniform(-3.0, 0.5)
         failure = strength**2 / (2.0 * CONCRETE.normal_stiffness)
         self.material = replace(
             CONCRETE,
             tensile_strength=strength,
-            cohesion=CONCRETE.cohesion * 10.0 ** draw.uniform(-1.0, 1.0),
+            cohesion=CONCRETE.cohesion * 10.0 ** draw.uniform(-3.0, 0.5),
             fracture_energy=failure * (1.0 + 10.0 ** draw.uniform(-1.0, 1.0)),
             friction=draw.choice([0.0, 0.1, 0.6]),
             contact_damping=draw.choice([0.0, 0.01, 0.1]) * CONCRETE.contact_damping,
             **({"normal_damping": 0.0, "shear_damping": 0.0} if draw.random() < 0.3 else {}),
         )
-        self.gap = 10.0 ** draw.uniform(-5.0, -3.0)
+        self.gap = 10.0 ** draw.uniform(-5.0, -3.5)
         self.mesh = beside(TARGET, THROWN, [2 * CELL + self.gap, *(0.3 * CELL * draw.random(2))])
-        self.speed = 10.0 ** draw.uniform(-1.0, 2.0) * draw.choice([-1.0, -1.0, -1.0, 1.0])
+        self.speed = 10.0 ** draw.uniform(0.0, 1.7) * draw.choice([-1.0, -1.0, -1.0, 1.0])
         thrown = np.arange(self.mesh.body_count) >= TARGET.body_count
         self.velocity = np.outer(thrown, [self.speed, *draw.normal(size=2)])
         weight = effects.Gravity(tuple(10.0 ** draw.uniform(0.0, 4.0) * draw.normal(size=3)))
@@ -227,22 +227,32 @@ def test_bodies_that_are_apart_miss_nothing(seed):
     assert missed(alone) == set() and alone.report.unresolved == ()
 
 
-def thrown(contact, material=CONCRETE):
-    """Two blocks of which one hits the other at 50 m/s, for the time of a passage by a third."""
+def softened(share):
+    """Concrete with so much of its contact stiffness and damping."""
+    return replace(
+        CONCRETE,
+        contact_stiffness=share * CONCRETE.contact_stiffness,
+        contact_damping=share * CONCRETE.contact_damping,
+    )
+
+
+def thrown(contact, material):
+    """Two blocks of which one hits the other at 50 m/s, for the time of two thirds of a passage."""
     bonds = [effects.BondDamping(), contact, effects.Friction()]
     mesh = beside(THROWN, THROWN, [CELL + 1e-4, 0.2 * CELL, 0.1 * CELL])
     simulation = Simulation(Scene(mesh, material, bonds), Uniform(STEP), driver="resident")
     second = np.arange(mesh.body_count) >= THROWN.body_count
     velocity = np.outer(second, [-50.0, 0.0, 0.0])
     simulation.state.set_motion(simulation.model.centre, None, velocity)
-    return run_simulation(simulation, until=CELL / 150.0, samples=SAMPLES, progress=None)
+    return run_simulation(simulation, until=CELL / 75.0, samples=SAMPLES, progress=None)
 
 
 def test_blocks_do_not_pass_through_each_other_unseen():
-    stopped = thrown(effects.SphereContact())
+    # A tenth, so that the step resolves the dashpots of all spheres of a body.
+    stopped = thrown(effects.SphereContact(), softened(0.1))
     assert stopped.report.interpenetration.share < NOTABLE
     assert missed(stopped) == set() and stopped.report.unresolved == ()
-    passed = thrown(effects.SphereContact(outer_faces=False))
+    passed = thrown(effects.SphereContact(outer_faces=False), softened(0.1))
     assert missed(passed) == {"SphereContact(outer_faces=True)"}
     assert passed.report.interpenetration.share > NOTABLE
     assert any(
@@ -251,13 +261,9 @@ def test_blocks_do_not_pass_through_each_other_unseen():
 
 
 def test_contact_that_is_too_soft_diverges_in_words_or_warns(seed):
+    """Spheres of 1.5 kN/m, a hundred by 5 mm, take 2 J of the 370 J: nothing is stopped."""
     draw = np.random.default_rng(seed)
-    softer = 10.0 ** draw.uniform(-7.0, -4.0)
-    soft = replace(
-        CONCRETE,
-        contact_stiffness=softer * CONCRETE.contact_stiffness,
-        contact_damping=softer * CONCRETE.contact_damping,
-    )
+    soft = softened(10.0 ** draw.uniform(-8.0, -6.0))
     try:
         report = thrown(effects.SphereContact(), soft).report
     except SimulationDiverged as error:

@@ -5,7 +5,9 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -178,7 +180,9 @@ def test_a_user_may_have_another_users_home(tmp_path, digest):
     home, out = tmp_path / "home", tmp_path / "out"
     home.mkdir(mode=0o700)
     out.mkdir()
-    for folder in (out, tmp_path, *list(tmp_path.parents)[:2]):
+    temporary = Path(tempfile.gettempdir())
+    parents = [folder for folder in tmp_path.parents if temporary in folder.parents]
+    for folder in (out, tmp_path, *parents):
         os.chmod(folder, 0o777)
     other = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"]
     environment = users_environment(PYTHONPATH=ROOT, HOME=str(home))

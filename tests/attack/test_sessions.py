@@ -393,7 +393,7 @@ def test_idle_engines_make_way_where_taichi_has_no_room_for_another(monkeypatch)
         simulation = Simulation(Scene(pair(), CONCRETE, [Frozen(float(number))]), METHOD)
         simulation.advance_to(2)
         # Gravity alone, over two steps from rest.
-        speed = simulation.state.velocity.to_numpy()[:, 1]
+        speed = simulation.motion()["velocity"][:, 1]
         np.testing.assert_allclose(speed, -9.81 * number * 2e-8, rtol=1e-12, atol=1e-25)
     used[0].advance_to(3)
     assert bits(used[0]) == alone(0, 3)

@@ -39,7 +39,7 @@ class Watched:
 
     def findings(self):
         """What a report would say."""
-        return self.watch.findings(self.watch.volume)
+        return self.watch.findings()
 
 
 @pytest.mark.parametrize(
