@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.fixed_order import dot, length
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.tetrahedra import all_faces, area_vectors
@@ -28,6 +29,9 @@ class FaceRims:
     edge: np.ndarray
     corner: np.ndarray
     ends: np.ndarray
+
+    def __repr__(self):
+        return by_fields(self)
 
 
 def face_rims(mesh: Mesh, outer: np.ndarray) -> FaceRims:
