@@ -234,10 +234,7 @@ class Simulation(Uncopied):
         return motion
 
     def sample(self) -> None:
-        """Sample missing effects, slip of bonds, and bonds that the step does not resolve.
-
-        Called at recording times, as the step itself does not check them.
-        """
+        """Sample missing effects, slip of bonds, and bonds that the step does not resolve."""
         self.missing_effects.sample(self.time_s)
         self.divergence_check.check_shared(self.shared_volume)
         self.step_resolution.sample()

@@ -51,6 +51,12 @@ def drawn_method(rng, distance=1e-5):
     )[rng.integers(4)]
 
 
+def drawn_contact(rng):
+    """Contact of either kind, and friction of either kind."""
+    contact = (effects.SphereContact, effects.FaceContact)[rng.integers(2)]
+    return contact(), (effects.Friction, effects.StickingFriction)[rng.integers(2)]()
+
+
 def moved(mesh, method, peak, acceleration, steps):
     """Displacements and velocities after some steps of a damped bar with gas and weight."""
     gas = effects.GasPressure("left", peak=peak, rise=1e-5)
@@ -96,7 +102,7 @@ def flung(rng, method, *more):
 def test_momentum_is_kept_while_a_bar_flies_apart(seed):
     """Pair impulses cancel bit for bit; each update rounds a body's momentum by eps of it."""
     rng = np.random.default_rng(seed)
-    simulation = flung(rng, drawn_method(rng), effects.SphereContact(), effects.Friction())
+    simulation = flung(rng, drawn_method(rng), *drawn_contact(rng))
     simulation.advance_to(200)
     report = simulation.report()
     assert report.bond_evaluations > 0
@@ -134,8 +140,8 @@ def test_threads_and_drivers_give_the_same_bits(seed):
         if runtime.settings() is None or runtime.settings().threads != threads:
             runtime.stop()
             runtime.start(arch.chosen(), threads=threads)
-        method = drawn_method(rng)
-        simulation = flung(rng, method)
+        method, contact = drawn_method(rng), drawn_contact(rng)
+        simulation = flung(rng, method, *contact)
         drivers = "resident", "parallel"
         simulation.driver = simulation._driver(drivers[len(found)])
         simulation.advance_to(60)
