@@ -1,0 +1,146 @@
+"""An answer to a question that was asked with a tolerance: value, error bar, and its price."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any, Union
+
+import numpy as np
+
+from taichi_dem.kit.display import counted, in_brief
+
+#: A number, or one for each place of a curve.
+Values = Union[float, np.ndarray]
+
+
+@dataclass(frozen=True)
+class ErrorParts:
+    """Half-widths of an error bar by source, in the unit of the value.
+
+    step: of the time step. solver: of sweeps that end early. chance: of runs that differ by one
+    rounding or by their seeds. sampling: of the time over which a mean was taken. Sources are
+    independent: their squares add.
+    """
+
+    step: Values = 0.0
+    solver: Values = 0.0
+    chance: Values = 0.0
+    sampling: Values = 0.0
+
+    @property
+    def total(self) -> Values:
+        """Half-width of the whole bar."""
+        return sum(getattr(self, part.name) ** 2 for part in fields(self)) ** 0.5
+
+    def __str__(self):
+        found = {part.name: largest(getattr(self, part.name)) for part in fields(self)}
+        unit = 10.0 ** (_places(max(found.values())) if any(found.values()) else 0)
+        shown = (f"{name} {rounded(value, unit)}" for name, value in found.items() if value > 0.0)
+        return ", ".join(shown) or "no error found"
+
+
+@dataclass(frozen=True)
+class Expense:
+    """What one tolerance costs. measured: whether it was paid, or is predicted from runs."""
+
+    tolerance: float
+    seconds: float
+    measured: bool
+
+    def __str__(self):
+        how = "measured" if self.measured else "predicted"
+        return f"{100.0 * self.tolerance:g} %: {self.seconds:.2g} s {how}"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How an answer was found. method: in words, with its step. runs: number made of all kinds.
+
+    pilot_s, final_s: CPU seconds of the runs that chose and of those that answered.
+    """
+
+    method: str
+    runs: int
+    pilot_s: float
+    final_s: float
+
+    @property
+    def seconds(self) -> float:
+        """CPU seconds of all runs."""
+        return self.pilot_s + self.final_s
+
+    def __str__(self):
+        return f"{self.method}; {self.seconds:.2g} s, of which pilot {self.pilot_s:.2g} s"
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """Value of a goal with its error bar.
+
+    goal, unit: what was asked. value: a number, or one a place of a curve. error: half-width of the
+    bar that holds the true value with the given confidence. parts: of it, by source. tolerance:
+    the largest error that was allowed, as a share of the value. plan: how it was found.
+    result: of the finest run. cost_curve: what other tolerances would cost. shortfall: why the
+    error is larger than asked, and what would help; "" where it is not.
+    """
+
+    goal: str
+    unit: str
+    value: Values
+    parts: ErrorParts
+    tolerance: float
+    confidence: float
+    plan: Plan
+    result: Any = None
+    cost_curve: Sequence[Expense] = field(default_factory=tuple)
+    shortfall: str = ""
+
+    @property
+    def error(self) -> Values:
+        """Half-width of the error bar, in the unit of the value."""
+        return self.parts.total
+
+    @property
+    def share(self) -> float:
+        """Largest half-width as a share of the largest value; infinite where that is zero."""
+        size = largest(self.value)
+        return largest(self.error) / size if size else math.inf * largest(self.error)
+
+    @property
+    def reached(self) -> bool:
+        """Whether the bar is as narrow as asked."""
+        return not self.shortfall
+
+    def __repr__(self):
+        return in_brief(self, self.goal, self._bar(), self.shortfall)
+
+    def __str__(self):
+        line = f"{self._bar()} ({self.parts}); {self.plan}"
+        return f"{line}\n{self.shortfall}" if self.shortfall else line
+
+    def _bar(self):
+        if isinstance(self.value, np.ndarray):
+            return f"{counted(self.value.size, 'value')}, each to {largest(self.error):.2g} {self.unit}"
+        size = largest(self.error)
+        unit = 10.0 ** _places(size) if size else 0.0
+        ends = f" {self.unit}" if self.unit != "1" else ""
+        return f"{rounded(self.value, unit)} +- {rounded(size, unit)}{ends}"
+
+
+def largest(values: Values) -> float:
+    """Largest magnitude of a value or a curve."""
+    return float(np.abs(values).max(initial=0.0))
+
+
+def rounded(value: float, unit: float) -> str:
+    """A number to a power of ten that its error leaves certain; to six digits for unit 0."""
+    if unit == 0.0 or not math.isfinite(value):
+        return f"{value:.6g}"
+    decimals = max(0, round(-math.log10(unit)))
+    return f"{value:.{decimals}f}" if unit < 1e5 else f"{value:.3g}"
+
+
+def _places(error):
+    """Power of ten of the second digit of an error, of the first where that is at least 3."""
+    power = math.floor(math.log10(error))
+    return power if error / 10.0**power >= 3.0 else power - 1
