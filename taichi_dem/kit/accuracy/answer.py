@@ -120,7 +120,8 @@ class Answer:
 
     def _bar(self):
         if isinstance(self.value, np.ndarray):
-            return f"{counted(self.value.size, 'value')}, each to {largest(self.error):.2g} {self.unit}"
+            count = counted(self.value.size, "value")
+            return f"{count}, each to {largest(self.error):.2g} {self.unit}"
         size = largest(self.error)
         unit = 10.0 ** _places(size) if size else 0.0
         ends = f" {self.unit}" if self.unit != "1" else ""
