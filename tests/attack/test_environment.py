@@ -15,7 +15,7 @@ import pytest
 from tests.processes import users_environment
 from tests.scenes import ROOT
 
-ATTACKS = "the environment"
+ATTACKS = "environment: variables, folders, closed output, signals"
 PROGRAM = os.path.join(ROOT, "tests", "attack", "short_run.py")
 DONE, REFUSED = 0, 2
 
