@@ -21,7 +21,7 @@ from taichi_dem.needed_effects import recorded_difference
 from taichi_dem.simulate import run_simulation
 from tests.scenes import apart, beside, quaternions
 
-ATTACKS = "Effects: active, droppable, missed"
+ATTACKS = "effects: active, droppable, missed"
 
 STEP, SAMPLES = 5e-8, 10
 UNTIL = 800 * STEP
