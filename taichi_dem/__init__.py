@@ -17,7 +17,7 @@ A scene is a mesh, a material and the effects that act; ``simulate`` runs it::
 # First, out of order: it prepares the environment for ``import taichi``.
 from taichi_dem.kit import runtime  # isort: skip
 
-from taichi_dem import effects, methods
+from taichi_dem import effects, goals, methods
 from taichi_dem.kit.checkpoint import Checkpoint
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.progress.progress import Progress
@@ -35,6 +35,7 @@ from taichi_dem.output.record import write_paraview
 from taichi_dem.scene import Scene
 from taichi_dem.simulate import simulate
 from taichi_dem.simulation import Simulation
+from taichi_dem.solve import solve
 from taichi_dem.stability.quality import quality_report
 from taichi_dem.stability.step_control import StepControl
 from taichi_dem.stability.step_report import step_report
@@ -63,6 +64,7 @@ __all__ = [
     "__version__",
     "checked_mesh",
     "effects",
+    "goals",
     "in_space_order",
     "methods",
     "needed_effects",
@@ -70,6 +72,7 @@ __all__ = [
     "read_mesh",
     "runtime",
     "simulate",
+    "solve",
     "step_report",
     "write_paraview",
 ]

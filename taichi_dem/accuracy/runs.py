@@ -1,0 +1,87 @@
+"""Runs of one question: by level of the step, and twins that differ by one rounding."""
+
+from dataclasses import dataclass
+from typing import Any, Optional
+
+import numpy as np
+
+from taichi_dem.accuracy.job import Job, Methods
+from taichi_dem.kit.display import counted
+from taichi_dem.kit.progress.progress import Listener, Progress
+from taichi_dem.kit.study.timing import clock
+from taichi_dem.result import Result
+from taichi_dem.simulate import result_of, run_simulation
+from taichi_dem.simulation import Simulation
+
+#: How far a twin's bodies are displaced at the start, as a share of the size of the solid.
+_ROUNDING = 1e-12
+#: Share of the whole that the first run is taken for.
+_GROWTH = 0.3
+
+
+@dataclass(frozen=True)
+class Sought(Progress):
+    """Progress of a search, whose number of runs is not known: the share grows ever slower."""
+
+    runs: int
+
+    @property
+    def speed(self) -> str:
+        """How many runs were made."""
+        return counted(self.runs, "run")
+
+
+class Runs:
+    """Runs that were made, each once.
+
+    seconds: CPU time of all so far, without compiling [s]. count: their number. results, cost: by
+    level of the step, Result and CPU time [s] of the last undisturbed run. failure: the sentence of
+    the last run that diverged.
+    """
+
+    def __init__(self, job: Job, methods: Methods, listen: Optional[Listener]):
+        self.job, self.methods, self._listen = job, methods, listen
+        self.seconds, self.count, self.failure = 0.0, 0, ""
+        self.results: dict[int, Result] = {}
+        self.cost: dict[int, float] = {}
+        self._values: dict[tuple[int, int, bool], Optional[float]] = {}
+
+    def value(self, level: int, twin: int = 0, tight: bool = False) -> Optional[float]:
+        """Goal of a run at a level; None for one that diverged.
+
+        twin: 0 for the scene as it is, else the seed of its disturbance. tight: see
+        ``Methods.at``.
+        """
+        key = level, twin, tight
+        if key not in self._values:
+            self._values[key] = self._run(*key)
+        return self._values[key]
+
+    def _run(self, level, twin, tight):
+        started = clock()
+        simulation = Simulation(self.job.scene, self.methods.at(level, tight))
+        if twin:
+            simulation.state.set_motion(**_displaced(simulation.model, twin))
+        looks: Any = {"samples": self.job.goal.samples, "frames": 1, "progress": None}
+        result = result_of(run_simulation, simulation, until=self.job.until, **looks)
+        spent = clock() - started
+        if not self.count:
+            # Kernels are compiled, or loaded, before the first run's first step.
+            spent = max(spent - result.report.compile_seconds, result.report.run_cpu_seconds)
+        self.seconds, self.count = self.seconds + spent, self.count + 1
+        if self._listen is not None:
+            share = 1.0 - 1.0 / (1.0 + _GROWTH * self.count)
+            self._listen(Sought(share, self.seconds, self.count))
+        if result.diverged:
+            self.failure = result.diverged
+            return None
+        if not (twin or tight):
+            self.results[level], self.cost[level] = result, spent
+        return self.job.goal.value(result)
+
+
+def _displaced(model, seed):
+    """Motion at the start of a twin: arguments of ``State.set_motion``."""
+    size = _ROUNDING * np.ptp(model.mesh.points, axis=0).max()
+    noise = np.random.default_rng(seed).uniform(-size, size, model.centre.shape)
+    return {"position": model.centre + noise}

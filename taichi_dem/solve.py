@@ -1,0 +1,51 @@
+"""An output of a scene to a tolerance: the program chooses method and step, and gives a bar."""
+
+import math
+from typing import Any, Optional, Union
+
+from taichi_dem.accuracy.job import Job
+from taichi_dem.accuracy.search import Search
+from taichi_dem.goals import Goal
+from taichi_dem.kit.accuracy.answer import Answer
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.progress.progress import Listener
+from taichi_dem.kit.progress.progress_bar import reporting
+from taichi_dem.kit.validation import AUTO, instance, positive, shown
+from taichi_dem.scene import Scene
+
+
+def solve(
+    scene: Scene,
+    *,
+    until: float,
+    goal: Goal,
+    tolerance: float = 0.01,
+    confidence: float = 0.95,
+    budget_s: Optional[float] = None,
+    progress: Union[Listener, str, None] = AUTO,
+) -> Answer:
+    """An output of a scene at a time, with an error bar that is as narrow as asked.
+
+    until: simulated time [s]. goal: from ``taichi_dem.goals``. tolerance: largest half-width of
+    the bar, as a share of the value, in (0, 1]. confidence: of the bar, in (0, 1).
+    budget_s: CPU seconds after which no run is begun; None for no limit. progress: as of
+    ``simulate``.
+    The answer's ``shortfall`` says why a bar is wider than asked, and what would help.
+    Raises InputError for what cannot be used, SimulationDiverged where no step is stable.
+    """
+    instance("scene", scene, Scene)
+    instance("goal", goal, Goal)
+    positive("until", until)
+    _share("tolerance", tolerance, 1.0)
+    _share("confidence", confidence, math.nextafter(1.0, 0.0))
+    budget = math.inf if budget_s is None else positive("budget_s", budget_s)
+    job = Job(scene, until, goal, tolerance, confidence)
+    with reporting(progress, goal.name) as report_progress:
+        return Search(job, budget, report_progress).answer()
+
+
+def _share(name: str, value: Any, most: float) -> None:
+    """InputError unless a value is above 0 and at most this."""
+    if positive(name, value) > most:
+        bound = "at most 1" if most == 1.0 else "below 1"
+        raise InputError(f"{name} must be above 0 and {bound}, got {shown(value)}")
