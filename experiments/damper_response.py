@@ -28,7 +28,7 @@ from ca_damper import (
     sweep_up_and_down,
 )
 from ca_damper.plot import picture_hysteresis, picture_measures, picture_responses
-from ca_damper.response import Grid
+from ca_damper.response import OUTSIDE, Grid
 from taichi_dem.kit import study
 from taichi_dem.kit.study import number, several, whole
 
@@ -128,8 +128,10 @@ def show_peaks(responses):
             rigid_ratio, rigid = response.oscillator.peak(n * PARTICLE_MASS)
             ratio, middle = float(np.median(ratios)), 1e3 * float(np.median(rms))
             spread = f"{1e3 * rms.min():.2f} .. {1e3 * rms.max():.2f}"
-            place = f"{ratio:.4f}", f"{rigid_ratio:.4f}"
-            rows.append((label, n, *place, f"{middle:.2f}", spread, f"{1e3 * rigid:.2f}"))
+            shown = f"{ratio:.4f}", f"{middle:.2f}", spread
+            found, height, spread = shown if np.isfinite(ratio) else (OUTSIDE,) * 3
+            place = found, f"{rigid_ratio:.4f}"
+            rows.append((label, n, *place, height, spread, f"{1e3 * rigid:.2f}"))
             figures[f"peak_ratio_{label}_N{n}"] = study.figure(ratio, "1")
             figures[f"peak_rms_mm_{label}_N{n}"] = study.figure(middle, "mm")
     header = ["filling", "N", "peak f/f0", "rigid", "peak RMS [mm]", "seeds", "rigid [mm]"]
