@@ -251,16 +251,21 @@ class Grid:
 
     def measures(self, cycles: Cycles) -> dict[str, np.ndarray]:
         """Measures of all scenes by name, each (scenes,)."""
-        o = self.oscillator
-        of_structure = {
-            "loss_factor": cycles.loss_factor(o.mass),
-            "damping_ratio": cycles.damping_ratio(o.mass, o.stiffness, o.damping),
-        }
-        plain = {name: getattr(cycles, name) for name in UNITS if name not in of_structure}
-        return {**plain, **of_structure}
+        return measures_of(self.oscillator, cycles)
 
     def response(self, steps: np.ndarray, values: Mapping[str, Any]) -> Response:
         """Response of measures by name, each of our shape; steps: a cycle, (ratios,)."""
         dt = 1.0 / (self.ratios * self.oscillator.natural_frequency * steps)
         axes = (self.particles, self.ratios, self.seeds)
         return Response(self.filling.label, self.oscillator, *axes, steps, dt, **values)
+
+
+def measures_of(oscillator: Oscillator, cycles: Cycles) -> dict[str, np.ndarray]:
+    """Measures of scenes on an oscillator by name, those of a Response, each (scenes,)."""
+    o = oscillator
+    of_structure = {
+        "loss_factor": cycles.loss_factor(o.mass),
+        "damping_ratio": cycles.damping_ratio(o.mass, o.stiffness, o.damping),
+    }
+    plain = {name: getattr(cycles, name) for name in UNITS if name not in of_structure}
+    return {**plain, **of_structure}
