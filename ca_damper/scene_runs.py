@@ -56,8 +56,12 @@ class SceneRuns:
         """Steps that scenes take to go on by so many cycles."""
         return sum(count * self._steps(key) for key, count in cycles.items())
 
+    def steps_per_cycle(self, ratio: float, dt: float) -> int:
+        """Steps of a cycle at a frequency ratio, none longer than dt [s]."""
+        return steps_per_cycle(ratio * self.oscillator.natural_frequency, dt)
+
     def _steps(self, key):
-        return steps_per_cycle(key.ratio * self.oscillator.natural_frequency, key.dt)
+        return self.steps_per_cycle(key.ratio, key.dt)
 
     def seconds(self, cycles: Mapping[SceneKey, int]) -> float:
         """CPU seconds that they will take, by what earlier ones took; 0 before the first."""

@@ -74,7 +74,7 @@ def mean_and_error(series: np.ndarray) -> tuple[float, float, int]:
     count = len(means)
     if count < 2:
         return float(np.mean(series)), math.inf, 1
-    more = _correlation_factor(series, count, length)
+    more = correlation_factor(series, count, length)
     return float(np.mean(series)), math.sqrt(more * means.var(ddof=1) / count), count - 1
 
 
@@ -128,7 +128,7 @@ def _error_off_trend(x):
     return math.sqrt(float(straight @ straight) / (len(x) - 2) * _variance(near, len(x))), free
 
 
-def _correlation_factor(x, count, length):
+def correlation_factor(x, count, length):
     """Variance of the mean of all by that of independent batches of the observed variance."""
     near = correlation(x)
     return max(1.0, count * _variance(near, count * length) / _variance(near, length))
