@@ -7,19 +7,22 @@ the step leave a bar that is narrow enough. Nothing begins again that can go on.
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, Optional, Union
 
 import numpy as np
 
-from ca_damper.branches import BranchedAnswer, branches_of, clusters_of, sentence
-from ca_damper.error_reduction import Job, Reduction
+from ca_damper.accuracy.branches import BranchedAnswer, branches_of, clusters_of, sentence
+from ca_damper.accuracy.error_reduction import Reduction
+from ca_damper.accuracy.error_sources import shortfall
+from ca_damper.accuracy.goal_estimate import Estimate, response_of
+from ca_damper.accuracy.job import Job
+from ca_damper.accuracy.scene_runs import SceneRuns
 from ca_damper.errors import SimulationDiverged
 from ca_damper.filling import Filling, check_filling
-from ca_damper.goal_estimate import Estimate, response_of
 from ca_damper.goals import Goal
 from ca_damper.oscillator import Oscillator
 from ca_damper.response import Grid
-from ca_damper.scene_runs import SceneRuns
 from taichi_dem.kit.accuracy.answer import Answer, ErrorParts, Expense, Plan
 from taichi_dem.kit.accuracy.student import t_quantile
 from taichi_dem.kit.display import counted
@@ -141,21 +144,20 @@ def _answered(job: Job) -> tuple[Reduction, list[Estimate]]:
 
 def _answer(job: Job, done: Reduction, found: Estimate) -> Answer:
     """Answer of an estimate, with branches where its seeds fall into clusters."""
-    goal, plan = found.goal, _plan(job, done)
-    response = response_of(done.runs, done.ratios_of(goal), done.seeds, done.dt, done.begins())
+    goal, ratios = found.goal, done.ratios_of(found.goal)
+    response = response_of(done.runs, ratios, done.seeds, done.dt, done.steady.begins())
     value, parts = _told(goal, found.value, found.parts)
-    base = {"goal": goal.name, "unit": goal.unit, "plan": plan, "result": response}
-    base.update(tolerance=job.tolerance, confidence=job.confidence)
+    base: dict[str, Any] = {"goal": goal.name, "unit": goal.unit, "plan": _plan(job, done)}
+    base.update(result=response, tolerance=job.tolerance, confidence=job.confidence)
     branches = _branches(job, done, found)
     if len(branches) > 1:
-        value, parts = branches[0].value, ErrorParts(step=parts.step, chance=branches[0].error)
-        shortfall = sentence(branches, goal.unit)
-        return BranchedAnswer(
-            value=value, parts=parts, shortfall=shortfall, branches=branches, **base
-        )
-    made = Answer(value=value, parts=parts, shortfall=done.shortfall(found), **base)
-    costs = tuple(_expenses(job, done, made))
-    return Answer(value=value, parts=parts, shortfall=made.shortfall, cost_curve=costs, **base)
+        first, words = branches[0], sentence(branches, goal.unit)
+        parts = ErrorParts(step=parts.step, chance=first.error)
+        found_value = {"value": first.value, "parts": parts}
+        return BranchedAnswer(**base, **found_value, shortfall=words, branches=branches)
+    words = shortfall(found, job.tolerance, done.ended)
+    made = Answer(**base, value=value, parts=parts, shortfall=words)
+    return replace(made, cost_curve=tuple(_expenses(job, done, made)))
 
 
 def _told(goal, value, parts):

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from ca_damper.accuracy.scene_runs import SceneKey, SceneRuns
 from ca_damper.goals import Goal
 from ca_damper.response import UNITS, Response
-from ca_damper.scene_runs import SceneKey, SceneRuns
 from ca_damper.steady_state import BATCHES, SteadyPart, correlation_factor
-from taichi_dem.kit.accuracy.answer import ErrorParts
+from taichi_dem.kit.accuracy.answer import ErrorParts, Values
 from taichi_dem.kit.accuracy.student import f_outside, t_quantile
 
 #: Error of the finest step by Richardson: times this.
@@ -151,7 +151,7 @@ def response_of(
     for ratio in ratios:
         keys = [SceneKey(ratio, seed, dt) for seed in seeds]
         rows.append([runs.measures(key, begins[key], leave_out) for key in keys])
-    values = {
+    values: dict[str, Any] = {
         name: np.stack([np.concatenate([one[name] for one in row]) for row in rows])[None]
         for name in UNITS
     }
@@ -163,6 +163,6 @@ def response_of(
     return Response(runs.filling.label, runs.oscillator, *places, steps, lengths, **values)
 
 
-def size_of(value: np.ndarray) -> float:
+def size_of(value: Values) -> float:
     """Largest magnitude of a value; NaN where one is no number."""
     return float(np.abs(value).max()) if np.isfinite(value).all() else math.nan

@@ -1,0 +1,88 @@
+"""Scenes that go on until each is steady, as far as a budget allows."""
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from ca_damper.accuracy.scene_runs import SceneKey, SceneRuns
+from ca_damper.steady_state import SteadyPart, steady_part
+
+_MOST_CYCLES = 40_000
+
+
+class BudgetSpent(Exception):
+    """The next runs would take more than is left. needed: what they would take in all [s]."""
+
+    def __init__(self, needed: float):
+        super().__init__(needed)
+        self.needed = needed
+
+
+class SteadyRuns:
+    """Steady parts of scenes, by SceneKey. budget_s: CPU seconds that all runs may take."""
+
+    def __init__(self, runs: SceneRuns, budget_s: float):
+        self.runs, self.budget_s = runs, budget_s
+        self.parts: dict[SceneKey, SteadyPart] = {}
+
+    def begins(self) -> dict[SceneKey, int]:
+        """Cycle at which the steady part of each scene begins."""
+        return {key: part.begin for key, part in self.parts.items()}
+
+    def go_on(self, keys: Iterable[SceneKey], drift: float, least: int, window: int) -> None:
+        """Let scenes go on until each is steady for a window of cycles.
+
+        drift: that does not matter, as a share of the value. least: cycles of each scene.
+        Raises BudgetSpent before runs that would take too long.
+        """
+        scenes = tuple(keys)
+        while True:
+            more = {key: self._missing(key, drift, least, window) for key in scenes}
+            more = {key: count for key, count in more.items() if count > 0}
+            if not more:
+                return
+            self._check_budget(more)
+            self.runs.go_on(more)
+
+    def _missing(self, key, drift, least, window):
+        """Cycles that a scene has to go on by before it can be judged, or is good enough."""
+        gone = self.runs.cycles(key)
+        if gone < least:
+            return least - gone
+        part = self.judge(key, drift)
+        if gone >= _MOST_CYCLES:
+            return 0
+        if not part.is_steady:
+            return min(_rounded(part.more), _MOST_CYCLES - gone)
+        return min(_rounded(1.25 * (window - (gone - part.begin))), _MOST_CYCLES - gone)
+
+    def _check_budget(self, more: Mapping[SceneKey, int]) -> None:
+        needed = self.runs.cpu_s + self.runs.seconds(more)
+        if needed > self.budget_s:
+            raise BudgetSpent(needed)
+
+    def judge(self, key: SceneKey, drift: float) -> SteadyPart:
+        """Judge a scene by all of its cycles."""
+        part = self.parts[key] = _steady(self.runs.series(key), drift)
+        return part
+
+
+def _steady(series: np.ndarray, drift: float) -> SteadyPart:
+    """Steady part of the RMS of a scene, where its amplitude is steady too; series (2, cycles)."""
+    rms, amplitude = (steady_part(row, drift) for row in series)
+    size = abs(amplitude.mean)
+    away = amplitude.drift / size * abs(rms.mean) if amplitude.drift > 0.0 else 0.0
+    return replace(
+        rms,
+        is_steady=rms.is_steady and amplitude.is_steady,
+        begin=max(rms.begin, amplitude.begin),
+        drift=max(rms.drift, away),
+        more=max(rms.more, amplitude.more),
+    )
+
+
+def _rounded(cycles: float) -> int:
+    """A number of cycles in eighths of a run, at least 0."""
+    return max(0, 8 * math.ceil(cycles / 8.0))
