@@ -144,15 +144,15 @@ def _approach(x, allowed):
     """The longest of our windows that an exponential approach has left no further than allowed."""
     count, size = len(x), abs(float(x[len(x) // 2 :].mean()))
     limit, error, time = _limit(x[count // 2 :])
-    for share in _WINDOWS:
-        window = max(LEAST_CYCLES, count // share)
-        drift = float(abs(x[count - window :].mean() - limit) + 2.0 * error)
+    windows = [max(LEAST_CYCLES, count // share) for share in _WINDOWS]
+    drifts = [float(abs(x[count - one :].mean() - limit) + 2.0 * error) for one in windows]
+    for window, drift in zip(windows, drifts):
         if drift <= allowed * size:
             return _judged(x, count - window, drift, 0, True)
-    more = count // 2
-    if math.isfinite(drift) and size > 0.0:
-        more = min(2 * count, math.ceil(time * math.log(max(2.0, 2.0 * drift / (allowed * size)))))
-    return _judged(x, count // 2, drift, max(LEAST_CYCLES, more), False)
+    more, last = count // 2, drifts[-1]
+    if math.isfinite(last) and size > 0.0:
+        more = min(2 * count, math.ceil(time * math.log(max(2.0, 2.0 * last / (allowed * size)))))
+    return _judged(x, count - windows[0], drifts[0], max(LEAST_CYCLES, more), False)
 
 
 def _limit(x):
