@@ -12,6 +12,7 @@ from ca_damper.accuracy.peak_search import Lattice, PeakSearch
 from ca_damper.accuracy.scene_runs import SceneKey, SceneRuns
 from ca_damper.accuracy.steady_runs import BudgetSpent, SteadyRuns
 from ca_damper.goals import Goal
+from taichi_dem.kit.display import counted
 from taichi_dem.kit.errors import InputError
 
 #: Order of the step's error: contacts begin and end within a step, and so do an automaton's
@@ -26,6 +27,8 @@ _PILOT_CYCLES, _LEAST_CYCLES, _LEAST_WINDOW = 40, 64, 32
 # Drift that does not matter: as a share of the value in the pilot, of the tolerance in the end.
 _PILOT_DRIFT, _DRIFT = 0.05, 0.2
 _MOST_ROUNDS = 24
+# Frequencies that are added on either side of a peak.
+_MOST_MARGIN = 5
 
 
 class Reduction:
@@ -39,7 +42,7 @@ class Reduction:
         self.seeds, self.pilot_s = job.first_seeds(), 0.0
         self.peak, self.lattice = math.nan, Lattice(1.0, 1.0)
         self.window, self.margin, self.ended = _LEAST_WINDOW, 0, ""
-        self.steady = SteadyRuns(runs, job.budget_s)
+        self.steady, self.is_placed = SteadyRuns(runs, job.budget_s), False
 
     @property
     def coarse(self) -> float:
@@ -51,14 +54,14 @@ class Reduction:
         found: list[Estimate] = []
         try:
             self._search()
-            self.pilot_s = self.runs.cpu_s
+            self.pilot_s, self.is_placed = self.runs.cpu_s, True
             for _ in range(_MOST_ROUNDS):
                 self._make_steady()
                 found, state = self._estimates(), self._state()
                 if not self._reduce(found):
                     break
             else:
-                self.ended = f"after {_MOST_ROUNDS} rounds of longer and more runs"
+                self.ended = f"after {counted(_MOST_ROUNDS, 'round')} of longer and more runs"
         except BudgetSpent as spent:
             self.ended = f"within budget_s of {self.job.budget_s:g} s"
             if found:
@@ -93,7 +96,7 @@ class Reduction:
 
     def _first(self, spent):
         """Estimates of scenes that are not steady; InputError where some have not begun."""
-        keys = self._keys() if self.pilot_s else []
+        keys = self._keys() if self.is_placed else []
         if not keys or min(map(self.runs.cycles, keys)) < _LEAST_CYCLES:
             raise InputError(
                 "budget_s must leave time for the pilot and one value: at least "
@@ -155,13 +158,16 @@ class Reduction:
         return estimate(goal, fine, coarse, grid, STEP_RATIO, STEP_ORDER, self.job.confidence)
 
     def _grid_error(self, goal, ratios):
-        """Half-width by the spacing at the peak: a quarter of what twice the spacing changes."""
+        """Half-width by the spacing at the peak: half of what twice the spacing changes.
+
+        So much for a curve with a kink; a smooth one is off by an eighth of it.
+        """
         first, wide = self.seeds[:1], [key.ratio for key in self._wide()]
         given = self.runs, first, self.coarse, self.steady.begins()
         near, far = (
             goal.values(response_of(given[0], some, *given[1:]))[0] for some in (ratios, wide)
         )
-        return np.abs(far - near) / 4.0
+        return np.abs(far - near) / 2.0
 
     def _reduce(self, found: list[Estimate]) -> bool:
         """Ask for more where the worst estimate needs it; False where all is done that can be."""
@@ -181,12 +187,14 @@ class Reduction:
         return total / (self.job.tolerance * size) if size > 0.0 else float(total > 0.0) * 1e9
 
     def _widen(self, goal):
-        """Add a frequency on either side of a peak that leaves them for some seed."""
+        """Take in further frequencies where the peak of some seed leaves those there are."""
         self.margin += 1
-        if goal.ratios or self.margin > 3:
+        if self.margin > 2 and self.lattice.level > 0:
+            self.lattice.level, self.margin = self.lattice.level - 1, 1
+        if goal.ratios or self.margin > _MOST_MARGIN:
             raise InputError(
-                f"goal {goal.name!r} must be a finite number in this scene, got NaN: the "
-                "frequencies it is asked at may not define it"
+                f"goal {goal.name!r} must be a finite number in this scene, got NaN: seeds peak "
+                "far apart, or the frequencies do not define it; ask for a goals.response_curve"
             )
         return True
 

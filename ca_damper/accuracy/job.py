@@ -11,8 +11,8 @@ from taichi_dem.kit.progress.progress import Listener
 
 # First coarse step by the filling's own and by its bound, which is that of safe runs.
 _OF_DEFAULT, _OF_BOUND = 1.5, 1.4
-# Seeds to begin with.
-_FIRST_SEEDS = 3
+# Seeds to begin with: so many particles in all, as few of them often have several steady motions.
+_FEWEST_SEEDS, _MANY_SEEDS, _PARTICLES = 3, 8, 80
 # Range of a search by the peak of the rigid mass and by the natural frequency.
 _BELOW, _ABOVE = 0.95, 1.04
 
@@ -41,8 +41,10 @@ class Job:
         """Seeds to begin with; one of a filling that draws nothing."""
         if self.fixed is not None:
             return self.fixed
-        certain = self.particles == 0 or isinstance(self.filling, (Empty, RigidMass))
-        return tuple(range(1, 2 if certain else _FIRST_SEEDS + 1))
+        if self.particles == 0 or isinstance(self.filling, (Empty, RigidMass)):
+            return (1,)
+        several = math.ceil(_PARTICLES / self.particles)
+        return tuple(range(1, 1 + min(_MANY_SEEDS, max(_FEWEST_SEEDS, several))))
 
     def search_range(self) -> tuple[float, float]:
         """Range in which to look for a peak first."""

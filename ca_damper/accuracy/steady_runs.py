@@ -46,6 +46,16 @@ class SteadyRuns:
             self._check_budget(more)
             self.runs.go_on(more)
 
+    def _check_budget(self, more: Mapping[SceneKey, int]) -> None:
+        """Raise BudgetSpent where runs would take too long; the first cycle tells their speed."""
+        if self.budget_s == math.inf:
+            return
+        if not self.runs.steps:
+            self.runs.go_on(dict.fromkeys(more, 1))
+        needed = self.runs.cpu_s + self.runs.seconds(more)
+        if needed > self.budget_s:
+            raise BudgetSpent(needed)
+
     def _missing(self, key, drift, least, window):
         """Cycles that a scene has to go on by before it can be judged, or is good enough."""
         gone = self.runs.cycles(key)
@@ -57,11 +67,6 @@ class SteadyRuns:
         if not part.is_steady:
             return min(_rounded(part.more), _MOST_CYCLES - gone)
         return min(_rounded(1.25 * (window - (gone - part.begin))), _MOST_CYCLES - gone)
-
-    def _check_budget(self, more: Mapping[SceneKey, int]) -> None:
-        needed = self.runs.cpu_s + self.runs.seconds(more)
-        if needed > self.budget_s:
-            raise BudgetSpent(needed)
 
     def judge(self, key: SceneKey, drift: float) -> SteadyPart:
         """Judge a scene by all of its cycles."""

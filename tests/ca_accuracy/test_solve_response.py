@@ -1,6 +1,7 @@
 """Questions with a tolerance whose answers are known, and how they cost, repeat and are refused."""
 
 import math
+import sys
 
 import numpy as np
 import pytest
@@ -27,6 +28,8 @@ from taichi_dem.kit.progress.progress import Progress
 
 PAPER = Oscillator()
 QUIET = {"progress": None}
+#: The function has the name of its module.
+MODULE = sys.modules["ca_damper.solve_response"]
 
 
 def light(damping_ratio):
@@ -141,7 +144,7 @@ class TwoMotions:
 
 def test_several_steady_motions_come_as_branches(monkeypatch):
     """Three seeds differ by more than 1 %: twelve make two clusters of 8 and 4."""
-    monkeypatch.setattr("ca_damper.solve_response.SceneRuns", TwoMotions)
+    monkeypatch.setattr(MODULE, "SceneRuns", TwoMotions)
     answer = grains(0.01)
     assert isinstance(answer, BranchedAnswer) and not answer.reached
     assert len(answer.branches) == 2 and answer.branches[1].share < 0.5
@@ -171,7 +174,7 @@ class Shaky:
 
 
 def test_a_step_that_diverges_is_shortened(monkeypatch):
-    monkeypatch.setattr("ca_damper.solve_response.SceneRuns", Shaky)
+    monkeypatch.setattr(MODULE, "SceneRuns", Shaky)
     assert grains(0.1).result.dt.max() <= 0.5 * Shaky.most
     monkeypatch.setattr(Shaky, "most", 1e-9)
     with pytest.raises(SimulationDiverged):
@@ -210,7 +213,7 @@ def test_rounds_come_to_an_end(monkeypatch):
 
 
 def test_spheres_are_asked_at_their_own_steps():
-    """Two steps below the one that a contact of five steps allows, and above it by less than half."""
+    """The finer of two steps is 0.7 of the one that resolves a contact in five."""
     answer = solve_response(
         Spheres(), particles=3, goal=goals.rms_at(0.9), tolerance=0.1, seeds=2, **QUIET
     )
