@@ -13,15 +13,16 @@ from typing import Any, Optional, Union
 import numpy as np
 
 from ca_damper.accuracy.branches import BranchedAnswer, branches_of, clusters_of, sentence
-from ca_damper.accuracy.error_reduction import Reduction
+from ca_damper.accuracy.error_reduction import STEP_ORDER, STEP_RATIO, Reduction
 from ca_damper.accuracy.error_sources import shortfall
-from ca_damper.accuracy.goal_estimate import Estimate, response_of
+from ca_damper.accuracy.goal_estimate import Estimate, response_of, step_error
 from ca_damper.accuracy.job import Job
 from ca_damper.accuracy.scene_runs import SceneRuns
 from ca_damper.errors import SimulationDiverged
 from ca_damper.filling import Filling, check_filling
 from ca_damper.goals import Goal
 from ca_damper.oscillator import Oscillator
+from ca_damper.progress import OpenEnded
 from ca_damper.response import Grid
 from taichi_dem.kit.accuracy.answer import Answer, ErrorParts, Expense, Plan
 from taichi_dem.kit.accuracy.student import t_quantile
@@ -72,8 +73,9 @@ def solve_response(
     question.tolerance = _share("tolerance", tolerance)
     question.confidence = between("confidence", confidence, 0.5, 0.9999)
     with reporting(progress, "answer") as listener:
-        question.listener = listener
+        question.listener = OpenEnded(listener)
         reduction, estimates = _answered(question)
+        question.listener.end()
     answers = tuple(_answer(question, reduction, found) for found in estimates)
     return answers if isinstance(goal, (list, tuple)) else answers[0]
 
@@ -152,7 +154,7 @@ def _answer(job: Job, done: Reduction, found: Estimate) -> Answer:
     branches = _branches(job, done, found)
     if len(branches) > 1:
         first, words = branches[0], sentence(branches, goal.unit)
-        parts = ErrorParts(step=parts.step, chance=first.error)
+        parts = ErrorParts(step=_step_of(branches, found), chance=first.error)
         found_value = {"value": first.value, "parts": parts}
         return BranchedAnswer(**base, **found_value, shortfall=words, branches=branches)
     words = shortfall(found, job.tolerance, done.ended)
@@ -178,6 +180,15 @@ def _branches(job, done, found):
         return ()
     t = t_quantile(job.confidence, found.fine.freedom)
     return branches_of(values, clusters, done.seeds, error, t)
+
+
+def _step_of(branches, found):
+    """Error by the step of the first branch: what its value differs at the coarse step."""
+    coarse = found.coarse.values[:, 0]
+    distance = np.abs(coarse[:, None] - [branch.value for branch in branches])
+    own = coarse[distance.argmin(axis=1) == 0]
+    change = abs(float(own.mean()) - branches[0].value) if len(own) else 0.0
+    return step_error(change, STEP_RATIO, STEP_ORDER)
 
 
 def _plan(job, done):

@@ -123,21 +123,21 @@ def _error_off_trend(x):
     place = np.arange(len(x)) - 0.5 * (len(x) - 1)
     apart = x - x.mean()
     straight = apart - place * float(place @ apart) / float(place @ place)
-    near = correlation(straight)
-    free = max(1.0, (len(x) - 2) * (1.0 - near) / (1.0 + near))
-    return math.sqrt(float(straight @ straight) / (len(x) - 2) * _variance(near, len(x))), free
+    rho = correlation(straight)
+    free = max(1.0, (len(x) - 2) * (1.0 - rho) / (1.0 + rho))
+    return math.sqrt(float(straight @ straight) / (len(x) - 2) * _variance(rho, len(x))), free
 
 
-def correlation_factor(x, count, length):
+def correlation_factor(x: np.ndarray, count: int, length: int) -> float:
     """Variance of the mean of all by that of independent batches of the observed variance."""
-    near = correlation(x)
-    return max(1.0, count * _variance(near, count * length) / _variance(near, length))
+    rho = correlation(x)
+    return max(1.0, count * _variance(rho, count * length) / _variance(rho, length))
 
 
-def _variance(near, count):
+def _variance(rho, count):
     """Variance of the mean of so many values of an autoregressive series of unit variance."""
-    far = 1.0 - near
-    return ((1.0 + near) / far - 2.0 * near * (1.0 - near**count) / (count * far**2)) / count
+    far = 1.0 - rho
+    return ((1.0 + rho) / far - 2.0 * rho * (1.0 - rho**count) / (count * far**2)) / count
 
 
 def _approach(x, allowed):

@@ -110,9 +110,9 @@ class Reduction:
         """Frequency ratios that a goal is made of."""
         if goal.ratios:
             return goal.ratios
-        near = self.lattice.around(self.peak)
+        around = self.lattice.around(self.peak)
         level = self.lattice.level
-        first, last = (round(self.lattice.place(end, level)) for end in (near[0], near[-1]))
+        first, last = (round(self.lattice.place(end, level)) for end in (around[0], around[-1]))
         places = range(first - self.margin, last + self.margin + 1)
         return tuple(self.lattice.ratio(k, level) for k in places)
 
@@ -164,10 +164,10 @@ class Reduction:
         """
         first, wide = self.seeds[:1], [key.ratio for key in self._wide()]
         given = self.runs, first, self.coarse, self.steady.begins()
-        near, far = (
+        given_values, wide_values = (
             goal.values(response_of(given[0], some, *given[1:]))[0] for some in (ratios, wide)
         )
-        return np.abs(far - near) / 2.0
+        return np.abs(wide_values - given_values) / 2.0
 
     def _reduce(self, found: list[Estimate]) -> bool:
         """Ask for more where the worst estimate needs it; False where all is done that can be."""

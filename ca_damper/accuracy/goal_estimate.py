@@ -81,6 +81,7 @@ class Estimate:
     value: np.ndarray
     parts: ErrorParts
     fine: SeedValues
+    coarse: SeedValues
     step_is_seen: bool
     grid: np.ndarray
 
@@ -97,11 +98,16 @@ def estimate(
     """Estimate of a goal at a step, and at one that is ``ratio`` times as long."""
     sampling, chance = fine.bars(confidence)
     change = np.abs(fine.mean - coarse.mean)
-    step = SAFETY * change / (ratio**order - 1.0)
+    step = step_error(change, ratio, order)
     known = sum(np.maximum(one.sampling, one.apart) ** 2 for one in (fine, coarse))
     is_seen = bool((change > 2.0 * np.sqrt(known)).any())
     parts = ErrorParts(step=step, chance=chance, sampling=np.hypot(sampling, grid))
-    return Estimate(goal, fine.mean, parts, fine, is_seen, grid)
+    return Estimate(goal, fine.mean, parts, fine, coarse, is_seen, grid)
+
+
+def step_error(change: Any, ratio: float, order: float) -> Any:
+    """Error of a value at a step that changes by so much at one that is ``ratio`` times as long."""
+    return SAFETY * change / (ratio**order - 1.0)
 
 
 def seed_values(

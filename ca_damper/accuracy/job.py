@@ -7,7 +7,6 @@ from typing import Any, Optional
 from ca_damper.fixed_mass import Empty, RigidMass
 from ca_damper.goals import Goal
 from ca_damper.oscillator import Oscillator
-from taichi_dem.kit.progress.progress import Listener
 
 # First coarse step by the filling's own and by its bound, which is that of safe runs.
 _OF_DEFAULT, _OF_BOUND = 1.5, 1.4
@@ -30,7 +29,7 @@ class Job:
     tolerance: float = 0.01
     confidence: float = 0.95
     budget_s: float = math.inf
-    listener: Optional[Listener] = field(default=None, repr=False)
+    listener: Any = field(default=None, repr=False)
 
     def first_step(self) -> float:
         """Coarse step to begin with [s]."""

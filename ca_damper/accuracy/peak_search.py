@@ -74,7 +74,7 @@ class PeakSearch:
         Raises InputError for a peak outside.
         """
         ends = range(FIRST + 1)
-        self._look([self.lattice.ratio(k, 0) for k in ends])
+        self._measure([self.lattice.ratio(k, 0) for k in ends])
         while True:
             ratio, wanted = self._peak()
             level = max(0, math.ceil(math.log2(self.lattice.spacing / wanted)))
@@ -83,9 +83,9 @@ class PeakSearch:
             missing = [one for one in self.lattice.around(ratio) if one not in self.found]
             if not missing:
                 return ratio, self.lattice
-            self._look(missing)
+            self._measure(missing)
 
-    def _look(self, ratios):
+    def _measure(self, ratios):
         self.found.update(zip(ratios, self.rms_at(ratios)))
 
     def _curve(self):
@@ -119,4 +119,4 @@ class PeakSearch:
                 f"still rises there, got ({self.lowest:g}, {self.highest:g})"
             )
         k = round(self.lattice.place(further, 0))
-        self._look([self.lattice.ratio(k, 0)])
+        self._measure([self.lattice.ratio(k, 0)])

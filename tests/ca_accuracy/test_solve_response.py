@@ -24,6 +24,7 @@ from ca_damper import (
 )
 from ca_damper.accuracy import error_reduction
 from ca_damper.accuracy.scene_runs import SceneKey, SceneRuns
+from ca_damper.progress import BatchProgress
 from taichi_dem.kit.progress.progress import Progress
 
 PAPER = Oscillator()
@@ -203,7 +204,9 @@ def test_scenes_go_on_from_where_they_are_each_as_far_as_asked():
 def test_progress_is_told():
     told = []
     grains(0.1, progress=told.append)
-    assert told and all(isinstance(one, Progress) for one in told)
+    shares = [one.share for one in told if isinstance(one, BatchProgress)]
+    assert all(isinstance(one, Progress) for one in told)
+    assert shares == sorted(shares) and shares[-1] == 1.0 and shares[0] < 1.0
 
 
 def test_rounds_come_to_an_end(monkeypatch):
