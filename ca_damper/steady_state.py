@@ -61,10 +61,10 @@ def steady_part(
     """
     x = np.asarray(series, dtype=np.float64)
     if len(x) < LEAST_CYCLES:
-        return _judged(x, 0, math.inf, LEAST_CYCLES - len(x), False)
+        return _part(x, 0, math.inf, LEAST_CYCLES - len(x), False)
     begin = _least_error(x)
     if begin < _LATEST * len(x) and not _halves_differ(x[begin:], false_alarms):
-        return _judged(x, begin + (len(x) - begin) // _MARGIN, 0.0, 0, True)
+        return _part(x, begin + (len(x) - begin) // _MARGIN, 0.0, 0, True)
     return _approach(x, max(allowed, _ROUNDING))
 
 
@@ -148,11 +148,11 @@ def _approach(x, allowed):
     drifts = [float(abs(x[count - one :].mean() - limit) + 2.0 * error) for one in windows]
     for window, drift in zip(windows, drifts):
         if drift <= allowed * size:
-            return _judged(x, count - window, drift, 0, True)
+            return _part(x, count - window, drift, 0, True)
     more, last = count // 2, drifts[-1]
     if math.isfinite(last) and size > 0.0:
         more = min(2 * count, math.ceil(time * math.log(max(2.0, 2.0 * last / (allowed * size)))))
-    return _judged(x, count - windows[0], drifts[0], max(LEAST_CYCLES, more), False)
+    return _part(x, count - windows[0], drifts[0], max(LEAST_CYCLES, more), False)
 
 
 def _limit(x):
@@ -179,6 +179,6 @@ def _limit(x):
     return c + (c - b) * ratio / (1.0 - ratio), error, -length / math.log(ratio)
 
 
-def _judged(x, begin, drift, more, is_steady):
+def _part(x, begin, drift, more, is_steady):
     mean, error, freedom = mean_and_error(x[begin:]) if len(x) else (math.nan, math.inf, 1)
     return SteadyPart(is_steady, begin, mean, error, freedom, drift, int(more))

@@ -103,7 +103,7 @@ class Reduction:
                 f"{1.5 * spent.needed:.2g} s here, got {self.job.budget_s:g}"
             ) from None
         for key in keys:
-            self.steady.judge(key, _DRIFT * self.job.tolerance)
+            self.steady.check_steady(key, _DRIFT * self.job.tolerance)
         return self._estimates()
 
     def ratios_of(self, goal: Goal) -> tuple[float, ...]:
@@ -112,7 +112,7 @@ class Reduction:
             return goal.ratios
         around = self.lattice.around(self.peak)
         level = self.lattice.level
-        first, last = (round(self.lattice.place(end, level)) for end in (around[0], around[-1]))
+        first, last = (round(self.lattice.position(end, level)) for end in (around[0], around[-1]))
         places = range(first - self.margin, last + self.margin + 1)
         return tuple(self.lattice.ratio(k, level) for k in places)
 

@@ -31,13 +31,13 @@ class Lattice:
         """The k-th ratio of a level."""
         return round(self.origin + k * self.spacing / 2**level, 12)
 
-    def place(self, ratio: float, level: int) -> float:
+    def position(self, ratio: float, level: int) -> float:
         """Place of a ratio on a level, not rounded."""
         return (ratio - self.origin) / self.spacing * 2**level
 
     def around(self, ratio: float) -> tuple[float, ...]:
         """Three ratios of our level around one, or four where it lies between two of them."""
-        place = self.place(ratio, self.level)
+        place = self.position(ratio, self.level)
         k = round(place)
         first = k - 2 if place - k < -0.2 else k - 1
         last = k + 2 if place - k > 0.2 else k + 1
@@ -45,7 +45,7 @@ class Lattice:
 
     def wide(self, ratio: float) -> tuple[float, ...]:
         """Three ratios around one, twice as far apart."""
-        k = round(self.place(ratio, self.level))
+        k = round(self.position(ratio, self.level))
         return tuple(self.ratio(j, self.level) for j in (k - 2, k, k + 2))
 
 
@@ -118,5 +118,5 @@ class PeakSearch:
                 f"ratios must hold the peak, which lies outside, {side} {end:.6g}: the response "
                 f"still rises there, got ({self.lowest:g}, {self.highest:g})"
             )
-        k = round(self.lattice.place(further, 0))
+        k = round(self.lattice.position(further, 0))
         self._measure([self.lattice.ratio(k, 0)])

@@ -61,15 +61,15 @@ class SteadyRuns:
         gone = self.runs.cycles(key)
         if gone < least:
             return least - gone
-        part = self.judge(key, drift)
+        part = self.check_steady(key, drift)
         if gone >= _MOST_CYCLES:
             return 0
         if not part.is_steady:
             return min(_rounded(part.more), _MOST_CYCLES - gone)
         return min(_rounded(1.25 * (window - (gone - part.begin))), _MOST_CYCLES - gone)
 
-    def judge(self, key: SceneKey, drift: float) -> SteadyPart:
-        """Judge a scene by all of its cycles."""
+    def check_steady(self, key: SceneKey, drift: float) -> SteadyPart:
+        """Check by all of its cycles from when on a scene is steady."""
         part = self.parts[key] = _steady(self.runs.series(key), drift)
         return part
 
