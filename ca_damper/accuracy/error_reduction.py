@@ -125,14 +125,18 @@ class Reduction:
         steps = self.dt, self.coarse
         ratios = self.frequencies()
         keys = [SceneKey(r, seed, dt) for dt in steps for r in ratios for seed in self.seeds]
-        return list(dict.fromkeys([*keys, *self._wide()]))
+        return list(dict.fromkeys([*keys, *self._wide_keys()]))
 
     def _wide(self):
-        """Scenes at twice the spacing around the peak, of the first seed at the coarse step."""
+        """Triples of ratios at twice the spacing around the peak, where a goal lies on it."""
         if all(goal.ratios for goal in self.job.goals):
             return []
-        wide = self.lattice.wide(self.peak)
-        return [SceneKey(ratio, self.seeds[0], self.coarse) for ratio in wide]
+        return self.lattice.wide(self.peak)
+
+    def _wide_keys(self):
+        """Scenes of the wide triples, of the first seed at the coarse step."""
+        ratios = dict.fromkeys(ratio for triple in self._wide() for ratio in triple)
+        return [SceneKey(ratio, self.seeds[0], self.coarse) for ratio in ratios]
 
     def longest(self) -> int:
         """Most cycles that a scene went."""
@@ -158,16 +162,21 @@ class Reduction:
         return estimate(goal, fine, coarse, grid, STEP_RATIO, STEP_ORDER, self.job.confidence)
 
     def _grid_error(self, goal, ratios):
-        """Half-width by the spacing at the peak: half of what twice the spacing changes.
+        """Half-width by the spacing at the peak, (places,): half of what twice the spacing changes.
 
-        So much for a curve with a kink; a smooth one is off by an eighth of it.
+        So much for a curve with a kink; a smooth one is off by an eighth of it. Where the peak is
+        lost at twice the spacing, the spacing is too wide, and the half-width a tenth.
         """
-        first, wide = self.seeds[:1], [key.ratio for key in self._wide()]
-        given = self.runs, first, self.coarse, self.steady.begins()
-        given_values, wide_values = (
-            goal.values(response_of(given[0], some, *given[1:]))[0] for some in (ratios, wide)
-        )
-        return np.abs(wide_values - given_values) / 2.0
+        own = self._mean_of(goal, ratios, self.seeds[:1], self.coarse)
+        wide = [self._mean_of(goal, some, self.seeds[:1], self.coarse) for some in self._wide()]
+        change = 0.5 * np.abs(np.array(wide) - own)
+        known = np.where(np.isnan(change), -1.0, change).max(axis=0)
+        return np.where(known < 0.0, 0.1 * np.abs(own), known)
+
+    def _mean_of(self, goal, ratios, seeds, dt):
+        """Mean over seeds of a goal that is made of some ratios, (places,)."""
+        found = response_of(self.runs, ratios, seeds, dt, self.steady.begins())
+        return goal.values(found).mean(axis=0)
 
     def _reduce(self, found: list[Estimate]) -> bool:
         """Ask for more where the worst estimate needs it; False where all is done that can be."""

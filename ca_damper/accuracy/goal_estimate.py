@@ -17,7 +17,7 @@ from taichi_dem.kit.accuracy.student import f_outside, t_quantile
 #: Error of the finest step by Richardson: times this.
 SAFETY = 1.25
 # Seeds are said to differ where chance would make their variance so large in this share of cases.
-_SEEDS_ALIKE = 0.05
+_SEEDS_ALIKE = 0.2
 # Differences that are rounding, as a share of the value.
 _ROUNDING = 1e-9
 

@@ -43,10 +43,15 @@ class Lattice:
         last = k + 2 if place - k > 0.2 else k + 1
         return tuple(self.ratio(j, self.level) for j in range(first, last + 1))
 
-    def wide(self, ratio: float) -> tuple[float, ...]:
-        """Three ratios around one, twice as far apart."""
-        k = round(self.position(ratio, self.level))
-        return tuple(self.ratio(j, self.level) for j in (k - 2, k, k + 2))
+    def wide(self, ratio: float) -> tuple[tuple[float, ...], ...]:
+        """Triples twice as far apart: around the middle one of ``around``, or each of two."""
+        place = self.position(ratio, self.level)
+        middle = {round(place), math.floor(place), math.ceil(place)}
+        if len(self.around(ratio)) == 3:
+            middle = {round(place)}
+        return tuple(
+            tuple(self.ratio(j, self.level) for j in (k - 2, k, k + 2)) for k in sorted(middle)
+        )
 
 
 class PeakSearch:

@@ -61,4 +61,6 @@ def test_ratios_of_a_lattice_are_the_same_numbers_on_every_level():
     for level in range(5):
         assert lattice.ratio(3 * 2**level, level) == lattice.ratio(3, 0)
     assert lattice.position(lattice.ratio(5, 2), 2) == pytest.approx(5.0)
-    assert lattice.wide(0.9) == tuple(lattice.ratio(k, 0) for k in (-2, 0, 2))
+    assert lattice.wide(0.9) == (tuple(lattice.ratio(k, 0) for k in (-2, 0, 2)),)
+    between = lattice.wide(0.9 + 0.5 * lattice.spacing)
+    assert between == tuple(tuple(lattice.ratio(k + j, 0) for j in (-2, 0, 2)) for k in (0, 1))
