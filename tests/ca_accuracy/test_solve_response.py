@@ -23,8 +23,10 @@ from ca_damper import (
     solve_response,
 )
 from ca_damper.accuracy import error_reduction
+from ca_damper.accuracy.error_reduction import Reduction
 from ca_damper.accuracy.scene_runs import SceneKey, SceneRuns
-from ca_damper.progress import BatchProgress
+from ca_damper.accuracy.steady_runs import BudgetSpent
+from ca_damper.progress import BatchProgress, OpenEnded
 from taichi_dem.kit.progress.progress import Progress
 
 PAPER = Oscillator()
@@ -155,6 +157,23 @@ def test_several_steady_motions_come_as_branches(monkeypatch):
     assert "no single number" in str(answer)
 
 
+def test_a_budget_that_ends_before_further_seeds_gives_the_answer_of_those_before(monkeypatch):
+    """Seeds of two motions ask for more of them; the second round is not paid any more."""
+    rounds, go_steady = [], Reduction._make_steady
+
+    def once(reduction):
+        rounds.append(reduction.seeds)
+        if len(rounds) > 1:
+            raise BudgetSpent(9.0)
+        go_steady(reduction)
+
+    monkeypatch.setattr(MODULE, "SceneRuns", TwoMotions)
+    monkeypatch.setattr(Reduction, "_make_steady", once)
+    answer = grains(0.01, budget_s=5.0)
+    assert len(rounds[1]) > len(rounds[0]) and answer.result.seeds == rounds[0]
+    assert "within budget_s of 5 s" in answer.shortfall and answer.share > 0.01
+
+
 class Shaky:
     """Runs that diverge at steps above a limit [s]."""
 
@@ -203,7 +222,7 @@ def test_scenes_go_on_from_where_they_are_each_as_far_as_asked():
 
 def test_progress_is_told():
     told = []
-    grains(0.1, progress=told.append)
+    grains(0.004, progress=told.append)
     shares = [one.share for one in told if isinstance(one, BatchProgress)]
     assert all(isinstance(one, Progress) for one in told)
     assert shares == sorted(shares) and shares[-1] == 1.0 and shares[0] < 1.0
@@ -221,3 +240,17 @@ def test_spheres_are_asked_at_their_own_steps():
         Spheres(), particles=3, goal=goals.rms_at(0.9), tolerance=0.1, seeds=2, **QUIET
     )
     assert answer.reached and 1.3e-5 < answer.result.dt[0] <= 1.5e-5
+
+
+def test_the_share_of_an_open_end_grows_from_run_to_run():
+    told = []
+    whole = OpenEnded(told.append)
+    whole.pace.seconds = 0.0
+    for _ in range(3):
+        for share in (0.5, 1.0):
+            whole(BatchProgress(share, share, round(100 * share)))
+    whole.end()
+    shares = [one.share for one in told]
+    assert len(shares) == 7 and shares == sorted(set(shares)) and shares[-1] == 1.0
+    assert (told[-1].seconds, told[-1].steps) == (3.0, 300)
+    OpenEnded(None)(BatchProgress(1.0, 1.0, 1))
