@@ -286,7 +286,7 @@ def test_spheres_beyond_their_limit_end_as_diverged(tmp_path, name, options):
 
 
 def test_peaks_are_found_to_an_accuracy(shown):
-    """30 grains of 0.2 g as a rigid mass peak at sqrt(86 / 92) f0; the bars are as narrow as asked."""
+    """30 grains of 0.2 g as a rigid mass peak at sqrt(86 / 92) f0; bars are as narrow as asked."""
     options = "--accuracy 5% --fillings ca_static --particles 30".split()
     folder, figures = shown("damper_response", *options)
     for name, unit in (("ratio", ""), ("rms", "_mm")):
