@@ -137,8 +137,9 @@ def _correlated(series):
 
 
 def _share(part):
-    """Drift of a scene as a share of its mean."""
-    return part.drift / abs(part.mean) if part.drift > 0.0 else 0.0
+    """Drift of a scene as a share of its mean; all of it where no limit can be seen."""
+    size = abs(part.mean)
+    return min(1.0, part.drift / size) if part.drift > 0.0 and size > 0.0 else 0.0
 
 
 def response_of(

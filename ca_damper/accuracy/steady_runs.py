@@ -9,7 +9,8 @@ import numpy as np
 from ca_damper.accuracy.scene_runs import SceneKey, SceneRuns
 from ca_damper.steady_state import SteadyPart, steady_part
 
-_MOST_CYCLES = 40_000
+# Cycles of a scene after which it is taken as it is, with what its drift is known to be.
+_MOST_CYCLES = 20_000
 
 
 class BudgetSpent(Exception):
@@ -78,7 +79,7 @@ def _steady(series: np.ndarray, drift: float) -> SteadyPart:
     """Steady part of the RMS of a scene, where its amplitude is steady too; series (2, cycles)."""
     rms, amplitude = (steady_part(row, drift) for row in series)
     size = abs(amplitude.mean)
-    away = amplitude.drift / size * abs(rms.mean) if amplitude.drift > 0.0 else 0.0
+    away = amplitude.drift / size * abs(rms.mean) if size > 0.0 else 0.0
     return replace(
         rms,
         is_steady=rms.is_steady and amplitude.is_steady,

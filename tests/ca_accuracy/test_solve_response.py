@@ -22,7 +22,7 @@ from ca_damper import (
     goals,
     solve_response,
 )
-from ca_damper.accuracy import error_reduction
+from ca_damper.accuracy import error_reduction, steady_runs
 from ca_damper.accuracy.error_reduction import Reduction
 from ca_damper.accuracy.scene_runs import SceneKey, SceneRuns
 from ca_damper.accuracy.steady_runs import BudgetSpent
@@ -232,6 +232,25 @@ def test_rounds_come_to_an_end(monkeypatch):
     monkeypatch.setattr(error_reduction, "_MOST_ROUNDS", 1)
     answer = grains(0.0005)
     assert not answer.reached and "after 1 round" in answer.shortfall
+
+
+def test_a_scene_that_is_never_steady_says_so(monkeypatch):
+    """A damping ratio of 1e-6 takes 160,000 cycles; 400 are allowed here."""
+    monkeypatch.setattr(steady_runs, "_MOST_CYCLES", 400)
+    answer = solve_response(
+        Empty(), particles=0, goal=goals.rms_at(1.0), oscillator=light(1e-6), **QUIET
+    )
+    assert not answer.reached and 0.3 < answer.share <= 1.1
+    assert "mean over cycles" in answer.shortfall and "%" in str(answer)
+
+
+def test_a_base_at_rest_moves_nothing():
+    still = Oscillator(base_amplitude=0.0)
+    answer = solve_response(Empty(), particles=0, goal=goals.rms_at(1.0), oscillator=still, **QUIET)
+    assert (answer.value, answer.error, answer.reached) == (0.0, 0.0, True)
+    for goal in (goals.loss_factor_at(1.0), goals.peak_rms()):
+        with pytest.raises(InputError, match="must"):
+            solve_response(Empty(), particles=0, goal=goal, oscillator=still, **QUIET)
 
 
 def test_spheres_are_asked_at_their_own_steps():
