@@ -6,7 +6,14 @@ import numpy as np
 
 from ca_damper.accuracy.branches import clusters_of
 from ca_damper.accuracy.error_sources import largest_source
-from ca_damper.accuracy.goal_estimate import Estimate, estimate, response_of, seed_values, size_of
+from ca_damper.accuracy.goal_estimate import (
+    Estimate,
+    estimate,
+    response_of,
+    seed_values,
+    series_of,
+    size_of,
+)
 from ca_damper.accuracy.job import Job
 from ca_damper.accuracy.peak_search import Lattice, PeakSearch
 from ca_damper.accuracy.scene_runs import SceneKey, SceneRuns
@@ -42,7 +49,7 @@ class Reduction:
         self.seeds, self.pilot_s = job.first_seeds(), 0.0
         self.peak, self.lattice = math.nan, Lattice(1.0, 1.0)
         self.window, self.margin, self.ended = _LEAST_WINDOW, 0, ""
-        self.steady, self.is_placed = SteadyRuns(runs, job.budget_s), False
+        self.steady, self.is_placed = SteadyRuns(runs, job.budget_s, self._goal_series), False
 
     @property
     def coarse(self) -> float:
@@ -89,6 +96,11 @@ class Reduction:
         keys = [SceneKey(ratio, self.seeds[0], self.coarse) for ratio in ratios]
         self.steady.go_on(keys, _PILOT_DRIFT, _PILOT_CYCLES, _PILOT_CYCLES // 4)
         return [self.steady.parts[key].mean for key in keys]
+
+    def _goal_series(self, key):
+        """Goals by cycle of this scene's frequency: they may drift where RMS rests."""
+        own = [goal for goal in self.job.goals if goal.ratios == (key.ratio,)]
+        return [series_of(goal, self.runs, key) for goal in own]
 
     def _make_steady(self):
         drift = _DRIFT * self.job.tolerance

@@ -162,11 +162,23 @@ def response_of(
         name: np.stack([np.concatenate([one[name] for one in row]) for row in rows])[None]
         for name in UNITS
     }
+    named = tuple(seeds) if not leave_out else tuple(range(len(seeds) * leave_out))
+    return _response(runs, ratios, named, dt, values)
+
+
+def series_of(goal: Goal, runs: SceneRuns, key: SceneKey) -> np.ndarray:
+    """A goal by cycle, of one that is made of the frequency of this scene alone, (cycles,)."""
+    values = {name: value[None, None] for name, value in runs.by_cycle(key).items()}
+    named = tuple(range(runs.cycles(key)))
+    return goal.values(_response(runs, (key.ratio,), named, key.dt, values))[:, 0]
+
+
+def _response(runs, ratios, seeds, dt, values):
+    """Response of measures by name, (1, ratios, seeds) each."""
     steps = np.array([runs.steps_per_cycle(ratio, dt) for ratio in ratios])
     axis = np.array(ratios)
     lengths = 1.0 / (axis * runs.oscillator.natural_frequency * steps)
-    named = tuple(seeds) if not leave_out else tuple(range(len(seeds) * leave_out))
-    places = (runs.particles,), axis, named
+    places = (runs.particles,), axis, seeds
     return Response(runs.filling.label, runs.oscillator, *places, steps, lengths, **values)
 
 

@@ -122,6 +122,10 @@ class SceneRuns:
         cycles = self._cycles(key, self._records[key][:, None])
         return np.stack([cycles.rms, cycles.amplitude])
 
+    def by_cycle(self, key: SceneKey) -> dict[str, np.ndarray]:
+        """Measures of every cycle of a scene, each (cycles,), by name."""
+        return measures_of(self.oscillator, self._cycles(key, self._records[key][:, None]))
+
     def measures(self, key: SceneKey, begin: int, leave_out: int = 0) -> dict[str, np.ndarray]:
         """Measures of a scene from cycle ``begin`` on, each (1,), by name.
 

@@ -1,7 +1,7 @@
 """Scenes that go on until each is steady, as far as a budget allows."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,10 +22,19 @@ class BudgetSpent(Exception):
 
 
 class SteadyRuns:
-    """Steady parts of scenes, by SceneKey. budget_s: CPU seconds that all runs may take."""
+    """Steady parts of scenes, by SceneKey.
 
-    def __init__(self, runs: SceneRuns, budget_s: float):
-        self.runs, self.budget_s = runs, budget_s
+    budget_s: CPU seconds that all runs may take. further: gives series by cycle, beside RMS and
+    amplitude, that must be steady in a scene.
+    """
+
+    def __init__(
+        self,
+        runs: SceneRuns,
+        budget_s: float,
+        further: Callable[[SceneKey], list[np.ndarray]],
+    ):
+        self.runs, self.budget_s, self.further = runs, budget_s, further
         self.parts: dict[SceneKey, SteadyPart] = {}
 
     def begins(self) -> dict[SceneKey, int]:
@@ -71,21 +80,22 @@ class SteadyRuns:
 
     def check_steady(self, key: SceneKey, drift: float) -> SteadyPart:
         """Check by all of its cycles from when on a scene is steady."""
-        part = self.parts[key] = _steady(self.runs.series(key), drift)
+        series = [*self.runs.series(key), *self.further(key)]
+        part = self.parts[key] = _steady(series, drift)
         return part
 
 
-def _steady(series: np.ndarray, drift: float) -> SteadyPart:
-    """Steady part of the RMS of a scene, where its amplitude is steady too; series (2, cycles)."""
-    rms, amplitude = (steady_part(row, drift) for row in series)
-    size = abs(amplitude.mean)
-    away = amplitude.drift / size * abs(rms.mean) if size > 0.0 else 0.0
+def _steady(series: Sequence[np.ndarray], drift: float) -> SteadyPart:
+    """Steady part of the first series, where the others are steady too; each (cycles,)."""
+    parts = [steady_part(row, drift) for row in series if np.isfinite(row).all()]
+    first = parts[0]
+    shares = [part.drift / abs(part.mean) for part in parts if part.mean != 0.0]
     return replace(
-        rms,
-        is_steady=rms.is_steady and amplitude.is_steady,
-        begin=max(rms.begin, amplitude.begin),
-        drift=max(rms.drift, away),
-        more=max(rms.more, amplitude.more),
+        first,
+        is_steady=all(part.is_steady for part in parts),
+        begin=max(part.begin for part in parts),
+        drift=abs(first.mean) * max(shares, default=0.0),
+        more=max(part.more for part in parts),
     )
 
 
