@@ -13,6 +13,7 @@ from typing import Any, Union
 import numpy as np
 
 from ca_damper.response import Response
+from taichi_dem.kit.display import counted
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import choice, positive, several, shown, word
 
@@ -63,7 +64,7 @@ class Goal:
         if found.ndim not in (1, 2) or len(found) != len(response.seeds) or found.size == 0:
             raise InputError(
                 f"function of the goal {self.name!r} must return one value or one row for each of "
-                f"{len(response.seeds)} seeds, got shape {found.shape}"
+                f"{counted(len(response.seeds), 'seed')}, got shape {found.shape}"
             )
         return found.reshape(len(found), -1)
 

@@ -265,7 +265,7 @@ DAMPERS = {
     "goal of a list": (lambda: solved(goal=[3]), "goal must be a Goal"),
     "goal's shape": (
         lambda: solved(goal=goals.Goal("a", "1", "value", lambda found: 3.0, (1.0,))),
-        "must return one value or one row for each of 1 seeds",
+        "must return one value or one row for each of",
     ),
     "budget": (lambda: solved(budget_s=0), "budget_s must be a positive"),
     "budget NaN": (lambda: solved(budget_s=math.nan), "budget_s must be a positive"),
