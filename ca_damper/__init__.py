@@ -3,26 +3,35 @@
 # First, out of order: it prepares the environment for ``import taichi``.
 from taichi_dem.kit import runtime  # isort: skip
 
+from ca_damper import goals
+from ca_damper.accuracy.branches import Branch, BranchedAnswer
 from ca_damper.automaton import Automaton
 from ca_damper.batch import Batch
 from ca_damper.errors import InputError, SimulationDiverged
 from ca_damper.fixed_mass import Empty, RigidMass
+from ca_damper.goals import Goal
 from ca_damper.needed_effects import needed_effects
 from ca_damper.oscillator import Oscillator
 from ca_damper.record import film
 from ca_damper.report import Report
 from ca_damper.response import Response, frequency_response
 from ca_damper.scenes.table import SceneTable
+from ca_damper.solve_response import solve_response
 from ca_damper.spheres import Spheres
 from ca_damper.sweep import Sweep, sweep_up_and_down
+from taichi_dem.kit.accuracy.answer import Answer
 from taichi_dem.kit.progress.progress import Progress
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.kit.version import __version__
 
 __all__ = [
+    "Answer",
     "Automaton",
     "Batch",
+    "Branch",
+    "BranchedAnswer",
     "Empty",
+    "Goal",
     "InputError",
     "Oscillator",
     "Progress",
@@ -37,7 +46,9 @@ __all__ = [
     "__version__",
     "film",
     "frequency_response",
+    "goals",
     "needed_effects",
     "runtime",
+    "solve_response",
     "sweep_up_and_down",
 ]

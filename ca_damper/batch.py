@@ -133,6 +133,22 @@ class Batch(LoadedScenes):
             self.engine.coupling.read(record)
         return measures.Cycles(self.table.column("frequency"), self.steps_per_cycle, record)
 
+    def measure_each(
+        self, cycles: Any, progress: Optional[Listener] = None
+    ) -> tuple[np.ndarray, ...]:
+        """Go on by cycles, a number for each scene or one for all, and measure all of them.
+
+        A scene of 0 cycles stays as it is. Returns the record of each, (cycles, COLUMNS).
+        Raises InputError for numbers of cycles that are none, or within a cycle;
+        SimulationDiverged.
+        """
+        counts = for_all("cycles", cycles, self.count, self.measured_cycles).astype(np.int64)
+        self._check_cycle_is_full()
+        self._go(counts * self.steps_per_cycle, np.zeros_like(counts), progress)
+        record = np.empty((self.count, max(1, int(counts.max())), len(measures.COLUMNS)))
+        self.engine.coupling.read(record)
+        return tuple(one[:count].copy() for one, count in zip(record, counts))
+
     def advance(self, steps: Any, progress: Optional[Listener] = None) -> None:
         """Advance every scene by a number of steps, one for all or (scenes,), without measuring.
 

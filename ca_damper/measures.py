@@ -164,23 +164,39 @@ def first_harmonic(phase: ArrayLike, values: ArrayLike) -> tuple[float, float]:
 def peak(frequency_ratio: ArrayLike, response: ArrayLike) -> tuple[float, float]:
     """Where a response curve peaks and how high it is there: (ratio, response), floats.
 
-    By the parabola through the highest point and its neighbours, whatever their spacing; at an end
-    of the curve, or where a neighbour is no number, the point itself. NaN for a curve of NaN.
+    By the parabola of 1 / response^2 over ratio^2 through the highest point and its neighbours,
+    whatever their spacing: exact for a linear oscillator but for (2 damping ratio)^2. NaN, NaN for
+    a peak outside: where the highest point is an end of the curve or stands beside NaN, nothing
+    says how much higher the curve rises.
     """
     x, y = np.asarray(frequency_ratio, dtype=float), np.asarray(response, dtype=float)
-    if np.isnan(y).all():
+    k = -1 if np.isnan(y).all() else int(np.nanargmax(y))
+    if not 0 < k < len(y) - 1 or not (y[k] > 0.0 and y[k - 1] == y[k - 1] and y[k + 1] == y[k + 1]):
         return np.nan, np.nan
-    k = int(np.nanargmax(y))
-    if not 0 < k < len(y) - 1 or np.isnan(y[k - 1 : k + 2]).any():
-        return float(x[k]), float(y[k])
-    left, right = ((y[k] - y[j]) / (x[k] - x[j]) for j in (k - 1, k + 1))
-    bend = (right - left) / (x[k + 1] - x[k - 1])
-    if bend == 0.0:
-        return float(x[k]), float(y[k])
-    # Newton's form through (k - 1, k): slope left + bend (2 x - x[k-1] - x[k]) is zero at the top.
-    top = 0.5 * (x[k - 1] + x[k] - left / bend)
-    height = y[k] + (top - x[k]) * (left + bend * (top - x[k - 1]))
-    return float(top), float(height)
+    # Relative to the highest point, so that no square leaves the range of numbers.
+    with np.errstate(divide="ignore"):
+        low = (y[k] / y[k - 1 : k + 2]) ** 2
+    square, lowest = vertex(x[k - 1 : k + 2] ** 2, low)
+    if not lowest > 0.0:
+        # Too far apart for a resonance between them; the curve itself is the smoother one.
+        square, height = vertex(x[k - 1 : k + 2] ** 2, -y[k - 1 : k + 2])
+        return float(np.sqrt(square)), float(-height)
+    return float(np.sqrt(square)), float(y[k] / np.sqrt(lowest))
+
+
+def vertex(x: ArrayLike, y: ArrayLike) -> tuple[float, float]:
+    """Lowest point (x, y) of the parabola through three points, the second of them the lowest.
+
+    The second point where they lie on a line, or where a neighbour is infinite.
+    """
+    (x0, x1, x2), (y0, y1, y2) = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+    left, right = (y1 - y0) / (x1 - x0), (y2 - y1) / (x2 - x1)
+    bend = (right - left) / (x2 - x0)
+    if not 0.0 < bend < np.inf:
+        return float(x1), float(y1)
+    # Newton's form through the first two: slope left + bend (2 x - x0 - x1) is zero at the top.
+    top = 0.5 * (x0 + x1 - left / bend)
+    return float(top), float(y1 + (top - x1) * (left + bend * (top - x0)))
 
 
 def curve_distance(curve: ArrayLike, reference: ArrayLike) -> float:

@@ -9,6 +9,8 @@ from taichi_dem.kit.progress.progress import Listener, Pace, Progress
 
 #: Calls of a progress callback keep this distance [s] when stages are short.
 _LEAST_SECONDS = 0.1
+#: Share of an open-ended job that its first run is taken for.
+_GROWTH = 0.1
 
 
 @dataclass(frozen=True)
@@ -55,3 +57,34 @@ class Stages:
     def _pass_on(self, progress):
         if self.progress is not None:
             self.progress(progress)
+
+
+class OpenEnded:
+    """Passes the progress of runs on whose number is not known: the share grows ever slower.
+
+    progress: called with a BatchProgress, or None for nobody.
+    """
+
+    def __init__(self, progress: Optional[Listener]):
+        self.progress, self.runs, self.before = progress, 0, BatchProgress(0.0, 0.0, 0)
+        self.pace = Pace(_LEAST_SECONDS)
+
+    def __call__(self, progress: Progress) -> None:
+        """Take note of the present run's progress; the run ends with a share of 1."""
+        if self.progress is None:
+            return
+        if not isinstance(progress, BatchProgress):
+            self.progress(progress)
+            return
+        share = 1.0 - 1.0 / (1.0 + _GROWTH * (self.runs + progress.share))
+        seconds = self.before.seconds + progress.seconds
+        whole = BatchProgress(share, seconds, self.before.steps + progress.steps)
+        if progress.share == 1.0:
+            self.runs, self.before = self.runs + 1, whole
+        if self.pace.should_report():
+            self.progress(whole)
+
+    def end(self) -> None:
+        """Report that all is done."""
+        if self.progress is not None:
+            self.progress(BatchProgress(1.0, self.before.seconds, self.before.steps))

@@ -37,6 +37,8 @@ UNITS = {
 }
 #: Particle numbers that a notebook shows, evenly over those there are.
 _MOST_SHOWN = 8
+#: In tables, of a peak at an end of the ratios, where its height cannot be known.
+OUTSIDE = "outside"
 _MOST_SEEDS = 2**31 - 1
 _MOST_SCENES = 2**24
 
@@ -61,7 +63,8 @@ class Response:
     ``measures.Cycles``. energy: of the particles [J]. report: what was done and what it cost; None
     for one way of a sweep.
 
-    As the last line of a notebook's cell it shows its curves and a table of the peaks.
+    As the last line of a notebook's cell it shows its curves and a table of the peaks; one at an
+    end of the ratios is said to be outside.
     """
 
     label: str
@@ -112,16 +115,17 @@ class Response:
         found = []
         for k, ratio, rms in zip(rows, *(measure[rows] for measure in self.peaks())):
             middle, spread = np.median(ratio), 1e3 * rms
-            found.append(
-                (
-                    *(f"{self.particles[k]}", f"{middle:.4f}", f"{natural * middle:.4g}"),
-                    *(f"{np.median(spread):.4g}", f"{spread.min():.4g} to {spread.max():.4g}"),
-                )
-            )
+            cells = f"{middle:.4f}", f"{natural * middle:.4g}", f"{np.median(spread):.4g}"
+            ends = f"{spread.min():.4g} to {spread.max():.4g}"
+            row = (*cells, ends) if math.isfinite(middle) else (OUTSIDE,) * 4
+            found.append((f"{self.particles[k]}", *row))
         return found
 
     def peaks(self) -> tuple[np.ndarray, np.ndarray]:
-        """Where each curve peaks: (ratio, rms [m]), two arrays (particles, seeds)."""
+        """Where each curve peaks: (ratio, rms [m]), two arrays (particles, seeds).
+
+        NaN where a peak lies outside the ratios: its curve is highest at the first or last of them.
+        """
         curves = np.moveaxis(self.rms, 2, 1).reshape(-1, len(self.ratios))
         found = np.array([peak(self.ratios, curve) for curve in curves])
         shape = (len(self.particles), len(self.seeds))
@@ -247,16 +251,21 @@ class Grid:
 
     def measures(self, cycles: Cycles) -> dict[str, np.ndarray]:
         """Measures of all scenes by name, each (scenes,)."""
-        o = self.oscillator
-        of_structure = {
-            "loss_factor": cycles.loss_factor(o.mass),
-            "damping_ratio": cycles.damping_ratio(o.mass, o.stiffness, o.damping),
-        }
-        plain = {name: getattr(cycles, name) for name in UNITS if name not in of_structure}
-        return {**plain, **of_structure}
+        return measures_of(self.oscillator, cycles)
 
     def response(self, steps: np.ndarray, values: Mapping[str, Any]) -> Response:
         """Response of measures by name, each of our shape; steps: a cycle, (ratios,)."""
         dt = 1.0 / (self.ratios * self.oscillator.natural_frequency * steps)
         axes = (self.particles, self.ratios, self.seeds)
         return Response(self.filling.label, self.oscillator, *axes, steps, dt, **values)
+
+
+def measures_of(oscillator: Oscillator, cycles: Cycles) -> dict[str, np.ndarray]:
+    """Measures of scenes on an oscillator by name, those of a Response, each (scenes,)."""
+    o = oscillator
+    of_structure = {
+        "loss_factor": cycles.loss_factor(o.mass),
+        "damping_ratio": cycles.damping_ratio(o.mass, o.stiffness, o.damping),
+    }
+    plain = {name: getattr(cycles, name) for name in UNITS if name not in of_structure}
+    return {**plain, **of_structure}

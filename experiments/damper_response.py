@@ -3,12 +3,17 @@
     python experiments/damper_response.py                       # about six minutes on two cores
     python experiments/damper_response.py --fillings ca_static  # the best automaton: a minute
     python experiments/damper_response.py --quick
+    python experiments/damper_response.py --accuracy 1%         # the peaks alone, with error bars
 
 Every particle number, frequency and seed is a scene; all scenes of a filling run as one batch.
 Bands are the lowest and highest of the seeds, lines their median. A rigid mass of the particles'
 weight is drawn for scale: what the particles take off its peak is damping, what they shift beside
 it is apparent mass. A sweep up and down, the state carried on, shows where two motions are
 possible.
+
+With --accuracy, place and height of the peaks are found to that share of their value: the program
+chooses frequencies, steps, seeds and cycles, whatever the other options say of them, and prints
+each answer with its error bar and what it cost. Nothing else is run then.
 
 Responses and sweeps save themselves at their end, on Ctrl-C, and as often as --checkpoint-every
 says; the same command with --resume goes on from there and repeats nothing.
@@ -25,10 +30,12 @@ from ca_damper import (
     ProgressBar,
     Spheres,
     frequency_response,
+    goals,
+    solve_response,
     sweep_up_and_down,
 )
 from ca_damper.plot import picture_hysteresis, picture_measures, picture_responses
-from ca_damper.response import Grid
+from ca_damper.response import OUTSIDE, Grid
 from taichi_dem.kit import study
 from taichi_dem.kit.study import number, several, whole
 
@@ -61,6 +68,8 @@ def options_parser():
     """Options of this experiment."""
     made = study.parser(NAME, __doc__, settings=SETTINGS)
     study.add_checkpoints(made)
+    words = "find the peaks to this share of their value, such as 1%%, and nothing else"
+    made.add_argument("--accuracy", type=study.tolerance, default=None, help=words)
     return made
 
 
@@ -69,6 +78,8 @@ def run(options):
     for label in options.fillings:
         if label not in FILLINGS:
             raise InputError(f"fillings must be some of {', '.join(FILLINGS)}, got {label!r}")
+    if options.accuracy is not None:
+        return run_to_accuracy(options)
     if options.resume and not any(Path(options.out).glob("checkpoint_*.npz")):
         raise InputError(f"resume must be left out: there is no checkpoint in {options.out}")
     jobs = {label: jobs_of(FILLINGS[label], options) for label in options.fillings}
@@ -84,6 +95,38 @@ def run(options):
     figures = {**show_peaks(responses), **figures_of(responses, sweeps)}
     reports = [one.report for one in (*responses.values(), *sweeps.values())]
     study.finish(options, NAME, figures, reports)
+
+
+def run_to_accuracy(options):
+    """Find the peaks to an accuracy; print and write the answers."""
+    if options.resume or options.checkpoint_every:
+        raise InputError("accuracy must be left out with resume or checkpoint-every")
+    folder, rows, figures = study.begin(options), [], {}
+    asked = [goals.peak_ratio(), goals.peak_rms()]
+    for label in options.fillings:
+        for n in options.particles:
+            job = {"particles": n, "goal": asked, "tolerance": options.accuracy}
+            with ProgressBar(f"{label}, {n} particles") as bar:
+                answers = solve_response(FILLINGS[label], **job, progress=bar)
+            for answer in answers:
+                print(f"{label}, {n} particles, {answer.goal}: {answer}")
+                row = answer.value, answer.error, answer.plan.seconds, answer.reached
+                rows.append((label, n, answer.goal, answer.unit, *row))
+            figures.update(figures_of_answers(f"{label}_N{n}", *answers))
+    names = "filling particles goal unit value error seconds reached"
+    study.write_rows(folder / "accuracy.csv", rows, names.split())
+    study.finish(options, NAME, figures, 0.0)
+
+
+def figures_of_answers(end, ratio, rms):
+    """Values and half-widths of their bars, and the CPU seconds that they took together."""
+    return {
+        f"peak_ratio_{end}": study.figure(ratio.value, "1"),
+        f"peak_ratio_error_{end}": study.figure(ratio.error, "1"),
+        f"peak_rms_mm_{end}": study.figure(1e3 * rms.value, "mm"),
+        f"peak_rms_error_mm_{end}": study.figure(1e3 * rms.error, "mm"),
+        f"cpu_seconds_{end}": study.figure(rms.plan.seconds, "s"),
+    }
 
 
 def jobs_of(filling, options):
@@ -128,8 +171,10 @@ def show_peaks(responses):
             rigid_ratio, rigid = response.oscillator.peak(n * PARTICLE_MASS)
             ratio, middle = float(np.median(ratios)), 1e3 * float(np.median(rms))
             spread = f"{1e3 * rms.min():.2f} .. {1e3 * rms.max():.2f}"
-            place = f"{ratio:.4f}", f"{rigid_ratio:.4f}"
-            rows.append((label, n, *place, f"{middle:.2f}", spread, f"{1e3 * rigid:.2f}"))
+            shown = f"{ratio:.4f}", f"{middle:.2f}", spread
+            found, height, spread = shown if np.isfinite(ratio) else (OUTSIDE,) * 3
+            place = found, f"{rigid_ratio:.4f}"
+            rows.append((label, n, *place, height, spread, f"{1e3 * rigid:.2f}"))
             figures[f"peak_ratio_{label}_N{n}"] = study.figure(ratio, "1")
             figures[f"peak_rms_mm_{label}_N{n}"] = study.figure(middle, "mm")
     header = ["filling", "N", "peak f/f0", "rigid", "peak RMS [mm]", "seeds", "rigid [mm]"]

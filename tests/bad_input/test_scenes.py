@@ -17,7 +17,9 @@ from ca_damper import (
     Spheres,
     film,
     frequency_response,
+    goals,
     rk45,
+    solve_response,
     sweep_up_and_down,
 )
 from ca_damper import needed_effects as damper_needs
@@ -182,6 +184,12 @@ def swept(**options):
     return sweep_up_and_down(RigidMass(), **{"particles": 1, "ratios": 1.0, **options})
 
 
+def solved(**options):
+    """An answer about a fixed mass."""
+    given = {"filling": RigidMass(), "particles": 1, "goal": goals.rms_at(1.0), **options}
+    return solve_response(given.pop("filling"), **given)
+
+
 def started():
     """A started batch."""
     made = batch()
@@ -246,6 +254,30 @@ DAMPERS = {
     "sweep start": (lambda: swept(start="moving"), "start must be one of"),
     "sweep transient": (lambda: swept(transient_cycles=None), "transient_cycles must be"),
     "needs": (lambda: damper_needs(3), "result must be a Response"),
+    "tolerance": (lambda: solved(tolerance=0), "tolerance must be a share in (0, 1]"),
+    "tolerance NaN": (lambda: solved(tolerance=math.nan), "tolerance must be a share"),
+    "tolerance large": (lambda: solved(tolerance=1.5), "got 1.5"),
+    "tolerance text": (lambda: solved(tolerance="1%"), "tolerance must be a share"),
+    "confidence": (lambda: solved(confidence=1.0), "confidence must be a number from 0.5"),
+    "goal": (lambda: solved(goal="peak"), "goal must be a Goal such as goals.peak_rms()"),
+    "goal function": (lambda: solved(goal=goals.peak_rms), "goal must be a Goal"),
+    "no goals": (lambda: solved(goal=[]), "a list of at least one, got none"),
+    "goal of a list": (lambda: solved(goal=[3]), "goal must be a Goal"),
+    "goal's shape": (
+        lambda: solved(goal=goals.Goal("a", "1", "value", lambda found: 3.0, (1.0,))),
+        "must return one value or one row for each of",
+    ),
+    "budget": (lambda: solved(budget_s=0), "budget_s must be a positive"),
+    "budget NaN": (lambda: solved(budget_s=math.nan), "budget_s must be a positive"),
+    "budget small": (lambda: solved(budget_s=1e-9), "budget_s must leave time for the pilot"),
+    "range": (lambda: solved(ratios=(1.0, 0.9)), "two numbers (lowest, highest)"),
+    "range of one": (lambda: solved(ratios=1.0), "two numbers (lowest, highest)"),
+    "range NaN": (lambda: solved(ratios=(0.9, math.nan)), "two numbers (lowest, highest)"),
+    "solved particles": (lambda: solved(particles=[1, 2]), "particles must be one whole number"),
+    "solved seeds": (lambda: solved(seeds=0), "seeds must be"),
+    "solved filling": (lambda: solved(filling=3), "filling must be"),
+    "solved oscillator": (lambda: solved(oscillator=3), "oscillator must be an Oscillator"),
+    "solved progress": (lambda: solved(progress="bar"), "progress must be a function"),
     "lattice": (lambda: Automaton(columns=4000, rows=4000), "fewer than 4096 cells"),
     "ledger": (lambda: Automaton(ledger=True), "ledger must be False"),
     "priority": (

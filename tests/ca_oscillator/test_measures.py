@@ -100,24 +100,47 @@ def test_a_container_at_rest_has_no_impedance():
     assert np.isnan(cycles_of(nothing, nothing, nothing).apparent_mass).all()
 
 
-def test_peak_of_a_parabola_is_exact_on_any_grid():
+def test_peak_is_exact_where_one_over_rms_squared_is_a_parabola_of_the_ratio_squared():
     x = np.array([0.8, 0.9, 0.97, 1.0, 1.02, 1.1])
-    found = peak(x, 3.0 - 50.0 * (x - 0.983) ** 2)
-    assert found == pytest.approx((0.983, 3.0), rel=1e-12)
+    response = (0.1 + 50.0 * (x**2 - 0.983**2) ** 2) ** -0.5
+    assert peak(x, response) == pytest.approx((0.983, 0.1**-0.5), rel=1e-12)
+
+
+@pytest.mark.parametrize("damping", [0.0006, 0.01228, 0.05])
+@pytest.mark.parametrize("offset", np.linspace(0.0, 1.0, 7))
+def test_peak_of_an_oscillator_from_a_grid_of_one_percent(damping, offset):
+    """To (2 z)^2, the share of the base's velocity in its pull, and to the cube of the spacing.
+
+    The numerator 1 + (2 z r)^2 of the transfer function makes a cubic of (2 z)^2 times that of the
+    squares, 0.02 apart; the grid falls anywhere.
+    """
+    o = Oscillator(damping=2.0 * damping * math.sqrt(123.4 * 0.086))
+    ratios = 0.95 + 0.01 * (np.arange(11) + offset)
+    found = peak(ratios, o.rms(ratios * o.natural_frequency))
+    assert found == pytest.approx(o.peak(), rel=4.0 * damping**2 + 0.02**3)
 
 
 @pytest.mark.parametrize(
-    ("response", "wanted"),
+    "response",
     [
-        ([3.0, 2.0, 1.0], (0.9, 3.0)),
-        ([1.0, 2.0, 3.0], (1.1, 3.0)),
-        ([math.nan, 2.0, 1.0], (1.0, 2.0)),
-        ([2.0, 2.0, 2.0], (0.9, 2.0)),
-        ([1.0, 2.0, 2.0], (1.05, 2.125)),
+        *([3.0, 2.0, 1.0], [1.0, 2.0, 3.0], [2.0, 2.0, 2.0], [0.0, 0.0, 0.0]),
+        *([math.nan, 2.0, 1.0], [1.0, 2.0, math.nan], [2.0, math.nan, 1.0]),
     ],
 )
-def test_peak_at_an_end_beside_nan_and_on_a_plateau(response, wanted):
-    assert peak([0.9, 1.0, 1.1], response) == pytest.approx(wanted, rel=1e-12)
+def test_a_peak_at_an_end_or_beside_nan_is_outside(response):
+    assert np.isnan(peak([0.9, 1.0, 1.1], response)).all()
+
+
+def test_peak_of_a_plateau_and_beside_rest():
+    ratio, height = peak([0.9, 1.0, 1.1], [1.0, 2.0, 2.0])
+    assert 1.0 < ratio < 1.1 and 2.0 < height < 3.0
+    assert peak([0.9, 1.0, 1.1], [0.0, 2.0, 1.0]) == (1.0, 2.0)
+
+
+def test_peak_of_points_too_far_apart_for_one_resonance():
+    """1 / response^2 would fall below zero between them: the curve's own parabola is taken."""
+    ratio, height = peak([0.5, 1.0, 1.1], [0.01, 1.0, 0.999])
+    assert 0.5 < ratio < 1.1 and 1.0 <= height < 2.0
 
 
 def test_no_peak_without_numbers():

@@ -212,3 +212,14 @@ def test_bad_options_of_a_batch_are_refused(options, name):
 def test_a_rigid_particle_has_a_mass(changes):
     with pytest.raises(InputError, match="particle_mass"):
         RigidMass(**changes)
+
+
+def test_a_peak_outside_the_ratios_is_said_to_be_outside():
+    """Both curves rise towards the last ratio; the table of a notebook has a word for it."""
+    response = rigid_response(ratios=[0.9, 0.92, 0.94], particles=[0, 30])
+    ratio, rms = response.peaks()
+    assert ratio.shape == rms.shape == (2, 2)
+    assert np.isnan(ratio).all() and np.isnan(rms).all()
+    assert response._repr_html_().count("outside") == 2 * 4
+    inside = rigid_response(ratios=[0.9, 0.95, 1.0, 1.05], particles=[0, 30])
+    assert np.isfinite(inside.peaks()).all() and "outside" not in inside._repr_html_()

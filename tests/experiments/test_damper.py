@@ -285,6 +285,17 @@ def test_spheres_beyond_their_limit_end_as_diverged(tmp_path, name, options):
     assert not (tmp_path / "summary.json").exists()
 
 
+def test_peaks_are_found_to_an_accuracy(shown):
+    """30 grains of 0.2 g as a rigid mass peak at sqrt(86 / 92) f0; bars are as narrow as asked."""
+    options = "--accuracy 5% --fillings ca_static --particles 30".split()
+    folder, figures = shown("damper_response", *options)
+    for name, unit in (("ratio", ""), ("rms", "_mm")):
+        value, error = (figures[f"peak_{name}{e}{unit}_ca_static_N30"] for e in ("", "_error"))
+        assert 0.0 < error <= 0.05 * value
+    assert figures["peak_ratio_ca_static_N30"] == pytest.approx((86.0 / 92.0) ** 0.5, abs=0.01)
+    assert len((folder / "accuracy.csv").read_text().splitlines()) == 3
+
+
 BAD_OPTIONS = [
     ("damper_rebound", ("--restitution", "1.2"), ("--restitution", "'1.2'", "(0.3, 1)")),
     ("damper_rebound", ("--restitution", "nan"), ("--restitution", "'nan'")),

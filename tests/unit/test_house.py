@@ -38,7 +38,10 @@ LAYERS = {
         ("__main__",),
     ),
     "ca_damper": (
-        ("errors", "random_numbers", "progress", "measures", "report", "contracts"),
+        (
+            *("errors", "random_numbers", "progress", "measures", "report", "contracts"),
+            "steady_state",
+        ),
         ("rk45", "oscillator", "record", "checks", "bouncing"),
         ("scenes",),
         ("filling", "lattice"),
@@ -47,7 +50,9 @@ LAYERS = {
         ("batch", "needed_effects"),
         ("plot",),
         ("response",),
-        ("sweep", "force_check"),
+        ("sweep", "force_check", "goals"),
+        ("accuracy",),
+        ("solve_response",),
         ("step_study",),
         ("__init__",),
         ("__main__",),

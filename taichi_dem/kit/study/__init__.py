@@ -15,6 +15,7 @@ from taichi_dem.kit.study.command_line import (
     output_paths,
     parser,
     several,
+    tolerance,
     whole,
 )
 from taichi_dem.kit.study.new_process import call_in_process, call_rounds
@@ -67,6 +68,7 @@ __all__ = [
     "several",
     "show_rows",
     "take_settings",
+    "tolerance",
     "value_in_words",
     "versions",
     "whole",

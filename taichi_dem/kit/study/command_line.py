@@ -67,6 +67,20 @@ def _checked(kind, words, allowed):
     return parse
 
 
+def tolerance(text: str) -> float:
+    """Type of an option that is a share in (0, 1], such as 1% or 0.01."""
+    number_part, percent = (text[:-1], 0.01) if text.endswith("%") else (text, 1.0)
+    try:
+        value = percent * float(number_part)
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value <= 1.0:
+        raise argparse.ArgumentTypeError(
+            f"must be a share above 0 and up to 100%, such as 1% or 0.01, got {shown(text)}"
+        )
+    return value
+
+
 def interval(text: str) -> dict:
     """Type of an option that says how often: 600s on the wall, 5000steps, or 1e-5sim seconds."""
     found: Any = re.fullmatch(r"([0-9.]+(?:[eE][-+]?[0-9]+)?)(s|steps|sim)?", text)

@@ -1,0 +1,252 @@
+"""Reduction of the error of goals: which scenes go on, until the bars are narrow enough."""
+
+import math
+
+import numpy as np
+
+from ca_damper.accuracy.branches import clusters_of
+from ca_damper.accuracy.error_sources import largest_source
+from ca_damper.accuracy.goal_estimate import (
+    Estimate,
+    estimate,
+    response_of,
+    seed_values,
+    series_of,
+    size_of,
+)
+from ca_damper.accuracy.job import Job
+from ca_damper.accuracy.peak_search import Lattice, PeakSearch
+from ca_damper.accuracy.scene_runs import SceneKey, SceneRuns
+from ca_damper.accuracy.steady_runs import BudgetSpent, SteadyRuns
+from ca_damper.goals import Goal
+from taichi_dem.kit.display import counted
+from taichi_dem.kit.errors import InputError
+
+#: Order of the step's error: contacts begin and end within a step, and so do an automaton's
+#: events, which is of first order whatever integrates the motion between them.
+STEP_ORDER = 1.0
+#: Coarse step by fine one.
+STEP_RATIO = 2.0
+# Most seeds there are.
+_MOST_SEEDS = 96
+# Cycles that a scene goes at least in the pilot and in the end, and those of its steady part.
+_PILOT_CYCLES, _LEAST_CYCLES, _LEAST_WINDOW = 40, 64, 32
+# Drift that does not matter: as a share of the value in the pilot, of the tolerance in the end.
+_PILOT_DRIFT, _DRIFT = 0.05, 0.2
+_MOST_ROUNDS = 24
+# Frequencies that are added on either side of a peak.
+_MOST_MARGIN = 5
+
+
+class Reduction:
+    """Runs of a job with coarse steps of ``2 dt`` and fine ones of ``dt`` [s].
+
+    seeds: that are run. pilot_s: CPU seconds of what came before the final runs.
+    """
+
+    def __init__(self, job: Job, runs: SceneRuns, coarse: float):
+        self.job, self.runs, self.dt = job, runs, coarse / STEP_RATIO
+        self.seeds, self.pilot_s = job.first_seeds(), 0.0
+        self.peak, self.lattice = math.nan, Lattice(1.0, 1.0)
+        self.window, self.margin, self.ended = _LEAST_WINDOW, 0, ""
+        self.steady, self.is_placed = SteadyRuns(runs, job.budget_s, self._goal_series), False
+
+    @property
+    def coarse(self) -> float:
+        """Coarse step [s]."""
+        return STEP_RATIO * self.dt
+
+    def run(self) -> list[Estimate]:
+        """Estimates of all goals, good enough or the best that could be had."""
+        found: list[Estimate] = []
+        try:
+            self._search()
+            self.pilot_s, self.is_placed = self.runs.cpu_s, True
+            for _ in range(_MOST_ROUNDS):
+                self._make_steady()
+                found, state = self._estimates(), self._state()
+                if not self._reduce(found):
+                    break
+            else:
+                self.ended = f"after {counted(_MOST_ROUNDS, 'round')} of longer and more runs"
+        except BudgetSpent as spent:
+            self.ended = f"within budget_s of {self.job.budget_s:g} s"
+            if found:
+                self._restore(state)
+            else:
+                found = self._first(spent)
+        return found
+
+    def _state(self):
+        """Which runs make the present estimates."""
+        return self.dt, self.seeds, self.lattice.level, self.margin
+
+    def _restore(self, state):
+        self.dt, self.seeds, self.lattice.level, self.margin = state
+
+    def _search(self):
+        """Find the peak, where a goal lies on it, with the first seed and the coarse step."""
+        if all(goal.ratios for goal in self.job.goals):
+            return
+        search = PeakSearch(self._pilot_rms, *self.job.search_range(), self.job.span is None)
+        self.peak, self.lattice = search.run()
+
+    def _pilot_rms(self, ratios):
+        """RMS [m] at some ratios, as well as the pilot wants to know it."""
+        keys = [SceneKey(ratio, self.seeds[0], self.coarse) for ratio in ratios]
+        self.steady.go_on(keys, _PILOT_DRIFT, _PILOT_CYCLES, _PILOT_CYCLES // 4)
+        return [self.steady.parts[key].mean for key in keys]
+
+    def _goal_series(self, key):
+        """Goals by cycle of this scene's frequency: they may drift where RMS rests."""
+        own = [goal for goal in self.job.goals if goal.ratios == (key.ratio,)]
+        return [series_of(goal, self.runs, key) for goal in own]
+
+    def _make_steady(self):
+        drift = _DRIFT * self.job.tolerance
+        self.steady.go_on(self._keys(), drift, _LEAST_CYCLES, self.window)
+
+    def _first(self, spent):
+        """Estimates of scenes that are not steady; InputError where some have not begun."""
+        keys = self._keys() if self.is_placed else []
+        if not keys or min(map(self.runs.cycles, keys)) < _LEAST_CYCLES:
+            raise InputError(
+                "budget_s must leave time for the pilot and one value: at least "
+                f"{1.5 * spent.needed:.2g} s here, got {self.job.budget_s:g}"
+            ) from None
+        for key in keys:
+            self.steady.check_steady(key, _DRIFT * self.job.tolerance)
+        return self._estimates()
+
+    def ratios_of(self, goal: Goal) -> tuple[float, ...]:
+        """Frequency ratios that a goal is made of."""
+        if goal.ratios:
+            return goal.ratios
+        around = self.lattice.around(self.peak)
+        level = self.lattice.level
+        first, last = (round(self.lattice.position(end, level)) for end in (around[0], around[-1]))
+        places = range(first - self.margin, last + self.margin + 1)
+        return tuple(self.lattice.ratio(k, level) for k in places)
+
+    def frequencies(self) -> tuple[float, ...]:
+        """Frequency ratios of the final runs."""
+        return tuple(sorted({ratio for goal in self.job.goals for ratio in self.ratios_of(goal)}))
+
+    def _keys(self):
+        """Scenes of the final runs, and those that tell what the spacing at a peak does."""
+        steps = self.dt, self.coarse
+        ratios = self.frequencies()
+        keys = [SceneKey(r, seed, dt) for dt in steps for r in ratios for seed in self.seeds]
+        return list(dict.fromkeys([*keys, *self._wide_keys()]))
+
+    def _wide(self):
+        """Triples of ratios at twice the spacing around the peak, where a goal lies on it."""
+        if all(goal.ratios for goal in self.job.goals):
+            return []
+        return self.lattice.wide(self.peak)
+
+    def _wide_keys(self):
+        """Scenes of the wide triples, of the first seed at the coarse step."""
+        ratios = dict.fromkeys(ratio for triple in self._wide() for ratio in triple)
+        return [SceneKey(ratio, self.seeds[0], self.coarse) for ratio in ratios]
+
+    def longest(self) -> int:
+        """Most cycles that a scene went."""
+        return max(map(self.runs.cycles, self._keys()))
+
+    def transient_share(self) -> float:
+        """Share of all cycles of the final runs that came before the steady parts."""
+        keys = self._keys()
+        gone = sum(map(self.runs.cycles, keys))
+        return sum(self.steady.parts[key].begin for key in keys) / max(1, gone)
+
+    def _estimates(self):
+        """Estimates of all goals from what has been run."""
+        return [self._estimate(goal) for goal in self.job.goals]
+
+    def _estimate(self, goal):
+        ratios = self.ratios_of(goal)
+        fine, coarse = (
+            seed_values(goal, self.runs, ratios, self.seeds, dt, self.steady.parts)
+            for dt in (self.dt, self.coarse)
+        )
+        grid = np.zeros_like(fine.mean) if goal.ratios else self._grid_error(goal, ratios)
+        return estimate(goal, fine, coarse, grid, STEP_RATIO, STEP_ORDER, self.job.confidence)
+
+    def _grid_error(self, goal, ratios):
+        """Half-width by the spacing at the peak, (places,): half of what twice the spacing changes.
+
+        So much for a curve with a kink; a smooth one is off by an eighth of it. Where the peak is
+        lost at twice the spacing, the spacing is too wide, and the half-width a tenth.
+        """
+        own = self._mean_of(goal, ratios, self.seeds[:1], self.coarse)
+        wide = [self._mean_of(goal, some, self.seeds[:1], self.coarse) for some in self._wide()]
+        change = 0.5 * np.abs(np.array(wide) - own)
+        known = np.where(np.isnan(change), -1.0, change).max(axis=0)
+        return np.where(known < 0.0, 0.1 * np.abs(own), known)
+
+    def _mean_of(self, goal, ratios, seeds, dt):
+        """Mean over seeds of a goal that is made of some ratios, (places,)."""
+        found = response_of(self.runs, ratios, seeds, dt, self.steady.begins())
+        return goal.values(found).mean(axis=0)
+
+    def _reduce(self, found: list[Estimate]) -> bool:
+        """Ask for more where the worst estimate needs it; False where all is done that can be."""
+        worst = max(found, key=self._excess)
+        excess = self._excess(worst)
+        if math.isinf(excess):
+            return self._widen(worst.goal)
+        if excess <= 1.0 or self._is_branched(worst):
+            return False
+        return self._enlarge(worst, largest_source(worst), excess)
+
+    def _excess(self, found):
+        """Bar by the bar that is allowed; infinite for no number."""
+        size, total = size_of(found.value), size_of(found.parts.total)
+        if not math.isfinite(size + total):
+            return math.inf
+        return total / (self.job.tolerance * size) if size > 0.0 else float(total > 0.0) * 1e9
+
+    def _widen(self, goal):
+        """Take in further frequencies where the peak of some seed leaves those there are."""
+        self.margin += 1
+        if self.margin > 2 and self.lattice.level > 0:
+            self.lattice.level, self.margin = self.lattice.level - 1, 1
+        if goal.ratios or self.margin > _MOST_MARGIN:
+            raise InputError(
+                f"goal {goal.name!r} must be a finite number in this scene, got NaN: seeds peak "
+                "far apart, or the frequencies do not define it; ask for a goals.response_curve"
+            )
+        return True
+
+    def _is_branched(self, found):
+        """Whether the seeds are known to come to several steady motions."""
+        if found.value.size != 1:
+            return False
+        values, error = found.fine.values[:, 0], math.sqrt(float(found.fine.variance[0]))
+        least = 0.5 * self.job.tolerance * size_of(found.value)
+        return len(clusters_of(values, error, least)) > 1
+
+    def _enlarge(self, found, source, excess):
+        """Shorten the step, halve the spacing, or take more seeds or cycles."""
+        if source == "step":
+            if found.step_is_seen:
+                self.dt /= STEP_RATIO
+                return True
+            source = "chance" if found.fine.apart.max() > 0.0 else "cycles"
+        factor = min(2.5, max(1.25, excess**2))
+        if source == "grid":
+            self.lattice.level += 1
+        elif source == "cycles":
+            self.window = math.ceil(self.window * factor)
+        else:
+            return self._more_seeds(factor)
+        return True
+
+    def _more_seeds(self, factor):
+        count = min(_MOST_SEEDS, math.ceil(len(self.seeds) * factor))
+        if self.job.fixed is not None or count <= len(self.seeds):
+            self.ended = f"with {len(self.seeds)} seeds"
+            return False
+        self.seeds = tuple(range(1, count + 1))
+        return True

@@ -1,0 +1,53 @@
+"""A checked question to ``solve_response``, and where its runs begin."""
+
+import math
+from dataclasses import dataclass, field
+from typing import Any, Optional
+
+from ca_damper.fixed_mass import Empty, RigidMass
+from ca_damper.goals import Goal
+from ca_damper.oscillator import Oscillator
+
+# First coarse step by the filling's own and by its bound, which is that of safe runs.
+_OF_DEFAULT, _OF_BOUND = 1.5, 1.4
+# Seeds to begin with: so many particles in all, as few of them often have several steady motions.
+_FEWEST_SEEDS, _MANY_SEEDS, _PARTICLES = 3, 8, 80
+# Range of a search by the peak of the rigid mass and by the natural frequency.
+_BELOW, _ABOVE = 0.95, 1.04
+
+
+@dataclass
+class Job:
+    """A checked question. span: range of ratios or None. fixed: seeds, or None for ours."""
+
+    filling: Any
+    particles: int
+    oscillator: Oscillator
+    span: Optional[tuple[float, float]]
+    fixed: Optional[tuple[int, ...]]
+    goals: tuple[Goal, ...] = ()
+    tolerance: float = 0.01
+    confidence: float = 0.95
+    budget_s: float = math.inf
+    listener: Any = field(default=None, repr=False)
+
+    def first_step(self) -> float:
+        """Coarse step to begin with [s]."""
+        step, bound = _OF_DEFAULT * self.filling.default_dt, self.filling.step_bound
+        return step if bound is None else min(step, _OF_BOUND * bound[0])
+
+    def first_seeds(self) -> tuple[int, ...]:
+        """Seeds to begin with; one of a filling that draws nothing."""
+        if self.fixed is not None:
+            return self.fixed
+        if self.particles == 0 or isinstance(self.filling, (Empty, RigidMass)):
+            return (1,)
+        several = math.ceil(_PARTICLES / self.particles)
+        return tuple(range(1, 1 + min(_MANY_SEEDS, max(_FEWEST_SEEDS, several))))
+
+    def search_range(self) -> tuple[float, float]:
+        """Range in which to look for a peak first."""
+        if self.span is not None:
+            return self.span
+        o = self.oscillator
+        return _BELOW * o.peak(self.particles * self.filling.particle_mass)[0], _ABOVE

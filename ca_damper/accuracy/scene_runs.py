@@ -1,0 +1,145 @@
+"""Scenes of one filling that go on from where they are, each as far as it is asked to."""
+
+import time
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple, Optional
+
+import numpy as np
+
+from ca_damper.batch import Batch
+from ca_damper.measures import COLUMNS, Cycles
+from ca_damper.oscillator import Oscillator
+from ca_damper.response import measures_of
+from ca_damper.scenes.clock import steps_per_cycle
+from ca_damper.scenes.table import SceneTable
+from taichi_dem.kit.progress.progress import Listener
+
+#: Scenes of a batch and cycles of a run: an engine has room for so many at least, so that further
+#: batches of the same filling compile nothing.
+SCENES, CYCLES = 64, 32
+
+
+class SceneKey(NamedTuple):
+    """Which scene: frequency ratio f/f0, seed, largest step [s]."""
+
+    ratio: float
+    seed: int
+    dt: float
+
+
+class SceneRuns:
+    """Records of scenes of a filling with a number of particles, by SceneKey.
+
+    cpu_s: CPU seconds of their runs, without compiling. steps: of all scenes. runs: number of
+    scenes started.
+    """
+
+    def __init__(
+        self, filling: Any, particles: int, oscillator: Oscillator, progress: Optional[Listener]
+    ):
+        self.filling, self.particles, self.oscillator = filling, particles, oscillator
+        self.progress = progress
+        self.cpu_s, self.steps = 0.0, 0
+        self._homes: dict[SceneKey, tuple[Batch, int]] = {}
+        self._records: dict[SceneKey, np.ndarray] = {}
+
+    @property
+    def runs(self) -> int:
+        """Number of scenes that were started."""
+        return len(self._records)
+
+    def cycles(self, key: SceneKey) -> int:
+        """Number of cycles that a scene has gone."""
+        return len(self._records[key]) if key in self._records else 0
+
+    def work(self, cycles: Mapping[SceneKey, int]) -> int:
+        """Steps that scenes take to go on by so many cycles."""
+        return sum(count * self._steps(key) for key, count in cycles.items())
+
+    def steps_per_cycle(self, ratio: float, dt: float) -> int:
+        """Steps of a cycle at a frequency ratio, none longer than dt [s]."""
+        return steps_per_cycle(ratio * self.oscillator.natural_frequency, dt)
+
+    def _steps(self, key):
+        return self.steps_per_cycle(key.ratio, key.dt)
+
+    def seconds(self, cycles: Mapping[SceneKey, int]) -> float:
+        """CPU seconds that they will take, by what earlier ones took; 0 before the first."""
+        return self.cpu_s / self.steps * self.work(cycles) if self.steps else 0.0
+
+    def go_on(self, cycles: Mapping[SceneKey, int]) -> None:
+        """Let scenes go on by numbers of cycles; those not known begin at rest.
+
+        Raises SimulationDiverged; the scenes of that batch are then lost.
+        """
+        self._begin([key for key, count in cycles.items() if count and key not in self._homes])
+        batches: dict[int, tuple[Batch, dict[int, SceneKey]]] = {}
+        for key, count in cycles.items():
+            if count:
+                batch, s = self._homes[key]
+                batches.setdefault(id(batch), (batch, {}))[1][s] = key
+        for batch, keys in batches.values():
+            self._go(batch, keys, {s: cycles[key] for s, key in keys.items()})
+
+    def _begin(self, keys):
+        """Make batches of new scenes at rest."""
+        for first in range(0, len(keys), SCENES):
+            some = keys[first : first + SCENES]
+            ratios, seeds, steps = (np.array(column) for column in zip(*some))
+            o = self.oscillator
+            structure = (o.base_amplitude, o.mass, o.stiffness, o.damping)
+            frequency = ratios * o.natural_frequency
+            table = SceneTable(self.particles, seeds, steps, frequency, *structure)
+            batch = Batch(self.filling, table, measured_cycles=CYCLES)
+            batch.start("rest")
+            # Compiles, where no batch of this structure has done so.
+            batch.advance(0)
+            self._homes.update({key: (batch, s) for s, key in enumerate(some)})
+            self._records.update({key: np.empty((0, len(COLUMNS))) for key in some})
+
+    def _go(self, batch, keys, left):
+        """Let scenes of a batch go on, by ``CYCLES`` at a time at most."""
+        while any(left.values()):
+            now = {s: min(CYCLES, count) for s, count in left.items()}
+            counts = np.zeros(batch.count, dtype=np.int64)
+            counts[list(now)] = list(now.values())
+            began = time.process_time()
+            records = batch.measure_each(counts, self.progress)
+            self.cpu_s += time.process_time() - began
+            self.steps += int((counts * batch.steps_per_cycle).sum())
+            for s, key in keys.items():
+                self._records[key] = np.concatenate([self._records[key], records[s]])
+                left[s] -= now[s]
+
+    def forget(self, keys: Iterable[SceneKey]) -> None:
+        """Give scenes up that have diverged, with those that shared their batch."""
+        lost = {id(self._homes[key][0]) for key in keys if key in self._homes}
+        for key in [key for key, (batch, _) in self._homes.items() if id(batch) in lost]:
+            del self._homes[key], self._records[key]
+
+    def series(self, key: SceneKey) -> np.ndarray:
+        """RMS and amplitude of every cycle of a scene [m], (2, cycles)."""
+        cycles = self._cycles(key, self._records[key][:, None])
+        return np.stack([cycles.rms, cycles.amplitude])
+
+    def by_cycle(self, key: SceneKey) -> dict[str, np.ndarray]:
+        """Measures of every cycle of a scene, each (cycles,), by name."""
+        return measures_of(self.oscillator, self._cycles(key, self._records[key][:, None]))
+
+    def measures(self, key: SceneKey, begin: int, leave_out: int = 0) -> dict[str, np.ndarray]:
+        """Measures of a scene from cycle ``begin`` on, each (1,), by name.
+
+        leave_out: number of equal parts, each of which is left out in turn: (parts,).
+        """
+        record = self._records[key][begin:]
+        if not leave_out:
+            return measures_of(self.oscillator, self._cycles(key, record[None]))
+        length = len(record) // leave_out
+        kept = record[len(record) - leave_out * length :]
+        part = np.arange(len(kept)) // length
+        without = np.stack([kept[part != k] for k in range(leave_out)])
+        return measures_of(self.oscillator, self._cycles(key, without))
+
+    def _cycles(self, key, record):
+        frequency = np.full(len(record), key.ratio * self.oscillator.natural_frequency)
+        return Cycles(frequency, np.full(len(record), self._steps(key)), record)

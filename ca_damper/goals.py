@@ -1,0 +1,108 @@
+"""Goals: outputs of a damper that can be asked for with a tolerance, see ``solve_response``.
+
+A goal of one's own takes a few lines; its function gets a Response of one particle number and
+returns one value for each seed, or a row of them:
+
+    largest_swing = Goal("largest swing", "m", "extreme", lambda found: found.amplitude[0].max(0))
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Union
+
+import numpy as np
+
+from ca_damper.response import Response
+from taichi_dem.kit.display import counted
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import choice, positive, several, shown, word
+
+#: "value": at given frequencies. "extreme": of the curve, which is followed to its peak. "curve":
+#: a value for each of the given frequencies.
+KINDS = ("value", "extreme", "curve")
+
+
+@dataclass(frozen=True)
+class Goal:
+    """An output: its name, its unit ("1" for none), one of KINDS, and how a Response gives it.
+
+    function: of a Response of one particle number, with as many seeds as there are runs; returns
+    (seeds,) or (seeds, places). ratios: frequencies f/f0 that it needs; none for an "extreme",
+    whose Response has at least three around the highest RMS.
+    Raises InputError.
+    """
+
+    name: str
+    unit: str
+    kind: str
+    function: Callable[[Response], Any] = field(repr=False)
+    ratios: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        word("name of a goal", self.name)
+        word("unit of a goal", self.unit)
+        choice("kind of a goal", self.kind, KINDS)
+        if not callable(self.function):
+            raise InputError(
+                f"function of a goal must be a function of a Response, got {shown(self.function)}"
+            )
+        if self.kind == "extreme":
+            if self.ratios:
+                raise InputError(
+                    "ratios of a goal must be left out of an 'extreme', whose frequencies are "
+                    f"found, got {shown(self.ratios)}"
+                )
+            return
+        ratios = several("ratios of a goal", self.ratios, positive)
+        if any(a >= b for a, b in zip(ratios, ratios[1:])):
+            raise InputError(f"ratios of a goal must ascend, got {shown(self.ratios)}")
+        object.__setattr__(self, "ratios", ratios)
+
+    def values(self, response: Response) -> np.ndarray:
+        """Values of a Response, (seeds, places). Raises InputError for a function of no use."""
+        found = np.asarray(self.function(response), dtype=np.float64)
+        if found.ndim not in (1, 2) or len(found) != len(response.seeds) or found.size == 0:
+            raise InputError(
+                f"function of the goal {self.name!r} must return one value or one row for each of "
+                f"{counted(len(response.seeds), 'seed')}, got shape {found.shape}"
+            )
+        return found.reshape(len(found), -1)
+
+
+def peak_ratio() -> Goal:
+    """Frequency ratio f/f0 at which the RMS displacement peaks."""
+    return Goal("peak ratio", "1", "extreme", lambda found: found.peaks()[0][0])
+
+
+def peak_rms() -> Goal:
+    """Height of the peak of the RMS displacement [m]."""
+    return Goal("peak RMS", "m", "extreme", lambda found: found.peaks()[1][0])
+
+
+def rms_at(ratio: float) -> Goal:
+    """RMS displacement [m] at a frequency ratio f/f0."""
+    return _measure_at("RMS", "m", "rms", ratio)
+
+
+def loss_factor_at(ratio: float) -> Goal:
+    """Loss factor at a frequency ratio f/f0."""
+    return _measure_at("loss factor", "1", "loss_factor", ratio)
+
+
+def apparent_mass_at(ratio: float) -> Goal:
+    """Apparent mass of the filling [kg] at a frequency ratio f/f0."""
+    return _measure_at("apparent mass", "kg", "apparent_mass", ratio)
+
+
+def response_curve(ratios: Union[Sequence[float], np.ndarray]) -> Goal:
+    """RMS displacement [m] at each of some ascending frequency ratios f/f0."""
+    given = several("ratios", ratios, positive)
+    return Goal("response curve", "m", "curve", lambda found: found.rms[0].T, given)
+
+
+def _measure_at(name, unit, measure, ratio):
+    """Goal of a measure of a Response at one frequency ratio."""
+    place = positive("ratio", ratio)
+    return Goal(
+        f"{name} at {place:g}", unit, "value", lambda found: getattr(found, measure)[0, 0], (place,)
+    )

@@ -1,0 +1,217 @@
+"""Ask for an output of the damper with a tolerance, get it with an error bar.
+
+A pilot at a coarse step finds the frequencies that the goal needs; scenes at two steps and of a few
+seeds then go on, each until its transient has ended and the mean over its cycles, the seeds and
+the step leave a bar that is narrow enough. Nothing begins again that can go on.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, Optional, Union
+
+import numpy as np
+
+from ca_damper.accuracy.branches import BranchedAnswer, branches_of, clusters_of, sentence
+from ca_damper.accuracy.error_reduction import STEP_ORDER, STEP_RATIO, Reduction
+from ca_damper.accuracy.error_sources import shortfall
+from ca_damper.accuracy.goal_estimate import Estimate, response_of, step_error
+from ca_damper.accuracy.job import Job
+from ca_damper.accuracy.scene_runs import SceneRuns
+from ca_damper.errors import SimulationDiverged
+from ca_damper.filling import Filling, check_filling
+from ca_damper.goals import Goal
+from ca_damper.oscillator import Oscillator
+from ca_damper.progress import OpenEnded
+from ca_damper.response import Grid
+from taichi_dem.kit.accuracy.answer import Answer, ErrorParts, Expense, Plan
+from taichi_dem.kit.accuracy.student import t_quantile
+from taichi_dem.kit.display import counted
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.progress.progress import Listener
+from taichi_dem.kit.progress.progress_bar import reporting
+from taichi_dem.kit.validation import AUTO, between, finite, instance, positive, shown
+
+# Tolerances whose cost an answer tells.
+_ASKED_OFTEN = (0.1, 0.03, 0.01, 0.003)
+# A run that diverges is repeated at a shorter step so often.
+_MOST_SHORTENED = 6
+_SHORTER = 1.5
+
+
+def solve_response(
+    filling: Filling,
+    *,
+    particles: int,
+    goal: Union[Goal, Sequence[Goal]],
+    tolerance: float = 0.01,
+    confidence: float = 0.95,
+    budget_s: Optional[float] = None,
+    oscillator: Optional[Oscillator] = None,
+    ratios: Optional[tuple[float, float]] = None,
+    seeds: Union[int, Sequence[int], None] = None,
+    progress: Union[Listener, str, None] = AUTO,
+) -> Any:
+    """Value of a goal with an error bar: an Answer, or a tuple of them for several goals.
+
+    goal: one of ``goals`` or several, which share their runs. tolerance: half-width of the bar as
+    a share of the value, or of a curve's largest. confidence: with which the bar holds the value
+    of endless runs at an endless small step. budget_s: CPU seconds without compiling, after which
+    the best answer is returned and says what is missing. ratios: range (lowest, highest) of f/f0
+    in which to look for a peak; one around the natural frequency if None, which is left where the
+    peak is outside. seeds: how many or which; as many as it takes if None. oscillator, progress:
+    as in ``frequency_response``.
+
+    Runs begin at rest. A filling whose seeds come to several steady motions gives a
+    BranchedAnswer. The same question gets the same bits, unless a budget ends it.
+    Raises InputError for what cannot be asked, for a peak outside ratios and for a budget that
+    ends before there is anything to tell; SimulationDiverged.
+    """
+    goals = _goals_of(goal)
+    question = _question(filling, particles, oscillator, ratios, seeds)
+    question.goals, question.budget_s = goals, _budget(budget_s)
+    question.tolerance = _share("tolerance", tolerance)
+    question.confidence = between("confidence", confidence, 0.5, 0.9999)
+    with reporting(progress, "answer") as listener:
+        question.listener = OpenEnded(listener)
+        reduction, estimates = _answered(question)
+        question.listener.end()
+    answers = tuple(_answer(question, reduction, found) for found in estimates)
+    return answers if isinstance(goal, (list, tuple)) else answers[0]
+
+
+def _question(filling, particles, oscillator, ratios, seeds):
+    """Job of the checked arguments."""
+    check_filling(filling)
+    oscillator = Oscillator() if oscillator is None else oscillator
+    instance("oscillator", oscillator, Oscillator)
+    one = Grid(filling, particles, 1.0, 1 if seeds is None else seeds, oscillator, None)
+    if len(one.particles) != 1:
+        raise InputError(f"particles must be one whole number, got {shown(particles)}")
+    fixed = None if seeds is None else one.seeds
+    return Job(filling, one.particles[0], oscillator, _range(ratios), fixed)
+
+
+def _goals_of(goal):
+    goals = tuple(goal) if isinstance(goal, (list, tuple)) else (goal,)
+    for one in goals:
+        if not isinstance(one, Goal):
+            raise InputError(
+                f"goal must be a Goal such as goals.peak_rms(), or a list of them, got {shown(one)}"
+            )
+    if not goals:
+        raise InputError("goal must be a Goal or a list of at least one, got none")
+    return goals
+
+
+def _share(name, value):
+    if not finite(value) or not 0.0 < value <= 1.0:
+        raise InputError(
+            f"{name} must be a share in (0, 1], such as 0.01 for 1 %, got {shown(value)}"
+        )
+    return float(value)
+
+
+def _budget(budget_s):
+    return math.inf if budget_s is None else positive("budget_s", budget_s)
+
+
+def _range(ratios):
+    """(lowest, highest) of a range, or None."""
+    if ratios is None:
+        return None
+    two = isinstance(ratios, (list, tuple, np.ndarray)) and len(ratios) == 2
+    if not two or not all(map(finite, ratios)) or not 0.0 < ratios[0] < ratios[1]:
+        raise InputError(
+            "ratios must be None or two numbers (lowest, highest) with 0 < lowest < highest, "
+            f"got {shown(ratios)}"
+        )
+    return float(ratios[0]), float(ratios[1])
+
+
+def _answered(job: Job) -> tuple[Reduction, list[Estimate]]:
+    """Estimates that are good enough, or the best ones; shorter steps where runs diverge."""
+    runs = SceneRuns(job.filling, job.particles, job.oscillator, job.listener)
+    dt = job.first_step()
+    for attempt in range(_MOST_SHORTENED + 1):
+        reduction = Reduction(job, runs, dt)
+        try:
+            return reduction, reduction.run()
+        except SimulationDiverged:
+            if attempt == _MOST_SHORTENED:
+                raise
+            dt /= _SHORTER
+    raise AssertionError("unreachable")
+
+
+def _answer(job: Job, done: Reduction, found: Estimate) -> Answer:
+    """Answer of an estimate, with branches where its seeds fall into clusters."""
+    goal, ratios = found.goal, done.ratios_of(found.goal)
+    response = response_of(done.runs, ratios, done.seeds, done.dt, done.steady.begins())
+    value, parts = _told(goal, found.value, found.parts)
+    base: dict[str, Any] = {"goal": goal.name, "unit": goal.unit, "plan": _plan(job, done)}
+    base.update(result=response, tolerance=job.tolerance, confidence=job.confidence)
+    branches = _branches(job, done, found)
+    if len(branches) > 1:
+        first, words = branches[0], sentence(branches, goal.unit)
+        parts = ErrorParts(step=_step_of(branches, found), chance=first.error)
+        found_value = {"value": first.value, "parts": parts}
+        return BranchedAnswer(**base, **found_value, shortfall=words, branches=branches)
+    words = shortfall(found, job.tolerance, done.ended)
+    made = Answer(**base, value=value, parts=parts, shortfall=words)
+    return replace(made, cost_curve=tuple(_expenses(job, done, made)))
+
+
+def _told(goal, value, parts):
+    """Value and parts as a user gets them: arrays for a curve, else numbers where there is one."""
+    if goal.kind == "curve" or len(value) > 1:
+        return value, parts
+    names = ("step", "chance", "sampling")
+    return float(value[0]), ErrorParts(**{name: float(getattr(parts, name)[0]) for name in names})
+
+
+def _branches(job, done, found):
+    """Branches of the seeds, of goals with one value."""
+    if found.value.size != 1:
+        return ()
+    values, error = found.fine.values[:, 0], math.sqrt(float(found.fine.variance[0]))
+    clusters = clusters_of(values, error, 0.5 * job.tolerance * abs(float(found.value[0])))
+    if len(clusters) < 2:
+        return ()
+    t = t_quantile(job.confidence, found.fine.freedom)
+    return branches_of(values, clusters, done.seeds, error, t)
+
+
+def _step_of(branches, found):
+    """Error by the step of the first branch: what its value differs at the coarse step."""
+    coarse = found.coarse.values[:, 0]
+    distance = np.abs(coarse[:, None] - [branch.value for branch in branches])
+    own = coarse[distance.argmin(axis=1) == 0]
+    change = abs(float(own.mean()) - branches[0].value) if len(own) else 0.0
+    return step_error(change, STEP_RATIO, STEP_ORDER)
+
+
+def _plan(job, done):
+    """Plan in words."""
+    label, seeds = job.filling.label, counted(len(done.seeds), "seed")
+    frequencies = done.frequencies()
+    several = "1 frequency" if len(frequencies) == 1 else f"{len(frequencies)} frequencies"
+    method = f"{label}, {done.dt:.3g} s, {several}, {seeds}, up to {done.longest()} cycles"
+    return Plan(method, done.runs.runs, done.pilot_s, done.runs.cpu_s - done.pilot_s)
+
+
+def _expenses(job, done, made):
+    """Costs of usual tolerances: that of the cycles and seeds beyond the transients grows as 1/x^2.
+
+    One that has been reached costs what was paid at most.
+    """
+    paid, fixed = (
+        done.runs.cpu_s,
+        done.pilot_s + done.transient_share() * (done.runs.cpu_s - done.pilot_s),
+    )
+    if not math.isfinite(made.share) or made.share <= 0.0:
+        return
+    for tolerance in sorted({*_ASKED_OFTEN, job.tolerance}, reverse=True):
+        is_paid = tolerance == job.tolerance and made.reached
+        more = max(1.0, (made.share / tolerance) ** 2)
+        yield Expense(tolerance, paid if is_paid else fixed + (paid - fixed) * more, is_paid)

@@ -1,0 +1,275 @@
+"""Questions with a tolerance whose answers are known, and how they cost, repeat and are refused."""
+
+import math
+import sys
+
+import numpy as np
+import pytest
+
+from ca_damper import (
+    Answer,
+    Automaton,
+    Batch,
+    BranchedAnswer,
+    Empty,
+    Goal,
+    InputError,
+    Oscillator,
+    RigidMass,
+    SceneTable,
+    SimulationDiverged,
+    Spheres,
+    goals,
+    solve_response,
+)
+from ca_damper.accuracy import error_reduction, steady_runs
+from ca_damper.accuracy.error_reduction import Reduction
+from ca_damper.accuracy.scene_runs import SceneKey, SceneRuns
+from ca_damper.accuracy.steady_runs import BudgetSpent
+from ca_damper.progress import BatchProgress, OpenEnded
+from taichi_dem.kit.progress.progress import Progress
+
+PAPER = Oscillator()
+QUIET = {"progress": None}
+#: The function has the name of its module.
+MODULE = sys.modules["ca_damper.solve_response"]
+
+
+def light(damping_ratio):
+    """The paper's structure with another damping ratio."""
+    return Oscillator(damping=2.0 * damping_ratio * math.sqrt(123.4 * 0.086))
+
+
+@pytest.mark.parametrize("damping", [0.0006, 0.01228])
+def test_an_empty_container_peaks_where_it_must(damping):
+    """From rest a damping ratio of 0.0006 takes 265 cycles to come to 63 %."""
+    oscillator = light(damping)
+    asked = [goals.peak_rms(), goals.peak_ratio()]
+    height, ratio = solve_response(
+        Empty(), particles=0, goal=asked, oscillator=oscillator, tolerance=0.01, **QUIET
+    )
+    for answer, wanted in zip((height, ratio), reversed(oscillator.peak())):
+        assert isinstance(answer, Answer) and answer.reached and answer.share <= 0.01
+        assert abs(answer.value - wanted) <= answer.error
+        assert answer.value == pytest.approx(wanted, rel=0.01)
+    assert height.result.rms.shape[2] == 1 and height.plan.runs >= 9
+    assert height.unit == "m" and ratio.unit == "1"
+
+
+def test_a_curve_of_a_rigid_mass():
+    ratios = (0.9, 0.96, 1.0, 1.05)
+    answer = solve_response(
+        RigidMass(), particles=30, goal=goals.response_curve(ratios), tolerance=0.003, **QUIET
+    )
+    wanted = PAPER.rms(np.array(ratios) * PAPER.natural_frequency, 30 * 0.2e-3)
+    assert answer.value.shape == answer.error.shape == (4,) and answer.reached
+    assert (abs(answer.value - wanted) <= answer.error + 1e-12).all()
+    assert answer.error.max() <= 0.003 * answer.value.max()
+    assert "4 values" in str(answer)
+    mass = solve_response(RigidMass(), particles=30, goal=goals.apparent_mass_at(0.9), **QUIET)
+    assert mass.value == pytest.approx(6e-3, rel=1e-3)
+
+
+def grains(tolerance=0.03, **options):
+    """A few grains of the automaton at one frequency."""
+    given = {"particles": 20, "goal": goals.rms_at(0.97), **QUIET, **options}
+    return solve_response(Automaton(), tolerance=tolerance, **given)
+
+
+def test_the_same_question_has_the_same_bits_and_the_same_runs():
+    first, second = grains(), grains()
+    assert (first.value, first.parts, first.plan.runs) == (
+        *(second.value, second.parts),
+        second.plan.runs,
+    )
+    assert np.array_equal(first.result.rms, second.result.rms)
+    assert first.plan.method == second.plan.method
+    assert (first.plan.pilot_s, first.plan.final_s > 0.0) == (0.0, True)
+
+
+def test_a_smaller_tolerance_has_a_smaller_bar_and_costs_more_cycles():
+    wide, narrow = grains(0.1), grains(0.004)
+    assert wide.reached and narrow.reached and narrow.error <= 0.004 * narrow.value
+    assert abs(wide.value - narrow.value) <= wide.error + narrow.error
+    costs = {round(one.tolerance, 6): one for one in narrow.cost_curve}
+    assert costs[0.004].measured and costs[0.004].seconds == pytest.approx(narrow.plan.seconds)
+    assert not costs[0.003].measured and costs[0.003].seconds >= costs[0.1].seconds
+
+
+def test_a_goal_of_one_s_own():
+    swing = Goal("largest swing", "m", "extreme", lambda found: found.amplitude[0].max(axis=0))
+    answer = solve_response(RigidMass(), particles=10, goal=swing, **QUIET)
+    assert answer.goal == "largest swing"
+    assert answer.value == pytest.approx(math.sqrt(2.0) * PAPER.peak(2e-3)[1], rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("span", "side"), [((0.80, 0.9), "above 0.9"), ((1.05, 1.2), "below 1.05")]
+)
+def test_a_peak_outside_the_ratios_is_said_to_be_outside(span, side):
+    with pytest.raises(InputError, match=f"lies outside, {side}"):
+        solve_response(Empty(), particles=0, goal=goals.peak_rms(), ratios=span, **QUIET)
+
+
+def test_a_budget_that_runs_out_gives_the_best_answer_and_says_what_is_missing():
+    most = grains(0.0005, budget_s=1.5)
+    assert not most.reached and most.error > 0.0005 * most.value
+    assert "0.05 % was not reached within budget_s of 1.5 s" in str(most)
+    assert most.value == pytest.approx(grains().value, rel=0.05)
+    assert most.plan.seconds <= 1.5 * 1.3
+
+
+def test_a_budget_too_small_for_a_pilot_is_refused():
+    with pytest.raises(InputError, match="budget_s must leave time for the pilot"):
+        grains(budget_s=1e-6)
+
+
+def test_given_seeds_are_the_seeds():
+    assert grains(0.1, seeds=[7, 9]).result.seeds == (7, 9)
+    few = grains(0.0005, seeds=2, budget_s=20.0)
+    assert few.result.seeds == (1, 2)
+
+
+class TwoMotions:
+    """Stands for runs of a filling of which every third seed swings by a quarter less."""
+
+    def __init__(self, *given):
+        self.runs = SceneRuns(*given)
+
+    def __getattr__(self, name):
+        return getattr(self.runs, name)
+
+    def measures(self, key, *rest):
+        found = self.runs.measures(key, *rest)
+        less = 0.75 if key.seed % 3 == 0 else 1.0
+        return {**found, "rms": less * found["rms"]}
+
+
+def test_several_steady_motions_come_as_branches(monkeypatch):
+    """Three seeds differ by more than 1 %: twelve make two clusters of 8 and 4."""
+    monkeypatch.setattr(MODULE, "SceneRuns", TwoMotions)
+    answer = grains(0.01)
+    assert isinstance(answer, BranchedAnswer) and not answer.reached
+    assert len(answer.branches) == 2 and answer.branches[1].share < 0.5
+    many, few = answer.branches
+    assert few.value == pytest.approx(0.75 * many.value, rel=0.02) and answer.value == many.value
+    assert {seed % 3 for seed in few.seeds} == {0} and 0 not in {seed % 3 for seed in many.seeds}
+    assert "no single number" in str(answer)
+
+
+def test_a_budget_that_ends_before_further_seeds_gives_the_answer_of_those_before(monkeypatch):
+    """Seeds of two motions ask for more of them; the second round is not paid any more."""
+    rounds, go_steady = [], Reduction._make_steady
+
+    def once(reduction):
+        rounds.append(reduction.seeds)
+        if len(rounds) > 1:
+            raise BudgetSpent(9.0)
+        go_steady(reduction)
+
+    monkeypatch.setattr(MODULE, "SceneRuns", TwoMotions)
+    monkeypatch.setattr(Reduction, "_make_steady", once)
+    answer = grains(0.01, budget_s=5.0)
+    assert len(rounds[1]) > len(rounds[0]) and answer.result.seeds == rounds[0]
+    assert "within budget_s of 5 s" in answer.shortfall and answer.share > 0.01
+
+
+class Shaky:
+    """Runs that diverge at steps above a limit [s]."""
+
+    most = 1.2e-4
+
+    def __init__(self, *given):
+        self.runs = SceneRuns(*given)
+
+    def __getattr__(self, name):
+        return getattr(self.runs, name)
+
+    def go_on(self, cycles):
+        if any(key.dt > self.most for key in cycles):
+            raise SimulationDiverged(
+                "diverged", scene={}, step=1, time_s=0.0, dt=1.0, dt_allowed=0.5
+            )
+        self.runs.go_on(cycles)
+
+
+def test_a_step_that_diverges_is_shortened(monkeypatch):
+    monkeypatch.setattr(MODULE, "SceneRuns", Shaky)
+    assert grains(0.1).result.dt.max() <= 0.5 * Shaky.most
+    monkeypatch.setattr(Shaky, "most", 1e-9)
+    with pytest.raises(SimulationDiverged):
+        grains(0.1)
+
+
+def test_scenes_go_on_from_where_they_are_each_as_far_as_asked():
+    """40 + 30 cycles of one and 70 of the other are the bits of a batch of 70."""
+    runs = SceneRuns(Automaton(), 9, PAPER, None)
+    keys = [SceneKey(0.95, 3, 2e-4), SceneKey(1.0, 4, 2e-4)]
+    runs.go_on({keys[0]: 40, keys[1]: 70})
+    runs.go_on({keys[0]: 30, keys[1]: 0})
+    frequency = np.array([0.95, 1.0]) * PAPER.natural_frequency
+    table = SceneTable(9, [3, 4], 2e-4, frequency, 0.6e-3)
+    batch = Batch(Automaton(), table, measured_cycles=70)
+    batch.start("rest")
+    whole = batch.run(0, 70)
+    for s, key in enumerate(keys):
+        assert runs.cycles(key) == 70
+        assert np.array_equal(runs.series(key)[1][-1:], 0.5 * whole.record[s, -1:, 9:11] @ [1, -1])
+        square, mean = (whole.record[s, :, k] / whole.steps[s] for k in (1, 0))
+        assert np.array_equal(runs.series(key)[0], np.sqrt(np.maximum(square - mean**2, 0.0)))
+    assert runs.steps == int(70 * whole.steps.sum()) and runs.runs == 2
+
+
+def test_progress_is_told():
+    told = []
+    grains(0.004, progress=told.append)
+    shares = [one.share for one in told if isinstance(one, BatchProgress)]
+    assert all(isinstance(one, Progress) for one in told)
+    assert shares == sorted(shares) and shares[-1] == 1.0 and shares[0] < 1.0
+
+
+def test_rounds_come_to_an_end(monkeypatch):
+    monkeypatch.setattr(error_reduction, "_MOST_ROUNDS", 1)
+    answer = grains(0.0005)
+    assert not answer.reached and "after 1 round" in answer.shortfall
+
+
+def test_a_scene_that_is_never_steady_says_so(monkeypatch):
+    """A damping ratio of 1e-6 takes 160,000 cycles; 400 are allowed here."""
+    monkeypatch.setattr(steady_runs, "_MOST_CYCLES", 400)
+    answer = solve_response(
+        Empty(), particles=0, goal=goals.rms_at(1.0), oscillator=light(1e-6), **QUIET
+    )
+    assert not answer.reached and 0.3 < answer.share <= 1.1
+    assert "mean over cycles" in answer.shortfall and "%" in str(answer)
+
+
+def test_a_base_at_rest_moves_nothing():
+    still = Oscillator(base_amplitude=0.0)
+    answer = solve_response(Empty(), particles=0, goal=goals.rms_at(1.0), oscillator=still, **QUIET)
+    assert (answer.value, answer.error, answer.reached) == (0.0, 0.0, True)
+    for goal in (goals.loss_factor_at(1.0), goals.peak_rms()):
+        with pytest.raises(InputError, match="must"):
+            solve_response(Empty(), particles=0, goal=goal, oscillator=still, **QUIET)
+
+
+def test_spheres_are_asked_at_their_own_steps():
+    """The finer of two steps is 0.7 of the one that resolves a contact in five."""
+    answer = solve_response(
+        Spheres(), particles=3, goal=goals.rms_at(0.9), tolerance=0.1, seeds=2, **QUIET
+    )
+    assert answer.reached and 1.3e-5 < answer.result.dt[0] <= 1.5e-5
+
+
+def test_the_share_of_an_open_end_grows_from_run_to_run():
+    told = []
+    whole = OpenEnded(told.append)
+    whole.pace.seconds = 0.0
+    for _ in range(3):
+        for share in (0.5, 1.0):
+            whole(BatchProgress(share, share, round(100 * share)))
+    whole.end()
+    shares = [one.share for one in told]
+    assert len(shares) == 7 and shares == sorted(set(shares)) and shares[-1] == 1.0
+    assert (told[-1].seconds, told[-1].steps) == (3.0, 300)
+    OpenEnded(None)(BatchProgress(1.0, 1.0, 1))
