@@ -8,6 +8,7 @@ DEMO_OPTIONS ?=
 TEST := -m pytest -q -n 2 --dist loadfile
 TEST_OPTIONS ?=
 BENCH_OPTIONS ?=
+ATTACK_OPTIONS ?=
 MESH_OPTIONS ?=
 GALLERY_OPTIONS ?=
 LESSONS_OPTIONS ?=
@@ -26,7 +27,7 @@ ifeq ($(strip $(HOME)),)
 export HOME := $(CURDIR)/.venv/home
 endif
 
-.PHONY: help venv demo test test-slow test-bounds lint bench gallery lessons api mesh clean
+.PHONY: help venv demo test test-slow test-bounds attack lint bench gallery lessons api mesh clean
 
 help: ## print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-11s %s\n", $$1, $$2}' Makefile
@@ -44,6 +45,9 @@ test-slow: $(STAMP) ## run those that take longer
 
 test-bounds: $(STAMP) ## run small scenes with every access to a field checked (also in test-slow)
 	$(BIN)/python -m pytest -q tests/bad_input/test_bounds.py $(TEST_OPTIONS)
+
+attack: $(STAMP) ## attack it at random, minutes (ATTACK_OPTIONS="--attacks 100 --attack-seed 20": longer)
+	$(BIN)/python -m pytest -q -n 2 tests/attack --attacks 20 --attack-table docs/reliability.md $(ATTACK_OPTIONS)
 
 lint: $(STAMP) ## check style, format and types
 	$(BIN)/python -m ruff check .

@@ -10,7 +10,7 @@ from ca_damper.filling import Action, Filling, Structure
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.effect_usage import EffectUse
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import positive, shown, whole
+from taichi_dem.kit.validation import plain_fields, positive, shown, whole
 
 
 @dataclass(frozen=True)
@@ -61,6 +61,7 @@ class RigidMass:
     capacity: ClassVar[int] = 1_000_000
 
     def __post_init__(self) -> None:
+        plain_fields(self)
         positive("particle_mass", self.particle_mass)
         positive("gravity", self.gravity, zero_allowed=True)
 

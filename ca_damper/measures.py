@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from taichi_dem.kit.display import by_fields
+from taichi_dem.kit.elementary import sine_and_cosine
 from taichi_dem.kit.types import FloatOrArray
 
 #: Summed over the steps of a cycle; _cos and _sin: times cos(w t) and sin(w t).
@@ -52,7 +53,10 @@ class Cycles:
     def harmonic(self, name: str) -> np.ndarray:
         """Complex amplitude of x, v or f, (scenes,)."""
         amplitude = 2.0 * (self.per_step(f"{name}_cos") - 1j * self.per_step(f"{name}_sin"))
-        return amplitude / np.sinc(1.0 / self.steps) if name == "f" else amplitude
+        if name != "f":
+            return amplitude
+        half = np.pi / np.asarray(self.steps, dtype=np.float64)
+        return amplitude / (np.array([sine_and_cosine(a)[0] for a in half.tolist()]) / half)
 
     @property
     def omega(self) -> np.ndarray:

@@ -14,7 +14,7 @@ import taichi as ti
 from numpy.typing import ArrayLike
 
 from taichi_dem.kit.types import FloatOrArray
-from taichi_dem.kit.validation import positive
+from taichi_dem.kit.validation import plain_fields, positive
 
 
 @dataclass(frozen=True)
@@ -31,6 +31,7 @@ class Oscillator:
     base_amplitude: float = 0.6e-3
 
     def __post_init__(self):
+        plain_fields(self)
         positive("mass", self.mass)
         positive("stiffness", self.stiffness)
         positive("damping", self.damping, zero_allowed=True)

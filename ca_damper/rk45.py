@@ -19,6 +19,7 @@ import taichi as ti
 from numpy.typing import ArrayLike
 
 from taichi_dem.kit.display import by_fields
+from taichi_dem.kit.elementary import fifth_root
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import finite, positive, shown, whole
 
@@ -58,7 +59,7 @@ def scaled_norm(vector, y, y_new, rtol, atol):
     A sum of squares and not a maximum: a maximum would let a NaN pass.
     """
     ratio = vector / (atol + rtol * ti.max(abs(y), abs(y_new)))
-    return (ratio * ratio).sum() ** 0.5
+    return ti.sqrt((ratio * ratio).sum())
 
 
 @ti.pyfunc
@@ -70,7 +71,7 @@ def growth(error):
     """
     factor = 0.2
     if error < 1e3:
-        factor = min(5.0, max(0.2, 0.9 * max(error, 1e-10) ** -0.2))
+        factor = min(5.0, max(0.2, 0.9 / fifth_root(max(error, 1e-10))))
     return factor
 
 
@@ -86,7 +87,7 @@ def first_step(rhs: ti.template(), context, t, y, slope, rtol, atol):
     steepest = max(speed, scaled_norm(bend, y, y, rtol, atol) / h)
     guess = max(1e-6, 1e-3 * h)
     if steepest > 1e-15:
-        guess = (0.01 / steepest) ** 0.2
+        guess = fifth_root(0.01 / steepest)
     return min(100.0 * h, guess)
 
 

@@ -1,5 +1,7 @@
 """The paper's blast, and the methods by which its experiments run it."""
 
+from functools import partial
+
 from taichi_dem import CONCRETE, PAPER_BLOCK, Scene, effects, quality_report, read_mesh
 from taichi_dem.kit.study import add_checkpoints, checkpoint_of, parser
 from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
@@ -7,15 +9,24 @@ from taichi_dem.stability.step_control import StepControl
 
 #: Drivers of a blast, the first the default.
 BLAST_DRIVERS = ("auto", "resident", "parallel")
+#: Fracture energy of mode II [J/m^2], ten times that of mode I.
+MODE_TWO = 1000.0
 EFFECTS = {
     "bond_damping": effects.BondDamping,
     "softening": effects.Softening,
     "shear_slip": effects.ShearSlip,
-    "sphere_contact": effects.SphereContact,
+    # The paper's reading: faces carry spheres once they break, outer faces never.
+    "sphere_contact": partial(effects.SphereContact, outer_faces=False),
+    "surface_contact": effects.SphereContact,
+    "face_contact": effects.FaceContact,
     "friction": effects.Friction,
     "gas_pressure": effects.GasPressure,
     "gravity": effects.Gravity,
+    "slip_weakening": partial(effects.SlipWeakening, MODE_TWO),
 }
+#: Those that the paper's scene does not have: weight, contact of all surfaces in place of that of
+#: broken faces, through spheres or of spheres with faces, and cohesion that slip degrades.
+OPTIONAL = ("gravity", "surface_contact", "face_contact", "slip_weakening")
 
 
 def blast_parser(name, description, drivers=BLAST_DRIVERS, mesh=PAPER_BLOCK, saves=False, **given):
@@ -39,7 +50,7 @@ def run_options(options):
 
 def paper_effects():
     """All effects of the paper's scene."""
-    return [make() for name, make in EFFECTS.items() if name != "gravity"]
+    return [make() for name, make in EFFECTS.items() if name not in OPTIONAL]
 
 
 def paper_scene(mesh=PAPER_BLOCK):

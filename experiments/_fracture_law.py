@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from taichi_dem import CONCRETE, Every
+from taichi_dem import CONCRETE, Every, effects
 from taichi_dem.closed_forms import bond_shear, bond_tension
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, RED, picture
@@ -48,7 +48,9 @@ class Bench:
 
     def __init__(self, simulation, steps, step):
         self.state, self.steps = simulation.state, steps
-        self.drives = [one for one in simulation.tables.supports if one.name == "prescribed_motion"]
+        self.drives = [
+            one for one in simulation.tables.supports if isinstance(one, effects.PrescribedMotion)
+        ]
         self.plans = [velocities(corners, steps, step) for corners in ways()]
         self.moved, self.given = [], []
 

@@ -22,9 +22,18 @@ from functools import partial
 
 import numpy as np
 
-from _blast import EFFECTS, blast_parser, print_quality, run_options
+from _blast import EFFECTS, OPTIONAL, blast_parser, print_quality, run_options
 from _blast import METHODS as BLAST_METHODS
-from taichi_dem import CONCRETE, InputError, Scene, SimulationDiverged, plot, read_mesh, simulate
+from taichi_dem import (
+    CONCRETE,
+    InputError,
+    Scene,
+    SimulationDiverged,
+    effects,
+    plot,
+    read_mesh,
+    simulate,
+)
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv
 from taichi_dem.methods import Multirate, Uniform
@@ -65,12 +74,14 @@ def options_parser():
 
 
 def chosen_effects(added, without):
-    """All effects but gravity, with those named in one list and without those of the other."""
+    """The paper's effects, with those named in one list and without those of the other."""
     added, without = ([name for name in text.split(",") if name] for text in (added, without))
     for name in (*added, *without):
         if name not in EFFECTS:
             raise InputError(f"effect must be one of {', '.join(EFFECTS)}, got {name!r}")
-    names = (name for name in EFFECTS if name != "gravity" or name in added)
+    if "surface_contact" in added or "face_contact" in added:
+        without.append("sphere_contact")
+    names = (name for name in EFFECTS if name not in OPTIONAL or name in added)
     return [EFFECTS[name]() for name in names if name not in without]
 
 
@@ -131,7 +142,7 @@ def picture(result, folder):
     frames, model, history = result.frames, result.model, result.history
     dt0, broken_time = result.method.dt0, result.broken_time
     write_bodies(at("bodies.csv"), frames)
-    for gas in (load for load in model.loads if load.name == "gas_pressure"):
+    for gas in (load for load in model.loads if isinstance(load, effects.GasPressure)):
         time_s = np.linspace(0.0, 1.1 * gas.duration, 400)
         pressure = gas.pressure_at(time_s)
         plot.plot_pressure(at("pressure.png"), time_s, pressure, history["time_s"][-1])

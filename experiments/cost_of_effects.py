@@ -58,7 +58,9 @@ FILLINGS = {
         "ejection and static contact": {"accounting": "landing"},
     },
 }
-ADDED = ("rotation",)
+#: Rows in which another contact takes the place of that of broken faces through spheres.
+CONTACTS = {"contact of all surfaces": "surface_contact", "contact with faces": "face_contact"}
+ADDED = ("rotation", *CONTACTS)
 #: Columns of what an effect adds, and their units.
 ADDS = {"run_s": "s", "memory_MB": "MB", "compiled_kB": "kB"}
 HIDDEN = ("group", "failed", "run_s", "spared_least_percent", "spared_most_percent")
@@ -103,6 +105,9 @@ def blasts(options):
         scene: (blast, {**shared, "names": ["gas_pressure", *names]})
         for names, scene in scenes.items()
     }
+    for scene, contact in CONTACTS.items():
+        names = [contact if name == "sphere_contact" else name for name in ORDER]
+        calls[scene] = blast, {**shared, "names": ["gas_pressure", *names]}
     if options.repeats > 1:
         calls[LAST_BIT] = blast, {**calls[ALL][1], "ulps": 1}
     return calls
@@ -176,7 +181,7 @@ def effects_in(rows):
     """(Name, row, sign) of each effect that was left out alone, or added: then the sign is -1."""
     for row in rows[1:]:
         name = row["scene"].replace("without ", "")
-        if row["group"] != "blast" or name != row["scene"]:
+        if row["group"] != "blast" or name != row["scene"] or name in ADDED:
             yield name, row, -1.0 if name in ADDED else 1.0
 
 

@@ -6,7 +6,7 @@ import dataclasses
 from dataclasses import dataclass
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import LARGEST, SMALLEST, finite, shown
+from taichi_dem.kit.validation import LARGEST, SMALLEST, finite, plain_fields, shown
 
 _MAY_BE_ZERO = frozenset(
     {"normal_damping", "shear_damping", "cohesion", "friction", "contact_damping"}
@@ -39,6 +39,7 @@ class Material:
     contact_damping: float
 
     def __post_init__(self):
+        plain_fields(self)
         for field in dataclasses.fields(self):
             _check_number(field.name, getattr(self, field.name))
         if self.failure_opening <= self.onset_opening:

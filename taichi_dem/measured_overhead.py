@@ -11,7 +11,7 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem.kit.study.timing import seconds_of
-from taichi_dem.kit.types import vec3
+from taichi_dem.kit.types import vec2, vec3
 from taichi_dem.materials import CONCRETE
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.methods import Uniform
@@ -66,13 +66,15 @@ class ByHand(Advance):
         if self.state.broken_tick[b] < 0:
             slots = self.tables.bond_slots[b]
             motion = self._motion(b, slots)
-            force, torque = zero3(), zero3()
+            k, force, torque = self.tables.bond_stiffness[b], zero3(), zero3()
             for q in range(3):
                 u = 3 * b + q
                 arm = unit_arm(motion, self.tables.vertex_slave[u])
                 opening = unit_opening(motion, arm, self.tables.vertex_master[u])
-                k = self.tables.bond_stiffness[b]
                 traction = vec3(k[0] * opening[0], k[1] * opening[1], k[1] * opening[2])
+                # What would have acted is watched in every scene.
+                shear = vec2(traction[1], traction[2])
+                self.state.note_passed(b, traction[0], shear.norm_sqr())
                 force += traction
                 torque += arm.cross(traction)
             dt = self.schedule.pair_step(slots[0] >> 2, slots[1] >> 2)

@@ -81,4 +81,7 @@ def _twin(simulation, step):
                 values = np.where(values == NEVER, NEVER, 0)
             field.from_numpy(values)
     twin.start()
+    # The velocities are half a step before the positions already.
+    for name in ("velocity", "angular_momentum", "spin"):
+        getattr(twin.state, name).from_numpy(given[name])
     return twin

@@ -6,7 +6,7 @@ from typing import Any, Optional, Protocol, Union
 
 from taichi_dem.effects.roles import members_of
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import between, choice, positive, shown
+from taichi_dem.kit.validation import between, choice, plain_fields, positive, shown
 from taichi_dem.stability.step_control import Displacement, FixedStep, StepControl
 
 NEIGHBOURS = ("held", "drifted")
@@ -130,6 +130,7 @@ class Uniform:
     solves = False
 
     def __post_init__(self):
+        plain_fields(self)
         positive("dt0", self.dt0)
         if self.distance is not None:
             positive("distance", self.distance)
@@ -171,6 +172,7 @@ class Multirate:
     solves = False
 
     def __post_init__(self):
+        plain_fields(self)
         positive("dt0", self.dt0)
         positive("distance", self.distance)
         choice("neighbour", self.neighbour, NEIGHBOURS)
@@ -223,6 +225,7 @@ class ImplicitDashpots:
     name = "implicit"
 
     def __post_init__(self):
+        plain_fields(self)
         positive("dt", self.dt)
         positive("tolerance", self.tolerance)
         positive("refresh", self.refresh)

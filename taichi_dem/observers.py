@@ -13,7 +13,8 @@ from taichi_dem.engine.model import Model
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import Pace
-from taichi_dem.kit.validation import positive, shown, whole
+from taichi_dem.kit.uncopied import Uncopied
+from taichi_dem.kit.validation import plain_fields, positive, shown, whole
 from taichi_dem.methods import Method
 from taichi_dem.output.record import Frame, Recorder
 from taichi_dem.simulation import Simulation
@@ -39,6 +40,7 @@ class Every:
     wall_s: Optional[float] = None
 
     def __post_init__(self):
+        plain_fields(self)
         given = [name for name, value in vars(self).items() if value is not None]
         if len(given) != 1:
             words = " and ".join(given) or "none"
@@ -79,6 +81,7 @@ class At:
     times_s: tuple
 
     def __post_init__(self):
+        plain_fields(self)
         times = self.times_s
         if isinstance(times, (str, bytes)) or not hasattr(times, "__iter__"):
             raise InputError(f"times_s must be a sequence of times in s, got {shown(times)}")
@@ -129,8 +132,12 @@ class Collector:
     def __getitem__(self, name: str) -> np.ndarray:
         return np.array(self.rows[name])
 
+    def __getstate__(self) -> dict:
+        """All but the view, which belongs to a session."""
+        return {**vars(self), "view": None}
 
-class RunView:
+
+class RunView(Uncopied):
     """Read-only view of a run at its present step; arrays are copies that refuse to be written."""
 
     _parts: tuple
@@ -187,7 +194,7 @@ class RunView:
 
     def motion(self) -> dict:
         """Arrays of the bodies' motion by name, as in ``State.motion``."""
-        return {name: _locked(array) for name, array in self._parts[0].state.motion().items()}
+        return {name: _locked(array) for name, array in self._parts[0].motion().items()}
 
     def energy_balance(self) -> dict:
         """Terms of the energy balance by name [J]."""

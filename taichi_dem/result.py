@@ -3,7 +3,7 @@
 import json
 import os
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Optional
 
 import numpy as np
 
@@ -24,7 +24,8 @@ class Result:
     history: arrays by column name, one row a sample. frames: snapshots. broken_time: when each bond
     was released [s], NaN while it holds. peak_speed: largest speed of each body at the samples
     [m/s]. report: figures of the run. diverged: the error sentence of a run that left its bounds,
-    whose data end before that, else "".
+    whose data end before that, else "". start: motion that was set before the run, arguments of
+    ``State.set_motion``; None for a run that began with the scene at rest.
 
     As the last line of a notebook's cell it shows a picture and a table.
     """
@@ -38,6 +39,7 @@ class Result:
     peak_speed: np.ndarray
     report: Report
     diverged: str = ""
+    start: Optional[dict[str, np.ndarray]] = None
 
     def __repr__(self):
         samples = counted(len(self.history.get("time_s", ())), "sample")

@@ -33,15 +33,19 @@ class Scene:
     max_speed: float = 1e4
 
     def __post_init__(self):
-        if not hasattr(self.effects, "__iter__") or getattr(self.effects, "ndim", 1) == 0:
+        unordered = isinstance(self.effects, (set, frozenset))
+        listed = hasattr(self.effects, "__iter__") and getattr(self.effects, "ndim", 1) != 0
+        if unordered or not listed:
             raise InputError(f"effects must be a list of effects, got {shown(self.effects)}")
         object.__setattr__(self, "effects", tuple(self.effects))
         _check_types(self)
         _check_roles(self.effects)
         for effect in self.effects:
+            effect.check_material(self.material)
+        for effect in self.effects:
             if hasattr(effect, "group"):
                 self.mesh.group_faces(effect.group)
-        positive("max_speed", self.max_speed)
+        object.__setattr__(self, "max_speed", positive("max_speed", self.max_speed))
 
     def __repr__(self):
         effects = ", ".join(effect.name or type(effect).__name__ for effect in self.effects)
@@ -83,24 +87,56 @@ def _check_roles(effects):
         raise InputError("effect friction acts in sphere contacts: list SphereContact too")
 
 
+def scene_warnings(scene: Any) -> tuple[str, ...]:
+    """Sentences about what a scene lists or leaves out in vain; before a run.
+
+    scene: a Scene, or a Model, which has the same mesh, material and effects.
+    """
+    return (*outer_faces_warnings(scene), *_friction_warnings(scene))
+
+
+def _friction_warnings(scene):
+    """Friction without springs is a drag up to its limit, so without a dashpot it is none."""
+    rubs = [effect for effect in scene.effects if effect.role == "friction"]
+    material = scene.material
+    if not rubs or rubs[0].remembers or material.contact_damping or not material.friction:
+        return ()
+    return (
+        f"{rubs[0].name} never acts: it is at most contact_damping times the sliding speed, and "
+        "contact_damping of the material is 0; StickingFriction acts by springs instead",
+    )
+
+
+def remedy(contact: Any) -> str:
+    """How bodies touch at their outer faces; contact: the effect of a scene, None without."""
+    return f"{type(contact).__name__}(outer_faces=True)" if contact else REMEDY
+
+
 def outer_faces_warnings(scene: Any) -> tuple[str, ...]:
     """Sentences about parts of a scene that may meet where they carry no spheres; before a run.
 
     A solid in one piece meets nothing until it breaks, which is detected in the run. Scenes with
     contact are expected to have meeting bodies: any with several parts is reported. Scenes without
     contact may hold independent solids: they are not reported where they stay at rest, fall alike,
-    or are too far from each other (``parts.may_meet``).
+    or are too far from each other (``parts.may_meet``). Faces that lie on each other without a bond
+    (``Mesh.keep_coincident``) meet in a solid of one piece too.
     scene: a Scene, or a Model, which has the same mesh and effects.
     """
-    contact = [effect for effect in scene.effects if effect.role == "contact"]
-    if contact and contact[0].outer_faces:
+    contact = next((effect for effect in scene.effects if effect.role == "contact"), None)
+    if contact and contact.outer_faces:
         return ()
     part = parts_of(scene.mesh)
     count = part.max() + 1
-    if count == 1 or not (contact or may_meet(scene, part)):
+    apart = count > 1 and (contact or may_meet(scene, part))
+    if not (apart or scene.mesh.keep_coincident):
         return ()
     lack = "their outer faces carry no contact spheres" if contact else "no contact is listed"
+    if not apart:
+        return (
+            f"coincident points of the mesh are kept apart, no bond joins the faces on them, and "
+            f"{lack}: bodies pass through each other there; {remedy(contact)} lets them touch",
+        )
     return (
         f"the mesh has {count} parts that no bond joins, and {lack}: "
-        f"where these parts meet they pass through each other; {REMEDY} lets them touch",
+        f"where these parts meet they pass through each other; {remedy(contact)} lets them touch",
     )

@@ -22,7 +22,7 @@ from taichi_dem.observers import Observer, RunView
 from taichi_dem.output.record import Recorder
 from taichi_dem.result import Result
 from taichi_dem.run_plan import RunPlan
-from taichi_dem.scene import Scene, outer_faces_warnings
+from taichi_dem.scene import Scene, scene_warnings
 from taichi_dem.simulation import Simulation, macro_steps
 from taichi_dem.timeline import MACRO_TICKS
 
@@ -59,7 +59,7 @@ def simulate(
     that are left.
     Raises InputError for bad arguments, SimulationDiverged when the run leaves its bounds,
     Interrupted when one of these signals has saved the run. Warns, as a UserWarning before the
-    first step, of parts of the mesh that can pass through each other (``outer_faces_warnings``).
+    first step, of what its scene cannot do (``scene_warnings``).
     """
     instance("scene", scene, Scene)
     check_method(method)
@@ -68,7 +68,7 @@ def simulate(
     arrays = _opened(scene, method, checkpoint, resume, last)
     if output is not None:
         output_folder(output)
-    for sentence in outer_faces_warnings(scene):
+    for sentence in scene_warnings(scene):
         warnings.warn(sentence, stacklevel=2)
     with reporting(progress, title) as report_progress:
         simulation, recorder = _started(Simulation(scene, method, driver))
@@ -104,7 +104,7 @@ def run_simulation(
         simulation, recorder = _started(simulation)
         writer = NoCheckpointWriter()
         error = _run_saved(simulation, recorder, writer, plan, report_progress)
-    result = _result(simulation, recorder, error)
+    result = replace(_result(simulation, recorder, error), start=simulation.first_motion)
     if error is not None:
         error.result = result
         raise error
@@ -170,6 +170,8 @@ def saved_run(simulation: Simulation, recorder: Recorder) -> RunSnapshot:
         "simulation": simulation,
         "energy balance": simulation.energy_balance,
         "missing effects": simulation.missing_effects,
+        "shared volume": simulation.shared_volume,
+        "bond slips": simulation.bond_slips,
         "step resolution": simulation.step_resolution,
         "recorder": recorder,
     }

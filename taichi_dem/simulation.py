@@ -1,18 +1,22 @@
 """A scene on the device, ready to step: builds every part once and ties them together."""
 
+import contextlib
+import copy
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Optional
 
 import numpy as np
 
+from taichi_dem.diagnostics.bond_slip import BondSlips
 from taichi_dem.diagnostics.divergence import DivergenceCheck
 from taichi_dem.diagnostics.effect_activity import effect_activity
 from taichi_dem.diagnostics.energy_balance import EnergyBalance
 from taichi_dem.diagnostics.missing_effects import MissingEffects
 from taichi_dem.diagnostics.readings import Readings
 from taichi_dem.diagnostics.report import Report
+from taichi_dem.diagnostics.shared_volume import SharedVolume
 from taichi_dem.diagnostics.step_resolution import StepResolution
 from taichi_dem.effects.gas_pressure import GasPressure
 from taichi_dem.engine.capacity import capacity_of
@@ -25,6 +29,7 @@ from taichi_dem.kit import runtime
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.progress.progress import compiling
+from taichi_dem.kit.uncopied import Uncopied
 from taichi_dem.kit.validation import choice, instance, positive, whole
 from taichi_dem.methods import Method, check_method
 from taichi_dem.scene import Scene
@@ -46,7 +51,7 @@ RESIDENT_BELOW, PARALLEL_FROM = 4000, 100000
 _MEASURED = "measured"
 
 
-class Simulation:
+class Simulation(Uncopied):
     """One scene, one method, one driver, on an engine of the session.
 
     driver: "resident", "parallel", or "auto": parallel on a GPU and for large scenes; for those of
@@ -54,7 +59,8 @@ class Simulation:
     brute_force: contact search without cells, for tests.
     model: the scene's arrays. tables, state, schedule, contacts, broad_phase, advance, step: parts
     of the engine, with the data of this simulation (``engine.view``); contacts and broad_phase are
-    None without contact.
+    None without contact. cut_short: what an exception or Ctrl-C interrupted, in words, so that its
+    bits would not be those of an undisturbed run; "" otherwise.
     Raises InputError for a wrong scene or method, an unknown driver, "resident" on a GPU, or a
     scene that exceeds the machine's memory.
     """
@@ -69,7 +75,6 @@ class Simulation:
     # None without contact.
     contacts: Any
     broad_phase: Any
-    outer_overlaps: Any
     # None before the start.
     energy_balance: Any
 
@@ -101,18 +106,35 @@ class Simulation:
         """Name the parts of the engine as this simulation sees them."""
         for name in ("tables", "state", "schedule", "advance", "step", "readings"):
             setattr(self, name, PartView(self.loan, (name,)))
-        for name in ("contacts", "broad_phase", "outer_overlaps"):
+        for name in ("contacts", "broad_phase"):
             present = self.model.has_contact
             setattr(self, name, PartView(self.loan, (name,)) if present else None)
 
     def _load(self):
         """Put the scene into the engine, at rest and at time zero."""
-        self.loan.activate()
-        engine: Any = self.loan.engine
-        engine.load(self.model, self.method, self.scene.max_speed)
-        self.energy_balance = None
-        self.run_seconds = self.run_cpu_seconds = 0.0
-        self.started = None
+        with self._undivided("its scene was loaded"):
+            self.loan.activate()
+            engine: Any = self.loan.engine
+            engine.load(self.model, self.method, self.scene.max_speed)
+            self.energy_balance = None
+            self.run_seconds = self.run_cpu_seconds = 0.0
+            self.started = None
+            self.first_motion: dict[str, np.ndarray] = {}
+
+    @contextlib.contextmanager
+    def _undivided(self, what: str) -> Iterator[None]:
+        """In its block an exception leaves a simulation that can only be reset."""
+        self.cut_short = what
+        yield
+        self.cut_short = ""
+
+    def _check_whole(self):
+        """Raise InputError where something was interrupted that cannot be gone on with."""
+        if self.cut_short:
+            raise InputError(
+                f"this simulation was interrupted while {self.cut_short}, and cannot be gone on "
+                "with: reset it, or make a new one"
+            )
 
     def _driver(self, name):
         """Driver of the engine, or one that measures both."""
@@ -161,10 +183,19 @@ class Simulation:
 
         Compiles everything, so that the time of the run is that of stepping alone.
         """
+        self._check_whole()
         if self.energy_balance is not None:
             return
         started = time.perf_counter()
         compiling("first step", 0.2)
+        with self._undivided("it was started"):
+            self._start()
+        self.compile_seconds += time.perf_counter() - started
+
+    def _start(self):
+        motion = self.state.motion()
+        names = ("position", "orientation", "velocity", "spin")
+        self.first_motion = {name: motion[name] for name in names}
         if self.model.has_contact and self.model.contact.outer_faces:
             self.state.expose(self.model.topology)
         self.step.prime()
@@ -174,11 +205,11 @@ class Simulation:
         self.driver.prepare()
         self._check_capacity()
         compiling("energy balance", 0.85)
+        self.readings.step_back()
         self._open_balance()
         self.sample()
         self.divergence_check.check()
         self.evaluation_rate()
-        self.compile_seconds += time.perf_counter() - started
 
     def _open_balance(self):
         """Begin the energy balance and the other diagnostics."""
@@ -187,16 +218,27 @@ class Simulation:
         self.divergence_check = DivergenceCheck(
             self.model, self.state, self.schedule, self.contacts, self.energy_balance, self.solves
         )
-        self.missing_effects = MissingEffects(*read, self.outer_overlaps)
+        self.shared_volume = SharedVolume(self.model, self.state)
+        self.missing_effects = MissingEffects(
+            self.model, self.state, self.readings, self.shared_volume, self.schedule
+        )
+        self.bond_slips = BondSlips(self.model, self.readings)
         self.step_resolution = StepResolution(*read, self.schedule, self.advance)
 
-    def sample(self) -> None:
-        """Sample missing effects, and bonds that the step does not resolve.
+    def motion(self) -> dict[str, np.ndarray]:
+        """Arrays of ``State.motion``, with velocities and spins at the time of the positions."""
+        motion = self.state.motion()
+        table = self.readings.motion()
+        for place, name in enumerate(("velocity", "spin", "angular_momentum")):
+            motion[name] = table[:, 3 * place : 3 * place + 3].copy()
+        return motion
 
-        Called at recording times, as the step itself does not check them.
-        """
+    def sample(self) -> None:
+        """Sample missing effects, slip of bonds, and bonds that the step does not resolve."""
         self.missing_effects.sample(self.time_s)
+        self.divergence_check.check_shared(self.shared_volume)
         self.step_resolution.sample()
+        self.bond_slips.sample(self.time_s)
 
     def advance_to(self, macro_step: int, on_call: Optional[Callable[[], object]] = None) -> None:
         """Step until a number of largest steps; on_call() is called about five times a second.
@@ -210,9 +252,11 @@ class Simulation:
         self.started, self.started_cpu = time.perf_counter(), time.process_time()
         try:
             while self.state.tick[None] < end:
-                self.driver.run(end)
-                self._check_capacity()
+                with self._undivided("it stepped"):
+                    self.driver.run(end)
+                    # Runaways fill the lists: they are named first.
                 self.divergence_check.check(hurried=self.state.tick[None] < end)
+                self._check_capacity()
                 if on_call is not None:
                     on_call()
         finally:
@@ -273,10 +317,16 @@ class Simulation:
     def report(self) -> Report:
         """Report of the run so far."""
         counts = [int(value) for value in self.schedule.evaluations.to_numpy()]
+        if self.energy_balance is None:
+            raise InputError("report must be asked for once the simulation was started, got none")
+        # A look of its own: to report changes nothing of what later samples find.
+        shared_volume = copy.copy(self.shared_volume)
+        shared_volume.sample(self.time_s, finished=True)
         linear, angular = self.energy_balance.momentum_errors()
         levels = self.state.level.to_numpy()
         tables = self.energy_balance.tables()
         account = self.energy_balance.account(tables)
+        unconverged, worst = self.step_resolution.unconverged
         return Report(
             method=self.method.name,
             driver=self.driver.name,
@@ -291,6 +341,8 @@ class Simulation:
             bond_evaluations=counts[2],
             pair_evaluations=counts[3],
             sweeps=self.sweeps(),
+            unconverged_steps=unconverged,
+            worst_residual=worst,
             uniform_evaluations=counts[4],
             searches=self.searches,
             energy_balance=account,
@@ -300,11 +352,17 @@ class Simulation:
             run_seconds=self.run_seconds,
             run_cpu_seconds=self.run_cpu_seconds,
             effect_activity=effect_activity(
-                self.model, self.energy_balance, tables, account, self.missing_effects, counts[0]
+                self.model, self.energy_balance, self.readings, tables, account, counts[0]
             ),
-            missing_effects=self.missing_effects.findings(),
-            unresolved=self.step_resolution.findings(),
+            missing_effects=self.missing_effects.findings(shared_volume),
+            unresolved=(
+                *self.step_resolution.findings(),
+                *self.missing_effects.unseen(),
+                *shared_volume.findings(),
+            ),
+            interpenetration=shared_volume.worst,
             bound_by=counted_criteria(self.state.bound.to_numpy()),
+            bond_slip=self.bond_slips.finding(),
             round_off_J=self.divergence_check.round_off(),
         )
 

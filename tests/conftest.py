@@ -1,6 +1,7 @@
 """A Taichi session for every test file; tests of starting and stopping use subprocesses.
 
 ``pytest --arch cuda`` runs all kernels of this process, and all experiments, on a CUDA device.
+Options of the attacks are those of ``tests/attacks.py``.
 """
 
 import pytest
@@ -11,6 +12,8 @@ from taichi_dem.engine.engine import ENGINES
 from taichi_dem.kit.allocation import field_bytes, tree_count
 from taichi_dem.simulation import CPU_ONLY
 from tests import arch
+
+pytest_plugins = ("tests.attacks",)
 
 
 def pytest_addoption(parser):

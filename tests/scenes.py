@@ -2,18 +2,25 @@
 
 import os
 
-from taichi_dem import CONCRETE, PAPER_BLOCK, Scene, effects, read_mesh
+import numpy as np
+
+from taichi_dem import CONCRETE, PAPER_BLOCK, Scene, checked_mesh, effects, read_mesh
+from taichi_dem.mesh.shapes import single
+from tests.turns import matrix
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 
 
-def paper_effects(peak=575e6, rise=1.33e-4, **contact):
-    """All effects of the paper; contact: options of SphereContact."""
+def paper_effects(peak=575e6, rise=1.33e-4, kind=effects.SphereContact, **contact):
+    """All effects of the paper; contact: options of SphereContact, of broken faces by default.
+
+    kind: its class.
+    """
     return [
         effects.BondDamping(),
         effects.Softening(),
         effects.ShearSlip(),
-        effects.SphereContact(**contact),
+        kind(**{"outer_faces": False, **contact}),
         effects.Friction(),
         effects.GasPressure(peak=peak, rise=rise),
     ]
@@ -27,3 +34,30 @@ def paper_scene(**options):
 def brisk_scene(**contact):
     """The paper's block under a harder, faster pulse: 90 bonds break within 3e-5 s."""
     return paper_scene(peak=3 * 575e6, rise=4e-5, **contact)
+
+
+def beside(mesh, other, shift):
+    """Two meshes in one, the second moved by a shift [m]."""
+    points = np.vstack([mesh.points, other.points + shift])
+    bodies = np.vstack([mesh.tetrahedra, other.tetrahedra + mesh.point_count])
+    groups = {f"first {name}": faces for name, faces in mesh.groups.items()}
+    groups.update({f"second {name}": f + mesh.point_count for name, f in other.groups.items()})
+    for name in set(mesh.groups) & set(other.groups):
+        groups[name] = np.vstack([groups[f"first {name}"], groups[f"second {name}"]])
+    return checked_mesh(points, bodies, groups)
+
+
+def apart(count, edge=0.05):
+    """Single regular bodies in a row, no two of which share a corner."""
+    alone = checked_mesh(single(edge).points, single(edge).tetrahedra, {})
+    mesh = alone
+    for k in range(1, count):
+        mesh = beside(mesh, alone, [20.0 * k * edge, 0.0, 0.0])
+    return mesh
+
+
+def quaternions(random, count):
+    """Random orientations, unit quaternions, and their matrices."""
+    turn = random.standard_normal((count, 4))
+    turn /= np.linalg.norm(turn, axis=1, keepdims=True)
+    return turn, np.array([matrix(each) for each in turn])

@@ -12,7 +12,7 @@ from ca_damper.contracts import check_members, members_of
 from ca_damper.filling import Structure
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import choice, flag, fraction, positive, shown, whole
+from taichi_dem.kit.validation import choice, flag, fraction, plain_fields, positive, shown, whole
 
 
 @dataclass(frozen=True)
@@ -56,6 +56,7 @@ class Automaton:
     ledger: bool = False
 
     def __post_init__(self) -> None:
+        plain_fields(self)
         choice("accounting", self.accounting, ACCOUNTINGS)
         check_members(f"accounting {self.accounting!r}", self._accounting, members_of(Accounting))
         choice("pair_rule", self.pair_rule, ("both", "one_sided"))

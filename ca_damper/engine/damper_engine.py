@@ -59,19 +59,12 @@ class DamperEngine(Engine):
         try:
             return check_device(filling, filling.bind(self.table))
         finally:
-            self._refuse_use(builder)
-
-    def _refuse_use(self, builder: Any) -> None:
-        """InputError where a field of the engine was used before all of them are declared."""
-        runtime = impl.get_runtime()
-        if builder not in runtime.unfinalized_fields_builder:
-            # Taichi closed the tree at that use and opened another; the end of ours expects it.
-            runtime.unfinalized_fields_builder.pop(impl._root_fb, None)
-            runtime.initialize_fields_builder(builder)
-            raise InputError(
-                "bind of a filling must declare its fields and use none of them: write their "
-                f"values in 'load', got {type(self.structure.filling).__name__}"
-            )
+            if builder.finalized:
+                # Taichi allocated what was declared so far at the first use of a field.
+                raise InputError(
+                    "bind of a filling must declare its fields and use none of them: write their "
+                    f"values in 'load', got {type(filling).__name__}"
+                )
 
     def load(self, filling: Any, table: SceneTable, rtol: float, atol: float) -> None:
         """Take over the numbers of a batch; the state follows with ``coupling.start``."""

@@ -20,12 +20,13 @@ from ca_damper.scenes.table import SceneTable
 from taichi_dem.kit import runtime
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import compiling
+from taichi_dem.kit.uncopied import Uncopied
 from taichi_dem.kit.validation import choice, instance, positive, whole
 
 MOUNTS = tuple(CONTAINERS)
 
 
-class LoadedScenes:
+class LoadedScenes(Uncopied):
     """A filling and a table of scenes on an engine; the arguments are those of a Batch.
 
     numbers: of the scenes, as SceneNumbers. loan: of the engine. time_origin: when step 0 would

@@ -6,6 +6,7 @@ import numpy as np
 import taichi as ti
 
 from ca_damper.scenes.scene_fields import SceneFields
+from taichi_dem.kit.elementary import sine_and_cosine
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import positive
 
@@ -50,8 +51,9 @@ class Clock:
     def set(self, steps: np.ndarray) -> None:
         """Set the steps a cycle of every scene, (scenes,); the phase stays as it is."""
         angle = 2.0 * np.pi / np.asarray(steps, dtype=np.float64)
-        turns = [f(a) for a in (angle, angle / 2) for f in (np.sin, np.cos)]
-        self._set(np.ascontiguousarray(steps, dtype=np.int32), np.stack(turns))
+        turns = [(*sine_and_cosine(a), *sine_and_cosine(a / 2)) for a in angle.tolist()]
+        columns = np.ascontiguousarray(np.reshape(turns, (-1, 4)).T)
+        self._set(np.ascontiguousarray(steps, dtype=np.int32), columns)
 
     @ti.kernel
     def _set(

@@ -43,7 +43,7 @@ class SceneTable:
         values = (particles, seed, dt, frequency, base_amplitude, mass, stiffness, damping)
         rows = _broadcast(dict(zip(self.COLUMNS, values)))
         self.count = len(rows[0])
-        self._host = dict(zip(self.COLUMNS, (row.copy() for row in rows)))
+        self._host = dict(zip(self.COLUMNS, map(_kept, self.COLUMNS, rows)))
 
     def copy(self) -> "SceneTable":
         """A table of the same numbers, to be changed without this one."""
@@ -60,25 +60,39 @@ class SceneTable:
     def change(self, **numbers: Any) -> None:
         """Replace numbers of all scenes by name, each a scalar or (scenes,).
 
-        Raises InputError for a name that is no column.
+        Raises InputError for a name that is no column, and for what the constructor refuses; the
+        table is then as it was.
         """
-        for name, values in numbers.items():
+        for name in numbers:
             choice("number to change", name, self.COLUMNS)
-            kind = np.int64 if name in ("particles", "seed") else np.float64
-            self._host[name] = np.broadcast_to(values, self.count).astype(kind)
+        changed = SceneTable(**{**self._host, **numbers})
+        if changed.count != self.count:
+            raise InputError(
+                f"numbers to change must be one for all or {self.count}, got {changed.count}"
+            )
+        self._host = changed._host
 
     def drive(self, frequency: Any, dt: Any) -> None:
         """Change frequency [Hz] and step [s] of all scenes, each a scalar or (scenes,)."""
-        pair = np.stack([np.broadcast_to(x, self.count) for x in (frequency, dt)])
-        self._host["frequency"], self._host["dt"] = pair.astype(np.float64)
+        for name, values in (("frequency", frequency), ("dt", dt)):
+            self._host[name] = _kept(name, np.broadcast_to(values, self.count))
 
     def column(self, name: str) -> np.ndarray:
-        """Column of the table by name, (scenes,)."""
+        """Column of the table by name, (scenes,); it refuses to be written, see ``change``."""
         return self._host[name]
 
     def row(self, s: int) -> dict[str, Any]:
         """Numbers of scene s by name."""
         return {name: self._host[name][s].item() for name in self.COLUMNS}
+
+
+def _kept(name: str, column: np.ndarray) -> np.ndarray:
+    """A copy of a column of 64 bits, which refuses to be written."""
+    # A number of more bits may become infinite here, which a Batch refuses.
+    with np.errstate(over="ignore"):
+        kept = column.astype(np.int64 if name in ("particles", "seed") else np.float64)
+    kept.flags.writeable = False
+    return kept
 
 
 def _broadcast(values: dict[str, Any]) -> list[np.ndarray]:

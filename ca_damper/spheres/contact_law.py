@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import taichi as ti
 
 from ca_damper.spheres.restitution import damping
+from taichi_dem.kit.elementary import fifth_root
 
 if TYPE_CHECKING:
     from ca_damper.spheres.options import Spheres
@@ -43,7 +44,8 @@ def hertz_stiffness(
     radius: float, young: float, poisson: float, other_young: float, other_poisson: float
 ) -> float:
     """Stiffness k [N/m^(3/2)] of a Hertz contact (eqs 5, 6); radius: effective [m]; moduli [Pa]."""
-    modulus = 1.0 / ((1.0 - poisson**2) / young + (1.0 - other_poisson**2) / other_young)
+    soft = (1.0 - poisson * poisson) / young
+    modulus = 1.0 / (soft + (1.0 - other_poisson * other_poisson) / other_young)
     return 4.0 / 3.0 * math.sqrt(radius) * modulus
 
 
@@ -52,8 +54,8 @@ def contact_duration(mass: float, stiffness: float, speed: float) -> float:
 
     Hertz (1882): 2.943 D / v, D the deepest overlap, from k D^(5/2) 2/5 = m v^2 / 2.
     """
-    deepest = (1.25 * mass * speed**2 / stiffness) ** 0.4
-    return _HERTZ * deepest / speed
+    root = fifth_root(1.25 * mass * speed * speed / stiffness)
+    return _HERTZ * root * root / speed
 
 
 def pair_numbers(options: "Spheres") -> dict[str, float]:

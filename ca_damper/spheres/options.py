@@ -13,7 +13,16 @@ from ca_damper.spheres.dynamics import DIVERGENCES, DeviceSpheres
 from ca_damper.spheres.search import SEARCHES, listed_pairs
 from taichi_dem.kit.engine_pool import power_of_two
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import choice, finite, flag, fraction, positive, shown, whole
+from taichi_dem.kit.validation import (
+    choice,
+    finite,
+    flag,
+    fraction,
+    plain_fields,
+    positive,
+    shown,
+    whole,
+)
 
 # Spheres part ever more slowly the stronger the dashpot, but none keeps them from parting.
 _LEAST_RESTITUTION = 0.01
@@ -70,6 +79,7 @@ class Spheres:
 
     def __post_init__(self) -> None:
         """InputError for a number or word outside its range."""
+        plain_fields(self)
         choice("damping", self.damping, POWERS)
         choice("search", self.search, SEARCHES)
         flag("rotation", self.rotation)

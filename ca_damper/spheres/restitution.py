@@ -8,7 +8,10 @@ for p = 1/2, so that it holds at one speed only.
 The contact ends where the force has fallen to zero, before the overlap has: spheres do not pull.
 """
 
+import math
 from functools import lru_cache
+
+from taichi_dem.kit.elementary import fifth_root
 
 # Step in the solver's variable: fourth order, errors of restitution below 1e-7.
 _STEP = 1.0 / 256.0
@@ -56,14 +59,17 @@ def damping(restitution: float, power: float, mass: float, stiffness: float, spe
 
     mass: effective mass [kg]. stiffness: k [N/m^(3/2)]. For power = 1/4 the speed cancels.
     """
-    depth = (mass * speed * speed / stiffness) ** 0.4
-    return damping_number(restitution, power) * mass * speed / depth ** (power + 1.0)
+    root = fifth_root(mass * speed * speed / stiffness)
+    depth = root * root
+    more = math.sqrt(depth) if power == 0.5 else math.sqrt(math.sqrt(depth))
+    return damping_number(restitution, power) * mass * speed / (depth * more)
 
 
 def _rate(y, u, alpha, power):
     """Change of the speed u: -4 y^3 (d^(3/2) + alpha d^p u), d = y^4."""
     damped = y * u if power == 0.25 else y * y * u
-    return -4.0 * y**3 * (y**6 + alpha * damped)
+    cube = y * y * y
+    return -4.0 * cube * (cube * cube + alpha * damped)
 
 
 def _runge_kutta(y, u, alpha, power):

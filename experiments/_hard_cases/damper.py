@@ -130,11 +130,12 @@ def spheres_beyond_limit(trial):
 
 @case((), (["spheres"], "dt must be at most"))
 def spheres_that_gain(trial):
-    """Steps of 40 us, three in a contact: some contacts give back more than they took.
+    """Steps of 42 us, three in a contact: some contacts give back more than they took.
 
-    Named by the account of energy, or by a speed, whichever is seen first.
+    Named by the account of energy, or by a speed, whichever is seen first. At 40 us three of eight
+    seeds do so, at 42 us all of them.
     """
-    mild(trial, 5, particles=50, dt=4e-5)
+    mild(trial, 5, particles=50, dt=4.2e-5)
 
 
 @case(SPHERES)

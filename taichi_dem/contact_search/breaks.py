@@ -63,11 +63,11 @@ class Breaks:
         """Energy [J] of overlaps of a pair that this tick's breaks have brought into being."""
         i, j = self.store.body[p][0], self.store.body[p][1]
         energy, tick = 0.0, self.state.tick[None]
-        size = self.tables.face_spheres[None]
         fresh, freed = self.fresh[None] == 1, self._freed_at(i, j, tick)
         for k in range(self.store.first[p], self.store.last[p]):
             a, b = self.store.sphere[k][0], self.store.sphere[k][1]
-            born = ti.max(self.state.exposed_tick[a // size], self.state.exposed_tick[b // size])
+            face_i, face_j = self.contacts.law.face_of(a), self.contacts.law.face_of(b)
+            born = ti.max(self.state.exposed_tick[face_i], self.state.exposed_tick[face_j])
             if fresh and (freed or born == tick):
                 overlap = ti.max(0.0, -self.contacts.gap(i, j, a, b))
                 energy += self.contacts.law.stored(overlap)

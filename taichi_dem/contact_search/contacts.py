@@ -21,8 +21,11 @@ if TYPE_CHECKING:
 
 #: Largest steps that a fast body makes before it is searched again.
 STEPS = 16.0
-#: Share of its extent beyond which it is searched again whatever its speed.
+#: Share of its extent beyond which it is searched again whatever its speed, and further than which
+#: no step may carry it: spheres would pass each other unseen.
 FARTHEST = 0.25
+#: Gap where another face has the contact [m].
+AWAY = 1e30
 
 
 @ti.data_oriented
@@ -30,8 +33,9 @@ class Contacts:
     """Candidate pairs of bodies with broken faces; p: a slot of the ``PairStore``, called store.
 
     exposed_faces: bit f for a broken face f. travel: bound of the displacement of any point of a
-    body since it was last searched [m]. body_skin: travel at which it is searched again [m]; a pair
-    holds the spheres whose gap is below the body skin of both. pace: largest step [s], and steps of
+    body since it was last searched [m]. skin: least gap up to which its spheres are listed [m].
+    body_skin: travel at which it is searched again [m]; a pair holds the spheres whose gap is below
+    the body skin of both. pace: largest step [s], and steps of
     a body by which its contacts are counted before they touch. search_requested: 1 when the list
     may miss one of them.
     """
@@ -46,15 +50,16 @@ class Contacts:
         for effect in tables.effects:
             effect.declare_columns(self.store)
         self.exposed_faces = ti.field(ti.i32, shape=n)
+        self.law.follow(self.exposed_faces)
         self.travel = ti.field(real, shape=n)
         self.body_skin = ti.field(real, shape=n)
-        self.skin = ti.field(real, shape=())
+        self.skin = ti.field(real, shape=n)
         self.search_requested = ti.field(ti.i32, shape=())
 
     def load(self, model: "Model", method: Method) -> None:
         """Load the numbers of a scene and a method; no pairs exist yet."""
         effect, n = model.contact, model.body_count
-        assign(self.skin, effect.skin)
+        assign(self.skin, effect.skin * model.spheres.extent)
         assign(self.pace, np.array([method.dt0, method.steps_ahead]))
         assign(self.store.slot_limit, n * effect.pairs_per_body + SPARE_PAIRS)
         assign(self.store.sphere_limit, n * effect.spheres_per_body + SPARE_SPHERES)
@@ -66,7 +71,21 @@ class Contacts:
 
     @ti.func
     def gap(self, i, j, a, b):
-        """Distance between the surfaces of spheres a of body i and b of body j [m]."""
+        """Gap between bodies i and j by an entry (a, b) of the pair store [m]."""
+        gap = 0.0
+        if ti.static(self.law.meets_faces):
+            back = self.state.rotation[i].transpose()
+            offset = back @ (self.state.position[j] - self.state.position[i])
+            near = self.law.nearest(a, b, back @ self.state.rotation[j], offset)
+            gap = near.apart.norm() - near.reach
+            if near.can_meet == 0:
+                gap = AWAY
+        else:
+            gap = self._gap_of_spheres(i, j, a, b)
+        return gap
+
+    @ti.func
+    def _gap_of_spheres(self, i, j, a, b):
         on_first = self.state.rotation[i] @ self.tables.sphere[a].xyz
         on_second = self.state.rotation[j] @ self.tables.sphere[b].xyz
         apart = self.state.position[j] + on_second - self.state.position[i] - on_first
@@ -154,9 +173,14 @@ class Contacts:
 
     @ti.func
     def moved(self, i, velocity, spin, elapsed):
-        """Add to the displacement of body i; request a search once it may exceed the body skin."""
+        """Add to the displacement of body i; request a search once it may exceed the body skin.
+
+        A body that leaps too far in one step for its contacts to be followed is out of bounds.
+        """
         if self.exposed_faces[i] != 0:
             speed = self._speed(i, velocity, spin)
+            if elapsed * speed > FARTHEST * self.tables.extent[i]:
+                ti.atomic_min(self.state.bad_body[None], i)
             way = self.travel[i] + speed * elapsed
             self.travel[i] = way
             if way + self.pace[1] * elapsed * speed > self.body_skin[i]:
@@ -170,7 +194,7 @@ class Contacts:
         """
         speed = self._speed(i, self.state.velocity[i], self.state.spin[i])
         way = ti.min(STEPS * self.pace[0] * speed, FARTHEST * self.tables.extent[i])
-        self.body_skin[i] = ti.max(0.5 * self.skin[None], way)
+        self.body_skin[i] = ti.max(0.5 * self.skin[i], way)
 
     @ti.func
     def _speed(self, i, velocity, spin):

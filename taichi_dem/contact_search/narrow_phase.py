@@ -4,6 +4,7 @@ import taichi as ti
 
 from taichi_dem.contact_search.contacts import Contacts
 from taichi_dem.kit.types import real, vec4
+from taichi_dem.physics.triangle import closest_point
 
 #: Skins beyond their margin within which the gap of two spheres is found; others count as farther.
 OUTLOOK = 7.0
@@ -14,7 +15,7 @@ class NarrowPhase:
     """Compares the spheres on the faces of two bodies, at the positions of their last search.
 
     sphere: centre and radius of every sphere there [m]. cluster: centre of the ball around those of
-    a face [m].
+    a face [m]. corner: of every face there [m], where spheres meet faces.
     """
 
     def __init__(self, contacts: Contacts):
@@ -23,6 +24,9 @@ class NarrowPhase:
         capacity = self.tables.capacity
         self.sphere = ti.Vector.field(4, real, shape=capacity.spheres)
         self.cluster = ti.Vector.field(3, real, shape=capacity.faces)
+        self.law = contacts.law
+        if self.law.meets_faces:
+            self.corner = ti.Vector.field(3, real, shape=3 * capacity.faces)
 
     @ti.func
     def note_places(self, i):
@@ -36,6 +40,9 @@ class NarrowPhase:
                     sphere = self.tables.sphere[s]
                     place = position + rotation @ sphere.xyz
                     self.sphere[s] = vec4(place[0], place[1], place[2], sphere[3])
+                if ti.static(self.law.meets_faces):
+                    for k in range(3 * face, 3 * face + 3):
+                        self.corner[k] = position + rotation @ self.law.corner[k]
 
     @ti.func
     def compare(self, i, j, faces, start, write):
@@ -48,13 +55,17 @@ class NarrowPhase:
         margin = self.contacts.margin(i, j)
         count, hits, least = 0, 0, margin
         if not write:
-            least += OUTLOOK * self.contacts.skin[None]
+            least += 0.5 * OUTLOOK * (self.contacts.skin[i] + self.contacts.skin[j])
         for fg in range(16):
             if (faces >> fg) & 1 == 1:
                 face_i, face_j = 4 * i + fg // 4, 4 * j + fg % 4
                 if self._clusters_near(face_i, face_j, least):
                     place = start + count
-                    more, least = self._of_faces(face_i, face_j, place, margin, least, write)
+                    more = 0
+                    if ti.static(self.law.meets_faces):
+                        more, least = self._on_faces(face_i, face_j, place, margin, least, write)
+                    else:
+                        more, least = self._of_faces(face_i, face_j, place, margin, least, write)
                     count += more
                     hits |= ti.cast(more > 0, ti.i32) << fg
         return count, hits, least
@@ -86,3 +97,33 @@ class NarrowPhase:
                         else:
                             least = ti.sqrt(apart2) - reach
         return count, least
+
+    @ti.func
+    def _on_faces(self, face_i, face_j, start, margin, least, write):
+        """Both ways: the spheres of one face on the other, then those of the other on the one."""
+        count = 0
+        size = self.tables.face_spheres[None]
+        for turned in range(2):
+            face, other = face_i, face_j
+            if turned == 1:
+                face, other = face_j, face_i
+            for a in range(size * face, size * face + size):
+                mine = self.sphere[a]
+                whole = mine[3] + self.tables.cluster[other][3] + least
+                if (self.cluster[other] - mine.xyz).norm_sqr() < whole * whole:
+                    gap = self._gap(mine, other)
+                    if gap < margin:
+                        if write:
+                            k = start + count
+                            self.store.sphere[k][turned] = a
+                            self.store.sphere[k][1 - turned] = -1 - other
+                        count += 1
+                    elif gap < least:
+                        least = gap
+        return count, least
+
+    @ti.func
+    def _gap(self, sphere, face):
+        """Gap between a sphere and a face, whichever side it is on [m]."""
+        p, q, s = self.corner[3 * face], self.corner[3 * face + 1], self.corner[3 * face + 2]
+        return (sphere.xyz - closest_point(sphere.xyz, p, q, s).point).norm() - sphere[3]

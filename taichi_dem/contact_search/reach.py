@@ -49,7 +49,7 @@ class Reach:
     @ti.func
     def note_place(self, i):
         """Note the position of body i and its clusters, extrapolated at its present velocity."""
-        self.reach[i] = BODY_SKINS * self.contacts.body_skin[i] + SKINS * self.contacts.skin[None]
+        self.reach[i] = BODY_SKINS * self.contacts.body_skin[i] + SKINS * self.contacts.skin[i]
         self.ball[i] = self.tables.extent[i] + self.reach[i]
         ahead = AHEAD * self.contacts.pace[0] * self.state.velocity[i]
         most = SHARE * (self.reach[i] - self.contacts.body_skin[i])

@@ -88,7 +88,8 @@ class BroadPhase:
         """Raise InputError when lists exceed the capacity that the scene gave them."""
         option = _CAPACITIES[int(values(self.full))]
         if option:
-            raise InputError(f"contact lists are full: give SphereContact a larger {option}")
+            law = type(self.contacts.law).__name__
+            raise InputError(f"contact lists are full: give {law} a larger {option}")
 
     @property
     def phases(self) -> tuple[tuple[Callable[..., Any], Callable[..., Any]], ...]:

@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING, Optional
 
 import numpy as np
 
-from taichi_dem.contact_search.contacts import Contacts
+from taichi_dem.contact_search.contacts import FARTHEST, Contacts
 from taichi_dem.diagnostics.energy_balance import EnergyBalance
+from taichi_dem.diagnostics.shared_volume import SharedVolume
 from taichi_dem.kit.errors import SimulationDiverged
 from taichi_dem.stability.contact_limits import contact_rates
 from taichi_dem.stability.quality import quality_report
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
 
 #: Unexplained energy beyond which a run counts as diverged, as a share of the energy present.
 ENERGY_FROM_NOWHERE = 0.5
+#: Share of the smaller body at which two bodies, whose faces all carry spheres, count as one
+#: within the other.
+DEEPEST_SHARE = 0.5
 #: Overlap of two contact spheres beyond recovery, as a share of the distance at which they touch:
 #: their centres are about to pass each other. A small sphere may be inside a large one.
 DEEPEST_OVERLAP = 0.95
@@ -72,7 +76,14 @@ class DivergenceCheck:
         if body < self.model.body_count:
             motion = self.state.motion()
             speed = np.linalg.norm(motion["velocity"][body])
-            raise SimulationDiverged(self._sentence(body, motion, f"moves at {speed:.3g} m/s"))
+            words = f"moves at {speed:.3g} m/s"
+            if speed < self.state.max_speed2[None] ** 0.5 and self.contacts is not None:
+                extent = float(self.model.spheres.extent[body])
+                whole = speed + np.linalg.norm(motion["spin"][body]) * extent
+                words += ", too far in a step for its contacts to be followed"
+                advice = f"try a step of {0.5 * FARTHEST * extent / whole:.2g} s"
+                raise SimulationDiverged(self._sentence(body, motion, words, advice))
+            raise SimulationDiverged(self._sentence(body, motion, words))
 
     def _check_overlap(self):
         if self.contacts is None or not self.contacts.store.near_count[None]:
@@ -83,6 +94,17 @@ class DivergenceCheck:
             body, other = bodies[pair].tolist()
             share = f"{100 * deepest[pair]:.0f} % of their radii"
             what = f"has a contact sphere inside one of body {other} ({share})"
+            raise SimulationDiverged(self._sentence(body, self.state.motion(), what))
+
+    def check_shared(self, volume: SharedVolume) -> None:
+        """Raise SimulationDiverged where contact of all faces has not kept two bodies apart."""
+        contact = self.model.contact
+        if contact is None or not contact.outer_faces or not len(volume.share):
+            return
+        place = int(volume.share.argmax())
+        if volume.share[place] > DEEPEST_SHARE:
+            body, other = volume.pairs[place].tolist()
+            what = f"shares {100 * volume.share[place]:.0f} % of its volume with body {other}"
             raise SimulationDiverged(self._sentence(body, self.state.motion(), what))
 
     def _check_energy(self):
@@ -111,7 +133,7 @@ class DivergenceCheck:
         place = 4.0 * np.finfo(float).eps * np.abs(self.model.mesh.points).max()
         return max(0.5 * float(np.sum(area * stiffness)) * place**2, 1e-300)
 
-    def _sentence(self, body, motion, what):
+    def _sentence(self, body, motion, what, advice=""):
         level = int(motion["level"][body])
         time_s = self.state.tick[None] * self.schedule.tick_seconds
         step = self.schedule.dt0 / 2.0**level
@@ -119,7 +141,7 @@ class DivergenceCheck:
         return (
             f"diverged at t = {time_s:.6g} s: body {body} {what}; "
             f"{_partner(body, motion, links)}; its step was {step:.3g} s (level {level}), "
-            f"{self._advice(body, links)}"
+            f"{advice or self._advice(body, links)}"
         )
 
     def _links(self, body):

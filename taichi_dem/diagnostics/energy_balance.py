@@ -35,6 +35,9 @@ TERMS = (
     "residual",
 )
 
+#: Terms that the bodies hold; all others are booked as they are given or taken.
+_HELD = ("kinetic", "bond_strain", "sphere_strain", "residual")
+
 
 class EnergyBalance:
     """Energy balance: sums of booked terms, and stored energies computed by the laws of the step.
@@ -46,18 +49,24 @@ class EnergyBalance:
         self, model: "Model", state: "State", readings: Readings, contacts: Optional[Contacts]
     ):
         self.model, self.state, self.readings, self.contacts = model, state, readings, contacts
-        self.start_energy = 0.0
+        self.start_energy, self.start = 0.0, np.zeros(len(TERMS))
+        self.start_works = np.zeros((model.body_count, len(model.loads) + 1))
         first = self.account()
         self.start_energy = first["kinetic"] + first["bond_strain"] + first["sphere_strain"]
+        # Half a step of what acts from the start is booked at time zero.
+        self.start = np.array([0.0 if name in _HELD else first[name] for name in TERMS])
+        self.start_works = self._works()
         self.start_momentum = self.momentum()
 
     def saved(self) -> dict[str, np.ndarray]:
         """Data for a checkpoint, arrays by name."""
-        return {"start": np.array([self.start_energy, *self.start_momentum])}
+        start = np.array([self.start_energy, *self.start_momentum, *self.start])
+        return {"start": start, "works": self.start_works.copy()}
 
     def resume(self, saved: Mapping[str, np.ndarray]) -> None:
         """Restore the data that ``saved`` returned."""
-        self.start_energy, self.start_momentum = float(saved["start"][0]), saved["start"][1:]
+        self.start_energy, self.start_momentum = float(saved["start"][0]), saved["start"][1:7]
+        self.start, self.start_works = saved["start"][7:], saved["works"].copy()
 
     def account(self, tables: Optional[EnergyTables] = None) -> dict[str, float]:
         """All terms in J by name; residual is the unexplained remainder.
@@ -79,6 +88,7 @@ class EnergyBalance:
             "load_work": body[:, 1].sum(),
             "support_work": body[:, 2].sum(),
         }
+        terms = {name: terms[name] - self.start[TERMS.index(name)] for name in terms}
         terms["residual"] = self._residual(terms)
         return {name: float(value) for name, value in terms.items()}
 
@@ -89,14 +99,9 @@ class EnergyBalance:
         strain, dashpot, slip, release, softening. A row a pair: strain, dashpots, friction,
         injected, so far as its first body has not taken them.
         """
-        n, bonds = self.model.body_count, self.model.bond_count
-        body, bond = np.zeros((n, 6)), np.zeros((bonds, 5))
-        self.readings.bodies(body)
+        bond = np.zeros((self.model.bond_count, 5))
         self.readings.bonds(bond)
-        pair = np.zeros((self._pair_count(), 4))
-        if self.contacts is not None:
-            self.readings.pairs(pair)
-        return body, bond, pair
+        return self.readings.bodies(), bond, self.readings.pairs()
 
     def _residual(self, terms):
         given = terms["load_work"] + terms["support_work"] + terms["injected"] + self.start_energy
@@ -112,18 +117,20 @@ class EnergyBalance:
 
     def load_works(self, index: int) -> np.ndarray:
         """Work of one load on every body [J], (body_count,)."""
-        work = np.zeros(self.model.body_count)
-        self.readings.load_work(index, work)
-        return work
+        return self._works()[:, index]
+
+    def _works(self):
+        """Work of each load, and of all supports last, on every body since the start [J]."""
+        return self.readings.works() - self.start_works
 
     def support_works(self, index: int) -> np.ndarray:
         """Work [J] of all supports on the bodies that one of them holds, (body_count,).
 
         NaN for a body that it does not hold.
         """
-        work = np.full(self.model.body_count, np.nan)
-        self.readings.support_work(index, work)
-        return work
+        marks = np.zeros(self.model.body_count, dtype=np.int32)
+        self.readings.supported(index, marks)
+        return np.where(marks == 1, self._works()[:, -1], np.nan)
 
     def momentum(self) -> np.ndarray:
         """Linear [N s] and angular momentum about the origin [N m s], less external impulses."""
@@ -142,6 +149,3 @@ class EnergyBalance:
         sizes = [np.linalg.norm(rows[:, k : k + 3], axis=1).sum() for k in (0, 3, 6, 9)]
         linear, angular = max(sizes[0], sizes[2], 1e-300), max(sizes[1], sizes[3], 1e-300)
         return np.linalg.norm(lost[:3]) / linear, np.linalg.norm(lost[3:]) / angular
-
-    def _pair_count(self):
-        return self.contacts.store.near_count[None] if self.contacts is not None else 0

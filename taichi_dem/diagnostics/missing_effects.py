@@ -1,100 +1,128 @@
-"""Effects that a scene left out and the run needs, found at recording times."""
+"""Effects that a scene left out and that would have acted in the run."""
 
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Optional, Union
 
 import numpy as np
 
-from taichi_dem.contact_search.contacts import Contacts
-from taichi_dem.diagnostics.outer_faces import OuterFaces, OuterOverlaps
-from taichi_dem.diagnostics.part_overlaps import PartOverlaps
 from taichi_dem.diagnostics.readings import Readings
-from taichi_dem.mesh.parts import parts_of
-from taichi_dem.scene import REMEDY
+from taichi_dem.diagnostics.shared_volume import SharedVolume
+from taichi_dem.mesh.contact_spheres import ContactSpheres, spheres_of_faces
+from taichi_dem.physics.sphere_pair import CONTACT
+from taichi_dem.scene import REMEDY, remedy
+from taichi_dem.step.schedule import Schedule
+from taichi_dem.timeline import NEVER
 
 if TYPE_CHECKING:
     from taichi_dem.engine.model import Model
-    from taichi_dem.engine.state import State
+    from taichi_dem.physics.sphere_pair import State
+
+_EPSILON = np.finfo(np.float64).eps
+#: Overlap of two spheres, as a share of the distance at which they touch, below which they count
+#: as apart: coordinates of a mesh file may be rounded to seven digits.
+LEAST_OVERLAP = 1e-4
+#: Divisions of faces, for spheres of bodies in a scene without contact.
+_DIVISIONS = 5
+#: Pairs of which spheres are compared at a recording, those that share most first.
+_MOST_PAIRS = 2000
+#: Way of a body between two looks, as a share of its radius, that may hide a passage.
+_LEAP = 1.0
+
+
+def bond_rounding(model: "Model", state: "State", substeps: int) -> np.ndarray:
+    """Heat that rounding alone may leave in each bond's dashpots [J], (bond_count,).
+
+    A bond's opening is the difference of coordinates of up to X [m], so it is known to eps X. In
+    every substep rounding may thus put into the bond the energy of such an opening,
+    A (k_n + k_s) (eps X)^2 / 2, which its dashpots then take.
+    """
+    reach = max(np.abs(model.mesh.points).max(), np.abs(state.position.to_numpy()).max())
+    area = 3.0 * model.bonds["area"]
+    stiffness = model.bond_stiffness.sum(axis=1)
+    return 0.5 * substeps * area * stiffness * (_EPSILON * reach) ** 2
 
 
 @dataclass
 class MissingEffect:
     """A need that no listed effect serves.
 
-    effect: the effect to list. what: the finding in words. times: recordings with the finding, of
-    ``looks``. most: largest number of places in one of them. where: first such bond or body, as
-    unit says; place_m: the middle of its face, or of the body, in the mesh [m]. first_s: time of
-    the first [s].
+    effect: the effect to list. what: the finding in words. count: number of places. where: first
+    such bond or body, as unit says; place_m: the middle of its face, or of the body, in the mesh
+    [m]. first_s: time at which it was first found [s].
     """
 
     effect: str
     what: str
-    times: int = 0
-    looks: int = 0
-    most: int = 0
+    count: int = 0
     where: int = -1
     place_m: tuple = ()
     first_s: float = 0.0
     unit: str = "bond"
 
-    def see(
-        self,
-        places: Union[Sequence[int], np.ndarray],
-        time_s: float,
-        middle: Callable[[int], tuple[float, ...]],
-    ) -> None:
-        """Add the findings of a recording at a time [s].
-
-        places: numbers of the bonds or bodies, one for every sight. middle: function of such a
-        number, its place in the mesh [m].
-        """
-        if not len(places):
-            return
-        if self.times == 0:
+    def see(self, places: Union[Sequence[int], np.ndarray], time_s: float) -> None:
+        """Take in the places of a recording at a time [s], numbers of bonds or bodies."""
+        if len(places) and not self.count:
             self.where, self.first_s = int(places[0]), time_s
-            self.place_m = middle(self.where)
-        self.times += 1
-        self.most = max(self.most, len(places))
+        self.count = max(self.count, len(places))
 
     def __str__(self):
         place = ", ".join(f"{x:.3g}" for x in self.place_m)
         return (
-            f"{self.effect} is left out, but {self.what}: up to {self.most} at a time, first at "
-            f"t = {self.first_s:.4g} s ({self.unit} {self.where} at {place} m), seen at "
-            f"{self.times} of {self.looks} recordings"
+            f"{self.effect} is left out, but {self.what}: {self.count}, first {self.unit} "
+            f"{self.where} at {place} m, t = {self.first_s:.4g} s"
         )
 
 
-_NEEDS = (
-    ("tension", "Softening", "bonds are stretched past their tensile strength"),
-    ("shear", "ShearSlip", "bonds are sheared past their Coulomb limit"),
-    ("contact", "SphereContact", "bodies overlap where a bond has been released"),
-)
-_OVERLAP = "pairs of bodies overlap at outer faces, which carry no contact spheres"
+#: Needs by role: the effect that serves it, the finding in words, and where it is found.
+_NEEDS = {
+    "tension": ("Softening", "bonds are stretched past their tensile strength", "bond"),
+    "shear": ("ShearSlip", "bonds are sheared past their Coulomb limit", "bond"),
+    "dashpot": ("BondDamping", "the material has damping and bonds are strained", "bond"),
+    "contact": ("SphereContact", "bodies overlap where a bond has been released", "bond"),
+    "friction": ("Friction", "the material has friction and bodies press on each other", "body"),
+    "bodies": ("SphereContact", "pairs of bodies are within each other", "body"),
+    "bare": (
+        REMEDY,
+        "pairs of bodies are within each other at outer faces without spheres",
+        "body",
+    ),
+}
 
 
-def _outer_faces(model, state, outer_overlaps):
-    """Detector of bodies that overlap at outer faces without spheres; None where none can.
-
-    Without contact a solid in one piece can only meet its own fragments, which is found at its
-    released bonds.
-    """
-    if model.has_contact:
-        return None if model.contact.outer_faces else OuterFaces(model, state, outer_overlaps)
-    part = parts_of(model.mesh)
-    return PartOverlaps(model, state, part) if part.any() else None
-
-
-def unserved(roles: Container[str]) -> dict[str, MissingEffect]:
-    """An empty ``MissingEffect`` by role, for every need that no effect of these roles serves."""
-    return {role: MissingEffect(effect, what) for role, effect, what in _NEEDS if role not in roles}
+def unserved(model: "Model") -> dict[str, MissingEffect]:
+    """An empty ``MissingEffect`` for every need that no effect of a model serves."""
+    roles = {effect.role for effect in model.effects if effect.name}
+    material = model.material
+    listed = {
+        "tension": "tension" not in roles,
+        "shear": "shear" not in roles,
+        "dashpot": "dashpot" not in roles and material.normal_damping + material.shear_damping > 0,
+        "contact": "contact" not in roles,
+        "friction": "contact" in roles and "friction" not in roles and material.friction > 0.0,
+        "bodies": "contact" not in roles,
+        "bare": "contact" in roles and not model.contact.outer_faces,
+    }
+    found = {
+        name: MissingEffect(effect, what, unit=unit)
+        for name, (effect, what, unit) in _NEEDS.items()
+        if listed[name]
+    }
+    if "bare" in found:
+        found["bare"].effect = remedy(model.contact)
+    if "friction" in found and material.contact_damping == 0.0:
+        # Friction is a dashpot's force up to a limit: without a dashpot springs alone hold.
+        found["friction"].effect = "StickingFriction"
+    return found
 
 
 class MissingEffects:
-    """Counts the places where an absent effect would have acted, at recording times.
+    """Finds where an absent effect would have acted.
 
-    touching: most pairs of bodies in contact at one of them.
+    Limits of bonds are watched at every step, all else at recording times.
+    strain: largest strain energy of each bond at one of them [J], where dashpots are missing.
+    leap: longest way of a body between two comparisons of bodies, as a share of its radius.
     """
 
     def __init__(
@@ -102,75 +130,131 @@ class MissingEffects:
         model: "Model",
         state: "State",
         readings: Readings,
-        contacts: Optional[Contacts],
-        outer_overlaps: Optional[OuterOverlaps] = None,
+        volume: SharedVolume,
+        schedule: Schedule,
     ):
         self.model, self.state, self.readings = model, state, readings
-        self.contacts = contacts
-        self.touching = self.looks = 0
-        self.last_s = -1.0
-        self.needed = unserved({effect.role for effect in model.effects if effect.name})
-        self.outer_faces = _outer_faces(model, state, outer_overlaps)
-        self.outer = MissingEffect(REMEDY, _OVERLAP, unit="body")
-        material = model.material
-        self.limits = material.tensile_strength, material.cohesion, material.friction
+        self.volume, self.schedule, self.last_s = volume, schedule, -1.0
+        self.needed = unserved(model)
+        self.strain, self.leap = np.zeros(model.bond_count), 0.0
 
     def sample(self, time_s: float) -> None:
         """Update the findings at a recording time [s]."""
         if time_s == self.last_s:
             return
-        self.looks, self.last_s = self.looks + 1, time_s
-        self._count_touching()
-        if self.outer_faces is not None:
-            later = self.outer_faces.overlaps()
-            pairs = np.repeat(np.arange(len(later)), later)
-            self.outer.see(pairs, time_s, self._centre)
-        if not self.needed or self.model.bond_count == 0:
-            return
-        marks = np.zeros((self.model.bond_count, 3), dtype=np.int32)
-        self.readings.beyond_limits(*self.limits, marks)
-        for column, (role, _, _) in enumerate(_NEEDS):
-            if role in self.needed:
-                self.needed[role].see(np.flatnonzero(marks[:, column]), time_s, self._middle)
+        self.last_s = time_s
+        self.leap = max(self.leap, self.volume.way())
+        if self.volume.sample(time_s):
+            self._see_bodies(self.needed, self.volume, time_s)
+        if self.model.bond_count and "contact" in self.needed:
+            marks = np.zeros(self.model.bond_count, dtype=np.int32)
+            self.readings.pressed(marks)
+            self.needed["contact"].see(np.flatnonzero(marks), time_s)
+        if self.model.bond_count and "dashpot" in self.needed:
+            table = np.zeros((self.model.bond_count, 5))
+            self.readings.bonds(table)
+            self.strain = np.maximum(self.strain, table[:, 0])
+        if "friction" in self.needed:
+            active = self.state.active_effects.to_numpy()[: self.model.body_count]
+            self.needed["friction"].see(np.flatnonzero(active & CONTACT), time_s)
+
+    def _see_bodies(self, needed, volume, time_s):
+        """Take in the bodies within each other of a look."""
+        for name in {"bodies", "bare"} & set(needed):
+            needed[name].see(self._overlapping(volume, name == "bare"), time_s)
+
+    def _overlapping(self, volume, bare):
+        """First bodies of pairs near each other whose spheres would touch.
+
+        volume: what has looked for them. bare: whether only pairs count of which a touching sphere
+        is on a bare outer face.
+        """
+        pairs = volume.near_pairs[:_MOST_PAIRS]
+        if not len(pairs):
+            return pairs[:, 0]
+        place, turn = volume.seen
+        spheres, top = self.spheres, self.model.topology
+        broken = self.state.broken_tick.to_numpy()[: self.model.bond_count] != NEVER
+        # Bond -1 stands for an outer face, which is as free as a broken one.
+        free, count = np.append(broken, True)[top.body_bond], spheres.radius.shape[2]
+        side = []
+        for bodies in pairs.T:
+            local = spheres.centre[bodies].reshape(len(pairs), -1, 3)
+            centre = np.einsum("nij,nsj->nsi", turn[bodies], local) + place[bodies][:, None]
+            marks = [np.repeat(of[bodies], count, axis=1) for of in (free, top.body_bond < 0)]
+            side.append((centre, spheres.radius[bodies].reshape(len(pairs), -1), *marks))
+        (centre, radius, open_one, outer), (other, radius_other, open_two, outer_two) = side
+        reach = radius[:, :, None] + radius_other[:, None]
+        apart = np.linalg.norm(centre[:, :, None] - other[:, None], axis=-1)
+        hit = apart < (1.0 - LEAST_OVERLAP) * reach
+        hit &= open_one[:, :, None] & open_two[:, None]
+        if bare:
+            hit &= outer[:, :, None] | outer_two[:, None]
+        return pairs[hit.any(axis=(1, 2)), 0]
+
+    @cached_property
+    def spheres(self) -> ContactSpheres:
+        """Spheres of all faces, those of the scene or, without contact, the paper's."""
+        if self.model.has_contact:
+            return self.model.spheres
+        return spheres_of_faces(self.model.mesh, self.model.centre, _DIVISIONS)
 
     def saved(self) -> dict[str, np.ndarray]:
         """Data for a checkpoint, arrays by name."""
-        rows = [[m.times, m.most, m.where, m.first_s] for m in self._all()]
+        rows = [[m.count, m.where, m.first_s] for m in self.needed.values()]
         return {
-            "needed": np.array(rows, dtype=np.float64),
-            "looks": np.array([self.looks, self.touching, self.last_s]),
+            "needed": np.array(rows, dtype=np.float64).reshape(-1, 3),
+            "looks": np.array([self.last_s, self.leap]),
+            "strain": self.strain.copy(),
         }
 
     def resume(self, saved: Mapping[str, np.ndarray]) -> None:
         """Restore the data that ``saved`` returned."""
-        for finding, row in zip(self._all(), saved["needed"].tolist()):
-            finding.times, finding.most, finding.where = (int(value) for value in row[:3])
-            finding.first_s = row[3]
-            if finding.times:
-                finding.place_m = self._position_of(finding)
-        looks, touching, self.last_s = saved["looks"].tolist()
-        self.looks, self.touching = int(looks), int(touching)
+        for finding, row in zip(self.needed.values(), saved["needed"].tolist()):
+            finding.count, finding.where, finding.first_s = int(row[0]), int(row[1]), row[2]
+        self.last_s, self.leap = saved["looks"].tolist()
+        self.strain = saved["strain"].copy()
 
-    def _count_touching(self):
-        contacts = self.contacts
-        if contacts is not None:
-            _, _, deepest = contacts.store.near_table()
-            self.touching = max(self.touching, int((deepest > 0.0).sum()))
+    def findings(self, volume: Optional[SharedVolume] = None) -> tuple[MissingEffect, ...]:
+        """A ``MissingEffect`` for each effect that would have acted; a tuple, empty for none.
 
-    def _all(self):
-        return (*self.needed.values(), self.outer)
+        volume: a look at the end, which also finds bodies that have moved by little; the last look
+        by default.
+        """
+        needed = {name: replace(finding) for name, finding in self.needed.items()}
+        volume = self.volume if volume is None else volume
+        self._see_bodies(needed, volume, int(self.state.tick[None]) * self.schedule.tick_seconds)
+        ticks = self.state.passed.to_numpy()[: self.model.bond_count]
+        for column, name in enumerate(("tension", "shear")):
+            if name in needed:
+                self._see_passed(needed[name], ticks[:, column])
+        if "dashpot" in needed:
+            substeps = int(self.schedule.evaluations[0])
+            rounding = bond_rounding(self.model, self.state, substeps)
+            needed["dashpot"].see(np.flatnonzero(self.strain > rounding), self.last_s)
+        found = [finding for finding in needed.values() if finding.count]
+        return tuple(replace(one, place_m=self._position_of(one)) for one in found)
+
+    def _see_passed(self, finding, ticks):
+        """Take in the ticks at which bonds first exceeded a limit."""
+        places = np.flatnonzero(ticks != NEVER)
+        order = places[np.argsort(ticks[places], kind="stable")]
+        first = float(ticks[order[0]]) if len(order) else 0.0
+        finding.see(order, first * self.schedule.tick_seconds)
+
+    def unseen(self) -> tuple[str, ...]:
+        """A sentence where bodies may have passed through each other between two recordings."""
+        open_roles = {"bodies", "bare"} & set(self.needed)
+        leap = max(self.leap, self.volume.way())
+        if not open_roles or leap <= _LEAP or self.volume.fragments() == 1:
+            return ()
+        return (
+            f"bodies without contact spheres moved up to {leap:.2g} times their radius "
+            f"between two samples: whether they passed through each other was not seen",
+        )
 
     def _position_of(self, finding):
-        return (self._centre if finding is self.outer else self._middle)(finding.where)
-
-    def _centre(self, body):
-        return tuple(self.model.centre[body].tolist())
-
-    def _middle(self, bond):
-        corners = self.model.topology.vertices[bond]
+        if finding.unit == "body":
+            return tuple(self.model.centre[finding.where].tolist())
+        corners = self.model.topology.vertices[finding.where]
         return tuple(self.model.mesh.points[corners].mean(axis=0).tolist())
-
-    def findings(self) -> tuple[MissingEffect, ...]:
-        """A ``MissingEffect`` for each effect that was needed, an empty tuple where none was."""
-        found = [finding for finding in self._all() if finding.times]
-        return tuple(replace(finding, looks=self.looks) for finding in found)

@@ -2,10 +2,13 @@
 
 from typing import TYPE_CHECKING
 
+import numpy as np
 import taichi as ti
 
-from taichi_dem.physics.fracture import coulomb_limit
+from taichi_dem.kit.allocation import values
+from taichi_dem.kit.types import vec3
 from taichi_dem.step.advance import Advance
+from taichi_dem.step.half_step import HalfStep
 
 if TYPE_CHECKING:
     from taichi_dem.engine.state import State
@@ -21,22 +24,83 @@ class Readings:
 
     def __init__(self, tables: "Tables", state: "State", advance: Advance):
         self.tables, self.state, self.advance = tables, state, advance
-        self.contacts = advance.contacts
+        self.contacts, self.half_step = advance.contacts, HalfStep(advance)
+
+    def pushes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Impulses [N s] and moments [N m s] of contacts in half a step, (body_count, 6).
+
+        Summed in the order of the pairs, so that no thread changes a bit. Also the heat of each
+        pair's dashpots and friction by which the booked one is behind [J], (pairs, 2).
+        """
+        pushed = np.zeros((int(values(self.tables.body_count)), 6))
+        count = int(values(self.contacts.store.near_count)) if self.contacts is not None else 0
+        table = np.zeros((count, 14))
+        if count:
+            bodies = self.contacts.store.near_table()[0]
+            self._push(table)
+            for side in range(2):
+                np.add.at(pushed, bodies[:, side], table[:, 6 * side : 6 * side + 6])
+        return pushed, table[:, 12:]
 
     @ti.kernel
-    def bodies(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
-        """Kinetic energy, work of loads and supports, contact heats of every body [J]."""
+    def _push(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
+        """Impulse and moment of every pair's contacts on both bodies in half a step, and heats."""
+        for a in range(self.contacts.store.near_count[None]):
+            p = self.contacts.store.near_slot[a]
+            found, half = self.advance.forces_now(p), self.half_step.pair_step(p)
+            for k in ti.static(range(3)):
+                table[a, k], table[a, 3 + k] = -half * found.force[k], half * found.moment_i[k]
+                table[a, 6 + k], table[a, 9 + k] = half * found.force[k], half * found.moment_j[k]
+            table[a, 12], table[a, 13] = half * found.dragged, half * found.rubbed
+
+    def bodies(self) -> np.ndarray:
+        """Kinetic energy, work of loads and supports, contact heats of every body [J], (n, 6)."""
+        return self._table()[:, :6]
+
+    def motion(self) -> np.ndarray:
+        """Velocity, spin and angular momentum of every body at the time of its position, (n, 9)."""
+        return self._table()[:, 6:15]
+
+    def works(self) -> np.ndarray:
+        """Work of each load, and of all supports last, on every body [J], (n, loads + 1)."""
+        return self._table()[:, 15:]
+
+    def step_back(self) -> None:
+        """Set the velocities, which are given at time zero, half a step back."""
+        self._table(back=1)
+
+    def _table(self, back=0):
+        pushed, _ = self.pushes()
+        table = np.zeros((len(pushed), 16 + len(self.tables.loads)))
+        self._visit(pushed, back, table)
+        return table
+
+    @ti.kernel
+    def _visit(
+        self,
+        pushed: ti.types.ndarray(dtype=ti.f64, ndim=2),
+        back: ti.i32,
+        table: ti.types.ndarray(dtype=ti.f64, ndim=2),
+    ):
+        """Bring what is recorded of bodies to the present, or set them back; one for all uses."""
         for i in range(self.tables.body_count[None]):
-            momentum = self.state.angular_momentum[i]
-            turning = momentum.dot(self.advance.spin(i, momentum))
-            moving = self.tables.mass[i] * self.state.velocity[i].norm_sqr()
-            table[i, 0] = 0.5 * (moving + turning)
-            for e in ti.static(range(len(self.tables.loads))):
-                table[i, 1] = table[i, 1] + self.state.load_work[i][e]
-            table[i, 2] = self.state.load_work[i][ti.static(len(self.tables.loads))]
-            if ti.static(self.tables.has_contact):
-                for k in ti.static(range(3)):
+            linear, angular = vec3(0.0), vec3(0.0)
+            for k in ti.static(range(3)):
+                linear[k], angular[k] = pushed[i, k], pushed[i, 3 + k]
+            velocity, momentum, works = self.half_step.visit(i, linear, angular, back)
+            spin = self.advance.spin(i, momentum)
+            moving = self.tables.mass[i] * velocity.norm_sqr()
+            table[i, 0] = 0.5 * (moving + momentum.dot(spin))
+            for k in ti.static(range(3)):
+                table[i, 6 + k], table[i, 9 + k] = velocity[k], spin[k]
+                table[i, 12 + k] = momentum[k]
+                if ti.static(self.tables.has_contact):
                     table[i, 3 + k] = self.state.contact_heat[i][k]
+            for e in ti.static(range(len(self.tables.loads) + 1)):
+                table[i, 15 + e] = self.state.load_work[i][e] + works[e]
+            for e in ti.static(range(len(self.tables.loads))):
+                table[i, 1] = table[i, 1] + table[i, 15 + e]
+            table[i, 2] = table[i, ti.static(15 + len(self.tables.loads))]
 
     @ti.kernel
     def bonds(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
@@ -46,13 +110,22 @@ class Readings:
             if ti.static(self.tables.has_bond_heat):
                 for k in ti.static(range(3)):
                     table[b, 1 + k] = self.state.bond_heat[b][k]
+                table[b, 1] = table[b, 1] + self.half_step.bond_heat(b)
             for q in range(3):
                 spent = self.tables.tension.spent(b, 3 * b + q)
                 table[b, 4] = table[b, 4] + self.tables.unit_area[b] * spent
 
+    def pairs(self) -> np.ndarray:
+        """Strain, and heats that the first body has not taken, of every pair [J], (pairs, 4)."""
+        _, heats = self.pushes()
+        table = np.zeros((len(heats), 4))
+        if len(heats):
+            self._pairs(table)
+            table[:, 1:3] += heats
+        return table
+
     @ti.kernel
-    def pairs(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
-        """Strain, and heats that the first body has not taken, of every pair [J]."""
+    def _pairs(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
         for a in range(self.contacts.store.near_count[None]):
             p = self.contacts.store.near_slot[a]
             table[a, 0] = self.contacts.pair_energy(p)
@@ -60,20 +133,12 @@ class Readings:
                 table[a, 1 + k] = self.contacts.store.heat[p][k]
 
     @ti.kernel
-    def load_work(self, index: ti.i32, work: ti.types.ndarray(dtype=ti.f64, ndim=1)):
-        """Work of one load on every body [J]."""
-        for i in range(self.tables.body_count[None]):
-            for e in ti.static(range(len(self.tables.loads))):
-                if e == index:
-                    work[i] = self.state.load_work[i][e]
-
-    @ti.kernel
-    def support_work(self, index: ti.i32, work: ti.types.ndarray(dtype=ti.f64, ndim=1)):
-        """Work [J] of all supports on the bodies that one of them holds; other entries stay."""
+    def supported(self, index: ti.i32, marks: ti.types.ndarray(dtype=ti.i32, ndim=1)):
+        """Mark the bodies on which one of the supports acts."""
         for i in range(self.tables.body_count[None]):
             for e in ti.static(range(len(self.tables.supports))):
                 if e == index and self.tables.supports[e].acts_on(i):
-                    work[i] = self.state.load_work[i][ti.static(len(self.tables.loads))]
+                    marks[i] = 1
 
     @ti.kernel
     def momentum(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
@@ -87,27 +152,36 @@ class Readings:
                 table[i, 6 + k] = self.state.load_impulse[i][k]
 
     @ti.kernel
-    def beyond_limits(
-        self,
-        strength: ti.f64,
-        cohesion: ti.f64,
-        friction: ti.f64,
-        marks: ti.types.ndarray(dtype=ti.i32, ndim=2),
-    ):
-        """Mark bonds stretched past their strength, sheared past their Coulomb limit, overlapping.
+    def pressed(self, marks: ti.types.ndarray(dtype=ti.i32, ndim=1)):
+        """Mark released bonds of which the faces overlap."""
+        for b in range(self.tables.bond_count[None]):
+            if self.state.broken_tick[b] >= 0:
+                marks[b] = ti.cast(self.advance.bond_opening(b)[0] < 0.0, ti.i32)
 
-        The last is asked of released bonds, the others of those that hold.
+    @ti.kernel
+    def active_bonds(self, marks: ti.types.ndarray(dtype=ti.i32, ndim=2)):
+        """Mark bonds of which a unit has softened, and of which one has slipped."""
+        for b in range(self.tables.bond_count[None]):
+            for u in range(3 * b, 3 * b + 3):
+                if ti.static(hasattr(self.tables.tension, "is_active")):
+                    marks[b, 0] = marks[b, 0] | self.tables.tension.is_active(b, u)
+                if ti.static(hasattr(self.tables.shear, "is_active")):
+                    marks[b, 1] = marks[b, 1] | self.tables.shear.is_active(b, u)
+
+    @ti.kernel
+    def residual_slip(self, slip: ti.types.ndarray(dtype=ti.f64, ndim=1)):
+        """Largest residual slip [m] of the units of every bond that holds.
+
+        Zero for released bonds, and for shear laws that keep none.
         """
         for b in range(self.tables.bond_count[None]):
-            opening = self.advance.bond_opening(b)
-            stiffness = self.tables.bond_stiffness[b]
-            if self.state.broken_tick[b] < 0:
-                pull = stiffness[0] * opening[0]
-                limit = coulomb_limit(cohesion, friction, -pull)
-                marks[b, 0] = ti.cast(pull > strength, ti.i32)
-                marks[b, 1] = ti.cast(stiffness[1] * opening[1] > limit, ti.i32)
-            else:
-                marks[b, 2] = ti.cast(opening[0] < 0.0, ti.i32)
+            largest = 0.0
+            if ti.static(self.tables.shear.remembers_slip):
+                if self.state.broken_tick[b] < 0:
+                    for q in range(3):
+                        found = self.tables.shear.residual_slip(3 * b + q).norm()
+                        largest = ti.max(largest, found)
+            slip[b] = largest
 
     @ti.kernel
     def damage(self, damage: ti.types.ndarray(dtype=ti.f64, ndim=1)):

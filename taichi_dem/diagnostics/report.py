@@ -3,6 +3,7 @@
 from dataclasses import asdict, dataclass
 from typing import Any, Optional
 
+from taichi_dem.diagnostics.shared_volume import Interpenetration
 from taichi_dem.kit.display import in_brief
 
 #: Keys of the JSON file that differ from the attribute's name.
@@ -18,8 +19,10 @@ class Report:
     bonds and pairs that one step for all would have evaluated in the same substeps. sweeps: over
     all dashpots where they are solved, else 0. ideal_gain: bodies times substeps over body updates,
     the saving by different steps if a pair cost nothing; boundary_gain: uniform over actual
-    evaluations, the saving with every pair evaluated at the finer body's step. searches: updates of
-    the contact lists.
+    evaluations, the saving with every pair evaluated at the finer body's step. unconverged_steps:
+    those whose sweeps ended before impulses agreed; worst_residual: their largest residual, as a
+    share of the fastest body's speed. interpenetration: volume that bodies shared, where it was
+    looked for. searches: updates of the contact lists.
     energy_balance: energy terms [J]; energy_residual_fraction: residual over the work put in.
     linear_momentum_error, angular_momentum_error: unexplained momentum, as shares of that
     exchanged. compile_seconds, run_seconds, run_cpu_seconds: cost. effect_activity: an
@@ -27,8 +30,9 @@ class Report:
     effect that was left out and needed. unresolved: sentences about bonds and contacts for which
     the step was too long. bound_by: number of bodies at the end by the criterion that bounds their
     step, see ``step_control.CRITERIA``. round_off_J: energies below this may be round-off
-    (``DivergenceCheck.round_off``). measured_speedup: CPU time of one step for all over that of the
-    run, where it was measured.
+    (``DivergenceCheck.round_off``). bond_slip: the ``bond_slip.BondSlip`` of the bond that slipped
+    farthest, empty where none slipped. measured_speedup: CPU time of one step for all over that of
+    the run, where it was measured.
     """
 
     method: str
@@ -57,6 +61,10 @@ class Report:
     unresolved: tuple
     bound_by: dict
     round_off_J: float = 0.0
+    unconverged_steps: int = 0
+    worst_residual: float = 0.0
+    interpenetration: Optional[Interpenetration] = None
+    bond_slip: tuple = ()
     measured_speedup: Optional[float] = None
 
     def __repr__(self):
@@ -71,8 +79,10 @@ class Report:
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """Sentences about effects that were missed, and about a step that was too long."""
-        return (*(str(missing) for missing in self.missing_effects), *self.unresolved)
+        """Sentences about effects that were missed, slip of bonds, and a step that was too long."""
+        slipped = (str(slip) for slip in self.bond_slip if slip.excessive)
+        missing = (str(missing) for missing in self.missing_effects)
+        return (*missing, *slipped, *self.unresolved)
 
     @property
     def contact_evaluations(self) -> int:
@@ -141,7 +151,8 @@ class Report:
         """Row with the sweeps over all dashpots, for methods that solve them."""
         if not self.sweeps:
             return ()
-        return (("sweeps", f"{self.sweeps:,}, {self.sweeps / self.substeps:.2f} a substep"),)
+        words = f"{self.sweeps:,}, {self.sweeps / self.substeps:.2f} a substep"
+        return (("sweeps", f"{words}, {self.unconverged_steps:,} substeps unconverged"),)
 
     def __str__(self):
         """A table of some twenty lines, then one line for every effect that was missed."""
@@ -160,9 +171,11 @@ class Report:
                 f"{self.bond_evaluations:,} bonds, {self.pair_evaluations:,} pairs, "
                 f"{self.body_updates:,} bodies",
             ),
+            *(("largest bond slip", slip.figure) for slip in self.bond_slip),
             *self._gain_row(),
             *self._sweeps_row(),
             ("contact searches", f"{self.searches:,}"),
+            ("interpenetration", str(self.interpenetration or "not looked for")),
             (
                 "work put in",
                 f"{self.energy_balance['load_work'] + self.energy_balance['support_work']:.6g} J",

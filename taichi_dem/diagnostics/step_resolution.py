@@ -9,7 +9,7 @@ from taichi_dem.contact_search.contacts import Contacts
 from taichi_dem.diagnostics.readings import Readings
 from taichi_dem.step.advance import Advance
 from taichi_dem.step.schedule import Schedule
-from taichi_dem.timeline import NEVER
+from taichi_dem.timeline import MAX_LEVEL, NEVER
 
 if TYPE_CHECKING:
     from taichi_dem.engine.model import Model
@@ -46,7 +46,7 @@ class StepResolution:
     ):
         self.model, self.state, self.readings, self.contacts = model, state, readings, contacts
         self.schedule, self.solves, self.limited = schedule, advance.solves, advance.limited
-        self.has_dashpot = advance.has_dashpot
+        self.has_dashpot, self.solver = advance.has_dashpot, advance.solver
         self.share = np.ones(model.bond_count)
         self.pair_share, self.taken = np.ones(model.body_count), np.zeros(model.body_count)
         self.step = np.full(model.body_count, np.inf)
@@ -86,7 +86,38 @@ class StepResolution:
         bodies: which to judge, booleans (body_count,), all by default.
         """
         bodies = np.ones(self.model.body_count, dtype=bool) if bodies is None else bodies
-        return (*self._bonds(bodies[self.model.topology.master]), *self._pairs(bodies))
+        bonds = self._bonds(bodies[self.model.topology.master])
+        return (*bonds, *self._pairs(bodies), *self._sweeps(), *self._levels())
+
+    def _levels(self):
+        if not self.schedule.undivided[None]:
+            return ()
+        least = self.schedule.dt0 / 2.0**MAX_LEVEL
+        return (
+            f"the shortest step of all, {least:.3g} s or 2^-{MAX_LEVEL} of the largest, was "
+            "reached: steps are not divided further; take a shorter largest step",
+        )
+
+    @property
+    def unconverged(self) -> tuple[int, float]:
+        """Steps whose sweeps ended before impulses agreed, and the worst residual.
+
+        The residual is a share of the fastest body's speed.
+        """
+        if self.solver is None:
+            return 0, 0.0
+        return int(self.solver.unconverged[None]), float(self.solver.worst[None])
+
+    def _sweeps(self):
+        steps, worst = self.unconverged
+        if not steps:
+            return ()
+        allowed = float(self.solver.tolerance[None])
+        return (
+            f"the dashpots of {steps} steps were not solved: sweeps ended with changes of up to "
+            f"{100 * worst:.2g} % of the largest speed, where {100 * allowed:.2g} % is asked; "
+            f"allow more sweeps than {int(self.solver.bounds[1])}, or take a shorter step",
+        )
 
     def _bonds(self, inside):
         share = np.where(inside, self.share, 1.0)

@@ -1,10 +1,12 @@
 """Effects that a scene may list; all others are not computed, allocated or compiled."""
 
 from taichi_dem.effects.bond_damping import BondDamping
+from taichi_dem.effects.face_contact import FaceContact
 from taichi_dem.effects.friction import Friction
 from taichi_dem.effects.gas_pressure import GasPressure
 from taichi_dem.effects.gravity import Gravity
 from taichi_dem.effects.shear_slip import ShearSlip
+from taichi_dem.effects.slip_weakening import SlipWeakening
 from taichi_dem.effects.softening import Softening
 from taichi_dem.effects.sphere_contact import SphereContact
 from taichi_dem.effects.sticking_friction import StickingFriction
@@ -12,6 +14,7 @@ from taichi_dem.effects.supports import Fixed, PrescribedMotion, Roller
 
 __all__ = [
     "BondDamping",
+    "FaceContact",
     "Fixed",
     "Friction",
     "GasPressure",
@@ -19,6 +22,7 @@ __all__ = [
     "PrescribedMotion",
     "Roller",
     "ShearSlip",
+    "SlipWeakening",
     "Softening",
     "SphereContact",
     "StickingFriction",

@@ -9,6 +9,7 @@ the others at most one.
 """
 
 import copy
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Optional
 
@@ -19,7 +20,9 @@ from taichi.lang import impl
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.display import by_arguments
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.sealed import Sealed
 from taichi_dem.kit.types import real, vec3
+from taichi_dem.kit.validation import shown
 from taichi_dem.materials import Material
 
 if TYPE_CHECKING:
@@ -38,21 +41,35 @@ ROLES = (*SINGLE, *MANY)
 HARMLESS = 2.0**40
 
 
-class Effect:
-    """Base of all effects.
+class Effect(Sealed):
+    """Base of all effects; one that has been made cannot be changed.
 
-    role: its place in the step. name: the word used in reports and on the command line. Kernels of
-    a bound effect read its numbers in the field ``self.law``, constants of the scene in
-    ``self.tables`` (engine.tables.Tables), and the fields that ``declare`` has declared.
+    role: its place in the step. name: the word used in reports and on the command line, by default
+    that of the class. Kernels of a bound effect read its numbers in the field ``self.law``,
+    constants of the scene in ``self.tables`` (engine.tables.Tables), and the fields that
+    ``declare`` has declared.
     """
 
     role = ""
     name = ""
     #: Whether a friction law keeps a spring for each sphere pair (``roles.FrictionMemory``).
     remembers = False
+    #: Whether a shear law keeps a residual slip of each unit (``roles.SlipMemory``).
+    remembers_slip = False
+    #: Whether a shear law may release a face (``roles.ShearFailure``).
+    releases = False
     law: ti.Field
     tables: "Tables"
     _count: int
+
+    #: Whether it stands for no effect, which no report lists.
+    is_null = False
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Name a class that has no name: reports list effects by it."""
+        super().__init_subclass__(**options)
+        if not cls.name and not cls.is_null:
+            cls.name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).strip("_").lower()
 
     def __repr__(self):
         return by_arguments(self)
@@ -66,12 +83,15 @@ class Effect:
         if type(self).harmless is Effect.harmless:
             raise InputError(f"effect {self.name} cannot be silent: leave it out of the scene")
         made = copy.copy(self)
-        made.name, made.is_silent = "", True
+        vars(made).update(name="", is_silent=True)
         return made
 
     def harmless(self, material: Material) -> Material:
         """The material with which the effect never acts, as ``silent`` needs it."""
         return material
+
+    def check_material(self, material: Material) -> None:
+        """Raise InputError for a material that the effect cannot act with; a scene asks."""
 
     def numbers(self, material: Material) -> tuple:
         """Numbers that kernels read as ``self.law[0]`` and on: to change them compiles nothing."""
@@ -111,17 +131,19 @@ class Effect:
             model = copy.copy(model)
             model.material = self.harmless(model.material)
         if self._count:
-            assign(self.law, np.array(self.numbers(model.material), dtype=np.float64))
+            assign(self.law, _checked_numbers(self, model.material))
         self.load(model)
 
     def accepts(self, given: Optional["Effect"]) -> bool:
         """Whether kernels compiled for this effect are valid for a scene's effect ``given``.
 
-        They are, unless they contain an attribute of it, read in a kernel, that has another value.
+        They are, unless they contain an attribute of it, read in a kernel, that has another value,
+        or it has another count of numbers.
         """
-        return given is None or all(
-            _same(vars(given).get(name), value) for name, value in self._frozen.items()
-        )
+        if given is None:
+            return True
+        same = (_same(vars(given).get(name), value) for name, value in self._frozen.items())
+        return _count_of(given) == self._count and all(same)
 
     def __getattr__(self, name):
         given = self.__dict__.get("_given", {})
@@ -137,12 +159,32 @@ def bound(effect: Effect, tables: "Tables") -> Any:
     """A copy of an effect with its own fields, which belongs to an engine and serves its scenes."""
     made = object.__new__(type(effect))
     made.__dict__.update(_given=vars(effect), _frozen={}, tables=tables)
-    material: Any = _AnyMaterial()
-    made._count = len(effect.numbers(material))
+    made._count = _count_of(effect)
     if made._count:
         made.law = ti.field(real, shape=made._count)
     made.declare(tables.capacity)
     return made
+
+
+def _count_of(effect):
+    """How many numbers an effect has."""
+    material: Any = _AnyMaterial()
+    return len(effect.numbers(material))
+
+
+def _checked_numbers(effect, material):
+    """Numbers of an effect with a material, as an array; InputError unless all are numbers."""
+    given = effect.numbers(material)
+    try:
+        found = np.array(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        found = np.array(np.nan)
+    if found.shape != (effect._count,) or np.isnan(found).any():
+        raise InputError(
+            f"numbers of effect {effect.name or type(effect).__name__} must be {effect._count} "
+            f"real numbers, got {shown(given)}"
+        )
+    return found
 
 
 class _AnyMaterial:
@@ -170,6 +212,7 @@ class ElasticTension(Effect):
     """No softening: a unit stays elastic in tension and compression and never fails."""
 
     role = "tension"
+    is_null = True
 
     @ti.func
     def traction(self, stiffness, u, opening):
@@ -202,6 +245,7 @@ class ElasticShear(Effect):
     """No slip: a unit stays elastic in shear."""
 
     role = "shear"
+    is_null = True
 
     @ti.func
     def traction(self, stiffness, u, sliding, pressure):
@@ -219,6 +263,7 @@ class NoDashpot(Effect):
     """Bonds without damping."""
 
     role = "dashpot"
+    is_null = True
 
     @ti.func
     def traction(self, velocity):
@@ -231,6 +276,7 @@ class NoFriction(Effect):
     """Frictionless sphere contacts."""
 
     role = "friction"
+    is_null = True
 
     @ti.func
     def limit(self, force_normal):

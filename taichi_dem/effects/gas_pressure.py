@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from taichi_dem.effects.base import Effect
 from taichi_dem.kit.allocation import assign
+from taichi_dem.kit.elementary import sine_and_cosine
 from taichi_dem.kit.validation import positive, word
 from taichi_dem.materials import Material
 from taichi_dem.mesh.tetrahedra import area_vectors
@@ -26,9 +27,11 @@ def pulse(peak, rise, decay_ratio, t):
     pressure = 0.0
     s = t / rise - 1.0
     if 0.0 <= t and s <= 0.0:
-        pressure = peak * ti.cos(0.5 * math.pi * s) ** 2
+        _, swing = sine_and_cosine(0.5 * math.pi * s)
+        pressure = peak * swing**2
     elif 0.0 < s and s <= decay_ratio:
-        pressure = peak * ti.cos(0.5 * math.pi * s / decay_ratio)
+        _, swing = sine_and_cosine(0.5 * math.pi * s / decay_ratio)
+        pressure = peak * swing
     return pressure
 
 

@@ -32,7 +32,11 @@ class TensionLaw(Protocol):
 
 
 class ShearLaw(Protocol):
-    """Tangential law of a bond's contact units; role "shear"."""
+    """Tangential law of a bond's contact units; role "shear".
+
+    One with ``remembers_slip = True`` also keeps the contract ``SlipMemory``, one with ``releases =
+    True`` the contract ``ShearFailure``.
+    """
 
     def traction(
         self, stiffness: float, u: int, sliding: ti.Vector, pressure: float
@@ -41,6 +45,20 @@ class ShearLaw(Protocol):
 
     def stored(self, b: int, u: int, sliding: ti.Vector) -> float:
         """Elastic energy per area [J/m^2]."""
+
+
+class SlipMemory(Protocol):
+    """Slip that stays when the traction is gone."""
+
+    def residual_slip(self, u: int) -> ti.Vector:
+        """Residual slip in the face frame [m], two components."""
+
+
+class ShearFailure(Protocol):
+    """Failure of a bond's contact units in shear."""
+
+    def failed(self, u: int, pressure: float) -> int:
+        """1 once the unit transmits nothing any more at a pressure [Pa], else 0."""
 
 
 class DashpotLaw(Protocol):
@@ -64,6 +82,12 @@ class ContactLaw(Protocol):
 
     def stored(self, overlap: float) -> float:
         """Energy [J]."""
+
+    def nearest(self, a: int, b: int, turn: ti.Matrix, offset: ti.Vector) -> Any:
+        """Where two bodies are nearest by an entry of the pair store (``SphereContact``)."""
+
+    def face_of(self, a: int) -> int:
+        """Face of one side of an entry of the pair store."""
 
 
 class FrictionLaw(Protocol):
@@ -140,6 +164,10 @@ CONTRACTS = {
 }
 
 
+#: Contracts that an effect keeps beside that of its role, by the attribute that says so.
+FURTHER = {"remembers": FrictionMemory, "remembers_slip": SlipMemory, "releases": ShearFailure}
+
+
 def members_of(contract: type) -> tuple:
     """Names of the members of a Protocol."""
     return tuple(name for name in vars(contract) if not name.startswith("_"))
@@ -153,8 +181,9 @@ def check_effect(effect: Any) -> None:
             f"role of effect {kind} must be one of {', '.join(CONTRACTS)}, got {effect.role!r}"
         )
     wanted = members_of(CONTRACTS[effect.role])
-    if getattr(effect, "remembers", False):
-        wanted += members_of(FrictionMemory)
+    for name, contract in FURTHER.items():
+        if getattr(effect, name, False):
+            wanted += members_of(contract)
     missing = [name for name in wanted if not hasattr(type(effect), name)]
     if missing:
         raise InputError(

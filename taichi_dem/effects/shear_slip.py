@@ -23,6 +23,7 @@ class ShearSlip(Effect):
 
     role = "shear"
     name = "shear_slip"
+    remembers_slip = True
 
     def numbers(self, material: Material) -> tuple[float, ...]:
         """Cohesion [Pa] and friction coefficient."""
@@ -54,6 +55,16 @@ class ShearSlip(Effect):
             self.slip[u] = self.slip[u] + slip
             elastic -= slip
         return stiffness * elastic, spent
+
+    @ti.func
+    def is_active(self, b, u):
+        """1 for a unit that has slipped, else 0."""
+        return ti.cast(self.slip[u].norm_sqr() > 0.0, ti.i32)
+
+    @ti.func
+    def residual_slip(self, u):
+        """Residual slip of a unit in the face frame [m]."""
+        return self.slip[u]
 
     @ti.func
     def stored(self, b, u, sliding):

@@ -79,6 +79,11 @@ class Softening(Effect):
         return ti.cast(self.unit[u][0] >= self.law[1], ti.i32)
 
     @ti.func
+    def is_active(self, b, u):
+        """1 for a unit that has been opened beyond its elastic limit, else 0."""
+        return ti.cast(self.unit[u][0] > self._onset(b), ti.i32)
+
+    @ti.func
     def stored(self, b, u, opening):
         """Elastic energy per area [J/m^2] at the present stiffness."""
         stiffness = self.tables.bond_stiffness[b][0]

@@ -1,11 +1,17 @@
 """Contact of fragments through spheres on their broken faces (Konno et al., 2.2, Fig. 5)."""
 
+from typing import TYPE_CHECKING
+
 import taichi as ti
 
 from taichi_dem.effects.base import Effect
-from taichi_dem.kit.validation import flag, positive, whole
+from taichi_dem.kit.validation import between, flag, whole
 from taichi_dem.materials import Material
-from taichi_dem.physics.sphere_pair import normal_force
+from taichi_dem.mesh.contact_spheres import ContactSpheres, spheres_of_faces
+from taichi_dem.physics.sphere_pair import Nearest, normal_force
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.model import Model
 
 #: Entries of a list for each body: a thousand tetrahedra with as many take some GiB.
 _MOST = 100_000
@@ -13,31 +19,34 @@ _MOST = 100_000
 
 @ti.data_oriented
 class SphereContact(Effect):
-    """Spheres inscribed behind broken faces repel each other, without attraction.
+    """Spheres inscribed behind free faces repel each other, without attraction.
 
     divisions: equal parts of a face's edges; 5 gives the paper's six spheres a face.
-    outer_faces: free outer faces carry spheres from the start too (the paper: no).
-    skin: gap up to which spheres enter the candidate list, at least; more where bodies are fast
-    [m]. It changes time, not results.
+    outer_faces: outer faces carry spheres from the start, beside those that break. Without, as in
+    the paper, bodies pass through each other there.
+    skin: gap up to which spheres enter the candidate list, at least, as a share of a body's radius;
+    more where bodies are fast. It changes time, not results.
     neighbours_per_body, pairs_per_body, spheres_per_body: capacity of the lists, on average; that
     of the spheres includes those of the next search, before those that they replace are freed.
     """
 
     role = "contact"
     name = "sphere_contact"
+    #: Whether spheres meet the faces of other bodies, instead of their spheres.
+    meets_faces = False
 
     def __init__(
         self,
         divisions: int = 5,
-        outer_faces: bool = False,
-        skin: float = 1.2e-3,
+        outer_faces: bool = True,
+        skin: float = 0.015,
         neighbours_per_body: int = 64,
         pairs_per_body: int = 24,
         spheres_per_body: int = 160,
     ):
         self.divisions = whole("divisions", divisions, 3, 20)
         self.outer_faces = flag("outer_faces", outer_faces)
-        self.skin = positive("skin", skin)
+        self.skin = between("skin", skin, 1e-6, 1.0)
         self.neighbours_per_body = whole("neighbours_per_body", neighbours_per_body, 1, _MOST)
         self.pairs_per_body = whole("pairs_per_body", pairs_per_body, 1, _MOST)
         self.spheres_per_body = whole("spheres_per_body", spheres_per_body, 1, _MOST)
@@ -55,6 +64,28 @@ class SphereContact(Effect):
     def numbers(self, material: Material) -> tuple[float, ...]:
         """Stiffness [N/m] and damping [N s/m] of a contact."""
         return material.contact_stiffness, material.contact_damping
+
+    def spheres(self, model: "Model") -> ContactSpheres:
+        """Spheres of a model, in balls that hold all of a face, or of a body, that can touch."""
+        return spheres_of_faces(model.mesh, model.centre, self.divisions)
+
+    def follow(self, exposed_faces: ti.Field) -> None:
+        """Take note of the field with a bit for each face of a body that is free."""
+
+    @ti.func
+    def nearest(self, a, b, turn, offset):
+        """Where two bodies are nearest by an entry (a, b) of the pair store, a ``Nearest``.
+
+        turn, offset: rotation and place of the second body in the frame of the first [m].
+        """
+        first, second = self.tables.sphere[a], self.tables.sphere[b]
+        apart = turn @ second.xyz + offset - first.xyz
+        return Nearest(first=first, apart=apart, reach=first[3] + second[3], can_meet=1)
+
+    @ti.func
+    def face_of(self, a):
+        """Face 4 * body + f of one side of an entry of the pair store."""
+        return a // self.tables.face_spheres[None]
 
     @ti.func
     def normal(self, overlap, opening_rate):

@@ -9,7 +9,9 @@ import taichi as ti
 
 from taichi_dem.effects.base import Effect, Travel, along
 from taichi_dem.kit.allocation import assign
+from taichi_dem.kit.elementary import sine_and_cosine
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.fixed_order import length
 from taichi_dem.kit.types import vec3
 from taichi_dem.kit.validation import direction, positive, shown, word
 from taichi_dem.materials import Material
@@ -19,6 +21,9 @@ from taichi_dem.physics.rotation import zero3
 if TYPE_CHECKING:
     from taichi_dem.engine.capacity import Capacity
     from taichi_dem.engine.model import Model
+
+#: Sine of the angle below which two normals count as parallel.
+_PARALLEL = 1e-6
 
 
 @ti.data_oriented
@@ -67,7 +72,8 @@ class Fixed(_Support):
 class Roller(_Support):
     """Bodies with a face in the group slide on its plane and turn about its normal only.
 
-    normal: of the plane; its length does not matter.
+    A body on several planes slides along what they have in common, and turns only where all are
+    parallel. normal: of the plane; its length does not matter.
     """
 
     name = "roller"
@@ -75,23 +81,67 @@ class Roller(_Support):
     def __init__(self, group: str, normal: Sequence[float]):
         super().__init__(group)
         numbers = np.array(direction("normal", normal))
-        if not np.linalg.norm(numbers) > 0.0:
+        if not length(numbers) > 0.0:
             raise InputError(f"normal must be longer than zero, got {shown(normal)}")
-        self._normal = numbers / np.linalg.norm(numbers)
+        self._normal = numbers / length(numbers)
 
-    def numbers(self, material: Material) -> tuple[float, ...]:
-        """Unit normal, three components."""
-        return tuple(self._normal)
+    def declare(self, capacity: "Capacity") -> None:
+        """Direction that each body may not move in, and whether it may turn about the normal."""
+        super().declare(capacity)
+        self.across = ti.Vector.field(3, ti.f64, shape=capacity.bodies)
+        self.turns = ti.field(ti.i32, shape=capacity.bodies)
+
+    def load(self, model: "Model") -> None:
+        """Share the directions that a body may not move in among the rollers that hold it."""
+        super().load(model)
+        across = np.zeros((model.body_count, 3))
+        turns = np.zeros(model.body_count, dtype=np.int32)
+        planes: dict[int, set] = {}
+        for effect in model.supports:
+            if isinstance(effect, Roller):
+                for body in faces_of_group(model.mesh, model.topology, effect.group)[0].tolist():
+                    planes.setdefault(body, set()).add(_upward(effect._normal))
+        for body in faces_of_group(model.mesh, model.topology, self.group)[0].tolist():
+            shares = _right_angled(planes[body])
+            across[body] = shares[_upward(self._normal)]
+            turns[body] = sum(any(share) for share in shares.values()) == 1
+        assign(self.across, across)
+        assign(self.turns, turns)
 
     @ti.func
     def held(self, i, t, rotation, velocity, angular_momentum):
         """Velocity within the plane, spin about its normal."""
-        normal = vec3(self.law[0], self.law[1], self.law[2])
-        axis = rotation.transpose() @ normal
-        # The plane's moment is normal to its normal, so the component along it is unchanged.
-        spin = angular_momentum.dot(normal) / axis.dot(self.tables.inertia[i] @ axis)
-        kept = rotation @ (self.tables.inertia[i] @ (spin * axis))
+        normal = self.across[i]
+        kept = zero3()
+        if self.turns[i] == 1:
+            kept = angular_momentum
+            if normal.norm_sqr() > 0.0:
+                axis = rotation.transpose() @ normal
+                # The moment of the plane is normal to its normal: the component along it stays.
+                spin = angular_momentum.dot(normal) / axis.dot(self.tables.inertia[i] @ axis)
+                kept = rotation @ (self.tables.inertia[i] @ (spin * axis))
         return velocity - velocity.dot(normal) * normal, kept
+
+
+def _upward(normal):
+    """The later one of a normal and its opposite, in the order of their components."""
+    return max(tuple(normal.tolist()), tuple((0.0 - normal).tolist()))
+
+
+def _right_angled(planes):
+    """Directions at right angles to each other that span the normals of planes, by plane.
+
+    In an order of the planes, so that it does not depend on that of the scene. Zero for a plane
+    that those before it contain.
+    """
+    found: dict[tuple, tuple] = {}
+    for plane in sorted(planes):
+        rest = np.array(plane)
+        for other in found.values():
+            rest = rest - sum(a * b for a, b in zip(rest.tolist(), other)) * np.array(other)
+        size = float(length(rest))
+        found[plane] = tuple((rest / size).tolist()) if size > _PARALLEL else (0.0, 0.0, 0.0)
+    return found
 
 
 @ti.data_oriented
@@ -108,6 +158,21 @@ class PrescribedMotion(_Support):
         self._velocity = direction("velocity", velocity)
         self._frequency = positive("frequency", frequency, zero_allowed=True)
 
+    def load(self, model: "Model") -> None:
+        """Mark the bodies; InputError where another support asks for another motion."""
+        super().load(model)
+        mine = set(faces_of_group(model.mesh, model.topology, self.group)[0].tolist())
+        for effect in model.supports:
+            if _allows(effect, self._velocity, self._frequency):
+                continue
+            both = mine & set(faces_of_group(model.mesh, model.topology, effect.group)[0].tolist())
+            if both:
+                raise InputError(
+                    f"group {self.group} of prescribed_motion must not share bodies with group "
+                    f"{effect.group} of {effect.name}, which holds them otherwise, got body "
+                    f"{min(both)} in both"
+                )
+
     def numbers(self, material: Material) -> tuple[float, ...]:
         """Velocity [m/s], three components, and angular frequency [rad/s]."""
         return (*self._velocity, 2.0 * math.pi * self._frequency)
@@ -123,4 +188,17 @@ class PrescribedMotion(_Support):
     def held(self, i, t, rotation, velocity, angular_momentum):
         """The prescribed velocity at time t [s] and no spin."""
         amplitude = vec3(self.law[0], self.law[1], self.law[2])
-        return amplitude * ti.cos(self.law[3] * t), zero3()
+        _, swing = sine_and_cosine(self.law[3] * t)
+        return amplitude * swing, zero3()
+
+
+def _allows(effect, velocity, frequency):
+    """Whether a support of the package allows a prescribed velocity [m/s] at a frequency [Hz]."""
+    if isinstance(effect, Fixed):
+        return not any(velocity)
+    if isinstance(effect, Roller):
+        return sum(a * b for a, b in zip(effect._normal.tolist(), velocity)) == 0.0
+    if isinstance(effect, PrescribedMotion):
+        same = tuple(effect._velocity) == tuple(velocity) and effect._frequency == frequency
+        return same or not any((*velocity, *effect._velocity))
+    return True

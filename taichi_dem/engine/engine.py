@@ -4,7 +4,6 @@ from collections.abc import Iterable
 
 from taichi_dem.contact_search.contacts import Contacts
 from taichi_dem.contact_search.search import BroadPhase
-from taichi_dem.diagnostics.outer_faces import OuterOverlaps
 from taichi_dem.diagnostics.readings import Readings
 from taichi_dem.effects.base import Effect
 from taichi_dem.engine.capacity import LEAST, Capacity
@@ -68,9 +67,6 @@ class BlastEngine(Engine):
         self.step = kind(self.advance, self.schedule, self.broad_phase)
         self.drivers = {name: driver(self.step) for name, driver in DRIVERS.items()}
         self.readings = Readings(self.tables, self.state, self.advance)
-        self.outer_overlaps = None
-        if self.tables.has_contact:
-            self.outer_overlaps = OuterOverlaps(self.tables, self.state)
 
     def _schedule(self, method):
         limits = limits_for(self.tables, self.state, self.contacts, method)

@@ -8,8 +8,9 @@ import numpy as np
 
 from taichi_dem.effects.base import ROLES, Effect
 from taichi_dem.kit.display import counted, in_brief
+from taichi_dem.kit.fixed_order import length, product, transposed
 from taichi_dem.materials import Material
-from taichi_dem.mesh.contact_spheres import ContactSpheres, spheres_of_faces
+from taichi_dem.mesh.contact_spheres import ContactSpheres
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.mesh.topology import body_properties, topology_of
@@ -30,7 +31,7 @@ class Model:
         self.body_count, self.bond_count = mesh.body_count, self.topology.bond_count
         self.body_mass, self.centre, self.body_inertia = body_properties(mesh, material.density)
         corners = mesh.points[mesh.tetrahedra] - self.centre[:, None]
-        self.body_radius = np.linalg.norm(corners, axis=-1).max(axis=1)
+        self.body_radius = length(corners).max(axis=1)
         self.by_role = {role: [e for e in effects if e.role == role] for role in ROLES}
         self.contact: Any = next(iter(self.by_role["contact"]), None)
         self.has_contact = self.contact is not None
@@ -57,7 +58,7 @@ class Model:
     @cached_property
     def spheres(self) -> ContactSpheres:
         """``ContactSpheres`` of every face; with contact only."""
-        return spheres_of_faces(self.mesh, self.centre, self.contact.divisions)
+        return self.contact.spheres(self)
 
     @cached_property
     def bonds(self) -> dict[str, np.ndarray]:
@@ -71,9 +72,9 @@ class Model:
         slots = np.stack([4 * top.master + top.master_face, 4 * top.slave + top.slave_face], axis=1)
         corners = points[top.vertices]
         area = area_vectors(points, top.vertices)
-        size = np.linalg.norm(area, axis=1)
+        size = length(area)
         xi = corners[:, 1] - corners[:, 0]
-        xi /= np.linalg.norm(xi, axis=1, keepdims=True)
+        xi /= length(xi)[:, None]
         normal = area / size[:, None]
         frame = np.stack([normal, xi, np.cross(normal, xi)], axis=1)
         from_master = corners - self.centre[top.master][:, None]
@@ -81,7 +82,7 @@ class Model:
             "slots": slots.astype(np.int32),
             "frame": frame,
             "area": size / 3.0,
-            "on_master": np.einsum("bij,bqj->bqi", frame, from_master),
+            "on_master": product(from_master, transposed(frame)),
             "on_slave": corners - self.centre[top.slave][:, None],
         }
 

@@ -12,8 +12,18 @@ from taichi_dem.engine.tables import Tables
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.kit.types import real, vec3, vec4
 from taichi_dem.mesh.topology import Topology
+from taichi_dem.physics.fracture import coulomb_limit
 from taichi_dem.physics.rotation import rotation_matrix, spin_of
 from taichi_dem.timeline import NEVER
+
+
+def unserved_limits(model: Model) -> tuple[float, float, float]:
+    """Tensile strength, cohesion [Pa] and friction that no effect of a model serves, else inf."""
+    served = {effect.role for effect in model.effects if effect.name}
+    material = model.material
+    strength = np.inf if "tension" in served else material.tensile_strength
+    cohesion = np.inf if "shear" in served else material.cohesion
+    return strength, cohesion, 0.0 if "shear" in served else material.friction
 
 
 @ti.data_oriented
@@ -36,6 +46,10 @@ class State:
     load_work: work [J], one component a load and a last one for supports; load_impulse: total
     impulse of all of them on a body (linear, and angular about the origin). tick: present time.
     bad_body: lowest body out of bounds, body_count if none.
+    active_effects: bits of each body: of the loads and then the supports that changed its motion,
+    CONTACT and RUBBED. limits: tensile strength, cohesion [Pa] and friction coefficient whose
+    excess in a bond is noted, without bound where an effect serves them; passed: ticks at which a
+    bond first exceeded its tensile and its shear limit, NEVER before.
     """
 
     def __init__(self, tables: Tables):
@@ -58,6 +72,9 @@ class State:
             self.exposed_tick = ti.field(ti.i64, shape=tables.capacity.faces)
             self.contact_heat = ti.Vector.field(3, real, shape=n)
             self.injected_tick = ti.field(ti.i64, shape=())
+        self.active_effects = ti.field(ti.i64, shape=n)
+        self.limits = ti.Vector.field(3, real, shape=())
+        self.passed = ti.Vector.field(2, ti.i64, shape=bonds)
         self.load_work = ti.Vector.field(len(tables.loads) + 1, real, shape=n)
         self.load_impulse = ti.Vector.field(6, real, shape=n)
         self.tick = ti.field(ti.i64, shape=())
@@ -72,6 +89,8 @@ class State:
         assign(self.max_speed2, max_speed**2)
         assign(self.broken_tick, np.full(model.bond_count, NEVER))
         assign(self.bad_body, n)
+        assign(self.passed, np.full((model.bond_count, 2), NEVER))
+        assign(self.limits, np.array(unserved_limits(model)))
         self.set_motion(model.centre)
 
     def set_motion(
@@ -92,6 +111,31 @@ class State:
         shapes = [(self.body_count, len(still)) for still in rest]
         shaped = [np.broadcast_to(part, shape) for part, shape in zip(rows, shapes)]
         self._write_motion(*(np.ascontiguousarray(part, dtype=np.float64) for part in shaped))
+
+    @ti.func
+    def note_active(self, i, bits):
+        """Note that effects, given as bits, have changed the motion of body i."""
+        # Seldom news: a comparison spares the atomic operation, which parallel pairs need.
+        if self.active_effects[i] & bits != bits:
+            ti.atomic_or(self.active_effects[i], bits)
+
+    @ti.func
+    def note_passed(self, b, pull, shear2):
+        """Note that a bond exceeds a limit that no listed effect serves.
+
+        pull: traction of one of its units [Pa]; shear2: square of that across [Pa^2].
+        """
+        limits = self.limits[None]
+        if pull > limits[0]:
+            self._note_first(b, 0)
+        bound = coulomb_limit(limits[1], limits[2], -pull)
+        if shear2 > bound * bound:
+            self._note_first(b, 1)
+
+    @ti.func
+    def _note_first(self, b, limit: ti.template()):
+        if self.passed[b][limit] < 0:
+            self.passed[b][limit] = self.tick[None]
 
     @ti.func
     def body_motion(self, i, time, step):

@@ -10,6 +10,7 @@ from taichi_dem.effects.base import ABSENT, ROLES, SINGLE, Effect, bound
 from taichi_dem.engine.capacity import Capacity
 from taichi_dem.engine.model import Model
 from taichi_dem.kit.allocation import assign
+from taichi_dem.kit.fixed_order import inverse
 from taichi_dem.kit.types import real
 
 
@@ -99,7 +100,7 @@ class Tables:
         assign(self.mass_inverse, 1.0 / model.body_mass)
         assign(self.radius, model.body_radius)
         assign(self.inertia, model.body_inertia)
-        assign(self.inertia_inverse, np.linalg.inv(model.body_inertia))
+        assign(self.inertia_inverse, inverse(model.body_inertia))
         self._load_bonds(model)
         if self.has_contact:
             self._load_spheres(model.spheres)

@@ -11,11 +11,12 @@ from taichi.lang.matrix import MatrixField
 from taichi_dem.kit.allocation import array_of, assign, values
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.engine_pool import Loan
+from taichi_dem.kit.uncopied import Uncopied
 
 _OWN = ("taichi_dem", "ca_damper")
 
 
-class PartView:
+class PartView(Uncopied):
     """A part of an engine on behalf of a simulation, which may share the engine with others.
 
     Attributes and methods are those of the part; before each access the simulation's data are
@@ -58,7 +59,7 @@ class PartView:
         return self._part().name
 
 
-class FieldView:
+class FieldView(Uncopied):
     """A field of an engine on behalf of a simulation: only the entries of its scene.
 
     As a NumPy array by ``to_numpy()``; single entries by index, as those of a field.

@@ -20,7 +20,9 @@ from taichi.lang.matrix import MatrixField
 from taichi.lang.snode import SNode
 from taichi.lang.util import to_numpy_type
 
+from taichi_dem.kit.declarations import Declarations
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.uncopied import Uncopied
 
 #: Trees beyond which no new one is begun; a few more complete those begun.
 MOST_TREES = 480
@@ -28,7 +30,11 @@ MOST_TREES = 480
 _SHARE = 0.9
 
 
-class FieldTree:
+class CapacityError(InputError):
+    """The machine's memory, or Taichi's room for field trees, is used up."""
+
+
+class FieldTree(Uncopied):
     """Fields declared in its ``with`` block; memory is taken at the end of the block, all at once.
 
     advice: what to do where the machine lacks the memory, as the end of a sentence. bytes: size of
@@ -44,19 +50,41 @@ class FieldTree:
 
     def __enter__(self) -> "FieldTree":
         check_capacity()
-        self._before, self._builder = impl._root_fb, FieldsBuilder()
-        impl._root_fb = self._builder
-        self._anchor = ti.field(ti.i64, shape=1)
+        self._before = Declarations()
+        try:
+            self._builder = FieldsBuilder()
+            impl._root_fb = self._builder
+            self._anchor = ti.field(ti.i64, shape=1)
+        except BaseException:
+            self._before.restore_trees()
+            self._before.restore_fields()
+            raise
         return self
 
-    def __exit__(self, kind, *_):
-        impl._root_fb = self._before
-        # Taichi would refuse every later kernel while it knows of a builder that is not finalized.
-        impl.get_runtime().finalize_fields_builder(self._builder)
-        if kind is not None:
+    def __exit__(self, kind, error, _):
+        used = self._builder.finalized
+        self._before.restore_trees()
+        if kind is None and not used:
+            try:
+                self._allocate()
+            except BaseException:
+                self._before.restore_fields(self._builder)
+                raise
             return
+        self._before.restore_fields()
+        if used and not isinstance(error, InputError):
+            raise InputError(
+                "fields must not be read or written before all are declared: fill them in load"
+            ) from error
+
+    def _allocate(self):
+        """Take the memory of the declared fields."""
+        for field in impl.get_runtime().global_vars:
+            if field.ptr.snode() is None:
+                raise InputError("a field must be declared with a shape, got one without")
         self.bytes = _declared_bytes(self._builder.root.ptr)
         check_memory(self.bytes, self.advice)
+        # Taichi takes it off its list of trees that are not finalized, and expects it there.
         impl.get_runtime().initialize_fields_builder(self._builder)
         self._tree = self._builder.finalize(raise_warning=False)
         if impl.current_cfg().arch != ti.cuda:
@@ -182,7 +210,7 @@ def check_memory(needed: float, advice: str) -> None:
     """Raise InputError, which ends with an advice, where the memory needed [bytes] is not free."""
     free = available_bytes()
     if needed > _SHARE * free:
-        raise InputError(
+        raise CapacityError(
             f"this needs {needed / 1e9:.3g} GB of memory, of which {free / 1e9:.3g} GB are free: "
             f"{advice}"
         )
@@ -241,23 +269,26 @@ def check_capacity() -> None:
     """Raise InputError when the session has no room for more fields."""
     trees = tree_count()
     if trees > MOST_TREES:
-        raise InputError(
+        raise CapacityError(
             f"groups of fields in a Taichi session must stay below {MOST_TREES}, got {trees}: "
             "call runtime.clear() after some hundred kinds of scenes"
         )
 
 
 def tree_count() -> int:
-    """Field trees of the session."""
-    program = impl.get_runtime().prog
-    return program.get_snode_tree_size() if program is not None else 0
+    """Field trees of the session whose memory has not been freed."""
+    return len(_live_roots()) if impl.get_runtime().prog is not None else 0
 
 
 def field_bytes() -> int:
     """Bytes of all fields that the session has used so far."""
+    return sum(root._cell_size_bytes for root in _live_roots())
+
+
+def _live_roots() -> list:
     _forget_other_sessions()
     roots = FieldsBuilder._finalized_roots()
-    return sum(root._cell_size_bytes for root in roots if root.ptr.id not in _destroyed)
+    return [root for root in roots if root.ptr.id not in _destroyed]
 
 
 @ti.func

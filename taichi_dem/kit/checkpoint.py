@@ -22,11 +22,11 @@ from numpy.typing import ArrayLike
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import renamed_when_done
 from taichi_dem.kit.sealed_file import read_sealed, write_sealed
-from taichi_dem.kit.validation import FileName, path_name, positive, shown, whole
+from taichi_dem.kit.validation import FileName, path_name, plain_fields, positive, shown, whole
 from taichi_dem.kit.version import __version__, taichi_version
 
 #: Of the file; another one cannot be read.
-FORMAT = 3
+FORMAT = 4
 _ABOUT = "about"
 _MOST_STEPS = 2**53
 _MOST_MARKS = 1_000_000
@@ -47,6 +47,7 @@ class Checkpoint:
     every_wall_s: Optional[float] = None
 
     def __post_init__(self):
+        plain_fields(self)
         object.__setattr__(self, "path", path_name("path", self.path))
         if self.every_steps is not None:
             whole("every_steps", self.every_steps, 1, _MOST_STEPS)

@@ -1,6 +1,8 @@
 """Activity of effects in a run, and advice on those to leave out; plain data, no physics."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from math import inf
 from typing import Optional
 
 from taichi_dem.kit.display import in_brief
@@ -65,11 +67,14 @@ class Advice:
 
     uses: an EffectUse for each effect. missing: findings about effects that were left out, with how
     often and where. tolerance: share of the energy below which an effect counts as negligible.
+    shown: difference that a run without an effect made, by name, as a share of what was recorded;
+    then only effects of which it is within the tolerance are droppable. None where counts decide.
     """
 
     uses: tuple[EffectUse, ...]
     missing: tuple
     tolerance: float
+    shown: Optional[Mapping[str, float]] = None
 
     @property
     def inactive(self) -> tuple[str, ...]:
@@ -84,7 +89,21 @@ class Advice:
     @property
     def droppable(self) -> tuple[str, ...]:
         """Names of the effects that the scene could do without."""
-        return self.inactive + self.negligible
+        names = self.inactive + self.negligible
+        if self.shown is None:
+            return names
+        return tuple(name for name in names if self.shown.get(name, inf) <= self.tolerance)
+
+    def _shown(self, use):
+        """What a run without an effect has shown, in words."""
+        if self.shown is None or not (use.idle or use.negligible(self.tolerance)):
+            return ""
+        if use.effect not in self.shown:
+            return "; no run without it was made"
+        if self.shown[use.effect] == 0.0:
+            same = "the same but for rounding" if use.rounding else "the same"
+            return f"; a run without it is {same}"
+        return f"; a run without it differs by {100.0 * self.shown[use.effect]:.2g} %"
 
     def verdict(self, name: str, kind: str) -> tuple[str, str]:
         """What an effect did, and "keep it", "drop it", "list it" or "not missed", in words.
@@ -96,7 +115,7 @@ class Advice:
                 return str(use), "drop it" if name in self.droppable else "keep it"
         for finding in self.missing:
             if finding.effect == kind:
-                return f"{finding.what}: up to {finding.most} at a time", "list it"
+                return f"{finding.what}: {finding.count}", "list it"
         return "left out", "not missed"
 
     def __repr__(self):
@@ -113,6 +132,6 @@ class Advice:
         return "\n".join([*lines, *(f"missed     {finding}" for finding in self.missing)])
 
     def _line(self, use):
-        verdict = "drop" if use.idle or use.negligible(self.tolerance) else "keep"
-        reason = f"; {use.kept}" if use.kept else ""
+        verdict = "drop" if use.effect in self.droppable else "keep"
+        reason = f"; {use.kept}" if use.kept else self._shown(use)
         return f"{verdict:10s} {use.effect:16s} {use}{reason}"

@@ -8,6 +8,7 @@ Each kind of engine has an ``EnginePool``. A simulation borrows an engine from i
 calls ``loan.activate()`` before it touches a field.
 """
 
+import gc
 import weakref
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from typing import Any, Optional
@@ -17,11 +18,12 @@ import taichi as ti
 from taichi.lang import impl
 
 from taichi_dem.kit import runtime
-from taichi_dem.kit.allocation import FieldTree
+from taichi_dem.kit.allocation import CapacityError, FieldTree
 from taichi_dem.kit.field_memory import FieldMemory
+from taichi_dem.kit.uncopied import Uncopied
 
 
-class Engine:
+class Engine(Uncopied):
     """Base of engines: fields in one ``FieldTree``, and the present owner of their data.
 
     capacity: tuple of whole numbers, the most that fits. Derived classes declare all of their
@@ -35,6 +37,7 @@ class Engine:
         self.structure, self.capacity = structure, tuple(capacity)
         self._holder: Optional[weakref.ref[Loan]] = None
         self._used = False
+        self.loans: weakref.WeakSet[Loan] = weakref.WeakSet()
         self.tree = FieldTree(self.advice)
         with self.tree:
             self.declare()
@@ -108,7 +111,7 @@ def _memory_of(engine):
     return (_FieldByField if impl.current_cfg().arch == ti.cuda else _WholeTree)(engine)
 
 
-class Loan:
+class Loan(Uncopied):
     """The right to an engine: data of one owner, on the device or kept aside.
 
     engine: the engine borrowed. scene: what runs in it. what: the owner in words, such as
@@ -119,6 +122,7 @@ class Loan:
         self.pool, self.engine, self.scene, self.what = pool, engine, scene, what
         self.session = runtime.session()
         self._aside: Any = None
+        engine.loans.add(self)
 
     def activate(self) -> None:
         """Bring the owner's data to the device; those of another owner are kept aside.
@@ -132,20 +136,27 @@ class Loan:
             return
         if not self.engine.accepts(self.scene):
             # The kernels are compiled with numbers of another owner.
+            self.engine.loans.discard(self)
             self.engine = self.pool.another(self.engine, self.scene)
+            self.engine.loans.add(self)
             self.activate()
             return
-        memory = _memory_of(self.engine)
+        self._take_over(holder)
+
+    def _take_over(self, holder):
+        """Exchange the data; an interrupt leaves an engine that belongs to nobody, and no loss."""
+        engine, memory = self.engine, _memory_of(self.engine)
         if holder is not None:
             holder._aside = memory.read()
+        engine._holder = None
         if self._aside is not None:
             memory.write(self._aside)
-            self._aside = None
-        self.engine._holder = weakref.ref(self)
-        self.engine.enter(self.scene)
+        engine.enter(self.scene)
+        engine._holder = weakref.ref(self)
+        self._aside = None
 
 
-class LoanMemory:
+class LoanMemory(Uncopied):
     """All fields of a loan that change in a run, by name, as ``FieldMemory`` reads and writes."""
 
     def __init__(self, loan: Loan):
@@ -168,7 +179,23 @@ class LoanMemory:
         self._memory().write(arrays)
 
 
-class EnginePool:
+#: All pools of the process.
+_pools: list["EnginePool"] = []
+
+
+def _made(kind, structure, capacity):
+    """A new engine; idle ones of all pools make way where memory or room for fields lacks."""
+    try:
+        return kind(structure, capacity)
+    except CapacityError:
+        # Simulations that refer to themselves, as by an exception's traceback, are freed only here.
+        gc.collect()
+        if not sum(pool.free_idle() for pool in _pools):
+            raise
+        return kind(structure, capacity)
+
+
+class EnginePool(Uncopied):
     """Engines of one kind, by structure.
 
     kind: class derived from ``Engine``. least: smallest capacity of an engine; sizes are rounded up
@@ -180,6 +207,7 @@ class EnginePool:
         self._session: Optional[runtime.Session] = None
         self._engines: dict[Hashable, list[Engine]] = {}
         runtime.when_cleared(self._forget)
+        _pools.append(self)
 
     def borrow(self, structure: Hashable, size: Sequence[int], scene: Any, what: str) -> Loan:
         """A ``Loan`` of an engine of a structure in which a scene of some size fits.
@@ -188,13 +216,12 @@ class EnginePool:
         numbers as ``least`` has. Its owner loads the scene after ``activate``.
         """
         runtime.check_thread(what)
-        if self._session is not runtime.session():
-            self._engines, self._session = {}, runtime.session()
+        self._forget_other_session()
         engines = self._engines.setdefault(structure, [])
         fitting = [engine for engine in engines if engine.fits(size) and engine.accepts(scene)]
         if not fitting:
             capacity = [power_of_two(wanted, low) for wanted, low in zip(size, self.least)]
-            fitting = [self.kind(structure, capacity)]
+            fitting = [_made(self.kind, structure, capacity)]
             engines += fitting
         return Loan(self, min(fitting, key=lambda engine: engine.tree.bytes), scene, what)
 
@@ -204,7 +231,7 @@ class EnginePool:
         for other in engines:
             if other.capacity == engine.capacity and other.accepts(scene):
                 return other
-        engines.append(self.kind(engine.structure, engine.capacity))
+        engines.append(_made(self.kind, engine.structure, engine.capacity))
         return engines[-1]
 
     @property
@@ -212,11 +239,27 @@ class EnginePool:
         """Engines of the present session."""
         return sum(map(len, self._engines.values()))
 
+    def free_idle(self) -> int:
+        """Free the engines that nobody has borrowed; returns their number."""
+        self._forget_other_session()
+        idle = [engine for engines in self._engines.values() for engine in engines]
+        idle = [engine for engine in idle if not engine.loans]
+        for engine in idle:
+            self._engines[engine.structure].remove(engine)
+            engine.tree.destroy()
+        return len(idle)
+
     def _forget(self):
+        self._forget_other_session()
         for engines in self._engines.values():
             for engine in engines:
                 engine.tree.destroy()
         self._engines = {}
+
+    def _forget_other_session(self):
+        """Drop engines of a session that has ended, whose memory is gone already."""
+        if self._session is not runtime.session():
+            self._engines, self._session = {}, runtime.session()
 
 
 def power_of_two(wanted: int, least: int = 1) -> int:

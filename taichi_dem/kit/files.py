@@ -23,6 +23,9 @@ except ImportError:  # not on Windows: there folders are not claimed
 _HOST = re.sub(r"[^A-Za-z0-9]", "", platform.node())[:32] or "here"
 _TEMPORARY = re.compile(rf"\..*\.{_HOST}-(\d+)\.part(\.[^.]*)?")
 
+#: Endings of what experiments write.
+_WRITTEN = (".csv", ".gif", ".html", ".json", ".msh", ".npz", ".png", ".pvd", ".txt", ".vtu")
+
 _claims: Optional[dict[str, int]] = None
 
 
@@ -150,6 +153,20 @@ def remove_files(folder: FileName, pattern: str) -> None:
             except OSError as error:
                 reason = error.strerror or error
                 raise InputError(f"cannot remove {path} of an earlier run: {reason}") from None
+
+
+def older_files(folder: FileName, since: float) -> list[str]:
+    """Names of files in a folder of a kind that programs write, unchanged since a time, sorted.
+
+    since: as of ``time.time``; clocks of file systems may lag behind by two seconds.
+    """
+    found = []
+    with contextlib.suppress(OSError), os.scandir(os.fspath(folder)) as entries:
+        for entry in entries:
+            ours = entry.name.lower().endswith(_WRITTEN) and not entry.name.startswith(".")
+            if ours and entry.is_file() and entry.stat().st_mtime < since - 2.0:
+                found.append(entry.name)
+    return sorted(found)
 
 
 def write_whole(path: FileName, write: Callable[[str], object]) -> None:

@@ -1,36 +1,31 @@
 """The only place that starts Taichi: architecture, threads, and the settings that keep bits equal.
 
 Imported before any other module of the package, because some environment variables must stand
-before the first ``import taichi``: HOME (Taichi aborts without it), and the switches that keep it
-from asking the network for a newer version and from talking.
+before the first ``import taichi`` (``environment``).
 """
 
 import atexit
 import contextlib
 import io
 import os
-import tempfile
 import threading
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Optional
 
-os.environ.setdefault("TI_SKIP_VERSION_CHECK", "ON")
-os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
-# TI_ARCH would silently overrule the architecture that the caller requests.
-os.environ.pop("TI_ARCH", None)
-if not os.environ.get("HOME"):
-    os.environ["HOME"] = tempfile.mkdtemp(prefix="taichi-home-")
+# First, out of order: it prepares the environment for ``import taichi``.
+from taichi_dem.kit.environment import (  # isort: skip
+    interrupts_deferred,
+    kernel_cache,
+    settings_hidden,
+)
 
-# In Jupyter Taichi would say when it is imported that it found a graphical shell.
-os.environ.setdefault("TI_LOG_LEVEL", "error")
 import taichi as ti
 from taichi.lang import impl
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.kernel_source_cache import remember
+from taichi_dem.kit.uncopied import Uncopied
 from taichi_dem.kit.validation import choice, flag, whole
 
 ARCHITECTURES = ("cpu", "cuda")
@@ -48,23 +43,21 @@ class Settings:
     debug: bool
 
 
-# Taichi holds the lock of its kernel cache for well under a second.
-_STALE_LOCK_S = 10.0
-
 _current: Optional[Settings] = None
 _session: Optional["Session"] = None
 _on_clear: list[Callable[[], object]] = []
 
 
-class Session:
+class Session(Uncopied):
     """One start of Taichi; objects that own fields remember theirs.
 
-    program: Taichi's own object of it. thread: the one that started it, the only one that may use
-    it. cleared: whether its engines have been given back since.
+    program: Taichi's own object of it. thread, process: those that started it, the only ones that
+    may use it. cleared: whether its engines have been given back since.
     """
 
     def __init__(self):
         self.program, self.thread = impl.get_runtime().prog, threading.get_ident()
+        self.process = os.getpid()
         self.cleared = False
 
 
@@ -74,10 +67,12 @@ def start(arch: str = "cpu", threads: Optional[int] = None, debug: bool = False)
     arch: "cpu" or "cuda". threads: number of CPU threads, all cores by default. debug: check
     array bounds inside kernels (about three times slower).
     Returns the settings in force. Raises InputError for an unknown or absent architecture, a
-    thread count below one, or a second start with other settings in the same process.
+    thread count below one, a second start with other settings in the same process, or one in a
+    fork of the process that runs Taichi.
     """
     global _current, _session
     wanted = _checked(arch, threads, debug)
+    _check_process()
     if _current and _session and impl.get_runtime().prog is _session.program:
         if wanted != _current:
             raise InputError(
@@ -90,8 +85,15 @@ def start(arch: str = "cpu", threads: Optional[int] = None, debug: bool = False)
 
 
 def stop() -> None:
-    """End the Taichi session; every model, state and result field made in it becomes invalid."""
+    """End the Taichi session; every simulation and batch made in it becomes invalid.
+
+    Raises InputError on another thread while the one that started Taichi is alive.
+    """
     global _current, _session
+    _check_process()
+    others = {thread.ident for thread in threading.enumerate()} - {threading.get_ident()}
+    if _session is not None and _session.thread in others:
+        check_thread("session")
     ti.reset()
     _current = _session = None
 
@@ -123,7 +125,17 @@ def session() -> Session:
     """
     if _session is None:
         raise InputError("Taichi is not started: call runtime.start() first")
+    _check_process()
     return _session
+
+
+def _check_process():
+    """Raise InputError in a fork of the process that started Taichi."""
+    if _session is not None and _session.process != os.getpid():
+        raise InputError(
+            "Taichi was started before this process was forked, and would hang in it: begin "
+            'processes by multiprocessing.get_context("spawn"), or start Taichi in them only'
+        )
 
 
 def check_session(made_in: Session, what: str) -> None:
@@ -133,6 +145,7 @@ def check_session(made_in: Session, what: str) -> None:
     """
     if made_in.cleared:
         raise InputError(f"the memory of this {what} has been given back by runtime.clear()")
+    _check_process()
     if made_in is not _session:
         raise InputError(f"this {what} belongs to a Taichi session that has been stopped")
     if impl.get_runtime().prog is not made_in.program:
@@ -147,8 +160,8 @@ def check_thread(what: str) -> None:
     """Raise InputError on another thread than the one that started Taichi."""
     if threading.get_ident() != session().thread:
         raise InputError(
-            f"a {what} must be made and used on the thread that called runtime.start(): Taichi "
-            "would crash on another"
+            f"a {what} must be made, used and ended on the thread that called runtime.start(): "
+            "Taichi would crash on another"
         )
 
 
@@ -164,7 +177,7 @@ def _end_session():
     Later it is lost wherever something still refers to a class with kernels, as the caches of
     ``typing`` do for the classes of an annotation.
     """
-    if _session and _session.thread == threading.get_ident():
+    if _session and _session.thread == threading.get_ident() and _session.process == os.getpid():
         if impl.get_runtime().prog is _session.program:
             ti.reset()
 
@@ -182,11 +195,9 @@ def _initialise(wanted):
     # Taichi falls back to the CPU with a mere warning: check first, and read back its choice.
     if wanted.arch == "cuda" and not cuda_present():
         raise InputError("arch 'cuda' was asked for, but no CUDA device answers here: use 'cpu'")
-    _remove_stale_lock()
+    keeps, folder = kernel_cache(impl.default_cfg().offline_cache_file_path)
     remember()
-    # ti.init would warn that its argument overrules this switch, which only its import needed.
-    os.environ.pop("TI_LOG_LEVEL", None)
-    with contextlib.redirect_stdout(io.StringIO()):
+    with settings_hidden(), _quietly(), interrupts_deferred(), _failures_in_words():
         ti.init(
             arch=ti.cuda if wanted.arch == "cuda" else ti.cpu,
             default_fp=ti.f64,
@@ -199,6 +210,8 @@ def _initialise(wanted):
             debug=wanted.debug,
             # Below errors Taichi only reports a cache that another process is writing.
             log_level=ti.ERROR,
+            offline_cache=keeps,
+            offline_cache_file_path=folder,
             random_seed=0,
         )
     got = impl.current_cfg().arch
@@ -207,17 +220,18 @@ def _initialise(wanted):
         raise InputError(f"arch {wanted.arch!r} was asked for, Taichi started {got}")
 
 
-def _remove_stale_lock():
-    """Remove the lock that a killed process left on Taichi's kernel cache.
+def _quietly():
+    return contextlib.redirect_stdout(io.StringIO())
 
-    With it, every later process would compile all its kernels anew and say so on stderr.
-    """
-    default = impl.default_cfg().offline_cache_file_path
-    folder = os.environ.get("TI_OFFLINE_CACHE_FILE_PATH", default)
-    lock = Path(folder, "ticache.lock")
-    with contextlib.suppress(OSError):
-        if time.time() - lock.stat().st_mtime > _STALE_LOCK_S:
-            lock.unlink()
+
+@contextlib.contextmanager
+def _failures_in_words():
+    """Name the reason where Taichi does not start, such as too little memory."""
+    try:
+        yield
+    except (RuntimeError, MemoryError) as error:
+        reason = " ".join(str(error).split()) or "out of memory"
+        raise InputError(f"Taichi could not start: {reason}") from None
 
 
 def cuda_present() -> bool:

@@ -1,5 +1,6 @@
 """Checks of user input: the value is returned, or InputError names it and the allowed range."""
 
+import dataclasses
 import math
 import numbers
 import os
@@ -31,6 +32,26 @@ def shown(value: Any) -> str:
         # Python prints no whole number of more than 4300 digits.
         text = f"a whole number of {value.bit_length()} bits"
     return text if len(text) <= _QUOTED else f"{text[: _QUOTED - 3]}..."
+
+
+def plain(value: Any) -> Any:
+    """A number of any type as a Python int or float of the same value, tuples of them likewise.
+
+    NumPy would calculate with np.float32 in 24 bits. Anything else is returned as it is.
+    """
+    if isinstance(value, tuple):
+        return tuple(map(plain, value))
+    if isinstance(value, (bool, int, float)) and type(value) in (bool, int, float):
+        return value
+    if isinstance(value, numbers.Integral):
+        return int(value)
+    return float(value) if finite(value) else value
+
+
+def plain_fields(owner: Any) -> None:
+    """Keep the numbers of a dataclass, also of a frozen one, as ``plain`` returns them."""
+    for field in dataclasses.fields(owner):
+        object.__setattr__(owner, field.name, plain(getattr(owner, field.name)))
 
 
 def finite(value: Any) -> bool:
@@ -163,7 +184,7 @@ def direction(name: str, value: Any) -> tuple[float, ...]:
         three = tuple(value)
     except TypeError:
         three = ()
-    if len(three) != 3 or not all(finite(x) and abs(x) <= LARGEST for x in three):
+    if len(three) != 3 or not all(finite(x) and abs(float(x)) <= LARGEST for x in three):
         raise InputError(
             f"{name} must be three finite numbers, none above {LARGEST:g}, got {shown(value)}"
         )

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichi_dem.kit.display import by_fields
+from taichi_dem.kit.fixed_order import dot, length, product, transposed
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.tetrahedra import all_faces, area_vectors
 
@@ -57,17 +58,17 @@ def spheres_of_faces(mesh: Mesh, centre: np.ndarray, divisions: int = 5) -> Cont
     faces = all_faces(mesh.tetrahedra).reshape(-1, 4, 3)
     corners = mesh.points[faces] - centre[:, None, None, :]
     inward = -area_vectors(mesh.points, faces.reshape(-1, 3)).reshape(-1, 4, 3)
-    inward /= np.linalg.norm(inward, axis=-1, keepdims=True)
-    touch = np.einsum("ka,nfax->nfkx", interior_crossings(divisions), corners)
-    height = np.einsum("nfkx,ngx->nfkg", touch, inward)
-    height -= np.einsum("ngx,ngx->ng", corners[:, :, 0], inward)[:, None, None, :]
-    slope = 1.0 - np.einsum("nfx,ngx->nfg", inward, inward)
+    inward /= length(inward)[..., None]
+    touch = product(interior_crossings(divisions), corners)
+    height = product(touch, transposed(inward)[:, None])
+    height -= dot(corners[:, :, 0], inward)[:, None, None, :]
+    slope = 1.0 - product(inward, transposed(inward))
     with np.errstate(divide="ignore", invalid="ignore"):
         allowed = height / slope[:, :, None, :]
     allowed[:, np.arange(4), :, np.arange(4)] = np.inf
     radius = allowed.min(axis=-1)
     middle = touch + radius[..., None] * inward[:, :, None, :]
-    extent = (np.linalg.norm(middle, axis=-1) + radius).max(axis=(1, 2))
+    extent = (length(middle) + radius).max(axis=(1, 2))
     return ContactSpheres(middle, radius, _clusters(middle, radius), extent)
 
 
@@ -82,7 +83,7 @@ def _clusters(middle, radius):
         away, reach = _reach(middle, radius, centre)
         far = reach.argmax(axis=2)[..., None]
         towards = np.take_along_axis(away, far[..., None], axis=2)[:, :, 0]
-        towards /= np.maximum(np.linalg.norm(towards, axis=-1, keepdims=True), _SMALL)
+        towards /= np.maximum(length(towards)[..., None], _SMALL)
         centre = centre + towards * reach.max(axis=2)[..., None] / (k + 2)
     reach = _reach(middle, radius, centre)[1].max(axis=2)
     return np.concatenate([centre, reach[..., None]], axis=-1)
@@ -90,4 +91,4 @@ def _clusters(middle, radius):
 
 def _reach(middle, radius, centre):
     away = middle - centre[:, :, None]
-    return away, np.linalg.norm(away, axis=-1) + radius
+    return away, length(away) + radius

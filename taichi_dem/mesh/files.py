@@ -32,6 +32,7 @@ from taichi_dem.mesh.content import (
     surfaces_of_abaqus,
     unread_groups,
 )
+from taichi_dem.mesh.gmsh_check import refuse_bad_gmsh
 from taichi_dem.mesh.mesh import Mesh, checked_mesh, welded_numbers
 from taichi_dem.mesh.parts_in_files import unbonded_places
 from taichi_dem.mesh.split import folded_or_flat, shape_of, tetrahedra_in, triangles_in
@@ -42,11 +43,19 @@ _PATIENCE_S = 20.0
 _SLOWEST_BYTES_PER_S = 1e5
 
 
-def read_mesh(path: FileName, *, scale: float = 1.0, weld_tolerance: float = 0.0) -> Mesh:
+def read_mesh(
+    path: FileName,
+    *,
+    scale: float = 1.0,
+    weld_tolerance: float = 0.0,
+    keep_coincident: bool = False,
+) -> Mesh:
     """Read solid cells and named face groups from a file (Gmsh 2.2 or 4.1, VTK, VTU, ...).
 
     scale: length of one unit of the file [m], e.g. 0.001 for a drawing in mm.
     weld_tolerance: points not farther apart [m] become one; 0 welds nothing.
+    keep_coincident: accept distinct points at one place, and leave the faces on them unbonded, as
+    at a joint or a crack (see ``checked_mesh``).
     Groups come from Gmsh's physical surfaces ("physical_TAG" where they have no name); in other
     formats from integer data on triangles, as "data name_value".
     Elements of higher order are read as linear ones; hexahedra, prisms and pyramids are cut into
@@ -65,7 +74,7 @@ def read_mesh(path: FileName, *, scale: float = 1.0, weld_tolerance: float = 0.0
         refuse_without_tetrahedra(raw, path, printed)
     unread = (*unread_groups(raw), *surfaces_of_abaqus(path))
     try:
-        mesh = _mesh(raw, scale, weld_tolerance)
+        mesh = _mesh(raw, scale, weld_tolerance, keep_coincident)
     except InputError as error:
         cells = _cell_at_fault(raw) if "tetrahedra " in str(error) else ""
         raise InputError(f"mesh file {path}: {error}{cells}") from None
@@ -135,6 +144,7 @@ def _read_raw(path):
         problem = "is no file" if os.path.lexists(path) else "does not exist"
         problem = "is a folder" if os.path.isdir(path) else problem
         raise InputError(f"mesh file {path} {problem}")
+    _refuse_if_gmsh(path)
     said = io.StringIO()
     seconds = _PATIENCE_S + os.path.getsize(path) / _SLOWEST_BYTES_PER_S
     sentence = f"its reader found no end in {seconds:.3g} s, as in a file that was cut off"
@@ -146,12 +156,22 @@ def _read_raw(path):
         raise InputError(f"mesh file {path} cannot be read: {reason}") from None
 
 
+def _refuse_if_gmsh(path):
+    """Check a Gmsh file before it is read."""
+    if path.lower().endswith(".msh"):
+        try:
+            refuse_bad_gmsh(path)
+        except OSError as error:
+            reason = error.strerror or error
+            raise InputError(f"mesh file {path} cannot be read: {reason}") from None
+
+
 def _meshio_read(path):
     with np.errstate(over="ignore"):  # an STL's text, tried as if it were binary
         return meshio.read(path)
 
 
-def _mesh(raw, scale, weld_tolerance):
+def _mesh(raw, scale, weld_tolerance, keep_coincident):
     """The mesh of a file's cells, cut once their points are welded; raw gets the welded numbers."""
     notes: list[str] = []
     welding: list[str] = []
@@ -163,7 +183,8 @@ def _mesh(raw, scale, weld_tolerance):
         _renumber(raw, label)
         notes.clear()
         tetrahedra = _tetrahedra(raw, notes)
-    mesh = checked_mesh(points, tetrahedra, _groups(raw))
+    kept = {"keep_coincident": keep_coincident}
+    mesh = checked_mesh(points, tetrahedra, _groups(raw), **kept)
     return replace(mesh, notes=(*notes, *welding, *mesh.notes))
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import renamed_when_done
-from taichi_dem.kit.validation import FileName, finite, path_name, positive, shown
+from taichi_dem.kit.validation import FileName, finite, path_name, plain_fields, positive, shown
 
 #: Options that could make two runs of the same Gmsh differ, or change the elements.
 _OPTIONS = {
@@ -48,6 +48,7 @@ class _Block:
     distance_far: float
 
     def __post_init__(self):
+        plain_fields(self)
         sizes = ("size_hole", "size_far", "distance_far")
         for name in ("width", "height", "depth", "hole_diameter", *sizes):
             object.__setattr__(self, name, positive(name, getattr(self, name)))

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import FileName, shown, word
+from taichi_dem.kit.validation import FileName, flag, shown, word
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.parts_in_files import parts_of
 from taichi_dem.mesh.weld import COINCIDENT, weld_labels
@@ -41,6 +41,8 @@ class Mesh:
     notes: sentences about what the checks mended or found remarkable.
     source: name of the file, "" for a mesh built in memory.
     unread: groups of the file that are not of faces, pairs of name and what they are of.
+    keep_coincident: points that coincide stay apart, and so do the faces on them: no bond joins
+    them, as at a joint or a crack (see ``checked_mesh``).
     Raises InputError for arrays that ``checked_mesh`` would refuse or mend.
     """
 
@@ -50,10 +52,13 @@ class Mesh:
     notes: tuple[str, ...] = ()
     source: str = ""
     unread: tuple[tuple[str, str], ...] = ()
+    keep_coincident: bool = False
 
     def __post_init__(self) -> None:
         notes: list[str] = []
-        self._hold(*_checked(self.points, self.tetrahedra, self.groups, 0.0, notes))
+        flag("keep_coincident", self.keep_coincident)
+        given = self.points, self.tetrahedra, self.groups, 0.0
+        self._hold(*_checked(*given, self.keep_coincident, notes))
         mended = [note for note in notes if note.split()[0] in _MENDING]
         if mended:
             raise InputError(f"a Mesh takes what checked_mesh gives, which here {mended[0]}")
@@ -117,26 +122,32 @@ def checked_mesh(
     groups: Mapping[str, ArrayLike],
     source: FileName = "",
     weld_tolerance: float = 0.0,
+    keep_coincident: bool = False,
 ) -> Mesh:
     """Build a Mesh from arrays; repair and report small defects, refuse others.
 
     points: (n, 3) [m].  tetrahedra: (m, 4) point indices, either orientation. groups: name -> (k,
     3) point indices of outer faces, either orientation. weld_tolerance: points not farther apart
-    [m] become one; 0 welds nothing.
+    [m] become one; 0 welds nothing. keep_coincident: accept distinct points at one place; faces on
+    them are free surfaces, as of two blocks that touch, a joint or a crack, and meet by the contact
+    of outer faces. Without it such points are refused, as bodies that seem joined there would not
+    be bonded.
 
     Repaired: negative volumes, points without a tetrahedron, faces twice in a group.
     Raises InputError, with the numbers (counted from 0) of the defects.
     """
     notes: list[str] = []
-    parts = _checked(points, tetrahedra, groups, weld_tolerance, notes)
+    flag("keep_coincident", keep_coincident)
+    parts = _checked(points, tetrahedra, groups, weld_tolerance, keep_coincident, notes)
     _note_parts(parts[1], notes)
     made = object.__new__(Mesh)
     made.__dict__.update(notes=tuple(notes), source=str(source), unread=())
+    made.__dict__.update(keep_coincident=keep_coincident)
     made._hold(*parts)
     return made
 
 
-def _checked(points, tetrahedra, groups, weld_tolerance, notes):
+def _checked(points, tetrahedra, groups, weld_tolerance, keep_coincident, notes):
     """Points, tetrahedra and groups as ``checked_mesh`` wants them; notes: of what was mended."""
     places = _checked_points(points)
     corners = _checked_indices("tetrahedra", tetrahedra, 4, len(places))
@@ -145,9 +156,12 @@ def _checked(points, tetrahedra, groups, weld_tolerance, notes):
     corners, faces = label[corners], {name: label[faces[name]] for name in faces}
     places, corners, faces = _without_loose_points(places, corners, faces, notes)
     _refuse_extent(places)
-    _refuse_coincident(places)
+    if not keep_coincident:
+        _refuse_coincident(places)
     corners = _positive(places, corners, notes)
     _refuse_bad_sharing(corners)
+    if keep_coincident:
+        _check_coincident(places, corners, weld_tolerance, notes)
     return places, corners, _outer_groups(corners, faces, notes)
 
 
@@ -238,15 +252,38 @@ def _refuse_extent(points):
 
 def _refuse_coincident(points):
     """Refuse coincident points: bodies that seem joined there would not be bonded."""
-    distance = COINCIDENT * np.ptp(points, axis=0).max()
-    pairs = geometry.close_pairs(points, distance) if distance > 0.0 else np.empty((0, 2))
+    pairs, distance = _coincident(points)
     if len(pairs):
         first = points[pairs[0, 0]]
         raise InputError(
             f"{len(np.unique(pairs[:, 1]))} points coincide with another, the first at "
             f"({first[0]:g}, {first[1]:g}, {first[2]:g}) m; pass "
-            f"weld_tolerance={2.0 * distance:.1e} to join them"
+            f"weld_tolerance={2.0 * distance:.1e} to join them, or keep_coincident=True to keep "
+            "the faces on them apart"
         )
+
+
+def _coincident(points):
+    """Pairs of points at one place, (n, 2), and the distance that counts as none [m]."""
+    distance = COINCIDENT * np.ptp(points, axis=0).max()
+    none = np.empty((0, 2), dtype=np.int64)
+    return geometry.close_pairs(points, distance) if distance > 0.0 else none, distance
+
+
+def _check_coincident(points, tetrahedra, weld_tolerance, notes):
+    """Say how many points are kept apart; refuse a wish to weld, and bodies in one place.
+
+    Joined where they coincide, the bodies must make a mesh that has no bodies in each other.
+    """
+    if weld_tolerance:
+        raise InputError(
+            f"weld_tolerance must be 0 with keep_coincident=True, got {shown(weld_tolerance)}"
+        )
+    pairs, _ = _coincident(points)
+    if len(pairs):
+        _refuse_bad_sharing(geometry.components(len(points), pairs)[tetrahedra])
+        count = len(np.unique(pairs))
+        notes.append(f"kept {count} points apart that coincide with another: no bond joins them")
 
 
 def _positive(points, tetrahedra, notes):

@@ -87,11 +87,12 @@ def bar(length: float, width: float, cells: Sequence[int]) -> Mesh:
     return checked_mesh(points, tetrahedra, _sides(grid.reshape(-1, 3), boxes, tetrahedra))
 
 
-def placed_together(parts: dict) -> Mesh:
-    """Several solids that do not touch as one mesh; bodies in the order of the parts.
+def placed_together(parts: dict, keep_coincident: bool = False) -> Mesh:
+    """Several solids as one mesh, not bonded to each other; bodies in the order of the parts.
 
     parts: name -> (mesh, shift (3,) [m]). Groups: those of every part as NAME_GROUP, and, under
-    its own name, a group of all parts together. Raises InputError as ``checked_mesh``.
+    its own name, a group of all parts together. keep_coincident: solids may touch point by point
+    (see ``checked_mesh``). Raises InputError as ``checked_mesh``.
     """
     points, tetrahedra, groups, first = [], [], {}, 0
     for name, (mesh, shift) in parts.items():
@@ -102,7 +103,8 @@ def placed_together(parts: dict) -> Mesh:
             groups.setdefault(group, []).append(faces + first)
         first += mesh.point_count
     joined = {key: np.vstack(faces) for key, faces in groups.items()}
-    return checked_mesh(np.vstack(points), np.vstack(tetrahedra), joined)
+    arrays = np.vstack(points), np.vstack(tetrahedra), joined
+    return checked_mesh(*arrays, keep_coincident=keep_coincident)
 
 
 def mirrored_copies(mesh: Mesh, copies: int) -> Mesh:
@@ -118,7 +120,9 @@ def mirrored_copies(mesh: Mesh, copies: int) -> Mesh:
     points[1::2, :, 2] = depth - points[1::2, :, 2]
     points[:, :, 2] += depth * np.arange(copies)[:, None]
     # Mirrored points differ from their originals in the last bit.
-    points, place = np.unique(np.round(points.reshape(-1, 3), 12), axis=0, return_inverse=True)
+    unit = 2.0 ** np.ceil(np.log2(np.ptp(mesh.points, axis=0).max()))
+    rounded = unit * np.round(points.reshape(-1, 3) / unit, 12)
+    points, place = np.unique(rounded, axis=0, return_inverse=True)
     place = place.reshape(copies, -1)
     groups = {name: place[:, faces].reshape(-1, 3) for name, faces in mesh.groups.items()}
     groups["back"] = place[0][mesh.groups["back"]]
@@ -130,10 +134,9 @@ def _base(edge, height):
     """Equilateral triangle in x = 0 about the origin, normal +x, and the apex height [m]."""
     edge = positive("edge", edge)
     height = positive("height", edge * np.sqrt(2.0 / 3.0) if height is None else height)
-    angle = 2.0 * np.pi / 3.0 * np.arange(3)
-    radius = edge / np.sqrt(3.0)
-    triangle = np.column_stack([np.zeros(3), radius * np.cos(angle), radius * np.sin(angle)])
-    return triangle, height
+    radius, half = edge / np.sqrt(3.0), 0.5 * edge
+    triangle = [[0.0, radius, 0.0], [0.0, -0.5 * radius, half], [0.0, -0.5 * radius, -half]]
+    return np.array(triangle), height
 
 
 def _checked_cells(length, width, cells):

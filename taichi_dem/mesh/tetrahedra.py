@@ -6,7 +6,11 @@ Local face f of a tetrahedron is the face opposite its local vertex f.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
+
+from taichi_dem.kit.fixed_order import dot, length
 
 #: Local vertices of the four faces, in the order whose right-hand normal points outward
 #: for a tetrahedron of positive volume.
@@ -15,18 +19,21 @@ LOCAL_FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]], dtype=np.in
 #: Local vertices of the six edges.
 LOCAL_EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]], dtype=np.int32)
 
+#: Powers of the inverse of the root of x^4 = x + 1: their multiples fill the unit cube evenly.
+_SPREAD = np.multiply.accumulate(np.full(3, 1.0 / 1.2207440846057596))
+
 
 def signed_volumes(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
     """Signed volumes det(p1 - p0, p2 - p0, p3 - p0) / 6 [m3], shape (body_count,)."""
     corners = points[tetrahedra]
     a, b, c = (corners[:, k] - corners[:, 0] for k in (1, 2, 3))
-    return np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0
+    return dot(a, np.cross(b, c)) / 6.0
 
 
 def edge_lengths(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
     """Lengths of the six edges [m], shape (body_count, 6)."""
     ends = points[tetrahedra[:, LOCAL_EDGES]]
-    return np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=-1)
+    return length(ends[:, :, 1] - ends[:, :, 0])
 
 
 def area_vectors(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
@@ -103,6 +110,34 @@ def _pairs_in_cells(points, cell_index, distance):
         if len(same) == 0:
             break
         pair = np.sort(np.column_stack([order[same], order[same + step]]), axis=1)
-        gap = np.linalg.norm(points[pair[:, 0]] - points[pair[:, 1]], axis=1)
+        gap = length(points[pair[:, 0]] - points[pair[:, 1]])
         found.append(pair[gap <= distance])
     return np.vstack(found)
+
+
+def points_of_parts(halvings: int) -> np.ndarray:
+    """A point in each of the equal parts of a tetrahedron, as shares of its corners, (parts, 4).
+
+    Their middles would lie in layers along every face, and a body that is pressed in by less than
+    a layer would hold none: Roberts's sequence spreads the points over their parts.
+    """
+    parts = [np.eye(4)]
+    for _ in range(halvings):
+        parts = [piece for whole in parts for piece in eighths(whole)]
+    cuts = np.sort(np.arange(1, len(parts) + 1)[:, None] * _SPREAD % 1.0, axis=1)
+    shares = np.diff(cuts, axis=1, prepend=0.0, append=1.0)
+    return (shares[:, :, None] * np.array(parts)).sum(axis=1)
+
+
+def eighths(corners: np.ndarray) -> Iterator[np.ndarray]:
+    """Eight parts of equal volume: one at each corner and four around an inner diagonal."""
+    middle = {(a, b): 0.5 * (corners[a] + corners[b]) for a in range(4) for b in range(a)}
+
+    def between(a, b):
+        return middle[max(a, b), min(a, b)]
+
+    for a in range(4):
+        yield np.array([corners[a] if b == a else between(a, b) for b in range(4)])
+    ring = [between(0, 2), between(0, 3), between(1, 3), between(1, 2)]
+    for k in range(4):
+        yield np.array([between(0, 1), between(2, 3), ring[k], ring[(k + 1) % 4]])

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichi_dem.kit.display import by_fields
+from taichi_dem.kit.fixed_order import product, transposed
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.mesh import Mesh
 
@@ -103,6 +104,6 @@ def body_properties(mesh: Mesh, density: float) -> tuple[np.ndarray, np.ndarray,
     centre = corners.mean(axis=1)
     mass = density * geometry.signed_volumes(mesh.points, mesh.tetrahedra)
     arms = corners - centre[:, None]
-    second = mass[:, None, None] / 20.0 * np.einsum("nki,nkj->nij", arms, arms)
+    second = mass[:, None, None] / 20.0 * product(transposed(arms), arms)
     trace = np.trace(second, axis1=1, axis2=2)
     return mass, centre, trace[:, None, None] * np.eye(3) - second

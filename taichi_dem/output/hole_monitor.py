@@ -3,6 +3,7 @@
 import numpy as np
 
 from taichi_dem.engine.model import Model
+from taichi_dem.kit.fixed_order import dot, length, weakest_direction
 from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.mesh.topology import face_vertices, faces_of_group
 
@@ -22,20 +23,21 @@ class HoleMonitor:
         corners = face_vertices(mesh, body, face)
         area = area_vectors(mesh.points, corners)
         middle = mesh.points[corners].mean(axis=1)
-        weight = np.linalg.norm(area, axis=1)
+        weight = length(area)
+        normal = area / weight[:, None]
         # No wall face has a normal along the axis: it is the weakest direction among the normals.
-        self.axis = np.linalg.eigh(area.T @ (area / weight[:, None]))[1][:, 0]
-        self.axis_point = weight @ middle / weight.sum()
+        self.axis = weakest_direction((area[:, :, None] * normal[:, None, :]).sum(axis=0))
+        self.axis_point = (weight[:, None] * middle).sum(axis=0) / weight.sum()
         self.bodies = np.unique(body)
         self.first = model.centre[self.bodies]
         away = self._in_plane(self.first - self.axis_point)
         # A body in the middle of what is loaded, where that is no hole, has no way outward.
-        length = np.linalg.norm(away, axis=1, keepdims=True)
-        self.outward = np.divide(away, length, out=np.zeros_like(away), where=length > 0.0)
+        way = length(away)[:, None]
+        self.outward = np.divide(away, way, out=np.zeros_like(away), where=way > 0.0)
         self.monitored_body = self._nearest_to_free_face(model, body, face)
 
     def _in_plane(self, vectors):
-        return vectors - np.outer(vectors @ self.axis, self.axis)
+        return vectors - dot(vectors, self.axis)[:, None] * self.axis
 
     def _nearest_to_free_face(self, model, hole_body, hole_face):
         mesh, topology = model.mesh, model.topology
@@ -45,22 +47,22 @@ class HoleMonitor:
         free = np.array(others, dtype=np.int32).reshape(-1, 2)
         corners = face_vertices(mesh, free[:, 0], free[:, 1])
         normal = area_vectors(mesh.points, corners)
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-        distance = np.einsum("ij,ij->i", mesh.points[corners[:, 0]] - self.axis_point, normal)
-        distance[np.abs(normal @ self.axis) > 0.5] = np.inf
-        depth = np.abs((self.first - self.axis_point) @ self.axis)
+        normal /= length(normal)[:, None]
+        distance = dot(mesh.points[corners[:, 0]] - self.axis_point, normal)
+        distance[np.abs(dot(normal, self.axis)) > 0.5] = np.inf
+        depth = np.abs(dot(self.first - self.axis_point, self.axis))
         if not np.isfinite(distance).any():
             return int(self.bodies[depth.argmin()])
         toward = normal[distance.argmin()]
-        score = (self.first - self.axis_point) @ toward - depth
+        score = dot(self.first - self.axis_point, toward) - depth
         return int(self.bodies[score.argmax()])
 
     def radial_displacement(self, position: np.ndarray) -> float:
         """Mean displacement of the hole's bodies away from its axis [m]; position (n, 3)."""
         moved = position[self.bodies] - self.first
-        return float(np.einsum("ij,ij->i", moved, self.outward).mean())
+        return float(dot(moved, self.outward).mean())
 
     def monitored_displacement(self, position: np.ndarray) -> float:
         """Displacement of the monitored body [m]."""
         row = int(np.flatnonzero(self.bodies == self.monitored_body)[0])
-        return float(np.linalg.norm(position[self.monitored_body] - self.first[row]))
+        return float(length(position[self.monitored_body] - self.first[row]))

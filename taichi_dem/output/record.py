@@ -91,7 +91,7 @@ class Recorder:
     def sample(self) -> None:
         """Add a row to the time series."""
         sim: Any = self.simulation
-        motion = self.state.motion()
+        motion = sim.motion()
         account = sim.energy_balance.account()
         account["gas_work"] = sim.gas_work()
         row = {"time_s": sim.time_s}
@@ -115,7 +115,7 @@ class Recorder:
 
     def frame(self) -> Frame:
         """The block as it is now, a Frame."""
-        motion = self.state.motion()
+        motion = self.simulation.motion()
         damage = np.zeros(max(1, self.model.bond_count))
         self.simulation.readings.damage(damage)
         return Frame(

@@ -41,3 +41,17 @@ def slip_beyond(stiffness, limit, sliding):
     if stiffness * reach > limit:
         slip = sliding * ((reach - limit / stiffness) / reach)
     return slip
+
+
+@ti.func
+def weakening_slip(stiffness, slope, cohesion, rubbing, reach):
+    """Length of the slip [m] that brings an elastic sliding onto a limit that falls with the slip.
+
+    stiffness [Pa/m]; slope: loss of cohesion with slip, less than the stiffness [Pa/m]. cohesion:
+    now, negative by slope times the slip since it was zero [Pa]. rubbing: friction times pressure
+    [Pa]. reach: length of the elastic sliding, beyond the limit [m].
+    The limit is the largest of three lines over the slip (with cohesion, rubbing alone, zero) and
+    the traction falls faster than each of them, so the first root of the three is the slip.
+    """
+    weakening = (stiffness * reach - cohesion - rubbing) / (stiffness - slope)
+    return ti.max(0.0, ti.min(weakening, reach - rubbing / stiffness, reach))

@@ -2,6 +2,7 @@
 
 import taichi as ti
 
+from taichi_dem.kit.elementary import sine_and_cosine
 from taichi_dem.kit.types import mat3, vec3, vec4
 
 # A chain of divisions would take as long as all else that turns a body.
@@ -47,8 +48,8 @@ def turned(q, spin, dt):
     cosine = 1.0 - 0.5 * angle2 * (1.0 - _12TH * angle2 * (1.0 - _30TH * angle2))
     if angle2 > 1e-3:
         angle = ti.sqrt(angle2)
-        sinc = ti.sin(angle) / angle
-        cosine = ti.cos(angle)
+        sine, cosine = sine_and_cosine(angle)
+        sinc = sine / angle
     turn = quaternion_product(vec4(cosine, sinc * half[0], sinc * half[1], sinc * half[2]), q)
     # One Newton step of 1/sqrt is exact here: the norm is 1 to round-off before and after.
     return turn * (1.5 - 0.5 * turn.dot(turn))

@@ -2,6 +2,10 @@
 
 import taichi as ti
 
+#: Bits of ``State.active_effects`` beside those of loads and supports: of sphere contact and of its
+#: friction.
+CONTACT, RUBBED = 1 << 61, 1 << 60
+
 
 @ti.func
 def normal_force(stiffness, damping, overlap, opening_rate):
@@ -55,6 +59,28 @@ def add_within(held, more, bound):
 
 
 @ti.dataclass
+class Nearest:
+    """Two bodies' surfaces where they are nearest, in the first body's frame.
+
+    first: centre of the first's sphere and its radius [m], or a point of its face and 0. apart:
+    from there to the second's centre or point [m]. reach: their distance when they touch [m].
+    can_meet: 0 where another face has the contact instead.
+    """
+
+    first: ti.types.vector(4, ti.f64)
+    apart: ti.types.vector(3, ti.f64)
+    reach: ti.f64
+    can_meet: ti.i32
+
+
+@ti.func
+def is_within(surfaces, margin):
+    """Whether the surfaces of a ``Nearest`` are nearer than a margin [m]."""
+    wide = surfaces.reach + margin
+    return surfaces.can_meet == 1 and surfaces.apart.norm_sqr() < wide * wide
+
+
+@ti.dataclass
 class Meeting:
     """Where two spheres meet: overlap [m], negative while they are apart.
 
@@ -69,13 +95,23 @@ class Meeting:
 
 @ti.func
 def meeting(first, reach, apart, rotation):
-    """Meeting of two spheres.
+    """Meeting of two spheres, or of a sphere and a face; all but rotation as in ``Nearest``.
 
-    first: centre of the first in its body's frame and radius [m]. reach: sum of both radii [m].
-    apart: from the first to the second centre, in the first body's frame [m]. rotation: of that.
+    rotation: of the first body.
     """
     distance = ti.max(apart.norm(), 1e-30)
     overlap = reach - distance
     normal = rotation @ apart / distance
     arm = rotation @ first.xyz + (first[3] - 0.5 * overlap) * normal
     return Meeting(overlap=overlap, normal=normal, arm=arm)
+
+
+@ti.func
+def active_bits(push, rub):
+    """CONTACT for a repulsion that is not zero, with RUBBED for such friction; both of one unit."""
+    active = ti.i64(0)
+    if push > 0.0:
+        active = ti.i64(CONTACT)
+        if rub.norm_sqr() > 0.0:
+            active = ti.i64(CONTACT | RUBBED)
+    return active

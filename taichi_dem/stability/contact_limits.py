@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.types import mat3, real
 from taichi_dem.physics.rotation import unit3
+from taichi_dem.physics.sphere_pair import is_within
 from taichi_dem.physics.wrench import cross_matrix
 from taichi_dem.stability.mesh_limits import inverse_root
 from taichi_dem.timeline import MAX_LEVEL
@@ -47,7 +48,10 @@ def largest_eigenvalue(a, b, c):
         for _ in range(SQUARINGS):
             across = b.transpose()
             a, b, c = a @ a + across @ b, b @ a + c @ b, b @ across + c @ c
-        bound = scale * ti.pow(a.trace() + c.trace(), 0.5**SQUARINGS)
+        root = a.trace() + c.trace()
+        for _ in range(SQUARINGS):
+            root = ti.sqrt(root)
+        bound = scale * root
     return bound
 
 
@@ -118,17 +122,21 @@ class ContactLimits:
         turn = back @ self.state.rotation[j]
         offset = back @ (self.state.position[j] - self.state.position[i])
         for k in range(self.store.first[p], self.store.last[p]):
-            spheres = self.store.sphere[k]
-            mine, other = self.tables.sphere[spheres[0]], self.tables.sphere[spheres[1]]
-            if side == 1:
-                mine, other = other, mine
-            apart = turn @ other.xyz + offset - mine.xyz
-            reach = mine[3] + other[3] + margin
-            if apart.norm_sqr() < reach * reach:
-                normal = apart / ti.max(apart.norm(), 1e-30)
-                da, db, dc = self._contact(i, mine.xyz + mine[3] * normal, normal)
+            near = self._nearest(k, side, turn, offset)
+            if is_within(near, margin):
+                normal = near.apart / ti.max(near.apart.norm(), 1e-30)
+                da, db, dc = self._contact(i, near.first.xyz + near.first[3] * normal, normal)
                 a, b, c = a + da, b + db, c + dc
         return a, b, c
+
+    @ti.func
+    def _nearest(self, k, side, turn, offset):
+        """Entry k of the pair store as its first (0) or second (1) body sees it, a ``Nearest``."""
+        entry = self.store.sphere[k]
+        a, b = entry[0], entry[1]
+        if side == 1:
+            a, b = b, a
+        return self.contacts.law.nearest(a, b, turn, offset)
 
     @ti.func
     def _contact(self, i, arm, normal):

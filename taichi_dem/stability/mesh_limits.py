@@ -6,6 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from taichi_dem.kit.fixed_order import (
+    inverse_factor,
+    largest_eigenvalues,
+    length,
+    product,
+    transposed,
+)
 from taichi_dem.materials import Material
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.mesh import Mesh
@@ -57,7 +64,7 @@ def subset_rates(
         total = np.zeros((mesh.body_count, 6, 6))
         kept = (subset >> face) & 1 == 1
         np.add.at(total, body[kept], blocks[kept])
-        rates[:, column] = np.linalg.eigvalsh(root @ total @ root)[:, -1]
+        rates[:, column] = scaled_eigenvalues(root, total)
     return np.maximum(rates, 0.0)
 
 
@@ -65,7 +72,7 @@ def _face_blocks(mesh, body, face, centre, coefficients):
     """The block G of single faces, shape (n, 6, 6)."""
     vertices = face_vertices(mesh, body, face)
     vector = geometry.area_vectors(mesh.points, vertices)
-    area = np.linalg.norm(vector, axis=1)
+    area = length(vector)
     normal = vector / area[:, None]
     law = coefficients[1] * np.eye(3) + (coefficients[0] - coefficients[1]) * (
         normal[:, :, None] * normal[:, None, :]
@@ -83,7 +90,7 @@ def point_blocks(arms: np.ndarray, law: np.ndarray) -> np.ndarray:
     lever = np.zeros((*arms.shape[:2], 3, 6))
     lever[..., :3] = np.eye(3)
     lever[..., 3:] = -_cross_matrix(arms)  # w x r = -[r]x w
-    return np.einsum("nuai,nab,nubj->nij", lever, law, lever)
+    return product(transposed(lever), product(law[:, None], lever)).sum(axis=1)
 
 
 def _cross_matrix(vectors):
@@ -94,10 +101,17 @@ def _cross_matrix(vectors):
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
+def scaled_eigenvalues(root: np.ndarray, blocks: np.ndarray) -> np.ndarray:
+    """Largest eigenvalue of root G root^T for every 6x6 block G, shape (n,)."""
+    return largest_eigenvalues(product(root, product(blocks, transposed(root))))
+
+
 def inverse_root(mass: np.ndarray, inertia: np.ndarray) -> np.ndarray:
-    """M^-1/2 of M = diag(mass, mass, mass, inertia), shape (n, 6, 6)."""
-    moments, axes = np.linalg.eigh(inertia)
+    """W with W^T W = M^-1 of M = diag(mass, mass, mass, inertia), shape (n, 6, 6).
+
+    W G W^T has the eigenvalues of M^-1/2 G M^-1/2.
+    """
     root = np.zeros((len(mass), 6, 6))
     root[:, :3, :3] = np.eye(3) / np.sqrt(mass)[:, None, None]
-    root[:, 3:, 3:] = np.einsum("nia,na,nja->nij", axes, moments**-0.5, axes)
+    root[:, 3:, 3:] = inverse_factor(inertia)
     return root

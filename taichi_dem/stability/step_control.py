@@ -8,7 +8,7 @@ import taichi as ti
 
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.types import real
-from taichi_dem.kit.validation import between, choices, whole
+from taichi_dem.kit.validation import between, choices, plain_fields, whole
 from taichi_dem.timeline import MAX_LEVEL
 
 #: Criteria that may bound the step of a body; the state holds an index into this tuple for each.
@@ -61,6 +61,7 @@ class StepControl:
     dashpot_floor: float = 0.0
 
     def __post_init__(self):
+        plain_fields(self)
         for name in ("safety", "angle"):
             between(name, getattr(self, name), 1e-6, 1.0)
         between("ahead", self.ahead, 1.0, 100.0)

@@ -8,18 +8,20 @@ from numpy.typing import ArrayLike
 
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.fixed_order import length
 from taichi_dem.materials import Material
 from taichi_dem.mesh.contact_spheres import spheres_of_faces
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.tetrahedra import all_faces, area_vectors
 from taichi_dem.mesh.topology import body_properties, topology_of
-from taichi_dem.scene import Scene, outer_faces_warnings
+from taichi_dem.scene import Scene, scene_warnings
 from taichi_dem.stability.body_limits import LIMITED
 from taichi_dem.stability.mesh_limits import (
     bond_rates,
     dashpots_of,
     inverse_root,
     point_blocks,
+    scaled_eigenvalues,
     springs_of,
 )
 from taichi_dem.stability.stable_step import dashpot_step, spring_step
@@ -207,7 +209,7 @@ def step_report(scene: Union[Scene, Mesh], material: Optional[Material] = None) 
     if isinstance(scene, Scene) and material is None:
         damped, friction, contact = map(scene.effect, ("dashpot", "friction", "contact"))
         divisions = contact.divisions if contact is not None else None
-        warnings = outer_faces_warnings(scene)
+        warnings = scene_warnings(scene)
         return _report(scene.mesh, scene.material, damped, friction, divisions, warnings)
     if isinstance(scene, Mesh) and isinstance(material, Material):
         return _report(scene, material, True, True, 5)
@@ -248,7 +250,7 @@ def contact_eigenvalues(
     for face in range(4):
         outward = _outward(mesh, face)
         arms = spheres.centre[:, face] + spheres.radius[:, face, :, None] * outward[:, None]
-        along = np.einsum("ni,nj->nij", outward, outward)
+        along = outward[:, :, None] * outward[:, None, :]
         law = np.broadcast_to(np.eye(3), along.shape) if friction else along
         whole = np.maximum(whole, _largest(root, point_blocks(arms, law)))
         for k in range(spheres.per_face):
@@ -259,8 +261,8 @@ def contact_eigenvalues(
 def _outward(mesh, face):
     """Outward unit normals of local face of every body, (n, 3)."""
     vector = area_vectors(mesh.points, all_faces(mesh.tetrahedra).reshape(-1, 4, 3)[:, face])
-    return vector / np.linalg.norm(vector, axis=1, keepdims=True)
+    return vector / length(vector)[:, None]
 
 
 def _largest(root, blocks):
-    return np.linalg.eigvalsh(root @ blocks @ root)[:, -1]
+    return scaled_eigenvalues(root, blocks)

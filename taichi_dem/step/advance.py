@@ -27,7 +27,13 @@ if TYPE_CHECKING:
 
 @ti.data_oriented
 class Advance(ContactForce):
-    """The order in which physics and effects act; see the module."""
+    """The order in which physics and effects act; see the module.
+
+    staggered: whether velocities are half a step behind positions, as the leapfrog's are. An order
+    of one's own that keeps both at one time sets it to False.
+    """
+
+    staggered = True
 
     def __init__(
         self,
@@ -49,6 +55,7 @@ class Advance(ContactForce):
         self.limits, self.retimes = schedule.limits, schedule.retimes
         self.has_limits = schedule.has_limits
         self.limited = self.has_limits and schedule.limits.limited
+        self.shear_releases = tables.shear.releases
         self.has_heat = self.has_dashpot or bool(tables.shear.name)
 
     @ti.func
@@ -72,6 +79,7 @@ class Advance(ContactForce):
                 pull = self.tables.tension.traction(stiffness[0], u, opening[0])
                 sliding = vec2(opening[1], opening[2])
                 shear, spent = self.tables.shear.traction(stiffness[1], u, sliding, -pull)
+                self.state.note_passed(b, pull, shear.norm_sqr())
                 traction = vec3(pull, shear[0], shear[1])
                 if ti.static(self.has_dashpot):
                     velocity = unit_velocity(motion, arm)
@@ -84,6 +92,8 @@ class Advance(ContactForce):
                 torque += arm.cross(traction)
                 slipped += spent
                 failed |= self.tables.tension.failed(u)
+                if ti.static(self.shear_releases):
+                    failed |= self.tables.shear.failed(u, -pull)
             dt = self._bond_step(b, slots[0] >> 2, slots[1] >> 2)
             area = self.tables.unit_area[b]
             if failed == 0:
@@ -185,6 +195,20 @@ class Advance(ContactForce):
             motion = self._motion(b, self.tables.bond_slots[b])
             energy = self.tables.unit_area[b] * self._stored(b, motion)
         return energy
+
+    @ti.func
+    def bond_power(self, b):
+        """Power that the dashpots of an intact bond take now [W]."""
+        slots, power, scale = self.tables.bond_slots[b], 0.0, 1.0
+        motion = self._motion(b, slots)
+        if ti.static(self.limited):
+            scale = self.bond_share(b)
+        if ti.static(self.solves_bonds):
+            motion = self.solver.bonds.mean(b, motion)
+        for q in range(3):
+            velocity = unit_velocity(motion, unit_arm(motion, self.tables.vertex_slave[3 * b + q]))
+            power += scale * self.tables.dashpot.traction(velocity).dot(velocity)
+        return power * self.tables.unit_area[b]
 
     @ti.func
     def bond_opening(self, b):
@@ -302,6 +326,10 @@ class Advance(ContactForce):
         """
         return self.schedule.seconds(self.state.tick[None]) - elapsed
 
+    def _support_bit(self, effect):
+        """Bit of a support in ``State.active_effects``."""
+        return 1 << len(self.tables.loads) + self.tables.supports.index(effect)
+
     @ti.func
     def _book_loads(self, i, kick, velocity, momentum):
         """Book work and impulse of the loads on body i, at a mean velocity and angular momentum."""
@@ -309,6 +337,8 @@ class Advance(ContactForce):
             if self.tables.loads[e].acts_on(i):
                 push = vec3(kick[e, 0], kick[e, 1], kick[e, 2])
                 twist = vec3(kick[e, 3], kick[e, 4], kick[e, 5])
+                if push.norm_sqr() + twist.norm_sqr() > 0.0:
+                    self.state.note_active(i, ti.i64(1 << e))
                 work = push.dot(velocity) + twist.dot(self.spin(i, momentum))
                 self._book(i, e, work, push, twist)
 
@@ -329,10 +359,13 @@ class Advance(ContactForce):
         half = self.schedule.seconds(self.state.tick[None]) - 0.5 * elapsed
         for effect in ti.static(self.tables.supports):
             if effect.acts_on(i):
+                before, spun = velocity, momentum
                 velocity, momentum = effect.held(
                     i, half, self.state.rotation[i], velocity, momentum
                 )
                 held = 1
+                if (velocity - before).norm_sqr() + (momentum - spun).norm_sqr() > 0.0:
+                    self.state.note_active(i, ti.i64(ti.static(self._support_bit(effect))))
         mean = 0.5 * (self.state.velocity[i] + velocity)
         mean_momentum = 0.5 * (self.state.angular_momentum[i] + momentum)
         self._book_loads(i, kick, mean, mean_momentum)

@@ -2,10 +2,31 @@
 
 import taichi as ti
 
-from taichi_dem.kit.types import vec3
+from taichi_dem.kit.types import real, vec3
 from taichi_dem.physics.rotation import zero3
-from taichi_dem.physics.sphere_pair import add_within, meeting
+from taichi_dem.physics.sphere_pair import active_bits, add_within, is_within, meeting
 from taichi_dem.stability.body_limits import HIT
+
+
+@ti.dataclass
+class PairForces:
+    """Forces between two bodies in contact, in world axes.
+
+    force: on the second [N]. moment_i, moment_j: about the centre of each [N m]. dragged, rubbed:
+    power that dashpots and friction take [W]. slipped: energy of springs that slipped or parted
+    [J]. deepest: largest overlap over the sum of the radii. near_count: spheres within a margin.
+    active: CONTACT and RUBBED, where spheres push and rub.
+    """
+
+    force: vec3
+    moment_i: vec3
+    moment_j: vec3
+    dragged: real
+    rubbed: real
+    slipped: real
+    deepest: real
+    near_count: ti.i32
+    active: ti.i64
 
 
 @ti.data_oriented
@@ -17,37 +38,67 @@ class ContactForce:
         """Evaluate the sphere contacts of a pair of bodies: repulsion and friction."""
         pair = self.contacts.store.body[p]
         i, j = pair[0], pair[1]
+        elapsed, margin = 0.0, 0.0
+        if ti.static(self.springs.present):
+            elapsed = self.springs.elapsed(p)
+        if ti.static(self.has_limits):
+            margin = self.limits.contact_limits.margin(i, j)
+        found = self.forces_of(p, elapsed, margin, True)
+        if found.active != 0:
+            self.state.note_active(i, found.active)
+            self.state.note_active(j, found.active)
+        if found.deepest > 0.0:
+            dt = self._pair_step(p, i, j)
+            self.contacts.add_impulse(p, 0, -found.force * dt, found.moment_i * dt)
+            self.contacts.add_impulse(p, 1, found.force * dt, found.moment_j * dt)
+            heat = dt * vec3(found.dragged, found.rubbed, 0.0)
+            self.contacts.store.heat[p] = self.contacts.store.heat[p] + heat
+        if ti.static(self.springs.present):
+            self.contacts.book_friction(p, found.slipped)
+        self.contacts.store.deepest[p] = found.deepest
+        if ti.static(self.has_limits):
+            self.limits.notice_pair(p, found.near_count, HIT)
+
+    @ti.func
+    def forces_now(self, p):
+        """Forces of a pair's contacts at the present time, a ``PairForces``; nothing changes."""
+        return self.forces_of(p, 0.0, 0.0, False)
+
+    @ti.func
+    def forces_of(self, p, elapsed, margin, stepping: ti.template()):
+        """Forces of a pair's sphere contacts now, a ``PairForces``.
+
+        elapsed: since springs between spheres were followed [s]. margin: gap up to which spheres
+        count as near [m]. stepping: whether springs follow and slip; else they stay as they are.
+        """
+        pair = self.contacts.store.body[p]
+        i, j = pair[0], pair[1]
         branch = self.state.position[j] - self.state.position[i]
         # Most candidates do not touch: tested in the first body's frame, at half the cost.
         back = self.state.rotation[i].transpose()
         turn, offset = back @ self.state.rotation[j], back @ branch
         force, moment_i, moment_j = zero3(), zero3(), zero3()
         dragged, rubbed, slipped, deepest = 0.0, 0.0, 0.0, 0.0
-        scale, margin, near = 1.0, 0.0, 0
+        scale, near, active = 1.0, 0, ti.i64(0)
         if ti.static(self.limited):
             scale = self.contact_share(i, j)
-        if ti.static(self.has_limits):
-            margin = self.limits.contact_limits.margin(i, j)
-        elapsed = 0.0
-        if ti.static(self.springs.present):
-            elapsed = self.springs.elapsed(p)
         for k in range(self.contacts.store.first[p], self.contacts.store.last[p]):
             a, b = self.contacts.store.sphere[k][0], self.contacts.store.sphere[k][1]
-            first, second = self.tables.sphere[a], self.tables.sphere[b]
-            apart = turn @ second.xyz + offset - first.xyz
-            reach = first[3] + second[3]
+            near_by = self.contacts.law.nearest(a, b, turn, offset)
+            apart, reach = near_by.apart, near_by.reach
             if ti.static(self.has_limits):
-                near += ti.cast(apart.norm_sqr() < (reach + margin) * (reach + margin), ti.i32)
-            if apart.norm_sqr() < reach * reach:
-                met = meeting(first, reach, apart, self.state.rotation[i])
+                near += ti.cast(is_within(near_by, margin), ti.i32)
+            if is_within(near_by, 0.0):
+                met = meeting(near_by.first, reach, apart, self.state.rotation[i])
                 overlap, normal, arm = met.overlap, met.normal, met.arm
                 velocity = self._velocity_at(j, arm - branch) - self._velocity_at(i, arm)
                 rate = velocity.dot(normal)
                 slide = velocity - rate * normal
                 push = self.contacts.law.normal(overlap, self._limited(rate, scale))
                 drag = self._limited(self.contacts.law.damping(), scale)
-                rub, stuck, spent = self._rub(k, i, normal, push, drag, slide, elapsed)
+                rub, stuck, spent = self._rub(k, i, normal, push, drag, slide, elapsed, stepping)
                 pushed = push * normal + rub
+                active |= active_bits(push, rub)
                 force += pushed
                 moment_i -= arm.cross(pushed)
                 moment_j += (arm - branch).cross(pushed)
@@ -55,28 +106,29 @@ class ContactForce:
                 rubbed -= (rub - stuck).dot(slide)
                 slipped += spent
                 deepest = ti.max(deepest, overlap / reach)
-            else:
+            elif ti.static(stepping):
                 slipped += self.springs.part(k)
-        if deepest > 0.0:
-            dt = self._pair_step(p, i, j)
-            self.contacts.add_impulse(p, 0, -force * dt, moment_i * dt)
-            self.contacts.add_impulse(p, 1, force * dt, moment_j * dt)
-            heat = dt * vec3(dragged, rubbed, 0.0)
-            self.contacts.store.heat[p] = self.contacts.store.heat[p] + heat
-        if ti.static(self.springs.present):
-            self.contacts.book_friction(p, slipped)
-        self.contacts.store.deepest[p] = deepest
-        if ti.static(self.has_limits):
-            self.limits.notice_pair(p, near, HIT)
+        return PairForces(
+            force=force,
+            moment_i=moment_i,
+            moment_j=moment_j,
+            dragged=dragged,
+            rubbed=rubbed,
+            slipped=slipped,
+            deepest=deepest,
+            near_count=near,
+            active=active,
+        )
 
     @ti.func
-    def _rub(self, k, i, normal, push, drag, slide, elapsed):
+    def _rub(self, k, i, normal, push, drag, slide, elapsed, stepping: ti.template()):
         """Friction on the second sphere and the spring's part of it [N]; energy of slipping [J]."""
         rub, stuck, spent = zero3(), zero3(), 0.0
         if ti.static(self.springs.present):
             rotation, bound = self.state.rotation[i], self.tables.friction.limit(push)
-            self.springs.follow(k, rotation, normal, elapsed * slide)
-            spent = self.springs.slip(k, rotation, bound, elapsed * slide)
+            if ti.static(stepping):
+                self.springs.follow(k, rotation, normal, elapsed * slide)
+                spent = self.springs.slip(k, rotation, bound, elapsed * slide)
             stuck = self.springs.force(k, rotation)
             rub = add_within(stuck, -drag * slide, bound)
         else:

@@ -32,7 +32,8 @@ class Schedule:
 
     criterion: rule from ``step_control``. uniform: all bodies share the finest level wanted.
     drifted: neighbours of an active body are brought to its time too, else only active bodies move.
-    finest: finest level present. low: coarsest level active now. changed: bodies whose own level or
+    finest: finest level present. undivided: 1 once it was the last one, below which no step is
+    divided further. low: coarsest level active now. changed: bodies whose own level or
     bonds changed since the lists were ordered.
     limits: the ``StabilityLimits`` of the bodies, None where the rule needs none. retimes: whether
     bodies may be brought to the present between their own times; applied_until then holds the time
@@ -69,6 +70,7 @@ class Schedule:
         self.pairs = ActiveList(self.store.slots if self.has_contact else 1)
         self.low = ti.field(ti.i32, shape=())
         self.finest = ti.field(ti.i32, shape=())
+        self.undivided = ti.field(ti.i32, shape=())
         self.wanted = ti.field(ti.i32, shape=())
         self.changed = ti.field(ti.i32, shape=2 * capacity.bodies + 2 * capacity.bonds + 1)
         self.changed_count = ti.field(ti.i32, shape=())
@@ -264,6 +266,8 @@ class Schedule:
             while finest > 0 and self.bodies.end[finest] == 0:
                 finest -= 1
             self.finest[None] = finest
+        if self.finest[None] == MAX_LEVEL:
+            self.undivided[None] = 1
 
     @ti.func
     def _count(self):

@@ -100,7 +100,7 @@ def test_valid_scenes_run_and_stay_finite(name):
         mesh = bar(2.0 * size, size, (2, 1, 1))
         step = 0.2 * float(step_report(mesh, material).step_s.min())
         listed = [effects.BondDamping(), effects.Softening(), effects.ShearSlip()]
-        listed += [effects.SphereContact(skin=1e-2 * size), effects.Friction(), effects.Gravity()]
+        listed += [effects.SphereContact(skin=1e-2), effects.Friction(), effects.Gravity()]
         listed += [effects.Fixed("left"), effects.GasPressure("right", peak, 10.0 * step)]
         simulation = Simulation(Scene(mesh, material, listed), methods(step)[name])
         with ends_within(120.0):

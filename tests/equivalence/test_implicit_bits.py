@@ -64,12 +64,12 @@ def test_skin_changes_no_bit(block):
     contacts, found = block.simulation.contacts, []
     for skin in (SKIN, 6e-4, 4e-3):
         block.restart(STEP)
-        contacts.skin[None] = skin
+        contacts.skin.fill(skin)
         block.search_anew()
         before = block.simulation.searches
         block.run(3 * STEPS)
         found.append((fields_of(block.state), block.simulation.searches - before))
-    contacts.skin[None] = SKIN
+    contacts.skin.fill(SKIN)
     assert len({searches for _, searches in found}) == 3
     for fields, _ in found[1:]:
         assert differing(found[0][0], fields, MOTION) == []

@@ -43,9 +43,9 @@ def every_field():
 class Run:
     """A started simulation of the bar, with all that a checkpoint takes of it."""
 
-    def __init__(self, method):
+    def __init__(self, method, kind=effects.SphereContact):
         before = every_field()
-        self.simulation = Simulation(squeezed_scene(), method)
+        self.simulation = Simulation(squeezed_scene(kind), method)
         self.made = [field for key, field in every_field().items() if key not in before]
         self.recorder = Recorder(self.simulation, "left")
         self.simulation.start()
@@ -68,12 +68,13 @@ class Run:
         self.simulation.advance_to(self.last)
         self.simulation.sample()
         self.recorder.sample()
+        missing = self.simulation.missing_effects
         columns, frame = self.recorder.history(), self.recorder.frames[-1]
         told = {
             "account": self.simulation.energy_balance.account(),
             "momentum": self.simulation.energy_balance.momentum_errors(),
             "searches": self.simulation.searches,
-            "needs": self.simulation.missing_effects.findings(),
+            "needs": missing.findings(missing.volume),
             "frames": len(self.recorder.frames),
         }
         arrays = {**self.saved.memory.read(), **columns, "damage": frame.damage}
@@ -92,10 +93,13 @@ def differing(first, second):
         "controlled",
         pytest.param("uniform", marks=pytest.mark.slow),
         pytest.param("implicit", marks=pytest.mark.slow),
+        pytest.param("faces", marks=pytest.mark.slow),
     ],
 )
 def run(request):
-    """A run of each method at its start."""
+    """A run of each method at its start, and one with contact of faces."""
+    if request.param == "faces":
+        return Run(METHODS["controlled"], effects.FaceContact)
     return Run(METHODS[request.param])
 
 

@@ -39,7 +39,7 @@ def scattered(again, skin, spread):
     state.exposed_tick.from_numpy(exposed)
     # What has been broken from the start injects nothing.
     state.injected_tick[None] = 0
-    simulation.contacts.skin[None] = skin
+    simulation.contacts.skin.fill(skin)
     again.search_anew()
     return simulation
 
@@ -318,7 +318,7 @@ def test_a_fast_body_has_a_skin_for_some_steps(again):
 def test_too_little_capacity_is_said_in_words(option):
     """The lists have some room for small scenes whatever the options; the mesh has to exceed it."""
     capacities = {"neighbours_per_body": 1000, option: 1}
-    contact = effects.SphereContact(outer_faces=True, skin=0.05, **capacities)
+    contact = effects.SphereContact(outer_faces=True, skin=1.0, **capacities)
     scene = Scene(bar(0.6, 0.2, (12, 4, 4)), CONCRETE, [contact])
     simulation = Simulation(scene, Uniform(1e-9))
     with pytest.raises(ValueError, match=f"larger {option}"):

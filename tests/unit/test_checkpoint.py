@@ -55,7 +55,7 @@ def test_another_format_is_refused(path):
         arrays = dict(file)
     arrays["about"] = np.array(json.dumps({"format": 99, "identity": IDENTITY}))
     write_sealed(path, arrays)
-    with pytest.raises(InputError, match="must have format 3, got 99"):
+    with pytest.raises(InputError, match="must have format 4, got 99"):
         read_checkpoint(path, IDENTITY)
 
 

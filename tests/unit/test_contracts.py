@@ -15,6 +15,8 @@ from taichi_dem import (
     Simulation,
     Uniform,
     effects,
+    needed_effects,
+    simulate,
     step_report,
 )
 from taichi_dem.effects.base import ABSENT, Effect
@@ -90,13 +92,16 @@ class AirDrag(Effect):
 
 @pytest.mark.parametrize("method", [Uniform(1e-4), ImplicitDashpots(1e-4)], ids=lambda m: m.name)
 def test_air_drag_is_a_load_of_one_class(method):
-    """v_n = v_0 (1 - rate dt)^n to round-off, as the force is taken at the beginning of a step."""
+    """v_n = v_0 (1 + rate dt / 2) (1 - rate dt)^n to round-off, half a step before the positions.
+
+    The force is taken at the beginning of a step, and a run begins half a step back.
+    """
     rate, steps, speed = 30.0, 50, np.array([2.0, -1.0, 0.5])
     simulation = Simulation(Scene(single(), CONCRETE, [AirDrag(rate)]), method)
     simulation.state.set_motion(simulation.model.centre, [[1.0, 0.0, 0.0, 0.0]], [speed])
     simulation.advance_to(steps)
     velocity = simulation.state.motion()["velocity"][0]
-    expected = speed * (1.0 - rate * 1e-4) ** steps
+    expected = speed * (1.0 + 0.5 * rate * 1e-4) * (1.0 - rate * 1e-4) ** steps
     np.testing.assert_allclose(velocity, expected, rtol=4 * steps * np.finfo(float).eps)
     account = simulation.energy_balance.account()
     assert abs(account["residual"]) < 1e-12 * simulation.energy_balance.start_energy
@@ -105,6 +110,52 @@ def test_air_drag_is_a_load_of_one_class(method):
 def renamed(effect):
     """The same law under another name, a class of the user's own."""
     return type("Own", (type(effect),), {"name": "own"})(*vars(effect).get("arguments", ()))
+
+
+class LooseSoil(effects.BondDamping):
+    """A law with a name of its own."""
+
+    name = "loose_soil"
+
+
+class OwnSlip(effects.ShearSlip):
+    """A law with the name of the one that it is derived from."""
+
+
+@ti.data_oriented
+class SideWind(AirDrag):
+    """A load whose class says nothing of a name."""
+
+    name = ""
+
+
+def test_effects_by_any_name_or_none_stay_in_reports_and_advice():
+    listed = [LooseSoil(), OwnSlip(), SideWind(30.0)]
+    assert [effect.name for effect in listed] == ["loose_soil", "shear_slip", "side_wind"]
+    scene = Scene(pair(), CONCRETE, listed)
+    result = simulate(scene, method=Uniform(1e-8), until=1e-7, progress=None)
+    assert set(result.report.effects) == {"loose_soil", "shear_slip", "side_wind"}
+    uses = {use.effect: use for use in result.report.effect_activity}
+    assert set(uses) == set(result.report.effects)
+    # The advice knows too little of what a law of one's own does.
+    assert all(uses[name].kept for name in uses)
+    assert not any(name in str(needed_effects(result).droppable) for name in uses)
+
+
+def test_heat_of_a_dashpot_without_a_name_is_in_the_account():
+    """What a class says of its name changes no number."""
+
+    class NoName(effects.BondDamping):
+        name = ""
+
+    found = []
+    for kind in (effects.BondDamping, NoName):
+        simulation = Simulation(Scene(pair(), CONCRETE, [kind()]), Uniform(1e-7))
+        turn, speed = [[1.0, 0.0, 0.0, 0.0]], [[0.1, 0.0, 0.0], [-0.1, 0.0, 0.0]]
+        simulation.state.set_motion(simulation.model.centre, turn, speed)
+        simulation.advance_to(20)
+        found.append(simulation.energy_balance.account())
+    assert found[0] == found[1] and found[0]["bond_dashpot"] > 0.0
 
 
 def test_laws_by_other_names_lose_no_criterion_of_the_step_report():

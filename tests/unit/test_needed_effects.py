@@ -1,7 +1,6 @@
 """What a run says of its effects: which acted, which it could do without, which it missed."""
 
 import json
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +10,6 @@ from taichi_dem import (
     CONCRETE,
     InputError,
     Scene,
-    Simulation,
     Uniform,
     checked_mesh,
     effects,
@@ -23,7 +21,7 @@ from taichi_dem.diagnostics.energy_balance import TERMS
 from taichi_dem.engine.model import Model
 from taichi_dem.kit.effect_usage import Advice, EffectUse
 from taichi_dem.mesh.shapes import bar, pair
-from tests.unit.test_outer_faces import beside
+from taichi_dem.physics.sphere_pair import CONTACT, RUBBED
 
 #: Far below the strength of concrete: a block of some 1 kg that falls from rest for 1e-5 s.
 STEP, UNTIL = 1e-7, 1e-5
@@ -96,25 +94,28 @@ def test_dropping_inactive_effects_changes_no_bit(scene, request):
         np.testing.assert_array_equal(again.history[name], column, err_msg=name)
 
 
-def used(
-    listed, material=CONCRETE, exposed=True, heat=0.0, lacking=0, mesh=None, works=None, **account
-):
+def column(values):
+    """A field of these values, to be read."""
+    return SimpleNamespace(to_numpy=lambda: np.asarray(values))
+
+
+def used(listed, bits=0, marked=0, heat=0.0, mesh=None, works=None, **account):
     """What is said of effects whose account holds these terms [J]; every effect by its name.
 
-    exposed: whether faces carry spheres. heat: of each body's contacts, and in each bond [J].
-    lacking: recordings that saw bodies overlap where faces carry none.
+    bits: of ``State.active_effects``, of the first body. marked: bonds softened and slipped.
+    heat: in each bond [J]. works: of the supports, by body [J].
     """
-    simulation = Simulation(Scene(mesh or pair(), material, listed), Uniform())
-    model, state = simulation.model, simulation.state
-    if model.has_contact and exposed:
-        state.expose(model.topology)
-    bonds = model.bond_count
-    tables = np.zeros((model.body_count, 6)), np.full((bonds, 5), heat), np.zeros((0, 4))
-    tables[0][:, 3:5] = heat
-    none = SimpleNamespace(state=state, start_energy=0.0, support_works=lambda index: works)
+    model = Model(mesh or pair(), CONCRETE, listed)
+    active = np.zeros(model.body_count, dtype=np.int64)
+    active[0] = bits
+    state = SimpleNamespace(active_effects=column(active), position=column(model.centre))
+    tables = np.zeros((model.body_count, 6)), np.full((model.bond_count, 5), heat), None
+    balance = SimpleNamespace(state=state, start_energy=0.0)
+    balance.support_works = lambda index: works
+    balance.load_works = lambda index: np.zeros(model.body_count)
+    readings = SimpleNamespace(active_bonds=lambda marks: marks[: min(1, marked)].fill(1))
     filled = {**dict.fromkeys(TERMS, 0.0), **account}
-    watch = SimpleNamespace(touching=0, outer=SimpleNamespace(times=lacking))
-    return {use.effect: use for use in effect_activity(model, none, tables, filled, watch, 100)}
+    return {u.effect: u for u in effect_activity(model, balance, readings, tables, filled, 100)}
 
 
 class OwnContact(effects.SphereContact):
@@ -125,45 +126,31 @@ class OwnFriction(effects.Friction):
     """A law of a user's own."""
 
 
-LOSSLESS = replace(CONCRETE, contact_damping=0.0)
-
-
+@pytest.mark.parametrize("contact", [effects.SphereContact, OwnContact])
 @pytest.mark.parametrize(
-    ("contact", "material", "exposed", "idle"),
-    [
-        (effects.SphereContact, CONCRETE, True, True),
-        (effects.SphereContact, LOSSLESS, True, False),
-        (effects.SphereContact, LOSSLESS, False, True),
-        (OwnContact, CONCRETE, True, False),
-        (OwnContact, CONCRETE, False, True),
-    ],
+    "friction", [effects.Friction, effects.StickingFriction, OwnFriction], ids=lambda f: f.__name__
 )
-def test_contact_is_idle_only_where_a_touch_would_have_left_a_trace(
-    contact, material, exposed, idle
+@pytest.mark.parametrize(
+    ("bits", "touched", "rubbed"),
+    [(0, 0, 0), (CONTACT, 1, 0), (CONTACT | RUBBED, 1, 1)],
+)
+def test_contact_and_friction_are_idle_only_where_the_step_noted_neither(
+    contact, friction, bits, touched, rubbed
 ):
-    """Heat in dashpots is one; without dashpots, or by a law of one's own, only bare faces are."""
-    use = used([contact(), effects.Friction()], material, exposed)["sphere_contact"]
-    assert use.idle == idle
-    assert bool(use.kept) != idle
+    """Whether by the package's law or one's own, with heat or without: the step sees every push."""
+    found = used([contact(), friction()], bits)
+    assert [found[name].events for name in (contact.name, friction.name)] == [touched, rubbed]
+    assert [found[name].idle for name in (contact.name, friction.name)] == [
+        *(not touched, not rubbed)
+    ]
 
 
-@pytest.mark.parametrize("exposed", [True, False])
-def test_friction_of_ones_own_is_dropped_only_with_the_contact_it_acts_in(exposed):
-    found = used([effects.SphereContact(), OwnFriction()], exposed=exposed)
-    assert found["friction"].idle != exposed
-    assert found["sphere_contact"].idle
-
-
-@pytest.mark.parametrize("exposed", [True, False])
-def test_friction_that_sticks_is_kept_where_springs_may_hold(exposed):
-    """They take no energy, so that no account tells; where no face carries spheres, none holds."""
-    found = used([effects.SphereContact(), effects.StickingFriction()], exposed=exposed)
-    assert found["sticking_friction"].idle != exposed
-
-
-def test_contact_is_not_dropped_where_spheres_on_outer_faces_are_missing():
-    found = used([effects.SphereContact(), effects.Friction()], exposed=False, lacking=1)
-    assert not any(use.idle for use in found.values())
+@pytest.mark.parametrize("place", range(3))
+def test_every_load_and_support_has_a_bit_of_its_own(place):
+    """Loads first, in the order of the list, then supports."""
+    listed = [effects.Gravity(), effects.GasPressure("left"), effects.Fixed("right")]
+    found = used(listed, 1 << place, works=np.zeros(2))
+    assert [use.events for use in found.values()] == [int(k == place) for k in range(3)]
 
 
 STEERING = (effects.Softening, effects.ShearSlip, effects.SphereContact, effects.Friction)
@@ -173,7 +160,8 @@ STEERING = (effects.Softening, effects.ShearSlip, effects.SphereContact, effects
 def test_what_steers_is_never_negligible(make):
     """It acted, and took a thousandth of a thousandth of the work put in."""
     listed = [make()] if make is not effects.Friction else [effects.SphereContact(), make()]
-    use = used(listed, heat=1e-9, load_work=1.0, slip=1e-9, softening=1e-9)[make.name]
+    bits = CONTACT | RUBBED
+    use = used(listed, bits, marked=1, load_work=1.0, slip=1e-9, softening=1e-9)[make.name]
     assert use.is_active and not use.negligible(1e-3)
 
 
@@ -189,7 +177,7 @@ def test_dashpots_are_compared_with_what_bonds_hold_not_with_a_fall(strain, shar
 def test_weight_of_all_is_all_the_work(gentle):
     """Free fall, work = m g (g t) t / 2 = weight times height; the only load, so its share is 1.
 
-    Kicks at the beginning of a step of dt give v = g t at its end; with the mean velocity of each
+    Kicks in the middle of a step of dt give v = g t at its end; with the mean velocity of each
     kick the work is exactly m (g t)^2 / 2.
     """
     use = next(use for use in gentle.report.effect_activity if use.effect == "gravity")
@@ -204,21 +192,21 @@ def test_missing_effect_is_told_how_often_and_where():
     mesh = pair()
     runs_away = effects.PrescribedMotion(next(iter(mesh.groups)), (-50.0, 0.0, 0.0))
     # In tension the limit of slip falls to nothing: with slip listed, only the strength is missed.
-    result = ran(runs_away, effects.ShearSlip())
+    result = ran(runs_away, effects.ShearSlip(), effects.BondDamping())
     missed = needed_effects(result).missing
     assert {finding.effect for finding in missed} == {"Softening"}
     (finding,) = missed
     middle = mesh.points[result.model.topology.vertices[0]].mean(axis=0)
     assert finding.where == 0
     assert finding.place_m == pytest.approx(tuple(middle), rel=1e-15)
-    assert finding.most == 1
-    # The start and four samples were looked at; nothing is stretched yet at the first.
-    assert finding.looks == 5
-    assert 1 <= finding.times <= 4
+    assert finding.count == 1
+    # Opened at 50 m/s, the bond is past its strength within ticks: the body turns a little.
+    onset = CONCRETE.onset_opening / 50.0
+    assert STEP < finding.first_s <= 1.5 * onset + STEP
     written = json.loads(json.dumps(result.report.as_dict()))
-    assert written["missed"][0]["times"] == finding.times
+    assert written["missed"][0]["count"] == 1
     assert written["needs"] == [str(finding)]
-    assert f"seen at {finding.times} of 5 recordings" in str(needed_effects(result))
+    assert str(finding) in str(needed_effects(result))
 
 
 USES = (
@@ -239,18 +227,6 @@ def test_small_share_is_negligible_unless_the_effect_steers(tolerance, names):
 def test_tolerance_out_of_range_is_refused(gentle, bad):
     with pytest.raises(InputError, match=r"tolerance must lie in \[0, 1\]"):
         needed_effects(gentle, bad)
-
-
-def test_contact_is_kept_where_parts_may_pass_through_each_other_between_recordings():
-    """No recording saw them within each other; that they never touched tells nothing."""
-    mesh = beside(pair(), pair(), [0.5, 0.0, 0.0])
-    for outer_faces in (False, True):
-        listed = [effects.SphereContact(outer_faces=outer_faces), effects.Friction()]
-        found = used(listed, mesh=mesh)
-        assert [found[name].idle for name in ("sphere_contact", "friction")] == [outer_faces] * 2
-        assert all(
-            ("may pass through each other" in use.kept) != use.idle for use in found.values()
-        )
 
 
 SHAKER = (
@@ -300,6 +276,7 @@ def test_round_off_in_bonds_is_no_damping(listed, away):
     use = advice.uses[0]
     assert use.energy_J > 0.0
     assert str(use) == f"never acted beyond round-off (0 bonds damped, {use.energy_J:.3g} J)"
+    assert "a run without it is the same but for rounding" in str(advice)
     assert advice.droppable == ("bond_damping",) and advice.inactive == ()
 
 

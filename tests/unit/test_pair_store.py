@@ -37,7 +37,7 @@ class Thrown:
         self.fields = self.law.number, self.law.vector, self.law.of_spheres
         self.neighbours = self.simulation.broad_phase.neighbours
         self.first_place = self.simulation.model.centre
-        self.simulation.contacts.skin[None] = SPREAD / 20
+        self.simulation.contacts.skin.fill(SPREAD / 20)
 
     def start(self):
         """Break all bonds, let all faces carry spheres, and search anew."""

@@ -1,15 +1,17 @@
-"""Parts without contact: which scenes are told that they may meet, and when they have met."""
+"""Parts without contact: which scenes are told that they may meet, before a run."""
+
+import sys
 
 import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE, Scene, Simulation, Uniform, checked_mesh, effects
-from taichi_dem.diagnostics.part_overlaps import PartOverlaps
+from taichi_dem import CONCRETE, Scene, Uniform, checked_mesh, effects, simulate
 from taichi_dem.effects.base import Effect
 from taichi_dem.mesh.parts import any_overlap, part_boxes, parts_of
-from taichi_dem.mesh.shapes import bar, single
+from taichi_dem.mesh.shapes import bar, pair, single
 from taichi_dem.scene import outer_faces_warnings
-from tests.unit.test_outer_faces import beside, quaternions
+from taichi_dem.stability.step_report import step_report
+from tests.scenes import beside
 
 BAR = bar(0.2, 0.05, (4, 1, 1))
 FALL, GAS = effects.Gravity(), effects.GasPressure("first left")
@@ -70,7 +72,8 @@ HELD = effects.Fixed("first left")
 def test_parts_without_contact_are_told_where_they_may_come_to_meet(shift, listed, expected):
     assert told(shift, *listed) == expected
     assert not told(shift, *listed, effects.SphereContact(outer_faces=True))
-    assert told(shift, *listed, effects.SphereContact())
+    assert told(shift, *listed, effects.SphereContact(outer_faces=False))
+    assert not told(shift, *listed, effects.SphereContact())
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -100,80 +103,40 @@ def test_boxes_of_parts_hold_their_corners_whatever_the_order_of_bodies():
     np.testing.assert_allclose(high[order], [[0.2, 0.05, 0.05], [1.2, 0.05, 0.05]], atol=1e-15)
 
 
-class Parts:
-    """Bodies of a mesh without contact, put anywhere and looked at."""
-
-    def __init__(self, mesh):
-        simulation = Simulation(Scene(mesh, CONCRETE), Uniform())
-        self.model, self.state = simulation.model, simulation.state
-        self.looker = PartOverlaps(self.model, self.state, parts_of(mesh))
-
-    def found(self, position, orientation=None):
-        """Pairs that are found with the bodies at a position [m], (n, 3)."""
-        still = np.tile([1.0, 0.0, 0.0, 0.0], (self.model.body_count, 1))
-        self.state.set_motion(position, still if orientation is None else orientation)
-        return int(self.looker.overlaps().sum())
-
-
-@pytest.fixture(scope="module")
-def bars():
-    """Two bars, 1 m from each other along x."""
-    return Parts(beside(BAR, BAR, [1.0, 0.0, 0.0]))
+EDGE = 0.05
+TWO = beside(single(EDGE), single(EDGE), [1.0, 0.0, 0.0])
 
 
 @pytest.mark.parametrize(
-    ("shift", "meets"),
+    ("mesh", "listed", "said"),
     [
-        ([0, 0, 0], False),
-        ([-0.8 + 1e-6, 0, 0], False),
-        ([-0.8, 0, 0], False),  # end against end
-        ([-0.8 - 1e-3, 0, 0], True),
-        ([-1.0, 0, 0], True),  # the same place
-        ([-1.0, 0.05, 0], False),  # side by side
-        ([-1.0, 0.049, 0], True),
-        ([-1.0, 0, 0.02], True),
-        ([-2.0, 0, 0], False),  # driven through, and beyond
+        (TWO, [effects.SphereContact(outer_faces=False)], True),
+        (TWO, [effects.SphereContact(outer_faces=True)], False),
+        (TWO, [effects.SphereContact()], False),
+        (TWO, [effects.BondDamping(), effects.GasPressure("sides")], True),
+        (TWO, [effects.BondDamping()], False),
+        (pair(EDGE), [effects.SphereContact(outer_faces=False)], False),
+        (bar(0.2, 0.1, (2, 1, 1)), [effects.SphereContact(outer_faces=False)], False),
     ],
 )
-def test_parts_that_are_within_each_other_are_found(bars, shift, meets):
-    second = np.arange(bars.model.body_count) >= BAR.body_count
-    assert bool(bars.found(bars.model.centre + np.outer(second, shift))) == meets
+def test_parts_that_may_pass_through_each_other_are_told_before_a_run(mesh, listed, said):
+    scene = Scene(mesh, CONCRETE, listed)
+    sentences = outer_faces_warnings(scene)
+    assert len(sentences) == said
+    assert all("SphereContact(outer_faces=True)" in sentence for sentence in sentences)
+    spheres = any(effect.role == "contact" for effect in listed)
+    assert all(("no contact is listed" in sentence) != spheres for sentence in sentences)
+    assert str(step_report(scene)).count("warning: the mesh has 2 parts") == said
 
 
-def test_bodies_of_one_part_are_never_found(bars):
-    """Each bar crushed into a point: its own bodies overlap, the parts stay apart."""
-    second = np.arange(bars.model.body_count) >= BAR.body_count
-    assert bars.found(0.05 * bars.model.centre + np.outer(second, [1.0, 0, 0])) == 0
+def test_simulate_warns_before_anything_is_compiled(monkeypatch):
+    class Reached(Exception):
+        pass
 
+    def reached(*arguments):
+        raise Reached
 
-def depth(first, second):
-    """How far two tetrahedra (4, 3) overlap along the axis on which they do least [m].
-
-    Axes: across all pairs of edges of both, which the edges of one body make its faces.
-    """
-    edges = [
-        np.array([b - a for k, a in enumerate(body) for b in body[k + 1 :]])
-        for body in (first, second)
-    ]
-    every = np.vstack(edges)
-    axes = np.cross(every[:, None], every[None]).reshape(-1, 3)
-    size = np.linalg.norm(axes, axis=1)
-    axes = axes[size > 1e-9] / size[size > 1e-9, None]
-    one, other = first @ axes.T, second @ axes.T
-    return (np.minimum(one.max(0), other.max(0)) - np.maximum(one.min(0), other.min(0))).min()
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_found_pairs_are_those_that_no_plane_parts(seed):
-    """A heap of single bodies turned at random, against a search over all axes with NumPy."""
-    random = np.random.default_rng(seed)
-    mesh = single(0.05)
-    for k in range(1, 12):
-        mesh = beside(checked_mesh(mesh.points, mesh.tetrahedra, {}), single(0.05), [k, 0, 0])
-    heap = Parts(mesh)
-    position = 0.1 * random.random((12, 3))
-    turn, rotation = quaternions(random, 12)
-    corners = position[:, None] + np.einsum("nij,ncj->nci", rotation, heap.looker.arms)
-    depths = [depth(corners[i], corners[j]) for i in range(12) for j in range(i)]
-    assert min(np.abs(depths)) > 1e-5  # no pair so close to touching that the two may differ
-    assert heap.found(position, turn) == sum(d > 0 for d in depths) > 0
+    monkeypatch.setattr(sys.modules["taichi_dem.simulate"], "Simulation", reached)
+    scene = Scene(TWO, CONCRETE, [effects.SphereContact(outer_faces=False)])
+    with pytest.warns(UserWarning, match="2 parts that no bond joins"), pytest.raises(Reached):
+        simulate(scene, method=Uniform(), until=1e-8)

@@ -15,6 +15,7 @@ from taichi_dem import (
     simulate,
 )
 from taichi_dem.mesh.shapes import pair, single
+from taichi_dem.scene import scene_warnings
 
 NAN = float("nan")
 MESH = single()
@@ -44,7 +45,7 @@ REFUSED = {
     "rise": (lambda: effects.GasPressure(rise=NAN), "rise must be a positive", "nan"),
     "ratio": (lambda: effects.GasPressure(decay_ratio="2"), "decay_ratio must be", "'2'"),
     "divisions": (lambda: effects.SphereContact(divisions=2), "from 3 to 20", "2"),
-    "skin": (lambda: effects.SphereContact(skin=0.0), "skin must be a positive", "0.0"),
+    "skin": (lambda: effects.SphereContact(skin=0.0), "skin must be a number from 1e-06", "0.0"),
     "normal": (lambda: effects.Roller("left", (0, 0, 0)), "normal must be", "(0, 0, 0)"),
     "gravity": (lambda: effects.Gravity((0, NAN, 0)), "acceleration must be three", "nan"),
     "velocity": (lambda: effects.PrescribedMotion("left", (1, 2)), "velocity must be", "(1, 2)"),
@@ -99,3 +100,15 @@ def test_loads_and_supports_may_be_listed_many_times():
         effects.Gravity(), effects.Gravity(), effects.Fixed("base"), effects.Fixed("sides")
     )
     assert len(listed.effects) == 4
+
+
+@pytest.mark.parametrize(
+    ("friction", "damping", "told"),
+    [(effects.Friction, 0.0, 1), (effects.Friction, 1.0, 0), (effects.StickingFriction, 0.0, 0)],
+)
+def test_friction_that_no_dashpot_carries_is_told_before_a_run(friction, damping, told):
+    material = replace(CONCRETE, contact_damping=damping)
+    made = Scene(pair(), material, [effects.SphereContact(), friction()])
+    sentences = scene_warnings(made)
+    assert len(sentences) == told
+    assert all("never acts" in sentence for sentence in sentences)

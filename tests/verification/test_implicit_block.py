@@ -48,14 +48,13 @@ def test_momentum_is_kept_through_fracture_and_contact(reports):
 
 
 def test_ledger_residual_halves_with_the_step(reports):
-    """Strain is that of positions half a step after the velocities: power times dt / 2.
+    """Fracture and contact are met up to a step late, and sweeps end within their tolerance.
 
-    First order through fracture and contact. The mean power is the work of the gas over the time;
-    it grows, and a few times the mean bounds what it is in the end.
+    Energies are of one time: no half step of power is left, which was STEP / UNTIL / 2 of the work.
     """
-    coarse, fine = (report.energy_balance["residual"] for report in reports)
-    assert fine / coarse == pytest.approx(0.5, abs=0.02)
-    assert reports[0].energy_residual_fraction < 4.0 * 0.5 * STEP / UNTIL
+    coarse, fine = (abs(report.energy_balance["residual"]) for report in reports)
+    assert fine < coarse
+    assert reports[0].energy_residual_fraction < 0.25 * 0.5 * STEP / UNTIL
 
 
 @pytest.mark.parametrize("until, bound", [(8e-6, 0.002), (1.44e-5, 0.02)])
@@ -80,9 +79,9 @@ def test_positions_are_of_second_order_before_anything_breaks(block, until, boun
 def test_touching_pairs_of_a_colour_share_no_body(block):
     """Those listed are just those that touch, each once, in the order of their colours."""
     pairs, contacts, counts = block.simulation.advance.solver.pairs, block.simulation.contacts, []
-    skin = contacts.skin[None]
+    skin = contacts.skin.to_numpy()
     block.restart(STEP)
-    contacts.skin[None] = 4e-3
+    contacts.skin.fill(4e-3)
     block.search_anew()
     block.run(50)
     for step in range(50, 250):
@@ -103,7 +102,7 @@ def test_touching_pairs_of_a_colour_share_no_body(block):
         assert order.tolist() == np.argsort(colours, kind="stable").tolist()
         first = pairs.colour_first.to_numpy()[: COLOURS + 1]
         assert first.tolist() == np.searchsorted(colours[order], np.arange(COLOURS + 1)).tolist()
-    contacts.skin[None] = skin
+    contacts.skin.from_numpy(skin)
     assert len(counts) > 20 and max(counts) > 50 and colours.max() > 0
 
 

@@ -117,34 +117,27 @@ class Parts:
         spin[bodies["tumbling"]] = SPIN
         return place, velocity, spin
 
-    def restart(self, step, pushed=0.0):
-        """Begin with a step [s]; pushed: acceleration and angular one at first, (n, 6).
+    def restart(self, step):
+        """Begin with a step [s]."""
+        self.again.restart(step, self.velocity, self.place, None, self.spin)
 
-        Velocities live half a step behind, so that a run begins with those of -step / 2.
-        """
-        start = np.hstack([self.velocity, self.spin]) - 0.5 * step * pushed
-        self.again.restart(step, start[:, :3], self.place, None, start[:, 3:])
-
-    def pushed(self):
-        """Acceleration [m/s2] and angular acceleration [1/s2] by the bonds at first, (n, 6)."""
-        self.restart(TINY)
-        impulse = self.state.slot.to_numpy().reshape(-1, 4, 6).sum(axis=1) / TINY
-        turned = np.linalg.solve(self.model.body_inertia, impulse[:, 3:, None])[..., 0]
-        return np.hstack([impulse[:, :3] / self.model.body_mass[:, None], turned])
-
-    def run(self, step, pushed=0.0):
+    def run(self, step):
         """Go to UNTIL; what the tests below ask for, by name."""
-        self.restart(step, pushed)
+        self.restart(step)
+        first = np.zeros((self.model.bond_count, 5))
+        self.again.simulation.readings.bonds(first)
         away = self.again.run(round(UNTIL / step)) - self.place
         simulation = self.again.simulation
         bonds = np.zeros((self.model.bond_count, 5))
         simulation.readings.bonds(bonds)
+        # Half a step of the dashpots is booked at the start.
+        bonds[:, 1] -= first[:, 1]
         return {
             "moved": {name: away[of] for name, of in self.bodies.items()},
             "broken_s": self.state.broken_tick.to_numpy() / MACRO_TICKS * step,
             "bonds": bonds,
             "account": simulation.energy_balance.account(),
-            **self.state.motion(),
+            **simulation.motion(),
         }
 
 
@@ -163,8 +156,7 @@ def implicit():
 @pytest.fixture(scope="module")
 def runs(explicit, implicit):
     """What both say at UNTIL: explicit, implicit."""
-    pushed = explicit.pushed()
-    return explicit.run(TINY), implicit.run(STEP, pushed)
+    return explicit.run(TINY), implicit.run(STEP)
 
 
 @pytest.mark.parametrize(
@@ -213,14 +205,15 @@ def test_softening_and_release_inside_a_step(runs, implicit):
         assert dashpot > fracture
     pulled = implicit.bodies["pulled"]
     mass = implicit.model.body_mass[pulled]
-    # Velocities of -STEP / 2: more than PULL by what the dashpot takes until 0.
-    rate = 2.0 * CONCRETE.normal_damping * area / mass[0]
-    start = 0.5 * mass.sum() * (PULL[0] * (1.0 + 0.5 * STEP * rate)) ** 2
+    start = 0.5 * mass.sum() * PULL[0] ** 2
     dashpot = runs[1]["bonds"][bond][1]
     end = 0.5 * (mass * (runs[1]["velocity"][pulled] ** 2).sum(axis=1)).sum()
     opened = 2.0 * PULL[0] * STEP
     bound = 2.0 * area * (CONCRETE.normal_stiffness + CONCRETE.softening_slope) * opened**2 / 8.0
     assert bound < 1e-2 * fracture
+    # Half a step of the dashpots is booked at time zero, to second order in their rate.
+    rate = 2.0 * CONCRETE.normal_damping * area / mass[0]
+    bound += 0.25 * (STEP * rate) ** 2 * start
     assert abs(start - end - dashpot - fracture) < bound
 
 
@@ -254,7 +247,9 @@ def test_one_fast_fragment_keeps_the_list_of_neighbours_right(implicit):
     """
     simulation, fragment = implicit.again.simulation, implicit.bodies["fragment"][0]
     implicit.restart(STEP)
-    neighbours, skin = simulation.broad_phase.neighbours, simulation.contacts.skin[None]
+    neighbours, skin = simulation.broad_phase.neighbours, 1.2e-3
+    simulation.contacts.skin.fill(skin)
+    implicit.again.search_anew()
     reach = (BODY_SKINS + 2.0 * SKINS) * skin
     rooms, place, still = neighbours.first.to_numpy(), implicit.place.copy(), implicit.spin * 0.0
     turn = np.tile([1.0, 0.0, 0.0, 0.0], (len(place), 1))

@@ -55,7 +55,8 @@ class _LastingOutput:
 
     def _drop(self, error):
         if not isinstance(error, BrokenPipeError):
-            print(f"standard output cannot be written to: {error.strerror}", file=sys.stderr)
+            with contextlib.suppress(OSError):
+                print(f"standard output cannot be written to: {error.strerror}", file=sys.stderr)
         # The buffer keeps unsent text, and Python would complain of it at the exit.
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, self._stream.fileno())

@@ -1,6 +1,7 @@
 """Options, endings and exit codes of a study that is run as a program."""
 
 import argparse
+import contextlib
 import functools
 import os
 import re
@@ -14,11 +15,13 @@ from typing import Any, Callable, NoReturn, Optional
 from taichi_dem.kit import runtime
 from taichi_dem.kit.checkpoint import Checkpoint, Interrupted
 from taichi_dem.kit.errors import InputError, SimulationDiverged
-from taichi_dem.kit.files import claiming, output_folder
+from taichi_dem.kit.files import claiming, older_files, output_folder
 from taichi_dem.kit.progress.lasting_output import lasting_output
 from taichi_dem.kit.study.settings import Settings, add_settings, take_settings
 from taichi_dem.kit.validation import shown
 
+#: Files of an earlier run that are named.
+_MOST_NAMED = 10
 _INTERVALS = {None: "every_wall_s", "s": "every_wall_s", "steps": "every_steps", "sim": "every_s"}
 
 
@@ -169,12 +172,28 @@ def main(
     def work():
         options = made.parse_args(arguments)
         take_settings(options, getattr(made, "settings", {}))
-        options.started = time.perf_counter()
+        options.started, began = time.perf_counter(), time.time()
         runtime.start(options.arch, options.threads)
         with claiming():
             run(options)
+        _name_older_files(getattr(options, "out", ""), began)
 
     return exit_code(work)
+
+
+def _name_older_files(folder, began):
+    """Say which files in the folder of the output this run has not written."""
+    older = older_files(folder, began) if folder else []
+    if older:
+        listed = ", ".join(older[:_MOST_NAMED])
+        more = f" and {len(older) - _MOST_NAMED} more" if len(older) > _MOST_NAMED else ""
+        print(f"Not of this run, in {folder}: {listed}{more}")
+
+
+def say(words: str) -> None:
+    """Say a sentence on stderr, as one line, where that can be written to."""
+    with contextlib.suppress(OSError):
+        print(" ".join(words.split()), file=sys.stderr, flush=True)
 
 
 def exit_code(work: Callable[[], Optional[int]]) -> int:
@@ -193,5 +212,5 @@ def exit_code(work: Callable[[], Optional[int]]) -> int:
             code, words = 128 + error.number, f"{error}: go on with --resume"
         except KeyboardInterrupt:
             code, words = 130, "interrupted"
-        print(" ".join(words.split()), file=sys.stderr)
+        say(words)
         return code

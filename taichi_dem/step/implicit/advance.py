@@ -42,6 +42,11 @@ class SolvedAdvance(Advance):
         self.schedule.choose_level(i, velocity.norm_sqr())
 
     @ti.func
+    def forces_now(self, p):
+        """Forces of a pair's contacts in the last step, a ``PairForces``."""
+        return self.solver.pairs.last_forces(p)
+
+    @ti.func
     def allowed(self, i, velocity, momentum):
         """Velocity and angular momentum that the supports of body i allow; nothing is booked."""
         for effect in ti.static(self.tables.supports):

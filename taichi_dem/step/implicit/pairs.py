@@ -8,7 +8,8 @@ from taichi_dem.contact_search.cell_grid import group
 from taichi_dem.contact_search.contacts import Contacts
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.physics.rotation import unit3, zero3
-from taichi_dem.physics.sphere_pair import add_within, cut_to, meeting
+from taichi_dem.physics.sphere_pair import active_bits, add_within, cut_to, is_within, meeting
+from taichi_dem.step.contact_force import PairForces
 from taichi_dem.step.implicit.velocities import Velocities
 from taichi_dem.step.tangential_springs import TangentialSprings
 
@@ -133,11 +134,10 @@ class PairDashpots:
         end = start
         for k in range(start, self.store.last[p]):
             a, b = self.store.sphere[k][0], self.store.sphere[k][1]
-            first, second = self.tables.sphere[a], self.tables.sphere[b]
-            apart = turn @ second.xyz + offset - first.xyz
-            reach = first[3] + second[3]
-            if apart.norm_sqr() < (reach + ahead) * (reach + ahead):
-                met = meeting(first, reach, apart, self.state.rotation[i])
+            near = self.contacts.law.nearest(a, b, turn, offset)
+            apart, reach = near.apart, near.reach
+            if is_within(near, ahead):
+                met = meeting(near.first, reach, apart, self.state.rotation[i])
                 overlap, normal, arm = met.overlap, met.normal, met.arm - branch
                 self.entry[end], self.normal[end], self.arm[end] = k, normal, arm
                 # Spheres still apart may approach until they touch, at the end of the step.
@@ -156,7 +156,7 @@ class PairDashpots:
                 end += 1
             else:
                 self.impulse[k] = zero3()
-            if apart.norm_sqr() >= reach * reach:
+            if not is_within(near, 0.0):
                 parted += self.springs.part(k)
         self.store.deepest[p], self.touching[p], self.branch[p] = deepest, end - start, branch
         if end > start:
@@ -212,10 +212,21 @@ class PairDashpots:
 
     @ti.func
     def _visit(self, c, i, j, branch, damping):
-        k, normal, arm, share = self.entry[c], self.normal[c], self.arm[c], self.share[c]
+        k, arm, share = self.entry[c], self.arm[c], self.share[c]
         linear, angular = self.velocities.apart(i, j, branch)
-        velocity = linear + angular.cross(arm)
-        held = self.impulse[k]
+        found = self._answer(c, linear + angular.cross(arm), damping)
+        step = self.impulse[k] - found
+        self.impulse[k] = found
+        self.velocities.pull(i, j, branch, step, arm.cross(step))
+        return share[0] * share[0] * step.norm_sqr()
+
+    @ti.func
+    def _answer(self, c, velocity, damping):
+        """Impulse of a contact by its laws [N s], with those of all others as they are.
+
+        velocity: of the second sphere against the first, with the present impulse [m/s].
+        """
+        normal, share, held = self.normal[c], self.share[c], self.impulse[self.entry[c]]
         pressed, rate = held.dot(normal), velocity.dot(normal)
         # The opening rate without this contact's own impulse, and the law solved for the impulse.
         free = rate - share[0] * pressed
@@ -229,36 +240,81 @@ class PairDashpots:
                 found += add_within(pull, stick * (slide + share[1] * pull), bound)
             else:
                 found += cut_to(stick * slide, bound)
-        step = held - found
-        self.impulse[k] = found
-        self.velocities.pull(i, j, branch, step, arm.cross(step))
-        return share[0] * share[0] * step.norm_sqr()
+        return found
 
     @ti.func
     def book(self, p):
-        """Book the energy taken by dashpots and friction of a pair, at its mean motion."""
+        """Book the energy taken by dashpots and friction of a pair, at its mean motion.
+
+        It is that of the impulses by law, as a further sweep would find them: where sweeps ended
+        before impulses agreed, the account does not close.
+        """
         if self.touching[p] > 0:
             pair = self.store.body[p]
             i, j, branch = pair[0], pair[1], self.branch[p]
-            linear, angular = self.velocities.apart(i, j, branch)
+            after, turned = self.velocities.apart(i, j, branch)
+            damping = self.schedule.step_seconds[0] * self.contacts.law.damping()
             spin = self.state.spin[i]
             before = self.state.velocity[j] - self.state.velocity[i] - spin.cross(branch)
-            linear = 0.5 * (linear + before)
-            angular = 0.5 * (angular + self.state.spin[j] - spin)
+            linear = 0.5 * (after + before)
+            angular = 0.5 * (turned + self.state.spin[j] - spin)
             start = self.store.first[p]
-            dragged, rubbed = 0.0, 0.0
+            dragged, rubbed, active = 0.0, 0.0, ti.i64(0)
             for c in range(start, start + self.touching[p]):
                 velocity, normal = linear + angular.cross(self.arm[c]), self.normal[c]
-                impulse = self.impulse[self.entry[c]]
+                impulse = self._answer(c, after + turned.cross(self.arm[c]), damping)
                 pressed, rate = impulse.dot(normal), velocity.dot(normal)
                 dragged += (ti.max(self.push[c], 0.0) - pressed) * rate
                 rub = impulse - pressed * normal
+                active |= active_bits(pressed, rub)
                 if ti.static(self.springs.present):
                     stuck, spent = self._slip(p, c, i, j, pressed)
                     rub -= stuck
                     rubbed += spent
                 rubbed -= rub.dot(velocity)
+            if active != 0:
+                self.state.note_active(i, active)
+                self.state.note_active(j, active)
             self.store.heat[p] = self.store.heat[p] + vec3(dragged, rubbed, 0.0)
+
+    @ti.func
+    def last_forces(self, p):
+        """Mean forces of the last step, at the spheres' present places, a ``PairForces``."""
+        pair, dt = self.store.body[p], self.schedule.step_seconds[0]
+        i, j = pair[0], pair[1]
+        back = self.state.rotation[i].transpose()
+        branch = self.state.position[j] - self.state.position[i]
+        turn, offset = back @ self.state.rotation[j], back @ branch
+        force, moment_i, moment_j, dragged, rubbed = zero3(), zero3(), zero3(), 0.0, 0.0
+        for k in range(self.store.first[p], self.store.last[p]):
+            pushed = self.impulse[k] / dt
+            a, b = self.store.sphere[k][0], self.store.sphere[k][1]
+            near = self.contacts.law.nearest(a, b, turn, offset)
+            met = meeting(near.first, near.reach, near.apart, self.state.rotation[i])
+            arm = met.arm - branch
+            force += pushed
+            moment_i -= met.arm.cross(pushed)
+            moment_j += arm.cross(pushed)
+            velocity = self.state.velocity[j] + self.state.spin[j].cross(arm)
+            velocity -= self.state.velocity[i] + self.state.spin[i].cross(met.arm)
+            rate, pressed = velocity.dot(met.normal), pushed.dot(met.normal)
+            spring = self.contacts.law.elastic(ti.max(met.overlap, 0.0))
+            dragged += (spring - pressed) * rate
+            rub = pushed - pressed * met.normal
+            if ti.static(self.springs.present):
+                rub -= self.springs.force(k, self.state.rotation[i])
+            rubbed -= rub.dot(velocity)
+        return PairForces(
+            force=force,
+            moment_i=moment_i,
+            moment_j=moment_j,
+            dragged=dragged,
+            rubbed=rubbed,
+            slipped=0.0,
+            deepest=0.0,
+            near_count=0,
+            active=0,
+        )
 
     @ti.func
     def _slip(self, p, c, i, j, pressed):

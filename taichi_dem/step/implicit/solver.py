@@ -30,7 +30,9 @@ class Solver:
     bounds: fewest and most sweeps of a step. tolerance: of the velocities. sweeps: number in the
     present step. change2: largest squared change of a velocity in the present sweep [m2/s2],
     residual2 that of the last. speed2: largest squared speed of a body at the beginning of the
-    step. unsolved: 1 while another sweep is required.
+    step. unsolved: 1 while another sweep is required. unconverged: steps whose sweeps ended without
+    agreement; worst: largest residual of them, over the fastest body's speed or, where that is
+    larger, over the change by the first sweep.
     """
 
     def __init__(
@@ -54,6 +56,9 @@ class Solver:
         self.change2 = ti.field(real, shape=())
         self.residual2 = ti.field(real, shape=())
         self.speed2 = ti.field(real, shape=())
+        self.first_change2 = ti.field(real, shape=())
+        self.unconverged = ti.field(ti.i64, shape=())
+        self.worst = ti.field(real, shape=())
 
     def load(self, model: "Model", method: ImplicitDashpots) -> None:
         """Load the numbers of a method, and the bonds of a model."""
@@ -107,6 +112,18 @@ class Solver:
         self.change2[None] = 0.0
         bound = self.tolerance[None] * self.tolerance[None] * self.speed2[None]
         settled = self.sweeps[None] >= self.bounds[0] and self.residual2[None] <= bound
+        if self.sweeps[None] == 1:
+            self.first_change2[None] = self.residual2[None]
         if settled or self.sweeps[None] >= self.bounds[1]:
             self.unsolved[None] = 0
+            self._note_residual()
         self.schedule.count_sweep(self.has_bonds)
+
+    @ti.func
+    def _note_residual(self):
+        """Count a step whose last sweep changed more than the tolerance allows."""
+        # From rest there is no speed yet to compare with.
+        scale2 = ti.max(self.speed2[None], self.first_change2[None])
+        if self.residual2[None] > self.tolerance[None] * self.tolerance[None] * scale2:
+            self.unconverged[None] = self.unconverged[None] + 1
+            self.worst[None] = ti.max(self.worst[None], ti.sqrt(self.residual2[None] / scale2))

@@ -1,0 +1,105 @@
+"""Linear algebra of stacks of small matrices whose bits are the same on every processor.
+
+NumPy hands products and decompositions of matrices to a BLAS, which rounds in another order on each
+kind of processor. Here every step is an elementwise operation that IEEE 754 rounds in one way.
+"""
+
+import numpy as np
+
+#: Sweeps of ``largest_eigenvalues``: a 6x6 matrix is diagonal to the last bit after six.
+_SWEEPS = 7
+#: Matrices taken at a time, so that they stay in the cache.
+_AT_A_TIME = 4096
+_TINY = 1e-300
+
+
+def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Sum of a b over the last axis, from the first entry to the last."""
+    total = a[..., 0] * b[..., 0]
+    for k in range(1, a.shape[-1]):
+        total = total + a[..., k] * b[..., k]
+    return total
+
+
+def length(vectors: np.ndarray) -> np.ndarray:
+    """Euclidean lengths of vectors along the last axis."""
+    return np.sqrt(dot(vectors, vectors))
+
+
+def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Matrix products of stacks of matrices, a (..., n, m) and b (..., m, k)."""
+    total = a[..., :, :1] * b[..., :1, :]
+    for k in range(1, a.shape[-1]):
+        total = total + a[..., :, k : k + 1] * b[..., k : k + 1, :]
+    return total
+
+
+def transposed(matrices: np.ndarray) -> np.ndarray:
+    """Transposes of a stack of matrices."""
+    return np.swapaxes(matrices, -1, -2)
+
+
+def inverse_factor(matrices: np.ndarray) -> np.ndarray:
+    """W with W^T W = A^-1 of symmetric positive definite A, shape (n, m, m); lower triangular.
+
+    It is the inverse of Cholesky's factor, A = W^-1 W^-T.
+    """
+    size = matrices.shape[-1]
+    rest, found = matrices.copy(), np.zeros_like(matrices)
+    found[:, range(size), range(size)] = 1.0
+    for k in range(size):
+        pivot = rest[:, k, k]
+        for i in range(k + 1, size):
+            share = (rest[:, i, k] / pivot)[:, None]
+            rest[:, i] = rest[:, i] - share * rest[:, k]
+            found[:, i] = found[:, i] - share * found[:, k]
+    return found / np.sqrt(np.diagonal(rest, axis1=1, axis2=2))[:, :, None]
+
+
+def inverse(matrices: np.ndarray) -> np.ndarray:
+    """Inverses of symmetric positive definite matrices, (n, m, m); symmetric to the last bit."""
+    factor = inverse_factor(matrices)
+    return product(transposed(factor), factor)
+
+
+def largest_eigenvalues(matrices: np.ndarray) -> np.ndarray:
+    """Largest eigenvalue of every symmetric matrix, shape (n, m, m)."""
+    parts = range(0, len(matrices), _AT_A_TIME)
+    found = [_diagonal(matrices[first : first + _AT_A_TIME])[0] for first in parts]
+    return np.concatenate([np.empty(0), *(values.max(axis=0) for values in found)])
+
+
+def weakest_direction(matrix: np.ndarray) -> np.ndarray:
+    """Unit eigenvector of the smallest eigenvalue of a symmetric matrix, shape (m, m)."""
+    values, axes = _diagonal(matrix[None])
+    return axes[:, values[:, 0].argmin(), 0]
+
+
+def _diagonal(matrices):
+    """Eigenvalues (m, n) and unit eigenvectors (m, m, n), columns, by Jacobi's rotations."""
+    a = np.moveaxis(matrices, 0, -1).copy()
+    size = range(len(a))
+    axes = np.zeros_like(a)
+    axes[size, size] = 1.0
+    for _ in range(_SWEEPS):
+        for p in size:
+            for q in size[p + 1 :]:
+                _rotate(a, axes, p, q)
+    return a[size, size], axes
+
+
+def _rotate(a, axes, p, q):
+    """Turn the axes p and q of matrices (m, m, n) such that their entry (p, q) vanishes.
+
+    Golub and Van Loan, Matrix Computations, algorithm 8.4.1.
+    """
+    twice, apart = 2.0 * a[p, q], a[q, q] - a[p, p]
+    # A denominator of zero belongs to an entry that has vanished.
+    root = np.abs(apart) + np.sqrt(apart * apart + twice * twice) + _TINY
+    t = np.where(apart < 0.0, -twice, twice) / root
+    c = 1.0 / np.sqrt(1.0 + t * t)
+    s = t * c
+    a[p], a[q] = c * a[p] - s * a[q], s * a[p] + c * a[q]
+    for columns in (a, axes):
+        first, second = columns[:, p], columns[:, q]
+        columns[:, p], columns[:, q] = c * first - s * second, s * first + c * second

@@ -1,0 +1,130 @@
+"""Motion and booked energies brought to the time of the positions.
+
+The leapfrog's velocities are half a step behind its positions, and its accounts with them. Half of
+the coming step's impulses brings them to one time, exact to second order in the step: an error of
+first order in a force becomes one of second order in half a step.
+"""
+
+import taichi as ti
+
+from taichi_dem.kit.types import real
+from taichi_dem.step.advance import Advance
+
+
+@ti.data_oriented
+class HalfStep:
+    """Reads what the first half of the coming step does; nothing changes in the run.
+
+    Impulses of contacts come from the caller, as they are sums over pairs. Only bodies that stand
+    at the present time are brought forward: between two largest steps others wait for theirs.
+    """
+
+    def __init__(self, advance: Advance):
+        self.advance, self.tables, self.state = advance, advance.tables, advance.state
+        self.schedule, self.staggered = advance.schedule, advance.staggered
+
+    @ti.func
+    def is_due(self, i):
+        """Whether the velocity of body i is half a step behind the present.
+
+        Held bodies begin with the motion that they are given, not with that of their support.
+        """
+        due = 0
+        if ti.static(self.staggered):
+            starts = self.state.tick[None] == 0 and self.is_held(i) == 1
+            due = ti.cast(self.state.last_tick[i] == self.state.tick[None] and not starts, ti.i32)
+        return due
+
+    @ti.func
+    def is_held(self, i):
+        """1 for a body on which a support acts, else 0."""
+        held = 0
+        for effect in ti.static(self.tables.supports):
+            held |= ti.cast(effect.acts_on(i) != 0, ti.i32)
+        return held
+
+    @ti.func
+    def impulse(self, i, linear, angular):
+        """Impulse and moment on body i by which it is behind, and those of each load, a row each.
+
+        linear [N s], angular [N m s]: of its contacts, as ``pair`` gives them. Of a bond it is half
+        of what waits in the slot, also where the other body steps finer: earlier impulses of their
+        finer steps have been taken.
+        """
+        for f in range(4):
+            linear += 0.5 * self.state.slot[4 * i + f][0:3]
+            angular += 0.5 * self.state.slot[4 * i + f][3:6]
+        half = 0.5 * self.schedule.own_step(i)
+        kick = ti.Matrix.zero(real, ti.static(max(1, len(self.tables.loads))), 6)
+        step = self.schedule.own_step(i)
+        motion = self.state.body_motion(i, self.schedule.seconds(self.state.tick[None]), step)
+        for e in ti.static(range(len(self.tables.loads))):
+            if self.tables.loads[e].acts_on(i):
+                push, twist = self.tables.loads[e].wrench(i, motion)
+                linear += push * half
+                angular += twist * half
+                for k in ti.static(range(3)):
+                    kick[e, k], kick[e, 3 + k] = push[k] * half, twist[k] * half
+        return linear, angular, kick
+
+    @ti.func
+    def held(self, i, velocity, momentum):
+        """Velocity and angular momentum that supports allow now."""
+        now = self.schedule.seconds(self.state.tick[None])
+        for effect in ti.static(self.tables.supports):
+            if effect.acts_on(i):
+                velocity, momentum = effect.held(i, now, self.state.rotation[i], velocity, momentum)
+        return velocity, momentum
+
+    @ti.func
+    def visit(self, i, pushed, turned, back):
+        """Velocity [m/s] and angular momentum [kg m^2/s] of body i now, and works in half a step.
+
+        pushed, turned: impulse [N s] and moment [N m s] of its contacts in half a step. Works [J]:
+        of each load, and of all supports last. back: 1 to set the body, whose motion is
+        given at time zero, half a step back instead; held bodies stay.
+        """
+        account = ti.Vector.zero(real, ti.static(len(self.tables.loads) + 1))
+        before, spun = self.state.velocity[i], self.state.angular_momentum[i]
+        velocity, momentum = before, spun
+        if self.is_due(i) == 1:
+            linear, angular, kick = self.impulse(i, pushed, turned)
+            linear *= self.tables.mass_inverse[i]
+            if back == 1:
+                self.state.velocity[i], self.state.angular_momentum[i] = (
+                    before - linear,
+                    spun - angular,
+                )
+                self.state.spin[i] = self.advance.spin(i, spun - angular)
+            else:
+                velocity, momentum = self.held(i, before + linear, spun + angular)
+                mean = 0.5 * (before + velocity)
+                turning = self.advance.spin(i, 0.5 * (spun + momentum))
+                for e in ti.static(range(len(self.tables.loads))):
+                    for k in ti.static(range(3)):
+                        work = kick[e, k] * mean[k] + kick[e, 3 + k] * turning[k]
+                        account[e] = account[e] + work
+                if ti.static(len(self.tables.supports) > 0):
+                    push = self.tables.mass[i] * (velocity - (before + linear))
+                    work = push.dot(mean) + (momentum - (spun + angular)).dot(turning)
+                    account[ti.static(len(self.tables.loads))] = work
+        return velocity, momentum, account
+
+    @ti.func
+    def bond_heat(self, b):
+        """Energy [J] by which the booked heat of a bond's dashpots is behind the present."""
+        heat = 0.0
+        if ti.static(self.advance.has_dashpot and self.staggered):
+            if self.state.broken_tick[b] < 0:
+                slots = self.tables.bond_slots[b]
+                step = self.schedule.pair_step(slots[0] >> 2, slots[1] >> 2)
+                # A solved dashpot is booked a step late, an explicit one ahead of its step.
+                sign = ti.static(0.5 if self.advance.solves_bonds else -0.5)
+                heat = sign * step * self.advance.bond_power(b)
+        return heat
+
+    @ti.func
+    def pair_step(self, p):
+        """Half of the coming step of a pair of bodies [s]; 0 where nothing is behind."""
+        pair = self.advance.contacts.store.body[p]
+        return 0.5 * self.schedule.pair_step(pair[0], pair[1])

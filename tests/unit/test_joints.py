@@ -1,0 +1,155 @@
+"""Faces that lie on each other without a bond: joints between blocks, cracks in one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from taichi_dem import CONCRETE, InputError, Scene, Simulation, Uniform, effects, read_mesh
+from taichi_dem.mesh.files import write_mesh
+from taichi_dem.mesh.mesh import Mesh, checked_mesh
+from taichi_dem.mesh.reorder import in_space_order
+from taichi_dem.mesh.shapes import bar, placed_together, single
+from taichi_dem.mesh.topology import topology_of
+from taichi_dem.scene import outer_faces_warnings
+
+EDGE = 0.05
+CUBE = bar(EDGE, EDGE, (1, 1, 1))
+BLOCKS = {"left": (CUBE, (0.0, 0.0, 0.0)), "right": (CUBE, (EDGE, 0.0, 0.0))}
+
+
+def cracked():
+    """A bar of two by two boxes, a crack across its lower half: points, bodies and their welding.
+
+    The bodies right of the middle take new points for those below the tip.
+    """
+    whole = bar(2 * EDGE, 2 * EDGE, (2, 2, 1))
+    on_crack = np.isclose(whole.points[:, 0], EDGE) & (whole.points[:, 1] < EDGE - 1e-6)
+    old = np.flatnonzero(on_crack)
+    points = np.vstack([whole.points, whole.points[old]])
+    new = np.arange(len(whole.points))
+    new[old] = len(whole.points) + np.arange(len(old))
+    bodies = whole.tetrahedra.copy()
+    right = whole.points[bodies].mean(axis=1)[:, 0] > EDGE
+    bodies[right] = new[bodies[right]]
+    return whole, points, bodies
+
+
+def test_blocks_that_touch_are_refused_unless_kept_apart():
+    with pytest.raises(InputError, match=r"weld_tolerance=.* or keep_coincident=True"):
+        placed_together(BLOCKS)
+    made = placed_together(BLOCKS, keep_coincident=True)
+    assert made.keep_coincident and made.point_count == 16
+    assert topology_of(made).bond_count == 2 * topology_of(CUBE).bond_count
+    assert any(note.startswith("kept 8 points apart") for note in made.notes)
+
+
+def test_a_crack_has_two_free_faces_for_each_bond_it_cuts():
+    whole, points, bodies = cracked()
+    made = checked_mesh(points, bodies, {}, keep_coincident=True)
+    before, after = topology_of(whole), topology_of(made)
+    cut = before.bond_count - after.bond_count
+    assert cut == 2 and after.outer_count == before.outer_count + 2 * cut
+    assert not any("parts" in note for note in made.notes)
+
+
+def test_a_mesh_made_directly_read_and_ordered_keeps_them(tmp_path):
+    _, points, bodies = cracked()
+    with pytest.raises(InputError, match="coincide with another"):
+        Mesh(points, bodies, {})
+    made = Mesh(points, bodies, {}, keep_coincident=True)
+    assert in_space_order(made).keep_coincident
+    assert replace(made, source="x").keep_coincident
+    with pytest.raises(InputError, match="coincide"):
+        replace(made, keep_coincident=False)
+    write_mesh(tmp_path / "crack.msh", made)
+    with pytest.raises(InputError, match=r"crack.msh: .* keep_coincident=True"):
+        read_mesh(tmp_path / "crack.msh")
+    found = read_mesh(tmp_path / "crack.msh", keep_coincident=True)
+    assert np.array_equal(found.tetrahedra, made.tetrahedra)
+    joined = read_mesh(tmp_path / "crack.msh", weld_tolerance=1e-9)
+    assert topology_of(joined).bond_count == topology_of(made).bond_count + 2
+
+
+WRONG = {
+    "one in the other": (lambda: twice(single(), 0.0), "0 and 1 have the same four points"),
+    "same side": (lambda: folded(), "lie on the same side"),
+    "weld too": (
+        lambda: checked_mesh(*arrays(CUBE), weld_tolerance=1e-6, keep_coincident=True),
+        "weld_tolerance must be 0 with keep_coincident",
+    ),
+    "no flag": (
+        lambda: checked_mesh(*arrays(CUBE), keep_coincident="yes"),
+        "keep_coincident must be True or False",
+    ),
+    "no flag of a Mesh": (
+        lambda: Mesh(*arrays(CUBE), keep_coincident=1),
+        "keep_coincident must be True or False",
+    ),
+}
+
+
+def arrays(mesh):
+    return mesh.points, mesh.tetrahedra, {}
+
+
+def twice(mesh, shift):
+    return placed_together({"a": (mesh, (0, 0, 0)), "b": (mesh, (shift, 0, 0))}, True)
+
+
+def folded():
+    """Two bodies on the same side of faces that lie on each other."""
+    other = single(height=0.02)
+    return placed_together({"a": (single(), (0, 0, 0)), "b": (other, (0, 0, 0))}, True)
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_bodies_in_each_other_and_contradictions_are_refused(name):
+    build, words = WRONG[name]
+    with pytest.raises(InputError, match=words):
+        build()
+
+
+@pytest.mark.parametrize("contact", [None, False, True])
+def test_joints_that_nothing_lets_meet_are_warned_of(contact):
+    _, points, bodies = cracked()
+    mesh = checked_mesh(points, bodies, {}, keep_coincident=True)
+    listed = [] if contact is None else [effects.SphereContact(outer_faces=contact)]
+    said = outer_faces_warnings(Scene(mesh, CONCRETE, listed))
+    assert len(said) == (0 if contact else 1)
+    assert contact or "coincident points of the mesh are kept apart" in said[0]
+
+
+def touching_blocks(speed, *listed):
+    """Simulation of two blocks that touch, the left one moving along x."""
+    mesh = placed_together(BLOCKS, keep_coincident=True)
+    listed = [effects.BondDamping(), effects.SphereContact(outer_faces=True), *listed]
+    simulation = Simulation(Scene(mesh, CONCRETE, listed), Uniform(2e-9))
+    velocity = np.zeros((12, 3))
+    velocity[:6, 0] = speed
+    still = [1.0, 0.0, 0.0, 0.0]
+    simulation.state.set_motion(simulation.model.centre, still, velocity)
+    return simulation
+
+
+def test_blocks_at_rest_stay_and_blocks_that_part_go_free():
+    """Spheres touch at a gap of zero: what rounding overlaps pushes less than 1e-12 m/s."""
+    resting = touching_blocks(0.0)
+    resting.advance_to(500)
+    assert np.abs(resting.state.velocity.to_numpy()).max() < 1e-12
+    parting = touching_blocks(-0.5)
+    parting.advance_to(500)
+    velocity = parting.state.velocity.to_numpy()
+    assert np.abs(velocity[6:]).max() < 1e-12
+    assert np.abs(velocity[:6, 0] + 0.5).max() < 1e-12
+
+
+def test_a_block_pushes_the_one_it_touches():
+    """Half of the momentum has gone over when both are as fast; none is lost."""
+    simulation = touching_blocks(0.5)
+    simulation.advance_to(5000)
+    velocity, mass = simulation.state.velocity.to_numpy(), simulation.model.body_mass
+    momentum = mass[:, None] * velocity
+    assert momentum[6:, 0].sum() > 0.4 * 0.5 * mass[:6].sum()
+    assert momentum[:, 0].sum() == pytest.approx(0.5 * mass[:6].sum(), rel=1e-12)
+    assert simulation.report().missing_effects == ()

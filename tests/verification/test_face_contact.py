@@ -1,0 +1,192 @@
+"""Contact of spheres with faces: geometry, energy, momentum, and sliding without interlocking."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from taichi_dem import (
+    CONCRETE,
+    ImplicitDashpots,
+    Multirate,
+    Scene,
+    Simulation,
+    Uniform,
+    checked_mesh,
+    effects,
+)
+from taichi_dem.mesh.face_rims import face_rims
+from taichi_dem.mesh.shapes import bar, single
+from taichi_dem.mesh.tetrahedra import all_faces
+from taichi_dem.mesh.topology import topology_of
+from tests.faces import AtABlock
+from tests.sliding import GRAVITY, STEP, sliding, tetrahedron
+
+EPS = np.finfo(float).eps
+LOSSLESS = replace(CONCRETE, contact_damping=0.0)
+
+
+@pytest.fixture(scope="module")
+def at_a_block():
+    """A tetrahedron that is put at a block of 72, without bonds' dashpots."""
+    return AtABlock(material=LOSSLESS)
+
+
+def touching(scene, random, count):
+    """Places and orientations in which some sphere touches, and no centre is within a body."""
+    found = []
+    while len(found) < count:
+        drawn = scene.drawn(random)
+        scene.put(*drawn)
+        gaps, within = scene.gaps()
+        if gaps.min() < -1e-5 and not within:
+            found.append(drawn)
+    return found
+
+
+def test_a_side_of_many_faces_ends_at_its_own_edges_and_corners():
+    """A box has 6 sides of 4 edges and 4 corners, however many faces they are made of."""
+    mesh = bar(0.12, 0.08, (3, 2, 2))
+    outer = topology_of(mesh).body_bond.reshape(-1) < 0
+    rims = face_rims(mesh, outer)
+    corners = mesh.points[all_faces(mesh.tetrahedra)]
+    edge = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    rim = edge[outer][rims.edge[outer]].sum()
+    assert rim == pytest.approx(2 * (4 * 0.12 + 4 * 0.08 + 4 * 0.08), rel=1e-12)
+    assert rims.corner[outer].sum() == 24
+    assert rims.edge[~outer].all() and rims.corner[~outer].all()
+
+
+def test_an_intact_block_does_not_touch_itself(at_a_block):
+    at_a_block.put((1.0, 1.0, 1.0), (1.0, 0.0, 0.0, 0.0))
+    # Spheres of different faces of bodies touch their own planes to a rounding of 0.1 m.
+    count = at_a_block.simulation.contacts.store.sphere_count[None]
+    assert at_a_block.energy() <= 0.5 * CONCRETE.contact_stiffness * (8 * EPS * 0.1) ** 2 * count
+
+
+def test_energy_is_that_of_six_flat_sides_and_four_triangles(at_a_block):
+    """The block's 56 outer faces act as six rectangles: no bump where they meet."""
+    random = np.random.default_rng(1)
+    for drawn in touching(at_a_block, random, 60):
+        at_a_block.put(*drawn)
+        overlap = np.maximum(0.0, -at_a_block.gaps()[0])
+        wanted = 0.5 * CONCRETE.contact_stiffness * (overlap**2).sum()
+        # Distances of 0.1 m are known to some roundings.
+        error = CONCRETE.contact_stiffness * (overlap * 100 * EPS * 0.1).sum()
+        assert at_a_block.energy() == pytest.approx(wanted, abs=error)
+
+
+def test_the_force_is_the_gradient_of_the_energy_and_conserves_momentum(at_a_block):
+    """Central differences are off by h times the sum of stiffnesses, where contacts begin."""
+    random, h, dt = np.random.default_rng(2), 1e-9, 1e-9
+    for place, orientation in touching(at_a_block, random, 10):
+        slope = np.zeros(3)
+        for axis in range(3):
+            for sign in (-1.0, 1.0):
+                at_a_block.put(place + sign * h * np.eye(3)[axis], orientation)
+                slope[axis] += sign * at_a_block.energy() / (2.0 * h)
+        at_a_block.simulation.reset()
+        at_a_block.put(place, orientation)
+        at_a_block.simulation.start()
+        at_a_block.simulation.advance_to(1)
+        velocity, mass = at_a_block.state.velocity.to_numpy(), at_a_block.model.body_mass
+        own = mass[-1] * velocity[at_a_block.model.body_count - 1]
+        # A run begins half a step back: the first kick is of half a step.
+        count = at_a_block.simulation.contacts.store.sphere_count[None]
+        error = CONCRETE.contact_stiffness * h * count
+        assert np.abs(own / (0.5 * dt) + slope).max() < error < 0.2 * np.linalg.norm(slope)
+        # Sums of some hundred impulses at arms of 0.1 m.
+        linear, angular = np.split(at_a_block.simulation.energy_balance.momentum(), 2)
+        assert np.abs(linear).max() < 100 * EPS * np.linalg.norm(own)
+        assert np.abs(angular).max() < 100 * EPS * np.linalg.norm(own) * 0.1
+
+
+def facing(gap):
+    """Two tetrahedra, mirror images, whose faces are a gap [m] apart along x."""
+    left = single()
+    right = left.points * [-1.0, 1.0, 1.0] + [gap, 0.0, 0.0]
+    return checked_mesh(np.vstack([left.points, right]), [[0, 1, 2, 3], [4, 5, 7, 6]], {})
+
+
+def test_a_centre_behind_a_face_is_pushed_back():
+    """Energy of a face pressed into another grows until centres are behind by nearly a radius."""
+    simulation = Simulation(Scene(facing(1e-9), LOSSLESS, [effects.FaceContact()]), Uniform(1e-9))
+    simulation.start()
+    model = simulation.model
+    still, energies = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1)), []
+    for depth in np.linspace(0.0, 1.9 * model.spheres.radius[0, 0].min(), 30):
+        simulation.state.set_motion(model.centre - [[0.0] * 3, [depth, 0.0, 0.0]], still)
+        simulation.broad_phase.search()
+        energies.append(simulation.energy_balance.account()["sphere_strain"])
+    assert energies[0] < 1e-9 * energies[-1]
+    assert (np.diff(energies) > 0.0).all()
+
+
+def test_faces_that_meet_leave_as_fast_as_they_came():
+    """Thirty springs: 30 k D^2 / 2 = m v^2; kicks and drifts change the speed by (w dt)^2.
+
+    Six spheres of each body lie behind its face, and nine behind the others touch it too.
+    """
+    gap, speed, dt = 1e-6, 1.0, 1e-7
+    simulation = Simulation(Scene(facing(gap), LOSSLESS, [effects.FaceContact()]), Uniform(dt0=dt))
+    model = simulation.model
+    still = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
+    simulation.state.set_motion(model.centre, still, [[speed, 0, 0], [-speed, 0, 0]])
+    distance, residual = [], []
+    for step in range(1, 801):
+        simulation.advance_to(step)
+        motion = simulation.state.motion()
+        distance.append(motion["position"][1, 0] - motion["position"][0, 0])
+        residual.append(abs(simulation.energy_balance.account()["residual"]))
+    mass = model.body_mass[0]
+    rate = np.sqrt(2.0 * 30.0 * CONCRETE.contact_stiffness / mass)
+    deepest = model.centre[1, 0] - model.centre[0, 0] - gap - min(distance)
+    expected = speed * np.sqrt(mass / (15.0 * CONCRETE.contact_stiffness))
+    assert 800 * dt > np.pi / rate + 2.0 * gap / speed
+    # Samples are up to half a step from the deepest point, where the overlap is a parabola.
+    assert deepest == pytest.approx(expected, rel=(rate * dt) ** 2)
+    assert motion["velocity"][1, 0] == pytest.approx(speed, rel=(rate * dt) ** 2)
+    assert residual[-1] < (rate * dt) ** 2 * mass * speed**2
+
+
+#: Method by name; explicit ones limit the dashpots of the bonds of the plate.
+SLIDES = {
+    "implicit": ImplicitDashpots(STEP),
+    "uniform": Uniform(4e-7, dashpot="limited"),
+    "multirate": Multirate(4e-7, 1e-6, dashpot="limited"),
+}
+
+
+def braking(friction, **other):
+    """Braking of a tetrahedron at 5 m/s over faces of the plate, over the impulse of the plate.
+
+    The impulse along the normal is that of the weight and of what the body bounces.
+    """
+    speed, time = 5.0, 0.01
+    simulation, way = sliding(tetrahedron(), speed, 0.4, friction, 5, effects.FaceContact, **other)
+    dt, ends = simulation.method.dt0, []
+    for part in (0.1, 1.0):
+        simulation.advance_to(round(part * time / dt))
+        velocity = simulation.state.velocity.to_numpy()[simulation.model.body_count - 1]
+        ends.append((velocity @ way, velocity[1]))
+    (first, up), (last, higher) = ends
+    return (first - last) / (GRAVITY * 0.9 * time + higher - up), simulation
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SLIDES)
+def test_a_face_slides_over_many_without_friction_unbraked(name):
+    found, _ = braking(0.0, method=SLIDES[name])
+    assert abs(found) < 1e-4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "law"),
+    [("implicit", effects.Friction), *((name, effects.StickingFriction) for name in SLIDES)],
+)
+def test_a_face_is_braked_by_coulomb_friction(name, law):
+    found, simulation = braking(CONCRETE.friction, method=SLIDES[name], law=law)
+    account = simulation.energy_balance.account()
+    assert found == pytest.approx(CONCRETE.friction, rel=1e-4)
+    assert abs(account["residual"]) < 1e-2 * account["friction"]

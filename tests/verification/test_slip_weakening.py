@@ -1,0 +1,246 @@
+"""Bonds whose cohesion falls with slip, against the closed form of the linear law.
+
+Errors of an opening, and of a traction, are those of ``test_bond_law``.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from taichi_dem import (
+    CONCRETE,
+    ImplicitDashpots,
+    InputError,
+    Multirate,
+    Scene,
+    Uniform,
+    effects,
+    needed_effects,
+    simulate,
+)
+from taichi_dem.mesh.shapes import bar
+from taichi_dem.mesh.shapes import pair as pair_mesh
+from tests.probe import BondProbe
+from tests.verification.test_bond_law import EDGE, EPS, OPENING_ERROR, SHEAR_ERROR
+
+K_N, K_S = CONCRETE.normal_stiffness, CONCRETE.shear_stiffness
+COHESION, FRICTION = CONCRETE.cohesion, CONCRETE.friction
+#: Fracture energy of mode II [J/m^2], and the slip at which no cohesion is left [m].
+ENERGY = 1000.0
+CRITICAL = 2.0 * ENERGY / COHESION
+SLOPE = COHESION / CRITICAL
+
+
+@pytest.fixture(scope="module")
+def built():
+    listed = [effects.BondDamping(), effects.Softening(), effects.SlipWeakening(ENERGY)]
+    return BondProbe(pair_mesh(EDGE), listed)
+
+
+@pytest.fixture
+def bonded(built):
+    """The same pair without history."""
+    built.reset()
+    built.state.fields()["slip_weakening"].fill(0.0)
+    return built
+
+
+def traction_at(sliding, pressure):
+    """Shear traction [Pa] and slip [m] of a monotonic test: the law k (d - s) = limit(s)."""
+    peak = COHESION + FRICTION * pressure
+    if K_S * sliding <= peak:
+        return K_S * sliding, 0.0
+    slip = (K_S * sliding - peak) / (K_S - SLOPE)
+    if slip < CRITICAL:
+        return peak - SLOPE * slip, slip
+    rest = FRICTION * pressure
+    return rest, sliding - rest / K_S
+
+
+@pytest.mark.parametrize("pressure", [0.0, 5e6, 40e6])
+def test_shear_follows_the_closed_form_to_the_friction_that_remains(bonded, pressure):
+    """Up k_s, down with the slope k_s c / (k_s d_c - c), then friction alone, in any direction."""
+    way = np.linspace(0.0, 3.0 * CRITICAL, 61)
+    along = np.array([0.6, 0.8])
+    for d in way[way < 0.99 * CRITICAL] if pressure == 0.0 else way:
+        found = bonded.open([-pressure / K_N, *(d * along)])[1:]
+        expected, _ = traction_at(d, pressure)
+        # In softening an error of the opening comes back enlarged by k_s / (k_s - slope).
+        bound = 61 * SHEAR_ERROR * K_S / (K_S - SLOPE)
+        assert np.abs(found - expected * along).max() < bound
+    assert not bonded.broken
+
+
+def test_energy_spent_is_that_of_mode_two_and_friction_work(bonded):
+    """G_II + mu p s, and (k_s - slope) ds^2 / 2 for each finite step ds, known in closed form.
+
+    In a step the spring is charged beyond the limit and then falls to it: the mean of both is
+    above the integral of the limit by that triangle.
+    """
+    pressure, end = 5e6, 3.0 * CRITICAL
+    way = np.linspace(0.0, end, 1200)
+    slips = []
+    for d in way:
+        bonded.open([-pressure / K_N, d, 0.0])
+        slips.append(traction_at(d, pressure)[1])
+    steps, slip = np.diff(slips), np.array(slips)
+    whole = steps[slip[1:] < CRITICAL]
+    rubbed = steps[slip[:-1] >= CRITICAL]
+    across = steps[(slip[1:] >= CRITICAL) & (slip[:-1] < CRITICAL)]
+    before = CRITICAL - slip[slip < CRITICAL][-1]
+    excess = 0.5 * (K_S - SLOPE) * (whole**2).sum() + 0.5 * K_S * (rubbed**2).sum()
+    # The step across the kink: its triangle is cut off where cohesion ends.
+    excess += 0.5 * K_S * (across**2).sum() - 0.5 * SLOPE * before**2
+    expected = ENERGY + FRICTION * pressure * slip[-1] + excess
+    error = len(way) * SHEAR_ERROR * CRITICAL
+    assert bonded.heat[1] / bonded.area == pytest.approx(expected, abs=error)
+    assert excess < 0.01 * expected
+    assert bonded.heat[0] == bonded.heat[2] == 0.0
+
+
+@pytest.mark.parametrize("pressure", [0.0, 5e6])
+def test_unloading_is_elastic_and_reloading_meets_the_reduced_limit(bonded, pressure):
+    """From half the critical slip back with k_s, and again up to the limit left there.
+
+    On the way back the reversed limit, of the same reduced cohesion, is not reached.
+    """
+    normal, reached = -pressure / K_N, 0.5 * CRITICAL
+    limit = COHESION - SLOPE * reached + FRICTION * pressure
+    top = reached + limit / K_S
+    bonded.open([normal, 0.0, top])
+    heat = bonded.heat[1]
+    for d in np.linspace(top, top - 1.9 * limit / K_S, 9):
+        found = bonded.open([normal, 0.0, d])[2]
+        assert found == pytest.approx(limit - K_S * (top - d), abs=9 * SHEAR_ERROR)
+    assert bonded.heat[1] == heat
+    again = bonded.open([normal, 0.0, top + 10e-6])[2]
+    expected = traction_at(top + 10e-6, pressure)[0]
+    assert again == pytest.approx(expected, abs=99 * SHEAR_ERROR)
+
+
+def test_slip_to_and_fro_accumulates(bonded):
+    """Back at zero residual slip the cohesion is that of the whole way."""
+    pressure, size = 2e6, 0.2 * CRITICAL
+    limit = COHESION - SLOPE * size + FRICTION * pressure
+    bonded.open([-pressure / K_N, size + limit / K_S, 0.0])
+    limit -= SLOPE * size
+    bonded.open([-pressure / K_N, -limit / K_S, 0.0])
+    unit = bonded.state.fields()["slip_weakening"].to_numpy()
+    assert np.abs(unit[:, 0]).max() < 99 * OPENING_ERROR
+    assert unit[:, 2] == pytest.approx([2 * size] * 3, abs=99 * OPENING_ERROR)
+
+
+def test_decohered_face_rubs_while_it_is_pressed_and_opens_free(bonded):
+    """Pressed it holds and rubs; without pressure it is released, where an intact one holds."""
+    far = [-1e-6, 2.0 * CRITICAL, 0.0]
+    bonded.open(far)
+    assert not bonded.broken
+    assert bonded.open(far)[1] == pytest.approx(FRICTION * 1e-6 * K_N, abs=99 * SHEAR_ERROR)
+    gap = 1e-9
+    assert np.array_equal(bonded.open([gap, 2.0 * CRITICAL, 0.0]), np.zeros(3))
+    assert bonded.broken
+    # What the unit still held in tension is lost, and booked as released.
+    release = 0.5 * K_N * gap**2 * bonded.area
+    assert bonded.heat[2] == pytest.approx(release, rel=3 * OPENING_ERROR / gap)
+
+
+def test_tension_lowers_the_limit_of_what_cohesion_is_left(bonded):
+    pull = 3e6
+    shear = bonded.open([pull / K_N, 0.0, 0.5 * CRITICAL])[2]
+    expected, _ = traction_at(0.5 * CRITICAL, -pull)
+    assert shear == pytest.approx(expected, abs=99 * SHEAR_ERROR)
+    assert not bonded.broken
+
+
+def test_energy_stored_plus_spent_is_the_work_done_on_any_way(bonded):
+    """Work of a jump is the change of the spring's energy before it slips: exact at any step."""
+    draw = np.random.default_rng(3)
+    way = np.cumsum(draw.normal(scale=0.4 * CRITICAL, size=(60, 2)), axis=0)
+    unit = bonded.state.fields()["slip_weakening"]
+    normal = -5e6 / K_N
+    bonded.open([normal, 0.0, 0.0])
+    work = bonded.stored()
+    for sliding in way:
+        slip = unit.to_numpy()[0, :2]
+        before = bonded.stored()
+        trial = 0.5 * K_S * ((sliding - slip) ** 2).sum() + 0.5 * K_N * normal**2
+        work += bonded.area * trial - before
+        bonded.open([normal, *sliding])
+    size = bonded.area * 60 * SHEAR_ERROR * np.abs(way).max()
+    assert bonded.stored() + bonded.heat[1] == pytest.approx(work, abs=size)
+
+
+LEAST = COHESION**2 / (2.0 * K_S)
+
+
+@pytest.mark.parametrize("energy", [0.0, -1.0, np.nan, "a", True])
+def test_a_fracture_energy_that_is_no_positive_number_is_refused(energy):
+    with pytest.raises(InputError, match="fracture_energy must be"):
+        effects.SlipWeakening(energy)
+
+
+@pytest.mark.parametrize("energy", [LEAST, 0.5 * LEAST, 1e-20])
+def test_a_bond_that_would_fail_at_once_is_refused(energy):
+    with pytest.raises(InputError, match=r"fracture_energy of slip_weakening must be larger than"):
+        Scene(pair_mesh(), CONCRETE, [effects.SlipWeakening(energy)])
+    Scene(pair_mesh(), CONCRETE, [effects.SlipWeakening(LEAST * (1.0 + EPS * 4))])
+
+
+def test_a_material_without_cohesion_is_refused():
+    with pytest.raises(InputError, match="cohesion of the material must be more than 0"):
+        Scene(pair_mesh(), replace(CONCRETE, cohesion=0.0), [effects.SlipWeakening(ENERGY)])
+
+
+def test_both_laws_of_slip_are_refused_together():
+    both = [effects.ShearSlip(), effects.SlipWeakening(ENERGY)]
+    with pytest.raises(InputError, match="both take the role shear"):
+        Scene(pair_mesh(), CONCRETE, both)
+
+
+#: By their step.
+METHODS = {
+    "uniform": (Uniform, 4e-8),
+    "multirate": (lambda step: Multirate(step, 25.0 * step), 4e-8),
+    "implicit": (ImplicitDashpots, 8e-7),
+}
+
+
+def sheared(method, *listed, until=4e-4):
+    """A bar that is pressed a little, and sheared between its ends at 8 m/s."""
+    held = [effects.Fixed("left"), effects.PrescribedMotion("right", (-0.02, 8.0, 0.0))]
+    scene = Scene(bar(0.15, 0.05, (3, 1, 1)), CONCRETE, [*listed, *held])
+    return simulate(scene, method=method, until=until, samples=20, frames=1, progress=None)
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_account_closes_in_the_limit_of_short_steps_and_decohered_faces_open(name):
+    """The residual is of first order in the step: half the step, half of it."""
+    make, step = METHODS[name]
+    listed = effects.BondDamping(), effects.SlipWeakening(300.0)
+    whole, half = (sheared(make(dt), *listed) for dt in (step, 0.5 * step))
+    residual, smaller = (abs(run.report.energy_balance["residual"]) for run in (whole, half))
+    assert smaller < 0.6 * residual
+    assert half.report.broken_faces == whole.report.broken_faces > 0
+    assert half.report.energy_balance["slip"] > 10.0 * smaller
+    assert half.report.linear_momentum_error < 1e-12
+    advice = needed_effects(half)
+    use = next(use for use in advice.uses if use.effect == "slip_weakening")
+    assert use.is_active and "slip_weakening" not in advice.droppable
+
+
+def test_silent_it_leaves_every_bit_of_a_scene_without_it():
+    silent = sheared(Uniform(4e-8), effects.SlipWeakening(ENERGY).silent(), until=4e-5)
+    without = sheared(Uniform(4e-8), until=4e-5)
+    for key, values in silent.history.items():
+        assert values.tobytes() == without.history[key].tobytes(), key
+    assert silent.report.effects == without.report.effects
+
+
+def test_large_energy_comes_to_the_law_of_constant_cohesion():
+    """With G_II = 1e12 J/m^2 a slip of 1 mm takes 3e-9 of the cohesion."""
+    weak = sheared(Uniform(4e-8), effects.SlipWeakening(1e12))
+    full = sheared(Uniform(4e-8), effects.ShearSlip())
+    slip = full.report.energy_balance["slip"]
+    assert slip > 0.0
+    assert weak.report.energy_balance["slip"] == pytest.approx(slip, rel=1e-6)
