@@ -204,7 +204,9 @@ def figures_of(tables, elastic):
     for group, rows in tables.items():
         for name, row, sign in effects_in(rows):
             own, known = group == "blast", not row["failed"]
-            key = name.split()[0] if own else f"{group}_{name.replace(' ', '_')}"
+            key = f"{group}_{name.replace(' ', '_')}"
+            if own:
+                key = CONTACTS.get(name, name.split()[0])
             for column, unit in ADDS.items():
                 more = sign * (rows[0][column] - row[column]) if known else None
                 found[f"{key}_{column.replace('run_s', 'seconds')}"] = more, unit

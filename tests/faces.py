@@ -2,11 +2,12 @@
 
 import numpy as np
 
-from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects
+from taichi_dem import CONCRETE, Scene, Simulation, Uniform, checked_mesh, effects
 from taichi_dem.mesh.shapes import bar, placed_together, single
-from taichi_dem.mesh.tetrahedra import LOCAL_FACES
+from taichi_dem.mesh.tetrahedra import all_faces
+from tests.turns import matrix
 
-LONG, WIDE, CELLS = 0.12, 0.08, (3, 2, 2)
+WIDE = 0.08
 
 
 def segment_distance(c, p, q):
@@ -29,15 +30,44 @@ def triangle_distance(c, corners):
     return np.where(inside, np.abs(height), beside)
 
 
+def solid():
+    """A block of 72 bodies."""
+    return bar(1.5 * WIDE, WIDE, (3, 2, 2))
+
+
+def cracked():
+    """The block in two parts that touch, and are bonded nowhere."""
+    half = bar(0.75 * WIDE, WIDE, (2, 2, 2))
+    apart = {"left": (half, (0.0, 0.0, 0.0)), "right": (half, (0.75 * WIDE, 0.0, 0.0))}
+    return placed_together(apart, keep_coincident=True)
+
+
+def ring():
+    """A block with a square hole through it: its sides have corners that are not convex."""
+    whole = bar(1.5 * WIDE, WIDE, (3, 3, 1))
+    middle = whole.points[whole.tetrahedra].mean(axis=1) - 0.5 * whole.points.max(axis=0)
+    outside = (np.abs(middle) > WIDE / np.array([4.0, 6.0, 1.0]))[:, :2].any(axis=1)
+    kept = whole.tetrahedra[outside]
+    used, tetrahedra = np.unique(kept, return_inverse=True)
+    return checked_mesh(whole.points[used], tetrahedra.reshape(kept.shape), {})
+
+
+def within_any(points, corners):
+    """Whether any of some points lies in any body; corners of their faces (n, 4, 3, 3)."""
+    outward = np.cross(corners[:, :, 1] - corners[:, :, 0], corners[:, :, 2] - corners[:, :, 0])
+    heights = np.einsum("pnfk,nfk->pnf", points[:, None, None] - corners[:, :, 0], outward)
+    return bool((heights < 0.0).all(axis=2).any())
+
+
 class AtABlock:
     """The last body of a mesh, a tetrahedron, is put somewhere; all others rest as a block."""
 
-    def __init__(self, method=None, contact=None, material=CONCRETE):
-        self.block = bar(LONG, WIDE, CELLS)
+    def __init__(self, block, material=CONCRETE):
+        self.block = block
         parts = {"block": (self.block, (0.0,) * 3), "body": (single(0.05), (1.0, 0.0, 0.0))}
-        listed = [contact or effects.FaceContact()]
-        scene = Scene(placed_together(parts), material, listed)
-        self.simulation = Simulation(scene, method or Uniform(1e-9))
+        listed = [effects.FaceContact(spheres_per_body=2000, pairs_per_body=100)]
+        mesh = placed_together(parts, keep_coincident=True)
+        self.simulation = Simulation(Scene(mesh, material, listed), Uniform(1e-9))
         self.model, self.state = self.simulation.model, self.simulation.state
         self.simulation.start()
         size = self.model.spheres.per_face
@@ -45,6 +75,7 @@ class AtABlock:
         self.sphere = self.sphere[: 4 * size * self.model.body_count].reshape(-1, 4, size, 4)
         self.low, self.high = self.block.points.min(axis=0), self.block.points.max(axis=0)
         self.outer = self.model.topology.body_bond[:-1] < 0
+        self.corners = mesh.points[all_faces(mesh.tetrahedra)].reshape(-1, 4, 3, 3)
 
     def put(self, place, orientation):
         """Put the tetrahedron there and search."""
@@ -60,34 +91,39 @@ class AtABlock:
         return self.simulation.energy_balance.account()["sphere_strain"]
 
     def gaps(self):
-        """Distances less radii of the tetrahedron's spheres from the six sides, and of the block's
-        outer spheres from the four faces; whether a centre lies within the other body."""
+        """Distances less radii of the tetrahedron's spheres from the free faces of every body of
+        the block, and of the block's free spheres from the tetrahedron, (spheres, bodies) each;
+        whether a centre lies within the other solid."""
         motion = self.state.motion()
         rotation, place = motion["rotation"][-1], motion["position"][-1]
         own = self.sphere[-1].reshape(-1, 4)
         centre = own[:, :3] @ rotation.T + place
-        gaps, held = [], np.clip(centre, self.low, self.high)
-        for axis in range(3):
-            for bound in (self.low, self.high):
-                side = held.copy()
-                side[:, axis] = bound[axis]
-                gaps.append(np.linalg.norm(centre - side, axis=1) - own[:, 3])
+        away = np.full((len(self.outer), len(own)), np.inf)
+        for body, face in np.argwhere(self.outer):
+            away[body] = np.minimum(away[body], triangle_distance(centre, self.corners[body, face]))
         others = self.sphere[:-1] + 0.0
         others[..., :3] += self.model.centre[:-1, None, None]
         others = others[self.outer].reshape(-1, 4)
-        mesh = self.model.mesh
-        corners = mesh.points[mesh.tetrahedra[-1]] - self.model.centre[-1]
-        corners = corners @ rotation.T + place
-        within = np.ones(len(others), dtype=bool)
-        for face in LOCAL_FACES:
-            triangle = corners[face]
-            gaps.append(triangle_distance(others[:, :3], triangle) - others[:, 3])
-            outward = np.cross(triangle[1] - triangle[0], triangle[2] - triangle[0])
-            within &= (others[:, :3] - triangle[0]) @ outward < 0.0
-        return np.concatenate(gaps), bool((held == centre).all(axis=1).any() or within.any())
+        turned = (self.corners[-1] - self.model.centre[-1]) @ rotation.T + place
+        near = np.min([triangle_distance(others[:, :3], face) for face in turned], axis=0)
+        within = within_any(centre, self.corners[:-1]) or within_any(others[:, :3], turned[None])
+        return np.concatenate([(away - own[:, 3]).ravel(), near - others[:, 3]]), within
 
     def drawn(self, random):
-        """A place near the block's surface and an orientation."""
-        place = random.uniform(self.low - 0.02, self.high + 0.02)
+        """A place near the block's surface and an orientation.
+
+        In most cases the centre of a sphere is above an edge of the surface, exactly but for
+        rounding, and in some of these the tetrahedron is not turned.
+        """
         orientation = random.standard_normal(4)
-        return place, orientation / np.linalg.norm(orientation)
+        if random.random() < 0.25:
+            orientation = np.array([1.0, 0.0, 0.0, 0.0])
+        orientation /= np.linalg.norm(orientation)
+        if random.random() < 0.2:
+            return random.uniform(self.low - 0.02, self.high + 0.02), orientation
+        face = self.corners[:-1][self.outer][random.integers(self.outer.sum())]
+        normal = np.cross(face[1] - face[0], face[2] - face[0])
+        sphere = self.sphere[-1].reshape(-1, 4)[random.integers(self.sphere[-1].size // 4)]
+        edge = face[0] + random.choice([0.0, random.random()]) * (face[1] - face[0])
+        above = sphere[3] * random.uniform(0.9, 1.0) / np.linalg.norm(normal)
+        return edge + above * normal - matrix(orientation) @ sphere[:3], orientation

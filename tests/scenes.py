@@ -16,11 +16,13 @@ def paper_effects(peak=575e6, rise=1.33e-4, kind=effects.SphereContact, **contac
 
     kind: its class.
     """
+    if kind is effects.SphereContact:
+        contact = {"outer_faces": False, **contact}
     return [
         effects.BondDamping(),
         effects.Softening(),
         effects.ShearSlip(),
-        kind(**{"outer_faces": False, **contact}),
+        kind(**contact),
         effects.Friction(),
         effects.GasPressure(peak=peak, rise=rise),
     ]

@@ -53,7 +53,7 @@ def sliding(body, speed, angle, friction, divisions=5, kind=effects.SphereContac
     mesh = placed_together({"plate": (plate(), (0.0, 0.0, 0.0)), "body": (body, place)})
     listed = [
         effects.BondDamping(),
-        kind(divisions, outer_faces=True, spheres_per_body=MOST[divisions]),
+        kind(divisions, spheres_per_body=MOST[divisions]),
         other.get("law", effects.Friction)(),
         effects.Gravity((0.0, -GRAVITY, 0.0)),
         effects.Fixed("plate_bottom"),

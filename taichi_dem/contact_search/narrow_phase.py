@@ -126,4 +126,4 @@ class NarrowPhase:
     def _gap(self, sphere, face):
         """Gap between a sphere and a face, whichever side it is on [m]."""
         p, q, s = self.corner[3 * face], self.corner[3 * face + 1], self.corner[3 * face + 2]
-        return (sphere.xyz - closest_point(sphere.xyz, p, q, s).point).norm() - sphere[3]
+        return (sphere.xyz - closest_point(sphere.xyz, p, q, s)).norm() - sphere[3]

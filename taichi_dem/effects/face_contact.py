@@ -9,48 +9,53 @@ import taichi as ti
 from taichi_dem.effects.sphere_contact import SphereContact
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.fixed_order import dot, length
-from taichi_dem.kit.types import real, vec3, vec4
+from taichi_dem.kit.types import real, vec4
 from taichi_dem.mesh.contact_spheres import ContactSpheres
-from taichi_dem.mesh.face_rims import face_rims
 from taichi_dem.mesh.tetrahedra import all_faces, area_vectors
 from taichi_dem.physics.sphere_pair import Nearest
-from taichi_dem.physics.triangle import CORNER, EDGE, INSIDE, closest_point
+from taichi_dem.physics.triangle import closest_point
 
 if TYPE_CHECKING:
     from taichi_dem.engine.capacity import Capacity
     from taichi_dem.engine.model import Model
 
 
+#: A distance farther than any, and a factor of its square that rounding does not reach.
+_FAR, _CLEARLY = 1e30, 1.0001
+
+
 @ti.data_oriented
 class FaceContact(SphereContact):
     """Spheres behind the free faces of a body touch the free faces of others; both ways.
 
-    In place of ``SphereContact``, whose spheres meet on their flanks. The overlap is the radius
-    less the distance from the centre to the closest point of the face; the force acts along this
-    line and derives from the energy. Outer faces that continue each other are one flat side,
-    without edges between them. A sphere whose centre is inside a body, by less than its radius, is
-    pushed back through the free face that is nearest.
+    In place of ``SphereContact``, whose spheres meet on their flanks. A sphere touches every other
+    body at the one point of its free faces that is nearest to the centre. The overlap is the radius
+    less that distance; the force acts along this line and derives from the energy, which changes
+    continuously over edges, corners and cracks. Over the common edge of two bodies that make a flat
+    side a sphere touches both: it sinks in less there, by a part of the overlap.
+    A sphere whose centre is inside a body is pushed out through the free face that is nearest; the
+    run counts as diverged by then.
 
-    Arguments: as of ``SphereContact``. Faces reach farther than the spheres behind them, so the
-    lists are longer; a body's radius, of which the skin is a share, is that to its corners.
+    Arguments: as of ``SphereContact``; outer faces always touch. Faces reach farther than the
+    spheres behind them, so the lists are longer; a body's radius, of which the skin is a share, is
+    that to its corners.
     Source of the closest point: Ericson, Real-Time Collision Detection, 5.1.5; not in the paper.
     """
 
     name = "face_contact"
     meets_faces = True
-    constant_fields = ("plane", "corner", "end", "rim")
+    constant_fields = ("plane", "corner")
 
     def __init__(
         self,
         divisions: int = 5,
-        outer_faces: bool = True,
         skin: float = 0.0075,
         neighbours_per_body: int = 192,
         pairs_per_body: int = 48,
         spheres_per_body: int = 320,
     ):
         room = neighbours_per_body, pairs_per_body, spheres_per_body
-        super().__init__(divisions, outer_faces, skin, *room)
+        super().__init__(divisions, True, skin, *room)
 
     def spheres(self, model: "Model") -> ContactSpheres:
         """Spheres of a model; the balls around them also hold the corners of the faces."""
@@ -63,16 +68,12 @@ class FaceContact(SphereContact):
         return replace(spheres, cluster=cluster, extent=extent)
 
     def declare(self, capacity: "Capacity") -> None:
-        """Planes and corners of the faces in body frames, and rims (``mesh.face_rims``).
+        """Planes and corners of the faces in body frames.
 
-        plane: outward normal and distance from the body's centre [m]. rim: bit e for an edge and
-        bit 3 + k for a corner that other bodies can meet.
+        plane: outward normal and distance from the body's centre [m].
         """
-        faces = capacity.faces
-        self.plane = ti.Vector.field(4, real, shape=faces)
-        self.corner = ti.Vector.field(3, real, shape=3 * faces)
-        self.end = ti.Vector.field(6, real, shape=3 * faces)
-        self.rim = ti.field(ti.i32, shape=faces)
+        self.plane = ti.Vector.field(4, real, shape=capacity.faces)
+        self.corner = ti.Vector.field(3, real, shape=3 * capacity.faces)
 
     def follow(self, exposed_faces: ti.Field) -> None:
         """Take note of the field with a bit for each face of a body that is free."""
@@ -83,29 +84,23 @@ class FaceContact(SphereContact):
         corners = _corners(model).reshape(-1, 3, 3)
         normal = area_vectors(corners.reshape(-1, 3), np.arange(corners.size // 3).reshape(-1, 3))
         normal /= length(normal)[:, None]
-        plane = np.concatenate([normal, dot(normal, corners[:, 0])[:, None]], axis=1)
-        rims = face_rims(model.mesh, model.topology.body_bond.reshape(-1) < 0)
-        bits = np.concatenate([rims.edge, rims.corner], axis=1) @ (1 << np.arange(6))
-        assign(self.plane, plane)
+        assign(self.plane, np.concatenate([normal, dot(normal, corners[:, 0])[:, None]], axis=1))
         assign(self.corner, corners.reshape(-1, 3))
-        assign(self.end, rims.ends.reshape(-1, 6))
-        assign(self.rim, bits.astype(np.int32))
 
     @ti.func
     def nearest(self, a, b, turn, offset):
-        """Where a sphere, the index that is not negative, is nearest to face -1 - a or -1 - b."""
-        first, apart, reach, can_meet = vec4(0.0), vec3(0.0), 0.0, 0
+        """Where a sphere, the index that is not negative, is nearest to the body of the other.
+
+        The other index is -1 - face. Only with the nearest of a body's faces can the sphere meet.
+        """
+        sphere, face = self.tables.sphere[ti.max(a, b)], -1 - ti.min(a, b)
+        centre = turn @ sphere.xyz + offset
         if b < 0:
-            first = self.tables.sphere[a]
-            back = turn.transpose()
-            found = self._nearest(back @ (first.xyz - offset), first[3], -1 - b)
-            apart, reach, can_meet = -(turn @ found.apart), found.reach, found.can_meet
-        else:
-            second = self.tables.sphere[b]
-            found = self._nearest(turn @ second.xyz + offset, second[3], -1 - a)
-            first, apart = found.first, found.apart
-            reach, can_meet = found.reach, found.can_meet
-        return Nearest(first=first, apart=apart, reach=reach, can_meet=can_meet)
+            centre = turn.transpose() @ (sphere.xyz - offset)
+        found = self._nearest(centre, sphere[3], face)
+        if b < 0:
+            found.first, found.apart = sphere, -(turn @ found.apart)
+        return found
 
     @ti.func
     def face_of(self, a):
@@ -117,42 +112,32 @@ class FaceContact(SphereContact):
 
     @ti.func
     def _nearest(self, centre, radius, face):
-        """A sphere's nearest point on a face, in the frame of the face's body, a ``Nearest``."""
-        k = 3 * face
-        found = closest_point(centre, self.corner[k], self.corner[k + 1], self.corner[k + 2])
-        point, region = found.point, found.region
-        apart, reach, can_meet = centre - point, radius, True
-        if region == INSIDE:
-            depth = -apart.dot(self.plane[face].xyz)
-            if 0.0 < depth and depth < radius:
-                if self._is_within(centre, depth, face):
-                    # The mirror image of the centre in front of the face has the same overlap.
-                    apart, reach = -apart, radius + 2.0 * depth
-        else:
-            can_meet = self._is_met(region, apart, face)
+        """A sphere's nearest point of the body of a face, in that body's frame, a ``Nearest``."""
+        i = face // 4
+        point, chosen, least = centre, -1, _FAR
+        highest, top, within = -_FAR, -1, True
+        for f in range(4 * i, 4 * i + 4):
+            height = self.plane[f].xyz.dot(centre) - self.plane[f][3]
+            within = within and height < 0.0
+            if (self.exposed_faces[i] >> (f - 4 * i)) & 1 == 1:
+                if height > highest:
+                    highest, top = height, f
+                # No point of a face is nearer than its plane.
+                if height * height < _CLEARLY * least:
+                    k = 3 * f
+                    on_f = closest_point(
+                        centre, self.corner[k], self.corner[k + 1], self.corner[k + 2]
+                    )
+                    if (centre - on_f).norm_sqr() < least:
+                        point, chosen, least = on_f, f, (centre - on_f).norm_sqr()
+        apart, reach, can_meet = centre - point, radius, chosen == face
+        if within:
+            # The mirror image of the centre in front of the face has the same overlap.
+            apart, reach = -highest * self.plane[face].xyz, radius - 2.0 * highest
+            point, can_meet = centre + apart, top == face and -highest < radius
         first = vec4(point[0], point[1], point[2], 0.0)
-        return Nearest(first=first, apart=apart, reach=reach, can_meet=ti.cast(can_meet, ti.i32))
-
-    @ti.func
-    def _is_within(self, centre, depth, face):
-        """Whether a point behind a face is within its body, and no other free face is nearer."""
-        within, i = True, face // 4
-        for f in range(4):
-            plane = self.plane[4 * i + f]
-            behind = plane[3] - plane.xyz.dot(centre)
-            free = (self.exposed_faces[i] >> f) & 1 == 1
-            if behind < 0.0 or (free and behind < depth):
-                within = within and 4 * i + f == face
-        return within
-
-    @ti.func
-    def _is_met(self, region, apart, face):
-        """Whether the edge or corner of a face ends the flat side of which the face is a part."""
-        met = (self.rim[face] >> (region - EDGE)) & 1 == 1
-        if region >= CORNER:
-            end = self.end[3 * face + region - CORNER]
-            met = met and apart.dot(end[0:3]) <= 0.0 and apart.dot(end[3:6]) <= 0.0
-        return met
+        met = ti.cast(can_meet, ti.i32)
+        return Nearest(first=first, apart=apart, reach=reach, size=radius, can_meet=met)
 
 
 def _corners(model):

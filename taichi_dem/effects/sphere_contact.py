@@ -80,7 +80,8 @@ class SphereContact(Effect):
         """
         first, second = self.tables.sphere[a], self.tables.sphere[b]
         apart = turn @ second.xyz + offset - first.xyz
-        return Nearest(first=first, apart=apart, reach=first[3] + second[3], can_meet=1)
+        size = first[3] + second[3]
+        return Nearest(first=first, apart=apart, reach=size, size=size, can_meet=1)
 
     @ti.func
     def face_of(self, a):

@@ -66,7 +66,7 @@ class Capacity(NamedTuple):
         if max(largest, self.neighbour_entries) > _MOST_ENTRIES:
             raise InputError(
                 f"lists must have at most {_MOST_ENTRIES} entries, a mesh of {self.bodies} bodies "
-                "with these options of SphereContact has more: take a smaller mesh or shorter lists"
+                "with these options of its contact has more: take a smaller mesh or shorter lists"
             )
 
 

@@ -45,7 +45,7 @@ class BlastEngine(Engine):
     """
 
     advice = (
-        "take a smaller mesh, or shorter lists (SphereContact: pairs_per_body, spheres_per_body, "
+        "take a smaller mesh, or shorter lists of contact (pairs_per_body, spheres_per_body, "
         "neighbours_per_body)"
     )
 

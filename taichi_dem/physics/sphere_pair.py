@@ -64,12 +64,13 @@ class Nearest:
 
     first: centre of the first's sphere and its radius [m], or a point of its face and 0. apart:
     from there to the second's centre or point [m]. reach: their distance when they touch [m].
-    can_meet: 0 where another face has the contact instead.
+    size: the sum of the radii [m]. can_meet: 0 where another face of the body is nearer.
     """
 
     first: ti.types.vector(4, ti.f64)
     apart: ti.types.vector(3, ti.f64)
     reach: ti.f64
+    size: ti.f64
     can_meet: ti.i32
 
 

@@ -85,11 +85,10 @@ class ContactForce:
         for k in range(self.contacts.store.first[p], self.contacts.store.last[p]):
             a, b = self.contacts.store.sphere[k][0], self.contacts.store.sphere[k][1]
             near_by = self.contacts.law.nearest(a, b, turn, offset)
-            apart, reach = near_by.apart, near_by.reach
             if ti.static(self.has_limits):
                 near += ti.cast(is_within(near_by, margin), ti.i32)
             if is_within(near_by, 0.0):
-                met = meeting(near_by.first, reach, apart, self.state.rotation[i])
+                met = meeting(near_by.first, near_by.reach, near_by.apart, self.state.rotation[i])
                 overlap, normal, arm = met.overlap, met.normal, met.arm
                 velocity = self._velocity_at(j, arm - branch) - self._velocity_at(i, arm)
                 rate = velocity.dot(normal)
@@ -105,7 +104,7 @@ class ContactForce:
                 dragged += (self.contacts.law.elastic(overlap) - push) * rate
                 rubbed -= (rub - stuck).dot(slide)
                 slipped += spent
-                deepest = ti.max(deepest, overlap / reach)
+                deepest = ti.max(deepest, overlap / near_by.size)
             elif ti.static(stepping):
                 slipped += self.springs.part(k)
         return PairForces(

@@ -16,7 +16,7 @@ from taichi_dem.mesh.shapes import bar
 from tests.processes import users_environment
 from tests.scenes import ROOT
 
-ATTACKS = "files"
+ATTACKS = "files: altered, cut off, too large, of others"
 BAR = bar(0.2, 0.1, (2, 1, 1))
 NUMBERS = ("-1", "0", "2147483648", "99999999999999999999", "nan", "inf", "x", "1.5", "")
 

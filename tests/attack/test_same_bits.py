@@ -24,7 +24,7 @@ from taichi_dem.kit.fixed_order import (
 from tests.processes import users_environment
 from tests.scenes import ROOT
 
-ATTACKS = "same bits on other processors"
+ATTACKS = "bits: other processors and libraries"
 ULP = 2.0**-52
 
 _NUMPY = getattr(np, "_core", None) or np.core

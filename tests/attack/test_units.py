@@ -23,7 +23,7 @@ from taichi_dem import (
 )
 from taichi_dem.mesh.shapes import bar, placed_together
 
-ATTACKS = "The same scene in other units"
+ATTACKS = "units: a scene in others is the same run"
 #: Powers of four by which a unit may be larger or smaller: a mm and a km are within 4^5 of a metre.
 LARGEST = 5
 CONTACTS = effects.SphereContact, effects.FaceContact

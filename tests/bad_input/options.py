@@ -122,7 +122,6 @@ BLAST = [
     *taken(effects.StickingFriction, "positive", ("stiffness_ratio",)),
     *taken(effects.FaceContact, "positive", ("skin",)),
     *taken(effects.FaceContact, "whole", ("divisions", *_ROOM)),
-    *taken(effects.FaceContact, "flag", ("outer_faces",)),
     *taken(effects.SphereContact, "whole", ("divisions", *_ROOM)),
     *taken(effects.SphereContact, "flag", ("outer_faces",)),
     *taken(effects.Gravity, "three numbers", ("acceleration",)),

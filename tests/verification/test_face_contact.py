@@ -15,46 +15,30 @@ from taichi_dem import (
     checked_mesh,
     effects,
 )
-from taichi_dem.mesh.face_rims import face_rims
-from taichi_dem.mesh.shapes import bar, single
-from taichi_dem.mesh.tetrahedra import all_faces
-from taichi_dem.mesh.topology import topology_of
-from tests.faces import AtABlock
+from taichi_dem.mesh.shapes import single
+from tests.faces import AtABlock, cracked, ring, solid
 from tests.sliding import GRAVITY, STEP, sliding, tetrahedron
 
 EPS = np.finfo(float).eps
 LOSSLESS = replace(CONCRETE, contact_damping=0.0)
 
 
-@pytest.fixture(scope="module")
-def at_a_block():
-    """A tetrahedron that is put at a block of 72, without bonds' dashpots."""
-    return AtABlock(material=LOSSLESS)
+@pytest.fixture(scope="module", params=[solid, cracked, ring], ids=lambda make: make.__name__)
+def at_a_block(request):
+    """A tetrahedron that is put at a block, without bonds' dashpots."""
+    return AtABlock(request.param(), LOSSLESS)
 
 
 def touching(scene, random, count):
-    """Places and orientations in which some sphere touches, and no centre is within a body."""
+    """Places and orientations in which some sphere touches, and none by most of its radius."""
     found = []
     while len(found) < count:
         drawn = scene.drawn(random)
         scene.put(*drawn)
         gaps, within = scene.gaps()
-        if gaps.min() < -1e-5 and not within:
+        if -1e-3 < gaps.min() < -1e-5 and not within:
             found.append(drawn)
     return found
-
-
-def test_a_side_of_many_faces_ends_at_its_own_edges_and_corners():
-    """A box has 6 sides of 4 edges and 4 corners, however many faces they are made of."""
-    mesh = bar(0.12, 0.08, (3, 2, 2))
-    outer = topology_of(mesh).body_bond.reshape(-1) < 0
-    rims = face_rims(mesh, outer)
-    corners = mesh.points[all_faces(mesh.tetrahedra)]
-    edge = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
-    rim = edge[outer][rims.edge[outer]].sum()
-    assert rim == pytest.approx(2 * (4 * 0.12 + 4 * 0.08 + 4 * 0.08), rel=1e-12)
-    assert rims.corner[outer].sum() == 24
-    assert rims.edge[~outer].all() and rims.corner[~outer].all()
 
 
 def test_an_intact_block_does_not_touch_itself(at_a_block):
@@ -64,16 +48,32 @@ def test_an_intact_block_does_not_touch_itself(at_a_block):
     assert at_a_block.energy() <= 0.5 * CONCRETE.contact_stiffness * (8 * EPS * 0.1) ** 2 * count
 
 
-def test_energy_is_that_of_six_flat_sides_and_four_triangles(at_a_block):
-    """The block's 56 outer faces act as six rectangles: no bump where they meet."""
+def test_energy_is_that_of_the_nearest_free_faces_of_every_body(at_a_block):
+    """A sphere and a body touch at one point, in whichever order faces and bodies are numbered."""
     random = np.random.default_rng(1)
-    for drawn in touching(at_a_block, random, 60):
+    for drawn in touching(at_a_block, random, 40):
         at_a_block.put(*drawn)
         overlap = np.maximum(0.0, -at_a_block.gaps()[0])
         wanted = 0.5 * CONCRETE.contact_stiffness * (overlap**2).sum()
         # Distances of 0.1 m are known to some roundings.
         error = CONCRETE.contact_stiffness * (overlap * 100 * EPS * 0.1).sum()
         assert at_a_block.energy() == pytest.approx(wanted, abs=error)
+
+
+def test_energy_changes_continuously(at_a_block):
+    """No distance changes by more than the way h, so that each contact adds at most k (o + h) h.
+
+    Over edges, corners that are not convex, and closed cracks.
+    """
+    random, h = np.random.default_rng(3), 1e-9
+    for place, orientation in touching(at_a_block, random, 25):
+        way = random.standard_normal(3)
+        found = []
+        for sign in (-1.0, 1.0):
+            at_a_block.put(place + 0.5 * sign * h * way / np.linalg.norm(way), orientation)
+            found.append(at_a_block.energy())
+        overlap = np.maximum(0.0, h - at_a_block.gaps()[0])
+        assert abs(found[1] - found[0]) <= CONCRETE.contact_stiffness * h * overlap.sum()
 
 
 def test_the_force_is_the_gradient_of_the_energy_and_conserves_momentum(at_a_block):
@@ -149,9 +149,10 @@ def test_faces_that_meet_leave_as_fast_as_they_came():
     assert residual[-1] < (rate * dt) ** 2 * mass * speed**2
 
 
-#: Method by name; explicit ones limit the dashpots of the bonds of the plate.
+#: Method by name; explicit ones limit the dashpots of the bonds of the plate. What a step adds to
+#: the braking falls with its square: by 4 from 2e-6 s to 1e-6 s.
 SLIDES = {
-    "implicit": ImplicitDashpots(STEP),
+    "implicit": ImplicitDashpots(0.5 * STEP),
     "uniform": Uniform(4e-7, dashpot="limited"),
     "multirate": Multirate(4e-7, 1e-6, dashpot="limited"),
 }

@@ -135,9 +135,8 @@ class PairDashpots:
         for k in range(start, self.store.last[p]):
             a, b = self.store.sphere[k][0], self.store.sphere[k][1]
             near = self.contacts.law.nearest(a, b, turn, offset)
-            apart, reach = near.apart, near.reach
             if is_within(near, ahead):
-                met = meeting(near.first, reach, apart, self.state.rotation[i])
+                met = meeting(near.first, near.reach, near.apart, self.state.rotation[i])
                 overlap, normal, arm = met.overlap, met.normal, met.arm - branch
                 self.entry[end], self.normal[end], self.arm[end] = k, normal, arm
                 # Spheres still apart may approach until they touch, at the end of the step.
@@ -146,7 +145,7 @@ class PairDashpots:
                 self.share[end] = self._share(i, j, branch, arm, normal)
                 force += self.impulse[k]
                 moment += arm.cross(self.impulse[k])
-                deepest = ti.max(deepest, overlap / reach)
+                deepest = ti.max(deepest, overlap / near.size)
                 if ti.static(self.springs.present):
                     self.pull[end] = zero3()
                     if overlap > 0.0:
@@ -298,7 +297,9 @@ class PairDashpots:
             velocity = self.state.velocity[j] + self.state.spin[j].cross(arm)
             velocity -= self.state.velocity[i] + self.state.spin[i].cross(met.arm)
             rate, pressed = velocity.dot(met.normal), pushed.dot(met.normal)
-            spring = self.contacts.law.elastic(ti.max(met.overlap, 0.0))
+            spring = 0.0
+            if near.can_meet == 1:
+                spring = self.contacts.law.elastic(ti.max(met.overlap, 0.0))
             dragged += (spring - pressed) * rate
             rub = pushed - pressed * met.normal
             if ti.static(self.springs.present):
