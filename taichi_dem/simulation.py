@@ -254,7 +254,7 @@ class Simulation(Uncopied):
             while self.state.tick[None] < end:
                 with self._undivided("it stepped"):
                     self.driver.run(end)
-                    # Runaways fill the lists: they are named first.
+                # A runaway fills the lists: it is named first.
                 self.divergence_check.check(hurried=self.state.tick[None] < end)
                 self._check_capacity()
                 if on_call is not None:

@@ -50,7 +50,7 @@ class Contacts:
         for effect in tables.effects:
             effect.declare_columns(self.store)
         self.exposed_faces = ti.field(ti.i32, shape=n)
-        self.law.follow(self.exposed_faces)
+        self.law.watch_faces(self.exposed_faces)
         self.travel = ti.field(real, shape=n)
         self.body_skin = ti.field(real, shape=n)
         self.skin = ti.field(real, shape=n)

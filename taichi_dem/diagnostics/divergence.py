@@ -92,8 +92,11 @@ class DivergenceCheck:
         pair = int(deepest.argmax())
         if deepest[pair] > DEEPEST_OVERLAP:
             body, other = bodies[pair].tolist()
-            share = f"{100 * deepest[pair]:.0f} % of their radii"
-            what = f"has a contact sphere inside one of body {other} ({share})"
+            inside, size = f"one of body {other}", "their radii"
+            if self.contacts.law.meets_faces:
+                inside, size = f"body {other}", "its radius"
+            share = f"{100 * deepest[pair]:.0f} % of {size}"
+            what = f"has a contact sphere inside {inside} ({share})"
             raise SimulationDiverged(self._sentence(body, self.state.motion(), what))
 
     def check_shared(self, volume: SharedVolume) -> None:

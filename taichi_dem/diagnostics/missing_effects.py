@@ -17,7 +17,7 @@ from taichi_dem.timeline import NEVER
 
 if TYPE_CHECKING:
     from taichi_dem.engine.model import Model
-    from taichi_dem.physics.sphere_pair import State
+    from taichi_dem.engine.state import State
 
 _EPSILON = np.finfo(np.float64).eps
 #: Overlap of two spheres, as a share of the distance at which they touch, below which they count

@@ -75,7 +75,7 @@ class FaceContact(SphereContact):
         self.plane = ti.Vector.field(4, real, shape=capacity.faces)
         self.corner = ti.Vector.field(3, real, shape=3 * capacity.faces)
 
-    def follow(self, exposed_faces: ti.Field) -> None:
+    def watch_faces(self, exposed_faces: ti.Field) -> None:
         """Take note of the field with a bit for each face of a body that is free."""
         self.exposed_faces = exposed_faces
 

@@ -83,6 +83,16 @@ class ContactLaw(Protocol):
     def stored(self, overlap: float) -> float:
         """Energy [J]."""
 
+    @property
+    def meets_faces(self) -> bool:
+        """Whether spheres meet faces, with ``corner`` of each in its body's frame [m]."""
+
+    def spheres(self, model: Any) -> Any:
+        """The ``ContactSpheres`` of a Model."""
+
+    def watch_faces(self, exposed_faces: ti.Field) -> None:
+        """Take note of the field with a bit for each face of a body that is free."""
+
     def nearest(self, a: int, b: int, turn: ti.Matrix, offset: ti.Vector) -> Any:
         """Where two bodies are nearest by an entry of the pair store (``SphereContact``)."""
 

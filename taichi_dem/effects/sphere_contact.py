@@ -69,7 +69,7 @@ class SphereContact(Effect):
         """Spheres of a model, in balls that hold all of a face, or of a body, that can touch."""
         return spheres_of_faces(model.mesh, model.centre, self.divisions)
 
-    def follow(self, exposed_faces: ti.Field) -> None:
+    def watch_faces(self, exposed_faces: ti.Field) -> None:
         """Take note of the field with a bit for each face of a body that is free."""
 
     @ti.func

@@ -1,4 +1,4 @@
-"""Contact of two spheres after fracture (Konno et al., 2.2): normal force and sliding friction."""
+"""Contact after fracture, of spheres (Konno et al., 2.2) or faces: normal force and friction."""
 
 import taichi as ti
 

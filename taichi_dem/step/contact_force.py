@@ -79,16 +79,16 @@ class ContactForce:
         turn, offset = back @ self.state.rotation[j], back @ branch
         force, moment_i, moment_j = zero3(), zero3(), zero3()
         dragged, rubbed, slipped, deepest = 0.0, 0.0, 0.0, 0.0
-        scale, near, active = 1.0, 0, ti.i64(0)
+        scale, near_count, active = 1.0, 0, ti.i64(0)
         if ti.static(self.limited):
             scale = self.contact_share(i, j)
         for k in range(self.contacts.store.first[p], self.contacts.store.last[p]):
             a, b = self.contacts.store.sphere[k][0], self.contacts.store.sphere[k][1]
-            near_by = self.contacts.law.nearest(a, b, turn, offset)
+            near = self.contacts.law.nearest(a, b, turn, offset)
             if ti.static(self.has_limits):
-                near += ti.cast(is_within(near_by, margin), ti.i32)
-            if is_within(near_by, 0.0):
-                met = meeting(near_by.first, near_by.reach, near_by.apart, self.state.rotation[i])
+                near_count += ti.cast(is_within(near, margin), ti.i32)
+            if is_within(near, 0.0):
+                met = meeting(near.first, near.reach, near.apart, self.state.rotation[i])
                 overlap, normal, arm = met.overlap, met.normal, met.arm
                 velocity = self._velocity_at(j, arm - branch) - self._velocity_at(i, arm)
                 rate = velocity.dot(normal)
@@ -104,7 +104,7 @@ class ContactForce:
                 dragged += (self.contacts.law.elastic(overlap) - push) * rate
                 rubbed -= (rub - stuck).dot(slide)
                 slipped += spent
-                deepest = ti.max(deepest, overlap / near_by.size)
+                deepest = ti.max(deepest, overlap / near.size)
             elif ti.static(stepping):
                 slipped += self.springs.part(k)
         return PairForces(
@@ -115,7 +115,7 @@ class ContactForce:
             rubbed=rubbed,
             slipped=slipped,
             deepest=deepest,
-            near_count=near,
+            near_count=near_count,
             active=active,
         )
 

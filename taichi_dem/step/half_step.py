@@ -47,9 +47,9 @@ class HalfStep:
     def impulse(self, i, linear, angular):
         """Impulse and moment on body i by which it is behind, and those of each load, a row each.
 
-        linear [N s], angular [N m s]: of its contacts, as ``pair`` gives them. Of a bond it is half
-        of what waits in the slot, also where the other body steps finer: earlier impulses of their
-        finer steps have been taken.
+        linear [N s], angular [N m s]: of its contacts, from ``Readings.pushes``. A bond adds half
+        of what waits in its slot, also where the other body steps finer: the impulses of all but
+        the last of its steps have been taken.
         """
         for f in range(4):
             linear += 0.5 * self.state.slot[4 * i + f][0:3]

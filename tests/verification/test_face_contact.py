@@ -11,6 +11,7 @@ from taichi_dem import (
     Multirate,
     Scene,
     Simulation,
+    SimulationDiverged,
     Uniform,
     checked_mesh,
     effects,
@@ -120,6 +121,15 @@ def test_a_centre_behind_a_face_is_pushed_back():
         energies.append(simulation.energy_balance.account()["sphere_strain"])
     assert energies[0] < 1e-9 * energies[-1]
     assert (np.diff(energies) > 0.0).all()
+
+
+def test_a_sphere_inside_a_body_is_named_as_such():
+    simulation = Simulation(Scene(facing(1e-9), LOSSLESS, [effects.FaceContact()]), Uniform(1e-9))
+    model = simulation.model
+    depth = [[0.0] * 3, [1.1 * model.spheres.radius[0, 0].min(), 0.0, 0.0]]
+    simulation.state.set_motion(model.centre - depth, np.tile([1.0, 0.0, 0.0, 0.0], (2, 1)))
+    with pytest.raises(SimulationDiverged, match=r"a contact sphere inside body \d .* % of its"):
+        simulation.advance_to(1)
 
 
 def test_faces_that_meet_leave_as_fast_as_they_came():
