@@ -13,11 +13,13 @@ from typing import Any, Optional, Union
 import numpy as np
 
 from ca_damper.accuracy.branches import BranchedAnswer, branches_of, clusters_of, sentence
-from ca_damper.accuracy.error_reduction import STEP_ORDER, STEP_RATIO, Reduction
+from ca_damper.accuracy.error_reduction import STEP_ORDER, Reduction
 from ca_damper.accuracy.error_sources import shortfall
-from ca_damper.accuracy.goal_estimate import Estimate, response_of, step_error
+from ca_damper.accuracy.goal_estimate import Estimate, response_of
 from ca_damper.accuracy.job import Job
+from ca_damper.accuracy.plan import DamperPlan, checked_plan
 from ca_damper.accuracy.scene_runs import SceneRuns
+from ca_damper.accuracy.step_part import step_part
 from ca_damper.errors import SimulationDiverged
 from ca_damper.filling import Filling, check_filling
 from ca_damper.goals import Goal
@@ -50,6 +52,7 @@ def solve_response(
     oscillator: Optional[Oscillator] = None,
     ratios: Optional[tuple[float, float]] = None,
     seeds: Union[int, Sequence[int], None] = None,
+    plan: Optional[Plan] = None,
     progress: Union[Listener, str, None] = AUTO,
 ) -> Any:
     """Value of a goal with an error bar: an Answer, or a tuple of them for several goals.
@@ -59,8 +62,9 @@ def solve_response(
     of endless runs at an endless small step. budget_s: CPU seconds without compiling, after which
     the best answer is returned and says what is missing. ratios: range (lowest, highest) of f/f0
     in which to look for a peak; one around the natural frequency if None, which is left where the
-    peak is outside. seeds: how many or which; as many as it takes if None. oscillator, progress:
-    as in ``frequency_response``.
+    peak is outside. seeds: how many or which; as many as it takes if None. plan: that of an
+    earlier answer for this filling and as many particles, where to begin: at its step, seeds and
+    cycles. oscillator, progress: as in ``frequency_response``.
 
     Runs begin at rest. A filling whose seeds come to several steady motions gives a
     BranchedAnswer. The same question gets the same bits, unless a budget ends it.
@@ -71,6 +75,7 @@ def solve_response(
     question = _question(filling, particles, oscillator, ratios, seeds)
     question.goals, question.budget_s = goals, _budget(budget_s)
     question.tolerance = _share("tolerance", tolerance)
+    question.plan = checked_plan(plan, filling, question.particles)
     question.confidence = between("confidence", confidence, 0.5, 0.9999)
     with reporting(progress, "answer") as listener:
         question.listener = OpenEnded(listener)
@@ -154,7 +159,8 @@ def _answer(job: Job, done: Reduction, found: Estimate) -> Answer:
     branches = _branches(job, done, found)
     if len(branches) > 1:
         first, words = branches[0], sentence(branches, goal.unit)
-        parts = ErrorParts(step=_step_of(branches, found), chance=first.error)
+        step = _step_of(branches, done.steps, found, job.confidence)
+        parts = ErrorParts(step=step, chance=first.error)
         found_value = {"value": first.value, "parts": parts}
         return BranchedAnswer(**base, **found_value, shortfall=words, branches=branches)
     words = shortfall(found, job.tolerance, done.ended)
@@ -182,13 +188,21 @@ def _branches(job, done, found):
     return branches_of(values, clusters, done.seeds, error, t)
 
 
-def _step_of(branches, found):
-    """Error by the step of the first branch: what its value differs at the coarse step."""
-    coarse = found.coarse.values[:, 0]
-    distance = np.abs(coarse[:, None] - [branch.value for branch in branches])
-    own = coarse[distance.argmin(axis=1) == 0]
-    change = abs(float(own.mean()) - branches[0].value) if len(own) else 0.0
-    return step_error(change, STEP_RATIO, STEP_ORDER)
+def _step_of(branches, steps, found, confidence):
+    """Error by the step of the first branch, from its seeds at each step."""
+    rows = []
+    for step, level in zip(steps, found.levels):
+        values = level.values[:, 0]
+        distance = np.abs(values[:, None] - [branch.value for branch in branches])
+        own = values[distance.argmin(axis=1) == 0]
+        if len(own):
+            error = np.sqrt(level.variance / len(own)).item()
+            rows.append((step, own.mean(), error))
+    some = np.array(rows)
+    if len(some) < 2 or 2.0 not in some[:, 0]:
+        return 0.0
+    values = some[:, 1:2], some[:, 2:3]
+    return float(step_part(some[:, 0].tolist(), *values, STEP_ORDER, confidence).error[0])
 
 
 def _plan(job, done):
@@ -197,7 +211,9 @@ def _plan(job, done):
     frequencies = done.frequencies()
     several = "1 frequency" if len(frequencies) == 1 else f"{len(frequencies)} frequencies"
     method = f"{label}, {done.dt:.3g} s, {several}, {seeds}, up to {done.longest()} cycles"
-    return Plan(method, done.runs.runs, done.pilot_s, done.runs.cpu_s - done.pilot_s)
+    paid = done.runs.runs, done.pilot_s, done.runs.cpu_s - done.pilot_s
+    shape = done.dt, len(done.seeds), done.window, done.has_between, done.margin
+    return DamperPlan(method, *paid, job.filling, job.particles, *shape)
 
 
 def _expenses(job, done, made):

@@ -25,8 +25,10 @@ from taichi_dem.kit.errors import InputError
 #: Order of the step's error: contacts begin and end within a step, and so do an automaton's
 #: events, which is of first order whatever integrates the motion between them.
 STEP_ORDER = 1.0
-#: Coarse step by fine one.
-STEP_RATIO = 2.0
+#: Steps by the finest: these show an order, and with those between the spread where there is none.
+STEPS, BETWEEN = (1.0, 2.0, 4.0), (math.sqrt(2.0), 2.0 * math.sqrt(2.0))
+# Halvings of a step without an order: it may only have been too coarse.
+_MOST_HOPES = 1
 # Most seeds there are.
 _MOST_SEEDS = 96
 # Cycles that a scene goes at least in the pilot and in the end, and those of its steady part.
@@ -34,27 +36,39 @@ _PILOT_CYCLES, _LEAST_CYCLES, _LEAST_WINDOW = 40, 64, 32
 # Drift that does not matter: as a share of the value in the pilot, of the tolerance in the end.
 _PILOT_DRIFT, _DRIFT = 0.05, 0.2
 _MOST_ROUNDS = 24
+# Seeds by which the frequencies at a peak are judged.
+_GRID_SEEDS = 3
 # Frequencies that are added on either side of a peak.
 _MOST_MARGIN = 5
 
 
 class Reduction:
-    """Runs of a job with coarse steps of ``2 dt`` and fine ones of ``dt`` [s].
+    """Runs of a job with steps of ``dt`` [s] and of 2 and 4 times as much.
 
     seeds: that are run. pilot_s: CPU seconds of what came before the final runs.
     """
 
     def __init__(self, job: Job, runs: SceneRuns, coarse: float):
-        self.job, self.runs, self.dt = job, runs, coarse / STEP_RATIO
+        self.job, self.runs, self.dt = job, runs, coarse / 2.0
+        self.has_between, self.hopes = False, _MOST_HOPES
         self.seeds, self.pilot_s = job.first_seeds(), 0.0
         self.peak, self.lattice = math.nan, Lattice(1.0, 1.0)
         self.window, self.margin, self.ended = _LEAST_WINDOW, 0, ""
+        if job.plan is not None:
+            self.window, self.margin = job.plan.window, job.plan.margin
+            self.has_between = job.plan.has_between
         self.steady, self.is_placed = SteadyRuns(runs, job.budget_s, self._goal_series), False
 
     @property
     def coarse(self) -> float:
-        """Coarse step [s]."""
-        return STEP_RATIO * self.dt
+        """Step of the pilot [s]."""
+        return 2.0 * self.dt
+
+    @property
+    def steps(self) -> tuple[float, ...]:
+        """Steps of the final runs, as multiples of the finest: one longer than safe is left out."""
+        some = sorted((*STEPS, *BETWEEN)) if self.has_between else STEPS
+        return tuple(k for k in some if k <= 2.0 or k * self.dt <= self.job.longest_step())
 
     def run(self) -> list[Estimate]:
         """Estimates of all goals, good enough or the best that could be had."""
@@ -79,10 +93,10 @@ class Reduction:
 
     def _state(self):
         """Which runs make the present estimates."""
-        return self.dt, self.seeds, self.lattice.level, self.margin
+        return self.dt, self.has_between, self.seeds, self.lattice.level, self.margin
 
     def _restore(self, state):
-        self.dt, self.seeds, self.lattice.level, self.margin = state
+        self.dt, self.has_between, self.seeds, self.lattice.level, self.margin = state
 
     def _search(self):
         """Find the peak, where a goal lies on it, with the first seed and the coarse step."""
@@ -134,8 +148,7 @@ class Reduction:
 
     def _keys(self):
         """Scenes of the final runs, and those that tell what the spacing at a peak does."""
-        steps = self.dt, self.coarse
-        ratios = self.frequencies()
+        steps, ratios = [k * self.dt for k in self.steps], self.frequencies()
         keys = [SceneKey(r, seed, dt) for dt in steps for r in ratios for seed in self.seeds]
         return list(dict.fromkeys([*keys, *self._wide_keys()]))
 
@@ -146,9 +159,18 @@ class Reduction:
         return self.lattice.wide(self.peak)
 
     def _wide_keys(self):
-        """Scenes of the wide triples, of the first seed at the coarse step."""
-        ratios = dict.fromkeys(ratio for triple in self._wide() for ratio in triple)
-        return [SceneKey(ratio, self.seeds[0], self.coarse) for ratio in ratios]
+        """Scenes of the wide triples, of few seeds at the coarsest step."""
+        ratios, dt = dict.fromkeys(r for some in self._wide() for r in some), self._coarsest
+        return [SceneKey(ratio, seed, dt) for ratio in ratios for seed in self._few_seeds]
+
+    @property
+    def _coarsest(self):
+        return self.steps[-1] * self.dt
+
+    @property
+    def _few_seeds(self):
+        """Seeds that tell what the frequencies at a peak do."""
+        return self.seeds[:_GRID_SEEDS]
 
     def longest(self) -> int:
         """Most cycles that a scene went."""
@@ -166,28 +188,33 @@ class Reduction:
 
     def _estimate(self, goal):
         ratios = self.ratios_of(goal)
-        fine, coarse = (
-            seed_values(goal, self.runs, ratios, self.seeds, dt, self.steady.parts)
-            for dt in (self.dt, self.coarse)
-        )
-        grid = np.zeros_like(fine.mean) if goal.ratios else self._grid_error(goal, ratios)
-        return estimate(goal, fine, coarse, grid, STEP_RATIO, STEP_ORDER, self.job.confidence)
+        levels = [
+            seed_values(goal, self.runs, ratios, self.seeds, k * self.dt, self.steady)
+            for k in self.steps
+        ]
+        grid = np.zeros_like(levels[0].mean) if goal.ratios else self._grid_error(goal, ratios)
+        return estimate(goal, self.steps, levels, grid, STEP_ORDER, self.job.confidence)
 
     def _grid_error(self, goal, ratios):
-        """Half-width by the spacing at the peak, (places,): half of what twice the spacing changes.
+        """Half-width by the frequencies at the peak, (places,).
 
-        So much for a curve with a kink; a smooth one is off by an eighth of it. Where the peak is
-        lost at twice the spacing, the spacing is too wide, and the half-width a tenth.
+        It is the most that the goal changes with other frequencies: at twice the spacing, or
+        without one of those around the peak. Where the peak is lost at twice the spacing, that is
+        too wide, and the half-width a tenth.
         """
-        own = self._mean_of(goal, ratios, self.seeds[:1], self.coarse)
-        wide = [self._mean_of(goal, some, self.seeds[:1], self.coarse) for some in self._wide()]
-        change = 0.5 * np.abs(np.array(wide) - own)
+        own, wide = self._mean_of(goal, ratios), self._wide()
+        everywhere = sorted({*ratios, *(ratio for some in wide for ratio in some)})
+        inside = [ratio for ratio in ratios if ratio not in (everywhere[0], everywhere[-1])]
+        without = [[one for one in everywhere if one != ratio] for ratio in inside]
+        found = np.array([self._mean_of(goal, some) for some in (*wide, *without)])
+        change = np.abs(found - own)
         known = np.where(np.isnan(change), -1.0, change).max(axis=0)
         return np.where(known < 0.0, 0.1 * np.abs(own), known)
 
-    def _mean_of(self, goal, ratios, seeds, dt):
-        """Mean over seeds of a goal that is made of some ratios, (places,)."""
-        found = response_of(self.runs, ratios, seeds, dt, self.steady.begins())
+    def _mean_of(self, goal, ratios):
+        """Mean over few seeds of a goal that is made of some ratios at the coarsest step, (places,)."""
+        begins = self.steady.begins()
+        found = response_of(self.runs, ratios, self._few_seeds, self._coarsest, begins)
         return goal.values(found).mean(axis=0)
 
     def _reduce(self, found: list[Estimate]) -> bool:
@@ -230,8 +257,10 @@ class Reduction:
     def _enlarge(self, found, source, excess):
         """Shorten the step, halve the spacing, or take more seeds or cycles."""
         if source == "step":
-            if found.step_is_seen:
-                self.dt /= STEP_RATIO
+            if not found.step.is_regular:
+                return self._without_order()
+            if found.step.is_seen:
+                self.dt /= 2.0
                 return True
             source = "chance" if found.fine.apart.max() > 0.0 else "cycles"
         factor = min(2.5, max(1.25, excess**2))
@@ -241,6 +270,17 @@ class Reduction:
             self.window = math.ceil(self.window * factor)
         else:
             return self._more_seeds(factor)
+        return True
+
+    def _without_order(self):
+        """Take in steps between, then half the step; False where there is no limit to be seen."""
+        if not self.has_between:
+            self.has_between = True
+        elif self.hopes > 0:
+            self.dt, self.hopes = self.dt / 2.0, self.hopes - 1
+        else:
+            self.ended = f"with {len(self.steps)} steps"
+            return False
         return True
 
     def _more_seeds(self, factor):

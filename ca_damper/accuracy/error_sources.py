@@ -7,6 +7,10 @@ from ca_damper.accuracy.goal_estimate import Estimate, size_of
 #: Source of most of a bar, and what narrows it, by its key.
 ADVICE = {
     "step": ("of the time step", "a larger budget_s shortens it"),
+    "no order": (
+        "of the time step, by which the value changes in no order",
+        "no step of this model has it to more",
+    ),
     "chance": ("from seed to seed", "more seeds narrow it"),
     "cycles": ("of the mean over cycles", "a larger budget_s lengthens the runs"),
     "grid": ("of the frequencies around the peak", "a larger budget_s takes more of them"),
@@ -34,7 +38,9 @@ def shortfall(found: Estimate, tolerance: float, ended: str) -> str:
     if total <= tolerance * size:
         return ""
     reached = f"{100.0 * total / size:.2g} %" if size > 0.0 else "wider than the value"
-    source, advice = ADVICE[largest_source(found)]
+    name = largest_source(found)
+    has_order = found.step.is_regular or name != "step"
+    source, advice = ADVICE[name if has_order else "no order"]
     return (
         f"{100.0 * tolerance:g} % was not reached {ended}: the bar is {reached}, most of it "
         f"{source}; {advice}"

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 
 from ca_damper.accuracy.scene_runs import SceneKey, SceneRuns
+from ca_damper.accuracy.steady_runs import SteadyRuns
+from ca_damper.accuracy.step_part import StepPart, step_part
 from ca_damper.goals import Goal
 from ca_damper.response import UNITS, Response
-from ca_damper.steady_state import BATCHES, SteadyPart, correlation_factor
+from ca_damper.steady_state import BATCHES, correlation_factor
 from taichi_dem.kit.accuracy.answer import ErrorParts, Values
 from taichi_dem.kit.accuracy.student import f_outside, t_quantile
 
-#: Error of the finest step by Richardson: times this.
-SAFETY = 1.25
 # Seeds are said to differ where chance would make their variance so large in this share of cases.
 _SEEDS_ALIKE = 0.2
 # Differences that are rounding, as a share of the value.
@@ -71,43 +71,44 @@ class SeedValues:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """A goal's value (places,) with its error parts. fine, coarse: the values at two steps.
+    """A goal's value (places,) with its error parts. levels: the values at each step, fine first.
 
-    step_is_seen: whether the steps differ by more than chance. grid: half-width by the frequencies
-    between which a peak lies, which is part of the sampling.
+    step: what they say of the step. grid: half-width by the frequencies between which a peak lies,
+    which is part of the sampling.
     """
 
     goal: Goal
-    value: np.ndarray
     parts: ErrorParts
-    fine: SeedValues
-    coarse: SeedValues
-    step_is_seen: bool
+    levels: tuple[SeedValues, ...]
+    step: StepPart
     grid: np.ndarray
+
+    @property
+    def value(self) -> np.ndarray:
+        """Value of the goal, (places,)."""
+        return self.step.value
+
+    @property
+    def fine(self) -> SeedValues:
+        """Values at the finest step."""
+        return self.levels[0]
 
 
 def estimate(
     goal: Goal,
-    fine: SeedValues,
-    coarse: SeedValues,
+    steps: Sequence[float],
+    levels: Sequence[SeedValues],
     grid: np.ndarray,
-    ratio: float,
     order: float,
     confidence: float,
 ) -> Estimate:
-    """Estimate of a goal at a step, and at one that is ``ratio`` times as long."""
-    sampling, chance = fine.bars(confidence)
-    change = np.abs(fine.mean - coarse.mean)
-    step = step_error(change, ratio, order)
-    known = sum(np.maximum(one.sampling, one.apart) ** 2 for one in (fine, coarse))
-    is_seen = bool((change > 2.0 * np.sqrt(known)).any())
-    parts = ErrorParts(step=step, chance=chance, sampling=np.hypot(sampling, grid))
-    return Estimate(goal, fine.mean, parts, fine, coarse, is_seen, grid)
-
-
-def step_error(change: Any, ratio: float, order: float) -> Any:
-    """Error of a value at a step that changes by so much at one that is ``ratio`` times as long."""
-    return SAFETY * change / (ratio**order - 1.0)
+    """Estimate of a goal from its values at steps, as multiples of the finest and from it on."""
+    means = np.array([one.mean for one in levels])
+    errors = np.array([np.maximum(one.sampling, one.apart) for one in levels])
+    step = step_part(steps, means, errors, order, confidence)
+    sampling, chance = levels[0].bars(confidence)
+    parts = ErrorParts(step=step.error, chance=chance, sampling=np.hypot(sampling, grid))
+    return Estimate(goal, parts, tuple(levels), step, grid)
 
 
 def seed_values(
@@ -116,19 +117,24 @@ def seed_values(
     ratios: Sequence[float],
     seeds: Sequence[int],
     dt: float,
-    steady: Mapping[SceneKey, SteadyPart],
+    steady: SteadyRuns,
 ) -> SeedValues:
-    """Values of a goal at a step [s], with the errors of their cycles by leaving parts out."""
-    begins = {key: part.begin for key, part in steady.items()}
+    """Values of a goal at a step [s], with the errors of their cycles by leaving parts out.
+
+    A goal that is not linear, as a peak, is off by a share of one over the cycles: it is highest
+    where chance lifts it. Leaving parts out tells how much, and that is taken off.
+    """
+    begins = steady.begins()
     values = goal.values(response_of(runs, ratios, seeds, dt, begins))
     without = goal.values(response_of(runs, ratios, seeds, dt, begins, BATCHES))
     places = values.shape[1]
-    apart = without.reshape(len(seeds), BATCHES, places)
-    apart = apart - apart.mean(axis=1, keepdims=True)
+    left = without.reshape(len(seeds), BATCHES, places)
+    apart = left - left.mean(axis=1, keepdims=True)
     variance = ((BATCHES - 1) / BATCHES * (apart**2).sum(axis=1)).mean(axis=0)
+    values = values - (BATCHES - 1) * (left.mean(axis=1) - values)
     keys = [SceneKey(ratio, seed, dt) for ratio in ratios for seed in seeds]
     more = np.mean([_correlated(runs.series(key)[0][begins[key] :]) for key in keys])
-    drift = max(_share(steady[key]) for key in keys) * np.abs(values.mean(axis=0))
+    drift = max(_share(steady.parts[key]) for key in keys) * np.abs(values.mean(axis=0))
     return SeedValues(values, more * variance, len(seeds) * (BATCHES - 1), drift)
 
 

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Any, Optional
 
+from ca_damper.accuracy.plan import DamperPlan
 from ca_damper.fixed_mass import Empty, RigidMass
 from ca_damper.goals import Goal
 from ca_damper.oscillator import Oscillator
@@ -18,7 +19,10 @@ _BELOW, _ABOVE = 0.95, 1.04
 
 @dataclass
 class Job:
-    """A checked question. span: range of ratios or None. fixed: seeds, or None for ours."""
+    """A checked question. span: range of ratios or None. fixed: seeds, or None for ours.
+
+    plan: where to begin, or None.
+    """
 
     filling: Any
     particles: int
@@ -29,12 +33,19 @@ class Job:
     tolerance: float = 0.01
     confidence: float = 0.95
     budget_s: float = math.inf
+    plan: Optional[DamperPlan] = None
     listener: Any = field(default=None, repr=False)
 
     def first_step(self) -> float:
         """Coarse step to begin with [s]."""
-        step, bound = _OF_DEFAULT * self.filling.default_dt, self.filling.step_bound
-        return step if bound is None else min(step, _OF_BOUND * bound[0])
+        if self.plan is not None:
+            return 2.0 * self.plan.dt
+        return min(_OF_DEFAULT * self.filling.default_dt, self.longest_step())
+
+    def longest_step(self) -> float:
+        """Longest step to be told anything by [s]."""
+        bound = self.filling.step_bound
+        return math.inf if bound is None else _OF_BOUND * bound[0]
 
     def first_seeds(self) -> tuple[int, ...]:
         """Seeds to begin with; one of a filling that draws nothing."""
@@ -42,6 +53,8 @@ class Job:
             return self.fixed
         if self.particles == 0 or isinstance(self.filling, (Empty, RigidMass)):
             return (1,)
+        if self.plan is not None:
+            return tuple(range(1, 1 + self.plan.seeds))
         several = math.ceil(_PARTICLES / self.particles)
         return tuple(range(1, 1 + min(_MANY_SEEDS, max(_FEWEST_SEEDS, several))))
 

@@ -1,5 +1,6 @@
 """Scenes of one filling that go on from where they are, each as far as it is asked to."""
 
+import math
 import time
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple, Optional
@@ -39,7 +40,7 @@ class SceneRuns:
     ):
         self.filling, self.particles, self.oscillator = filling, particles, oscillator
         self.progress = progress
-        self.cpu_s, self.steps = 0.0, 0
+        self.cpu_s, self.steps, self._pace = 0.0, 0, math.inf
         self._homes: dict[SceneKey, tuple[Batch, int]] = {}
         self._records: dict[SceneKey, np.ndarray] = {}
 
@@ -64,8 +65,8 @@ class SceneRuns:
         return self.steps_per_cycle(key.ratio, key.dt)
 
     def seconds(self, cycles: Mapping[SceneKey, int]) -> float:
-        """CPU seconds that they will take, by what earlier ones took; 0 before the first."""
-        return self.cpu_s / self.steps * self.work(cycles) if self.steps else 0.0
+        """CPU seconds that they will take, by the fastest so far; 0 before the first."""
+        return self._pace * self.work(cycles) if self.steps else 0.0
 
     def go_on(self, cycles: Mapping[SceneKey, int]) -> None:
         """Let scenes go on by numbers of cycles; those not known begin at rest.
@@ -105,8 +106,10 @@ class SceneRuns:
             counts[list(now)] = list(now.values())
             began = time.process_time()
             records = batch.measure_each(counts, self.progress)
-            self.cpu_s += time.process_time() - began
-            self.steps += int((counts * batch.steps_per_cycle).sum())
+            spent, steps = time.process_time() - began, int((counts * batch.steps_per_cycle).sum())
+            self.cpu_s, self.steps = self.cpu_s + spent, self.steps + steps
+            # The first runs of a process take longer.
+            self._pace = min(self._pace, spent / steps)
             for s, key in keys.items():
                 self._records[key] = np.concatenate([self._records[key], records[s]])
                 left[s] -= now[s]

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ca_damper.accuracy.scene_runs import SceneKey, SceneRuns
-from ca_damper.steady_state import SteadyPart, steady_part
+from ca_damper.steady_state import BATCHES, SteadyPart, steady_part
 
 # Cycles of a scene after which it is taken as it is, with what its drift is known to be.
 _MOST_CYCLES = 20_000
@@ -38,8 +38,11 @@ class SteadyRuns:
         self.parts: dict[SceneKey, SteadyPart] = {}
 
     def begins(self) -> dict[SceneKey, int]:
-        """Cycle at which the steady part of each scene begins."""
-        return {key: part.begin for key, part in self.parts.items()}
+        """Cycle from which on each scene is steady, in whole batches."""
+        return {key: self._begin(key, part.begin) for key, part in self.parts.items()}
+
+    def _begin(self, key, begin):
+        return begin + (self.runs.cycles(key) - begin) % BATCHES
 
     def go_on(self, keys: Iterable[SceneKey], drift: float, least: int, window: int) -> None:
         """Let scenes go on until each is steady for a window of cycles.
@@ -57,11 +60,12 @@ class SteadyRuns:
             self.runs.go_on(more)
 
     def _check_budget(self, more: Mapping[SceneKey, int]) -> None:
-        """Raise BudgetSpent where runs would take too long; the first cycle tells their speed."""
+        """Raise BudgetSpent where runs would take too long; two cycles tell their speed."""
         if self.budget_s == math.inf:
             return
         if not self.runs.steps:
-            self.runs.go_on(dict.fromkeys(more, 1))
+            for _ in range(2):
+                self.runs.go_on(dict.fromkeys(more, 1))
         needed = self.runs.cpu_s + self.runs.seconds(more)
         if needed > self.budget_s:
             raise BudgetSpent(needed)

@@ -45,14 +45,16 @@ def test_one_seed_has_no_chance_to_tell():
     assert chance[0] == 0.0 and sampling[0] == pytest.approx(np.hypot(2.3646 * 0.2, 0.3), rel=1e-4)
 
 
-def test_the_step_s_error_is_that_of_its_order():
-    """Values 1 + h and 1 + 2 h at steps h and 2 h, order 1: the finer is off by h, times 1.25."""
-    fine, coarse = (SeedValues(np.full((3, 1), v), NOTHING, 21, NOTHING) for v in (1.1, 1.2))
-    found = estimate(GOAL, fine, coarse, NOTHING, 2.0, 1.0, 0.95)
-    assert found.parts.step[0] == pytest.approx(0.125) and found.step_is_seen
-    again = estimate(GOAL, fine, coarse, NOTHING, 2.0, 2.0, 0.95)
-    assert again.parts.step[0] == pytest.approx(1.25 * 0.1 / 3.0)
-    assert not estimate(GOAL, fine, fine, NOTHING, 2.0, 1.0, 0.95).step_is_seen
+def test_an_estimate_has_the_value_of_the_finest_step_and_the_parts_of_all():
+    """Values 1 + h, 1 + 2 h and 1 + 4 h, order 1: the finest is off by h, times 1.25."""
+    levels = [
+        SeedValues(np.full((3, 1), v), np.array([1e-6]), 21, NOTHING) for v in (1.1, 1.2, 1.4)
+    ]
+    found = estimate(GOAL, (1.0, 2.0, 4.0), levels, np.array([0.3]), 1.0, 0.95)
+    assert found.value[0] == pytest.approx(1.1) and found.fine is levels[0]
+    assert found.parts.step[0] == pytest.approx(0.125) and found.step.is_seen
+    own = 2.0796 * 1e-3 / 3.0**0.5
+    assert found.parts.sampling[0] == pytest.approx(np.hypot(own, 0.3), rel=1e-4)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """Questions with a tolerance whose answers are known, and how they cost, repeat and are refused."""
 
 import math
+import subprocess
 import sys
 
 import numpy as np
@@ -28,6 +29,7 @@ from ca_damper.accuracy.scene_runs import SceneKey, SceneRuns
 from ca_damper.accuracy.steady_runs import BudgetSpent
 from ca_damper.progress import BatchProgress, OpenEnded
 from taichi_dem.kit.progress.progress import Progress
+from tests.processes import users_environment
 
 PAPER = Oscillator()
 QUIET = {"progress": None}
@@ -273,3 +275,85 @@ def test_the_share_of_an_open_end_grows_from_run_to_run():
     assert len(shares) == 7 and shares == sorted(set(shares)) and shares[-1] == 1.0
     assert (told[-1].seconds, told[-1].steps) == (3.0, 300)
     OpenEnded(None)(BatchProgress(1.0, 1.0, 1))
+
+
+_THREADS = """
+from ca_damper import Automaton, goals, runtime, solve_response
+runtime.start(threads={threads})
+asked = [goals.rms_at(0.97), goals.peak_rms()]
+for answer in solve_response(Automaton(), particles=9, goal=asked, tolerance=0.1, progress=None):
+    print(answer.value.hex(), answer.error.hex(), answer.plan.runs, answer.plan.method)
+"""
+
+
+def test_the_number_of_threads_changes_no_bit():
+    told = [
+        subprocess.run(
+            [sys.executable, "-c", _THREADS.format(threads=threads)],
+            env=users_environment(),
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=True,
+        ).stdout
+        for threads in (1, 2)
+    ]
+    assert told[0] == told[1] and told[0].count("\n") == 2
+
+
+def test_an_undamped_container_at_resonance_is_never_steady(monkeypatch):
+    """Its RMS grows for ever: the bar says so, and the value is no limit."""
+    monkeypatch.setattr(steady_runs, "_MOST_CYCLES", 300)
+    flat = Oscillator(damping=0.0)
+    answer = solve_response(Empty(), particles=0, goal=goals.rms_at(1.0), oscillator=flat, **QUIET)
+    assert not answer.reached and answer.share >= 0.5
+
+
+def test_ratios_are_where_a_peak_is_looked_for_and_bind_no_frequency_of_a_goal():
+    asked = {"particles": 10, "goal": goals.rms_at(1.2), **QUIET}
+    free = solve_response(RigidMass(), **asked)
+    bound = solve_response(RigidMass(), ratios=(0.9, 1.0), **asked)
+    assert bound.value == free.value
+    wanted = PAPER.rms(1.2 * PAPER.natural_frequency, 10 * 0.2e-3)
+    assert abs(bound.value - wanted) <= bound.error + 1e-9 * wanted
+    both = [goals.rms_at(1.2), goals.peak_ratio()]
+    far, peak = solve_response(RigidMass(), ratios=(0.9, 1.02), **{**asked, "goal": both})
+    assert far.value == pytest.approx(wanted, rel=0.01) and 0.9 < peak.value < 1.02
+
+
+def test_a_question_may_begin_with_the_plan_of_another():
+    """The second begins with the window of the first, and makes fewer rounds; bits are its own."""
+    first = grains(0.004)
+    begun, again = grains(0.004, plan=first.plan), grains(0.004, plan=first.plan)
+    assert begun.reached and (begun.value, begun.parts) == (again.value, again.parts)
+    assert begun.plan.window >= first.plan.window and begun.plan.seeds >= first.plan.seeds
+    assert abs(begun.value - first.value) <= begun.error + first.error
+    assert grains(0.004).value == first.value
+
+
+@pytest.mark.parametrize(
+    ("plan", "words"),
+    [
+        (lambda: "fast", "plan must be that of an answer of solve_response, got 'fast'"),
+        (lambda: grains(0.1, particles=5).plan, "plan must be of the same filling and particles"),
+    ],
+)
+def test_plans_of_something_else_are_refused(plan, words):
+    with pytest.raises(InputError, match=words):
+        grains(plan=plan())
+
+
+def test_a_method_without_a_limit_says_that_no_step_has_it():
+    """Three grains whose pushes alone count change their mass by a third from step to step."""
+    answer = solve_response(
+        Automaton(accounting="landing+ejection"),
+        particles=3,
+        goal=goals.apparent_mass_at(0.983),
+        oscillator=Oscillator(base_amplitude=0.3e-3),
+        **QUIET,
+    )
+    assert not answer.reached and "changes in no order" in answer.shortfall
+    # 8.4e-5 to 12.9e-5 kg at six steps from 4e-4 to 1.25e-5 s.
+    for mass in (8.4e-5, 12.9e-5):
+        assert abs(answer.value - mass) <= answer.error
+    assert answer.share < 1.0
