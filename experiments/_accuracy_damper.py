@@ -23,7 +23,7 @@ FILLINGS = (
     *((Automaton(accounting="landing"), 1.5), (Automaton(accounting="landing+ejection"), 1.5)),
 )
 #: CPU seconds that an answer may take.
-BUDGET_S = 3.0
+BUDGET_S = 4.0
 # A reference: first seed, cycles; step of the answer by its own, and at a peak of spheres.
 _FIRST_SEED, _TRANSIENT, _MEASURED, _FINER, _PEAK_OF_SPHERES = 1001, 120, 80, 4, 2
 # Its seeds, as many as come to so many steps, between these.

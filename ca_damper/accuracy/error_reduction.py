@@ -212,7 +212,7 @@ class Reduction:
         return np.where(known < 0.0, 0.1 * np.abs(own), known)
 
     def _mean_of(self, goal, ratios):
-        """Mean over few seeds of a goal that is made of some ratios at the coarsest step, (places,)."""
+        """Mean over few seeds of a goal of some ratios at the coarsest step, (places,)."""
         begins = self.steady.begins()
         found = response_of(self.runs, ratios, self._few_seeds, self._coarsest, begins)
         return goal.values(found).mean(axis=0)
@@ -262,14 +262,21 @@ class Reduction:
             if found.step.is_seen:
                 self.dt /= 2.0
                 return True
-            source = "chance" if found.fine.apart.max() > 0.0 else "cycles"
+            source = "chance" if _seeds_blur(found) else "cycles"
         factor = min(2.5, max(1.25, excess**2))
         if source == "grid":
             self.lattice.level += 1
         elif source == "cycles":
-            self.window = math.ceil(self.window * factor)
+            return self._more_cycles(factor)
         else:
             return self._more_seeds(factor)
+        return True
+
+    def _more_cycles(self, factor):
+        self.window = math.ceil(self.window * factor)
+        if self.steady.is_full(self._keys()):
+            self.ended = f"in {self.longest()} cycles"
+            return False
         return True
 
     def _without_order(self):
@@ -290,3 +297,12 @@ class Reduction:
             return False
         self.seeds = tuple(range(1, count + 1))
         return True
+
+
+def _seeds_blur(found):
+    """Whether the steps are compared less well for the seeds than for their cycles."""
+    apart, sampling = (
+        max(float(getattr(level, name).max()) for level in found.levels)
+        for name in ("apart", "sampling")
+    )
+    return apart > sampling

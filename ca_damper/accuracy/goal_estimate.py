@@ -107,8 +107,21 @@ def estimate(
     errors = np.array([np.maximum(one.sampling, one.apart) for one in levels])
     step = step_part(steps, means, errors, order, confidence)
     sampling, chance = levels[0].bars(confidence)
-    parts = ErrorParts(step=step.error, chance=chance, sampling=np.hypot(sampling, grid))
+    sampling = np.hypot(sampling, grid)
+    shift = np.where(step.regular, _shift(step.error, np.hypot(sampling, chance), confidence), 0.0)
+    parts = ErrorParts(step=np.maximum(step.error, shift), chance=chance, sampling=sampling)
     return Estimate(goal, parts, tuple(levels), step, grid)
+
+
+def _shift(error, blur, confidence):
+    """Half-width of an error that is of one sign, beside one of chance: their squares then add.
+
+    Together they must hold the error itself and chance on one side of it, which is more than the
+    root of their squares where both are alike.
+    """
+    one_sided = max(0.5, 2.0 * confidence - 1.0)
+    share = t_quantile(one_sided, math.inf) / t_quantile(confidence, math.inf)
+    return np.sqrt(np.maximum((error + min(1.0, share) * blur) ** 2 - blur**2, 0.0))
 
 
 def seed_values(

@@ -44,6 +44,10 @@ class SteadyRuns:
     def _begin(self, key, begin):
         return begin + (self.runs.cycles(key) - begin) % BATCHES
 
+    def is_full(self, keys: Iterable[SceneKey]) -> bool:
+        """Whether no scene may go on any further."""
+        return min(map(self.runs.cycles, keys)) >= _MOST_CYCLES
+
     def go_on(self, keys: Iterable[SceneKey], drift: float, least: int, window: int) -> None:
         """Let scenes go on until each is steady for a window of cycles.
 

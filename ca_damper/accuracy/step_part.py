@@ -17,8 +17,9 @@ from taichi_dem.kit.accuracy.student import t_quantile
 SAFETY = 1.25
 # Orders that are in range: from the least one to the declared one and so much.
 _LEAST_ORDER, _MORE = 0.5, 1.5
-# Standard errors beyond which a difference is not chance, and changes are in no order.
-_SEEN, _NO_ORDER = 2.0, 2.5
+# Standard errors beyond which a difference is not chance, changes are not those of the method's
+# order, and those of no order.
+_SEEN, _OTHER_ORDER, _NO_ORDER = 2.0, 2.5, 3.0
 # Differences that are rounding, as a share of the value.
 _ROUNDING = 1e-9
 
@@ -27,15 +28,19 @@ _ROUNDING = 1e-9
 class StepPart:
     """A value as its steps give it (places,), and the half-width of its bar by the step (places,).
 
-    value: at the finest step, or the mean over all where they have no order. is_seen: whether
-    steps differ by more than chance. is_regular: whether they have an order as far as chance lets
-    see.
+    value: at the finest step, or the mean over all where they have no order. regular: whether they
+    have one, as far as chance lets see (places,). is_seen: whether steps differ beyond chance.
     """
 
     value: np.ndarray
     error: np.ndarray
+    regular: np.ndarray
     is_seen: bool
-    is_regular: bool
+
+    @property
+    def is_regular(self) -> bool:
+        """Whether steps have an order in all places."""
+        return bool(self.regular.all())
 
 
 def step_part(
@@ -56,14 +61,14 @@ def step_part(
     seen = np.abs(change) > _SEEN * np.hypot(noise[0], noise[near])
     if far < 0:
         error = _richardson(change, order)
-        return StepPart(values[0], error, bool(seen.any()), True)
+        return StepPart(values[0], error, np.full(seen.shape, True), bool(seen.any()))
     three = [0, near, far]
     regular = _in_range(values[three], noise[three], order)
-    error = _by_order(values[three], seen, order)
+    error = _by_order(values[three], noise[three], order)
     spread = _prediction(values, confidence)
     value = np.where(regular, values[0], values.mean(axis=0))
     found = np.where(regular, error, spread)
-    return StepPart(value, found, bool(seen.any()), bool(regular.all()))
+    return StepPart(value, found, regular, bool(seen.any()))
 
 
 def _richardson(change, order):
@@ -77,28 +82,31 @@ def _in_range(values, noise, order):
     Then the change to the finest is a share of the one before, between two bounds; chance as a
     whole may take it out of them.
     """
-    near, far = values[0] - values[1], values[1] - values[2]
-    beyond = []
-    for power in (_LEAST_ORDER, order + _MORE):
-        share = 0.5**power
-        blur = np.sqrt(noise[0] ** 2 + ((1.0 + share) * noise[1]) ** 2 + (share * noise[2]) ** 2)
-        beyond.append((near - share * far) / np.where(blur > 0.0, blur, 1.0))
-    same_side = beyond[0] * beyond[1] > 0.0
-    return ~same_side | (np.minimum(*map(np.abs, beyond)) < _NO_ORDER)
+    high, low = (_beyond(values, noise, power) for power in (_LEAST_ORDER, order + _MORE))
+    return (high * low <= 0.0) | (np.minimum(np.abs(high), np.abs(low)) < _NO_ORDER)
 
 
-def _by_order(values, seen, order):
+def _beyond(values, noise, order):
+    """Standard errors by which the change to the finest is off the share that an order has."""
+    share = 0.5**order
+    gap = values[0] - values[1] - share * (values[1] - values[2])
+    blur = np.sqrt(noise[0] ** 2 + ((1.0 + share) * noise[1]) ** 2 + (share * noise[2]) ** 2)
+    return gap / np.where(blur > 0.0, blur, 1.0)
+
+
+def _by_order(values, noise, order):
     """Half-width of the finest of values at 1, 2 and 4 steps.
 
-    seen: places where its difference to the next is more than chance: the order is then that of
-    the differences, if it is lower than the method's. Elsewhere all three steps tell more of it.
+    All three tell it where they agree with the order of the method as far as chance lets see.
+    Elsewhere the order is that of the differences, if it is lower than the method's.
     """
     near, far = np.abs(values[0] - values[1]), np.abs(values[1] - values[2])
     with np.errstate(divide="ignore", invalid="ignore"):
         observed = np.log2(far / near)
     trusted = np.clip(np.where(near > 0.0, observed, order), _LEAST_ORDER, order)
-    whole = np.abs(values[0] - values[2]) / (4.0**order - 1.0)
-    return np.where(seen, _richardson(near, trusted), SAFETY * whole)
+    whole = SAFETY * np.abs(values[0] - values[2]) / (4.0**order - 1.0)
+    agree = np.abs(_beyond(values, noise, order)) < _OTHER_ORDER
+    return np.where(agree, whole, _richardson(near, trusted))
 
 
 def _prediction(values, confidence):
