@@ -211,9 +211,19 @@ def _plan(job, done):
     frequencies = done.frequencies()
     several = "1 frequency" if len(frequencies) == 1 else f"{len(frequencies)} frequencies"
     method = f"{label}, {done.dt:.3g} s, {several}, {seeds}, up to {done.longest()} cycles"
-    paid = done.runs.runs, done.pilot_s, done.runs.cpu_s - done.pilot_s
-    shape = done.dt, len(done.seeds), done.window, done.has_between, done.margin
-    return DamperPlan(method, *paid, job.filling, job.particles, *shape)
+    return DamperPlan(
+        method,
+        runs=done.runs.runs,
+        pilot_s=done.pilot_s,
+        final_s=done.runs.cpu_s - done.pilot_s,
+        filling=job.filling,
+        particles=job.particles,
+        dt=done.dt,
+        seeds=len(done.seeds),
+        window=done.window,
+        has_between=done.has_between,
+        margin=done.margin,
+    )
 
 
 def _expenses(job, done, made):

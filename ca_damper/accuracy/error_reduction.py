@@ -9,7 +9,7 @@ from ca_damper.accuracy.error_sources import largest_source
 from ca_damper.accuracy.goal_estimate import (
     Estimate,
     estimate,
-    response_of,
+    grid_error,
     seed_values,
     series_of,
     size_of,
@@ -85,11 +85,15 @@ class Reduction:
                 self.ended = f"after {counted(_MOST_ROUNDS, 'round')} of longer and more runs"
         except BudgetSpent as spent:
             self.ended = f"within budget_s of {self.job.budget_s:g} s"
-            if found:
+            if self._is_told(found):
                 self._restore(state)
             else:
                 found = self._first(spent)
         return found
+
+    def _is_told(self, found):
+        """Whether there are estimates, and all of them numbers."""
+        return bool(found) and all(math.isfinite(self._excess(one)) for one in found)
 
     def _state(self):
         """Which runs make the present estimates."""
@@ -123,14 +127,17 @@ class Reduction:
     def _first(self, spent):
         """Estimates of scenes that are not steady; InputError where some have not begun."""
         keys = self._keys() if self.is_placed else []
-        if not keys or min(map(self.runs.cycles, keys)) < _LEAST_CYCLES:
+        found = []
+        if keys and min(map(self.runs.cycles, keys)) >= _LEAST_CYCLES:
+            for key in keys:
+                self.steady.check_steady(key, _DRIFT * self.job.tolerance)
+            found = self._estimates()
+        if not self._is_told(found):
             raise InputError(
                 "budget_s must leave time for the pilot and one value: at least "
                 f"{1.5 * spent.needed:.2g} s here, got {self.job.budget_s:g}"
             ) from None
-        for key in keys:
-            self.steady.check_steady(key, _DRIFT * self.job.tolerance)
-        return self._estimates()
+        return found
 
     def ratios_of(self, goal: Goal) -> tuple[float, ...]:
         """Frequency ratios that a goal is made of."""
@@ -192,30 +199,11 @@ class Reduction:
             seed_values(goal, self.runs, ratios, self.seeds, k * self.dt, self.steady)
             for k in self.steps
         ]
-        grid = np.zeros_like(levels[0].mean) if goal.ratios else self._grid_error(goal, ratios)
+        grid = np.zeros_like(levels[0].mean)
+        if not goal.ratios:
+            few = self._few_seeds, self._coarsest, self.steady.begins()
+            grid = grid_error(goal, self.runs, ratios, self._wide(), *few)
         return estimate(goal, self.steps, levels, grid, STEP_ORDER, self.job.confidence)
-
-    def _grid_error(self, goal, ratios):
-        """Half-width by the frequencies at the peak, (places,).
-
-        It is the most that the goal changes with other frequencies: at twice the spacing, or
-        without one of those around the peak. Where the peak is lost at twice the spacing, that is
-        too wide, and the half-width a tenth.
-        """
-        own, wide = self._mean_of(goal, ratios), self._wide()
-        everywhere = sorted({*ratios, *(ratio for some in wide for ratio in some)})
-        inside = [ratio for ratio in ratios if ratio not in (everywhere[0], everywhere[-1])]
-        without = [[one for one in everywhere if one != ratio] for ratio in inside]
-        found = np.array([self._mean_of(goal, some) for some in (*wide, *without)])
-        change = np.abs(found - own)
-        known = np.where(np.isnan(change), -1.0, change).max(axis=0)
-        return np.where(known < 0.0, 0.1 * np.abs(own), known)
-
-    def _mean_of(self, goal, ratios):
-        """Mean over few seeds of a goal of some ratios at the coarsest step, (places,)."""
-        begins = self.steady.begins()
-        found = response_of(self.runs, ratios, self._few_seeds, self._coarsest, begins)
-        return goal.values(found).mean(axis=0)
 
     def _reduce(self, found: list[Estimate]) -> bool:
         """Ask for more where the worst estimate needs it; False where all is done that can be."""

@@ -185,6 +185,34 @@ def response_of(
     return _response(runs, ratios, named, dt, values)
 
 
+def grid_error(
+    goal: Goal,
+    runs: SceneRuns,
+    ratios: Sequence[float],
+    wide: Sequence[Sequence[float]],
+    seeds: Sequence[int],
+    dt: float,
+    begins: Mapping[SceneKey, int],
+) -> np.ndarray:
+    """Half-width by the frequencies at a peak, (places,).
+
+    It is the most that the goal changes with other frequencies: those of ``wide``, at twice the
+    spacing, or all without one of those around the peak. Where the peak is lost at twice the
+    spacing, that is too wide, and the half-width a tenth.
+    """
+
+    def mean_of(some):
+        return goal.values(response_of(runs, some, seeds, dt, begins)).mean(axis=0)
+
+    everywhere = sorted({*ratios, *(ratio for some in wide for ratio in some)})
+    inside = [ratio for ratio in ratios if ratio not in (everywhere[0], everywhere[-1])]
+    without = [[one for one in everywhere if one != ratio] for ratio in inside]
+    own = mean_of(ratios)
+    change = np.abs(np.array([mean_of(some) for some in (*wide, *without)]) - own)
+    known = np.where(np.isnan(change), -1.0, change).max(axis=0)
+    return np.where(known < 0.0, 0.1 * np.abs(own), known)
+
+
 def series_of(goal: Goal, runs: SceneRuns, key: SceneKey) -> np.ndarray:
     """A goal by cycle, of one that is made of the frequency of this scene alone, (cycles,)."""
     values = {name: value[None, None] for name, value in runs.by_cycle(key).items()}

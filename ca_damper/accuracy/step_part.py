@@ -17,9 +17,8 @@ from taichi_dem.kit.accuracy.student import t_quantile
 SAFETY = 1.25
 # Orders that are in range: from the least one to the declared one and so much.
 _LEAST_ORDER, _MORE = 0.5, 1.5
-# Standard errors beyond which a difference is not chance, changes are not those of the method's
-# order, and those of no order.
-_SEEN, _OTHER_ORDER, _NO_ORDER = 2.0, 2.5, 3.0
+# Standard errors beyond which a difference is not chance, and changes are not those of an order.
+_SEEN, _OTHER_ORDER = 2.0, 2.5
 # Differences that are rounding, as a share of the value.
 _ROUNDING = 1e-9
 
@@ -83,7 +82,7 @@ def _in_range(values, noise, order):
     whole may take it out of them.
     """
     high, low = (_beyond(values, noise, power) for power in (_LEAST_ORDER, order + _MORE))
-    return (high * low <= 0.0) | (np.minimum(np.abs(high), np.abs(low)) < _NO_ORDER)
+    return (high * low <= 0.0) | (np.minimum(np.abs(high), np.abs(low)) < _OTHER_ORDER)
 
 
 def _beyond(values, noise, order):
