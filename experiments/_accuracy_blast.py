@@ -5,16 +5,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from taichi_dem import CONCRETE, Goal, Scene, effects, goals
+from taichi_dem.kit.display import counted
 from taichi_dem.mesh.mesh import Mesh, checked_mesh
 from taichi_dem.mesh.shapes import bar
 
 #: Fewest and most boxes along x, y and z, and bodies of a bar.
 BOXES, BODIES = ((2, 12), (1, 5), (1, 5)), (12, 1500)
 #: Powers of ten between which are drawn: edge of a box [m], stiffness and damping over those of
-#: concrete, peak of the pressure [Pa], end of the run over the time of a wave along the bar.
-EDGE, STIFFNESS, DAMPING, PEAK, LASTS = (-2, -1), (-0.3, 0.5), (-1.5, 0.3), (6.5, 8.7), (0.0, 1.3)
+#: concrete, peak of the pressure [Pa]; end of the run and rise of the pressure over the time of a
+#: wave along the bar.
+EDGE, STIFFNESS, DAMPING, PEAK = (-2, -1), (-0.3, 0.5), (-1.5, 0.3), (6.5, 8.7)
+LASTS, RISES = (0.0, 1.3), (-1.0, 0.5)
 #: Shares of the bars that have dashpots, that may break, and that are fixed at one end.
 DAMPED, BREAKING, FIXED = 0.85, 0.6, 0.4
+#: Room in the lists of contacts: a bar that is crushed needs more than a block that is blasted.
+LISTS = 600
 #: Tolerances, powers of ten.
 TOLERANCE = (-2.5, -1.0)
 
@@ -28,6 +33,11 @@ class Question:
     until: float
     goal: Goal
     tolerance: float
+
+    def __str__(self):
+        bodies = counted(self.scene.mesh.body_count, "body")
+        effects = " ".join(effect.name for effect in self.scene.effects if effect.name)
+        return f"bar of {bodies} to {self.until:.3g} s: {self.goal.name}; {effects}"
 
 
 def blast_question(seed: int) -> Question:
@@ -43,8 +53,9 @@ def blast_question(seed: int) -> Question:
         shear_damping=CONCRETE.shear_damping * damped,
     )
     wave = np.sqrt(material.normal_stiffness * edge / material.density)
-    until = float(np.ptp(mesh.points[:, 0]) / wave * _power(random, LASTS))
-    scene = Scene(mesh, material, _effects(random, until))
+    travel = float(np.ptp(mesh.points[:, 0]) / wave)
+    until = travel * _power(random, LASTS)
+    scene = Scene(mesh, material, _effects(random, travel))
     goal = _goal(random, scene)
     return Question(seed, scene, until, goal, _power(random, TOLERANCE))
 
@@ -69,16 +80,16 @@ def _bar(random) -> tuple[Mesh, float]:
     return checked_mesh(mesh.points + inner * moved, mesh.tetrahedra, mesh.groups), edge
 
 
-def _effects(random, until):
-    """Gas pressure on the left end, and what else was drawn."""
-    rise, decay = until * random.uniform(0.1, 0.6), random.uniform(1.5, 4.0)
+def _effects(random, travel):
+    """Gas pressure on the left end, and what else was drawn; travel: time of a wave [s]."""
+    rise, decay = travel * _power(random, RISES), random.uniform(1.5, 4.0)
     gas = effects.GasPressure("left", peak=_power(random, PEAK), rise=rise, decay_ratio=decay)
     found = [gas]
     if random.random() < DAMPED:
         found.append(effects.BondDamping())
     if random.random() < BREAKING:
         found += [effects.Softening(), effects.ShearSlip()]
-        found += [effects.SphereContact(), effects.Friction()]
+        found += [effects.SphereContact(spheres_per_body=LISTS), effects.Friction()]
     if random.random() < FIXED:
         found.append(effects.Fixed("right"))
     return found

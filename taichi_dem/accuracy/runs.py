@@ -19,7 +19,7 @@ _ROUNDING = 1e-12
 #: Share of the whole that the first run is taken for.
 _GROWTH = 0.3
 #: Frames of a run, at which twins are compared.
-_FRAMES = 8
+_FRAMES = 32
 
 
 @dataclass(frozen=True)
@@ -38,8 +38,8 @@ class Runs:
     """Runs that were made, each once.
 
     seconds: CPU time of all so far, without compiling [s]. count: their number. results, cost: by
-    level of the step, Result and CPU time [s] of the last undisturbed run. failure: the sentence of
-    the last run that diverged.
+    level of the step, Result of the undisturbed run and CPU time [s] of the first. failure: the
+    sentence of the last run that diverged.
     """
 
     def __init__(self, job: Job, methods: Methods, listen: Optional[Listener]):
@@ -48,7 +48,7 @@ class Runs:
         self.results: dict[int, Result] = {}
         self.cost: dict[int, float] = {}
         self._simulation: Optional[Simulation] = None
-        self._known: dict[tuple[int, int, bool], tuple[float, float]] = {}
+        self._known: dict[tuple[int, int, bool], Optional[float]] = {}
 
     def value(self, level: int, twin: int = 0, tight: bool = False) -> Optional[float]:
         """Goal of a run at a level; None for one that diverged.
@@ -56,44 +56,66 @@ class Runs:
         twin: 0 for the scene as it is, else the seed of its disturbance. tight: see
         ``Methods.at``.
         """
-        return self._found(level, twin, tight)[0]
+        key = level, twin, tight
+        if key not in self._known:
+            self._known[key] = self._run(*key)
+        return self._known[key]
 
-    def parting(self, level: int, twin: int) -> float:
+    def parting(self, level: int) -> float:
         """Time at which a twin has left the run at a level by the tolerance [s]; infinite if never.
 
-        By the displacements of all bodies, to an eighth of the run.
+        By the way of a usual body, to a fraction of the run. Makes two runs.
         """
-        return self._found(level, twin, False)[1]
+        one, two = (self._timed(level, twin, False, _FRAMES) for twin in (0, 1))
+        for frame, other in zip(one.frames[1:], two.frames[1:]):
+            if _apart(other, frame) > self.job.tolerance:
+                return float(frame.time_s)
+        return math.inf
 
     def change(self, coarse: int, fine: int) -> float:
         """Difference of the displacements of all bodies at two levels, as a share of the finer."""
         return _apart(self.results[coarse].frames[-1], self.results[fine].frames[-1])
 
-    def _found(self, *key):
-        if key not in self._known:
-            self._known[key] = self._run(*key)
-        return self._known[key]
+    def leap(self, coarse: int, fine: int) -> float:
+        """Change of a number of broken faces between two levels that may go unseen, as a share.
+
+        Faces that broke in one of the runs only, taken to add up like steps to either side.
+        """
+        first, second = (np.isnan(self.results[level].broken_time) for level in (coarse, fine))
+        return math.sqrt((first != second).sum()) / max(1, int((~second).sum()))
+
+    def same_breaks(self, coarse: int, fine: int) -> bool:
+        """Whether the same faces broke at two levels."""
+        broken = (~np.isnan(self.results[level].broken_time) for level in (coarse, fine))
+        return np.array_equal(*broken)
 
     def _run(self, level, twin, tight):
+        result = self._timed(level, twin, tight)
+        if result.diverged:
+            self.failure = result.diverged
+            return None
+        if not (twin or tight):
+            self.results[level] = result
+        return self.job.goal.value(result)
+
+    def _timed(self, level, twin, tight, frames=1):
+        """Result of a run, whose CPU time is added to the sum."""
         started = clock()
-        result = self._simulated(level, twin, tight, brief=bool(twin or tight or not self.count))
+        brief = bool(twin or tight or not self.count or frames > 1)
+        result = self._simulated(level, twin, tight, frames, brief)
         spent = clock() - started
         if not self.count:
             # Kernels are compiled, or loaded, before the first run's first step.
             spent = max(spent - result.report.compile_seconds, result.report.run_cpu_seconds)
         self.seconds, self.count = self.seconds + spent, self.count + 1
+        self.cost.setdefault(level, spent)
         if self._listen is not None:
             share = 1.0 - 1.0 / (1.0 + _GROWTH * self.count)
             self._listen(Sought(share, self.seconds, self.count))
-        if result.diverged:
-            self.failure = result.diverged
-            return None, 0.0
-        if not (twin or tight):
-            self.results[level], self.cost[level] = result, spent
-        return self.job.goal.value(result), self._parted(self.results[level], result)
+        return result
 
-    def _simulated(self, level, twin, tight, brief):
-        """Result of a run; the simulation of the first is used again, which loads no engine."""
+    def _simulated(self, level, twin, tight, frames, brief):
+        """Result of a run; the simulation of the first is used again, which is not set up anew."""
         method = self.methods.at(level, tight)
         if self._simulation is None:
             self._simulation = Simulation(self.job.scene, method)
@@ -102,15 +124,9 @@ class Runs:
         simulation = self._simulation
         if twin:
             simulation.state.set_motion(**_displaced(simulation.model, twin))
-        looks: Any = {"samples": self.job.rows(level), "frames": _FRAMES, "progress": None}
+        looks: Any = {"samples": self.job.rows(level), "frames": frames, "progress": None}
         until = self.job.until
         return result_of(run_simulation, simulation, until=until, brief=brief, **looks)
-
-    def _parted(self, result, other):
-        for frame, twin in zip(result.frames, other.frames):
-            if frame.time_s > 0.0 and _apart(twin, frame) > self.job.tolerance:
-                return frame.time_s
-        return math.inf
 
 
 def _apart(frame, finer):

@@ -22,6 +22,9 @@ _MOST_COARSE, _MOST_FINE, _MOST_AT_ONCE = 6, 7, 2
 _NEGLIGIBLE, _TWO = 0.25, 2.8
 #: Runs of which a spread is taken at first, and at most.
 _FEW, _MANY = 6, 96
+#: Share of the change of a usual body that an output is taken to change by, at least: that it
+#: changes by less may be chance.
+_LIKELY = 0.3
 #: Tolerances of which the cost is told.
 _TOLERANCES = (0.1, 0.03, 0.01, 0.003)
 
@@ -48,6 +51,7 @@ class Search:
             self._reduce(parts)
             parts = self._parts()
         job, last = self.job, self.levels[-1]
+        parting = self._parting(parts.chance)
         words, spent = self.methods.in_words(last), self.runs.seconds - pilot_s
         made = Answer(
             goal=job.goal.name,
@@ -56,7 +60,7 @@ class Search:
             parts=parts,
             tolerance=job.tolerance,
             confidence=job.confidence,
-            plan=Plan(words, self.runs.count, pilot_s, spent, last - 1, self._parting()),
+            plan=Plan(words, self.runs.count, pilot_s, spent, last - 1, parting),
             result=self.runs.results[last],
             cost_curve=tuple(self._cost_curve()),
             shortfall=self._shortfall(),
@@ -113,13 +117,12 @@ class Search:
     def _step(self) -> StepError:
         """Error of the step, and of sweeps whose tolerance falls with it."""
         values = [self._value(level) for level in self.levels]
-        counted = self.job.goal.kind == "count"
-        change = 0.0 if counted else self.runs.change(*self.levels[-2:]) * abs(values[-1])
+        change = self.runs.leap if self.job.goal.kind == "count" else self.runs.change
         return step_error(
             values,
             self.methods.declared,
             [2.0**-level for level in self.levels],
-            least=change,
+            least=_LIKELY * change(*self.levels[-2:]) * abs(values[-1]),
             smooth=not self._eventful,
             confidence=self.job.confidence,
         )
@@ -138,21 +141,27 @@ class Search:
     def _spread(self):
         """Half-width by which runs that differ by one rounding spread, of one or of their mean.
 
-        A twin that agrees to a small part of what is allowed is enough.
+        To halve the step disturbs a run far more than a rounding does: where that moves a usual
+        body by little, and breaks the same faces, nothing is there that could let twins part.
         """
-        first = self.levels[0]
-        self.count = max(1, self.count)
-        if self.count == 1:
+        first, averaged = self.levels[0], self.job.goal.averaged
+        if self.count == 0:
+            change = self.runs.change(*self.levels[-2:])
+            if not averaged and change <= _NEGLIGIBLE * self.job.tolerance:
+                if self.runs.same_breaks(*self.levels[-2:]):
+                    return 0.0
+            self.count = 1
+        if self.count == 1 and not averaged:
             here, twin = self._single(first), self._single(first, 1)
             apart = math.inf if twin is None else _TWO * abs(twin - here)
             if apart <= _NEGLIGIBLE * self._allowed:
                 return apart
-            self.count = _FEW - 1
+        self.count = max(self.count, _FEW - 1)
         found = self._sample(first)
         if len(found) < 2:
             return math.inf
         spread = float(np.std(found, ddof=1)) * t_quantile(self.job.confidence, len(found) - 1)
-        return spread / math.sqrt(len(found)) if self.job.goal.averaged else spread
+        return spread / math.sqrt(len(found)) if averaged else spread
 
     @property
     def _eventful(self):
@@ -160,10 +169,9 @@ class Search:
         report = self.runs.results[self.levels[-1]].report
         return report.broken_faces > 0 or report.pair_evaluations > 0 or bool(report.bond_slip)
 
-    def _parting(self):
-        """Time from which a twin differs by more than the tolerance [s]; infinite if never."""
-        twins = range(1, self.count + 1)
-        return min((self.runs.parting(self.levels[0], k) for k in twins), default=math.inf)
+    def _parting(self, chance):
+        """Time from which twins differ by more than the tolerance [s], where chance tells."""
+        return self.runs.parting(self.levels[0]) if chance > self._allowed else math.inf
 
     def _reduce(self, parts):
         """Make the runs that narrow the largest part, or say why there are none."""
