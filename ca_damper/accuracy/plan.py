@@ -17,13 +17,13 @@ class DamperPlan(Plan):
     frequencies on either side of a peak.
     """
 
-    filling: Any
-    particles: int
-    dt: float
-    seeds: int
-    window: int
-    has_between: bool
-    margin: int
+    filling: Any = None
+    particles: int = 0
+    dt: float = 0.0
+    seeds: int = 1
+    window: int = 0
+    has_between: bool = False
+    margin: int = 0
 
 
 def checked_plan(plan: Any, filling: Any, particles: int) -> Any:
