@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from _damper_reference import reference_values
 from ca_damper import Automaton, Empty, Oscillator, RigidMass, Spheres, frequency_response, goals
 
 #: Fillings by how often they are drawn, in tenths.
@@ -22,12 +23,8 @@ FILLINGS = (
     *((Empty(), 1), (RigidMass(), 1), (Spheres(), 2), (Automaton(), 3)),
     *((Automaton(accounting="landing"), 1.5), (Automaton(accounting="landing+ejection"), 1.5)),
 )
-#: CPU seconds that an answer may take.
-BUDGET_S = 4.0
-# A reference: first seed, cycles; step of the answer by its own, and at a peak of spheres.
-_FIRST_SEED, _TRANSIENT, _MEASURED, _FINER, _PEAK_OF_SPHERES = 1001, 120, 80, 4, 2
-# Its seeds, as many as come to so many steps, between these.
-_STEPS, _FEWEST, _MOST = 12_000_000, 3, 16
+#: CPU seconds that an answer may take, and a peak of spheres, which are dearer.
+BUDGET_S, PEAK_OF_SPHERES_S = 4.0, 12.0
 # The fixed job: cycles, ratios at a peak, seeds of an automaton and of other fillings.
 _CYCLES, _RATIOS, _SEEDS = (150, 20), 33, (5, 1)
 
@@ -47,7 +44,9 @@ class Question:
         """Arguments of ``solve_response``; more: further ones."""
         names = "filling particles oscillator goal tolerance".split()
         given = {name: getattr(self, name) for name in names}
-        return {**given, "budget_s": BUDGET_S, "progress": None, **more}
+        dear = isinstance(self.filling, Spheres) and self.goal.kind == "extreme"
+        budget_s = PEAK_OF_SPHERES_S if dear else BUDGET_S
+        return {**given, "budget_s": budget_s, "progress": None, **more}
 
     def __str__(self):
         o, share = self.oscillator, 100.0 * self.tolerance
@@ -94,74 +93,6 @@ def damper_reference(question, answer):
     several steady motions that nearest to the answer.
     """
     return float(np.mean(reference_values(question, answer)))
-
-
-def reference_values(question, answer):
-    """Independent values whose mean is the reference, one a seed."""
-    if isinstance(question.filling, (Empty, RigidMass)):
-        return np.array([_exact(question)])
-    goal, ratios, finer = question.goal, answer.result.ratios, _FINER
-    if goal.kind == "extreme" and isinstance(question.filling, Spheres):
-        finer = _PEAK_OF_SPHERES
-    elif goal.kind == "extreme":
-        step = np.diff(ratios).min() / 2.0
-        ratios = np.arange(ratios[0], ratios[-1] + 0.5 * step, step)
-    cycles = len(ratios) * (_TRANSIENT + _MEASURED)
-    steps = cycles * finer * float(answer.result.steps_per_cycle.max())
-    count = min(_MOST, max(_FEWEST, round(_STEPS / steps)))
-    found = _run(question, ratios, range(_FIRST_SEED, _FIRST_SEED + count), answer, finer)
-    branches = getattr(answer, "branches", ())
-    if goal.kind == "extreme" and not branches:
-        return _without_one(found, goal)
-    values = goal.values(found)[:, 0]
-    values = values[np.isfinite(values)]
-    centres = [branch.value for branch in branches] or [answer.value]
-    own = np.abs(values[:, None] - centres).argmin(axis=1) == 0
-    return values[own] if own.any() else values
-
-
-def _run(question, ratios, seeds, answer, finer):
-    return frequency_response(
-        question.filling,
-        particles=question.particles,
-        ratios=ratios,
-        seeds=seeds,
-        oscillator=question.oscillator,
-        dt=float(answer.result.dt.max()) / finer,
-        transient_cycles=_TRANSIENT,
-        measured_cycles=_MEASURED,
-        progress=None,
-    )
-
-
-def _without_one(found, goal):
-    """Jackknife of the peak of the mean curve, smoothed by a polynomial of 1 / RMS^2, (seeds,)."""
-    curves = found.rms[0].T
-    count, whole = len(curves), _top(found.ratios, curves.mean(axis=0), goal)
-    less = [
-        _top(found.ratios, np.delete(curves, k, axis=0).mean(axis=0), goal) for k in range(count)
-    ]
-    return count * whole - (count - 1) * np.array(less)
-
-
-def _top(ratios, curve, goal):
-    square = ratios**2
-    x = (square - square.mean()) / np.ptp(square)
-    fit = np.polynomial.Polynomial.fit(x, curve**-2.0, min(4, len(x) - 1))
-    place = np.linspace(x[0], x[-1], 4001)
-    low = fit(place)
-    k = int(low.argmin())
-    at_peak = math.sqrt(square.mean() + np.ptp(square) * place[k]), low[k] ** -0.5
-    return at_peak[goal.unit == "m"]
-
-
-def _exact(question):
-    """Exact value of a goal of a filling that is a mass and nothing else."""
-    o, goal = question.oscillator, question.goal
-    mass = question.particles * question.filling.particle_mass
-    if goal.kind == "extreme":
-        return o.peak(mass)[goal.unit == "m"]
-    return float(o.rms(goal.ratios[0] * o.natural_frequency, mass))
 
 
 def damper_fixed(question):
