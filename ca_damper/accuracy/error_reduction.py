@@ -78,14 +78,16 @@ class Reduction:
             self.pilot_s, self.is_placed = self.runs.cpu_s, True
             for _ in range(_MOST_ROUNDS):
                 self._make_steady()
-                found, state = self._estimates(), self._state()
-                if not self._reduce(found):
+                now = self._estimates()
+                if self._is_told(now):
+                    found, state = now, self._state()
+                if not self._reduce(now):
                     break
             else:
                 self.ended = f"after {counted(_MOST_ROUNDS, 'round')} of longer and more runs"
         except BudgetSpent as spent:
             self.ended = f"within budget_s of {self.job.budget_s:g} s"
-            if self._is_told(found):
+            if found:
                 self._restore(state)
             else:
                 found = self._first(spent)

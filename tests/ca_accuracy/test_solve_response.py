@@ -3,6 +3,7 @@
 import math
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -29,6 +30,7 @@ from ca_damper.accuracy.error_reduction import Reduction
 from ca_damper.accuracy.scene_runs import SceneKey, SceneRuns
 from ca_damper.accuracy.steady_runs import BudgetSpent
 from ca_damper.progress import BatchProgress, OpenEnded
+from taichi_dem.kit.accuracy.answer import ErrorParts
 from taichi_dem.kit.progress.progress import Progress
 from tests.processes import users_environment
 
@@ -175,6 +177,25 @@ def test_a_budget_that_ends_before_further_seeds_gives_the_answer_of_those_befor
     answer = grains(0.01, budget_s=5.0)
     assert len(rounds[1]) > len(rounds[0]) and answer.result.seeds == rounds[0]
     assert "within budget_s of 5 s" in answer.shortfall and answer.share > 0.01
+
+
+def test_a_budget_that_ends_after_a_round_without_a_number_gives_the_round_before(monkeypatch):
+    """As where the peak of a further seed lies outside the frequencies there are."""
+    rounds, estimates = [], Reduction._estimates
+
+    def lost(reduction):
+        rounds.append(reduction.window)
+        if len(rounds) == 1:
+            return estimates(reduction)
+        reduction.runs.cpu_s += 100.0
+        found = estimates(reduction)
+        return [replace(one, parts=ErrorParts(step=np.full(1, math.nan))) for one in found]
+
+    monkeypatch.setattr(Reduction, "_estimates", lost)
+    asked = {"particles": 20, "goal": goals.peak_rms(), "tolerance": 1e-4, **QUIET}
+    answer = solve_response(Automaton(), seeds=3, budget_s=50.0, **asked)
+    assert len(rounds) == 2 and math.isfinite(answer.error) and answer.error > 0.0
+    assert "within budget_s of 50 s" in answer.shortfall
 
 
 class Shaky:
