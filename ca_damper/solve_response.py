@@ -181,7 +181,7 @@ def _branches(job, done, found):
     if found.value.size != 1:
         return ()
     values, error = found.fine.values[:, 0], math.sqrt(float(found.fine.variance[0]))
-    clusters = clusters_of(values, error, 0.5 * job.tolerance * abs(float(found.value[0])))
+    clusters = clusters_of(values, error, 0.5 * found.allowed(job.tolerance))
     if len(clusters) < 2:
         return ()
     t = t_quantile(job.confidence, found.fine.freedom)

@@ -9,6 +9,7 @@ from ca_damper.accuracy.goal_estimate import (
     Estimate,
     estimate,
     grid_error,
+    rounding_of,
     seed_values,
     series_of,
     size_of,
@@ -205,7 +206,8 @@ class Reduction:
         if not goal.ratios:
             few = self._few_seeds, self._coarsest, self.steady.begins()
             grid = grid_error(goal, self.runs, ratios, self._wide(), *few)
-        return estimate(goal, self.steps, levels, grid, STEP_ORDER, self.job.confidence)
+        known = STEP_ORDER, self.job.confidence, rounding_of(goal, self.job.oscillator)
+        return estimate(goal, self.steps, levels, grid, *known)
 
     def _reduce(self, found: list[Estimate]) -> bool:
         """Ask for more where the worst estimate needs it; False where all is done that can be."""
@@ -219,10 +221,10 @@ class Reduction:
 
     def _excess(self, found):
         """Bar by the bar that is allowed; infinite for no number."""
-        size, total = size_of(found.value), size_of(found.parts.total)
-        if not math.isfinite(size + total):
+        total, allowed = size_of(found.parts.total), found.allowed(self.job.tolerance)
+        if not math.isfinite(total + allowed):
             return math.inf
-        return total / (self.job.tolerance * size) if size > 0.0 else float(total > 0.0) * 1e9
+        return total / allowed if allowed > 0.0 else float(total > 0.0) * 1e9
 
     def _widen(self, goal):
         """Take in further frequencies where the peak of some seed leaves those there are."""
@@ -241,7 +243,7 @@ class Reduction:
         if found.value.size != 1:
             return False
         values, error = found.fine.values[:, 0], math.sqrt(float(found.fine.variance[0]))
-        least = 0.5 * self.job.tolerance * size_of(found.value)
+        least = 0.5 * found.allowed(self.job.tolerance)
         return len(clusters_of(values, error, least)) > 1
 
     def _enlarge(self, found, source, excess):

@@ -35,7 +35,7 @@ def shortfall(found: Estimate, tolerance: float, ended: str) -> str:
     ended: in words, what ended the runs.
     """
     size, total = size_of(found.value), size_of(found.parts.total)
-    if total <= tolerance * size:
+    if total <= found.allowed(tolerance):
         return ""
     reached = f"{100.0 * total / size:.2g} %" if size > 0.0 else "wider than the value"
     name = largest_source(found)

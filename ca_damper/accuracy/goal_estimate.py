@@ -11,6 +11,7 @@ from ca_damper.accuracy.scene_runs import SceneKey, SceneRuns
 from ca_damper.accuracy.steady_runs import SteadyRuns
 from ca_damper.accuracy.step_part import StepPart, step_part
 from ca_damper.goals import Goal
+from ca_damper.oscillator import Oscillator
 from ca_damper.response import UNITS, Response
 from ca_damper.steady_state import BATCHES, correlation_factor
 from taichi_dem.kit.accuracy.answer import ErrorParts, Values
@@ -18,8 +19,8 @@ from taichi_dem.kit.accuracy.student import f_outside, t_quantile
 
 # Seeds are said to differ where chance would make their variance so large in this share of cases.
 _SEEDS_ALIKE = 0.2
-# Differences that are rounding, as a share of the value.
-_ROUNDING = 1e-9
+# Differences that are rounding, as a share of the value, and values, as one of their unit's size.
+_ROUNDING, _ZERO = 1e-9, 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +75,8 @@ class Estimate:
     """A goal's value (places,) with its error parts. levels: the values at each step, fine first.
 
     step: what they say of the step. grid: half-width by the frequencies between which a peak lies,
-    which is part of the sampling.
+    and rounding: of the machine, by which a value that is truly zero is off; both are part of the
+    sampling.
     """
 
     goal: Goal
@@ -82,6 +84,7 @@ class Estimate:
     levels: tuple[SeedValues, ...]
     step: StepPart
     grid: np.ndarray
+    rounding: float = 0.0
 
     @property
     def value(self) -> np.ndarray:
@@ -93,6 +96,10 @@ class Estimate:
         """Values at the finest step."""
         return self.levels[0]
 
+    def allowed(self, tolerance: float) -> float:
+        """Largest half-width that is good enough: nothing is known better than to rounding."""
+        return float(np.maximum(tolerance * size_of(self.value), 2.0 * self.rounding))
+
 
 def estimate(
     goal: Goal,
@@ -101,16 +108,17 @@ def estimate(
     grid: np.ndarray,
     order: float,
     confidence: float,
+    rounding: float = 0.0,
 ) -> Estimate:
     """Estimate of a goal from its values at steps, as multiples of the finest and from it on."""
     means = np.array([one.mean for one in levels])
     errors = np.array([np.maximum(one.sampling, one.apart) for one in levels])
     step = step_part(steps, means, errors, order, confidence)
     sampling, chance = levels[0].bars(confidence)
-    sampling = np.hypot(sampling, grid)
+    sampling = np.hypot(np.hypot(sampling, grid), rounding)
     shift = np.where(step.regular, _shift(step.error, np.hypot(sampling, chance), confidence), 0.0)
     parts = ErrorParts(step=np.maximum(step.error, shift), chance=chance, sampling=sampling)
-    return Estimate(goal, parts, tuple(levels), step, grid)
+    return Estimate(goal, parts, tuple(levels), step, grid, rounding)
 
 
 def _shift(error, blur, confidence):
@@ -227,6 +235,12 @@ def _response(runs, ratios, seeds, dt, values):
     lengths = 1.0 / (axis * runs.oscillator.natural_frequency * steps)
     places = (runs.particles,), axis, seeds
     return Response(runs.filling.label, runs.oscillator, *places, steps, lengths, **values)
+
+
+def rounding_of(goal: Goal, oscillator: Oscillator) -> float:
+    """Value of a goal that is zero but for rounding, by the size that its unit has in a scene."""
+    sizes = {"1": 1.0, "m": oscillator.base_amplitude, "kg": oscillator.mass}
+    return _ZERO * sizes.get(goal.unit, 0.0)
 
 
 def size_of(value: Values) -> float:

@@ -381,3 +381,12 @@ def test_a_method_without_a_limit_says_that_no_step_has_it():
     for mass in (8.4e-5, 12.9e-5):
         assert abs(answer.value - mass) <= answer.error
     assert answer.share < 1.0
+
+
+def test_grains_at_rest_lose_nothing_to_rounding():
+    """Their loss factor is zero, of which no share can be known: to rounding is good enough."""
+    still = Oscillator(base_amplitude=1e-5)
+    answer = solve_response(
+        Automaton(), particles=5, goal=goals.loss_factor_at(0.8), oscillator=still, **QUIET
+    )
+    assert answer.reached and abs(answer.value) <= answer.error < 1e-11
