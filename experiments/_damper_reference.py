@@ -10,7 +10,7 @@ from ca_damper import Empty, RigidMass, Spheres, frequency_response
 _FIRST_SEED, _TRANSIENT, _MEASURED, _FINER, _PEAK_OF_SPHERES = 1001, 120, 80, 4, 2
 # Seeds of a round of it, as many as come to so many steps, between these; rounds at most, and
 # standard error by half the bar at which they end.
-_STEPS, _FEWEST, _MOST, _ROUNDS, _SHARP = 10_000_000, 3, 12, 4, 0.3
+_STEPS, _FEWEST, _MOST, _ROUNDS, _SHARP = 8_000_000, 3, 12, 3, 0.3
 
 
 def reference_values(question, answer):
