@@ -10,6 +10,7 @@ from taichi_dem.accuracy.job import Job, Methods
 from taichi_dem.kit.display import counted
 from taichi_dem.kit.progress.progress import Listener, Progress
 from taichi_dem.kit.study.timing import clock
+from taichi_dem.output.record import Frame
 from taichi_dem.result import Result
 from taichi_dem.simulate import result_of, run_simulation
 from taichi_dem.simulation import Simulation
@@ -66,11 +67,15 @@ class Runs:
 
         By the way of a usual body, to a fraction of the run. Makes two runs.
         """
-        one, two = (self._timed(level, twin, False, _FRAMES) for twin in (0, 1))
-        for frame, other in zip(one.frames[1:], two.frames[1:]):
+        one, two = (self.frames(level, twin) for twin in (0, 1))
+        for frame, other in zip(one[1:], two[1:]):
             if _apart(other, frame) > self.job.tolerance:
                 return float(frame.time_s)
         return math.inf
+
+    def frames(self, level: int, twin: int) -> tuple[Frame, ...]:
+        """Frames of a run at a level, made for them."""
+        return self._timed(level, twin, False, _FRAMES).frames
 
     def change(self, coarse: int, fine: int) -> float:
         """Difference of the displacements of all bodies at two levels, as a share of the finer."""

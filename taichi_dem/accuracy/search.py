@@ -25,6 +25,8 @@ _FEW, _MANY = 6, 96
 #: Share of the change of a usual body that an output is taken to change by, at least: that it
 #: changes by less may be chance.
 _LIKELY = 0.3
+#: Runs there must be of each end, on average, to call it one: more ends are a distribution.
+_OF_EACH = 3
 #: Tolerances of which the cost is told.
 _TOLERANCES = (0.1, 0.03, 0.01, 0.003)
 
@@ -71,7 +73,8 @@ class Search:
         """The answer with its branches, where twins come to a few ends; else as it is."""
         values = self._sample(self.levels[0])
         clusters = clusters_of(values, 0.0, 0.5 * self._allowed)
-        if self.job.goal.averaged or len(clusters) < 2:
+        few = 2 <= len(clusters) <= len(values) // _OF_EACH
+        if self.job.goal.averaged or not few:
             return made
         branches = branches_of(
             np.array(values), clusters, range(len(values)), self._step().error, 1.0
