@@ -5,6 +5,7 @@ import copy
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from typing import Any, Optional
 
 import numpy as np
@@ -13,6 +14,7 @@ from taichi_dem.diagnostics.bond_slip import BondSlips
 from taichi_dem.diagnostics.divergence import DivergenceCheck
 from taichi_dem.diagnostics.effect_activity import effect_activity
 from taichi_dem.diagnostics.energy_balance import EnergyBalance
+from taichi_dem.diagnostics.known_error import known_error
 from taichi_dem.diagnostics.missing_effects import MissingEffects
 from taichi_dem.diagnostics.readings import Readings
 from taichi_dem.diagnostics.report import Report
@@ -323,11 +325,10 @@ class Simulation(Uncopied):
         shared_volume = copy.copy(self.shared_volume)
         shared_volume.sample(self.time_s, finished=True)
         linear, angular = self.energy_balance.momentum_errors()
-        levels = self.state.level.to_numpy()
         tables = self.energy_balance.tables()
         account = self.energy_balance.account(tables)
         unconverged, worst = self.step_resolution.unconverged
-        return Report(
+        report = Report(
             method=self.method.name,
             driver=self.driver.name,
             effects=tuple(effect.name for effect in self.model.effects if effect.name),
@@ -335,7 +336,7 @@ class Simulation(Uncopied):
             body_count=self.model.body_count,
             bond_count=self.model.bond_count,
             broken_faces=int((self.state.broken_tick.to_numpy() != NEVER).sum()),
-            smallest_step_s=self.method.dt0 / 2.0 ** int(levels.max()),
+            smallest_step_s=self.method.dt0 / 2.0 ** int(self.state.level.to_numpy().max()),
             substeps=counts[0],
             body_updates=counts[1],
             bond_evaluations=counts[2],
@@ -365,6 +366,7 @@ class Simulation(Uncopied):
             bond_slip=self.bond_slips.finding(),
             round_off_J=self.divergence_check.round_off(),
         )
+        return replace(report, known_error=known_error(report, self.scene, self.method))
 
 
 def _driver_name(name, bond_count):
