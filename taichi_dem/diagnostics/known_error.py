@@ -15,7 +15,7 @@ def known_error(report: Report, scene: Scene, method: Any) -> str:
     """
     if not report.substeps:
         return ""
-    plan = plans.known(kind_of(scene))
+    plan = plans.recall(kind_of(scene))
     parts = _step(report, scene, method), _balance(report), plan and f"in such scenes {plan}"
     return "; ".join(part for part in parts if part)
 

@@ -166,16 +166,16 @@ def test_a_plan_of_the_session_tells_when_twins_part(nothing_known):
     plans.remember(kind_of(struck_bar()), sentence)
     assert run(Uniform(1e-8), True).report.known_error.endswith(f"; in such scenes {sentence}")
     for other in (struck_bar(damping=False), Scene(pair(), CONCRETE, struck_bar().effects)):
-        assert plans.known(kind_of(other)) == ""
+        assert plans.recall(kind_of(other)) == ""
     plans.remember(kind_of(struck_bar()), together)
-    assert plans.known(kind_of(struck_bar())) == together
+    assert plans.recall(kind_of(struck_bar())) == together
 
 
 def test_plans_end_with_their_session(nothing_known, monkeypatch):
     plans.remember("kind", "words")
-    assert plans.known("kind") == "words"
+    assert plans.recall("kind") == "words"
     monkeypatch.setattr(runtime, "_session", runtime.Session())
-    assert plans.known("kind") == ""
+    assert plans.recall("kind") == ""
 
 
 def test_what_is_known_is_the_same_after_a_restart_and_costs_nothing(tmp_path):

@@ -17,7 +17,7 @@ def remember(key: Hashable, sentence: str) -> None:
     _of_session()[key] = sentence
 
 
-def known(key: Hashable) -> str:
+def recall(key: Hashable) -> str:
     """The sentence that is remembered about runs of a kind, "" where there is none."""
     return _of_session().get(key, "")
 
