@@ -4,6 +4,7 @@ import inspect
 import json
 from dataclasses import dataclass, replace
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ from taichi_dem import (
     simulate,
 )
 from taichi_dem.diagnostics.known_error import known_error
-from taichi_dem.kit import listing, runtime
+from taichi_dem.kit import listing, runtime, study
 from taichi_dem.kit.accuracy import plans
 from taichi_dem.mesh.shapes import pair, single
 from taichi_dem.methods import order_of
@@ -191,3 +192,15 @@ def test_what_is_known_is_the_same_after_a_restart_and_costs_nothing(tmp_path):
     simulate(**question, until=5e-8, checkpoint=Checkpoint(path), **looks)
     resumed = simulate(**question, until=1e-7, resume=path, **looks).report
     assert resumed.known_error == simulate(**question, until=1e-7, **looks).report.known_error
+
+
+def test_summary_of_a_study_keeps_what_its_runs_say(tmp_path, capsys):
+    """Once for equal sentences; figures without a report of runs have none."""
+    reports = [run(Uniform(step), False).report for step in (1e-7, 1e-7, 2e-7)]
+    told = []
+    for runs in (reports, (1.0, 2.0)):
+        study.finish(SimpleNamespace(out=str(tmp_path)), "some", {}, runs)
+        told.append(json.loads((tmp_path / "summary.json").read_text()))
+    assert told[0]["known_errors"] == [reports[0].known_error, reports[2].known_error]
+    assert told[1]["known_errors"] == [] and told[1]["seconds"] == {"compile": 1.0, "run": 2.0}
+    assert told[0]["seconds"]["run"] == sum(report.run_seconds for report in reports)
