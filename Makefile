@@ -18,7 +18,7 @@ STAMP := .venv/stamp
 MESH_STAMP := .venv/stamp-mesh
 DOCS_STAMP := .venv/stamp-docs
 LESSONS_STAMP := .venv/stamp-lessons
-LESSONS := $(addprefix experiments/lessons/,$(addsuffix .py,what_a_time_step_costs \
+LESSONS := $(addprefix experiments/lessons/,$(addsuffix .py,what_a_time_step_costs what_an_answer_costs \
   why_a_box_of_grains_damps which_effects_a_scene_needs))
 GMSH_PACKAGES := libglu1-mesa libgl1 libxcursor1 libxft2 libxinerama1 libgomp1
 
