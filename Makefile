@@ -60,7 +60,7 @@ bench: $(STAMP) ## measure speed
 gallery: $(STAMP) ## run all experiments and show them on one page (GALLERY_OPTIONS=--quick: minutes)
 	$(BIN)/python experiments/gallery.py $(GALLERY_OPTIONS)
 
-lessons: $(LESSONS_STAMP) ## serve three interactive lessons to this machine's browser (installs marimo)
+lessons: $(LESSONS_STAMP) ## serve four interactive lessons to this machine's browser (installs marimo)
 	$(BIN)/python -m marimo run $(LESSONS) --host 127.0.0.1 $(LESSONS_OPTIONS)
 
 api: $(DOCS_STAMP) ## pages of all functions from their docstrings, in results/api (installs pdoc)
