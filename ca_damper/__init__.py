@@ -4,7 +4,6 @@
 from taichi_dem.kit import runtime  # isort: skip
 
 from ca_damper import goals
-from ca_damper.accuracy.branches import Branch, BranchedAnswer
 from ca_damper.automaton import Automaton
 from ca_damper.batch import Batch
 from ca_damper.errors import InputError, SimulationDiverged
@@ -20,6 +19,7 @@ from ca_damper.solve_response import solve_response
 from ca_damper.spheres import Spheres
 from ca_damper.sweep import Sweep, sweep_up_and_down
 from taichi_dem.kit.accuracy.answer import Answer
+from taichi_dem.kit.accuracy.branches import Branch, BranchedAnswer
 from taichi_dem.kit.progress.progress import Progress
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.kit.version import __version__

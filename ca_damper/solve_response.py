@@ -12,7 +12,6 @@ from typing import Any, Optional, Union
 
 import numpy as np
 
-from ca_damper.accuracy.branches import BranchedAnswer, branches_of, clusters_of, sentence
 from ca_damper.accuracy.error_reduction import STEP_ORDER, STEP_RATIO, Reduction
 from ca_damper.accuracy.error_sources import shortfall
 from ca_damper.accuracy.goal_estimate import Estimate, response_of, step_error
@@ -25,6 +24,7 @@ from ca_damper.oscillator import Oscillator
 from ca_damper.progress import OpenEnded
 from ca_damper.response import Grid
 from taichi_dem.kit.accuracy.answer import Answer, ErrorParts, Expense, Plan
+from taichi_dem.kit.accuracy.branches import BranchedAnswer, branches_of, clusters_of, sentence
 from taichi_dem.kit.accuracy.student import t_quantile
 from taichi_dem.kit.display import counted
 from taichi_dem.kit.errors import InputError

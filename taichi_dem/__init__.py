@@ -18,6 +18,9 @@ A scene is a mesh, a material and the effects that act; ``simulate`` runs it::
 from taichi_dem.kit import runtime  # isort: skip
 
 from taichi_dem import effects, goals, methods
+from taichi_dem.goals import Goal
+from taichi_dem.kit.accuracy.answer import Answer
+from taichi_dem.kit.accuracy.branches import Branch, BranchedAnswer
 from taichi_dem.kit.checkpoint import Checkpoint
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.progress.progress import Progress
@@ -43,10 +46,14 @@ from taichi_dem.stability.step_report import step_report
 __all__ = [
     "CONCRETE",
     "PAPER_BLOCK",
+    "Answer",
     "At",
+    "Branch",
+    "BranchedAnswer",
     "Checkpoint",
     "Collector",
     "Every",
+    "Goal",
     "ImplicitDashpots",
     "InputError",
     "Material",

@@ -106,15 +106,26 @@ class _Sampler:
         self.recorder.sample()
 
 
-class _Photographer:
-    """Keeps a number of frames after the one at the start; none for 0."""
+class _EvenlySpaced:
+    """A number of times after the start; none for 0.
 
-    def __init__(self, recorder, count):
-        self.when, self.recorder, self.count = self, recorder, count
+    Apart from its observer: one that named itself would keep its simulation until the next
+    collection of garbage, and the engine would put its data aside meanwhile.
+    """
+
+    def __init__(self, count):
+        self.count = count
 
     def marks(self, last, dt, samples):
         """Largest steps at which to call."""
         return Every(samples=1).marks(last, dt, self.count) if self.count else set()
+
+
+class _Photographer:
+    """Keeps a number of frames after the one at the start."""
+
+    def __init__(self, recorder, count):
+        self.when, self.recorder = _EvenlySpaced(count), recorder
 
     def observe(self, view):
         """Keep a frame."""

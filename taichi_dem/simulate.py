@@ -95,8 +95,12 @@ def run_simulation(
     progress: Union[Listener, str, None] = AUTO,
     title: str = "simulating",
     observers: Sequence[Observer] = (),
+    brief: bool = False,
 ) -> Result:
-    """Run a Simulation, whose motion may have been set, to a time; otherwise as ``simulate``."""
+    """Run a Simulation, whose motion may have been set, to a time; otherwise as ``simulate``.
+
+    brief: whether the report leaves out all that needs a comparison of the bodies at the end.
+    """
     instance("simulation", simulation, Simulation)
     last = macro_steps(until, simulation.method.dt0)
     plan = RunPlan(last, simulation.method.dt0, samples, frames, observers, progress)
@@ -104,7 +108,8 @@ def run_simulation(
         simulation, recorder = _started(simulation)
         writer = NoCheckpointWriter()
         error = _run_saved(simulation, recorder, writer, plan, report_progress)
-    result = replace(_result(simulation, recorder, error), start=simulation.first_motion)
+    result = _result(simulation, recorder, error, brief)
+    result = replace(result, start=simulation.first_motion)
     if error is not None:
         error.result = result
         raise error
@@ -249,7 +254,7 @@ def _watched_group(scene):
     return groups[0] if groups else None
 
 
-def _result(simulation, recorder, error):
+def _result(simulation, recorder, error, brief=False):
     return Result(
         scene=simulation.scene,
         method=simulation.method,
@@ -258,6 +263,6 @@ def _result(simulation, recorder, error):
         frames=tuple(recorder.frames),
         broken_time=recorder.broken_time(),
         peak_speed=recorder.peak_speed,
-        report=simulation.report(),
+        report=simulation.report(brief),
         diverged=str(error) if error else "",
     )

@@ -6,7 +6,7 @@ from typing import Any, Optional, Union
 from taichi_dem.accuracy.job import Job
 from taichi_dem.accuracy.search import Search
 from taichi_dem.goals import Goal
-from taichi_dem.kit.accuracy.answer import Answer
+from taichi_dem.kit.accuracy.answer import Answer, Plan
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.progress.progress_bar import reporting
@@ -22,13 +22,15 @@ def solve(
     tolerance: float = 0.01,
     confidence: float = 0.95,
     budget_s: Optional[float] = None,
+    plan: Optional[Plan] = None,
     progress: Union[Listener, str, None] = AUTO,
 ) -> Answer:
     """An output of a scene at a time, with an error bar that is as narrow as asked.
 
     until: simulated time [s]. goal: from ``taichi_dem.goals``. tolerance: largest half-width of
     the bar, as a share of the value, in (0, 1]. confidence: of the bar, in (0, 1).
-    budget_s: CPU seconds after which no run is begun; None for no limit. progress: as of
+    budget_s: CPU seconds after which no run is begun; None for no limit. plan: of the answer to a
+    question of a like scene, which then begins at the steps that were enough. progress: as of
     ``simulate``.
     The answer's ``shortfall`` says why a bar is wider than asked, and what would help.
     Raises InputError for what cannot be used, SimulationDiverged where no step is stable.
@@ -39,9 +41,10 @@ def solve(
     _share("tolerance", tolerance, 1.0)
     _share("confidence", confidence, math.nextafter(1.0, 0.0))
     budget = math.inf if budget_s is None else positive("budget_s", budget_s)
+    first = 0 if plan is None else instance("plan", plan, Plan).begin
     job = Job(scene, until, goal, tolerance, confidence)
     with reporting(progress, goal.name) as report_progress:
-        return Search(job, budget, report_progress).answer()
+        return Search(job, budget, report_progress, first).answer()
 
 
 def _share(name: str, value: Any, most: float) -> None:

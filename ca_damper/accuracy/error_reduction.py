@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 
-from ca_damper.accuracy.branches import clusters_of
 from ca_damper.accuracy.error_sources import largest_source
 from ca_damper.accuracy.goal_estimate import (
     Estimate,
@@ -19,6 +18,7 @@ from ca_damper.accuracy.peak_search import Lattice, PeakSearch
 from ca_damper.accuracy.scene_runs import SceneKey, SceneRuns
 from ca_damper.accuracy.steady_runs import BudgetSpent, SteadyRuns
 from ca_damper.goals import Goal
+from taichi_dem.kit.accuracy.branches import clusters_of
 from taichi_dem.kit.display import counted
 from taichi_dem.kit.errors import InputError
 

@@ -5,14 +5,18 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from taichi_dem.goals import Goal
+from taichi_dem.mesh.topology import topology_of
 from taichi_dem.methods import ImplicitDashpots, Uniform
 from taichi_dem.scene import Scene
-from taichi_dem.stability.step_report import step_report
+from taichi_dem.stability.mesh_limits import bond_rates, springs_of
+from taichi_dem.stability.stable_step import spring_step
 
 #: Fewest steps of a run.
 _FEWEST = 8
 #: Sweeps of a step at most, and by how much better they agree to see their error.
 _MOST_SWEEPS, _TIGHT = 1000, 8
+#: Rows of the time series of the coarsest run in which an extreme is looked for, and of any run.
+_ROWS, _MOST_ROWS = 50, 3200
 
 
 @dataclass(frozen=True)
@@ -27,15 +31,20 @@ class Job:
 
     def methods(self) -> "Methods":
         """The method for this scene, at any step."""
-        scene = self.scene
-        damped = any(effect.role == "dashpot" for effect in scene.effects if effect.name)
-        damped &= scene.material.normal_damping + scene.material.shear_damping > 0.0
-        touching = any(effect.role == "contact" for effect in scene.effects if effect.name)
-        damped |= touching and scene.material.contact_damping > 0.0
-        make = ImplicitDashpots if damped else Uniform
-        report = step_report(scene)
-        step = report.borne("solved" if damped else "full").min()
-        return Methods(make, self.until, max(_FEWEST, math.ceil(self.until / step)))
+        scene, material = self.scene, self.scene.material
+        present = {effect.role for effect in scene.effects if effect.name}
+        damped = "dashpot" in present and material.normal_damping + material.shear_damping > 0.0
+        damped |= "contact" in present and material.contact_damping > 0.0
+        # Solved dashpots leave the limit of the springs, which is all there is without any.
+        step = spring_step(
+            bond_rates(scene.mesh, topology_of(scene.mesh), material.density, springs_of(material))
+        )
+        steps = max(_FEWEST, math.ceil(self.until / step.min()))
+        return Methods(ImplicitDashpots if damped else Uniform, self.until, steps)
+
+    def rows(self, level: int) -> int:
+        """Rows of the time series of a run at a level, of which an extreme needs ever more."""
+        return min(_MOST_ROWS, _ROWS * 2**level) if self.goal.kind == "extreme" else 1
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """Runs of one question: by level of the step, and twins that differ by one rounding."""
 
+import math
 from dataclasses import dataclass
 from typing import Any, Optional
 
@@ -17,6 +18,8 @@ from taichi_dem.simulation import Simulation
 _ROUNDING = 1e-12
 #: Share of the whole that the first run is taken for.
 _GROWTH = 0.3
+#: Frames of a run, at which twins are compared.
+_FRAMES = 32
 
 
 @dataclass(frozen=True)
@@ -35,8 +38,8 @@ class Runs:
     """Runs that were made, each once.
 
     seconds: CPU time of all so far, without compiling [s]. count: their number. results, cost: by
-    level of the step, Result and CPU time [s] of the last undisturbed run. failure: the sentence of
-    the last run that diverged.
+    level of the step, Result of the undisturbed run and CPU time [s] of the first. failure: the
+    sentence of the last run that diverged.
     """
 
     def __init__(self, job: Job, methods: Methods, listen: Optional[Listener]):
@@ -44,7 +47,8 @@ class Runs:
         self.seconds, self.count, self.failure = 0.0, 0, ""
         self.results: dict[int, Result] = {}
         self.cost: dict[int, float] = {}
-        self._values: dict[tuple[int, int, bool], Optional[float]] = {}
+        self._simulation: Optional[Simulation] = None
+        self._known: dict[tuple[int, int, bool], Optional[float]] = {}
 
     def value(self, level: int, twin: int = 0, tight: bool = False) -> Optional[float]:
         """Goal of a run at a level; None for one that diverged.
@@ -53,31 +57,86 @@ class Runs:
         ``Methods.at``.
         """
         key = level, twin, tight
-        if key not in self._values:
-            self._values[key] = self._run(*key)
-        return self._values[key]
+        if key not in self._known:
+            self._known[key] = self._run(*key)
+        return self._known[key]
+
+    def parting(self, level: int) -> float:
+        """Time at which a twin has left the run at a level by the tolerance [s]; infinite if never.
+
+        By the way of a usual body, to a fraction of the run. Makes two runs.
+        """
+        one, two = (self._timed(level, twin, False, _FRAMES) for twin in (0, 1))
+        for frame, other in zip(one.frames[1:], two.frames[1:]):
+            if _apart(other, frame) > self.job.tolerance:
+                return float(frame.time_s)
+        return math.inf
+
+    def change(self, coarse: int, fine: int) -> float:
+        """Difference of the displacements of all bodies at two levels, as a share of the finer."""
+        return _apart(self.results[coarse].frames[-1], self.results[fine].frames[-1])
+
+    def leap(self, coarse: int, fine: int) -> float:
+        """Change of a number of broken faces between two levels that may go unseen, as a share.
+
+        Faces that broke in one of the runs only, taken to add up like steps to either side.
+        """
+        first, second = (np.isnan(self.results[level].broken_time) for level in (coarse, fine))
+        return math.sqrt((first != second).sum()) / max(1, int((~second).sum()))
+
+    def same_breaks(self, coarse: int, fine: int) -> bool:
+        """Whether the same faces broke at two levels."""
+        broken = (~np.isnan(self.results[level].broken_time) for level in (coarse, fine))
+        return np.array_equal(*broken)
 
     def _run(self, level, twin, tight):
+        result = self._timed(level, twin, tight)
+        if result.diverged:
+            self.failure = result.diverged
+            return None
+        if not (twin or tight):
+            self.results[level] = result
+        return self.job.goal.value(result)
+
+    def _timed(self, level, twin, tight, frames=1):
+        """Result of a run, whose CPU time is added to the sum."""
         started = clock()
-        simulation = Simulation(self.job.scene, self.methods.at(level, tight))
-        if twin:
-            simulation.state.set_motion(**_displaced(simulation.model, twin))
-        looks: Any = {"samples": self.job.goal.samples, "frames": 1, "progress": None}
-        result = result_of(run_simulation, simulation, until=self.job.until, **looks)
+        brief = bool(twin or tight or not self.count or frames > 1)
+        result = self._simulated(level, twin, tight, frames, brief)
         spent = clock() - started
         if not self.count:
             # Kernels are compiled, or loaded, before the first run's first step.
             spent = max(spent - result.report.compile_seconds, result.report.run_cpu_seconds)
         self.seconds, self.count = self.seconds + spent, self.count + 1
+        self.cost.setdefault(level, spent)
         if self._listen is not None:
             share = 1.0 - 1.0 / (1.0 + _GROWTH * self.count)
             self._listen(Sought(share, self.seconds, self.count))
-        if result.diverged:
-            self.failure = result.diverged
-            return None
-        if not (twin or tight):
-            self.results[level], self.cost[level] = result, spent
-        return self.job.goal.value(result)
+        return result
+
+    def _simulated(self, level, twin, tight, frames, brief):
+        """Result of a run; the simulation of the first is used again, which is not set up anew."""
+        method = self.methods.at(level, tight)
+        if self._simulation is None:
+            self._simulation = Simulation(self.job.scene, method)
+        else:
+            self._simulation.reset(method=method)
+        simulation = self._simulation
+        if twin:
+            simulation.state.set_motion(**_displaced(simulation.model, twin))
+        looks: Any = {"samples": self.job.rows(level), "frames": frames, "progress": None}
+        until = self.job.until
+        return result_of(run_simulation, simulation, until=until, brief=brief, **looks)
+
+
+def _apart(frame, finer):
+    """Difference of the displacements of a usual body, as a share of what a usual one moves.
+
+    Usual: in the middle of all, so that a few fragments that fly elsewhere do not count.
+    """
+    moved = np.median(np.linalg.norm(finer.displacement, axis=1))
+    apart = np.median(np.linalg.norm(frame.displacement - finer.displacement, axis=1))
+    return float(apart) / max(float(moved), 1e-300)
 
 
 def _displaced(model, seed):

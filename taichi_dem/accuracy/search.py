@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import fields, replace
 from typing import Any, Optional
 
 import numpy as np
@@ -9,17 +10,21 @@ import numpy as np
 from taichi_dem.accuracy.job import Job
 from taichi_dem.accuracy.runs import Runs
 from taichi_dem.kit.accuracy.answer import Answer, ErrorParts, Expense, Plan
+from taichi_dem.kit.accuracy.branches import BranchedAnswer, branches_of, clusters_of, sentence
 from taichi_dem.kit.accuracy.step_error import StepError, step_error
 from taichi_dem.kit.accuracy.student import t_quantile
-from taichi_dem.kit.errors import SimulationDiverged
+from taichi_dem.kit.errors import InputError, SimulationDiverged
 
-#: Halvings of the step until one is stable, and from there on.
-_MOST_COARSE, _MOST_FINE = 4, 6
-#: Share of what is allowed below which two runs are enough to know of chance, and their difference
-#: in standard deviations of one, at most, in 95 of 100 cases.
+#: Halvings of the step until one is stable, and from there on; of one refinement.
+_MOST_COARSE, _MOST_FINE, _MOST_AT_ONCE = 6, 7, 2
+#: Share of what is allowed below which a single twin is enough to know of chance, and a difference
+#: of two in standard deviations of one, at most, in 95 of 100 cases.
 _NEGLIGIBLE, _TWO = 0.25, 2.8
 #: Runs of which a spread is taken at first, and at most.
-_FEW, _MANY = 4, 32
+_FEW, _MANY = 6, 96
+#: Share of the change of a usual body that an output is taken to change by, at least: that it
+#: changes by less may be chance.
+_LIKELY = 0.3
 #: Tolerances of which the cost is told.
 _TOLERANCES = (0.1, 0.03, 0.01, 0.003)
 
@@ -27,15 +32,16 @@ _TOLERANCES = (0.1, 0.03, 0.01, 0.003)
 class Search:
     """Makes runs until the bar is as narrow as asked, or cannot be, or the budget is spent.
 
-    budget: CPU seconds after which no run is begun.
+    budget: CPU seconds after which no run is begun. first: level to begin with.
     """
 
-    def __init__(self, job: Job, budget: float, listen: Optional[Callable[[Any], Any]]):
+    def __init__(
+        self, job: Job, budget: float, listen: Optional[Callable[[Any], Any]], first: int = 0
+    ):
         self.job, self.budget = job, budget
         self.methods = job.methods()
         self.runs = Runs(job, self.methods, listen)
-        self.first, self.last, self.count = 0, 1, 1
-        self.why = ""
+        self.levels, self.count, self.why = [first], 0, ""
 
     def answer(self) -> Answer:
         """The answer, after all runs that it needs."""
@@ -44,118 +50,173 @@ class Search:
         while not self.why and parts.total > self._allowed:
             self._reduce(parts)
             parts = self._parts()
-        plan = Plan(
-            self.methods.in_words(self.last),
-            self.runs.count,
-            pilot_s,
-            self.runs.seconds - pilot_s,
-        )
-        job = self.job
-        return Answer(
+        job, last = self.job, self.levels[-1]
+        parting = self._parting(parts.chance)
+        words, spent = self.methods.in_words(last), self.runs.seconds - pilot_s
+        made = Answer(
             goal=job.goal.name,
             unit=job.goal.unit,
-            value=self._value(self.last),
+            value=self._value(last),
             parts=parts,
             tolerance=job.tolerance,
             confidence=job.confidence,
-            plan=plan,
-            result=self.runs.results[self.last],
-            cost_curve=self._cost_curve(),
+            plan=Plan(words, self.runs.count, pilot_s, spent, last - 1, parting),
+            result=self.runs.results[last],
+            cost_curve=tuple(self._cost_curve()),
             shortfall=self._shortfall(),
         )
+        return self._branched(made) if parts.chance > self._allowed else made
+
+    def _branched(self, made: Answer) -> Answer:
+        """The answer with its branches, where twins come to a few ends; else as it is."""
+        values = self._sample(self.levels[0])
+        clusters = clusters_of(values, 0.0, 0.5 * self._allowed)
+        if self.job.goal.averaged or len(clusters) < 2:
+            return made
+        branches = branches_of(
+            np.array(values), clusters, range(len(values)), self._step().error, 1.0
+        )
+        words = sentence(branches, made.unit, "run", "that differ by one rounding came to {} ends")
+        given = {field.name: getattr(made, field.name) for field in fields(made)}
+        parts = replace(made.parts, chance=branches[0].error)
+        given.update(value=branches[0].value, parts=parts, shortfall=words)
+        return BranchedAnswer(**given, branches=branches)
 
     def _begin(self):
         """Find the longest step that is stable, and go on to half of it."""
-        while self._single(self.first) is None:
-            self.first += 1
-            if self.first > _MOST_COARSE:
+        while self._single(self.levels[0]) is None:
+            self.levels[0] += 1
+            if self.levels[0] > _MOST_COARSE:
                 raise SimulationDiverged(self.runs.failure)
-        self.last = self.first + 1
-        if self._single(self.last) is None:
+        first, needed = self.levels[0], self.runs.seconds + 2.0 * self.runs.cost[self.levels[0]]
+        if needed > self.budget:
+            raise InputError(
+                f"budget_s must leave time for two runs, {needed:.2g} s here, got {self.budget:g}"
+            )
+        if self._single(first + 1) is None:
             raise SimulationDiverged(self.runs.failure)
+        self.levels.append(first + 1)
 
     @property
     def _allowed(self):
-        return self.job.tolerance * abs(self._value(self.last))
+        return self.job.tolerance * abs(self._value(self.levels[-1]))
 
     def _single(self, level, twin=0):
         return self.runs.value(level, twin)
 
     def _sample(self, level):
         """Values of a run and its twins that did not diverge, as many as were asked for."""
-        found = (self._single(level, twin) for twin in range(self.count))
+        found = (self._single(level, twin) for twin in range(self.count + 1))
         return [value for value in found if value is not None]
 
     def _value(self, level):
-        """Value at a level; of an averaged goal the mean over a run and its twins."""
-        return float(
-            np.mean(self._sample(level) if self.job.goal.averaged else [self._single(level)])
-        )
+        """Value at a level; where one run means little, the mean over a run and its twins."""
+        many = self.job.goal.averaged
+        return float(np.mean(self._sample(level) if many else [self._single(level)]))
 
     def _step(self) -> StepError:
-        levels = range(self.first, self.last + 1)
-        return step_error([self._value(level) for level in levels], self.methods.declared)
+        """Error of the step, and of sweeps whose tolerance falls with it."""
+        values = [self._value(level) for level in self.levels]
+        change = self.runs.leap if self.job.goal.kind == "count" else self.runs.change
+        return step_error(
+            values,
+            self.methods.declared,
+            [2.0**-level for level in self.levels],
+            least=_LIKELY * change(*self.levels[-2:]) * abs(values[-1]),
+            smooth=not self._eventful,
+            confidence=self.job.confidence,
+        )
 
     def _parts(self):
-        """Half-widths of the bar. What sweeps change at the coarsest step falls with the step."""
-        solver = chance = 0.0
-        if self._eventful:
-            chance = self._spread()
-            if self.methods.solves:
-                tight, here = self.runs.value(self.first, 0, True), self._single(self.first)
-                solver = math.inf if tight is None else abs(tight - here)
-        finer = 2.0 ** (self.first - self.last)
-        return ErrorParts(step=self._step().error, solver=solver * finer, chance=chance)
+        """Half-widths of the bar by source; that of sweeps once a second step was not enough."""
+        step, first = self._step().error, self.levels[0]
+        chance = self._spread() if self._eventful or self.job.goal.averaged else 0.0
+        if len(self.levels) == 2 or not self.methods.solves:
+            return ErrorParts(step=step, chance=chance)
+        tight = self.runs.value(first, 0, True)
+        sweeps = math.inf if tight is None else abs(tight - self._single(first))
+        sweeps = min(step, sweeps * 2.0 ** (first - self.levels[-1]))
+        return ErrorParts(step=math.sqrt(step**2 - sweeps**2), solver=sweeps, chance=chance)
 
     def _spread(self):
         """Half-width by which runs that differ by one rounding spread, of one or of their mean.
 
-        Two that agree to a small part of what is allowed are enough.
+        To halve the step disturbs a run far more than a rounding does: where that moves a usual
+        body by little, and breaks the same faces, nothing is there that could let twins part.
         """
-        if self.count == 1:
-            twin, here = self._single(self.first, 1), self._single(self.first)
+        first, averaged = self.levels[0], self.job.goal.averaged
+        if self.count == 0:
+            change = self.runs.change(*self.levels[-2:])
+            if not averaged and change <= _NEGLIGIBLE * self.job.tolerance:
+                if self.runs.same_breaks(*self.levels[-2:]):
+                    return 0.0
+            self.count = 1
+        if self.count == 1 and not averaged:
+            here, twin = self._single(first), self._single(first, 1)
             apart = math.inf if twin is None else _TWO * abs(twin - here)
             if apart <= _NEGLIGIBLE * self._allowed:
                 return apart
-            self.count = _FEW
-        found = self._sample(self.first)
-        if len(found) < _FEW:
+        self.count = max(self.count, _FEW - 1)
+        found = self._sample(first)
+        if len(found) < 2:
             return math.inf
         spread = float(np.std(found, ddof=1)) * t_quantile(self.job.confidence, len(found) - 1)
-        return spread / math.sqrt(len(found)) if self.job.goal.averaged else spread
+        return spread / math.sqrt(len(found)) if averaged else spread
 
     @property
     def _eventful(self):
         """Whether anything broke, touched or slipped: then one rounding may decide."""
-        report = self.runs.results[self.last].report
+        report = self.runs.results[self.levels[-1]].report
         return report.broken_faces > 0 or report.pair_evaluations > 0 or bool(report.bond_slip)
+
+    def _parting(self, chance):
+        """Time from which twins differ by more than the tolerance [s], where chance tells."""
+        return self.runs.parting(self.levels[0]) if chance > self._allowed else math.inf
 
     def _reduce(self, parts):
         """Make the runs that narrow the largest part, or say why there are none."""
-        if max(parts.step, parts.solver) >= parts.chance:
-            self._refine()
-        elif not self.job.goal.averaged:
-            self._give_up(
-                f"runs that differ by one rounding spread by {self._percent(parts.chance)}: ask "
-                "for the mean of many, goal.mean()"
-            )
-        elif self.count >= _MANY:
-            self._give_up(
-                f"the mean of {self.count} runs is known to {self._percent(parts.chance)}"
-            )
-        elif self._affords((self.last - self.first + 1) * self.count, self.first):
-            self.count = min(_MANY, 2 * self.count)
+        if not self.job.goal.averaged and parts.chance > self._allowed:
+            self._give_up(self._chaotic())
+        elif parts.chance > 0.5 * parts.total and self.job.goal.averaged:
+            self._add_twins(parts)
+        else:
+            self._refine(parts)
 
-    def _refine(self):
-        if self.last - self.first >= _MOST_FINE:
-            self._give_up(
-                f"half of a step of {self.methods.at(self.last).dt0:.2g} s changes as much"
-            )
-        elif self._affords(2.0 * self.count, self.last):
-            self.last += 1
-            if self._single(self.last) is None:
-                self.last -= 1
-                self._give_up(f"half of the step diverged: {self.runs.failure}")
+    def _chaotic(self):
+        """Why no single run answers, and what would."""
+        found = self._sample(self.levels[0])
+        if len(found) < 2:
+            return f"runs that differ by one rounding diverged: {self.runs.failure}"
+        width = t_quantile(self.job.confidence, math.inf) * float(np.std(found, ddof=1))
+        needed = max(2, math.ceil(2.0 * (width / max(self._allowed, 1e-300)) ** 2))
+        seconds = needed * sum(self.runs.cost[level] for level in self.levels[:2])
+        return (
+            f"runs that differ by one rounding spread by {self._percent(width)}. The mean of some "
+            f"{needed} of them may have it, in {seconds:.2g} s: ask for goal.mean()"
+        )
+
+    def _add_twins(self, parts):
+        if self.count + 1 >= _MANY:
+            self._give_up(f"the mean of {self.count + 1} runs has {self._percent(parts.total)}")
+        elif self._affords((self.count + 1) * len(self.levels), self.levels[0]):
+            self.count = min(_MANY - 1, 2 * self.count + 1)
+
+    def _refine(self, parts):
+        """Go on to half the step, or to the one that the order of a smooth run calls for."""
+        last, more = self.levels[-1], 1
+        if last - self.levels[0] >= _MOST_FINE:
+            self._give_up(f"half of a step of {self.methods.at(last).dt0:.2g} s changes as much")
+            return
+        if not self._eventful:
+            wanted = math.log2(parts.total / max(self._allowed, 1e-300)) / self.methods.declared
+            more = min(_MOST_AT_ONCE, max(1, math.ceil(wanted)))
+        while more > 1 and not self._affords(2.0**more, last):
+            more, self.why = more - 1, ""
+        if self._affords(2.0**more * (self.count + 1 if self.job.goal.averaged else 1), last):
+            if self._single(last + more) is None:
+                self._give_up(f"a smaller step diverged: {self.runs.failure}")
+            else:
+                self.levels.append(last + more)
 
     def _affords(self, runs, level):
         """Whether the budget lets some runs as long as that at a level be made."""
@@ -168,19 +229,17 @@ class Search:
         self.why = why
 
     def _percent(self, error):
-        return f"{100.0 * error / max(abs(self._value(self.last)), 1e-300):.2g} %"
+        return f"{100.0 * error / max(abs(self._value(self.levels[-1])), 1e-300):.2g} %"
 
     def _shortfall(self):
         return f"{100.0 * self.job.tolerance:g} % was not reached: {self.why}" if self.why else ""
 
     def _cost_curve(self):
         """Cost of other tolerances: by the step alone, from the levels that were run."""
-        size, found = abs(self._value(self.last)), []
-        step = self._step()
+        size, step = abs(self._value(self.levels[-1])), self._step()
         order = step.order if step.regular else 1.0
-        for tolerance in _TOLERANCES:
+        for tolerance in sorted({*_TOLERANCES, self.job.tolerance}, reverse=True):
             ratio = max(step.error, 1e-300) / max(tolerance * size, 1e-300)
-            more = max(1 - self.last + self.first, math.ceil(math.log2(ratio) / order))
-            seconds = self.runs.seconds * 2.0**more
-            found.append(Expense(tolerance, seconds, measured=tolerance == self.job.tolerance))
-        return tuple(found)
+            more = max(1 - len(self.levels) + 1, math.ceil(math.log2(ratio) / order))
+            paid = tolerance == self.job.tolerance and not self.why
+            yield Expense(tolerance, self.runs.seconds * (1.0 if paid else 2.0**more), paid)

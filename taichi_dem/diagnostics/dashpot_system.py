@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from taichi_dem.step.implicit.colouring import edge_colours
+from taichi_dem.mesh.colouring import edge_colours
 
 #: All bonds.
 ALL = slice(None)

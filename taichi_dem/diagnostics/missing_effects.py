@@ -170,26 +170,31 @@ class MissingEffects:
         is on a bare outer face.
         """
         pairs = volume.near_pairs[:_MOST_PAIRS]
+        broken = self.state.broken_tick.to_numpy()[: self.model.bond_count] != NEVER
+        bonds = self.model.topology.body_bond
+        # Bond -1 stands for an outer face, which is as free as a broken one.
+        free, outer = np.append(broken, True)[bonds], bonds < 0
+        able = free.any(axis=1)[pairs].all(axis=1)
+        if bare:
+            able &= outer.any(axis=1)[pairs].any(axis=1)
+        pairs = pairs[able]
         if not len(pairs):
             return pairs[:, 0]
+        spheres = self.spheres
         place, turn = volume.seen
-        spheres, top = self.spheres, self.model.topology
-        broken = self.state.broken_tick.to_numpy()[: self.model.bond_count] != NEVER
-        # Bond -1 stands for an outer face, which is as free as a broken one.
-        free, count = np.append(broken, True)[top.body_bond], spheres.radius.shape[2]
         side = []
         for bodies in pairs.T:
             local = spheres.centre[bodies].reshape(len(pairs), -1, 3)
             centre = np.einsum("nij,nsj->nsi", turn[bodies], local) + place[bodies][:, None]
-            marks = [np.repeat(of[bodies], count, axis=1) for of in (free, top.body_bond < 0)]
+            marks = [np.repeat(of[bodies], spheres.radius.shape[2], axis=1) for of in (free, outer)]
             side.append((centre, spheres.radius[bodies].reshape(len(pairs), -1), *marks))
-        (centre, radius, open_one, outer), (other, radius_other, open_two, outer_two) = side
+        (centre, radius, open_one, outer_one), (other, radius_other, open_two, outer_two) = side
         reach = radius[:, :, None] + radius_other[:, None]
-        apart = np.linalg.norm(centre[:, :, None] - other[:, None], axis=-1)
-        hit = apart < (1.0 - LEAST_OVERLAP) * reach
+        x, y, z = (centre[:, :, None, k] - other[:, None, :, k] for k in range(3))
+        hit = np.sqrt(x * x + y * y + z * z) < (1.0 - LEAST_OVERLAP) * reach
         hit &= open_one[:, :, None] & open_two[:, None]
         if bare:
-            hit &= outer[:, :, None] | outer_two[:, None]
+            hit &= outer_one[:, :, None] | outer_two[:, None]
         return pairs[hit.any(axis=(1, 2)), 0]
 
     @cached_property

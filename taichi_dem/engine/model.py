@@ -10,6 +10,7 @@ from taichi_dem.effects.base import ROLES, Effect
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.fixed_order import length, product, transposed
 from taichi_dem.materials import Material
+from taichi_dem.mesh.colouring import edge_colours
 from taichi_dem.mesh.contact_spheres import ContactSpheres
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.tetrahedra import area_vectors
@@ -59,6 +60,12 @@ class Model:
     def spheres(self) -> ContactSpheres:
         """``ContactSpheres`` of every face; with contact only."""
         return self.contact.spheres(self)
+
+    @cached_property
+    def bond_colours(self) -> np.ndarray:
+        """Colour of every bond, (n,): bonds of one colour share no body."""
+        links = np.stack([self.topology.master, self.topology.slave], axis=1)
+        return edge_colours(links, self.body_count)
 
     @cached_property
     def bonds(self) -> dict[str, np.ndarray]:

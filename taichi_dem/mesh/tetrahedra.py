@@ -6,6 +6,7 @@ Local face f of a tetrahedron is the face opposite its local vertex f.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator
 
 import numpy as np
@@ -115,6 +116,7 @@ def _pairs_in_cells(points, cell_index, distance):
     return np.vstack(found)
 
 
+@functools.cache
 def points_of_parts(halvings: int) -> np.ndarray:
     """A point in each of the equal parts of a tetrahedron, as shares of its corners, (parts, 4).
 
@@ -126,7 +128,9 @@ def points_of_parts(halvings: int) -> np.ndarray:
         parts = [piece for whole in parts for piece in eighths(whole)]
     cuts = np.sort(np.arange(1, len(parts) + 1)[:, None] * _SPREAD % 1.0, axis=1)
     shares = np.diff(cuts, axis=1, prepend=0.0, append=1.0)
-    return (shares[:, :, None] * np.array(parts)).sum(axis=1)
+    points = (shares[:, :, None] * np.array(parts)).sum(axis=1)
+    points.flags.writeable = False
+    return points
 
 
 def eighths(corners: np.ndarray) -> Iterator[np.ndarray]:

@@ -11,8 +11,8 @@ import pytest
 
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, effects
 from taichi_dem.contact_search import pair_store
+from taichi_dem.mesh.colouring import edge_colours
 from taichi_dem.mesh.shapes import bar
-from taichi_dem.step.implicit.colouring import edge_colours
 from tests.again import Again
 from tests.equivalence.test_bits import ENVIRONMENT, MOTION, differing
 from tests.scenes import ROOT, brisk_scene

@@ -56,13 +56,17 @@ class Expense:
 class Plan:
     """How an answer was found. method: in words, with its step. runs: number made of all kinds.
 
-    pilot_s, final_s: CPU seconds of the runs that chose and of those that answered.
+    pilot_s, final_s: CPU seconds of the runs that chose and of those that answered. begin: level
+    of the step at which a question of a like scene may begin. parting_s: simulated time from which
+    twins, runs that differ by one rounding, differ by more than was allowed [s]; infinite if never.
     """
 
     method: str
     runs: int
     pilot_s: float
     final_s: float
+    begin: int = 0
+    parting_s: float = math.inf
 
     @property
     def seconds(self) -> float:
@@ -70,7 +74,10 @@ class Plan:
         return self.pilot_s + self.final_s
 
     def __str__(self):
-        return f"{self.method}; {self.seconds:.2g} s, of which pilot {self.pilot_s:.2g} s"
+        words = f"{self.method}; {self.seconds:.2g} s, of which pilot {self.pilot_s:.2g} s"
+        if math.isinf(self.parting_s):
+            return words
+        return f"{words}; runs that differ by one rounding part from {self.parting_s:.2g} s"
 
 
 @dataclass(frozen=True, eq=False)

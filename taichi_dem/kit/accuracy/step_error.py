@@ -1,17 +1,23 @@
-"""Error of the step, from runs of which each has half the step of the one before.
+"""Error of the step, from runs at falling steps.
 
 Richardson's extrapolation as the grid convergence index takes it (Roache 1994): an order is read
-off three runs and believed only where their differences shrink as an order in range would let them.
+off three runs, and believed where their differences shrink as an order in range would let them.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Optional
+
+from taichi_dem.kit.accuracy.student import t_quantile
 
 #: Orders that are believed: between these and the declared one plus the last.
 _LEAST_ORDER, _MORE = 0.5, 0.5
-#: Factor on the error of a finest run whose order has been seen, and on differences where not.
-SEEN, UNSEEN = 1.25, 1.0
+#: Factor on the error of a finest run whose order has been seen.
+SEEN = 1.25
+#: Degrees of freedom of Student's t with whose quantiles all errors grow with the confidence.
+_FREEDOM = 4
+_BISECTIONS = 50
 
 
 @dataclass(frozen=True)
@@ -31,20 +37,53 @@ class StepError:
         return not math.isnan(self.order)
 
 
-def step_error(values: Sequence[float], declared: float = 2.0) -> StepError:
-    """Error of the last of at least two values, at steps h, h/2, h/4 and so on.
+def step_error(
+    values: Sequence[float],
+    declared: float = 2.0,
+    steps: Optional[Sequence[float]] = None,
+    *,
+    least: float = 0.0,
+    smooth: bool = False,
+    confidence: float = 0.95,
+) -> StepError:
+    """Error of the last of at least two values, at falling steps.
 
-    declared: order of the method where all is smooth. With two values, or where no order is seen,
-    the error is that of first order: the last difference, or as much as the one before lets expect.
+    declared: order of the method where all is smooth. steps: of any unit; h, h/2, h/4 and so on if
+    None. least: difference that is believed, at least, of the last two values: what they may have
+    in common by chance. smooth: whether nothing happens at an instant, so that the declared order
+    may be trusted before it was seen.
+    Where no order is seen, the error is that of first order; of a smooth run 1.5 times that of
+    the declared one.
     """
-    last = abs(values[-1] - values[-2])
-    if len(values) == 2:
-        return StepError(UNSEEN * last)
-    before = values[-2] - values[-3]
-    after = values[-1] - values[-2]
-    if before * after > 0.0:
-        order = math.log2(before / after)
-        if _LEAST_ORDER <= order <= declared + _MORE:
+    if steps is None:
+        steps = [2.0**-k for k in range(len(values))]
+    wider = t_quantile(confidence, _FREEDOM) / t_quantile(0.95, _FREEDOM)
+    last = max(abs(values[-1] - values[-2]), least)
+    shrinking = steps[-2] / steps[-1]
+    if len(values) > 2:
+        order = _order(values[-3:], steps[-3:], declared + _MORE)
+        if order > _LEAST_ORDER:
             trusted = min(order, declared)
-            return StepError(SEEN * last / (2.0**trusted - 1.0), trusted)
-    return StepError(UNSEEN * max(last, 0.25 * abs(before)))
+            return StepError(wider * SEEN * last / (shrinking**trusted - 1.0), trusted)
+    unseen = 1.5 / (shrinking**declared - 1.0) if smooth else 1.0 / (shrinking - 1.0)
+    return StepError(wider * unseen * last)
+
+
+def _order(values, steps, most):
+    """Order that three values at falling steps show, NaN for none in (0, most]."""
+    before, after = values[1] - values[0], values[2] - values[1]
+    if before * after <= 0.0:
+        return math.nan
+    low, high = 1e-3, most
+    if not _ratio(steps, low) <= before / after <= _ratio(steps, high):
+        return math.nan
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if _ratio(steps, middle) < before / after else (low, middle)
+    return high
+
+
+def _ratio(steps, order):
+    """First over second difference of three values whose error is a power of the step."""
+    a, b, c = (step**order for step in steps)
+    return (a - b) / (b - c)

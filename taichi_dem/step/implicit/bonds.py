@@ -9,7 +9,6 @@ from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.types import real, vec3, vec6
 from taichi_dem.methods import ImplicitDashpots
 from taichi_dem.physics.wrench import inverse, mobility, plus, point_block, zero_block
-from taichi_dem.step.implicit.colouring import edge_colours
 from taichi_dem.step.implicit.velocities import Velocities
 from taichi_dem.timeline import MACRO_TICKS
 
@@ -62,8 +61,7 @@ class BondDashpots:
         """Colour the bonds of a model and take the numbers of a method."""
         assign(self.theta, np.array([method.theta, (1.0 - method.theta) / method.theta]))
         assign(self.refresh_every, max(1, round(method.refresh / method.dt)))
-        top = model.topology
-        colours = edge_colours(np.stack([top.master, top.slave], axis=1), model.body_count)
+        colours = model.bond_colours
         place = np.empty(model.bond_count, dtype=np.int32)
         place[np.argsort(colours, kind="stable")] = np.arange(model.bond_count, dtype=np.int32)
         assign(self.index, place)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ca_damper.accuracy.branches import branches_of, clusters_of, sentence
+from taichi_dem.kit.accuracy.branches import branches_of, clusters_of, sentence
 
 SEEDS = tuple(range(1, 13))
 

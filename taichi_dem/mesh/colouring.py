@@ -12,13 +12,16 @@ def edge_colours(links: np.ndarray, body_count: int) -> np.ndarray:
     """
     colours = np.full(len(links), -1, dtype=np.int32)
     at: list[dict[int, int]] = [{} for _ in range(body_count)]
+    highest = -1
     for link, (i, j) in enumerate(np.asarray(links).tolist()):
         most = max(max(at[i], default=-1), max(at[j], default=-1)) + 1
-        used = max(most, 1 + int(colours.max(initial=-1)))
+        used = max(most, 1 + highest)
         free = [k for k in range(used) if k not in at[i] and k not in at[j]]
         colour = free[0] if free else _freed(links, colours, at, i, j, used)
         colours[link] = colour
         at[i][colour] = at[j][colour] = link
+        # A flipped chain may have held the only link of the last colour.
+        highest = max(highest, colour) if free else int(colours.max())
     return colours
 
 

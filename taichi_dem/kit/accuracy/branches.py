@@ -1,4 +1,4 @@
-"""Several steady motions of one filling: seeds whose values fall into clusters."""
+"""Several ends of one question: values of its runs that fall into clusters."""
 
 import math
 from collections.abc import Sequence
@@ -19,9 +19,9 @@ _MOST_BRANCHES = 4
 
 @dataclass(frozen=True)
 class Branch:
-    """One of several steady motions. value, error: mean over its seeds and half-width of its bar.
+    """One of several ends. value, error: mean over its runs and half-width of its bar.
 
-    share: of all seeds that took it, share_error: half-width of its bar. seeds: which.
+    share: of all runs that came to it, share_error: half-width of its bar. seeds: of its runs.
     """
 
     value: float
@@ -30,16 +30,16 @@ class Branch:
     share_error: float
     seeds: tuple[int, ...]
 
-    def in_words(self, unit: str) -> str:
+    def in_words(self, unit: str, runs: str) -> str:
         """Value, bar and share."""
         end = f" {unit}" if unit != "1" else ""
         share = f"{100.0 * self.share:.0f} +- {100.0 * self.share_error:.0f} %"
-        return f"{self.value:.6g} +- {self.error:.2g}{end} for {share} of the seeds"
+        return f"{self.value:.6g} +- {self.error:.2g}{end} for {share} of the {runs}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BranchedAnswer(Answer):
-    """Answer of a filling with several steady motions: its value is that of the most frequent.
+    """Answer of a question with several ends: its value is that of the most frequent.
 
     branches: all of them, the most frequent first.
     """
@@ -94,8 +94,13 @@ def _share_error(count, total):
     return z * math.sqrt(inside) / (1.0 + z**2 / total)
 
 
-def sentence(branches: Sequence[Branch], unit: str) -> str:
-    """One sentence that no single number answers the question."""
-    total = sum(len(branch.seeds) for branch in branches)
-    each = "; ".join(branch.in_words(unit) for branch in branches)
-    return f"no single number: {counted(total, 'seed')} took {len(branches)} steady motions: {each}"
+def sentence(
+    branches: Sequence[Branch], unit: str, run: str = "seed", ends: str = "took {} steady motions"
+) -> str:
+    """One sentence that no single number answers the question.
+
+    run: what a seed stands for, in the singular. ends: what they did, with a place for how many.
+    """
+    total = counted(sum(len(branch.seeds) for branch in branches), run)
+    each = "; ".join(branch.in_words(unit, f"{run}s") for branch in branches)
+    return f"no single number: {total} {ends.format(len(branches))}: {each}"

@@ -1,0 +1,130 @@
+"""How answers are judged: their price over single runs, and their bars by finer runs."""
+
+import math
+from dataclasses import dataclass
+from typing import Any, Optional
+
+from _accuracy_damper import damper_reference
+from ca_damper import solve_response
+from taichi_dem import Answer, ImplicitDashpots, InputError, Uniform, simulate, solve, step_report
+from taichi_dem.accuracy.job import Job
+from taichi_dem.accuracy.runs import Runs
+from taichi_dem.kit.study.timing import clock
+from taichi_dem.simulate import result_of
+
+#: The reference has a step so many halvings below that of the answer: 16 times finer.
+FINER = 4
+#: Steps of the scan: the longest stable one, over 2^k; a method whose steps are longer than that by
+#: more than this has no chance.
+SCANNED, HOPELESS = range(6), 100
+#: Times of a run; the least of them counts, as the first may compile.
+REPEATS = 2
+
+
+@dataclass(frozen=True)
+class FixedRun:
+    """A run with a fixed method and step: its words, its value of the goal, its CPU time [s]."""
+
+    method: str
+    value: float
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Judged:
+    """An answer, its CPU time [s], and the true value: that of the same goal at a finer step."""
+
+    question: Any
+    answer: Answer
+    seconds: float
+    true: float
+
+    @property
+    def deviation(self) -> float:
+        """How far the value is off, in half-widths of its bar; from -1 to 1 where that holds."""
+        off = float(self.answer.value) - self.true
+        return off / self.answer.error if self.answer.error else math.copysign(math.inf, off)
+
+    @property
+    def holds(self) -> bool:
+        """Whether the bar holds the true value."""
+        return abs(float(self.answer.value) - self.true) <= self.answer.error
+
+    def row(self, kind: str) -> tuple:
+        """Cells of a table: the question, the answer, the truth."""
+        asked, answer = self.question, self.answer
+        words = str(asked).replace(",", ";"), 100.0 * asked.tolerance, float(answer.value)
+        found = *words, float(answer.error), self.true, int(self.holds), int(answer.reached)
+        return (kind, asked.seed, *found, self.seconds)
+
+
+def judged_blast(question: Any) -> Judged:
+    """A question to the blast answered, beside the value at a step 16 times finer."""
+    answer, seconds = answered(question)
+    job = _job(question)
+    true = Runs(job, job.methods(), None).value(answer.plan.begin + 1 + FINER)
+    return Judged(question, answer, seconds, math.nan if true is None else true)
+
+
+def judged_damper(question: Any) -> Judged:
+    """A question to the damper answered, beside the value of finer runs with other seeds."""
+    answer = solve_response(**question.arguments())
+    return Judged(question, answer, answer.plan.seconds, damper_reference(question, answer))
+
+
+def answered(question: Any) -> tuple[Answer, float]:
+    """Answer to a question to the blast, and its CPU time [s]."""
+    spent = []
+    for _ in range(REPEATS):
+        begun = clock()
+        given = {"until": question.until, "goal": question.goal, "progress": None}
+        answer = solve(question.scene, tolerance=question.tolerance, **given)
+        spent.append(clock() - begun)
+    return answer, min(spent)
+
+
+def _job(question):
+    return Job(question.scene, question.until, question.goal, question.tolerance, 0.95)
+
+
+def fixed_runs(question: Any) -> list[FixedRun]:
+    """All runs of the scan, those that diverge left out."""
+    found = (_fixed_run(question, words, method) for words, method in _scanned(question))
+    return [run for run in found if run is not None]
+
+
+def _scanned(question):
+    """Methods of the scan, with their words."""
+    base = _job(question).methods()
+    longest = base.until / base.steps
+    found = [(base.in_words(k), base.make(longest / 2**k)) for k in SCANNED]
+    if base.make is ImplicitDashpots:
+        report = step_report(question.scene)
+        full, limited = (float(report.borne(kind).min()) for kind in ("full", "limited"))
+        found += [(f"explicit, {dt:.2g} s", Uniform(dt)) for dt in (full, 0.5 * full)]
+        found.append((f"limited dashpots, {limited:.2g} s", Uniform(limited, dashpot="limited")))
+    return [(words, made) for words, made in found if HOPELESS * made.dt0 > longest]
+
+
+def _fixed_run(question, words, method) -> Optional[FixedRun]:
+    """One run of the scan; None where it diverges, or is refused as too long a step."""
+    spent, rows = [], 100 if question.goal.kind == "extreme" else 1
+    looks = {"samples": rows, "frames": 1, "progress": None}
+    for _ in range(REPEATS):
+        begun = clock()
+        try:
+            result = result_of(
+                simulate, question.scene, method=method, until=question.until, **looks
+            )
+        except InputError:
+            return None
+        spent.append(clock() - begun)
+    if result.diverged:
+        return None
+    return FixedRun(words, question.goal.value(result), min(spent))
+
+
+def cheapest(runs: list[FixedRun], true: float, tolerance: float) -> Optional[FixedRun]:
+    """Cheapest run that is off by a share of the true value at most; None if there is none."""
+    good = [run for run in runs if abs(run.value - true) <= tolerance * abs(true)]
+    return min(good, key=lambda run: run.seconds, default=None)
