@@ -37,20 +37,13 @@ from taichi_dem.methods import Method, check_method
 from taichi_dem.scene import Scene
 from taichi_dem.stability.step_control import counted_criteria
 from taichi_dem.step.advance import Advance
-from taichi_dem.step.auto_driver import AutoDriver
+from taichi_dem.step.auto_driver import MEASURED, AutoDriver, driver_name
 from taichi_dem.step.drivers import DRIVERS, Step
 from taichi_dem.step.schedule import Schedule
 from taichi_dem.timeline import MACRO_TICKS, NEVER
 
 #: Largest steps of a run, of which the ticks are counted in 64 bits.
 MOST_STEPS = 2**42
-#: Reason why the resident driver cannot run, for a sentence.
-CPU_ONLY = "runs on a CPU only"
-#: Bonds below which the resident driver is the quicker one, and above which the parallel one is,
-#: on a CPU with several threads and free cores; between them both are tried.
-RESIDENT_BELOW, PARALLEL_FROM = 4000, 100000
-#: Name of the driver that is chosen by measurement.
-_MEASURED = "measured"
 
 
 class Simulation(Uncopied):
@@ -91,7 +84,7 @@ class Simulation(Uncopied):
         compiling("set-up", 0.0)
         self.scene, self.method, self.solves = scene, method, method.solves
         self.model = Model(scene.mesh, scene.material, scene.effects)
-        name = _driver_name(driver, self.model.bond_count)
+        name = driver_name(driver, self.model.bond_count)
         structure = Structure(scene.effects, method, brute_force)
         self.loan = ENGINES.borrow(structure, capacity_of(self.model), self.model, "simulation")
         self._take_parts()
@@ -140,7 +133,7 @@ class Simulation(Uncopied):
 
     def _driver(self, name):
         """Driver of the engine, or one that measures both."""
-        if name == _MEASURED:
+        if name == MEASURED:
             drivers: Any = {each: PartView(self.loan, ("drivers", each)) for each in DRIVERS}
             return AutoDriver(self.step, drivers)
         return PartView(self.loan, ("drivers", name))
@@ -371,23 +364,6 @@ class Simulation(Uncopied):
             round_off_J=self.divergence_check.round_off(),
         )
         return replace(report, known_error=known_error(report, self.scene, self.method))
-
-
-def _driver_name(name, bond_count):
-    settings: Any = runtime.settings()
-    arch = settings.arch
-    if name == "auto":
-        return "parallel" if arch == "cuda" else _by_size(bond_count)
-    if name == "resident" and arch == "cuda":
-        raise InputError(f"driver 'resident' {CPU_ONLY}: use 'parallel' with arch 'cuda'")
-    return name
-
-
-def _by_size(bond_count):
-    settings: Any = runtime.settings()
-    if settings.threads == 1 or bond_count < RESIDENT_BELOW:
-        return "resident"
-    return "parallel" if bond_count >= PARALLEL_FROM else _MEASURED
 
 
 def macro_steps(until: float, dt0: float) -> int:
