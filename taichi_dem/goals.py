@@ -23,10 +23,9 @@ from taichi_dem.output.hole_monitor import HoleMonitor
 from taichi_dem.result import Result
 from taichi_dem.scene import Scene
 
-#: "value": at the end. "extreme": over the run. "count": a whole number.
+#: "value": at the end. "extreme": over the run, of which its Results then have a time series.
+#: "count": a whole number.
 KINDS = ("value", "extreme", "count")
-#: Rows of the time series in which an extreme is looked for.
-_ROWS = 100
 
 
 @dataclass(frozen=True)
@@ -58,11 +57,6 @@ class Goal:
             raise InputError(
                 f"check of a goal must be a function of a Scene or None, got {shown(self.check)}"
             )
-
-    @property
-    def samples(self) -> int:
-        """Rows of the time series that its Results need."""
-        return _ROWS if self.kind == "extreme" else 1
 
     def mean(self) -> "Goal":
         """The mean of the same output over runs that differ by one rounding."""
@@ -123,7 +117,7 @@ def kinetic_energy() -> Goal:
 
 
 def peak_speed(body: int) -> Goal:
-    """Largest speed of a body at 100 times of the run [m/s]."""
+    """Largest speed of a body in the run [m/s]; shorter steps look at it at more times."""
     name, check = f"peak speed of body {body}", _has_body(body)
     return Goal(name, "m/s", lambda result: result.peak_speed[body], "extreme", check=check)
 
@@ -131,7 +125,7 @@ def peak_speed(body: int) -> Goal:
 def peak_particle_velocity(distance: float, group: str = "hole") -> Goal:
     """Mean of the largest speeds of bodies at a distance [m] from the axis of a hole [m/s].
 
-    They are the bodies that a cylinder of this radius cuts, their speeds the largest at 100 times.
+    They are the bodies that a cylinder of this radius cuts; shorter steps look at more times.
     """
     positive("distance", distance)
     bodies = partial(_cut_by_cylinder, distance, group)
