@@ -13,6 +13,7 @@ from ca_damper.response import UNITS, Response
 from ca_damper.steady_state import BATCHES, SteadyPart, correlation_factor
 from taichi_dem.kit.accuracy.answer import ErrorParts, Values
 from taichi_dem.kit.accuracy.student import f_outside, t_quantile
+from taichi_dem.kit.display import by_fields
 
 #: Error of the finest step by Richardson: times this.
 SAFETY = 1.25
@@ -34,6 +35,9 @@ class SeedValues:
     variance: np.ndarray
     freedom: int
     drift: np.ndarray
+
+    def __repr__(self) -> str:
+        return by_fields(self)
 
     @property
     def mean(self) -> np.ndarray:
@@ -84,6 +88,9 @@ class Estimate:
     coarse: SeedValues
     step_is_seen: bool
     grid: np.ndarray
+
+    def __repr__(self) -> str:
+        return by_fields(self)
 
 
 def estimate(
