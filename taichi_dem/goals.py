@@ -24,7 +24,7 @@ from taichi_dem.result import Result
 from taichi_dem.scene import Scene
 
 #: "value": at the end. "extreme": over the run, of which its Results then have a time series.
-#: "count": a whole number.
+#: "count": one that changes in leaps, as a whole number does.
 KINDS = ("value", "extreme", "count")
 
 
@@ -166,7 +166,7 @@ def largest_fragment() -> Goal:
         part = components(model.body_count, bonds[held])
         return np.bincount(part, model.body_mass).max() / model.body_mass.sum()
 
-    return Goal("largest fragment", "1", found)
+    return Goal("largest fragment", "1", found, "count")
 
 
 def _mean_way(result, bodies):

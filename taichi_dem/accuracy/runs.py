@@ -81,6 +81,11 @@ class Runs:
         """Difference of the displacements of all bodies at two levels, as a share of the finer."""
         return _apart(self.results[coarse].frames[-1], self.results[fine].frames[-1])
 
+    def peak_change(self, coarse: int, fine: int) -> float:
+        """Difference of a usual body's largest speed at two levels, as a share of the finer."""
+        slower, faster = (self.results[level].peak_speed for level in (coarse, fine))
+        return _share(np.abs(slower - faster), faster)
+
     def leap(self, coarse: int, fine: int) -> float:
         """Change of a number of broken faces between two levels that may go unseen, as a share.
 
@@ -135,13 +140,18 @@ class Runs:
 
 
 def _apart(frame, finer):
-    """Difference of the displacements of a usual body, as a share of what a usual one moves.
+    """Difference of the displacements of a usual body, as a share of a usual one."""
+    ways = finer.displacement, frame.displacement - finer.displacement
+    moved, apart = (np.linalg.norm(way, axis=1) for way in ways)
+    return _share(apart, moved)
+
+
+def _share(apart, whole):
+    """Difference of a usual body as a share of a usual value.
 
     Usual: in the middle of all, so that a few fragments that fly elsewhere do not count.
     """
-    moved = np.median(np.linalg.norm(finer.displacement, axis=1))
-    apart = np.median(np.linalg.norm(frame.displacement - finer.displacement, axis=1))
-    return float(apart) / max(float(moved), 1e-300)
+    return float(np.median(apart)) / max(float(np.median(whole)), 1e-300)
 
 
 def _displaced(model, seed):

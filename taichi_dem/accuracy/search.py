@@ -22,9 +22,6 @@ _MOST_COARSE, _MOST_FINE, _MOST_AT_ONCE = 6, 7, 2
 _NEGLIGIBLE, _TWO = 0.25, 2.8
 #: Runs of which a spread is taken at first, and at most.
 _FEW, _MANY = 6, 96
-#: Share of the change of a usual body that an output is taken to change by, at least: that it
-#: changes by less may be chance.
-_LIKELY = 0.3
 #: Runs there must be of each end, on average, to call it one: more ends are a distribution.
 _OF_EACH = 3
 #: Tolerances of which the cost is told.
@@ -117,15 +114,18 @@ class Search:
         many = self.job.goal.averaged
         return float(np.mean(self._sample(level) if many else [self._single(level)]))
 
-    def _step(self) -> StepError:
-        """Error of the step, and of sweeps whose tolerance falls with it."""
-        values = [self._value(level) for level in self.levels]
-        change = self.runs.leap if self.job.goal.kind == "count" else self.runs.change
+    def _step(self, count: Optional[int] = None) -> StepError:
+        """Error of the step, and of sweeps whose tolerance falls with it; count: of levels."""
+        levels = self.levels[:count]
+        values = [self._value(level) for level in levels]
+        # An output that changes by less than a usual body's may do so by chance.
+        usual = {"count": self.runs.leap, "extreme": self.runs.peak_change}
+        change = usual.get(self.job.goal.kind, self.runs.change)
         return step_error(
             values,
             self.methods.declared,
-            [2.0**-level for level in self.levels],
-            least=_LIKELY * change(*self.levels[-2:]) * abs(values[-1]),
+            [2.0**-level for level in levels],
+            least=change(*levels[-2:]) * abs(values[-1]),
             smooth=not self._eventful,
             confidence=self.job.confidence,
         )
@@ -238,11 +238,15 @@ class Search:
         return f"{100.0 * self.job.tolerance:g} % was not reached: {self.why}" if self.why else ""
 
     def _cost_curve(self):
-        """Cost of other tolerances: by the step alone, from the levels that were run."""
-        size, step = abs(self._value(self.levels[-1])), self._step()
-        order = step.order if step.regular else 1.0
+        """Cost of other tolerances: what the runs cost that were enough for them, or would be."""
+        levels, size = self.levels, abs(self._value(self.levels[-1]))
+        others = self.runs.seconds - sum(self.runs.cost[level] for level in levels)
+        paid = others + np.cumsum([self.runs.cost[level] for level in levels])
+        stages = [(self._step(count), paid[count - 1]) for count in range(2, len(levels) + 1)]
         for tolerance in sorted({*_TOLERANCES, self.job.tolerance}, reverse=True):
-            ratio = max(step.error, 1e-300) / max(tolerance * size, 1e-300)
-            more = max(1 - len(self.levels) + 1, math.ceil(math.log2(ratio) / order))
-            paid = tolerance == self.job.tolerance and not self.why
-            yield Expense(tolerance, self.runs.seconds * (1.0 if paid else 2.0**more), paid)
+            enough = [seconds for step, seconds in stages if step.error <= tolerance * size]
+            step, seconds = stages[-1]
+            order = step.order if step.regular else 1.0
+            ratio = step.error / max(tolerance * size, 1e-300)
+            predicted = seconds * 2.0 ** math.ceil(math.log2(max(1.0, ratio)) / order)
+            yield Expense(tolerance, enough[0] if enough else predicted, bool(enough))
