@@ -40,7 +40,9 @@ class Search:
         self.job, self.budget = job, budget
         self.methods = job.methods()
         self.runs = Runs(job, self.methods, listen)
-        self.levels, self.count, self.why = [first], 0, ""
+        self.levels, self.why = [first], ""
+        # Twins so far, and their level.
+        self.count, self.twins_at = 0, first
 
     def answer(self) -> Answer:
         """The answer, after all runs that it needs."""
@@ -68,7 +70,7 @@ class Search:
 
     def _branched(self, made: Answer) -> Answer:
         """The answer with its branches, where twins come to a few ends; else as it is."""
-        values = self._sample(self.levels[0])
+        values = self._sample(self.twins_at)
         clusters = clusters_of(values, 0.0, 0.5 * self._allowed)
         few = 2 <= len(clusters) <= len(values) // _OF_EACH
         if self.job.goal.averaged or not few:
@@ -96,6 +98,7 @@ class Search:
         if self._single(first + 1) is None:
             raise SimulationDiverged(self.runs.failure)
         self.levels.append(first + 1)
+        self.twins_at = first
 
     @property
     def _allowed(self):
@@ -147,7 +150,7 @@ class Search:
         To halve the step disturbs a run far more than a rounding does: where that moves a usual
         body by little, and breaks the same faces, nothing is there that could let twins part.
         """
-        first, averaged = self.levels[0], self.job.goal.averaged
+        coarse, averaged = self.twins_at, self.job.goal.averaged
         if self.count == 0:
             change = self.runs.change(*self.levels[-2:])
             if not averaged and change <= _NEGLIGIBLE * self.job.tolerance:
@@ -155,12 +158,12 @@ class Search:
                     return 0.0
             self.count = 1
         if self.count == 1 and not averaged:
-            here, twin = self._single(first), self._single(first, 1)
+            here, twin = self._single(coarse), self._single(coarse, 1)
             apart = math.inf if twin is None else _TWO * abs(twin - here)
             if apart <= _NEGLIGIBLE * self._allowed:
                 return apart
         self.count = max(self.count, _FEW - 1)
-        found = self._sample(first)
+        found = self._sample(coarse)
         if len(found) < 2:
             return math.inf
         spread = float(np.std(found, ddof=1)) * t_quantile(self.job.confidence, len(found) - 1)
@@ -174,28 +177,32 @@ class Search:
 
     def _parting(self, chance):
         """Time from which twins differ by more than the tolerance [s], where chance tells."""
-        return self.runs.parting(self.levels[0]) if chance > self._allowed else math.inf
+        return self.runs.parting(self.twins_at) if chance > self._allowed else math.inf
 
     def _reduce(self, parts):
         """Make the runs that narrow the largest part, or say why there are none."""
-        if not self.job.goal.averaged and parts.chance > self._allowed:
+        averaged = self.job.goal.averaged
+        if not averaged and len(self.levels) > 2 and parts.chance > self._allowed:
             self._give_up(self._chaotic())
-        elif parts.chance > 0.5 * parts.total and self.job.goal.averaged:
+        elif averaged and parts.chance > 0.5 * parts.total:
             self._add_twins(parts)
         else:
             self._refine(parts)
 
     def _chaotic(self):
         """Why no single run answers, and what would."""
-        found = self._sample(self.levels[0])
+        found = self._sample(self.twins_at)
         if len(found) < 2:
             return f"runs that differ by one rounding diverged: {self.runs.failure}"
         width = t_quantile(self.job.confidence, math.inf) * float(np.std(found, ddof=1))
-        needed = max(2, math.ceil(2.0 * (width / max(self._allowed, 1e-300)) ** 2))
+        words = f"runs that differ by one rounding spread by {self._percent(width)}"
+        if not self._allowed:
+            return words
+        needed = max(2, math.ceil(2.0 * (width / self._allowed) ** 2))
         seconds = needed * sum(self.runs.cost[level] for level in self.levels[:2])
         return (
-            f"runs that differ by one rounding spread by {self._percent(width)}. The mean of some "
-            f"{needed} of them may have it, in {seconds:.2g} s: ask for goal.mean()"
+            f"{words}. The mean of some {needed} of them may have it, in {seconds:.2g} s: ask for "
+            "goal.mean()"
         )
 
     def _add_twins(self, parts):
@@ -220,6 +227,9 @@ class Search:
                 self._give_up(f"a smaller step diverged: {self.runs.failure}")
             else:
                 self.levels.append(last + more)
+                if not self.job.goal.averaged and parts.chance > self._allowed:
+                    # At the step before, twins may have parted by the step alone.
+                    self.count, self.twins_at = 0, last
 
     def _affords(self, runs, level):
         """Whether the budget lets some runs as long as that at a level be made."""
@@ -232,7 +242,9 @@ class Search:
         self.why = why
 
     def _percent(self, error):
-        return f"{100.0 * error / max(abs(self._value(self.levels[-1])), 1e-300):.2g} %"
+        size = abs(self._value(self.levels[-1]))
+        unit = self.job.goal.unit
+        return f"{100.0 * error / size:.2g} %" if size else f"{error:.2g} {unit} about zero"
 
     def _shortfall(self):
         return f"{100.0 * self.job.tolerance:g} % was not reached: {self.why}" if self.why else ""
