@@ -137,7 +137,7 @@ class Search:
         """Half-widths of the bar by source; that of sweeps once a second step was not enough."""
         step, first = self._step().error, self.levels[0]
         chance = self._spread() if self._eventful or self.job.goal.averaged else 0.0
-        if len(self.levels) == 2 or not self.methods.solves:
+        if len(self.levels) == 2 or self.why or not self.methods.solves:
             return ErrorParts(step=step, chance=chance)
         tight = self.runs.value(first, 0, True)
         sweeps = math.inf if tight is None else abs(tight - self._single(first))
@@ -156,13 +156,16 @@ class Search:
             if not averaged and change <= _NEGLIGIBLE * self.job.tolerance:
                 if self.runs.same_breaks(*self.levels[-2:]):
                     return 0.0
+            if not self._affords(1.0, coarse):
+                return math.inf
             self.count = 1
         if self.count == 1 and not averaged:
             here, twin = self._single(coarse), self._single(coarse, 1)
             apart = math.inf if twin is None else _TWO * abs(twin - here)
             if apart <= _NEGLIGIBLE * self._allowed:
                 return apart
-        self.count = max(self.count, _FEW - 1)
+        if self.count < _FEW - 1 and self._affords(_FEW - 1.0 - self.count, coarse):
+            self.count = _FEW - 1
         found = self._sample(coarse)
         if len(found) < 2:
             return math.inf
@@ -258,7 +261,8 @@ class Search:
         for tolerance in sorted({*_TOLERANCES, self.job.tolerance}, reverse=True):
             enough = [seconds for step, seconds in stages if step.error <= tolerance * size]
             step, seconds = stages[-1]
-            order = step.order if step.regular else 1.0
+            unseen = 1.0 if self._eventful else self.methods.declared
+            order = step.order if step.regular else unseen
             ratio = step.error / max(tolerance * size, 1e-300)
             predicted = seconds * 2.0 ** math.ceil(math.log2(max(1.0, ratio)) / order)
-            yield Expense(tolerance, enough[0] if enough else predicted, bool(enough))
+            yield Expense(tolerance, float(enough[0] if enough else predicted), bool(enough))
