@@ -18,7 +18,7 @@ STAMP := .venv/stamp
 MESH_STAMP := .venv/stamp-mesh
 DOCS_STAMP := .venv/stamp-docs
 LESSONS_STAMP := .venv/stamp-lessons
-LESSONS := $(addprefix experiments/lessons/,$(addsuffix .py,what_a_time_step_costs \
+LESSONS := $(addprefix experiments/lessons/,$(addsuffix .py,what_a_time_step_costs what_an_answer_costs \
   why_a_box_of_grains_damps which_effects_a_scene_needs))
 GMSH_PACKAGES := libglu1-mesa libgl1 libxcursor1 libxft2 libxinerama1 libgomp1
 
@@ -60,7 +60,7 @@ bench: $(STAMP) ## measure speed
 gallery: $(STAMP) ## run all experiments and show them on one page (GALLERY_OPTIONS=--quick: minutes)
 	$(BIN)/python experiments/gallery.py $(GALLERY_OPTIONS)
 
-lessons: $(LESSONS_STAMP) ## serve three interactive lessons to this machine's browser (installs marimo)
+lessons: $(LESSONS_STAMP) ## serve four interactive lessons to this machine's browser (installs marimo)
 	$(BIN)/python -m marimo run $(LESSONS) --host 127.0.0.1 $(LESSONS_OPTIONS)
 
 api: $(DOCS_STAMP) ## pages of all functions from their docstrings, in results/api (installs pdoc)

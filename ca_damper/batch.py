@@ -226,6 +226,7 @@ class Batch(LoadedScenes):
             container_evaluations=RK45_STAGES * int(self.attempts().sum()) if sprung else 0,
             compile_seconds=self.compile_seconds,
             run_seconds=self.run_seconds,
+            order=getattr(self.filling, "order", None),
         )
 
     def _go(self, steps: np.ndarray, before_measuring: np.ndarray, progress: Any) -> None:

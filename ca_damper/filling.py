@@ -76,6 +76,7 @@ class Filling(Protocol):
     A filling may also have a property ``structure``, a Structure. Its device then has a method
     ``load(filling)`` that takes over all numbers of a filling of the same structure. Without it the
     filling itself, which must be hashable, is the structure, and other options compile anew.
+    It may have ``order``, that of the error in the step, for the report.
     """
 
     @property

@@ -20,6 +20,7 @@ class Empty:
     label: ClassVar[str] = "empty"
     effects: ClassVar[tuple] = ()
     step_bound: ClassVar[None] = None
+    order: ClassVar[int] = 1
     default_dt: ClassVar[float] = 1e-4
     capacity: ClassVar[int] = 0
     particle_mass: ClassVar[float] = 0.0
@@ -57,6 +58,7 @@ class RigidMass:
     label: ClassVar[str] = "rigid"
     effects: ClassVar[tuple] = ("fixed mass",)
     step_bound: ClassVar[None] = None
+    order: ClassVar[int] = 1
     default_dt: ClassVar[float] = 1e-4
     capacity: ClassVar[int] = 1_000_000
 

@@ -66,9 +66,19 @@ class Cycles:
     @property
     def rms(self) -> np.ndarray:
         """Root mean square of x about its mean in each cycle [m]: the response of the paper."""
+        return np.sqrt(self._variance.mean(axis=1))
+
+    @property
+    def rms_by_cycle(self) -> np.ndarray:
+        """The same of every cycle [m], (scenes, cycles)."""
+        return np.sqrt(self._variance)
+
+    @property
+    def _variance(self):
+        """Mean square of x about its mean in each cycle [m^2], (scenes, cycles)."""
         totals = [self.record[:, :, COLUMNS.index(name)] for name in ("x_squared", "x")]
         square, mean = (total / self.steps[:, None] for total in totals)
-        return np.sqrt(np.maximum(square - mean**2, 0.0).mean(axis=1))
+        return np.maximum(square - mean**2, 0.0)
 
     @property
     def amplitude(self) -> np.ndarray:

@@ -25,7 +25,9 @@ class Report:
     they and the container exchanged, of the worst scene.
     scene_steps, particle_steps: steps of all scenes, and times their particles.
     container_evaluations: of the container's right-hand side since the start; 0 on the base.
-    compile_seconds, run_seconds: cost.
+    compile_seconds, run_seconds: cost. order: of the error in the step, None where the filling
+    declares none. sampling: cycles of a response over which means were taken, and by how much of
+    itself that of the highest RMS may be off with a confidence of 95 %; None where it is not known.
     """
 
     method: str
@@ -43,6 +45,8 @@ class Report:
     container_evaluations: int
     compile_seconds: float
     run_seconds: float
+    order: Optional[int] = None
+    sampling: Optional[tuple[int, float]] = None
 
     def __repr__(self):
         particles = f"{_range(self.particles)} particles"
@@ -55,11 +59,24 @@ class Report:
         """Speed, without compiling; 0 before anything has run."""
         return self.particle_steps / self.run_seconds if self.run_seconds > 0.0 else 0.0
 
+    @property
+    def known_error(self) -> str:
+        """What is known of the error of the run, for nothing extra."""
+        order = "order unknown" if self.order is None else f"order {self.order}"
+        parts = [f"step {_range(self.dt_s)} s, {order}"]
+        parts.append(f"momentum closes to {100.0 * self.momentum_error:.2g} %")
+        if self.sampling is not None:
+            cycles, share = self.sampling
+            known = f"known to {100.0 * share:.2g} %"
+            parts.append(f"highest RMS, a mean over {counted(cycles, 'cycle')}, {known}")
+        return "; ".join(parts)
+
     def as_dict(self) -> dict[str, Any]:
         """All figures, for a JSON file."""
         figures = asdict(self)
         figures["acted"] = figures.pop("effect_activity")
-        return {**figures, "particle_steps_per_second": self.particle_steps_per_second}
+        derived = ("particle_steps_per_second", "known_error")
+        return {**figures, **{name: getattr(self, name) for name in derived}}
 
     def write(self, path: FileName) -> None:
         """Write all figures as JSON. Raises InputError when the file cannot be written."""
@@ -73,7 +90,8 @@ class Report:
         return (("step bound by", f"{why}: {most:.3g} s, {self.dt_s[1] / most:.2g} of it taken"),)
 
     def __str__(self):
-        """A table of some nine lines, and one for each effect that acted."""
+        """A table of some twelve lines, and one for each effect that acted."""
+        step, *others = self.known_error.split("; ")
         rows = [
             ("method", f"{self.method}, container on the {self.mount}"),
             ("effects", ", ".join(self.effects) or "none"),
@@ -82,6 +100,8 @@ class Report:
             ("simulated", f"{self.simulated_s:.4g} s in steps of {_range(self.dt_s)} s"),
             *self._bound_row(),
             ("momentum error", f"{self.momentum_error:.2g} of what was exchanged"),
+            ("known of the error", step),
+            *(("", part) for part in others),
             ("steps", f"{self.scene_steps:,} of scenes, {self.particle_steps:,} of particles"),
             ("evaluations", f"{self.container_evaluations:,} of the container's motion"),
             (

@@ -15,6 +15,8 @@ from ca_damper.oscillator import Oscillator
 from ca_damper.report import Report
 from ca_damper.scenes.clock import steps_per_cycle
 from ca_damper.scenes.table import SceneTable
+from ca_damper.steady_state import mean_and_error
+from taichi_dem.kit.accuracy.student import t_quantile
 from taichi_dem.kit.checkpoint import Checkpoint
 from taichi_dem.kit.display import counted, embedded, in_brief, listed, table, titled, unfolded
 from taichi_dem.kit.errors import InputError
@@ -41,6 +43,8 @@ _MOST_SHOWN = 8
 OUTSIDE = "outside"
 _MOST_SEEDS = 2**31 - 1
 _MOST_SCENES = 2**24
+#: Of the sampling error in a report.
+_CONFIDENCE = 0.95
 
 
 _PEAK_COLUMNS = (
@@ -183,7 +187,22 @@ def frequency_response(
     shape = grid.shape
     steps = batch.steps_per_cycle.reshape(shape)[0, :, 0]
     values = {name: value.reshape(shape) for name, value in grid.measures(cycles).items()}
-    return replace(grid.response(steps, values), report=batch.report())
+    report = replace(batch.report(), sampling=_sampling(cycles))
+    return replace(grid.response(steps, values), report=report)
+
+
+def _sampling(cycles):
+    """Number of cycles, and half-width of the mean RMS in the scene where it is highest, a share.
+
+    None where no mean is known: of a single cycle, or of a container at rest.
+    """
+    highest = int(np.argmax(cycles.rms))
+    one = slice(highest, highest + 1)
+    series = Cycles(cycles.frequency[one], cycles.steps[one], cycles.record[one]).rms_by_cycle[0]
+    mean, error, freedom = mean_and_error(series)
+    if not mean > 0.0 or not math.isfinite(error):
+        return None
+    return len(series), t_quantile(_CONFIDENCE, freedom) * error / mean
 
 
 class Grid:

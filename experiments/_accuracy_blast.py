@@ -4,10 +4,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from _blast import paper_scene
 from taichi_dem import CONCRETE, Goal, Scene, effects, goals
 from taichi_dem.kit.display import counted
 from taichi_dem.mesh.mesh import Mesh, checked_mesh
-from taichi_dem.mesh.shapes import bar
+from taichi_dem.mesh.shapes import bar, placed_together, single
 
 #: Fewest and most boxes along x, y and z, and bodies of a bar.
 BOXES, BODIES = ((2, 12), (1, 5), (1, 5)), (12, 1500)
@@ -58,6 +59,37 @@ def blast_question(seed: int) -> Question:
     scene = Scene(mesh, material, _effects(random, travel))
     goal = _goal(random, scene)
     return Question(seed, scene, until, goal, _power(random, TOLERANCE))
+
+
+def paper_question(until: float, tolerance: float) -> Question:
+    """How far the hole of the paper's block opens until a time [s]."""
+    return Question(0, paper_scene(), until, goals.hole_displacement(), tolerance)
+
+
+def dropped_question() -> Question:
+    """How far three stiff tetrahedra go that fall on a slab: each bounce magnifies what differs.
+
+    Under 3,000 times the weight of the earth, without dashpots, friction and bonds of their own.
+    """
+    random, parts = (
+        np.random.default_rng(1),
+        {"floor": (bar(0.05, 0.6, (1, 4, 4)), (0.0, 0.0, 0.0))},
+    )
+    for k in range(3):
+        body = single(0.05)
+        turned = (body.points - body.points.mean(axis=0)) @ _turn(random)
+        place = 0.12 + 0.04 * k, 0.3, 0.3
+        parts[f"body{k}"] = checked_mesh(turned, body.tetrahedra, body.groups), place
+    material = replace(CONCRETE, contact_damping=0.0)
+    chosen = [effects.Gravity((-3e4, 0, 0)), effects.FaceContact(), effects.Fixed("floor_left")]
+    scene = Scene(placed_together(parts), material, chosen)
+    return Question(0, scene, 0.0155, goals.displacement("base"), 0.01)
+
+
+def _turn(random):
+    """A random rotation matrix."""
+    turn, _ = np.linalg.qr(random.standard_normal((3, 3)))
+    return turn * np.sign(np.linalg.det(turn))
 
 
 def _power(random, between):

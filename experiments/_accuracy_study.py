@@ -4,6 +4,8 @@ import math
 from dataclasses import dataclass
 from typing import Any, Optional
 
+import numpy as np
+
 from _accuracy_damper import damper_reference
 from ca_damper import solve_response
 from taichi_dem import Answer, ImplicitDashpots, InputError, Uniform, simulate, solve, step_report
@@ -128,3 +130,22 @@ def cheapest(runs: list[FixedRun], true: float, tolerance: float) -> Optional[Fi
     """Cheapest run that is off by a share of the true value at most; None if there is none."""
     good = [run for run in runs if abs(run.value - true) <= tolerance * abs(true)]
     return min(good, key=lambda run: run.seconds, default=None)
+
+
+def twins_of(question: Any, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Runs that differ by one rounding: times [ms], mean ways [mm], and how far they are apart.
+
+    (frames,), (count, frames) and (count - 1, frames), the last as a share of a usual way.
+    """
+    job = _job(question)
+    runs = Runs(job, job.methods(), None)
+    level = next(k for k in SCANNED if runs.value(k) is not None)
+    frames = [runs.frames(level, twin) for twin in range(count)]
+    moved = np.array([[frame.displacement for frame in some] for some in frames])
+    loose = np.linalg.norm(moved[0, -1], axis=1) > np.median(np.linalg.norm(moved[0, -1], axis=1))
+    moved = moved[:, :, loose]
+    ways = np.linalg.norm(moved, axis=3)
+    apart = np.linalg.norm(moved[1:] - moved[0], axis=3)
+    share = apart.mean(axis=2) / np.maximum(ways[0].mean(axis=1), 1e-300)
+    time_ms = 1e3 * np.array([frame.time_s for frame in frames[0]])
+    return time_ms, 1e3 * ways.mean(axis=2), share

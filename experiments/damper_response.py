@@ -68,8 +68,7 @@ def options_parser():
     """Options of this experiment."""
     made = study.parser(NAME, __doc__, settings=SETTINGS)
     study.add_checkpoints(made)
-    words = "find the peaks to this share of their value, such as 1%%, and nothing else"
-    made.add_argument("--accuracy", type=study.tolerance, default=None, help=words)
+    study.add_accuracy(made, "the peaks")
     return made
 
 
@@ -99,8 +98,7 @@ def run(options):
 
 def run_to_accuracy(options):
     """Find the peaks to an accuracy; print and write the answers."""
-    if options.resume or options.checkpoint_every:
-        raise InputError("accuracy must be left out with resume or checkpoint-every")
+    study.check_accuracy(options)
     folder, rows, figures = study.begin(options), [], {}
     asked = [goals.peak_ratio(), goals.peak_rms()]
     for label in options.fillings:
@@ -109,12 +107,10 @@ def run_to_accuracy(options):
             with ProgressBar(f"{label}, {n} particles") as bar:
                 answers = solve_response(FILLINGS[label], **job, progress=bar)
             for answer in answers:
-                print(f"{label}, {n} particles, {answer.goal}: {answer}")
-                row = answer.value, answer.error, answer.plan.seconds, answer.reached
-                rows.append((label, n, answer.goal, answer.unit, *row))
+                study.show_answer(f"{label}, {n} particles", answer)
+                rows.append(((label, n), answer))
             figures.update(figures_of_answers(f"{label}_N{n}", *answers))
-    names = "filling particles goal unit value error seconds reached"
-    study.write_rows(folder / "accuracy.csv", rows, names.split())
+    study.write_accuracy(folder, ("filling", "particles"), rows)
     study.finish(options, NAME, figures, 0.0)
 
 

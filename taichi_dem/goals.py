@@ -7,20 +7,25 @@ A goal of one's own takes a line; its function gets a ``Result`` with a frame at
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any, Optional
 
 import numpy as np
 
+from taichi_dem.diagnostics.energy_balance import TERMS
+from taichi_dem.engine.model import Model
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import choice, shown, whole, word
+from taichi_dem.kit.fixed_order import dot, length
+from taichi_dem.kit.validation import choice, finite, flag, positive, shown, whole, word
 from taichi_dem.mesh.tetrahedra import components
 from taichi_dem.mesh.topology import faces_of_group
 from taichi_dem.output.hole_monitor import HoleMonitor
 from taichi_dem.result import Result
+from taichi_dem.scene import Scene
 
-#: "value": at the end. "extreme": over the run. "count": a whole number.
+#: "value": at the end. "extreme": over the run, of which its Results then have a time series.
+#: "count": one that changes in leaps, as a whole number does.
 KINDS = ("value", "extreme", "count")
-#: Rows of the time series in which an extreme is looked for.
-_ROWS = 100
 
 
 @dataclass(frozen=True)
@@ -28,6 +33,7 @@ class Goal:
     """An output: its name, its unit ("1" for none), how a Result gives it, and one of KINDS.
 
     averaged: whether the mean over runs is asked for that differ by one rounding (``mean``).
+    check: a function of a Scene that raises InputError where the scene lacks what is asked for.
     Raises InputError.
     """
 
@@ -36,6 +42,7 @@ class Goal:
     function: Callable[[Result], float] = field(repr=False)
     kind: str = "value"
     averaged: bool = False
+    check: Optional[Callable[[Scene], Any]] = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         word("name of a goal", self.name)
@@ -45,25 +52,32 @@ class Goal:
             raise InputError(
                 f"function of a goal must be a function of a Result, got {shown(self.function)}"
             )
-
-    @property
-    def samples(self) -> int:
-        """Rows of the time series that its Results need."""
-        return _ROWS if self.kind == "extreme" else 1
+        flag("averaged of a goal", self.averaged)
+        if self.check is not None and not callable(self.check):
+            raise InputError(
+                f"check of a goal must be a function of a Scene or None, got {shown(self.check)}"
+            )
 
     def mean(self) -> "Goal":
         """The mean of the same output over runs that differ by one rounding."""
         return replace(self, name=f"mean {self.name}", averaged=True)
 
+    def check_scene(self, scene: Scene) -> None:
+        """Raise InputError, before any run, for a scene that lacks what is asked for."""
+        if self.check is not None:
+            self.check(scene)
+
     def value(self, result: Result) -> float:
         """Its value in a result. Raises InputError for a function that gives no number."""
-        found = np.asarray(self.function(result))
-        if found.shape != () or not np.isfinite(found):
+        found: Any = self.function(result)
+        single = isinstance(found, (np.ndarray, np.generic)) and found.size == 1
+        value: Any = found.item() if single else found
+        if not finite(value):
             raise InputError(
                 f"function of the goal {self.name!r} must return a finite number, "
-                f"got {shown(found.tolist())}"
+                f"got {shown(value)}"
             )
-        return float(found)
+        return float(value)
 
 
 def hole_displacement(group: str = "hole") -> Goal:
@@ -73,7 +87,7 @@ def hole_displacement(group: str = "hole") -> Goal:
         monitor = HoleMonitor(result.model, group)
         return 1e3 * monitor.radial_displacement(result.frames[-1].position)
 
-    return Goal("hole displacement", "mm", found)
+    return Goal("hole displacement", "mm", found, check=_has_group(group))
 
 
 def displacement(group: str) -> Goal:
@@ -83,13 +97,13 @@ def displacement(group: str) -> Goal:
         bodies, _ = faces_of_group(result.model.mesh, result.model.topology, group)
         return _mean_way(result, np.unique(bodies))
 
-    return Goal(f"displacement of {group}", "mm", found)
+    return Goal(f"displacement of {group}", "mm", found, check=_has_group(group))
 
 
 def body_displacement(body: int) -> Goal:
     """Distance by which a body has moved [mm]."""
-    whole("body", body, 0, 2**31 - 1)
-    return Goal(f"displacement of body {body}", "mm", lambda result: _mean_way(result, [body]))
+    name, check = f"displacement of body {body}", _has_body(body)
+    return Goal(name, "mm", lambda result: _mean_way(result, [body]), check=check)
 
 
 def broken_faces() -> Goal:
@@ -103,19 +117,42 @@ def kinetic_energy() -> Goal:
 
 
 def peak_speed(body: int) -> Goal:
-    """Largest speed of a body at 100 times of the run [m/s]."""
-    whole("body", body, 0, 2**31 - 1)
-    name = f"peak speed of body {body}"
-    return Goal(name, "m/s", lambda result: result.peak_speed[body], "extreme")
+    """Largest speed of a body in the run [m/s]; shorter steps look at it at more times."""
+    name, check = f"peak speed of body {body}", _has_body(body)
+    return Goal(name, "m/s", lambda result: result.peak_speed[body], "extreme", check=check)
+
+
+def peak_particle_velocity(distance: float, group: str = "hole") -> Goal:
+    """Mean of the largest speeds of bodies at a distance [m] from the axis of a hole [m/s].
+
+    They are the bodies that a cylinder of this radius cuts; shorter steps look at more times.
+    """
+    positive("distance", distance)
+    bodies = partial(_cut_by_cylinder, distance, group)
+
+    def found(result):
+        return result.peak_speed[bodies(result.model)].mean()
+
+    def check(scene):
+        _has_group(group)(scene)
+        bodies(Model(scene.mesh, scene.material, scene.effects))
+
+    return Goal(f"peak velocity at {distance:g} m", "m/s", found, "extreme", check=check)
 
 
 def energy_share(term: str) -> Goal:
     """Share of the work put in that a term of the energy balance has, such as "friction"."""
+    choice("term", term, TERMS)
 
     def found(result):
         account = result.report.energy_balance
-        choice("term", term, tuple(account))
-        return account[term] / max(account["load_work"] + account["support_work"], 1e-300)
+        work = account["load_work"] + account["support_work"]
+        if work <= 0.0:
+            raise InputError(
+                f"an energy share must be of work put in above 0 J, got {work:.3g} J by "
+                f"{result.report.until_s:.3g} s"
+            )
+        return account[term] / work
 
     return Goal(f"energy share of {term}", "1", found)
 
@@ -129,9 +166,37 @@ def largest_fragment() -> Goal:
         part = components(model.body_count, bonds[held])
         return np.bincount(part, model.body_mass).max() / model.body_mass.sum()
 
-    return Goal("largest fragment", "1", found)
+    return Goal("largest fragment", "1", found, "count")
 
 
 def _mean_way(result, bodies):
     """Mean length of the displacements of some bodies at the end [mm]."""
     return 1e3 * np.linalg.norm(result.frames[-1].displacement[bodies], axis=1).mean()
+
+
+def _has_group(group):
+    """Check of a scene for a face group."""
+    word("group", group)
+    return lambda scene: scene.mesh.group_faces(group)
+
+
+def _has_body(body):
+    """Check of a scene for a body."""
+    whole("body", body, 0, 2**31 - 1)
+    return lambda scene: whole("body", body, 0, scene.mesh.body_count - 1)
+
+
+def _cut_by_cylinder(radius, group, model):
+    """Bodies with corners on both sides of a cylinder around the axis of a hole."""
+    hole = HoleMonitor(model, group)
+    away = model.mesh.points - hole.axis_point
+    reach = length(away - dot(away, hole.axis)[:, None] * hole.axis)
+    corners = reach[model.mesh.tetrahedra]
+    nearest, farthest = corners.min(axis=1), corners.max(axis=1)
+    cut = np.flatnonzero((nearest < radius) & (radius < farthest))
+    if not len(cut):
+        raise InputError(
+            f"distance must be that of a body from the axis of {group}, from {nearest.min():.3g} "
+            f"to {farthest.max():.3g} m, got {radius:.3g}"
+        )
+    return cut

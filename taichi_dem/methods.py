@@ -16,8 +16,9 @@ DASHPOTS = ("full", "limited")
 class Method(Protocol):
     """How bodies step; every member that the package reads.
 
-    A method may also have ``advance``, a class derived from ``step.advance.Advance``, and
-    ``structure``, what its kernels depend on beside its class (``structure_of``).
+    A method may also have ``advance``, a class derived from ``step.advance.Advance``,
+    ``structure``, what its kernels depend on beside its class (``structure_of``), and ``order``,
+    that of its error (``order_of``).
     """
 
     @property
@@ -103,6 +104,24 @@ def structure_of(method: Any) -> Hashable:
     return type(method), method.neighbour, method.dashpot, method.distance is None, rule
 
 
+def order_of(method: Any, damped: bool, varying: bool) -> Optional[int]:
+    """Order of the error in the step between events; None where a method declares none.
+
+    damped: whether a dashpot acts. varying: whether bodies or times had steps of their own.
+    A class that is derived from a method declares an order of its own, or none: its ``advance`` may
+    have another one.
+    """
+    declared = vars(type(method)).get("order")
+    return declared(method, damped, varying) if callable(declared) else None
+
+
+def _explicit_order(method, damped, varying):
+    """Dashpots lag by half a step; limited ones are those of another material at each step."""
+    if damped and method.dashpot == "limited":
+        return None
+    return 1 if damped or varying else 2
+
+
 def _suffix(method):
     """Suffix of a name for control and limited dashpots."""
     controlled = "_controlled" if method.control is not None else ""
@@ -146,6 +165,10 @@ class Uniform:
         """Steps of a body by which its contacts are counted before they touch."""
         return _steps_ahead(self)
 
+    def order(self, damped: bool, varying: bool) -> Optional[int]:
+        """Order of the error in the step, see ``order_of``."""
+        return _explicit_order(self, damped, varying)
+
     def criterion(self) -> Union[FixedStep, Displacement]:
         """Step rule for the schedule."""
         return FixedStep() if self.distance is None else Displacement()
@@ -187,6 +210,10 @@ class Multirate:
     def steps_ahead(self) -> float:
         """Steps of a body by which its contacts are counted before they touch."""
         return _steps_ahead(self)
+
+    def order(self, damped: bool, varying: bool) -> Optional[int]:
+        """Order of the error in the step, see ``order_of``."""
+        return _explicit_order(self, damped, varying)
 
     def criterion(self) -> Displacement:
         """Step rule for the schedule."""
@@ -236,6 +263,10 @@ class ImplicitDashpots:
     def dt0(self) -> float:
         """Largest step [s]."""
         return self.dt
+
+    def order(self, damped: bool, varying: bool) -> int:
+        """Order of the error in the step, see ``order_of``; that of sweeps that have agreed."""
+        return 1 if varying or (damped and self.theta != 0.5) else 2
 
     def criterion(self) -> FixedStep:
         """Step rule for the schedule."""

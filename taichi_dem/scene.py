@@ -1,6 +1,6 @@
 """Scene: mesh, material and the effects that act in it."""
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -56,9 +56,20 @@ class Scene:
         """The effect of a role that takes one, None where none is listed."""
         return next((effect for effect in self.effects if effect.role == role), None)
 
+    def damped(self, touching: bool = True) -> bool:
+        """Whether a dashpot acts: of bonds, or, where bodies are touching, of contacts."""
+        material, roles = self.material, {effect.role for effect in self.effects if effect.name}
+        bonds = "dashpot" in roles and material.normal_damping + material.shear_damping > 0.0
+        return bonds or (touching and "contact" in roles and material.contact_damping > 0.0)
+
     def has(self, name: str) -> bool:
         """Whether an effect of this name is listed."""
         return any(effect.name == name for effect in self.effects)
+
+
+def kind_of(scene: Scene) -> Hashable:
+    """Kind of a scene: classes of its effects, and number of its bodies."""
+    return tuple(type(effect) for effect in scene.effects), scene.mesh.body_count
 
 
 def _check_types(scene):

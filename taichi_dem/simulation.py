@@ -5,6 +5,7 @@ import copy
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from typing import Any, Optional
 
 import numpy as np
@@ -13,6 +14,7 @@ from taichi_dem.diagnostics.bond_slip import BondSlips
 from taichi_dem.diagnostics.divergence import DivergenceCheck
 from taichi_dem.diagnostics.effect_activity import effect_activity
 from taichi_dem.diagnostics.energy_balance import EnergyBalance
+from taichi_dem.diagnostics.known_error import known_error
 from taichi_dem.diagnostics.missing_effects import MissingEffects
 from taichi_dem.diagnostics.readings import Readings
 from taichi_dem.diagnostics.report import Report
@@ -35,20 +37,13 @@ from taichi_dem.methods import Method, check_method
 from taichi_dem.scene import Scene
 from taichi_dem.stability.step_control import counted_criteria
 from taichi_dem.step.advance import Advance
-from taichi_dem.step.auto_driver import AutoDriver
+from taichi_dem.step.auto_driver import MEASURED, AutoDriver, driver_name
 from taichi_dem.step.drivers import DRIVERS, Step
 from taichi_dem.step.schedule import Schedule
 from taichi_dem.timeline import MACRO_TICKS, NEVER
 
 #: Largest steps of a run, of which the ticks are counted in 64 bits.
 MOST_STEPS = 2**42
-#: Reason why the resident driver cannot run, for a sentence.
-CPU_ONLY = "runs on a CPU only"
-#: Bonds below which the resident driver is the quicker one, and above which the parallel one is,
-#: on a CPU with several threads and free cores; between them both are tried.
-RESIDENT_BELOW, PARALLEL_FROM = 4000, 100000
-#: Name of the driver that is chosen by measurement.
-_MEASURED = "measured"
 
 
 class Simulation(Uncopied):
@@ -89,7 +84,7 @@ class Simulation(Uncopied):
         compiling("set-up", 0.0)
         self.scene, self.method, self.solves = scene, method, method.solves
         self.model = Model(scene.mesh, scene.material, scene.effects)
-        name = _driver_name(driver, self.model.bond_count)
+        name = driver_name(driver, self.model.bond_count)
         structure = Structure(scene.effects, method, brute_force)
         self.loan = ENGINES.borrow(structure, capacity_of(self.model), self.model, "simulation")
         self._take_parts()
@@ -138,7 +133,7 @@ class Simulation(Uncopied):
 
     def _driver(self, name):
         """Driver of the engine, or one that measures both."""
-        if name == _MEASURED:
+        if name == MEASURED:
             drivers: Any = {each: PartView(self.loan, ("drivers", each)) for each in DRIVERS}
             return AutoDriver(self.step, drivers)
         return PartView(self.loan, ("drivers", name))
@@ -327,11 +322,10 @@ class Simulation(Uncopied):
         if not brief:
             shared_volume.sample(self.time_s, finished=True)
         linear, angular = self.energy_balance.momentum_errors()
-        levels = self.state.level.to_numpy()
         tables = self.energy_balance.tables()
         account = self.energy_balance.account(tables)
         unconverged, worst = self.step_resolution.unconverged
-        return Report(
+        report = Report(
             method=self.method.name,
             driver=self.driver.name,
             effects=tuple(effect.name for effect in self.model.effects if effect.name),
@@ -339,7 +333,7 @@ class Simulation(Uncopied):
             body_count=self.model.body_count,
             bond_count=self.model.bond_count,
             broken_faces=int((self.state.broken_tick.to_numpy() != NEVER).sum()),
-            smallest_step_s=self.method.dt0 / 2.0 ** int(levels.max()),
+            smallest_step_s=self.method.dt0 / 2.0 ** int(self.state.level.to_numpy().max()),
             substeps=counts[0],
             body_updates=counts[1],
             bond_evaluations=counts[2],
@@ -369,23 +363,7 @@ class Simulation(Uncopied):
             bond_slip=self.bond_slips.finding(),
             round_off_J=self.divergence_check.round_off(),
         )
-
-
-def _driver_name(name, bond_count):
-    settings: Any = runtime.settings()
-    arch = settings.arch
-    if name == "auto":
-        return "parallel" if arch == "cuda" else _by_size(bond_count)
-    if name == "resident" and arch == "cuda":
-        raise InputError(f"driver 'resident' {CPU_ONLY}: use 'parallel' with arch 'cuda'")
-    return name
-
-
-def _by_size(bond_count):
-    settings: Any = runtime.settings()
-    if settings.threads == 1 or bond_count < RESIDENT_BELOW:
-        return "resident"
-    return "parallel" if bond_count >= PARALLEL_FROM else _MEASURED
+        return replace(report, known_error=known_error(report, self.scene, self.method))
 
 
 def macro_steps(until: float, dt0: float) -> int:

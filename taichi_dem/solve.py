@@ -6,12 +6,13 @@ from typing import Any, Optional, Union
 from taichi_dem.accuracy.job import Job
 from taichi_dem.accuracy.search import Search
 from taichi_dem.goals import Goal
+from taichi_dem.kit.accuracy import plans
 from taichi_dem.kit.accuracy.answer import Answer, Plan
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.progress.progress_bar import reporting
 from taichi_dem.kit.validation import AUTO, instance, positive, shown
-from taichi_dem.scene import Scene
+from taichi_dem.scene import Scene, kind_of
 
 
 def solve(
@@ -36,7 +37,7 @@ def solve(
     Raises InputError for what cannot be used, SimulationDiverged where no step is stable.
     """
     instance("scene", scene, Scene)
-    instance("goal", goal, Goal)
+    instance("goal", goal, Goal).check_scene(scene)
     positive("until", until)
     _share("tolerance", tolerance, 1.0)
     _share("confidence", confidence, math.nextafter(1.0, 0.0))
@@ -44,7 +45,10 @@ def solve(
     first = 0 if plan is None else instance("plan", plan, Plan).begin
     job = Job(scene, until, goal, tolerance, confidence)
     with reporting(progress, goal.name) as report_progress:
-        return Search(job, budget, report_progress, first).answer()
+        answer = Search(job, budget, report_progress, first).answer()
+    if math.isfinite(answer.plan.parting_s):
+        plans.remember(kind_of(scene), plans.parting(answer.plan.parting_s, until))
+    return answer
 
 
 def _share(name: str, value: Any, most: float) -> None:

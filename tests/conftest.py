@@ -10,7 +10,7 @@ from ca_damper.engine import damper_engine
 from taichi_dem import InputError, runtime
 from taichi_dem.engine.engine import ENGINES
 from taichi_dem.kit.allocation import field_bytes, tree_count
-from taichi_dem.simulation import CPU_ONLY
+from taichi_dem.step.auto_driver import CPU_ONLY
 from tests import arch
 
 pytest_plugins = ("tests.attacks",)

@@ -16,6 +16,7 @@ from ca_damper.response import UNITS, Response
 from ca_damper.steady_state import BATCHES, correlation_factor
 from taichi_dem.kit.accuracy.answer import ErrorParts, Values
 from taichi_dem.kit.accuracy.student import f_outside, t_quantile
+from taichi_dem.kit.display import by_fields
 
 # Seeds are said to differ where chance would make their variance so large in this share of cases.
 _SEEDS_ALIKE = 0.2
@@ -35,6 +36,9 @@ class SeedValues:
     variance: np.ndarray
     freedom: int
     drift: np.ndarray
+
+    def __repr__(self) -> str:
+        return by_fields(self)
 
     @property
     def mean(self) -> np.ndarray:
@@ -99,6 +103,9 @@ class Estimate:
     def allowed(self, tolerance: float) -> float:
         """Largest half-width that is good enough: nothing is known better than to rounding."""
         return float(np.maximum(tolerance * size_of(self.value), 2.0 * self.rounding))
+
+    def __repr__(self) -> str:
+        return by_fields(self)
 
 
 def estimate(

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichi_dem.kit.accuracy.student import t_quantile
+from taichi_dem.kit.display import by_fields
 
 #: Error of the finest step by Richardson: times this.
 SAFETY = 1.25
@@ -35,6 +36,9 @@ class StepPart:
     error: np.ndarray
     regular: np.ndarray
     is_seen: bool
+
+    def __repr__(self) -> str:
+        return by_fields(self)
 
     @property
     def is_regular(self) -> bool:
@@ -63,7 +67,7 @@ def step_part(
         return StepPart(values[0], error, np.full(seen.shape, True), bool(seen.any()))
     three = [0, near, far]
     regular = _in_range(values[three], noise[three], order)
-    error = _by_order(values[three], noise[three], order)
+    error = _by_order(values[three], noise[three], seen, order)
     spread = _prediction(values, confidence)
     value = np.where(regular, values[0], values.mean(axis=0))
     found = np.where(regular, error, spread)
@@ -93,11 +97,12 @@ def _beyond(values, noise, order):
     return gap / np.where(blur > 0.0, blur, 1.0)
 
 
-def _by_order(values, noise, order):
+def _by_order(values, noise, seen, order):
     """Half-width of the finest of values at 1, 2 and 4 steps.
 
-    All three tell it where they agree with the order of the method as far as chance lets see.
-    Elsewhere the order is that of the differences, if it is lower than the method's.
+    All three tell it where they agree with the order of the method as far as chance lets see, and
+    the last change does where it is seen beyond chance and larger. Elsewhere the order is that of
+    the differences, if it is lower than the method's.
     """
     near, far = np.abs(values[0] - values[1]), np.abs(values[1] - values[2])
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -105,7 +110,8 @@ def _by_order(values, noise, order):
     trusted = np.clip(np.where(near > 0.0, observed, order), _LEAST_ORDER, order)
     whole = SAFETY * np.abs(values[0] - values[2]) / (4.0**order - 1.0)
     agree = np.abs(_beyond(values, noise, order)) < _OTHER_ORDER
-    return np.where(agree, whole, _richardson(near, trusted))
+    last = np.where(seen, _richardson(near, order), 0.0)
+    return np.where(agree, np.maximum(whole, last), _richardson(near, trusted))
 
 
 def _prediction(values, confidence):

@@ -155,6 +155,11 @@ class Automaton:
         return self.width / self.v_max
 
     @property
+    def order(self) -> Optional[int]:
+        """Order of the error in the step; without some of the impulses there is none."""
+        return 1 if self.accounting == "all" else None
+
+    @property
     def step_bound(self) -> tuple[float, str]:
         """Longest step [s], and why."""
         return self.longest_dt, "a cell crossed at v_max"

@@ -76,6 +76,7 @@ class Spheres:
 
     label: ClassVar[str] = "dem"
     default_dt: ClassVar[float] = 2e-5
+    order: ClassVar[int] = 1
 
     def __post_init__(self) -> None:
         """InputError for a number or word outside its range."""

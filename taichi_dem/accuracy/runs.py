@@ -10,6 +10,7 @@ from taichi_dem.accuracy.job import Job, Methods
 from taichi_dem.kit.display import counted
 from taichi_dem.kit.progress.progress import Listener, Progress
 from taichi_dem.kit.study.timing import clock
+from taichi_dem.output.record import Frame
 from taichi_dem.result import Result
 from taichi_dem.simulate import result_of, run_simulation
 from taichi_dem.simulation import Simulation
@@ -66,15 +67,24 @@ class Runs:
 
         By the way of a usual body, to a fraction of the run. Makes two runs.
         """
-        one, two = (self._timed(level, twin, False, _FRAMES) for twin in (0, 1))
-        for frame, other in zip(one.frames[1:], two.frames[1:]):
+        one, two = (self.frames(level, twin) for twin in (0, 1))
+        for frame, other in zip(one[1:], two[1:]):
             if _apart(other, frame) > self.job.tolerance:
                 return float(frame.time_s)
         return math.inf
 
+    def frames(self, level: int, twin: int) -> tuple[Frame, ...]:
+        """Frames of a run at a level, made for them."""
+        return self._timed(level, twin, False, _FRAMES).frames
+
     def change(self, coarse: int, fine: int) -> float:
         """Difference of the displacements of all bodies at two levels, as a share of the finer."""
         return _apart(self.results[coarse].frames[-1], self.results[fine].frames[-1])
+
+    def peak_change(self, coarse: int, fine: int) -> float:
+        """Difference of a usual body's largest speed at two levels, as a share of the finer."""
+        slower, faster = (self.results[level].peak_speed for level in (coarse, fine))
+        return _share(np.abs(slower - faster), faster)
 
     def leap(self, coarse: int, fine: int) -> float:
         """Change of a number of broken faces between two levels that may go unseen, as a share.
@@ -130,13 +140,18 @@ class Runs:
 
 
 def _apart(frame, finer):
-    """Difference of the displacements of a usual body, as a share of what a usual one moves.
+    """Difference of the displacements of a usual body, as a share of a usual one."""
+    ways = finer.displacement, frame.displacement - finer.displacement
+    moved, apart = (np.linalg.norm(way, axis=1) for way in ways)
+    return _share(apart, moved)
+
+
+def _share(apart, whole):
+    """Difference of a usual body as a share of a usual value.
 
     Usual: in the middle of all, so that a few fragments that fly elsewhere do not count.
     """
-    moved = np.median(np.linalg.norm(finer.displacement, axis=1))
-    apart = np.median(np.linalg.norm(frame.displacement - finer.displacement, axis=1))
-    return float(apart) / max(float(moved), 1e-300)
+    return float(np.median(apart)) / max(float(np.median(whole)), 1e-300)
 
 
 def _displaced(model, seed):

@@ -22,9 +22,8 @@ _MOST_COARSE, _MOST_FINE, _MOST_AT_ONCE = 6, 7, 2
 _NEGLIGIBLE, _TWO = 0.25, 2.8
 #: Runs of which a spread is taken at first, and at most.
 _FEW, _MANY = 6, 96
-#: Share of the change of a usual body that an output is taken to change by, at least: that it
-#: changes by less may be chance.
-_LIKELY = 0.3
+#: Runs there must be of each end, on average, to call it one: more ends are a distribution.
+_OF_EACH = 3
 #: Tolerances of which the cost is told.
 _TOLERANCES = (0.1, 0.03, 0.01, 0.003)
 
@@ -41,7 +40,9 @@ class Search:
         self.job, self.budget = job, budget
         self.methods = job.methods()
         self.runs = Runs(job, self.methods, listen)
-        self.levels, self.count, self.why = [first], 0, ""
+        self.levels, self.why = [first], ""
+        # Twins so far, and their level.
+        self.count, self.twins_at = 0, first
 
     def answer(self) -> Answer:
         """The answer, after all runs that it needs."""
@@ -69,9 +70,10 @@ class Search:
 
     def _branched(self, made: Answer) -> Answer:
         """The answer with its branches, where twins come to a few ends; else as it is."""
-        values = self._sample(self.levels[0])
+        values = self._sample(self.twins_at)
         clusters = clusters_of(values, 0.0, 0.5 * self._allowed)
-        if self.job.goal.averaged or len(clusters) < 2:
+        few = 2 <= len(clusters) <= len(values) // _OF_EACH
+        if self.job.goal.averaged or not few:
             return made
         branches = branches_of(
             np.array(values), clusters, range(len(values)), self._step().error, 1.0
@@ -96,6 +98,7 @@ class Search:
         if self._single(first + 1) is None:
             raise SimulationDiverged(self.runs.failure)
         self.levels.append(first + 1)
+        self.twins_at = first
 
     @property
     def _allowed(self):
@@ -114,15 +117,18 @@ class Search:
         many = self.job.goal.averaged
         return float(np.mean(self._sample(level) if many else [self._single(level)]))
 
-    def _step(self) -> StepError:
-        """Error of the step, and of sweeps whose tolerance falls with it."""
-        values = [self._value(level) for level in self.levels]
-        change = self.runs.leap if self.job.goal.kind == "count" else self.runs.change
+    def _step(self, count: Optional[int] = None) -> StepError:
+        """Error of the step, and of sweeps whose tolerance falls with it; count: of levels."""
+        levels = self.levels[:count]
+        values = [self._value(level) for level in levels]
+        # An output that changes by less than a usual body's may do so by chance.
+        usual = {"count": self.runs.leap, "extreme": self.runs.peak_change}
+        change = usual.get(self.job.goal.kind, self.runs.change)
         return step_error(
             values,
             self.methods.declared,
-            [2.0**-level for level in self.levels],
-            least=_LIKELY * change(*self.levels[-2:]) * abs(values[-1]),
+            [2.0**-level for level in levels],
+            least=change(*levels[-2:]) * abs(values[-1]),
             smooth=not self._eventful,
             confidence=self.job.confidence,
         )
@@ -131,7 +137,7 @@ class Search:
         """Half-widths of the bar by source; that of sweeps once a second step was not enough."""
         step, first = self._step().error, self.levels[0]
         chance = self._spread() if self._eventful or self.job.goal.averaged else 0.0
-        if len(self.levels) == 2 or not self.methods.solves:
+        if len(self.levels) == 2 or self.why or not self.methods.solves:
             return ErrorParts(step=step, chance=chance)
         tight = self.runs.value(first, 0, True)
         sweeps = math.inf if tight is None else abs(tight - self._single(first))
@@ -144,20 +150,23 @@ class Search:
         To halve the step disturbs a run far more than a rounding does: where that moves a usual
         body by little, and breaks the same faces, nothing is there that could let twins part.
         """
-        first, averaged = self.levels[0], self.job.goal.averaged
+        coarse, averaged = self.twins_at, self.job.goal.averaged
         if self.count == 0:
             change = self.runs.change(*self.levels[-2:])
             if not averaged and change <= _NEGLIGIBLE * self.job.tolerance:
                 if self.runs.same_breaks(*self.levels[-2:]):
                     return 0.0
+            if not self._affords(1.0, coarse):
+                return math.inf
             self.count = 1
         if self.count == 1 and not averaged:
-            here, twin = self._single(first), self._single(first, 1)
+            here, twin = self._single(coarse), self._single(coarse, 1)
             apart = math.inf if twin is None else _TWO * abs(twin - here)
             if apart <= _NEGLIGIBLE * self._allowed:
                 return apart
-        self.count = max(self.count, _FEW - 1)
-        found = self._sample(first)
+        if self.count < _FEW - 1 and self._affords(_FEW - 1.0 - self.count, coarse):
+            self.count = _FEW - 1
+        found = self._sample(coarse)
         if len(found) < 2:
             return math.inf
         spread = float(np.std(found, ddof=1)) * t_quantile(self.job.confidence, len(found) - 1)
@@ -171,28 +180,32 @@ class Search:
 
     def _parting(self, chance):
         """Time from which twins differ by more than the tolerance [s], where chance tells."""
-        return self.runs.parting(self.levels[0]) if chance > self._allowed else math.inf
+        return self.runs.parting(self.twins_at) if chance > self._allowed else math.inf
 
     def _reduce(self, parts):
         """Make the runs that narrow the largest part, or say why there are none."""
-        if not self.job.goal.averaged and parts.chance > self._allowed:
+        averaged = self.job.goal.averaged
+        if not averaged and len(self.levels) > 2 and parts.chance > self._allowed:
             self._give_up(self._chaotic())
-        elif parts.chance > 0.5 * parts.total and self.job.goal.averaged:
+        elif averaged and parts.chance > 0.5 * parts.total:
             self._add_twins(parts)
         else:
             self._refine(parts)
 
     def _chaotic(self):
         """Why no single run answers, and what would."""
-        found = self._sample(self.levels[0])
+        found = self._sample(self.twins_at)
         if len(found) < 2:
             return f"runs that differ by one rounding diverged: {self.runs.failure}"
         width = t_quantile(self.job.confidence, math.inf) * float(np.std(found, ddof=1))
-        needed = max(2, math.ceil(2.0 * (width / max(self._allowed, 1e-300)) ** 2))
+        words = f"runs that differ by one rounding spread by {self._percent(width)}"
+        if not self._allowed:
+            return words
+        needed = max(2, math.ceil(2.0 * (width / self._allowed) ** 2))
         seconds = needed * sum(self.runs.cost[level] for level in self.levels[:2])
         return (
-            f"runs that differ by one rounding spread by {self._percent(width)}. The mean of some "
-            f"{needed} of them may have it, in {seconds:.2g} s: ask for goal.mean()"
+            f"{words}. The mean of some {needed} of them may have it, in {seconds:.2g} s: ask for "
+            "goal.mean()"
         )
 
     def _add_twins(self, parts):
@@ -217,6 +230,9 @@ class Search:
                 self._give_up(f"a smaller step diverged: {self.runs.failure}")
             else:
                 self.levels.append(last + more)
+                if not self.job.goal.averaged and parts.chance > self._allowed:
+                    # At the step before, twins may have parted by the step alone.
+                    self.count, self.twins_at = 0, last
 
     def _affords(self, runs, level):
         """Whether the budget lets some runs as long as that at a level be made."""
@@ -229,17 +245,24 @@ class Search:
         self.why = why
 
     def _percent(self, error):
-        return f"{100.0 * error / max(abs(self._value(self.levels[-1])), 1e-300):.2g} %"
+        size = abs(self._value(self.levels[-1]))
+        unit = self.job.goal.unit
+        return f"{100.0 * error / size:.2g} %" if size else f"{error:.2g} {unit} about zero"
 
     def _shortfall(self):
         return f"{100.0 * self.job.tolerance:g} % was not reached: {self.why}" if self.why else ""
 
     def _cost_curve(self):
-        """Cost of other tolerances: by the step alone, from the levels that were run."""
-        size, step = abs(self._value(self.levels[-1])), self._step()
-        order = step.order if step.regular else 1.0
+        """Cost of other tolerances: what the runs cost that were enough for them, or would be."""
+        levels, size = self.levels, abs(self._value(self.levels[-1]))
+        others = self.runs.seconds - sum(self.runs.cost[level] for level in levels)
+        paid = others + np.cumsum([self.runs.cost[level] for level in levels])
+        stages = [(self._step(count), paid[count - 1]) for count in range(2, len(levels) + 1)]
         for tolerance in sorted({*_TOLERANCES, self.job.tolerance}, reverse=True):
-            ratio = max(step.error, 1e-300) / max(tolerance * size, 1e-300)
-            more = max(1 - len(self.levels) + 1, math.ceil(math.log2(ratio) / order))
-            paid = tolerance == self.job.tolerance and not self.why
-            yield Expense(tolerance, self.runs.seconds * (1.0 if paid else 2.0**more), paid)
+            enough = [seconds for step, seconds in stages if step.error <= tolerance * size]
+            step, seconds = stages[-1]
+            unseen = 1.0 if self._eventful else self.methods.declared
+            order = step.order if step.regular else unseen
+            ratio = step.error / max(tolerance * size, 1e-300)
+            predicted = seconds * 2.0 ** math.ceil(math.log2(max(1.0, ratio)) / order)
+            yield Expense(tolerance, float(enough[0] if enough else predicted), bool(enough))

@@ -32,7 +32,8 @@ class Report:
     step, see ``step_control.CRITERIA``. round_off_J: energies below this may be round-off
     (``DivergenceCheck.round_off``). bond_slip: the ``bond_slip.BondSlip`` of the bond that slipped
     farthest, empty where none slipped. measured_speedup: CPU time of one step for all over that of
-    the run, where it was measured.
+    the run, where it was measured. known_error: what is known of the error for nothing extra, in
+    words.
     """
 
     method: str
@@ -66,6 +67,7 @@ class Report:
     interpenetration: Optional[Interpenetration] = None
     bond_slip: tuple = ()
     measured_speedup: Optional[float] = None
+    known_error: str = ""
 
     def __repr__(self):
         took = f"{self.run_seconds:.3g} s run"
@@ -154,6 +156,11 @@ class Report:
         words = f"{self.sweeps:,}, {self.sweeps / self.substeps:.2f} a substep"
         return (("sweeps", f"{words}, {self.unconverged_steps:,} substeps unconverged"),)
 
+    def _error_rows(self):
+        """Rows with what is known of the error."""
+        parts = self.known_error.split("; ") if self.known_error else ()
+        return tuple((name, part) for name, part in zip(("known of the error", "", ""), parts))
+
     def __str__(self):
         """A table of some twenty lines, then one line for every effect that was missed."""
         rows = [
@@ -181,6 +188,7 @@ class Report:
                 f"{self.energy_balance['load_work'] + self.energy_balance['support_work']:.6g} J",
             ),
             ("energy residual", self.unexplained),
+            *self._error_rows(),
             (
                 "momentum error",
                 f"{self.linear_momentum_error:.1e} linear, "

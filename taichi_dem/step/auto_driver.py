@@ -6,15 +6,45 @@ every phase, and much more where other programs occupy a core.
 
 import time
 from collections.abc import Callable, Mapping
+from typing import Any
 
+from taichi_dem.kit import runtime
 from taichi_dem.kit.allocation import values
+from taichi_dem.kit.errors import InputError
 from taichi_dem.step.drivers import Driver, Parallel, Resident, Step
 
+#: Reason why the resident driver cannot run, for a sentence.
+CPU_ONLY = "runs on a CPU only"
+#: Bonds below which the resident driver is the quicker one, and above which the parallel one is,
+#: on a CPU with several threads and free cores; between them both are tried.
+RESIDENT_BELOW, PARALLEL_FROM = 4000, 100000
+#: Name of the driver that is chosen by measurement.
+MEASURED = "measured"
 #: Substeps of a try, and how often each driver is tried; the better of its tries counts.
 _SUBSTEPS = 8
 _TRIES = 2
 #: Share of the time that goes into tries.
 _SHARE = 0.05
+
+
+def driver_name(name: str, bond_count: int) -> str:
+    """Name of the driver for a scene of so many bonds; name: of the one asked for, or "auto".
+
+    Raises InputError for one that the present architecture does not have.
+    """
+    settings: Any = runtime.settings()
+    if name == "auto":
+        return "parallel" if settings.arch == "cuda" else _by_size(settings.threads, bond_count)
+    if name == "resident" and settings.arch == "cuda":
+        raise InputError(f"driver 'resident' {CPU_ONLY}: use 'parallel' with arch 'cuda'")
+    return name
+
+
+def _by_size(threads, bond_count):
+    """Driver of a CPU."""
+    if threads == 1 or bond_count < RESIDENT_BELOW:
+        return "resident"
+    return "parallel" if bond_count >= PARALLEL_FROM else MEASURED
 
 
 class AutoDriver:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from taichi_dem import ImplicitDashpots, Simulation, runtime
-from taichi_dem.simulation import PARALLEL_FROM, RESIDENT_BELOW, _driver_name
-from taichi_dem.step.auto_driver import AutoDriver
+from taichi_dem.step.auto_driver import PARALLEL_FROM, RESIDENT_BELOW, AutoDriver, driver_name
+from taichi_dem.step.drivers import DRIVERS
 from tests.bar_blast import UNTIL, squeezed_scene
 
 METHOD = ImplicitDashpots(4e-7, refresh=1e-5)
@@ -35,6 +35,12 @@ class Slow:
         return timed
 
 
+def measuring(simulation, clock):
+    """Driver that measures both, drivers of its own, by a clock."""
+    drivers = {name: kind(simulation.step) for name, kind in DRIVERS.items()}
+    return AutoDriver(simulation.step, drivers, clock)
+
+
 @pytest.fixture(scope="module")
 def runs():
     """The same scene by the resident driver, and by one that changes to the parallel one and back.
@@ -45,7 +51,7 @@ def runs():
     straight.advance_to(STEPS)
     simulation = Simulation(squeezed_scene(), METHOD, "resident")
     clock = Slow("resident")
-    simulation.driver = AutoDriver(simulation.step, clock)
+    simulation.driver = measuring(simulation, clock)
     simulation.start()
     clock.time_calls(simulation.driver)
     names = [simulation.driver.name]
@@ -78,8 +84,8 @@ def test_changing_drivers_changes_no_bit(runs):
 def test_tries_take_their_share(runs):
     """Tries of 2 (1 + 0.01) s are repeated once the driver has gone on for twenty times as long."""
     _, simulation, _ = runs
-    made, clock = AutoDriver(simulation.step, Slow("parallel")), None
-    clock = made.clock
+    clock = Slow("parallel")
+    made = measuring(simulation, clock)
     for name, driver in made.drivers.items():
         seconds = 1.0 if name == "parallel" else 0.01
         driver.few = lambda end, count, seconds=seconds: clock.__dict__.update(
@@ -99,6 +105,6 @@ def test_tries_take_their_share(runs):
 def test_auto_goes_by_size_and_threads():
     """Without a second thread the parallel driver has nothing to offer."""
     sizes = (RESIDENT_BELOW - 1, RESIDENT_BELOW, PARALLEL_FROM - 1, PARALLEL_FROM)
-    found = [_driver_name("auto", size) for size in sizes]
+    found = [driver_name("auto", size) for size in sizes]
     assert runtime.settings().threads == 2
     assert found == ["resident", "measured", "measured", "parallel"]

@@ -285,7 +285,7 @@ def test_spheres_beyond_their_limit_end_as_diverged(tmp_path, name, options):
     assert not (tmp_path / "summary.json").exists()
 
 
-def test_peaks_are_found_to_an_accuracy(shown):
+def test_peaks_are_found_to_an_accuracy(shown, quick_run):
     """30 grains of 0.2 g as a rigid mass peak at sqrt(86 / 92) f0; bars are as narrow as asked."""
     options = "--accuracy 5% --fillings ca_static --particles 30".split()
     folder, figures = shown("damper_response", *options)
@@ -294,6 +294,9 @@ def test_peaks_are_found_to_an_accuracy(shown):
         assert 0.0 < error <= 0.05 * value
     assert figures["peak_ratio_ca_static_N30"] == pytest.approx((86.0 / 92.0) ** 0.5, abs=0.01)
     assert len((folder / "accuracy.csv").read_text().splitlines()) == 3
+    # The fixture keeps the run.
+    said = quick_run("damper_response", *options)[1].stdout
+    assert said.count("5 % was reached") == 2 and said.count("10 %: ") == 2
 
 
 BAD_OPTIONS = [

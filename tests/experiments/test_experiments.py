@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from taichi_dem import PAPER_BLOCK
+from taichi_dem import CONCRETE, PAPER_BLOCK
 from taichi_dem.mesh import shapes as mesh_shapes
 from taichi_dem.mesh.files import read_mesh, write_mesh
 from taichi_dem.plot.film import write_mp4
@@ -141,6 +141,38 @@ def shown(quick_run):
         return folder, {key: figure["value"] for key, figure in figures.items()}
 
     return run
+
+
+def test_the_displacement_of_the_hole_is_found_to_an_accuracy(quick_run):
+    """The answer, its bar and its price, and no files of a run that nobody asked for."""
+    folder, done = quick_run("blast_fracture", "--accuracy", "2%")
+    assert done.returncode == 0 and done.stderr == "", done.stderr
+    figures = json.loads((folder / "summary.json").read_text())["figures"]
+    value, error = (figures[f"hole_displacement{e}_mm"]["value"] for e in ("", "_error"))
+    assert 0.0 < error <= 0.02 * value and figures["accuracy_reached"]["value"] == 1
+    assert "blast, 8e-05 s, hole displacement: " in done.stdout
+    for words in ("+-", "2 % was reached", "10 %: ", "0.3 %: ", "s predicted"):
+        assert words in done.stdout
+    (row,) = rows_of(folder / "accuracy.csv")
+    assert float(row["value"]) == value and row["reached"] == "True"
+    assert sorted(path.name for path in folder.iterdir()) == [
+        *("accuracy.csv", "cracks.png", "summary.json"),
+    ]
+
+
+@pytest.mark.slow
+def test_a_block_without_a_hole_is_asked_for_its_kinetic_energy(tmp_path):
+    """Of free fall: m (g t)^2 / 2."""
+    mesh = mesh_shapes.bar(0.1, 0.05, (3, 2, 2))
+    write_mesh(tmp_path / "bar.msh", mesh)
+    options = "--without gas_pressure --with gravity --quick --accuracy 1%".split()
+    out = tmp_path / "out"
+    done = start("blast_fracture", "--mesh", tmp_path / "bar.msh", "--out", out, *options)
+    assert done.returncode == 0, done.stderr
+    figures = json.loads((out / "summary.json").read_text())["figures"]
+    mass = 0.1 * 0.05**2 * CONCRETE.density
+    wanted = 0.5 * mass * (9.81 * 8e-5) ** 2
+    assert figures["kinetic_energy_J"]["value"] == pytest.approx(wanted, rel=1e-6)
 
 
 @pytest.mark.slow

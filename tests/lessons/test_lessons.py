@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import _answers
 import _grains
 import _needs
 import _page
@@ -186,6 +187,28 @@ def test_effects_that_are_silenced_give_the_bits_of_a_program_without_them(engin
     assert silent.report.energy_balance == own.report.energy_balance
 
 
+def test_answers_hold_the_truth_and_narrower_ones_cost_more_runs(engine):
+    """A bar that is asked for to a share is no wider; the truth's own error is below 1e-6.
+
+    It falls by four from step to step: from 1.5e-6 s, where it is 3 %, to 1e-8 s.
+    """
+    asked = [engine.ask(_answers.answer, tolerance) for tolerance in (10.0, 0.29, 0.01)]
+    last = asked[-1]
+    assert list(last.answers) == [10.0, 0.3, 0.01]
+    for tolerance, found in last.answers.items():
+        assert found.reached and 0.0 < last.bar(tolerance) <= 0.01 * tolerance
+        assert last.error(tolerance) <= last.bar(tolerance) + 3e-6
+    runs = [found.plan.runs for found in last.answers.values()]
+    assert runs == sorted(runs) and runs[0] < runs[-1]
+    # The same answers are given again.
+    assert engine.ask(_answers.answer, 10.0).chosen is asked[0].chosen
+    said = _answers.words(asked[1])
+    assert said.startswith("You allow 0.3 %.") and said.count("**") == 8 and " ± " in said
+    with Image.open(io.BytesIO(engine.ask(_answers.picture, last))) as image:
+        assert 900 <= image.width <= 1300 and 500 <= image.height <= 800
+        assert len(np.unique(np.asarray(image.convert("L")))) > 20
+
+
 def test_what_a_choice_costs_is_known_once_it_was_measured(engine):
     unknown, known = (engine.ask(work, _needs.ALL, 0.2) for work in (_needs.answer, _needs.price))
     assert all(map(math.isnan, unknown.step_s)) and min(known.step_s) > 0.0
@@ -226,8 +249,8 @@ def test_friction_is_listed_with_contact_only():
     assert _needs.allowed(reversed(_needs.ALL)) == _needs.ALL
 
 
-def test_there_are_three_notebooks_and_make_serves_them():
-    assert len(NOTEBOOKS) == 3
+def test_there_are_four_notebooks_and_make_serves_them():
+    assert len(NOTEBOOKS) == 4
     makefile = (Path(ROOT) / "Makefile").read_text(encoding="utf-8")
     assert all(name in makefile for name in NOTEBOOKS)
 

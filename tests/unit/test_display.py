@@ -15,6 +15,7 @@ from ca_damper import measures, rk45
 from taichi_dem import CONCRETE, effects, methods, runtime
 from taichi_dem.diagnostics.missing_effects import MissingEffect
 from taichi_dem.effects.base import Effect
+from taichi_dem.kit.accuracy.answer import Answer, ErrorParts, Expense, Plan
 from taichi_dem.kit.display import counted, in_brief, listed
 from taichi_dem.mesh.contact_spheres import spheres_of_faces
 from taichi_dem.mesh.shapes import bar
@@ -85,10 +86,21 @@ def of_the_damper():
     yield ca_damper.ProgressBar("work")
 
 
+def of_questions():
+    """Goals, and answers of both packages."""
+    parts, plan = ErrorParts(step=0.01), Plan("solved dashpots", 3, 0.1, 0.2)
+    cost = (Expense(0.01, 0.3, True), Expense(0.001, 1.0, False))
+    answer = Answer("way", "mm", 1.0, parts, 0.01, 0.95, plan, cost_curve=cost)
+    branch = ca_damper.Branch(1.0, 0.1, 0.75, 0.2, (1, 2, 3))
+    yield from (answer, parts, plan, *cost, branch)
+    yield ca_damper.BranchedAnswer(**{**vars(answer), "branches": (branch, branch)})
+    yield from (taichi_dem.goals.hole_displacement(), ca_damper.goals.peak_rms())
+
+
 @pytest.fixture(scope="module")
 def held():
     """Objects that a user may hold; their session has ended, so that no field can be read."""
-    made = (*IDENTIFYING, *EFFECTS, *of_the_blast(), *of_the_damper())
+    made = (*IDENTIFYING, *EFFECTS, *of_the_blast(), *of_the_damper(), *of_questions())
     runtime.stop()
     return made
 

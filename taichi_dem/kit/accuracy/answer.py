@@ -7,7 +7,7 @@ from typing import Any, Union
 
 import numpy as np
 
-from taichi_dem.kit.display import counted, in_brief
+from taichi_dem.kit.display import by_fields, counted, in_brief
 
 #: A number, or one for each place of a curve.
 Values = Union[float, np.ndarray]
@@ -31,6 +31,9 @@ class ErrorParts:
     def total(self) -> Values:
         """Half-width of the whole bar."""
         return sum(getattr(self, part.name) ** 2 for part in fields(self)) ** 0.5
+
+    def __repr__(self):
+        return by_fields(self)
 
     def __str__(self):
         found = {part.name: largest(getattr(self, part.name)) for part in fields(self)}
@@ -144,8 +147,10 @@ def rounded(value: float, unit: float) -> str:
     """A number to a power of ten that its error leaves certain; to six digits for unit 0."""
     if unit == 0.0 or not math.isfinite(value):
         return f"{value:.6g}"
-    decimals = max(0, round(-math.log10(unit)))
-    return f"{value:.{decimals}f}" if unit < 1e5 else f"{value:.3g}"
+    if 0.0 < abs(value) < 1e-4 or unit >= 1e5:
+        digits = math.floor(math.log10(abs(value) / unit)) + 1 if value else 1
+        return f"{value:.{max(1, digits)}g}"
+    return f"{value:.{max(0, round(-math.log10(unit)))}f}"
 
 
 def _places(error):

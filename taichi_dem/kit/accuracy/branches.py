@@ -37,7 +37,7 @@ class Branch:
         return f"{self.value:.6g} +- {self.error:.2g}{end} for {share} of the {runs}"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class BranchedAnswer(Answer):
     """Answer of a question with several ends: its value is that of the most frequent.
 

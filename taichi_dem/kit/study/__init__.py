@@ -1,5 +1,11 @@
 """Tools of a study: options, tables, figures of a summary, timings, kept results, workers."""
 
+from taichi_dem.kit.study.accuracy_option import (
+    add_accuracy,
+    check_accuracy,
+    show_answer,
+    write_accuracy,
+)
 from taichi_dem.kit.study.answers import cheapest_figures, figures_by_method, give_answers
 from taichi_dem.kit.study.cached_result import cached, digest
 from taichi_dem.kit.study.command_line import (
@@ -37,6 +43,7 @@ __all__ = [
     "Parser",
     "Table",
     "Timing",
+    "add_accuracy",
     "add_checkpoints",
     "add_settings",
     "bare_parser",
@@ -45,6 +52,7 @@ __all__ = [
     "call_in_process",
     "call_rounds",
     "cheapest_figures",
+    "check_accuracy",
     "checkpoint_of",
     "clock",
     "columns_of",
@@ -66,12 +74,14 @@ __all__ = [
     "processor",
     "seconds_of",
     "several",
+    "show_answer",
     "show_rows",
     "take_settings",
     "tolerance",
     "value_in_words",
     "versions",
     "whole",
+    "write_accuracy",
     "write_rows",
     "write_summary",
 ]

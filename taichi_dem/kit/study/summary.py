@@ -10,7 +10,7 @@ import sys
 import textwrap
 import time
 from argparse import Namespace
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Union
 
 import numpy as np
@@ -48,15 +48,15 @@ def finish(
     """Write summary.json, and caption.txt where there is a caption; print them, and the folder.
 
     figures: by name, as of ``figure``, or tuples of its arguments.
-    runs: objects with compile_seconds and run_seconds, or both sums as a pair of numbers; or those
-    of compiling alone: all else since ``main`` began counts as running. see: the picture to look
-    at first. show: whether the figures are printed too.
+    runs: reports, objects with compile_seconds and run_seconds, or both sums as a pair of numbers;
+    or those of compiling alone: all else since ``main`` began counts as running. see: the picture
+    to look at first. show: whether the figures are printed too.
     """
     if isinstance(runs, float):
         runs = runs, time.perf_counter() - options.started - runs
-    compiling, running = runs if isinstance(runs, tuple) else _seconds_of(runs)
+    found = _seconds_of(runs) if isinstance(runs, tuple) else _figures_of(list(runs))
     made = {key: figure(*one) if isinstance(one, tuple) else one for key, one in figures.items()}
-    write_summary(options.out, name, made, compile_seconds=compiling, run_seconds=running)
+    write_summary(options.out, name, made, **found)
     if show:
         print_figures(made)
     if caption:
@@ -66,17 +66,31 @@ def finish(
     print(f"\nPictures and tables are in {options.out}{see}")
 
 
-def _seconds_of(runs):
-    pairs = [(made.compile_seconds, made.run_seconds) for made in runs]
-    return sum(pair[0] for pair in pairs), sum(pair[1] for pair in pairs)
+def _seconds_of(pair) -> dict[str, Any]:
+    return dict(zip(("compile_seconds", "run_seconds"), pair))
+
+
+def _figures_of(reports) -> dict[str, Any]:
+    """Arguments of ``write_summary`` from the reports of runs."""
+    names = "compile_seconds", "run_seconds"
+    seconds = _seconds_of(sum(getattr(one, name) for one in reports) for name in names)
+    known = [one.known_error for one in reports if getattr(one, "known_error", "")]
+    return {**seconds, "known_errors": known}
 
 
 def write_summary(
-    folder: str, name: str, figures: Figures, *, compile_seconds: float, run_seconds: float
+    folder: str,
+    name: str,
+    figures: Figures,
+    *,
+    compile_seconds: float,
+    run_seconds: float,
+    known_errors: Sequence[str] = (),
 ) -> None:
     """Write summary.json: figures, machine, versions, seconds, command; see ``figure``.
 
-    quick: whether the command asked for the smaller job, which the gallery's texts do not describe.
+    known_errors: what reports say of the errors of their runs; equal ones are written once. quick:
+    whether the command asked for the smaller job, which the gallery's texts do not describe.
     """
     settings: Any = runtime.settings()
     arguments = sys.argv[1:]
@@ -86,6 +100,7 @@ def write_summary(
         "figures": figures,
         "machine": {**machine, "threads": settings.threads, "system": platform.platform()},
         "versions": versions(),
+        "known_errors": list(dict.fromkeys(known_errors)),
         "seconds": {"compile": compile_seconds, "run": run_seconds},
         "command": shlex.join([f"experiments/{name}.py", *arguments]),
         "quick": "--quick" in arguments,
