@@ -37,9 +37,9 @@ from taichi_dem.kit import study
 NAME = "accuracy_on_request"
 QUESTIONS = Path(__file__).with_name("accuracy_questions.csv")
 SETTINGS = {
-    "prices": (30, 2),
-    "blasts": (100, 3),
-    "dampers": (24, 1),
+    "prices": (30, 2, study.whole(1, 30), "questions whose price is compared"),
+    "blasts": (100, 3, study.whole(1, 120), "questions to the blast whose bars are checked"),
+    "dampers": (24, 1, study.whole(1, 40), "questions to the damper whose bars are checked"),
     "until": (1e-4, 5e-5),
     "later": (5e-4, 5e-5),
     "tolerances": ((0.1, 0.03, 0.01, 0.003), (0.1, 0.03)),

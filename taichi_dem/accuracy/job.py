@@ -16,7 +16,7 @@ _FEWEST = 8
 #: Sweeps of a step at most, and by how much better they agree to see their error.
 _MOST_SWEEPS, _TIGHT = 1000, 8
 #: Rows of the time series of the coarsest run in which an extreme is looked for, and of any run.
-_ROWS, _MOST_ROWS = 50, 3200
+_ROWS, _MOST_ROWS = 100, 6400
 
 
 @dataclass(frozen=True)

@@ -124,12 +124,14 @@ class Search:
         # An output that changes by less than a usual body's may do so by chance.
         usual = {"count": self.runs.leap, "extreme": self.runs.peak_change}
         change = usual.get(self.job.goal.kind, self.runs.change)
+        # Where the times of samples lie by a largest speed is chance: no high order is trusted.
+        value = self.job.goal.kind == "value"
         return step_error(
             values,
-            self.methods.declared,
+            self.methods.declared if value else 1.0,
             [2.0**-level for level in levels],
             least=change(*levels[-2:]) * abs(values[-1]),
-            smooth=not self._eventful,
+            smooth=value and not self._eventful,
             confidence=self.job.confidence,
         )
 

@@ -49,6 +49,8 @@ LINES = [
     ),
     ("blast_fracture", ("--accuracy", "1%", "--dt0", "1e-7"), ("left out with dt0: it chooses",)),
     ("blast_fracture", ("--with", "gravity\n,dust"), ("effect must be one of",)),
+    ("accuracy_on_request", ("--prices", "0"), ("--prices", "1 to 30")),
+    ("accuracy_on_request", ("--blasts", "121"), ("--blasts", "1 to 120")),
     ("blast_methods", ("--methods", "implicit,implicit"), ("--methods", "twice")),
     ("blast_methods", ("--methods", "magic"), ("magic", "paper_uniform")),
     ("blast_methods", ("--methods", ""), ("method must be one of",)),

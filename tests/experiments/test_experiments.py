@@ -88,6 +88,10 @@ FIGURES = {
         *("seconds_at_0.1_percent", "chaos_floor", "reference_check"),
         *(f"seconds_at_1_percent_{name}" for name in ("multirate_held", "limited", "implicit")),
     },
+    "accuracy_on_request": {
+        *("price_ratio_median", "price_ratio_worst", "coverage_percent", "answers"),
+        *("seconds_at_1_percent_blast", "seconds_at_1_percent_damper", "hole_later_mm"),
+    },
     "demo_fracture_law": {"peak_MPa_error", "failure_opening_um_error", "energy_J_m2_error"},
     "demo_wave_and_spall": {"wave_speed_m_s", "free_end_over_wave", "spall_1.5_depth_m"},
     "demo_step_too_large": {"limit_dashpots_s", "dashpots_0.9_diverged", "dashpots_1.3_diverged"},
@@ -114,6 +118,7 @@ FILES = {
     "cost_of_accuracy_blast": (
         *("work_precision.png", "errors.png", "points.csv", "runs.csv", "answers.csv"),
     ),
+    "accuracy_on_request": ("cost.png", "calibration.png", "twins.png", "prices.csv", "bars.csv"),
     "demo_fracture_law": ("law.gif", "law.png", "tension.csv", "shear.csv", "caption.txt"),
     "demo_wave_and_spall": (
         *("spall.gif", "wave.png", "spall.png", "wave.csv", "spall.csv", "caption.txt"),
@@ -123,7 +128,13 @@ FILES = {
 }
 
 
-quick = quick_runs([name for name in NAMES if "blast" in name or name == "cost_of_effects"])
+quick = quick_runs(
+    [
+        name
+        for name in NAMES
+        if "blast" in name or name in ("cost_of_effects", "accuracy_on_request")
+    ]
+)
 
 
 class TestQuickRun(QuickRun):
