@@ -6,11 +6,13 @@ from typing import Any, Optional
 
 import numpy as np
 
-from _accuracy_damper import damper_reference
+from _damper_reference import reference_values
 from ca_damper import solve_response
 from taichi_dem import Answer, ImplicitDashpots, InputError, Uniform, simulate, solve, step_report
 from taichi_dem.accuracy.job import Job
 from taichi_dem.accuracy.runs import Runs
+from taichi_dem.kit.accuracy.branches import BranchedAnswer
+from taichi_dem.kit.accuracy.student import t_quantile
 from taichi_dem.kit.study.timing import clock
 from taichi_dem.simulate import result_of
 
@@ -34,23 +36,34 @@ class FixedRun:
 
 @dataclass(frozen=True)
 class Judged:
-    """An answer, its CPU time [s], and the true value: that of the same goal at a finer step."""
+    """An answer, its CPU time [s], and the true value: that of the same goal at a finer step.
+
+    doubt: half-width at 95 % of the bar of the true value, where seeds make it a mean.
+    """
 
     question: Any
     answer: Answer
     seconds: float
     true: float
+    doubt: float = 0.0
 
     @property
     def deviation(self) -> float:
         """How far the value is off, in half-widths of its bar; from -1 to 1 where that holds."""
         off = float(self.answer.value) - self.true
-        return off / self.answer.error if self.answer.error else math.copysign(math.inf, off)
+        width = math.hypot(self.answer.error, self.doubt)
+        return off / width if width else (math.copysign(math.inf, off) if off else 0.0)
 
     @property
     def holds(self) -> bool:
-        """Whether the bar holds the true value."""
-        return abs(float(self.answer.value) - self.true) <= self.answer.error
+        """Whether the bar holds the true value, as well as that is known."""
+        width = math.hypot(self.answer.error, self.doubt)
+        return abs(float(self.answer.value) - self.true) <= width
+
+    @property
+    def single(self) -> bool:
+        """Whether a single number answers the question."""
+        return not isinstance(self.answer, BranchedAnswer)
 
     def row(self, kind: str) -> tuple:
         """Cells of a table: the question, the answer, the truth."""
@@ -68,10 +81,20 @@ def judged_blast(question: Any) -> Judged:
     return Judged(question, answer, seconds, math.nan if true is None else true)
 
 
-def judged_damper(question: Any) -> Judged:
-    """A question to the damper answered, beside the value of finer runs with other seeds."""
-    answer = solve_response(**question.arguments())
-    return Judged(question, answer, answer.plan.seconds, damper_reference(question, answer))
+def judged_damper(question: Any) -> Optional[Judged]:
+    """A question to the damper answered, beside the mean of finer runs with other seeds.
+
+    None where its budget ends before there is anything to tell.
+    """
+    try:
+        answer = solve_response(**question.arguments())
+    except InputError:
+        return None
+    true = reference_values(question, answer)
+    doubt = 0.0
+    if len(true) > 1:
+        doubt = t_quantile(0.95, len(true) - 1) * float(true.std(ddof=1)) / math.sqrt(len(true))
+    return Judged(question, answer, answer.plan.seconds, float(true.mean()), doubt)
 
 
 def answered(question: Any) -> tuple[Answer, float]:

@@ -65,6 +65,7 @@ def run(options):
         "blast": [judged_blast(blast_question(k)) for k in seeds_of("blast", options.blasts)],
         "damper": [judged_damper(damper_question(k)) for k in seeds_of("damper", options.dampers)],
     }
+    judged = {kind: [one for one in some if one is not None] for kind, some in judged.items()}
     rows = [one.row(kind) for kind, some in judged.items() for one in some]
     study.write_rows(folder / "bars.csv", rows, ROWS)
     ratios = [row[-1] for row in prices if row]
@@ -92,11 +93,13 @@ def price_row(question):
 def figures_of(ratios, judged):
     """Figures of all answers."""
     everyone = [one for some in judged.values() for one in some]
+    singles = [one for one in everyone if one.single]
     figures = {
         "price_ratio_median": (float(np.median(ratios)), "1"),
         "price_ratio_worst": (max(ratios), "1"),
-        "coverage_percent": (share_held(everyone), "%"),
+        "coverage_percent": (share_held(singles), "%"),
         "answers": (len(everyone), "1"),
+        "without_a_single_number": (len(everyone) - len(singles), "1"),
         "reached_percent": (100.0 * np.mean([one.answer.reached for one in everyone]), "%"),
     }
     each = {f"coverage_percent_{name}": (share_held(some), "%") for name, some in judged.items()}
@@ -104,8 +107,8 @@ def figures_of(ratios, judged):
 
 
 def share_held(judged):
-    """Share of the bars that hold the true value [%]."""
-    return 100.0 * float(np.mean([one.holds for one in judged]))
+    """Share of the bars that hold the true value [%], of answers with a single number."""
+    return 100.0 * float(np.mean([one.holds for one in judged if one.single]))
 
 
 def draw_all(folder, options, judged):
@@ -122,7 +125,9 @@ def draw_all(folder, options, judged):
     panels["paper's damper, peak RMS"], times = cost_of_damper(options)
     figures.update({name: (seconds, "s") for name, seconds in times.items()})
     draw_cost(folder / "cost.png", panels)
-    deviations = {name: [one.deviation for one in some] for name, some in judged.items()}
+    deviations = {
+        name: [one.deviation for one in some if one.single] for name, some in judged.items()
+    }
     everyone = [one for some in judged.values() for one in some]
     draw_calibration(folder / "calibration.png", deviations, share_held(everyone))
     dropped = dropped_question()
