@@ -10,6 +10,7 @@ from taichi_dem.methods import ImplicitDashpots, Uniform
 from taichi_dem.scene import Scene
 from taichi_dem.stability.mesh_limits import bond_rates, springs_of
 from taichi_dem.stability.stable_step import spring_step
+from taichi_dem.stability.step_report import step_report
 
 #: Fewest steps of a run.
 _FEWEST = 8
@@ -35,12 +36,20 @@ class Job:
         present = {effect.role for effect in scene.effects if effect.name}
         damped = "dashpot" in present and material.normal_damping + material.shear_damping > 0.0
         damped |= "contact" in present and material.contact_damping > 0.0
-        # Solved dashpots leave the limit of the springs, which is all there is without any.
-        step = spring_step(
-            bond_rates(scene.mesh, topology_of(scene.mesh), material.density, springs_of(material))
-        )
-        steps = max(_FEWEST, math.ceil(self.until / step.min()))
+        steps = max(_FEWEST, math.ceil(self.until / self._longest_step()))
         return Methods(ImplicitDashpots if damped else Uniform, self.until, steps)
+
+    def _longest_step(self):
+        """Longest step that all springs bear [s]: solved dashpots leave no other limit.
+
+        Without bonds that of contacts, which is not needed where few of their spheres ever touch.
+        """
+        mesh, material = self.scene.mesh, self.scene.material
+        rates = bond_rates(mesh, topology_of(mesh), material.density, springs_of(material))
+        step = float(spring_step(rates).min())
+        if math.isinf(step):
+            step = float(step_report(self.scene).borne("solved", "contact").min())
+        return step
 
     def rows(self, level: int) -> int:
         """Rows of the time series of a run at a level, of which an extreme needs ever more."""

@@ -4,6 +4,7 @@ import math
 import subprocess
 import sys
 import weakref
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -21,11 +22,11 @@ from taichi_dem import (
 )
 from taichi_dem.accuracy.job import Job
 from taichi_dem.accuracy.runs import Runs
-from taichi_dem.mesh.shapes import bar
+from taichi_dem.mesh.shapes import bar, placed_together, single
 from tests.accuracy.drawn import blast_question, dropped_question
 from tests.accuracy.small_bar import UNTIL, struck_bar
 from tests.equivalence.test_bits import ENVIRONMENT
-from tests.scenes import ROOT
+from tests.scenes import ROOT, apart
 
 GOALS = (
     goals.broken_faces(),
@@ -180,3 +181,22 @@ def test_the_mean_of_bodies_that_bounce_is_found():
     answer = solve(asked.scene, goal=asked.goal.mean(), **looks)
     assert answer.reached and answer.parts.chance > 0.0 and answer.plan.runs > 6
     assert np.isfinite(answer.value) and answer.goal.startswith("mean ")
+
+
+def test_bodies_that_fall_freely_have_an_answer_to_rounding():
+    """No spring limits the step; half of g t^2 is exact at any."""
+    scene = Scene(apart(3), CONCRETE, [effects.Gravity((0.0, 0.0, -9.81))])
+    answer = solve(scene, until=0.2, goal=goals.body_displacement(1), progress=None)
+    assert answer.reached and answer.value == pytest.approx(1e3 * 0.5 * 9.81 * 0.2**2, rel=1e-9)
+
+
+def test_bodies_without_bonds_take_the_step_of_their_contacts():
+    """A body that falls on a held one and comes back: the same energy as before."""
+    parts = {"held": (single(0.05), (0.0, 0.0, 0.0)), "falling": (single(0.05), (0.06, 0.0, 0.0))}
+    mesh = placed_together(parts)
+    chosen = [effects.Gravity((-2e4, 0.0, 0.0)), effects.FaceContact(), effects.Fixed("held_base")]
+    scene = Scene(mesh, replace(CONCRETE, contact_damping=0.0), chosen)
+    answer = solve(scene, until=2e-3, goal=goals.kinetic_energy(), tolerance=0.1, progress=None)
+    assert answer.result.report.pair_evaluations > 0
+    true = finer(scene, 2e-3, goals.kinetic_energy(), answer, 3)
+    assert abs(answer.value - true) <= answer.error
