@@ -20,7 +20,7 @@ LASTS, RISES = (0.0, 1.3), (-1.0, 0.5)
 #: Shares of the bars that have dashpots, that may break, and that are fixed at one end.
 DAMPED, BREAKING, FIXED = 0.85, 0.6, 0.4
 #: Room in the lists of contacts: a bar that is crushed needs more than a block that is blasted.
-LISTS = 600
+LISTS = {"spheres_per_body": 1000, "neighbours_per_body": 128}
 #: Tolerances, powers of ten.
 TOLERANCE = (-2.5, -1.0)
 
@@ -121,7 +121,7 @@ def _effects(random, travel):
         found.append(effects.BondDamping())
     if random.random() < BREAKING:
         found += [effects.Softening(), effects.ShearSlip()]
-        found += [effects.SphereContact(spheres_per_body=LISTS), effects.Friction()]
+        found += [effects.SphereContact(**LISTS), effects.Friction()]
     if random.random() < FIXED:
         found.append(effects.Fixed("right"))
     return found

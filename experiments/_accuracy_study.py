@@ -73,11 +73,18 @@ class Judged:
         return (kind, asked.seed, *found, self.seconds)
 
 
-def judged_blast(question: Any) -> Judged:
-    """A question to the blast answered, beside the value at a step 16 times finer."""
-    answer, seconds = answered(question)
+def judged_blast(question: Any) -> Optional[Judged]:
+    """A question to the blast answered, beside the value at a step 16 times finer.
+
+    None where one of them is refused: a bar that is crushed to rubble fills its lists.
+    """
     job = _job(question)
-    true = Runs(job, job.methods(), None).value(answer.plan.begin + 1 + FINER)
+    try:
+        answer, seconds = answered(question)
+        true = Runs(job, job.methods(), None).value(answer.plan.begin + 1 + FINER)
+    except InputError as refused:
+        print(f"left out: {question}: {refused}")
+        return None
     return Judged(question, answer, seconds, math.nan if true is None else true)
 
 

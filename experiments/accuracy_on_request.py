@@ -82,7 +82,7 @@ def seeds_of(kind, count):
 def price_row(question):
     """Cells of the table of prices; None where no single run, or no answer, is good enough."""
     found, runs = judged_blast(question), fixed_runs(question)
-    best = cheapest(runs, found.true, question.tolerance)
+    best = found and cheapest(runs, found.true, question.tolerance)
     if best is None or not found.answer.reached:
         return None
     words = str(question).replace(",", ";"), 100.0 * question.tolerance

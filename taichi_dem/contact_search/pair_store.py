@@ -84,9 +84,13 @@ class PairStore:
 
     def near_table(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Near pairs in order: both bodies (n, 2), number of sphere pairs (n,) and deepest (n,)."""
-        slots = values(self.near_slot)[: int(values(self.near_count))]
-        counts = values(self.last) - values(self.first)
-        return values(self.body)[slots], counts[slots], values(self.deepest)[slots]
+        slots = values(self.near_slot, slice(int(values(self.near_count))))
+        counts = values(self.last, slots) - values(self.first, slots)
+        return values(self.body, slots), counts, values(self.deepest, slots)
+
+    def near_bodies(self) -> np.ndarray:
+        """Both bodies of every near pair, in order, (n, 2)."""
+        return values(self.body, values(self.near_slot, slice(int(values(self.near_count)))))
 
     @ti.func
     def allocate(self, i, j):

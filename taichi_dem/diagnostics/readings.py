@@ -36,7 +36,7 @@ class Readings:
         count = int(values(self.contacts.store.near_count)) if self.contacts is not None else 0
         table = np.zeros((count, 14))
         if count:
-            bodies = self.contacts.store.near_table()[0]
+            bodies = self.contacts.store.near_bodies()
             self._push(table)
             for side in range(2):
                 np.add.at(pushed, bodies[:, side], table[:, 6 * side : 6 * side + 6])

@@ -9,6 +9,7 @@ import contextlib
 import ctypes
 import math
 import os
+import weakref
 from typing import Any
 
 import numpy as np
@@ -142,6 +143,18 @@ def array_of(field: ti.Field) -> np.ndarray:
 
     Writing to it writes to the field. It serves as long as the tree exists.
     """
+    if field not in _layouts:
+        _layouts[field] = _layout(field)
+    root, offset, kind, shape, strides = _layouts[field]
+    return _array_at(_base(root) + offset, kind, shape, strides)
+
+
+#: Where fields lie in their trees, which is asked for thousands of times a run.
+_layouts: weakref.WeakKeyDictionary = weakref.WeakKeyDictionary()
+
+
+def _layout(field):
+    """Root of a field's tree, bytes from there to its first entry, type, shape and strides."""
     first = _first_scalar(field).snode.ptr
     kind = np.dtype(to_numpy_type(field.dtype))
     shape: tuple[int, ...] = tuple(field.shape)
@@ -154,16 +167,15 @@ def array_of(field: ti.Field) -> np.ndarray:
         entry = (field.n,) if field.ndim == 1 else (field.n, field.m)
         steps = (kind.itemsize,) if field.ndim == 1 else (field.m * kind.itemsize, kind.itemsize)
         shape, strides = shape + entry, strides + steps
-    root, offset = _offset(first)
-    return _array_at(_base(root) + offset, kind, shape, strides)
+    return (*_offset(first), kind, shape, strides)
 
 
-def values(field: ti.Field) -> np.ndarray:
-    """Copy of all entries of a field."""
+def values(field: ti.Field, wanted: Any = ...) -> np.ndarray:
+    """Copy of entries of a field; wanted: their slice or their numbers, all by default."""
     if impl.current_cfg().arch == ti.cuda or not in_tree(field):
-        return field.to_numpy()
+        return field.to_numpy()[wanted]
     ti.sync()
-    return array_of(field).copy()
+    return np.array(array_of(field)[wanted])
 
 
 def assign(field: ti.Field, array: ArrayLike) -> None:
