@@ -46,8 +46,8 @@ def draw_calibration(path, judged, coverage):
         found = [np.clip(deviation, -FARTHEST, FARTHEST) for deviation in judged.values()]
         names = [f"{name}, {len(deviation)} answers" for name, deviation in judged.items()]
         axes.hist(found, edges, stacked=True, label=names, color=[BLUE, ORANGE][: len(found)])
-        axes.set_xlabel("(value - true value) / half-width of the bar; beyond 3 at the ends")
-        axes.set_ylabel("answers")
+        axes.set_xlabel("(value - true value) / half-width of the bar [1]; beyond 3 at the ends")
+        axes.set_ylabel("answers [1]")
         axes.set_title(f"{coverage:.1f} % of the bars hold the true value (95 % meant)")
         axes.legend(fontsize=8)
 
@@ -61,11 +61,11 @@ def draw_parting(path, time_ms, ways, apart, answer):
     with picture(path, 1, 2, size=(10.0, 4.2)) as (_, (left, right)):
         left.plot(time_ms, ways.T, color=BLUE, linewidth=0.8)
         left.set(xlabel="time [ms]", ylabel="mean way of the bodies [mm]")
-        left.set_title(f"{len(ways)} runs whose starts differ by 1e-12 of the size")
+        left.set_title(f"{len(ways)} runs whose starts differ by one rounding")
         right.semilogy(time_ms[1:], np.maximum(apart[:, 1:].T, 1e-16), color=BLUE, linewidth=0.8)
         right.axhline(answer.tolerance, color=ORANGE)
         right.axvline(1e3 * answer.plan.parting_s, color=RED, linestyle="--")
-        right.set(xlabel="time [ms]", ylabel="distance from the first run / way")
+        right.set(xlabel="time [ms]", ylabel="distance from the first run / way [1]")
         right.set_title("how far they are apart")
         keys = [line_key(f"tolerance, {100 * answer.tolerance:g} %", color=ORANGE)]
         keys.append(line_key("from here on solve sees them part", color=RED, linestyle="--"))

@@ -1,6 +1,6 @@
 """What an answer with an error bar costs, and whether its bar is to be believed.
 
-    python experiments/accuracy_on_request.py          # about twelve minutes on one core
+    python experiments/accuracy_on_request.py          # about 25 minutes on one core
     python experiments/accuracy_on_request.py --quick
 
 Questions about bars under gas pressure and about dampers are drawn at random, by seeds that are
@@ -70,7 +70,9 @@ def run(options):
     study.write_rows(folder / "bars.csv", rows, ROWS)
     ratios = [row[-1] for row in prices if row]
     found = {**figures_of(ratios, judged), **draw_all(folder, options, judged)}
-    study.finish(options, NAME, found, 0.0, see="cost.png")
+    blasts = (one.answer.result.report for one in judged["blast"])
+    compiling = sum(report.compile_seconds for report in blasts)
+    study.finish(options, NAME, found, compiling, see="cost.png")
 
 
 def seeds_of(kind, count):

@@ -124,14 +124,15 @@ class Search:
         # An output that changes by less than a usual body's may do so by chance.
         usual = {"count": self.runs.leap, "extreme": self.runs.peak_change}
         change = usual.get(self.job.goal.kind, self.runs.change)
-        # Where the times of samples lie by a largest speed is chance: no high order is trusted.
-        value = self.job.goal.kind == "value"
+        # What breaks or touches does so within a step, and where the times of samples lie by a
+        # largest speed is chance: only first order is trusted then.
+        smooth = self.job.goal.kind == "value" and not self._eventful
         return step_error(
             values,
-            self.methods.declared if value else 1.0,
+            self.methods.declared if smooth else 1.0,
             [2.0**-level for level in levels],
             least=change(*levels[-2:]) * abs(values[-1]),
-            smooth=value and not self._eventful,
+            smooth=smooth,
             confidence=self.job.confidence,
         )
 

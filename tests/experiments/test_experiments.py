@@ -162,7 +162,7 @@ def test_the_displacement_of_the_hole_is_found_to_an_accuracy(quick_run):
     value, error = (figures[f"hole_displacement{e}_mm"]["value"] for e in ("", "_error"))
     assert 0.0 < error <= 0.02 * value and figures["accuracy_reached"]["value"] == 1
     assert "blast, 8e-05 s, hole displacement: " in done.stdout
-    for words in ("+-", "2 % was reached", "10 %: ", "0.3 %: ", "s predicted"):
+    for words in ("+-", "2 % was reached", "10 %: ", "0.3 %: ", "s measured"):
         assert words in done.stdout
     (row,) = rows_of(folder / "accuracy.csv")
     assert float(row["value"]) == value and row["reached"] == "True"
