@@ -1,18 +1,21 @@
 """Scene: mesh, material and the effects that act in it."""
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Optional, Union
 
 from taichi_dem.effects.base import MANY, Effect
+from taichi_dem.effects.chosen import AUTO, ChosenEffects, chosen_effects
 from taichi_dem.effects.roles import check_effect
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import positive, shown
+from taichi_dem.kit.validation import between, positive, shown
 from taichi_dem.materials import Material
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.parts import may_meet, parts_of
 
+#: Bound of the momentum of a body that wakes no neighbour, as a share of the mean of all.
+SLEEP = 1e-6
 #: Option that lets bodies touch at outer faces.
 REMEDY = "SphereContact(outer_faces=True)"
 
@@ -21,24 +24,30 @@ REMEDY = "SphereContact(outer_faces=True)"
 class Scene:
     """A block of bonded bodies and the effects that act in it; checked once, here.
 
-    mesh: tetrahedra and face groups. material: its constants. effects: the effects that act; what
-    is not listed is not computed. max_speed: bound [m/s] beyond which a run counts as diverged.
+    mesh: tetrahedra and face groups. material: its constants. effects: a list of the effects that
+    act, and what is not listed is not computed; or "auto": the laws of the material, each evaluated
+    only where and when it acts; or "all": the same laws, evaluated everywhere. loads: loads and
+    supports, and laws in place of the usual ones, beside a word. max_speed: bound [m/s] beyond
+    which a run counts as diverged. sleep: with "auto", largest momentum of a body, as a share of
+    the mean of all, at which its neighbours still count as not reached by any wave and are not
+    evaluated; 1e-6 by default, at most 0.01, 0 for none.
     Raises InputError for a wrong type, an effect listed twice in a role that takes one, friction
     without contact, a group that the mesh does not have, or a bound that is no positive number.
     """
 
     mesh: Mesh
     material: Material
-    effects: Sequence[Effect] = ()
+    effects: Union[str, Sequence[Effect]] = ()
     max_speed: float = 1e4
+    loads: Iterable[Effect] = ()
+    sleep: Optional[float] = None
 
     def __post_init__(self):
-        unordered = isinstance(self.effects, (set, frozenset))
-        listed = hasattr(self.effects, "__iter__") and getattr(self.effects, "ndim", 1) != 0
-        if unordered or not listed:
-            raise InputError(f"effects must be a list of effects, got {shown(self.effects)}")
-        object.__setattr__(self, "effects", tuple(self.effects))
+        _check_body(self)
+        object.__setattr__(self, "effects", _effects_of(self))
+        object.__setattr__(self, "loads", ())
         _check_types(self)
+        object.__setattr__(self, "sleep", _sleep_of(self))
         _check_roles(self.effects)
         for effect in self.effects:
             effect.check_material(self.material)
@@ -51,6 +60,11 @@ class Scene:
         effects = ", ".join(effect.name or type(effect).__name__ for effect in self.effects)
         words = f"effects {effects}" if effects else "no effects"
         return in_brief(self, counted(self.mesh.body_count, "body"), words)
+
+    @property
+    def on_demand(self) -> bool:
+        """Whether effects are evaluated only where they act: effects="auto"."""
+        return self.effects.word == AUTO
 
     def effect(self, role: str) -> Any:
         """The effect of a role that takes one, None where none is listed."""
@@ -72,11 +86,47 @@ def kind_of(scene: Scene) -> Hashable:
     return tuple(type(effect) for effect in scene.effects), scene.mesh.body_count
 
 
-def _check_types(scene):
+def _effects_of(scene):
+    """Effects as a ``ChosenEffects``, from a list or a word."""
+    given = _listed("loads", scene.loads)
+    if isinstance(scene.effects, str):
+        return chosen_effects(scene.effects, scene.mesh, scene.material, given)
+    word = getattr(scene.effects, "word", None)
+    effects = _listed("effects", scene.effects)
+    if given and word is None:
+        raise InputError(
+            "loads must be left out where effects is a list, which holds them, "
+            f"got {shown(scene.loads)}"
+        )
+    return ChosenEffects((*effects, *given), *([word] if word else []))
+
+
+def _listed(name, effects):
+    unordered = isinstance(effects, (str, set, frozenset))
+    listed = hasattr(effects, "__iter__") and getattr(effects, "ndim", 1) != 0
+    if unordered or not listed:
+        raise InputError(f"{name} must be a list of effects, got {shown(effects)}")
+    return tuple(effects)
+
+
+def _sleep_of(scene):
+    """Share of the mean momentum below which a body wakes no neighbour."""
+    if scene.sleep is None:
+        return SLEEP if scene.on_demand else 0.0
+    sleep = between("sleep", scene.sleep, 0.0, 0.01)
+    if sleep and not scene.on_demand:
+        raise InputError(f"sleep must be 0 unless effects is 'auto', got {sleep:g}")
+    return sleep
+
+
+def _check_body(scene):
     if not isinstance(scene.mesh, Mesh):
         raise InputError(f"mesh must be a Mesh (see read_mesh), got {type(scene.mesh).__name__}")
     if not isinstance(scene.material, Material):
         raise InputError(f"material must be a Material, got {type(scene.material).__name__}")
+
+
+def _check_types(scene):
     for effect in scene.effects:
         if not isinstance(effect, Effect):
             raise InputError(

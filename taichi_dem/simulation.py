@@ -85,7 +85,7 @@ class Simulation(Uncopied):
         self.scene, self.method, self.solves = scene, method, method.solves
         self.model = Model(scene.mesh, scene.material, scene.effects)
         name = driver_name(driver, self.model.bond_count)
-        structure = Structure(scene.effects, method, brute_force)
+        structure = Structure(scene.effects, method, brute_force, scene.on_demand)
         self.loan = ENGINES.borrow(structure, capacity_of(self.model), self.model, "simulation")
         self._take_parts()
         self._load()
@@ -157,7 +157,8 @@ class Simulation(Uncopied):
 
     def _check_reset(self, scene, method, model):
         engine = self.loan.engine
-        if Structure(scene.effects, method, engine.structure.brute_force) != engine.structure:
+        brute_force = engine.structure.brute_force
+        if Structure(scene.effects, method, brute_force, scene.on_demand) != engine.structure:
             raise InputError(
                 "reset must have a scene and a method of the same structure, kinds of effects and "
                 f"of steps, got {scene!r} and {method!r}: make a new Simulation"

@@ -39,6 +39,8 @@ SINGLE = ("tension", "shear", "dashpot", "friction", "contact")
 ROLES = (*SINGLE, *MANY)
 #: Times its strength that no bond reaches; a power of two, so that no digit changes.
 HARMLESS = 2.0**40
+#: Share of a limit from which on a law is evaluated: rounding is far below the rest.
+NEAR = 1.0 - 1e-9
 
 
 class Effect(Sealed):
@@ -62,6 +64,8 @@ class Effect(Sealed):
     tables: "Tables"
     _count: int
 
+    #: When it begins to act, in words; a scene with effects="auto" refuses a law that says nothing.
+    activation = ""
     #: Whether it stands for no effect, which no report lists.
     is_null = False
 
@@ -298,4 +302,4 @@ ABSENT: dict[str, Any] = {
     "contact": None,
 }
 
-__all__ = ["ABSENT", "HARMLESS", "MANY", "ROLES", "SINGLE", "Effect", "Travel", "along", "bound"]
+__all__ = ["ABSENT", "HARMLESS", "MANY", "NEAR", "ROLES", "SINGLE", "Effect", "Travel", "along", "bound"]

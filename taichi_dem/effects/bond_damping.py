@@ -15,6 +15,7 @@ class BondDamping(Effect):
 
     role = "dashpot"
     name = "bond_damping"
+    activation = "bonds are strained at a rate"
 
     def numbers(self, material: Material) -> tuple[float, ...]:
         """Normal and tangential damping coefficient [Pa s/m]."""

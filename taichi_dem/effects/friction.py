@@ -15,6 +15,7 @@ class Friction(Effect):
 
     role = "friction"
     name = "friction"
+    activation = "spheres that touch slide"
 
     def numbers(self, material: Material) -> tuple[float, ...]:
         """Friction coefficient."""

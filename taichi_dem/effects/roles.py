@@ -162,6 +162,21 @@ class Support(Protocol):
         """Velocity [m/s] and angular momentum [kg m^2/s] that it allows at a time [s]."""
 
 
+class Activation(Protocol):
+    """Rule by which effects="auto" knows where a law of bonds need not be evaluated.
+
+    Kept by laws of the roles tension and shear, beside ``activation``, the rule in words, which
+    laws of contact, friction and damping have too.
+    """
+
+    def begins(self, stiffness: float, *state: Any) -> int:
+        """Nonzero where a unit that the law never changed comes near its limit.
+
+        Below, the traction must be stiffness times opening, and nothing else may happen. state: of
+        a normal law the opening [m], of a shear law the sliding [m] and the pressure [Pa].
+        """
+
+
 #: Contract of each role.
 CONTRACTS = {
     "tension": TensionLaw,
@@ -176,6 +191,37 @@ CONTRACTS = {
 
 #: Contracts that an effect keeps beside that of its role, by the attribute that says so.
 FURTHER = {"remembers": FrictionMemory, "remembers_slip": SlipMemory, "releases": ShearFailure}
+
+
+#: What a law does, by role: a class that changes it has to say anew when it begins to act.
+_DOES = {
+    "tension": ("traction", "failed"),
+    "shear": ("traction", "failed"),
+    "dashpot": ("traction",),
+    "contact": ("normal", "elastic", "nearest"),
+    "friction": ("limit", "force", "spring"),
+}
+
+
+def check_activation(effect: Any) -> None:
+    """Raise InputError for a law that has no rule for effects="auto"; loads and supports act."""
+    rules = ("activation", "begins") if effect.role in ("tension", "shear") else ("activation",)
+    order = [kind.__name__ for kind in type(effect).__mro__]
+    for rule in rules if effect.role in _DOES else ():
+        said = _first(type(effect), rule)
+        changed = min(_first(type(effect), member) for member in _DOES[effect.role])
+        if not getattr(effect, rule, None) or said > changed:
+            what = "the words activation" if rule == "activation" else "a function begins"
+            raise InputError(
+                f"effects 'auto' must have laws that say when they begin to act: {order[0]} has no "
+                f"{rule} of its own; give it {what}, or list the effects"
+            )
+
+
+def _first(kind, member):
+    """Place in the order of its bases of the class that has a member."""
+    places = [k for k, base in enumerate(kind.__mro__) if member in vars(base)]
+    return places[0] if places else len(kind.__mro__)
 
 
 def members_of(contract: type) -> tuple:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import taichi as ti
 
-from taichi_dem.effects.base import HARMLESS, Effect
+from taichi_dem.effects.base import HARMLESS, NEAR, Effect
 from taichi_dem.materials import Material
 from taichi_dem.physics.fracture import coulomb_limit, slip_beyond
 
@@ -23,6 +23,7 @@ class ShearSlip(Effect):
 
     role = "shear"
     name = "shear_slip"
+    activation = "a unit is sheared to its Coulomb limit"
     remembers_slip = True
 
     def numbers(self, material: Material) -> tuple[float, ...]:
@@ -40,6 +41,12 @@ class ShearSlip(Effect):
     def state(self) -> dict[str, ti.Field]:
         """Residual slip of every unit in the face frame [m]."""
         return {"shear_slip": self.slip}
+
+    @ti.func
+    def begins(self, stiffness, sliding, pressure):
+        """1 where a unit that never slipped comes near its limit at a pressure [Pa], else 0."""
+        limit = NEAR * coulomb_limit(self.law[0], self.law[1], pressure)
+        return ti.cast(stiffness * stiffness * sliding.norm_sqr() > limit * limit, ti.i32)
 
     @ti.func
     def traction(self, stiffness, u, sliding, pressure):

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import taichi as ti
 
-from taichi_dem.effects.base import HARMLESS, Effect
+from taichi_dem.effects.base import HARMLESS, NEAR, Effect
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.types import vec2
 from taichi_dem.kit.validation import positive
@@ -35,6 +35,7 @@ class SlipWeakening(Effect):
 
     role = "shear"
     name = "slip_weakening"
+    activation = "a unit is sheared to its Coulomb limit"
     remembers_slip = True
     releases = True
 
@@ -72,6 +73,12 @@ class SlipWeakening(Effect):
     def state(self) -> dict[str, ti.Field]:
         """Residual slip in the face frame, two components, and accumulated slip of units [m]."""
         return {"slip_weakening": self.unit}
+
+    @ti.func
+    def begins(self, stiffness, sliding, pressure):
+        """1 where a unit that never slipped comes near its limit at a pressure [Pa], else 0."""
+        limit = NEAR * coulomb_limit(self.law[0], self.law[1], pressure)
+        return ti.cast(stiffness * stiffness * sliding.norm_sqr() > limit * limit, ti.i32)
 
     @ti.func
     def traction(self, stiffness, u, sliding, pressure):

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import taichi as ti
 
-from taichi_dem.effects.base import HARMLESS, Effect
+from taichi_dem.effects.base import HARMLESS, NEAR, Effect
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.types import vec2
 from taichi_dem.materials import Material
@@ -28,6 +28,7 @@ class Softening(Effect):
 
     role = "tension"
     name = "softening"
+    activation = "a unit is opened to its tensile strength"
 
     def numbers(self, material: Material) -> tuple[float, ...]:
         """Tensile strength [Pa] and opening at failure [m]."""
@@ -58,6 +59,11 @@ class Softening(Effect):
     @ti.func
     def _onset(self, b):
         return self.law[0] / self.tables.bond_stiffness[b][0]
+
+    @ti.func
+    def begins(self, stiffness, opening):
+        """1 where an intact unit comes near its strength at an opening [m], else 0."""
+        return ti.cast(stiffness * opening > NEAR * self.law[0], ti.i32)
 
     @ti.func
     def traction(self, stiffness, u, opening):

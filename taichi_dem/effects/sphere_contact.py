@@ -32,6 +32,7 @@ class SphereContact(Effect):
 
     role = "contact"
     name = "sphere_contact"
+    activation = "spheres of free faces touch"
     #: Whether spheres meet the faces of other bodies, instead of their spheres.
     meets_faces = False
 

@@ -24,12 +24,21 @@ class Structure:
     """Compiled structure of a scene and a method: classes of effects, kind of method.
 
     Scenes of equal structures share kernels. effects, method: those of the first scene, of which
-    engines make copies. brute_force: contact search without cells.
+    engines make copies. brute_force: contact search without cells. on_demand: laws are evaluated
+    only where they act.
     """
 
-    def __init__(self, effects: Iterable[Effect], method: Method, brute_force: bool = False):
-        self.effects, self.method, self.brute_force = tuple(effects), method, brute_force
-        self.key = tuple(map(type, self.effects)), structure_of(method), brute_force
+    def __init__(
+        self,
+        effects: Iterable[Effect],
+        method: Method,
+        brute_force: bool = False,
+        on_demand: bool = False,
+    ):
+        self.effects, self.method = tuple(effects), method
+        self.brute_force, self.on_demand = brute_force, on_demand
+        kinds = tuple(map(type, self.effects))
+        self.key = kinds, structure_of(method), brute_force, on_demand
 
     def __eq__(self, other):
         return self.key == other.key
@@ -54,7 +63,7 @@ class BlastEngine(Engine):
         capacity = Capacity(*self.capacity)
         capacity.check()
         method = self.structure.method
-        self.tables = Tables(capacity, self.structure.effects)
+        self.tables = Tables(capacity, self.structure.effects, self.structure.on_demand)
         self.state = State(self.tables)
         self.contacts = Contacts(self.tables, self.state) if self.tables.has_contact else None
         self.schedule = self._schedule(method)

@@ -14,6 +14,7 @@ from taichi_dem.kit.types import real, vec3, vec4
 from taichi_dem.mesh.topology import Topology
 from taichi_dem.physics.fracture import coulomb_limit
 from taichi_dem.physics.rotation import rotation_matrix, spin_of
+from taichi_dem.step.activity import Activity
 from taichi_dem.timeline import NEVER
 
 
@@ -49,12 +50,14 @@ class State:
     active_effects: bits of each body: of the loads and then the supports that changed its motion,
     CONTACT and RUBBED. limits: tensile strength, cohesion [Pa] and friction coefficient whose
     excess in a bond is noted, without bound where an effect serves them; passed: ticks at which a
-    bond first exceeded its tensile and its shear limit, NEVER before.
+    bond first exceeded its tensile and its shear limit, NEVER before. activity: the ``Activity``
+    of bonds whose laws act on demand, else None.
     """
 
     def __init__(self, tables: Tables):
         n, bonds = tables.capacity.bodies, tables.capacity.bonds
         self.tables = tables
+        self.activity = Activity(tables) if tables.on_demand else None
         self.position = ti.Vector.field(3, real, shape=n)
         self.orientation = ti.Vector.field(4, real, shape=n)
         self.rotation = ti.Matrix.field(3, 3, real, shape=n)
@@ -91,6 +94,8 @@ class State:
         assign(self.bad_body, n)
         assign(self.passed, np.full((model.bond_count, 2), NEVER))
         assign(self.limits, np.array(unserved_limits(model)))
+        if self.activity is not None:
+            self.activity.load(model)
         self.set_motion(model.centre)
 
     def set_motion(

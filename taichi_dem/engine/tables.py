@@ -27,6 +27,7 @@ class Tables:
     unit_area [m^2] one a bond. neighbour is the body behind local face f, entry 4 * body + f, -1
     where it is outer; face_bond the bond there. face_spheres: contact spheres on a face; those of
     face k begin at entry k * face_spheres.
+    on_demand: whether laws are evaluated only where they act.
     Body frames coincide with the world axes at the start. Source: Konno et al., section 2.
     """
 
@@ -44,8 +45,8 @@ class Tables:
     friction: Any
     contact: Any
 
-    def __init__(self, capacity: Capacity, effects: Iterable[Effect]):
-        self.capacity = capacity
+    def __init__(self, capacity: Capacity, effects: Iterable[Effect], on_demand: bool = False):
+        self.capacity, self.on_demand = capacity, on_demand
         self.body_count, self.bond_count = ti.field(ti.i32, shape=()), ti.field(ti.i32, shape=())
         self._declare_bodies(capacity.bodies)
         self._declare_bonds(capacity)

@@ -15,6 +15,7 @@ from taichi_dem.kit.types import real, vec2, vec3
 from taichi_dem.physics.bond import bond_motion, unit_arm, unit_opening, unit_velocity
 from taichi_dem.physics.rotation import mean_spin, rotation_matrix, spin_of, turned, zero3
 from taichi_dem.stability.body_limits import RELEASE
+from taichi_dem.step.bond_laws import BondLaws
 from taichi_dem.step.contact_force import ContactForce
 from taichi_dem.step.tangential_springs import TangentialSprings
 
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @ti.data_oriented
-class Advance(ContactForce):
+class Advance(BondLaws, ContactForce):
     """The order in which physics and effects act; see the module.
 
     staggered: whether velocities are half a step behind positions, as the leapfrog's are. An order
@@ -44,6 +45,10 @@ class Advance(ContactForce):
         solver: Optional["Solver"] = None,
     ):
         self.tables, self.state, self.schedule = tables, state, schedule
+        self.activity = state.activity
+        self.on_demand = state.activity.laws if tables.on_demand else (False, False)
+        # Where both laws act on demand, none is missing and none is to be watched for.
+        self.notes_limits = not all(self.on_demand)
         self.solver, self.solves = solver, solver is not None
         self.solves_bonds = self.solves and solver.has_bonds
         self.contacts = contacts
@@ -76,10 +81,11 @@ class Advance(ContactForce):
                 u = 3 * b + q
                 arm = unit_arm(motion, self.tables.vertex_slave[u])
                 opening = unit_opening(motion, arm, self.tables.vertex_master[u])
-                pull = self.tables.tension.traction(stiffness[0], u, opening[0])
+                pull = self.pull(b, u, stiffness[0], opening[0])
                 sliding = vec2(opening[1], opening[2])
-                shear, spent = self.tables.shear.traction(stiffness[1], u, sliding, -pull)
-                self.state.note_passed(b, pull, shear.norm_sqr())
+                shear, spent = self.shear(b, u, stiffness[1], sliding, -pull)
+                if ti.static(self.notes_limits):
+                    self.state.note_passed(b, pull, shear.norm_sqr())
                 traction = vec3(pull, shear[0], shear[1])
                 if ti.static(self.has_dashpot):
                     velocity = unit_velocity(motion, arm)
@@ -91,9 +97,7 @@ class Advance(ContactForce):
                 force += traction
                 torque += arm.cross(traction)
                 slipped += spent
-                failed |= self.tables.tension.failed(u)
-                if ti.static(self.shear_releases):
-                    failed |= self.tables.shear.failed(u, -pull)
+                failed |= self.has_failed(b, u, pull)
             dt = self._bond_step(b, slots[0] >> 2, slots[1] >> 2)
             area = self.tables.unit_area[b]
             if failed == 0:

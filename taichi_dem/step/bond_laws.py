@@ -1,0 +1,55 @@
+"""Tractions of a bond's contact units: the part of ``Advance`` that asks the bond's laws."""
+
+import taichi as ti
+
+from taichi_dem.step.activity import SLIP, SOFTENING
+
+
+@ti.data_oriented
+class BondLaws:
+    """Base of ``Advance``, which owns all that is used here.
+
+    on_demand: whether the normal and the shear law are evaluated only on bonds that came near
+    their limits (``Activity``); else on all.
+    """
+
+    @ti.func
+    def pull(self, b, u, stiffness, opening):
+        """Normal traction of a unit [Pa] at an opening [m], by its law where that acts."""
+        traction = stiffness * opening
+        if ti.static(self.on_demand[SOFTENING]):
+            begins = self.tables.tension.begins(stiffness, opening)
+            if self.activity.is_active(b, SOFTENING, begins, self.state.tick[None]):
+                traction = self.tables.tension.traction(stiffness, u, opening)
+        else:
+            traction = self.tables.tension.traction(stiffness, u, opening)
+        return traction
+
+    @ti.func
+    def shear(self, b, u, stiffness, sliding, pressure):
+        """Shear traction of a unit [Pa] and energy per area slipped away now [J/m^2]."""
+        traction, spent = stiffness * sliding, 0.0
+        if ti.static(self.on_demand[SLIP]):
+            begins = self.tables.shear.begins(stiffness, sliding, pressure)
+            if self.activity.is_active(b, SLIP, begins, self.state.tick[None]):
+                traction, spent = self.tables.shear.traction(stiffness, u, sliding, pressure)
+        else:
+            traction, spent = self.tables.shear.traction(stiffness, u, sliding, pressure)
+        return traction, spent
+
+    @ti.func
+    def has_failed(self, b, u, pull):
+        """1 once a unit transmits nothing any more, else 0; pull: its normal traction [Pa]."""
+        failed = 0
+        if ti.static(self.on_demand[SOFTENING]):
+            if self.activity.has_begun(b, SOFTENING):
+                failed = self.tables.tension.failed(u)
+        else:
+            failed = self.tables.tension.failed(u)
+        if ti.static(self.shear_releases):
+            if ti.static(self.on_demand[SLIP]):
+                if self.activity.has_begun(b, SLIP):
+                    failed |= self.tables.shear.failed(u, -pull)
+            else:
+                failed |= self.tables.shear.failed(u, -pull)
+        return failed
