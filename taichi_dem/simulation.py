@@ -110,7 +110,7 @@ class Simulation(Uncopied):
         with self._undivided("its scene was loaded"):
             self.loan.activate()
             engine: Any = self.loan.engine
-            engine.load(self.model, self.method, self.scene.max_speed)
+            engine.load(self.model, self.method, self.scene.max_speed, self.scene.sleep)
             self.energy_balance = None
             self.run_seconds = self.run_cpu_seconds = 0.0
             self.started = None

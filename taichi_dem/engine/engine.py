@@ -18,6 +18,7 @@ from taichi_dem.step.drivers import DRIVERS, SolvedStep, Step
 from taichi_dem.step.implicit.advance import SolvedAdvance
 from taichi_dem.step.implicit.solver import Solver
 from taichi_dem.step.schedule import Schedule
+from taichi_dem.step.sleeping import WokenLists
 
 
 class Structure:
@@ -68,6 +69,8 @@ class BlastEngine(Engine):
         self.contacts = Contacts(self.tables, self.state) if self.tables.has_contact else None
         self.schedule = self._schedule(method)
         self.advance = self._advance(method)
+        if self.tables.on_demand:
+            self.schedule.woken = WokenLists(self.state.sleeping, self.schedule, self.advance)
         self.broad_phase = None
         if self.contacts is not None:
             parts = self.contacts, self.schedule, self.structure.brute_force
@@ -90,12 +93,12 @@ class BlastEngine(Engine):
         # A method may have its own order of the physics (docs/add_a_time_integrator.md).
         return getattr(method, "advance", Advance)(*parts)
 
-    def load(self, model: Model, method: Method, max_speed: float) -> None:
-        """Take over a scene, at rest and at time zero; max_speed [m/s]."""
+    def load(self, model: Model, method: Method, max_speed: float, sleep: float = 0.0) -> None:
+        """Take over a scene, at rest and at time zero; max_speed [m/s], sleep: see ``Scene``."""
         self.clear()
         self.enter(model)
         self.tables.load(model)
-        self.state.load(model, max_speed)
+        self.state.load(model, max_speed, sleep)
         if self.contacts is not None:
             self.contacts.load(model, method)
             self.broad_phase.load(model, method)

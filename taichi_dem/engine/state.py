@@ -15,6 +15,7 @@ from taichi_dem.mesh.topology import Topology
 from taichi_dem.physics.fracture import coulomb_limit
 from taichi_dem.physics.rotation import rotation_matrix, spin_of
 from taichi_dem.step.activity import Activity
+from taichi_dem.step.sleeping import Sleeping
 from taichi_dem.timeline import NEVER
 
 
@@ -51,13 +52,14 @@ class State:
     CONTACT and RUBBED. limits: tensile strength, cohesion [Pa] and friction coefficient whose
     excess in a bond is noted, without bound where an effect serves them; passed: ticks at which a
     bond first exceeded its tensile and its shear limit, NEVER before. activity: the ``Activity``
-    of bonds whose laws act on demand, else None.
+    of bonds whose laws act on demand, sleeping: the ``Sleeping`` of bodies; else None.
     """
 
     def __init__(self, tables: Tables):
         n, bonds = tables.capacity.bodies, tables.capacity.bonds
         self.tables = tables
         self.activity = Activity(tables) if tables.on_demand else None
+        self.sleeping = Sleeping(tables) if tables.on_demand else None
         self.position = ti.Vector.field(3, real, shape=n)
         self.orientation = ti.Vector.field(4, real, shape=n)
         self.rotation = ti.Matrix.field(3, 3, real, shape=n)
@@ -84,7 +86,7 @@ class State:
         self.bad_body = ti.field(ti.i32, shape=())
         self.max_speed2 = ti.field(real, shape=())
 
-    def load(self, model: Model, max_speed: float) -> None:
+    def load(self, model: Model, max_speed: float, sleep: float = 0.0) -> None:
         """Put the bodies where the mesh has them, at rest; all fields are zero before."""
         n = model.body_count
         if self.tables.has_contact:
@@ -96,6 +98,7 @@ class State:
         assign(self.limits, np.array(unserved_limits(model)))
         if self.activity is not None:
             self.activity.load(model)
+            self.sleeping.load(model, sleep)
         self.set_motion(model.centre)
 
     def set_motion(

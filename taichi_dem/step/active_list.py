@@ -80,6 +80,15 @@ class ActiveList:
             present -= 1
 
     @ti.func
+    def insert(self, m, key):
+        """List a member that is not listed, unless its key is negative."""
+        if key >= 0 and self.key[m] < 0:
+            self._put(m, self.end[0])
+            self.end[0] = self.end[0] + 1
+            self.key[m] = 0
+            self.move(m, key)
+
+    @ti.func
     def _swap(self, m, place):
         other, old = self.order[place], self.index[m]
         self._put(other, old)

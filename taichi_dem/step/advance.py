@@ -257,13 +257,15 @@ class Advance(BondLaws, ContactForce):
 
     @ti.func
     def _drift(self, i, elapsed, velocity, momentum, spin):
-        """Move and turn body i from a spin; note its displacement, and a runaway."""
+        """Move and turn body i from a spin; note its displacement, and a runaway; wake others."""
         turning = self._turning(i, elapsed, momentum, spin)
         orientation = turned(self.state.orientation[i], turning, elapsed)
         self.state.orientation[i] = orientation
         self.state.rotation[i] = rotation_matrix(orientation)
         self.state.position[i] = self.state.position[i] + elapsed * velocity
         self.state.last_tick[i] = self.state.tick[None]
+        if ti.static(self.tables.on_demand):
+            self.state.sleeping.stir(i, self.state, velocity, momentum)
         if ti.static(self.has_contact):
             self.contacts.moved(i, velocity, spin, elapsed)
         speed2 = velocity.norm_sqr()

@@ -2,6 +2,9 @@
 
 import taichi as ti
 
+from taichi_dem.kit.types import vec3
+from taichi_dem.physics.bond import unit_arm, unit_opening, unit_velocity
+from taichi_dem.physics.rotation import zero3
 from taichi_dem.step.activity import SLIP, SOFTENING
 
 
@@ -36,6 +39,18 @@ class BondLaws:
         else:
             traction, spent = self.tables.shear.traction(stiffness, u, sliding, pressure)
         return traction, spent
+
+    @ti.func
+    def linear_force(self, b):
+        """Force of a bond as if its springs were linear, and with all of its dashpots [N]."""
+        stiffness, force = self.tables.bond_stiffness[b], zero3()
+        motion = self._motion(b, self.tables.bond_slots[b])
+        for u in range(3 * b, 3 * b + 3):
+            arm = unit_arm(motion, self.tables.vertex_slave[u])
+            opening = unit_opening(motion, arm, self.tables.vertex_master[u])
+            springs = vec3(stiffness[0], stiffness[1], stiffness[1]) * opening
+            force += springs + self.tables.dashpot.traction(unit_velocity(motion, arm))
+        return self.tables.unit_area[b] * force
 
     @ti.func
     def has_failed(self, b, u, pull):

@@ -16,6 +16,7 @@ from taichi_dem.step.advance import Advance
 from taichi_dem.step.implicit.bonds import BOND_COLOURS
 from taichi_dem.step.implicit.pairs import COLOURS, PairDashpots
 from taichi_dem.step.schedule import Schedule
+from taichi_dem.step.sleeping import Chunks
 from taichi_dem.step.wake_up import WakeUp
 
 #: The parallel driver is called for about this long [s] between two checks of divergence, progress
@@ -75,11 +76,19 @@ class Step:
                 *self._retimed(),
                 *touching,
                 (Once(), schedule.advance_clock),
+                *self._rested(),
                 (schedule.bodies, advance.body),
                 (Once(), schedule.reorder),
                 (schedule.bonds, advance.bond),
             ),
         )
+
+    def _rested(self):
+        """Phases that find the momentum at which bodies wake others, where some may sleep."""
+        if not self.schedule.sleeps:
+            return ()
+        chunks = Chunks(self.state.sleeping, self.schedule)
+        return (chunks, chunks.add), (Once(), chunks.end)
 
     def repeats(self, part: int) -> bool:
         """Whether a part of the phases is called for once more: never here."""
@@ -104,6 +113,11 @@ class Step:
         if ti.static(self.schedule.has_limits):
             for i in range(self.advance.tables.body_count[None]):
                 self.schedule.limits.refresh(i)
+        if ti.static(self.schedule.sleeps):
+            for i in range(self.advance.tables.body_count[None]):
+                self.state.sleeping.begin(i, self.state)
+            for i in range(self.advance.tables.body_count[None]):
+                self.state.sleeping.begin_beside(i)
         for i in range(self.advance.tables.body_count[None]):
             self.schedule.choose_level(i, self.state.velocity[i].norm_sqr())
         for _ in range(1):
@@ -170,6 +184,7 @@ class SolvedStep(Step):
         before = (
             *touching,
             (Once(), schedule.advance_clock),
+            *self._rested(),
             (Once(), solver.begin),
             (schedule.bodies, advance.predict),
         )
@@ -203,6 +218,11 @@ class SolvedStep(Step):
         for _ in range(1):
             self.schedule.low[None] = 0
             self.schedule.wanted[None] = 0
+        if ti.static(self.schedule.sleeps):
+            for i in range(self.advance.tables.body_count[None]):
+                self.state.sleeping.begin(i, self.state)
+            for i in range(self.advance.tables.body_count[None]):
+                self.state.sleeping.begin_beside(i)
         for i in range(self.advance.tables.body_count[None]):
             self.schedule.choose_level(i, self.state.velocity[i].norm_sqr())
             self.advance.solver.velocities.update_inertia(i, self.advance)
@@ -216,6 +236,9 @@ class SolvedStep(Step):
             # It booked a step before the start.
             if ti.static(self.advance.tables.has_bond_heat):
                 self.state.bond_heat[b] = 0.0 * self.state.bond_heat[b]
+            if ti.static(self.schedule.sleeps and self.advance.solver.has_bonds):
+                if self.schedule.bonds.key[b] < 0:
+                    self.advance.solver.bonds.end(b)
 
 
 class Driver(Protocol):

@@ -18,6 +18,7 @@ from taichi_dem.stability.step_control import DISPLACEMENT, LARGEST, NEIGHBOUR
 from taichi_dem.step.active_list import ActiveList, itself
 from taichi_dem.step.applied_until import AppliedUntil
 from taichi_dem.step.level_limit import LevelLimit
+from taichi_dem.step.sleeping import ASLEEP
 from taichi_dem.timeline import MACRO_TICKS, MAX_LEVEL, device_coarsest_active, device_ticks_of
 
 if TYPE_CHECKING:
@@ -54,6 +55,7 @@ class Schedule:
     ):
         self.tables, self.state, self.contacts, self.limits = tables, state, contacts, limits
         self.has_limits = limits is not None
+        self.sleeps, self.woken = tables.on_demand, None
         self.controlled = self.has_limits and limits.control is not None
         self.retimes = self.controlled and limits.wakes != 0
         self.applied_until = AppliedUntil(tables, state, self, contacts) if self.retimes else None
@@ -183,6 +185,8 @@ class Schedule:
     def _rearrange(self):
         if ti.static(self.uniform):
             self._level_all()
+        if ti.static(self.sleeps):
+            self.woken.admit()
         for a in range(self.changed_count[None]):
             self._move_entries(self.changed[a])
             if ti.static(self.spreads):
@@ -193,15 +197,15 @@ class Schedule:
     @ti.func
     def _move_entries(self, i):
         """Move body i, its bonds and its pairs to their present keys."""
-        self.bodies.move(i, self._body_key(i))
+        self.bodies.move(i, self.body_key(i))
         for f in range(4):
             b = self.tables.face_bond[4 * i + f]
             if b >= 0:
                 if self.bonds.key[b] >= 0:
-                    self.bonds.move(b, self._bond_key(b))
+                    self.bonds.move(b, self.bond_key(b))
                 if ti.static(self.drifted):
                     j = self.tables.neighbour[4 * i + f]
-                    self.bodies.move(j, self._body_key(j))
+                    self.bodies.move(j, self.body_key(j))
         if ti.static(self.has_contact):
             for k in range(self.store.first_of[i], self.store.first_of[i + 1]):
                 self._move_pair(self.store.near_slot[k], 1)
@@ -214,7 +218,7 @@ class Schedule:
         self.pairs.move(p, self._pair_key(p))
         if ti.static(self.drifted):
             j = self.store.body[p][partner]
-            self.bodies.move(j, self._body_key(j))
+            self.bodies.move(j, self.body_key(j))
 
     @ti.func
     def start_all(self):
@@ -224,8 +228,8 @@ class Schedule:
         self.changed_count[None] = 0
         if ti.static(self.spreads):
             self.level_limit.note_all()
-        self.bodies.fill(self.tables.body_count[None], itself, self._body_key)
-        self.bonds.fill(self.tables.bond_count[None], itself, self._bond_key)
+        self.bodies.fill(self.tables.body_count[None], itself, self.body_key)
+        self.bonds.fill(self.tables.bond_count[None], itself, self.bond_key)
         if ti.static(self.has_contact):
             self._list_pairs()
         self._find_finest()
@@ -237,10 +241,16 @@ class Schedule:
         All lists are filled again, which restores contiguous visits; moving entries destroys them
         with time (5 % of the time of a run).
         """
+        if ti.static(self.sleeps):
+            for a in range(self.store.near_count[None]):
+                for side in ti.static(range(2)):
+                    pair = self.store.body[self.store.near_slot[a]]
+                    self.state.sleeping.wake(pair[side], self.state)
+            self.woken.admit()
         self._list_pairs()
         if ti.static(not self.uniform):
-            self.bodies.fill(self.tables.body_count[None], itself, self._body_key)
-            self.bonds.fill(self.tables.bond_count[None], itself, self._bond_key)
+            self.bodies.fill(self.tables.body_count[None], itself, self.body_key)
+            self.bonds.fill(self.tables.bond_count[None], itself, self.bond_key)
 
     @ti.func
     def _list_pairs(self):
@@ -291,11 +301,16 @@ class Schedule:
         self.evaluations[4] = self.evaluations[4] + visits
 
     @ti.func
-    def _bond_key(self, b):
+    def bond_key(self, b):
+        """Finer level of the bodies of an intact bond, -1 for one that is not evaluated."""
         key = -1
         if self.state.broken_tick[b] < 0:
             slots = self.tables.bond_slots[b]
-            key = self._key(slots[0] >> 2, slots[1] >> 2)
+            i, j = slots[0] >> 2, slots[1] >> 2
+            key = self._key(i, j)
+            if ti.static(self.sleeps):
+                if not self.state.sleeping.both_awake(i, j):
+                    key = -1
         return key
 
     @ti.func
@@ -304,8 +319,11 @@ class Schedule:
         return self._key(pair[0], pair[1])
 
     @ti.func
-    def _body_key(self, i):
-        """Own level, or the finest level among those it touches where neighbours drift along."""
+    def body_key(self, i):
+        """Own level, or the finest level among those it touches where neighbours drift along.
+
+        -1 for a body that sleeps.
+        """
         key = self._key(i, i)
         if ti.static(self.drifted):
             for f in range(4):
@@ -315,6 +333,9 @@ class Schedule:
                         key = ti.max(key, self.state.level[j])
             if ti.static(self.has_contact):
                 key = ti.max(key, self.contacts.finest_partner(i))
+        if ti.static(self.sleeps):
+            if self.state.sleeping.awake[i] == ASLEEP:
+                key = -1
         return key
 
     @ti.func

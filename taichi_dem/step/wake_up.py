@@ -4,6 +4,7 @@ import taichi as ti
 
 from taichi_dem.step.advance import Advance
 from taichi_dem.step.schedule import Schedule
+from taichi_dem.step.sleeping import ASLEEP
 
 
 @ti.data_oriented
@@ -20,9 +21,16 @@ class WakeUp:
         self.state = schedule.state
 
     @ti.func
+    def _is_awake(self, i):
+        awake = True
+        if ti.static(self.schedule.sleeps):
+            awake = self.state.sleeping.awake[i] != ASLEEP
+        return awake
+
+    @ti.func
     def wake_up(self, i):
         """Bring body i to the present tick when it wants a shorter step because of an event."""
-        if self.limits.events[i] & self.limits.wakes != 0:
+        if self.limits.events[i] & self.limits.wakes != 0 and self._is_awake(i):
             wanted, bound = self.schedule.controlled_level(i)
             if ti.static(self.schedule.uniform):
                 ti.atomic_max(self.schedule.wanted[None], wanted)
