@@ -1,0 +1,69 @@
+"""Audit of skipped evaluations: some are made all the same, and say how many may have been missed.
+
+A few of all evaluations that were skipped, chosen by a counter and not by their result, are made
+and compared. What was found among them bounds the share of misses among all of them.
+"""
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from taichi_dem.kit.accuracy.student import beta_share
+from taichi_dem.kit.validation import whole
+
+#: Confidence of the bound.
+CONFIDENCE = 0.95
+_MOST = 2**62
+_BISECTIONS = 200
+
+
+def misses_bound(misses: int, audited: int) -> float:
+    """Upper bound, with a confidence of 95 %, of the share of misses among what was skipped.
+
+    Exact for a binomial number of misses (Clopper and Pearson, Biometrika 26, 1934): the share at
+    which so few misses or fewer have a chance of 5 %. About 3 / audited without a miss, and 1 where
+    nothing was audited. Raises InputError unless 0 <= misses <= audited.
+    """
+    whole("audited", audited, 0, _MOST)
+    whole("misses", misses, 0, audited)
+    low, high = 0.0, 1.0
+    if misses == audited:
+        return high
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        # Chance of more misses than were found; a tail of the binomial is an incomplete beta.
+        if beta_share(middle, misses + 1.0, float(audited - misses)) < CONFIDENCE:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+@dataclass(frozen=True)
+class Audit:
+    """Outcome of an audit.
+
+    skipped: evaluations that were not needed, those made for the audit among them. audited: of
+    these, made and compared. misses: of these, that would have changed something. what: the
+    evaluations in words.
+    """
+
+    skipped: int
+    audited: int
+    misses: int
+    what: str = "evaluations"
+
+    @property
+    def misses_bound(self) -> float:
+        """Upper bound of the share of misses, with a confidence of 95 %."""
+        return misses_bound(self.misses, self.audited)
+
+    def as_dict(self) -> dict[str, Any]:
+        """All figures, for a JSON file."""
+        return {**asdict(self), "misses_bound": self.misses_bound}
+
+    def __str__(self) -> str:
+        counts = f"{self.audited:,} of {self.skipped:,} skipped {self.what}"
+        if not self.audited:
+            return f"{counts}, nothing is known of the others"
+        misses = f"{self.misses:,} miss{'' if self.misses == 1 else 'es'}"
+        return f"{counts}, {misses} (< {100.0 * self.misses_bound:.2g} %)"
