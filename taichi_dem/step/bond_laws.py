@@ -41,15 +41,21 @@ class BondLaws:
         return traction, spent
 
     @ti.func
-    def linear_force(self, b):
-        """Force of a bond as if its springs were linear, and with all of its dashpots [N]."""
+    def motion_of(self, b):
+        """Relative motion of the two bodies of a bond now, a ``BondMotion``."""
+        return self._motion(b, self.tables.bond_slots[b])
+
+    @ti.func
+    def linear_force(self, b, damped: ti.template()):
+        """Force of a bond as if its springs were linear [N]; damped: with all of its dashpots."""
         stiffness, force = self.tables.bond_stiffness[b], zero3()
-        motion = self._motion(b, self.tables.bond_slots[b])
+        motion = self.motion_of(b)
         for u in range(3 * b, 3 * b + 3):
             arm = unit_arm(motion, self.tables.vertex_slave[u])
             opening = unit_opening(motion, arm, self.tables.vertex_master[u])
-            springs = vec3(stiffness[0], stiffness[1], stiffness[1]) * opening
-            force += springs + self.tables.dashpot.traction(unit_velocity(motion, arm))
+            force += vec3(stiffness[0], stiffness[1], stiffness[1]) * opening
+            if ti.static(damped):
+                force += self.tables.dashpot.traction(unit_velocity(motion, arm))
         return self.tables.unit_area[b] * force
 
     @ti.func

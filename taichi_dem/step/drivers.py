@@ -13,6 +13,7 @@ import taichi as ti
 from taichi_dem.contact_search.search import BroadPhase
 from taichi_dem.kit.allocation import values
 from taichi_dem.step.advance import Advance
+from taichi_dem.step.audit import Audit
 from taichi_dem.step.implicit.bonds import BOND_COLOURS
 from taichi_dem.step.implicit.pairs import COLOURS, PairDashpots
 from taichi_dem.step.schedule import Schedule
@@ -60,6 +61,9 @@ class Step:
         self.advance, self.schedule, self.search = advance, schedule, search
         self.has_contact = search is not None
         self.state = advance.state
+        self.audit = None
+        if self.schedule.sleeps:
+            self.audit = Audit(self.advance.tables, self.state, self.schedule, self.advance)
         self.parts = self._parts()
         self.phases = self._phases()
 
@@ -80,6 +84,7 @@ class Step:
                 (schedule.bodies, advance.body),
                 (Once(), schedule.reorder),
                 (schedule.bonds, advance.bond),
+                *self._audited(),
             ),
         )
 
@@ -89,6 +94,11 @@ class Step:
             return ()
         chunks = Chunks(self.state.sleeping, self.schedule)
         return (chunks, chunks.add), (Once(), chunks.end)
+
+    def _audited(self):
+        """Phases that look at a few of the evaluations that were skipped."""
+        audit = self.audit
+        return ((Once(), audit.choose), (audit, audit.visit)) if audit is not None else ()
 
     def repeats(self, part: int) -> bool:
         """Whether a part of the phases is called for once more: never here."""
@@ -193,6 +203,7 @@ class SolvedStep(Step):
             (schedule.bodies, advance.body),
             (Once(), schedule.reorder),
             (schedule.bonds, advance.bond),
+            *self._audited(),
         )
         return (before, self._sweep(solver), after)
 

@@ -35,7 +35,7 @@ class Sleeping:
     awake: ASLEEP, AWAKE, or STIRRED once the body has woken its neighbours. since: tick at which it
     woke, NEVER while asleep. woken: bodies that wait to be listed, woken_count of them. share: of
     the mean momentum, at which a body wakes its neighbours; 0 where none sleeps. bound2: square of
-    that momentum now [(N s)^2]. sums: of the momenta, a chunk of bodies each [N s]. left_out: bound
+    that momentum now [(N s)^2]. mean: momentum of all bodies [N s]. sums: of the momenta, a chunk of bodies each [N s]. left_out: bound
     of the impulse [N s] and the energy [J] that each bond left out before it woke.
     """
 
@@ -47,7 +47,7 @@ class Sleeping:
         self.woken = ti.field(ti.i32, shape=n)
         self.woken_count = ti.field(ti.i32, shape=())
         self.share = ti.field(real, shape=())
-        self.bound2 = ti.field(real, shape=())
+        self.bound2, self.mean = ti.field(real, shape=()), ti.field(real, shape=())
         self.sums = ti.field(real, shape=n // _CHUNK + 1)
         self.left_out = ti.Vector.field(2, real, shape=tables.capacity.bonds)
 
@@ -131,7 +131,8 @@ class Sleeping:
         total = 0.0
         for c in range(self.chunks()):
             total += self.sums[c]
-        bound = self.share[None] * total / self.tables.body_count[None]
+        self.mean[None] = total / self.tables.body_count[None]
+        bound = self.share[None] * self.mean[None]
         self.bound2[None] = bound * bound
 
 
@@ -206,5 +207,5 @@ class WokenLists:
         if first >= 0:
             energy = self.advance.bond_energy(b)
             elapsed = self.schedule.seconds(self.state.tick[None] - first)
-            impulse = elapsed * self.advance.linear_force(b).norm()
+            impulse = elapsed * self.advance.linear_force(b, True).norm()
         return vec2(impulse, energy)
