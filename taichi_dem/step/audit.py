@@ -113,8 +113,11 @@ class Audit:
         """Compare the impulse of a sleeping bond's springs in a step with the bound."""
         slots = self.tables.bond_slots[b]
         step = self.schedule.pair_step(slots[0] >> 2, slots[1] >> 2)
-        impulse = step * self.advance.linear_force(b, False).norm()
-        self._book(_ASLEEP, impulse > self.sleeping.share[None] * self.sleeping.mean[None])
+        stiffness = self.tables.bond_stiffness[b]
+        most = 3.0 * self.tables.unit_area[b] * ti.max(stiffness[0], stiffness[1])
+        allowed = self.sleeping.share[None] * self.sleeping.mean[None]
+        allowed += step * most * self.sleeping.rounding[None]
+        self._book(_ASLEEP, step * self.advance.linear_force(b, False).norm() > allowed)
 
     @ti.func
     def _book(self, kind: ti.template(), missed):

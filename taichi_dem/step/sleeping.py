@@ -26,6 +26,8 @@ ASLEEP, AWAKE, STIRRED = range(3)
 _CHUNK = 256
 #: Largest steps between two sums of the momenta, once the run is as many steps old as the next one.
 _EVERY, _EARLY = 16, 64
+#: Roundings of a coordinate that the opening of a bond at rest may show.
+_ROUNDINGS = 16.0
 
 
 @ti.data_oriented
@@ -35,7 +37,8 @@ class Sleeping:
     awake: ASLEEP, AWAKE, or STIRRED once the body has woken its neighbours. since: tick at which it
     woke, NEVER while asleep. woken: bodies that wait to be listed, woken_count of them. share: of
     the mean momentum, at which a body wakes its neighbours; 0 where none sleeps. bound2: square of
-    that momentum now [(N s)^2]. mean: momentum of all bodies [N s]. sums: of the momenta, a chunk of bodies each [N s]. left_out: bound
+    that momentum now [(N s)^2]. mean: momentum of all bodies [N s].
+    rounding: opening that a bond at rest may show [m]. sums: of the momenta, a chunk of bodies each [N s]. left_out: bound
     of the impulse [N s] and the energy [J] that each bond left out before it woke.
     """
 
@@ -48,6 +51,7 @@ class Sleeping:
         self.woken_count = ti.field(ti.i32, shape=())
         self.share = ti.field(real, shape=())
         self.bound2, self.mean = ti.field(real, shape=()), ti.field(real, shape=())
+        self.rounding = ti.field(real, shape=())
         self.sums = ti.field(real, shape=n // _CHUNK + 1)
         self.left_out = ti.Vector.field(2, real, shape=tables.capacity.bonds)
 
@@ -55,6 +59,8 @@ class Sleeping:
         """Begin with all bodies asleep; all fields are zero before."""
         assign(self.since, np.full(model.body_count, NEVER))
         assign(self.share, share)
+        # A few roundings of the coordinates of its corners.
+        assign(self.rounding, _ROUNDINGS * np.finfo(float).eps * np.abs(model.mesh.points).max())
 
     @ti.func
     def begin(self, i, state):
