@@ -146,6 +146,17 @@ class EnergyBalance:
         rows = np.zeros((self.model.body_count, 12))
         self.readings.momentum(rows)
         lost = rows[:, :6].sum(axis=0) - rows[:, 6:].sum(axis=0) - self.start_momentum
-        sizes = [np.linalg.norm(rows[:, k : k + 3], axis=1).sum() for k in (0, 3, 6, 9)]
-        linear, angular = max(sizes[0], sizes[2], 1e-300), max(sizes[1], sizes[3], 1e-300)
+        linear, angular = _exchanged(rows)
         return np.linalg.norm(lost[:3]) / linear, np.linalg.norm(lost[3:]) / angular
+
+    def momentum_exchanged(self) -> float:
+        """Sum over the bodies of the size of momentum, or of load impulse if larger [N s]."""
+        rows = np.zeros((self.model.body_count, 12))
+        self.readings.momentum(rows)
+        return _exchanged(rows)[0]
+
+
+def _exchanged(rows):
+    """Linear and angular momentum that bodies have, or have got from loads if that is more."""
+    sizes = [np.linalg.norm(rows[:, k : k + 3], axis=1).sum() for k in (0, 3, 6, 9)]
+    return max(sizes[0], sizes[2], 1e-300), max(sizes[1], sizes[3], 1e-300)

@@ -152,6 +152,16 @@ class Readings:
                 table[i, 6 + k] = self.state.load_impulse[i][k]
 
     @ti.kernel
+    def left_out(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
+        """Bound of impulse [N s] and energy [J] that each bond has left out while it slept."""
+        for b in range(self.tables.bond_count[None]):
+            slots = self.tables.bond_slots[b]
+            found = self.state.sleeping.left_out[b]
+            if not self.state.sleeping.both_awake(slots[0] >> 2, slots[1] >> 2):
+                found = self.advance.schedule.woken.left_out(b)
+            table[b, 0], table[b, 1] = found[0], found[1]
+
+    @ti.kernel
     def pressed(self, marks: ti.types.ndarray(dtype=ti.i32, ndim=1)):
         """Mark released bonds of which the faces overlap."""
         for b in range(self.tables.bond_count[None]):

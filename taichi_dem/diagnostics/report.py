@@ -1,8 +1,9 @@
 """The short report at the end of a run."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Optional
 
+from taichi_dem.diagnostics.certificate import Certificate
 from taichi_dem.diagnostics.shared_volume import Interpenetration
 from taichi_dem.kit.display import in_brief
 
@@ -33,7 +34,7 @@ class Report:
     (``DivergenceCheck.round_off``). bond_slip: the ``bond_slip.BondSlip`` of the bond that slipped
     farthest, empty where none slipped. measured_speedup: CPU time of one step for all over that of
     the run, where it was measured. known_error: what is known of the error for nothing extra, in
-    words.
+    words. certificate: what acted and what was left out, with effects="auto".
     """
 
     method: str
@@ -68,6 +69,7 @@ class Report:
     bond_slip: tuple = ()
     measured_speedup: Optional[float] = None
     known_error: str = ""
+    certificate: Optional[Certificate] = None
 
     def __repr__(self):
         took = f"{self.run_seconds:.3g} s run"
@@ -124,7 +126,9 @@ class Report:
         """All figures, for a JSON file."""
         gains = "ideal_gain", "boundary_gain"
         derived = ("contact_evaluations", *gains, "energy_residual_fraction", "needs")
-        figures = {_JSON_KEYS.get(name, name): value for name, value in asdict(self).items()}
+        plain = replace(self, certificate=None)
+        figures = {_JSON_KEYS.get(name, name): value for name, value in asdict(plain).items()}
+        figures["certificate"] = self.certificate and self.certificate.as_dict()
         return {**figures, **{name: getattr(self, name) for name in derived}}
 
     def _effect_rows(self):
@@ -155,6 +159,13 @@ class Report:
             return ()
         words = f"{self.sweeps:,}, {self.sweeps / self.substeps:.2f} a substep"
         return (("sweeps", f"{words}, {self.unconverged_steps:,} substeps unconverged"),)
+
+    def _certificate_rows(self):
+        """Rows with what was left out; what acted stands among the effects."""
+        if self.certificate is None:
+            return ()
+        parts = str(self.certificate).splitlines()[len(self.certificate.acting) :]
+        return tuple(("certificate" if not k else "", part) for k, part in enumerate(parts))
 
     def _error_rows(self):
         """Rows with what is known of the error."""
@@ -189,6 +200,7 @@ class Report:
             ),
             ("energy residual", self.unexplained),
             *self._error_rows(),
+            *self._certificate_rows(),
             (
                 "momentum error",
                 f"{self.linear_momentum_error:.1e} linear, "

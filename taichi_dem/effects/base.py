@@ -117,6 +117,13 @@ class Effect(Sealed):
         """Fields that change in a run, by name; a checkpoint holds them."""
         return {}
 
+    def stress(self, material: Material, size: float) -> float:
+        """Stress that a load or support may cause in a block of some size [m], in Pa; NaN: unknown.
+
+        Used by estimates before a run.
+        """
+        return np.nan
+
     def travel(self) -> Travel:
         """Bounds of the displacement that it may cause along x, y and z [m]: lowest and highest.
 

@@ -67,6 +67,10 @@ class GasPressure(Effect):
         """Peak [Pa], rise [s] and decay ratio."""
         return self.peak, self.rise, self.decay_ratio
 
+    def stress(self, material: Material, size: float) -> float:
+        """The peak pressure."""
+        return self.peak
+
     def declare(self, capacity: "Capacity") -> None:
         """Loaded faces of every body: area vectors [m^2] and arms from the centre [m]."""
         self.first = ti.field(ti.i32, shape=capacity.bodies + 1)

@@ -25,6 +25,10 @@ class Gravity(Effect):
         """Acceleration [m/s^2], three components."""
         return self._acceleration
 
+    def stress(self, material: Material, size: float) -> float:
+        """Weight of a column as high as the block."""
+        return material.density * size * sum(x * x for x in self._acceleration) ** 0.5
+
     def travel(self) -> Travel:
         """Without end along the acceleration."""
         return along(self._acceleration)

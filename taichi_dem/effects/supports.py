@@ -35,6 +35,10 @@ class _Support(Effect):
     def __init__(self, group: str):
         self.group = word("group", group)
 
+    def stress(self, material: Material, size: float) -> float:
+        """None of its own."""
+        return 0.0
+
     def travel(self) -> Travel:
         """No displacement: the bodies are held."""
         return (0.0,) * 3, (0.0,) * 3

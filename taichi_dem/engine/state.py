@@ -126,6 +126,8 @@ class State:
         # Seldom news: a comparison spares the atomic operation, which parallel pairs need.
         if self.active_effects[i] & bits != bits:
             ti.atomic_or(self.active_effects[i], bits)
+            if ti.static(self.tables.on_demand):
+                self.activity.note_touch(i, bits, self.tick[None])
 
     @ti.func
     def note_passed(self, b, pull, shear2):

@@ -10,6 +10,7 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem.kit.allocation import assign
+from taichi_dem.physics.sphere_pair import CONTACT, RUBBED
 from taichi_dem.timeline import NEVER
 
 if TYPE_CHECKING:
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
 
 #: Columns of the two laws of a bond.
 SOFTENING, SLIP = range(2)
+#: Tick after all others, for what has not begun.
+LATER = 1 << 62
 
 
 @ti.data_oriented
@@ -25,7 +28,8 @@ class Activity:
     """Laws that act on each bond: since when, and how often they were evaluated.
 
     since: tick at which a unit of a bond first came near the limit of its normal and of its shear
-    law, NEVER before. evaluated: evaluations of these laws, units of a bond together.
+    law, NEVER before. evaluated: evaluations of these laws, units of a bond together. touched:
+    tick from which contact and friction acted on each body, LATER before.
     """
 
     def __init__(self, tables: "Tables"):
@@ -33,10 +37,12 @@ class Activity:
         self.laws = (not tables.tension.is_null, not tables.shear.is_null)
         self.since = ti.Vector.field(2, ti.i64, shape=bonds)
         self.evaluated = ti.Vector.field(2, ti.i64, shape=bonds)
+        self.touched = ti.Vector.field(2, ti.i64, shape=tables.capacity.bodies)
 
     def load(self, model: "Model") -> None:
         """Begin with no bond near a limit; all fields are zero before."""
         assign(self.since, np.full((model.bond_count, 2), NEVER))
+        assign(self.touched, np.full((model.body_count, 2), LATER))
 
     @ti.func
     def is_active(self, b, law: ti.template(), begins, tick):
@@ -48,6 +54,14 @@ class Activity:
         if active:
             self.evaluated[b][law] = self.evaluated[b][law] + 1
         return active
+
+    @ti.func
+    def note_touch(self, i, bits, tick):
+        """Note when contact and friction, given as bits, first act on body i."""
+        if bits & ti.i64(CONTACT) != 0:
+            ti.atomic_min(self.touched[i][0], tick)
+        if bits & ti.i64(RUBBED) != 0:
+            ti.atomic_min(self.touched[i][1], tick)
 
     @ti.func
     def has_begun(self, b, law: ti.template()):

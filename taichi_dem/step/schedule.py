@@ -40,7 +40,8 @@ class Schedule:
     bodies may be brought to the present between their own times; applied_until then holds the time
     up to which bonds and pairs have applied their impulses. level_limit: largest difference of
     levels between neighbours. evaluations: substeps, bodies advanced, bonds and pairs evaluated,
-    and the bonds and pairs that one step for all would have evaluated in the same substeps.
+    and the bonds and pairs that one step for all would have evaluated in the same substeps, and the
+    bonds whose laws were called.
     """
 
     def __init__(
@@ -76,7 +77,7 @@ class Schedule:
         self.wanted = ti.field(ti.i32, shape=())
         self.changed = ti.field(ti.i32, shape=2 * capacity.bodies + 2 * capacity.bonds + 1)
         self.changed_count = ti.field(ti.i32, shape=())
-        self.evaluations = ti.field(ti.i64, shape=5)
+        self.evaluations = ti.field(ti.i64, shape=6)
 
     def load(self, model: "Model", method: Method) -> None:
         """Load the steps of a method."""
@@ -287,6 +288,7 @@ class Schedule:
         self.evaluations[1] = self.evaluations[1] + self.bodies.count(low)
         self.evaluations[2] = self.evaluations[2] + self.bonds.count(low)
         self.evaluations[4] = self.evaluations[4] + self.bonds.end[0]
+        self.evaluations[5] = self.evaluations[5] + self.bonds.count(low)
 
     @ti.func
     def count_sweep(self, with_bonds: ti.template()):

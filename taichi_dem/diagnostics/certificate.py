@@ -1,0 +1,203 @@
+"""Certificate of a run with effects="auto": what acted, since when, and what was left out."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from taichi_dem.diagnostics.estimates import Estimate
+from taichi_dem.diagnostics.readings import Readings
+from taichi_dem.kit.audit import Audit
+from taichi_dem.kit.display import in_brief
+from taichi_dem.kit.effect_usage import EffectUse
+from taichi_dem.step.activity import LATER, SLIP, SOFTENING
+from taichi_dem.step.audit import KINDS
+from taichi_dem.timeline import MACRO_TICKS, NEVER
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.model import Model
+    from taichi_dem.engine.state import State
+    from taichi_dem.step.schedule import Schedule
+
+#: What is skipped of each kind of ``step.audit``, in words.
+_SKIPPED = dict(zip(KINDS, ("softening", "slip", "bonds asleep")))
+#: Times at which effects began on bodies, by the role that they have in a report.
+_TIMES = {"tension": "softening", "shear": "slip", "contact": "contact", "friction": "friction"}
+
+
+@dataclass(frozen=True)
+class Acting:
+    """One effect of a run. use: its activity. since_s: time at which it first acted, NaN if never.
+
+    The time is that at which its limit was first reached; NaN also where it is not known.
+    """
+
+    use: EffectUse
+    since_s: float
+
+    def __str__(self):
+        if self.use.idle:
+            return f"{self.use.effect}: never"
+        of = f" of {self.use.of:,}" if self.use.of else ""
+        begun = f" from {1e3 * self.since_s:.3g} ms" if np.isfinite(self.since_s) else ""
+        return f"{self.use.effect}: {self.use.events:,}{of} {self.use.what}{begun}"
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """What acted in a run with effects="auto", and a bound of what was left out.
+
+    acting: an ``Acting`` for each effect. law_evaluations: of softening and slip, a unit each;
+    all_law_evaluations: those that effects="all" makes. sleep: bound that was asked for, see
+    ``Scene``. asleep: share of bodies times time. impulse, energy: bounds of the impulse and the
+    energy that sleeping bonds left out, as shares of all momentum and of the energy put in. audits:
+    an ``Audit`` for each kind of skipped evaluation. left_out: an ``Estimate`` for each effect that
+    no law of the scene serves.
+    """
+
+    acting: tuple[Acting, ...]
+    law_evaluations: int
+    all_law_evaluations: int
+    sleep: float
+    asleep: float
+    impulse: float
+    energy: float
+    audits: tuple[Audit, ...]
+    left_out: tuple[Estimate, ...]
+
+    @property
+    def law_ratio(self) -> float:
+        """How many times fewer evaluations of softening and slip than with effects="all"."""
+        return self.all_law_evaluations / max(1, self.law_evaluations)
+
+    @property
+    def holds(self) -> bool:
+        """Whether no audit found a miss, and no more impulse was left out than asked for."""
+        return not any(audit.misses for audit in self.audits) and self.impulse <= self.sleep
+
+    def __repr__(self):
+        return in_brief(self, *map(str, self.acting), "" if self.holds else "does not hold")
+
+    def as_dict(self) -> dict[str, Any]:
+        """All figures, for a JSON file."""
+        since = {one.use.effect: one.since_s for one in self.acting}
+        return {
+            "acting_since_s": {k: None if np.isnan(v) else v for k, v in since.items()},
+            "law_evaluations": self.law_evaluations,
+            "all_law_evaluations": self.all_law_evaluations,
+            "law_ratio": self.law_ratio,
+            "sleep": self.sleep,
+            "asleep": self.asleep,
+            "left_out_impulse": self.impulse,
+            "left_out_energy": self.energy,
+            "audits": [audit.as_dict() for audit in self.audits],
+            "left_out": [estimate.as_dict() for estimate in self.left_out],
+            "holds": self.holds,
+        }
+
+    def __str__(self):
+        """A line for every kind of thing."""
+        skipped = 100.0 * (1.0 - self.law_evaluations / max(1, self.all_law_evaluations))
+        lines = [
+            *map(str, self.acting),
+            f"softening and slip: {skipped:.3g} % of their evaluations skipped",
+            self._sleep_line(),
+            *(f"left out: {estimate}" for estimate in self.left_out),
+            *(f"audit: {audit}" for audit in self.audits if audit.skipped),
+        ]
+        if not self.holds:
+            lines.append("this certificate does not hold: run the scene with effects='all'")
+        return "\n".join(lines)
+
+    def _sleep_line(self):
+        if not self.sleep:
+            return "asleep: no body, as sleep is 0"
+        return (
+            f"asleep: {100.0 * self.asleep:.3g} % of body-steps (left out: at most "
+            f"{self.impulse:.1g} of the impulse, {self.energy:.1g} of the energy; "
+            f"{self.sleep:g} asked)"
+        )
+
+
+def acting_since(model: "Model", state: "State", schedule: "Schedule") -> dict[str, np.ndarray]:
+    """Time [s] from which each effect acted on each body, (body_count,), NaN where never, by name.
+
+    Softening and slip: on one of the body's bonds, as soon as it came near a limit. awake: since
+    the body was evaluated. Empty unless effects act on demand.
+    """
+    if state.activity is None:
+        return {}
+    n, seconds = model.body_count, schedule.tick_seconds
+    bonds = _times(state.activity.since.to_numpy()[: model.bond_count], NEVER, seconds)
+    bodies = _times(state.activity.touched.to_numpy()[:n], LATER, seconds)
+    own = np.append(bonds, [[np.nan, np.nan]], axis=0)[model.topology.body_bond]
+    first = np.fmin.reduce(own, axis=1, initial=np.nan)
+    awake = _times(state.sleeping.since.to_numpy()[:n], NEVER, seconds)
+    found = first[:, SOFTENING], first[:, SLIP], bodies[:, 0], bodies[:, 1], awake
+    return dict(zip((*_TIMES.values(), "awake"), found))
+
+
+def _times(ticks, never, tick_seconds):
+    return np.where(ticks == never, np.nan, ticks * tick_seconds)
+
+
+def certificate_of(
+    model: "Model",
+    state: "State",
+    schedule: "Schedule",
+    readings: Readings,
+    audit: Any,
+    uses: Sequence[EffectUse],
+    scales: Mapping[str, float],
+    left_out: Sequence[Estimate],
+) -> Certificate:
+    """Certificate of a run so far.
+
+    audit: the ``step.audit.Audit`` of the step. uses: activity of the effects, in the model's
+    order. scales: momentum [N s] and energy [J] that shares are of. left_out: estimates.
+    """
+    since = acting_since(model, state, schedule)
+    table = np.zeros((max(1, model.bond_count), 2))
+    readings.left_out(table)
+    evaluated = state.activity.evaluated.to_numpy()[: model.bond_count].sum(axis=0)
+    units = 3 * (int(schedule.evaluations[5]) + model.bond_count)
+    laws = [units * has for has in state.activity.laws]
+    now = int(state.tick[None]) * schedule.tick_seconds
+    awake = np.nan_to_num(since["awake"], nan=now)
+    bonds_asleep = _bond_steps_asleep(model, since["awake"], now, schedule)
+    skipped = (laws[0] - evaluated[0], laws[1] - evaluated[1], bonds_asleep)
+    return Certificate(
+        acting=tuple(_acting(model, use, since) for use in uses),
+        law_evaluations=int(evaluated.sum()),
+        all_law_evaluations=int(sum(laws)),
+        sleep=float(state.sleeping.share[None]),
+        asleep=float(awake.mean() / now) if now > 0.0 else 0.0,
+        impulse=float(table[:, 0].sum() / max(scales["momentum"], 1e-300)),
+        energy=float(table[:, 1].sum() / max(scales["energy"], 1e-300)),
+        audits=_audits(audit, skipped),
+        left_out=tuple(left_out),
+    )
+
+
+def _acting(model, use, since):
+    role = next((e.role for e in model.effects if e.name == use.effect), "")
+    times = since.get(_TIMES.get(role, ""), np.zeros(0))
+    first = np.fmin.reduce(times, initial=np.nan) if use.events else np.nan
+    return Acting(use, float(first))
+
+
+def _audits(audit, skipped):
+    counts = zip(_SKIPPED.values(), skipped, audit.audited.to_numpy(), audit.missed.to_numpy())
+    return tuple(
+        Audit(max(int(most), int(audited)), int(audited), int(missed), what)
+        for what, most, audited, missed in counts
+    )
+
+
+def _bond_steps_asleep(model, awake, now, schedule):
+    """Evaluations of bonds that sleep has spared, at the largest step."""
+    links = np.stack([model.topology.master, model.topology.slave])
+    until = np.nan_to_num(awake, nan=now)[links].max(axis=0, initial=0.0)
+    return int(until.sum() / (schedule.tick_seconds * MACRO_TICKS))
+

@@ -1,0 +1,114 @@
+"""Is an effect needed? Estimates from the numbers of a scene, before a run and after it.
+
+A dimensionless group compares the effect with what it acts beside. Far below one it is negligible,
+far above it is needed, and between it is unclear: stresses concentrate at holes and notches by a
+factor of a few, which no such estimate knows.
+"""
+
+import math
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.model import Model
+
+NEGLIGIBLE, NEEDED, UNCLEAR = "negligible", "needed", "unclear"
+#: Groups below which an effect is negligible, and from which on it is needed.
+_LOW, _HIGH = 0.05, 2.0
+#: Standard weight [m/s^2] and density of air [kg/m^3].
+WEIGHT, AIR = 9.80665, 1.2
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """An effect and the group by which it is judged.
+
+    group: its value. words: the group in words. verdict: "negligible", "needed" or "unclear".
+    """
+
+    effect: str
+    group: float
+    words: str
+    verdict: str
+
+    def as_dict(self) -> dict[str, Any]:
+        """All figures, for a JSON file; a group that is not known is None."""
+        return {**asdict(self), "group": None if math.isnan(self.group) else self.group}
+
+    def __str__(self):
+        value = "not known" if math.isnan(self.group) else f"{self.group:.2g}"
+        return f"{self.effect}: {self.verdict} ({self.words} {value})"
+
+
+def estimates_before(model: "Model", until: float) -> tuple[Estimate, ...]:
+    """Estimates of all effects of a scene before a run, by dimensionless groups.
+
+    model: the scene's arrays. until: end of the run [s]. The stress is that of the loads and
+    supports (``Effect.stress``), the speed that of a wave of this stress, stress / (density wave
+    speed).
+    """
+    material, size = model.material, float(np.ptp(model.mesh.points, axis=0).max())
+    given = [effect.stress(material, size) for effect in (*model.loads, *model.supports)]
+    # An unknown load is NaN, and with it all that follows.
+    stress = float(sum(given))
+    spacing = float(2.0 * model.body_radius.mean())
+    wave = math.sqrt(material.normal_stiffness * spacing / material.density)
+    speed = stress / (material.density * wave)
+    softening = stress / material.tensile_strength
+    shear = stress / max(material.cohesion, 1e-300)
+    breaks = max(softening, shear)
+    return (
+        _judged("softening", softening, "stress over tensile strength"),
+        _judged("slip", shear, "stress over cohesion"),
+        _judged("contact", breaks, "stress over strength, as contact needs free faces"),
+        _judged("friction", material.friction * breaks, "friction times stress over strength"),
+        _judged("bond damping", _damping(model), "share of a bond's vibration lost in a cycle"),
+        _judged("gravity", WEIGHT * until / max(speed, 1e-300), "speed of a fall over that given"),
+        _judged("air drag", _drag(material, speed, until, spacing), "share of momentum lost to air"),
+    )
+
+
+def _damping(model):
+    """Share of its energy that a bond between two bodies of mean size loses in a cycle."""
+    material, area = model.material, 3.0 * float(model.bonds["area"].mean())
+    pair = 0.5 * float(model.body_mass.mean())
+    ratio = 0.5 * material.normal_damping * math.sqrt(area / (material.normal_stiffness * pair))
+    return 4.0 * math.pi * ratio
+
+
+def _drag(material, speed, until, spacing):
+    return AIR * speed * until / (material.density * spacing)
+
+
+def _judged(effect, group, words):
+    if math.isnan(group):
+        return Estimate(effect, group, words, UNCLEAR)
+    verdict = NEGLIGIBLE if group < _LOW else NEEDED if group >= _HIGH else UNCLEAR
+    return Estimate(effect, float(group), words, verdict)
+
+
+def estimates_after(
+    model: "Model", displacement: np.ndarray, speed: np.ndarray, until: float, energy: float
+) -> tuple[Estimate, ...]:
+    """Estimates of what no law of a scene serves, from where a run has brought the bodies.
+
+    displacement (n, 3) [m] and speed (n,) [m/s]: of the bodies. energy: put in [J]. Shares of this
+    energy: work of the weight along the way and its fall, and of the drag of air on balls of the
+    bodies' size at their present speed.
+    """
+    way = np.linalg.norm(displacement, axis=1)
+    found = []
+    if not any(effect.name == "gravity" for effect in model.loads):
+        fall = WEIGHT * until
+        work = float((model.body_mass * (WEIGHT * way + fall * speed + 0.5 * fall**2)).sum())
+        found.append(_share("gravity", work, energy))
+    drag = 0.5 * AIR * math.pi * model.body_radius**2 * speed**2
+    found.append(_share("air drag", float((drag * way).sum()), energy))
+    return tuple(found)
+
+
+def _share(effect, work, energy):
+    share = work / energy if energy > 0.0 else math.nan
+    return _judged(effect, share, "share of the energy put in, at most")
