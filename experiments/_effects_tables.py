@@ -197,6 +197,16 @@ def list_rows(known):
     return rows
 
 
+def overhead_of_auto(rows):
+    """What a step with effects="auto" costs beyond the best list [%], by scene and at most."""
+    found = {row["scene"]: row["over_best_percent"] for row in rows if row["list"] == "auto"}
+    keys = {
+        f"auto_overhead_{scene.replace(',', '').replace(' ', '_')}_percent": (value, "%")
+        for scene, value in found.items()
+    }
+    return {"auto_overhead_percent": (max(found.values()), "%"), **keys}
+
+
 def show_lists(rows):
     """Print what a step costs beyond that with the best list of effects."""
     print("\nScenes whose shortest list of effects is known: what a step costs beyond it")

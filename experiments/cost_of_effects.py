@@ -28,11 +28,20 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
-from _effects_costs import KNOWN_LISTS, ORDER, blast_costs, list_costs
+from _effects_costs import KNOWN_LISTS, ORDER, blast_costs, certificate, list_costs
 from _effects_damper import damper_costs
 from _effects_pictures import picture_effects
 from _effects_runs import absent, blast, damper
-from _effects_tables import CONTACTS, LAST_BIT, figures_of, list_rows, row_of, show, show_lists
+from _effects_tables import (
+    CONTACTS,
+    LAST_BIT,
+    figures_of,
+    list_rows,
+    overhead_of_auto,
+    row_of,
+    show,
+    show_lists,
+)
 from taichi_dem.kit import study
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 
@@ -46,7 +55,8 @@ SETTINGS = {
     "half_width": (0.01, 0.02, study.number(0, 1), "of the 95 % interval of a cost, 0.01"),
     "states": (8, 4),
     "substeps": (16, 8),
-    "lists": ((*KNOWN_LISTS,), ()),
+    "lists": ((*KNOWN_LISTS,), ("blast",)),
+    "certified": (5e-4, 1e-4),
     "chance": (True, False),
     "ratios": ((0.88, 0.91, 0.94, 0.96, 0.98, 1.0, 1.03), (0.92, 0.96, 1.0)),
     "cycles": ((60, 20), (15, 5)),
@@ -96,11 +106,13 @@ def run(options):
     picture_effects(folder / "effects.png", tables)
     show(tables["blast"], "The blast: hole's displacement [mm] and broken faces")
     show(rows, "The damper: peak of the response [mm]; first rows: what two seeds may differ by")
-    if known["lists"]:
-        study.write_rows(folder / "lists.csv", list_rows(known["lists"]))
-        show_lists(list_rows(known["lists"]))
+    listed = list_rows(known["lists"])
+    study.write_rows(folder / "lists.csv", listed)
+    show_lists(listed)
+    auto = study.call_in_process(certificate, until=options.certified, step=STEPS["blast"])
     compiling = sum(found[0].get("compile_s", 0.0) for found in results.values())
-    study.finish(options, NAME, figures_of(tables, elastic), compiling)
+    figures = {**figures_of(tables, elastic), **overhead_of_auto(listed), **auto}
+    study.finish(options, NAME, figures, compiling)
 
 
 def blasts(options):
