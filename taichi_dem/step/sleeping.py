@@ -39,8 +39,9 @@ class Sleeping:
     unsorted: bodies listed out of order since. share: of
     the mean momentum, at which a body wakes its neighbours; 0 where none sleeps. bound2: square of
     that momentum now [(N s)^2]. mean: momentum of all bodies [N s].
-    rounding: opening that a bond at rest may show [m]. sums: of the momenta, a chunk of bodies each [N s]. left_out: bound
-    of the impulse [N s] and the energy [J] that each bond left out before it woke.
+    rounding: opening that a bond at rest may show [m]. sums: of the momenta, a chunk of bodies each
+    [N s]. left_out: bound of the impulse [N s] and the energy [J] that each bond left out before
+    it woke.
     """
 
     def __init__(self, tables: "Tables"):
@@ -184,7 +185,7 @@ class Chunks:
 
 @ti.data_oriented
 class WokenLists:
-    """Puts woken bodies and their bonds on the lists of a schedule, and books what they left out."""
+    """Puts woken bodies and bonds on the lists of a schedule, and books what they left out."""
 
     def __init__(self, sleeping: Sleeping, schedule: "Schedule", advance: "Advance"):
         self.sleeping, self.schedule, self.advance = sleeping, schedule, advance
@@ -203,7 +204,9 @@ class WokenLists:
                     if key >= 0 and self.schedule.bonds.key[b] < 0:
                         self.schedule.bonds.insert(b, key)
                         self.sleeping.left_out[b] = self.left_out(b)
-        self.sleeping.unsorted[None] = self.sleeping.unsorted[None] + self.sleeping.woken_count[None]
+        self.sleeping.unsorted[None] = (
+            self.sleeping.unsorted[None] + self.sleeping.woken_count[None]
+        )
         self.sleeping.woken_count[None] = 0
 
     @ti.func
