@@ -117,7 +117,7 @@ class Audit:
         most = 3.0 * self.tables.unit_area[b] * ti.max(stiffness[0], stiffness[1])
         allowed = self.sleeping.share[None] * self.sleeping.mean[None]
         allowed += step * most * self.sleeping.rounding[None]
-        self._book(_ASLEEP, step * self.advance.linear_force(b, False).norm() > allowed)
+        self._book(_ASLEEP, step * self.advance.linear_force(b).norm() > allowed)
 
     @ti.func
     def _book(self, kind: ti.template(), missed):

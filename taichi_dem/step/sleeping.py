@@ -63,9 +63,17 @@ class Sleeping:
         assign(self.rounding, _ROUNDINGS * np.finfo(float).eps * np.abs(model.mesh.points).max())
 
     @ti.func
-    def begin(self, i, state):
-        """Wake body i at the start where something acts on it or it moves, or none may sleep."""
-        stirred = self.share[None] <= 0.0
+    def begin(self, i, advance):
+        """Wake body i at the start where something acts on it or it moves, or none may sleep.
+
+        Bodies may also be at rest with strained bonds, and these act at once.
+        """
+        state, stirred = advance.state, self.share[None] <= 0.0
+        for f in range(4):
+            b = self.tables.face_bond[4 * i + f]
+            if b >= 0:
+                if advance.is_strained(b, self.rounding[None]):
+                    stirred = True
         for effect in ti.static(self.acting):
             if effect.acts_on(i) != 0:
                 stirred = True
@@ -183,8 +191,11 @@ class WokenLists:
         self.tables, self.state = schedule.tables, schedule.state
 
     @ti.func
-    def admit(self):
-        """List the bodies woken since the last call, and the bonds that now act."""
+    def admit(self, moved: ti.template()):
+        """List the bodies woken since the last call, and the bonds that now act.
+
+        moved: whether bodies have moved since bonds were evaluated.
+        """
         for a in range(self.sleeping.woken_count[None]):
             i = self.sleeping.woken[a]
             self.schedule.bodies.insert(i, self.schedule.body_key(i))
@@ -194,24 +205,25 @@ class WokenLists:
                     key = self.schedule.bond_key(b)
                     if key >= 0 and self.schedule.bonds.key[b] < 0:
                         self.schedule.bonds.insert(b, key)
-                        self.sleeping.left_out[b] = self.left_out(b)
+                        self.sleeping.left_out[b] = self.left_out(b, moved)
         self.sleeping.woken_count[None] = 0
 
     @ti.func
-    def left_out(self, b):
+    def left_out(self, b, moved: ti.template()):
         """Bound of the impulse [N s] and the energy [J] that a bond has left out so far.
 
-        One body moved while the other slept: the force now of its springs and dashpots, which has
-        grown to this, times the time since that body woke.
+        One body moved while the other slept, since it woke. moved: whether it has gone on since the
+        bond would last have been evaluated, as it does in the step in which it wakes others.
         """
         slots = self.tables.bond_slots[b]
         i, j = slots[0] >> 2, slots[1] >> 2
-        first = self.sleeping.since[i]
+        first, last = self.sleeping.since[i], 0.0
         if first < 0 or (self.sleeping.since[j] >= 0 and self.sleeping.since[j] < first):
             first = self.sleeping.since[j]
-        impulse, energy = 0.0, 0.0
-        if first >= 0:
-            energy = self.advance.bond_energy(b)
+        if ti.static(moved):
+            last = self.schedule.pair_step(i, j)
+        found = vec2(0.0, 0.0)
+        if 0 <= first and first < self.state.tick[None]:
             elapsed = self.schedule.seconds(self.state.tick[None] - first)
-            impulse = elapsed * self.advance.linear_force(b, True).norm()
-        return vec2(impulse, energy)
+            found = self.advance.withheld(b, elapsed, last)
+        return found
