@@ -194,7 +194,7 @@ class Simulation(Uncopied):
         motion = self.state.motion()
         names = ("position", "orientation", "velocity", "spin")
         self.first_motion = {name: motion[name] for name in names}
-        if self.model.has_contact and self.model.contact.outer_faces:
+        if self.model.has_contact and self.model.contact.outer_faces is True:
             self.state.expose(self.model.topology)
         self.step.prime()
         if self.contacts is not None:

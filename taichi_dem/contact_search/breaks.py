@@ -36,6 +36,19 @@ class Breaks:
         return exposed
 
     @ti.func
+    def expose_outer(self):
+        """Put spheres on all outer faces once a bond has broken, where they wait for that."""
+        if self.contacts.outer_waits[None] == 1:
+            broken = False
+            for b in range(self.tables.bond_count[None]):
+                broken = broken or self.state.broken_tick[b] >= 0
+            if broken:
+                self.contacts.outer_waits[None] = 0
+                for face in range(4 * self.tables.body_count[None]):
+                    if self.tables.face_bond[face] < 0:
+                        self.state.exposed_tick[face] = self.state.tick[None]
+
+    @ti.func
     def note_newest(self, newest):
         """Note the last tick at which a face got its spheres.
 

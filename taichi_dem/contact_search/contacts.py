@@ -10,6 +10,7 @@ import taichi as ti
 
 from taichi_dem.contact_search.lengths import SPARE_PAIRS, SPARE_SPHERES
 from taichi_dem.contact_search.pair_store import PairStore
+from taichi_dem.effects.sphere_contact import ONCE_BROKEN
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.methods import Method
@@ -37,7 +38,7 @@ class Contacts:
     body_skin: travel at which it is searched again [m]; a pair holds the spheres whose gap is below
     the body skin of both. pace: largest step [s], and steps of
     a body by which its contacts are counted before they touch. search_requested: 1 when the list
-    may miss one of them.
+    may miss one of them. outer_waits: 1 while outer faces wait for the first break to get spheres.
     """
 
     def __init__(self, tables: "Tables", state: "State"):
@@ -55,10 +56,12 @@ class Contacts:
         self.body_skin = ti.field(real, shape=n)
         self.skin = ti.field(real, shape=n)
         self.search_requested = ti.field(ti.i32, shape=())
+        self.outer_waits = ti.field(ti.i32, shape=())
 
     def load(self, model: "Model", method: Method) -> None:
         """Load the numbers of a scene and a method; no pairs exist yet."""
         effect, n = model.contact, model.body_count
+        assign(self.outer_waits, int(effect.outer_faces == ONCE_BROKEN))
         assign(self.skin, effect.skin * model.spheres.extent)
         assign(self.pace, np.array([method.dt0, method.steps_ahead]))
         assign(self.store.slot_limit, n * effect.pairs_per_body + SPARE_PAIRS)

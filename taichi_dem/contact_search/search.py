@@ -179,6 +179,7 @@ class BroadPhase:
         """List the bodies with spheres on some face, in order of their index."""
         count = 0
         newest = ti.cast(0, ti.i64)
+        self.breaks.expose_outer()
         for i in range(self.tables.body_count[None]):
             exposed = self.breaks.exposed_faces(i)
             newest = ti.max(newest, self.breaks.newest[i])

@@ -9,7 +9,7 @@ from taichi_dem.effects.friction import Friction
 from taichi_dem.effects.roles import check_activation
 from taichi_dem.effects.shear_slip import ShearSlip
 from taichi_dem.effects.softening import Softening
-from taichi_dem.effects.sphere_contact import SphereContact
+from taichi_dem.effects.sphere_contact import ONCE_BROKEN, SphereContact
 from taichi_dem.effects.sticking_friction import StickingFriction
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import shown
@@ -42,8 +42,8 @@ def chosen_effects(
 ) -> ChosenEffects:
     """Effects for a word, "auto" or "all": laws of the material, and those given.
 
-    given: loads, supports, and laws in place of the paper's. Bodies may touch at outer faces where
-    the mesh has several parts. Raises InputError for an unknown word, or, with "auto", a law whose
+    given: loads, supports, and laws in place of the usual ones. Bodies may touch at outer faces
+    from the start where the mesh has several parts, else once something has broken. Raises InputError for an unknown word, or, with "auto", a law whose
     author does not say when it begins to act.
     """
     if word not in WORDS:
@@ -70,7 +70,8 @@ def _laws(mesh, material, taken):
     if material.normal_damping + material.shear_damping > 0.0:
         laws.append(BondDamping())
     if "contact" not in taken:
-        laws.append(SphereContact(outer_faces=_may_meet(mesh)))
+        # Nothing meets a solid of one piece at its outer faces before something has come loose.
+        laws.append(SphereContact(outer_faces=True if _may_meet(mesh) else ONCE_BROKEN))
     if material.friction > 0.0:
         # Friction without springs is a dashpot's force up to its limit: none without a dashpot.
         laws.append(Friction() if material.contact_damping > 0.0 else StickingFriction())

@@ -1,11 +1,12 @@
 """Contact of fragments through spheres on their broken faces (Konno et al., 2.2, Fig. 5)."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Union
 
 import taichi as ti
 
 from taichi_dem.effects.base import Effect
-from taichi_dem.kit.validation import between, flag, whole
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import between, flag, shown, whole
 from taichi_dem.materials import Material
 from taichi_dem.mesh.contact_spheres import ContactSpheres, spheres_of_faces
 from taichi_dem.physics.sphere_pair import Nearest, normal_force
@@ -15,6 +16,15 @@ if TYPE_CHECKING:
 
 #: Entries of a list for each body: a thousand tetrahedra with as many take some GiB.
 _MOST = 100_000
+#: Value of outer_faces for spheres there from the first break on.
+ONCE_BROKEN = "once_broken"
+
+
+def _outer_faces(value: Any) -> Union[bool, str]:
+    """The value; InputError unless it is True, False or "once_broken"."""
+    if isinstance(value, str) and value != ONCE_BROKEN:
+        raise InputError(f"outer_faces must be True, False or {ONCE_BROKEN!r}, got {shown(value)}")
+    return value if value == ONCE_BROKEN else flag("outer_faces", value)
 
 
 @ti.data_oriented
@@ -22,8 +32,9 @@ class SphereContact(Effect):
     """Spheres inscribed behind free faces repel each other, without attraction.
 
     divisions: equal parts of a face's edges; 5 gives the paper's six spheres a face.
-    outer_faces: outer faces carry spheres from the start, beside those that break. Without, as in
-    the paper, bodies pass through each other there.
+    outer_faces: outer faces carry spheres from the start, beside those that break, or with
+    "once_broken" from the first break of any bond. Without, as in the paper, bodies pass through
+    each other there.
     skin: gap up to which spheres enter the candidate list, at least, as a share of a body's radius;
     more where bodies are fast. It changes time, not results.
     neighbours_per_body, pairs_per_body, spheres_per_body: capacity of the lists, on average; that
@@ -39,14 +50,14 @@ class SphereContact(Effect):
     def __init__(
         self,
         divisions: int = 5,
-        outer_faces: bool = True,
+        outer_faces: Union[bool, str] = True,
         skin: float = 0.015,
         neighbours_per_body: int = 64,
         pairs_per_body: int = 24,
         spheres_per_body: int = 160,
     ):
         self.divisions = whole("divisions", divisions, 3, 20)
-        self.outer_faces = flag("outer_faces", outer_faces)
+        self.outer_faces = _outer_faces(outer_faces)
         self.skin = between("skin", skin, 1e-6, 1.0)
         self.neighbours_per_body = whole("neighbours_per_body", neighbours_per_body, 1, _MOST)
         self.pairs_per_body = whole("pairs_per_body", pairs_per_body, 1, _MOST)
