@@ -35,11 +35,12 @@ class Sleeping:
     """State of sleep of the bodies.
 
     awake: ASLEEP, AWAKE, or STIRRED once the body has woken its neighbours. since: tick at which it
-    woke, NEVER while asleep. woken: bodies that wait to be listed, woken_count of them. share: of
-    the mean momentum, at which a body wakes its neighbours; 0 where none sleeps. bound2: square of
-    that momentum now [(N s)^2]. mean: momentum of all bodies [N s].
-    rounding: opening that a bond at rest may show [m]. sums: of the momenta, a chunk of bodies each [N s]. left_out: bound
-    of the impulse [N s] and the energy [J] that each bond left out before it woke.
+    woke, NEVER while asleep. stride: step [s] in which it woke others. woken: bodies that wait to
+    be listed, woken_count of them. share: of the mean momentum, at which a body wakes its
+    neighbours; 0 where none sleeps. bound2: square of that momentum now [(N s)^2]. mean: of the
+    momenta of all bodies [N s]. rounding: opening that a bond at rest may show [m]. sums: of the
+    momenta, a chunk of bodies each [N s]. left_out: bound of the impulse [N s] and the energy [J]
+    that each bond left out before it woke.
     """
 
     def __init__(self, tables: "Tables"):
@@ -47,6 +48,7 @@ class Sleeping:
         self.tables, self.acting = tables, (*tables.loads, *tables.supports)
         self.awake = ti.field(ti.i32, shape=n)
         self.since = ti.field(ti.i64, shape=n)
+        self.stride = ti.field(real, shape=n)
         self.woken = ti.field(ti.i32, shape=n)
         self.woken_count = ti.field(ti.i32, shape=())
         self.share = ti.field(real, shape=())
@@ -97,13 +99,13 @@ class Sleeping:
         return self.awake[i] != ASLEEP and self.awake[j] != ASLEEP
 
     @ti.func
-    def stir(self, i, state, velocity, angular_momentum):
-        """Wake the neighbours of body i once its momentum exceeds the bound."""
+    def stir(self, i, state, elapsed, velocity, angular_momentum):
+        """Wake the neighbours of body i once its momentum exceeds the bound; elapsed: step [s]."""
         if self.awake[i] == AWAKE:
             spin = angular_momentum.norm() / self.tables.radius[i]
             momentum2 = (self.tables.mass[i] ** 2) * velocity.norm_sqr() + spin * spin
             if momentum2 > self.bound2[None]:
-                self.awake[i] = STIRRED
+                self.awake[i], self.stride[i] = STIRRED, elapsed
                 for f in range(4):
                     b = self.tables.face_bond[4 * i + f]
                     if b >= 0:
@@ -217,12 +219,13 @@ class WokenLists:
         """
         slots = self.tables.bond_slots[b]
         i, j = slots[0] >> 2, slots[1] >> 2
-        first, last = self.sleeping.since[i], 0.0
-        if first < 0 or (self.sleeping.since[j] >= 0 and self.sleeping.since[j] < first):
-            first = self.sleeping.since[j]
+        if self.sleeping.since[i] < 0 or (
+            self.sleeping.since[j] >= 0 and self.sleeping.since[j] < self.sleeping.since[i]
+        ):
+            i = j
+        first, last, found = self.sleeping.since[i], 0.0, vec2(0.0, 0.0)
         if ti.static(moved):
-            last = self.schedule.pair_step(i, j)
-        found = vec2(0.0, 0.0)
+            last = self.sleeping.stride[i]
         if 0 <= first and first < self.state.tick[None]:
             elapsed = self.schedule.seconds(self.state.tick[None] - first)
             found = self.advance.withheld(b, elapsed, last)
