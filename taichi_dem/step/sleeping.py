@@ -100,7 +100,7 @@ class Sleeping:
 
     @ti.func
     def stir(self, i, state, elapsed, velocity, angular_momentum):
-        """Wake the neighbours of body i once its momentum exceeds the bound; elapsed: step [s]."""
+        """Wake the neighbours of a body once its momentum exceeds the bound; elapsed: step [s]."""
         if self.awake[i] == AWAKE:
             spin = angular_momentum.norm() / self.tables.radius[i]
             momentum2 = (self.tables.mass[i] ** 2) * velocity.norm_sqr() + spin * spin
@@ -186,7 +186,7 @@ class Chunks:
 
 @ti.data_oriented
 class WokenLists:
-    """Puts woken bodies and their bonds on the lists of a schedule, and books what they left out."""
+    """Puts woken bodies and their bonds on the lists of a schedule; books what they left out."""
 
     def __init__(self, sleeping: Sleeping, schedule: "Schedule", advance: "Advance"):
         self.sleeping, self.schedule, self.advance = sleeping, schedule, advance

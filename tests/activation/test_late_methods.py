@@ -1,4 +1,4 @@
-"""The same with all kinds of methods: multirate and controlled steps, limited and solved dashpots."""
+"""The same with all kinds of methods: several or controlled steps, limited or solved dashpots."""
 
 import itertools
 
