@@ -127,26 +127,30 @@ class Audit:
 
     @ti.func
     def _keep(self, place, u, aside: ti.template()):
-        """Put the memory of the laws of a unit aside, or bring it back."""
+        """Put the memory of the laws of a unit, and of its bond, aside, or bring it back."""
         for law in ti.static(range(2)):
-            for pair in ti.static(self.memory[law]):
+            for field, other, units in ti.static(self.memory[law]):
                 if ti.static(aside):
-                    pair[1][place] = pair[0][u]
+                    other[place // units] = field[u // units]
                 else:
-                    pair[0][u] = pair[1][place]
+                    field[u // units] = other[place // units]
 
 
 def _memory(law, tables):
-    """Pairs of a field of a law with an entry a unit, and a field to put entries aside."""
-    pairs = []
+    """Fields of a law with an entry for each unit or bond, each as a tuple of three.
+
+    The field, a field to put entries aside, and how many units share an entry.
+    """
+    found, room = [], tables.capacity
     for field in law.state().values():
-        if field.shape == (tables.capacity.units,):
-            size = 3 * (tables.capacity.bonds // RATE + 1)
+        units = {(room.units,): 1, (room.bonds,): 3}.get(field.shape)
+        if units:
+            size = 3 * (room.bonds // RATE + 1) // units
             rows, columns = getattr(field, "n", 1), getattr(field, "m", 1)
             if isinstance(field, ti.lang.matrix.MatrixField):
                 aside = ti.Matrix.field(rows, columns, field.dtype, shape=size)
                 aside = aside if columns > 1 else ti.Vector.field(rows, field.dtype, shape=size)
             else:
                 aside = ti.field(field.dtype, shape=size)
-            pairs.append((field, aside))
-    return tuple(pairs)
+            found.append((field, aside, units))
+    return tuple(found)
