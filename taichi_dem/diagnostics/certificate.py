@@ -197,7 +197,7 @@ def _acting(model, use, since):
 
 
 def _audits(audit, skipped):
-    counts = zip(_SKIPPED.values(), skipped, audit.audited.to_numpy(), audit.missed.to_numpy())
+    counts = zip(_SKIPPED.values(), skipped, audit.audited.to_numpy(), audit.misses.to_numpy())
     return tuple(
         Audit(max(int(most), int(audited)), int(audited), int(missed), what)
         for what, most, audited, missed in counts

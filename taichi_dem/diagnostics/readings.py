@@ -158,7 +158,7 @@ class Readings:
             slots = self.tables.bond_slots[b]
             found = self.state.sleeping.left_out[b]
             if not self.state.sleeping.both_awake(slots[0] >> 2, slots[1] >> 2):
-                found = self.advance.schedule.woken.left_out(b)
+                found = self.advance.schedule.woken.left_out(b, False)
             table[b, 0], table[b, 1] = found[0], found[1]
 
     @ti.kernel

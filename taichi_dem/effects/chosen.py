@@ -44,7 +44,8 @@ def chosen_effects(
 
     given: loads, supports, and laws in place of the usual ones. Bodies may touch at outer faces
     from the start where the mesh has several parts, else once something has broken. Raises
-    InputError for an unknown word, or, with "auto", a law whose author does not say when it begins to act.
+    InputError for an unknown word, or, with "auto", a law whose author does not say when it begins
+    to act.
     """
     if word not in WORDS:
         raise InputError(

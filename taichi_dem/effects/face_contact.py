@@ -43,6 +43,7 @@ class FaceContact(SphereContact):
     """
 
     name = "face_contact"
+    activation = "spheres of free faces touch a face"
     meets_faces = True
     constant_fields = ("plane", "corner")
 

@@ -27,6 +27,7 @@ class StickingFriction(Friction):
     """
 
     name = "sticking_friction"
+    activation = "spheres that touch slide"
     remembers = True
 
     def __init__(self, stiffness_ratio: float = 0.8):

@@ -40,7 +40,7 @@ def mixed(number):
 class Audit:
     """List of the bonds that are looked at in a substep, and what was found.
 
-    audited, missed: by kind, see KINDS. A law is missed where it would have given other bits, or a
+    audited, misses: by kind, see KINDS. A law is missed where it would have given other bits, or a
     unit would have failed. A bond asleep is missed where its springs would have given its bodies
     more, in a step, than the momentum at which a body wakes others. aside: memory of a law before
     it was evaluated.
@@ -52,7 +52,7 @@ class Audit:
         self.tables, self.state, self.schedule, self.advance = tables, state, schedule, advance
         self.activity, self.sleeping = state.activity, state.sleeping
         self.first = ti.field(ti.i32, shape=())
-        self.audited, self.missed = (ti.field(ti.i64, shape=len(KINDS)) for _ in range(2))
+        self.audited, self.misses = (ti.field(ti.i64, shape=len(KINDS)) for _ in range(2))
         self.memory = [_memory(law, tables) for law in (tables.tension, tables.shear)]
         self.has_memory = any(self.memory)
 
@@ -92,7 +92,7 @@ class Audit:
             arm = unit_arm(motion, self.tables.vertex_slave[u])
             opening = unit_opening(motion, arm, self.tables.vertex_master[u])
             pull, sliding = stiffness[0] * opening[0], vec2(opening[1], opening[2])
-            self._keep(3 * a + q, u, True)
+            self._remember(3 * a + q, u, True)
             if ti.static(self.activity.laws[SOFTENING]):
                 if not self.activity.has_begun(b, SOFTENING):
                     law = self.tables.tension.traction(stiffness[0], u, opening[0])
@@ -106,7 +106,7 @@ class Audit:
                     straight = stiffness[1] * sliding
                     other = law[0] != straight[0] or law[1] != straight[1] or spent != 0.0
                     self._book(SLIP, other)
-            self._keep(3 * a + q, u, False)
+            self._remember(3 * a + q, u, False)
 
     @ti.func
     def _asleep(self, b):
@@ -117,36 +117,40 @@ class Audit:
         most = 3.0 * self.tables.unit_area[b] * ti.max(stiffness[0], stiffness[1])
         allowed = self.sleeping.share[None] * self.sleeping.mean[None]
         allowed += step * most * self.sleeping.rounding[None]
-        self._book(_ASLEEP, step * self.advance.linear_force(b, False).norm() > allowed)
+        self._book(_ASLEEP, step * self.advance.linear_force(b).norm() > allowed)
 
     @ti.func
-    def _book(self, kind: ti.template(), missed):
+    def _book(self, kind: ti.template(), is_miss):
         ti.atomic_add(self.audited[kind], 1)
-        if missed:
-            ti.atomic_add(self.missed[kind], 1)
+        if is_miss:
+            ti.atomic_add(self.misses[kind], 1)
 
     @ti.func
-    def _keep(self, place, u, aside: ti.template()):
-        """Put the memory of the laws of a unit aside, or bring it back."""
+    def _remember(self, place, u, aside: ti.template()):
+        """Put the memory of the laws of a unit, and of its bond, aside, or bring it back."""
         for law in ti.static(range(2)):
-            for pair in ti.static(self.memory[law]):
+            for field, other, units in ti.static(self.memory[law]):
                 if ti.static(aside):
-                    pair[1][place] = pair[0][u]
+                    other[place // units] = field[u // units]
                 else:
-                    pair[0][u] = pair[1][place]
+                    field[u // units] = other[place // units]
 
 
 def _memory(law, tables):
-    """Pairs of a field of a law with an entry a unit, and a field to put entries aside."""
-    pairs = []
+    """Fields of a law with an entry for each unit or bond, each as a tuple of three.
+
+    The field, a field to put entries aside, and how many units share an entry.
+    """
+    found, room = [], tables.capacity
     for field in law.state().values():
-        if field.shape == (tables.capacity.units,):
-            size = 3 * (tables.capacity.bonds // RATE + 1)
+        units = {(room.units,): 1, (room.bonds,): 3}.get(field.shape)
+        if units:
+            size = 3 * (room.bonds // RATE + 1) // units
             rows, columns = getattr(field, "n", 1), getattr(field, "m", 1)
             if isinstance(field, ti.lang.matrix.MatrixField):
                 aside = ti.Matrix.field(rows, columns, field.dtype, shape=size)
                 aside = aside if columns > 1 else ti.Vector.field(rows, field.dtype, shape=size)
             else:
                 aside = ti.field(field.dtype, shape=size)
-            pairs.append((field, aside))
-    return tuple(pairs)
+            found.append((field, aside, units))
+    return tuple(found)

@@ -2,7 +2,7 @@
 
 import taichi as ti
 
-from taichi_dem.kit.types import vec3
+from taichi_dem.kit.types import vec2, vec3
 from taichi_dem.physics.bond import unit_arm, unit_opening, unit_velocity
 from taichi_dem.physics.rotation import zero3
 from taichi_dem.step.activity import SLIP, SOFTENING
@@ -46,17 +46,45 @@ class BondLaws:
         return self._motion(b, self.tables.bond_slots[b])
 
     @ti.func
-    def linear_force(self, b, damped: ti.template()):
-        """Force of a bond as if its springs were linear [N]; damped: with all of its dashpots."""
+    def linear_force(self, b):
+        """Force of a bond as if its springs were linear [N]."""
         stiffness, force = self.tables.bond_stiffness[b], zero3()
         motion = self.motion_of(b)
         for u in range(3 * b, 3 * b + 3):
             arm = unit_arm(motion, self.tables.vertex_slave[u])
             opening = unit_opening(motion, arm, self.tables.vertex_master[u])
             force += vec3(stiffness[0], stiffness[1], stiffness[1]) * opening
-            if ti.static(damped):
-                force += self.tables.dashpot.traction(unit_velocity(motion, arm))
         return self.tables.unit_area[b] * force
+
+    @ti.func
+    def is_strained(self, b, rounding):
+        """Whether a unit of a bond is opened by more than a rounding [m]."""
+        motion, strained = self.motion_of(b), False
+        for u in range(3 * b, 3 * b + 3):
+            arm = unit_arm(motion, self.tables.vertex_slave[u])
+            opening = unit_opening(motion, arm, self.tables.vertex_master[u])
+            if opening.norm_sqr() > rounding * rounding:
+                strained = True
+        return strained
+
+    @ti.func
+    def withheld(self, b, elapsed, last):
+        """Impulse [N s] and energy [J] of a bond that was not evaluated for a time [s].
+
+        last: time [s] since the last evaluation that it missed. The springs' force has grown to
+        what it was then; the dashpots' impulse is that of the mean velocity. Energy: what springs
+        hold now, less the work of a leapfrog's coming step.
+        """
+        stiffness, force, energy = self.tables.bond_stiffness[b], zero3(), 0.0
+        motion = self.motion_of(b)
+        for u in range(3 * b, 3 * b + 3):
+            arm = unit_arm(motion, self.tables.vertex_slave[u])
+            opening = unit_opening(motion, arm, self.tables.vertex_master[u])
+            before = opening - last * unit_velocity(motion, arm)
+            pull = vec3(stiffness[0], stiffness[1], stiffness[1]) * before
+            force += pull + self.tables.dashpot.traction(before / elapsed)
+            energy += 0.5 * pull.dot(opening)
+        return self.tables.unit_area[b] * vec2(elapsed * force.norm(), ti.abs(energy))
 
     @ti.func
     def has_failed(self, b, u, pull):

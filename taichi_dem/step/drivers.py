@@ -125,7 +125,7 @@ class Step:
                 self.schedule.limits.refresh(i)
         if ti.static(self.schedule.sleeps):
             for i in range(self.advance.tables.body_count[None]):
-                self.state.sleeping.begin(i, self.state)
+                self.state.sleeping.begin(i, self.advance)
             for i in range(self.advance.tables.body_count[None]):
                 self.state.sleeping.begin_beside(i)
         for i in range(self.advance.tables.body_count[None]):
@@ -231,7 +231,7 @@ class SolvedStep(Step):
             self.schedule.wanted[None] = 0
         if ti.static(self.schedule.sleeps):
             for i in range(self.advance.tables.body_count[None]):
-                self.state.sleeping.begin(i, self.state)
+                self.state.sleeping.begin(i, self.advance)
             for i in range(self.advance.tables.body_count[None]):
                 self.state.sleeping.begin_beside(i)
         for i in range(self.advance.tables.body_count[None]):

@@ -187,7 +187,7 @@ class Schedule:
         if ti.static(self.uniform):
             self._level_all()
         if ti.static(self.sleeps):
-            self.woken.admit()
+            self.woken.admit(True)
         for a in range(self.changed_count[None]):
             self._move_entries(self.changed[a])
             if ti.static(self.spreads):
@@ -251,8 +251,8 @@ class Schedule:
             for a in range(self.store.near_count[None]):
                 for side in ti.static(range(2)):
                     pair = self.store.body[self.store.near_slot[a]]
-                    self.state.sleeping.wake(pair[side], self.state)
-            self.woken.admit()
+                    self.state.sleeping.awaken(pair[side], self.state)
+            self.woken.admit(False)
         self._list_pairs()
         if ti.static(not self.uniform):
             self.list_members()

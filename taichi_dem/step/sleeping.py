@@ -35,13 +35,12 @@ class Sleeping:
     """State of sleep of the bodies.
 
     awake: ASLEEP, AWAKE, or STIRRED once the body has woken its neighbours. since: tick at which it
-    woke, NEVER while asleep. woken: bodies that wait to be listed, woken_count of them.
-    unsorted: bodies listed out of order since. share: of
-    the mean momentum, at which a body wakes its neighbours; 0 where none sleeps. bound2: square of
-    that momentum now [(N s)^2]. mean: momentum of all bodies [N s].
-    rounding: opening that a bond at rest may show [m]. sums: of the momenta, a chunk of bodies each
-    [N s]. left_out: bound of the impulse [N s] and the energy [J] that each bond left out before
-    it woke.
+    woke, NEVER while asleep. stride: step [s] in which it woke others. woken: bodies that wait to
+    be listed, woken_count of them. unsorted: bodies listed out of order since. share: of the mean
+    momentum, at which a body wakes its neighbours; 0 where none sleeps. bound2: square of that
+    momentum now [(N s)^2]. mean: of the momenta of all bodies [N s]. rounding: opening that a bond
+    at rest may show [m]. sums: of the momenta, a chunk of bodies each [N s]. left_out: bound of the
+    impulse [N s] and the energy [J] that each bond left out before it woke.
     """
 
     def __init__(self, tables: "Tables"):
@@ -49,6 +48,7 @@ class Sleeping:
         self.tables, self.acting = tables, (*tables.loads, *tables.supports)
         self.awake = ti.field(ti.i32, shape=n)
         self.since = ti.field(ti.i64, shape=n)
+        self.stride = ti.field(real, shape=n)
         self.woken = ti.field(ti.i32, shape=n)
         self.woken_count = ti.field(ti.i32, shape=())
         self.unsorted = ti.field(ti.i32, shape=())
@@ -66,9 +66,17 @@ class Sleeping:
         assign(self.rounding, _ROUNDINGS * np.finfo(float).eps * np.abs(model.mesh.points).max())
 
     @ti.func
-    def begin(self, i, state):
-        """Wake body i at the start where something acts on it or it moves, or none may sleep."""
-        stirred = self.share[None] <= 0.0
+    def begin(self, i, advance):
+        """Wake body i at the start where something acts on it or it moves, or none may sleep.
+
+        Bodies may also be at rest with strained bonds, and these act at once.
+        """
+        state, stirred = advance.state, self.share[None] <= 0.0
+        for f in range(4):
+            b = self.tables.face_bond[4 * i + f]
+            if b >= 0:
+                if advance.is_strained(b, self.rounding[None]):
+                    stirred = True
         for effect in ti.static(self.acting):
             if effect.acts_on(i) != 0:
                 stirred = True
@@ -92,21 +100,21 @@ class Sleeping:
         return self.awake[i] != ASLEEP and self.awake[j] != ASLEEP
 
     @ti.func
-    def stir(self, i, state, velocity, angular_momentum):
-        """Wake the neighbours of body i once its momentum exceeds the bound."""
+    def stir(self, i, state, elapsed, velocity, angular_momentum):
+        """Wake the neighbours of a body once its momentum exceeds the bound; elapsed: step [s]."""
         if self.awake[i] == AWAKE:
             spin = angular_momentum.norm() / self.tables.radius[i]
             momentum2 = (self.tables.mass[i] ** 2) * velocity.norm_sqr() + spin * spin
             if momentum2 > self.bound2[None]:
-                self.awake[i] = STIRRED
+                self.awake[i], self.stride[i] = STIRRED, elapsed
                 for f in range(4):
                     b = self.tables.face_bond[4 * i + f]
                     if b >= 0:
                         if state.broken_tick[b] < 0:
-                            self.wake(self.tables.neighbour[4 * i + f], state)
+                            self.awaken(self.tables.neighbour[4 * i + f], state)
 
     @ti.func
-    def wake(self, j, state):
+    def awaken(self, j, state):
         """Wake body j now, if it sleeps; it is listed at the end of this substep."""
         if ti.atomic_max(self.awake[j], AWAKE) == ASLEEP:
             self.since[j] = state.tick[None]
@@ -185,15 +193,18 @@ class Chunks:
 
 @ti.data_oriented
 class WokenLists:
-    """Puts woken bodies and bonds on the lists of a schedule, and books what they left out."""
+    """Puts woken bodies and their bonds on the lists of a schedule; books what they left out."""
 
     def __init__(self, sleeping: Sleeping, schedule: "Schedule", advance: "Advance"):
         self.sleeping, self.schedule, self.advance = sleeping, schedule, advance
         self.tables, self.state = schedule.tables, schedule.state
 
     @ti.func
-    def admit(self):
-        """List the bodies woken since the last call, and the bonds that now act."""
+    def admit(self, moved: ti.template()):
+        """List the bodies woken since the last call, and the bonds that now act.
+
+        moved: whether bodies have moved since bonds were evaluated.
+        """
         for a in range(self.sleeping.woken_count[None]):
             i = self.sleeping.woken[a]
             self.schedule.bodies.insert(i, self.schedule.body_key(i))
@@ -203,27 +214,29 @@ class WokenLists:
                     key = self.schedule.bond_key(b)
                     if key >= 0 and self.schedule.bonds.key[b] < 0:
                         self.schedule.bonds.insert(b, key)
-                        self.sleeping.left_out[b] = self.left_out(b)
+                        self.sleeping.left_out[b] = self.left_out(b, moved)
         self.sleeping.unsorted[None] = (
             self.sleeping.unsorted[None] + self.sleeping.woken_count[None]
         )
         self.sleeping.woken_count[None] = 0
 
     @ti.func
-    def left_out(self, b):
+    def left_out(self, b, moved: ti.template()):
         """Bound of the impulse [N s] and the energy [J] that a bond has left out so far.
 
-        One body moved while the other slept: the force now of its springs and dashpots, which has
-        grown to this, times the time since that body woke.
+        One body moved while the other slept, since it woke. moved: whether it has gone on since the
+        bond would last have been evaluated, as it does in the step in which it wakes others.
         """
         slots = self.tables.bond_slots[b]
         i, j = slots[0] >> 2, slots[1] >> 2
-        first = self.sleeping.since[i]
-        if first < 0 or (self.sleeping.since[j] >= 0 and self.sleeping.since[j] < first):
-            first = self.sleeping.since[j]
-        impulse, energy = 0.0, 0.0
-        if first >= 0:
-            energy = self.advance.bond_energy(b)
+        if self.sleeping.since[i] < 0 or (
+            self.sleeping.since[j] >= 0 and self.sleeping.since[j] < self.sleeping.since[i]
+        ):
+            i = j
+        first, last, found = self.sleeping.since[i], 0.0, vec2(0.0, 0.0)
+        if ti.static(moved):
+            last = self.sleeping.stride[i]
+        if 0 <= first and first < self.state.tick[None]:
             elapsed = self.schedule.seconds(self.state.tick[None] - first)
-            impulse = elapsed * self.advance.linear_force(b, True).norm()
-        return vec2(impulse, energy)
+            found = self.advance.withheld(b, elapsed, last)
+        return found
