@@ -44,17 +44,13 @@ def plot_acting(
     rows, columns = (1, len(names)) if extent[1] > 0.3 * extent[0] else (len(names), 1)
     size = 2.6 * columns + 1.4, (height + 0.5) * rows + 0.7
     shades = ListedColormap(matplotlib.colormaps["plasma"](np.linspace(0.0, 0.92, 256)))
-    shades.set_bad(_NEVER)
     with picture(path, rows, columns, size, squeeze=False, sharex=True, sharey=True) as (
         figure,
         panels,
     ):
         for axes, name in zip(panels.flat, names):
             times = acting_since[name]
-            drawn = PolyCollection(polygons, cmap=shades, edgecolor="#00000030", linewidth=0.3)
-            drawn.set_array(np.ma.masked_invalid(1e3 * times[body]))
-            drawn.set_clim(0.0, 1e3 * until)
-            axes.add_collection(drawn)
+            drawn = _coloured(axes, polygons, 1e3 * times[body], shades, 1e3 * until)
             count = int(np.isfinite(times).sum())
             axes.set_title(f"{_TITLES[name]}\n{count:,} of {len(times):,} bodies", fontsize=9.5)
             frame_block(axes, view, model, 0.03)
@@ -66,3 +62,14 @@ def plot_acting(
         figure.legend(
             handles=[area_key("never", fc=_NEVER, ec="#00000030")], loc="outside lower left"
         )
+
+
+def _coloured(axes, polygons, values, shades, most):
+    """Polygons by their values, plain where they have none; returns those with a value."""
+    known, edges = np.isfinite(values), {"edgecolor": "#00000030", "linewidth": 0.3}
+    axes.add_collection(PolyCollection(polygons[~known], facecolor=_NEVER, **edges))
+    drawn = PolyCollection(polygons[known], cmap=shades, **edges)
+    drawn.set_array(values[known])
+    drawn.set_clim(0.0, most)
+    axes.add_collection(drawn)
+    return drawn
