@@ -26,3 +26,15 @@ def draw(path, slept, whole, length):
         right.plot(times, [row["cpu_s"] for row in slept], color=BLUE, label="asleep until reached")
         right.set(xlabel="time [ms]", ylabel="CPU time of stepping [s]", ylim=(0.0, None))
         right.legend(loc="upper left")
+
+
+def caption(figures):
+    """What the picture shows, in words."""
+    share, gain, error = (
+        figures[key][0] for key in ("asleep_percent", "speedup_by_sleep", "error_by_sleep_percent")
+    )
+    return (
+        f"A blow on the head of a pile. Bodies sleep until the momentum of a neighbour exceeds a "
+        f"share of the mean: {share:.0f} % of all bodies times time asleep, steps {gain:.1f} times "
+        f"cheaper in all, and displacements that differ by {error:.1g} % of the largest."
+    )

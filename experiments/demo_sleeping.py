@@ -10,7 +10,7 @@ some 1e-8 where the bound is 1e-6. In the paper's block of 2 m nothing sleeps fo
     python experiments/demo_sleeping.py --cells 60       # a pile of 23,000: three minutes
     python experiments/demo_sleeping.py --sleep 1e-3     # a looser bound
 
-Writes sleeping.png, sleeping.csv and summary.json to results/demo_sleeping/.
+Writes sleeping.png, sleeping.csv, caption.txt and summary.json to results/demo_sleeping/.
 """
 
 import sys
@@ -19,7 +19,7 @@ from functools import partial
 import numpy as np
 
 import taichi_dem as dem
-from _sleeping import draw, write
+from _sleeping import caption, draw, write
 from taichi_dem.kit import study
 from taichi_dem.mesh.shapes import bar
 
@@ -89,7 +89,8 @@ def run(options):
     print(f"\n{certificate}\n")
     write(folder, slept, whole)
     draw(folder / "sleeping.png", slept, whole, EDGE * options.cells)
-    study.finish(options, NAME, figures, compiling + second.compile_seconds, see="sleeping.png")
+    told = {"caption": caption(figures), "see": "sleeping.png"}
+    study.finish(options, NAME, figures, compiling + second.compile_seconds, **told)
 
 
 if __name__ == "__main__":

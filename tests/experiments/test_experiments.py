@@ -83,6 +83,7 @@ FIGURES = {
         *(f"friction_step{end}_percent" for end in ("", "_low", "_high")),
         "spheres_rotation_seconds",
         "automaton_static_contact_response_change_percent",
+        *("auto_overhead_percent", "fracture_evaluations_ratio", "asleep_percent"),
     },
     "cost_of_accuracy_blast": {
         *("cheapest_seconds_at_1_percent", "cheapest_method_at_1_percent"),
@@ -97,11 +98,15 @@ FIGURES = {
     "demo_wave_and_spall": {"wave_speed_m_s", "free_end_over_wave", "spall_1.5_depth_m"},
     "demo_step_too_large": {"limit_dashpots_s", "dashpots_0.9_diverged", "dashpots_1.3_diverged"},
     "demo_multirate": {"uniform_evaluations", "held_fewer_evaluations", "held_difference"},
+    "demo_sleeping": {
+        *("tetrahedra", "speedup_by_sleep", "error_by_sleep_percent", "asleep_percent"),
+        *("left_out_impulse", "audit_misses"),
+    },
 }
 FILES = {
     "blast_fracture": (
         *("history.csv", "mesh.msh", "report.json", "bonds.csv", "bodies.csv", "pressure.csv"),
-        *("pressure.png", "cracks.png", "energy.png", "history.png"),
+        *("pressure.png", "cracks.png", "energy.png", "history.png", "acting.png"),
         *("blast.gif", "paraview/{folder}.pvd", "paraview/{folder}_0000.vtu"),
     ),
     "blast_methods": ("methods.csv", "methods.png", "history_reference.csv"),
@@ -115,7 +120,7 @@ FILES = {
         *("paraview/{folder}.pvd", "checkpoint.npz"),
     ),
     "blast_scaling": ("scaling.png", "scaling.csv", "shares.csv"),
-    "cost_of_effects": ("effects.png", "blast.csv", "damper.csv"),
+    "cost_of_effects": ("effects.png", "blast.csv", "damper.csv", "lists.csv"),
     "cost_of_accuracy_blast": (
         *("work_precision.png", "errors.png", "points.csv", "runs.csv", "answers.csv"),
     ),
@@ -126,6 +131,7 @@ FILES = {
     ),
     "demo_step_too_large": ("shaken.gif", "energy.png", "steps.csv", "caption.txt"),
     "demo_multirate": ("blow.gif", "blow.png", "blow.csv", "levels_held.csv", "caption.txt"),
+    "demo_sleeping": ("sleeping.png", "sleeping.csv", "caption.txt"),
 }
 
 
@@ -230,6 +236,18 @@ def test_multirate_gives_the_same_answer_for_fewer_evaluations(shown):
     _, figures = shown("demo_multirate")
     assert figures["held_fewer_evaluations"] > 3.0
     assert figures["held_difference"] < 2e-3
+
+
+@pytest.mark.slow
+def test_sleep_saves_time_and_changes_next_to_nothing(shown):
+    folder, figures = shown("demo_sleeping")
+    assert figures["audit_misses"] == 0 and figures["left_out_impulse"] <= 1e-6
+    # A share of 1e-6 of the impulse moves nothing by more than some of that.
+    assert figures["error_by_sleep_percent"] < 1e-2
+    assert figures["asleep_percent"] > 50.0
+    rows = rows_of(folder / "sleeping.csv")
+    slept = [row for row in rows if row["run"] == "asleep"]
+    assert all(float(row["awake_m"]) >= float(row["front_m"]) for row in slept)
 
 
 def test_film_is_written_as_mp4_where_ffmpeg_is_found(tmp_path, monkeypatch):
