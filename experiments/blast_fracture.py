@@ -40,6 +40,7 @@ from taichi_dem import (
     Scene,
     SimulationDiverged,
     effects,
+    estimated_effects,
     goals,
     plot,
     read_mesh,
@@ -131,6 +132,7 @@ def run(options):
     if options.accuracy is not None:
         return run_to_accuracy(scene, options)
     print_quality(scene)
+    print("", *estimated_effects(scene, options.until), "", sep="\n")
     try:
         result = simulate(scene, method=method, title="blasting", **run_options(options))
     except SimulationDiverged as error:
