@@ -42,12 +42,8 @@ def blast(names, until, step, ulps):
 
 def damper(filling, options, particles, step, ratios, seeds, cycles):
     """A response curve; cycles: before measuring, and measured."""
-    oscillator = Oscillator()
-    frequency, seed = np.meshgrid(np.array(ratios) * oscillator.natural_frequency, seeds)
-    scenes = particles, seed.ravel(), step, frequency.ravel(), oscillator.base_amplitude
-    made = FILLINGS[filling](**options)
     started = time.process_time()
-    batch = Batch(made, SceneTable(*scenes), measured_cycles=cycles[1])
+    batch = damper_batch(filling, options, particles, step, ratios, seeds, cycles[1])
     batch.start("rigid")
     batch.advance(0)
     ready = time.process_time()
@@ -62,6 +58,15 @@ def damper(filling, options, particles, step, ratios, seeds, cycles):
         "memory_MB": 1e-6 * field_bytes(),
         "rms_mm": (1e3 * measured.rms).reshape(len(seeds), len(ratios)).tolist(),
     }
+
+
+def damper_batch(filling, options, particles, step, ratios, seeds, measured_cycles):
+    """Scenes of the paper's oscillator; ratios: of frequencies to its natural one, each seed."""
+    oscillator = Oscillator()
+    frequency, seed = np.meshgrid(np.array(ratios) * oscillator.natural_frequency, seeds)
+    scenes = particles, seed.ravel(), step, frequency.ravel(), oscillator.base_amplitude
+    made = FILLINGS[filling](**options)
+    return Batch(made, SceneTable(*scenes), measured_cycles=measured_cycles)
 
 
 def absent(substeps, repeats):

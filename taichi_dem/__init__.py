@@ -32,7 +32,7 @@ from taichi_dem.mesh.mesh import Mesh, checked_mesh
 from taichi_dem.mesh.reorder import in_space_order
 from taichi_dem.meshes import PAPER_BLOCK
 from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
-from taichi_dem.needed_effects import needed_effects
+from taichi_dem.needed_effects import estimated_effects, needed_effects
 from taichi_dem.observers import At, Collector, Every, Observer, RunView
 from taichi_dem.output.record import write_paraview
 from taichi_dem.scene import Scene
@@ -71,6 +71,7 @@ __all__ = [
     "__version__",
     "checked_mesh",
     "effects",
+    "estimated_effects",
     "goals",
     "in_space_order",
     "methods",

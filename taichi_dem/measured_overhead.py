@@ -27,15 +27,16 @@ STEP = 1e-8
 
 
 def elastic_step_seconds(mesh: Mesh, substeps: int, repeats: int) -> dict[str, list[float]]:
-    """CPU seconds of some substeps of an elastic block in motion, in turns.
+    """CPU seconds of some substeps of an elastic block in motion, in turns of random order.
 
     Returns "composed", of the step as the package composes it, and "by_hand", of ``ByHand``.
     """
     runs = {"composed": _elastic(mesh, None), "by_hand": _elastic(mesh, ByHand)}
     seconds: dict[str, list[float]] = {name: [] for name in runs}
+    order = np.random.default_rng(2)
     for _ in range(repeats):
-        for name, run in runs.items():
-            seconds[name].append(seconds_of(run, substeps))
+        for name in order.permutation([*runs]):
+            seconds[name].append(seconds_of(runs[name], substeps))
     return seconds
 
 

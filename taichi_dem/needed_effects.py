@@ -9,11 +9,15 @@ from typing import Any, Optional
 
 import numpy as np
 
+from taichi_dem.diagnostics.estimates import Estimate, estimates_before
 from taichi_dem.diagnostics.report import Report
+from taichi_dem.effects.chosen import ChosenEffects
+from taichi_dem.engine.model import Model
 from taichi_dem.kit.effect_usage import Advice
 from taichi_dem.kit.errors import InputError, SimulationDiverged
-from taichi_dem.kit.validation import fraction
+from taichi_dem.kit.validation import fraction, instance, positive
 from taichi_dem.result import Result
+from taichi_dem.scene import Scene
 from taichi_dem.simulate import run_simulation
 from taichi_dem.simulation import Simulation
 
@@ -44,6 +48,18 @@ def needed_effects(result: object, tolerance: float = ROUNDING) -> Advice:
     return Advice(uses, (*report.missing_effects, *slipped), tolerance, shown)
 
 
+def estimated_effects(scene: Scene, until: float) -> tuple[Estimate, ...]:
+    """Estimates of which effects a scene needs, before a run; print them.
+
+    until: end of the run [s]. Each compares an effect with what it acts beside by a dimensionless
+    group, and says negligible, needed or unclear; with effects="auto" a run finds out by itself.
+    Raises InputError for another kind of scene, or a time that is no positive number.
+    """
+    instance("scene", scene, Scene)
+    model = Model(scene.mesh, scene.material, scene.effects)
+    return estimates_before(model, positive("until", until))
+
+
 def differences(result: Result, names: Iterable[str], tolerance: float) -> dict[str, float]:
     """Difference that each effect makes to a run, by name, as a share of what was recorded.
 
@@ -72,7 +88,8 @@ def _role(result, name):
 
 def _difference(result, names):
     """Largest relative difference of a run without some effects; infinite where it fails."""
-    kept = _without(result.scene.effects, names)
+    effects = result.scene.effects
+    kept = ChosenEffects(_without(effects, names), effects.word)
     try:
         scene = replace(result.scene, effects=kept)
         simulation = Simulation(scene, result.method, result.report.driver.split("+")[0])

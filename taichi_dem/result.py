@@ -2,11 +2,12 @@
 
 import json
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Optional
 
 import numpy as np
 
+from taichi_dem.diagnostics.certificate import Certificate
 from taichi_dem.diagnostics.report import Report
 from taichi_dem.engine.model import Model
 from taichi_dem.kit.display import counted, embedded, in_brief, table, titled, unfolded
@@ -25,7 +26,8 @@ class Result:
     was released [s], NaN while it holds. peak_speed: largest speed of each body at the samples
     [m/s]. report: figures of the run. diverged: the error sentence of a run that left its bounds,
     whose data end before that, else "". start: motion that was set before the run, arguments of
-    ``State.set_motion``; None for a run that began with the scene at rest.
+    ``State.set_motion``; None for a run that began with the scene at rest. acting_since: with
+    effects="auto", time [s] from which each effect acted on each body, NaN for never, by name.
 
     As the last line of a notebook's cell it shows a picture and a table.
     """
@@ -40,6 +42,7 @@ class Result:
     report: Report
     diverged: str = ""
     start: Optional[dict[str, np.ndarray]] = None
+    acting_since: dict[str, np.ndarray] = field(default_factory=dict)
 
     def __repr__(self):
         samples = counted(len(self.history.get("time_s", ())), "sample")
@@ -60,6 +63,11 @@ class Result:
             unfolded("All figures of the run", str(self.report)),
             warning=self.diverged,
         )
+
+    @property
+    def certificate(self) -> Optional[Certificate]:
+        """What acted and what was left out, with effects="auto"; else None."""
+        return self.report.certificate
 
     def mean_displacement(self, bodies: np.ndarray) -> np.ndarray:
         """Mean displacement of some bodies [m], (frames, 3).
@@ -107,4 +115,4 @@ class Result:
         text = json.dumps({**self.report.as_dict(), "diverged": self.diverged}, indent=1)
         write_text(os.path.join(folder, "report.json"), text)
         if self.frames:
-            write_paraview(place, self.model, self.frames, name)
+            write_paraview(place, self.model, self.frames, name, self.acting_since)

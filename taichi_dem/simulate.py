@@ -266,4 +266,5 @@ def _result(simulation, recorder, error, brief=False):
         peak_speed=recorder.peak_speed,
         report=simulation.report(brief),
         diverged=str(error) if error else "",
+        acting_since=simulation.acting_since(),
     )

@@ -227,14 +227,20 @@ def remove_series(folder: FileName, name: str) -> None:
 
 
 def write_paraview(
-    folder: FileName, model: Model, frames: Sequence[Frame], name: Optional[str] = None
+    folder: FileName,
+    model: Model,
+    frames: Sequence[Frame],
+    name: Optional[str] = None,
+    acting_since: Optional[Mapping[str, np.ndarray]] = None,
 ) -> None:
     """Write frames as a ParaView series: folder/name.pvd and a VTU file a frame.
 
     name: of the files, that of the folder if None (``series_name``).
     Cells carry body_id, level, speed_m_s, displacement_m, damage and step_bound_by, the place
-    in ``step_control.CRITERIA`` of what bounds a body's step. An earlier series of that name in
-    the folder is removed first.
+    in ``step_control.CRITERIA`` of what bounds a body's step. acting_since: times [s] by name,
+    (body_count,), NaN for never; cells then carry NAME_acts, 1 where an effect has begun to act by
+    the time of the frame, and NAME_since_s. An earlier series of that name in the folder is removed
+    first.
     """
     folder = output_folder(folder)
     name = series_name(folder) if name is None else name
@@ -251,6 +257,9 @@ def write_paraview(
             "damage": frame.damage,
             "step_bound_by": frame.bound,
         }
+        for effect, since in (acting_since or {}).items():
+            data[f"{effect}_acts"] = (since <= frame.time_s).astype(np.int32)
+            data[f"{effect}_since_s"] = since
         points = body_corners(model, frame).reshape(-1, 3)
         write_vtu(os.path.join(folder, names[-1]), points, cells, {}, data)
     write_pvd(os.path.join(folder, f"{name}.pvd"), [frame.time_s for frame in frames], names)

@@ -1,5 +1,6 @@
 """Pictures of a run; the only part of the package that imports matplotlib."""
 
+from taichi_dem.plot.acting import plot_acting
 from taichi_dem.plot.animation import save_animation
 from taichi_dem.plot.attenuation import plot_attenuation
 from taichi_dem.plot.block import plot_cracks, plot_steps
@@ -13,6 +14,7 @@ from taichi_dem.plot.series import (
 )
 
 __all__ = [
+    "plot_acting",
     "plot_attenuation",
     "plot_cracks",
     "plot_deep_cracks",

@@ -229,11 +229,16 @@ class Schedule:
         self.changed_count[None] = 0
         if ti.static(self.spreads):
             self.level_limit.note_all()
-        self.bodies.fill(self.tables.body_count[None], itself, self.body_key)
-        self.bonds.fill(self.tables.bond_count[None], itself, self.bond_key)
+        self.list_members()
         if ti.static(self.has_contact):
             self._list_pairs()
         self._find_finest()
+
+    @ti.func
+    def list_members(self):
+        """Fill the lists of bodies and bonds, in their order."""
+        self.bodies.fill(self.tables.body_count[None], itself, self.body_key)
+        self.bonds.fill(self.tables.bond_count[None], itself, self.bond_key)
 
     @ti.func
     def start_pairs(self):
@@ -250,8 +255,7 @@ class Schedule:
             self.woken.admit(False)
         self._list_pairs()
         if ti.static(not self.uniform):
-            self.bodies.fill(self.tables.body_count[None], itself, self.body_key)
-            self.bonds.fill(self.tables.bond_count[None], itself, self.bond_key)
+            self.list_members()
 
     @ti.func
     def _list_pairs(self):

@@ -36,11 +36,11 @@ class Sleeping:
 
     awake: ASLEEP, AWAKE, or STIRRED once the body has woken its neighbours. since: tick at which it
     woke, NEVER while asleep. stride: step [s] in which it woke others. woken: bodies that wait to
-    be listed, woken_count of them. share: of the mean momentum, at which a body wakes its
-    neighbours; 0 where none sleeps. bound2: square of that momentum now [(N s)^2]. mean: of the
-    momenta of all bodies [N s]. rounding: opening that a bond at rest may show [m]. sums: of the
-    momenta, a chunk of bodies each [N s]. left_out: bound of the impulse [N s] and the energy [J]
-    that each bond left out before it woke.
+    be listed, woken_count of them. unsorted: bodies listed out of order since. share: of the mean
+    momentum, at which a body wakes its neighbours; 0 where none sleeps. bound2: square of that
+    momentum now [(N s)^2]. mean: of the momenta of all bodies [N s]. rounding: opening that a bond
+    at rest may show [m]. sums: of the momenta, a chunk of bodies each [N s]. left_out: bound of the
+    impulse [N s] and the energy [J] that each bond left out before it woke.
     """
 
     def __init__(self, tables: "Tables"):
@@ -51,6 +51,7 @@ class Sleeping:
         self.stride = ti.field(real, shape=n)
         self.woken = ti.field(ti.i32, shape=n)
         self.woken_count = ti.field(ti.i32, shape=())
+        self.unsorted = ti.field(ti.i32, shape=())
         self.share = ti.field(real, shape=())
         self.bound2, self.mean = ti.field(real, shape=()), ti.field(real, shape=())
         self.rounding = ti.field(real, shape=())
@@ -157,7 +158,7 @@ class Chunks:
     """List of the chunks of bodies, at the ticks at which their momenta are summed."""
 
     def __init__(self, sleeping: Sleeping, schedule: "Schedule"):
-        self.sleeping, self.state = sleeping, schedule.state
+        self.sleeping, self.state, self.schedule = sleeping, schedule.state, schedule
 
     @ti.func
     def count(self, low):
@@ -179,9 +180,15 @@ class Chunks:
 
     @ti.func
     def end(self, one):
-        """Set the bound."""
+        """Set the bound, and bring bodies woken of late into the order of the others.
+
+        Visits in the order of waking take up to 40 % longer.
+        """
         if self.sleeping.is_due(self.state.tick[None]):
             self.sleeping.renew_bound()
+            if self.sleeping.unsorted[None] > 0:
+                self.sleeping.unsorted[None] = 0
+                self.schedule.list_members()
 
 
 @ti.data_oriented
@@ -208,6 +215,8 @@ class WokenLists:
                     if key >= 0 and self.schedule.bonds.key[b] < 0:
                         self.schedule.bonds.insert(b, key)
                         self.sleeping.left_out[b] = self.left_out(b, moved)
+        woken = self.sleeping.woken_count[None]
+        self.sleeping.unsorted[None] = self.sleeping.unsorted[None] + woken
         self.sleeping.woken_count[None] = 0
 
     @ti.func

@@ -1,4 +1,4 @@
-"""Picture of the effects' costs: a cost that the spread of the repeats hides."""
+"""Picture of the effects' costs: a cost whose interval holds zero."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ def effect(cost, least, most, sign=1.0):
 
 
 EFFECTS = [
-    effect(-5.0, -12.0, 6.0),
+    effect(-0.04, -1.2, 0.6),
     effect(24.0, 17.0, 33.0),
     effect(-20.0, -30.0, -8.0),
     effect(14.0, 7.0, 21.0, sign=-1.0),
@@ -23,19 +23,19 @@ EFFECTS = [
 @pytest.fixture
 def axes(script):
     with styled() as (_, made):
-        script("cost_of_effects").draw_costs(made, EFFECTS)
+        script("_effects_pictures").draw_costs(made, EFFECTS)
         yield made
 
 
-def test_a_cost_whose_range_holds_zero_is_pale_and_says_so(axes):
+def test_a_cost_whose_interval_holds_zero_is_pale_and_says_so(axes):
     words = [text.get_text().strip() for text in axes.texts]
-    assert words == ["-5 %, within the spread", "24 %", "-20 %", "14 %"]
+    assert words == ["0.0 %, not resolved", "24 %", "-20 %", "14 %"]
     colours = [to_hex(bar.get_facecolor()).lower() for bar in axes.patches]
     assert colours == [colour.lower() for colour in (SKY, BLUE, BLUE, BLUE)]
 
 
-def test_no_number_is_changed_and_the_range_is_drawn(axes):
-    assert [bar.get_width() for bar in axes.patches] == [-5.0, 24.0, -20.0, 14.0]
-    ranges = [tuple(line.get_xdata()) for line in axes.lines[:4]]
-    assert np.allclose(ranges, [(-12.0, 6.0), (17.0, 33.0), (-30.0, -8.0), (7.0, 21.0)])
-    assert axes.get_yticklabels()[3].get_text() == "some effect (added)"
+def test_no_number_is_changed_and_the_interval_is_drawn(axes):
+    assert [bar.get_width() for bar in axes.patches] == [-0.04, 24.0, -20.0, 14.0]
+    drawn = [tuple(line.get_xdata()) for line in axes.lines[:4]]
+    assert np.allclose(drawn, [(-1.2, 0.6), (17.0, 33.0), (-30.0, -8.0), (7.0, 21.0)])
+    assert axes.get_yticklabels()[3].get_text() == "some effect\n(added)"

@@ -80,6 +80,7 @@ FIGURES = {
             for effect in ("sphere_contact", "friction")
             for what in ("seconds", "memory_MB", "compiled_kB", "displacement_change_percent")
         ),
+        *(f"friction_step{end}_percent" for end in ("", "_low", "_high")),
         "spheres_rotation_seconds",
         "automaton_static_contact_response_change_percent",
     },

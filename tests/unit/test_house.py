@@ -29,7 +29,7 @@ LAYERS = {
         ("diagnostics",),
         ("engine",),
         ("simulation",),
-        ("output", "measured_speedup", "measured_overhead", "observers", "run_plan"),
+        ("output", "measured_speedup", "measured_overhead", "paired_cost", "observers", "run_plan"),
         ("plot",),
         ("result",),
         ("simulate", "needed_effects", "outcome"),

@@ -111,6 +111,11 @@ class Answer:
         return self.parts.total
 
     @property
+    def certificate(self) -> Any:
+        """Certificate of the finest run, of a scene with effects="auto"; else None."""
+        return getattr(self.result, "certificate", None)
+
+    @property
     def share(self) -> float:
         """Largest half-width as a share of the largest value; infinite where that is zero."""
         size = largest(self.value)
