@@ -210,7 +210,8 @@ def check_activation(effect: Any) -> None:
     for rule in rules if effect.role in _DOES else ():
         said = _first(type(effect), rule)
         changed = min(_first(type(effect), member) for member in _DOES[effect.role])
-        if not getattr(effect, rule, None) or said > changed:
+        rightly = callable if rule == "begins" else lambda words: isinstance(words, str) and words
+        if not rightly(getattr(effect, rule, None)) or said > changed:
             what = "the words activation" if rule == "activation" else "a function begins"
             raise InputError(
                 f"effects 'auto' must have laws that say when they begin to act: {order[0]} has no "
