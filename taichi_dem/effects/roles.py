@@ -205,6 +205,11 @@ _DOES = {
 
 def check_activation(effect: Any) -> None:
     """Raise InputError for a law that has no rule for effects="auto"; loads and supports act."""
+    if effect.role in ("tension", "shear") and getattr(effect, "is_silent", False):
+        raise InputError(
+            "effects 'auto' must have laws of bonds that act, as it looks for no limit beside "
+            f"theirs, got a silent {type(effect).name}: list the effects, or take 'all'"
+        )
     rules = ("activation", "begins") if effect.role in ("tension", "shear") else ("activation",)
     order = [kind.__name__ for kind in type(effect).__mro__]
     for rule in rules if effect.role in _DOES else ():

@@ -121,6 +121,11 @@ ON_DEMAND = {
         lambda: on_demand(effects.ShearSlip(), effects.SlipWeakening(1e3)),
         "effects shear_slip and slip_weakening both take the role shear",
     ),
+    "silent law": (
+        lambda: on_demand(effects.Softening().silent()),
+        "must have laws of bonds that act, as it looks for no limit beside theirs, got a silent "
+        "softening",
+    ),
     "contact": (lambda: on_demand(Unsaid()), f"{SAY}Unsaid has no activation of its own"),
     "friction": (lambda: on_demand(UnsaidFriction()), f"{SAY}UnsaidFriction has no activation"),
     "tension": (lambda: on_demand(UnsaidTension()), f"{SAY}UnsaidTension has no activation"),
