@@ -81,7 +81,9 @@ def scene_of(material, peak, names):
 def certificate(until, step):
     """Figures of the certificate of the paper's blast with effects="auto"."""
     scene = scene_of(CONCRETE, PEAK, AUTO)
-    found = simulate(scene, until=until, method=ImplicitDashpots(step), samples=1).report.certificate
+    found = simulate(
+        scene, until=until, method=ImplicitDashpots(step), samples=1
+    ).report.certificate
     misses = sum(audit.misses for audit in found.audits)
     audited = sum(audit.audited for audit in found.audits)
     return {

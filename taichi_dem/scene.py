@@ -1,8 +1,8 @@
 """Scene: mesh, material and the effects that act in it."""
 
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Hashable, Iterable
 from dataclasses import dataclass
-from typing import Any, Optional, Union
+from typing import Any, Optional
 
 from taichi_dem.effects.base import MANY, Effect
 from taichi_dem.effects.chosen import AUTO, LISTED, ChosenEffects, chosen_effects
@@ -37,7 +37,7 @@ class Scene:
 
     mesh: Mesh
     material: Material
-    effects: Union[str, Sequence[Effect]] = ()
+    effects: Any = ()
     max_speed: float = 1e4
     loads: Iterable[Effect] = ()
     sleep: Optional[float] = None

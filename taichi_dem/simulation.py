@@ -15,7 +15,6 @@ from taichi_dem.diagnostics.certificate import acting_since, certificate_of
 from taichi_dem.diagnostics.divergence import DivergenceCheck
 from taichi_dem.diagnostics.effect_activity import effect_activity
 from taichi_dem.diagnostics.energy_balance import EnergyBalance
-from taichi_dem.diagnostics.estimates import estimates_after
 from taichi_dem.diagnostics.known_error import known_error
 from taichi_dem.diagnostics.missing_effects import MissingEffects
 from taichi_dem.diagnostics.readings import Readings
@@ -369,20 +368,8 @@ class Simulation(Uncopied):
         return replace(
             report,
             known_error=known_error(report, self.scene, self.method),
-            certificate=self._certificate(report) if self.scene.on_demand else None,
+            certificate=certificate_of(self, report) if self.scene.on_demand else None,
         )
-
-    def _certificate(self, report):
-        """What acted and what was left out so far."""
-        account, motion = report.energy_balance, self.motion()
-        given = abs(account["load_work"]) + abs(account["support_work"])
-        energy = given + self.energy_balance.start_energy
-        scales = {"momentum": self.energy_balance.momentum_exchanged(), "energy": energy}
-        moved = motion["position"] - self.first_motion["position"]
-        speed = np.linalg.norm(motion["velocity"], axis=1)
-        left_out = estimates_after(self.model, moved, speed, self.time_s, energy)
-        read = self.model, self.state, self.schedule, self.readings, self.step.audit
-        return certificate_of(*read, report.effect_activity, scales, left_out)
 
     def acting_since(self) -> dict[str, np.ndarray]:
         """Time [s] from which each effect acted on each body, by name; with effects="auto" only."""

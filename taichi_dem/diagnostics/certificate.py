@@ -1,13 +1,11 @@
 """Certificate of a run with effects="auto": what acted, since when, and what was left out."""
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taichi_dem.diagnostics.estimates import Estimate
-from taichi_dem.diagnostics.readings import Readings
+from taichi_dem.diagnostics.estimates import Estimate, estimates_after
 from taichi_dem.kit.audit import Audit
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.effect_usage import EffectUse
@@ -142,42 +140,53 @@ def _times(ticks, never, tick_seconds):
     return np.where(ticks == never, np.nan, ticks * tick_seconds)
 
 
-def certificate_of(
-    model: "Model",
-    state: "State",
-    schedule: "Schedule",
-    readings: Readings,
-    audit: Any,
-    uses: Sequence[EffectUse],
-    scales: Mapping[str, float],
-    left_out: Sequence[Estimate],
-) -> Certificate:
+def certificate_of(run: Any, report: Any) -> Certificate:
     """Certificate of a run so far.
 
-    audit: the ``step.audit.Audit`` of the step. uses: activity of the effects, in the model's
-    order. scales: momentum [N s] and energy [J] that shares are of. left_out: estimates.
+    run: the ``Simulation``, started. report: its ``Report`` without a certificate.
     """
+    model, state, schedule, now = run.model, run.state, run.schedule, run.time_s
     since = acting_since(model, state, schedule)
-    table = np.zeros((max(1, model.bond_count), 2))
-    readings.left_out(table)
-    evaluated = state.activity.evaluated.to_numpy()[: model.bond_count].sum(axis=0)
-    units = 3 * (int(schedule.evaluations[5]) + model.bond_count)
-    laws = [units * has for has in state.activity.laws]
-    now = int(state.tick[None]) * schedule.tick_seconds
+    evaluated, laws = _law_evaluations(model, state, schedule)
+    skipped = *(laws - evaluated), _bond_steps_asleep(model, since["awake"], now, schedule)
     awake = np.nan_to_num(since["awake"], nan=now)
-    bonds_asleep = _bond_steps_asleep(model, since["awake"], now, schedule)
-    skipped = (laws[0] - evaluated[0], laws[1] - evaluated[1], bonds_asleep)
+    energy, impulse, left_energy = _left_out(run, report)
     return Certificate(
-        acting=tuple(_acting(model, use, since) for use in uses),
+        acting=tuple(_acting(model, use, since) for use in report.effect_activity),
         law_evaluations=int(evaluated.sum()),
-        all_law_evaluations=int(sum(laws)),
+        all_law_evaluations=int(laws.sum()),
         sleep=float(state.sleeping.share[None]),
         asleep=float(awake.mean() / now) if now > 0.0 else 0.0,
-        impulse=float(table[:, 0].sum() / max(scales["momentum"], 1e-300)),
-        energy=float(table[:, 1].sum() / max(scales["energy"], 1e-300)),
-        audits=_audits(audit, skipped),
-        left_out=tuple(left_out),
+        impulse=impulse,
+        energy=left_energy,
+        audits=_audits(run.step.audit, skipped),
+        left_out=_not_served(run, energy),
     )
+
+
+def _law_evaluations(model, state, schedule):
+    """Evaluations of softening and slip, a unit each: those made, and those of effects="all"."""
+    evaluated = state.activity.evaluated.to_numpy()[: model.bond_count].sum(axis=0)
+    units = 3 * (int(schedule.evaluations[5]) + model.bond_count)
+    return evaluated, units * np.array(state.activity.laws, dtype=np.int64)
+
+
+def _left_out(run, report):
+    """Energy put in [J]; impulse and energy that sleep left out, as shares."""
+    account, table = report.energy_balance, np.zeros((max(1, run.model.bond_count), 2))
+    run.readings.left_out(table)
+    given = abs(account["load_work"]) + abs(account["support_work"])
+    energy = given + run.energy_balance.start_energy
+    impulse = table[:, 0].sum() / run.energy_balance.momentum_exchanged()
+    return energy, float(impulse), float(table[:, 1].sum() / max(energy, 1e-300))
+
+
+def _not_served(run, energy):
+    """Estimates of what no law of the scene serves."""
+    motion = run.motion()
+    moved = motion["position"] - run.first_motion["position"]
+    speed = np.linalg.norm(motion["velocity"], axis=1)
+    return estimates_after(run.model, moved, speed, run.time_s, energy)
 
 
 def _acting(model, use, since):
@@ -188,7 +197,7 @@ def _acting(model, use, since):
 
 
 def _audits(audit, skipped):
-    counts = zip(_SKIPPED.values(), skipped, audit.audited.to_numpy(), audit.missed.to_numpy())
+    counts = zip(_SKIPPED.values(), skipped, audit.audited.to_numpy(), audit.misses.to_numpy())
     return tuple(
         Audit(max(int(most), int(audited)), int(audited), int(missed), what)
         for what, most, audited, missed in counts
@@ -200,4 +209,3 @@ def _bond_steps_asleep(model, awake, now, schedule):
     links = np.stack([model.topology.master, model.topology.slave])
     until = np.nan_to_num(awake, nan=now)[links].max(axis=0, initial=0.0)
     return int(until.sum() / (schedule.tick_seconds * MACRO_TICKS))
-

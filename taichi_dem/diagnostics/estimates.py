@@ -66,7 +66,9 @@ def estimates_before(model: "Model", until: float) -> tuple[Estimate, ...]:
         _judged("friction", material.friction * breaks, "friction times stress over strength"),
         _judged("bond damping", _damping(model), "share of a bond's vibration lost in a cycle"),
         _judged("gravity", WEIGHT * until / max(speed, 1e-300), "speed of a fall over that given"),
-        _judged("air drag", _drag(material, speed, until, spacing), "share of momentum lost to air"),
+        _judged(
+            "air drag", _drag(material, speed, until, spacing), "share of momentum lost to air"
+        ),
     )
 
 

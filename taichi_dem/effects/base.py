@@ -309,4 +309,15 @@ ABSENT: dict[str, Any] = {
     "contact": None,
 }
 
-__all__ = ["ABSENT", "HARMLESS", "MANY", "NEAR", "ROLES", "SINGLE", "Effect", "Travel", "along", "bound"]
+__all__ = [
+    "ABSENT",
+    "HARMLESS",
+    "MANY",
+    "NEAR",
+    "ROLES",
+    "SINGLE",
+    "Effect",
+    "Travel",
+    "along",
+    "bound",
+]

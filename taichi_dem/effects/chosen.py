@@ -1,7 +1,7 @@
 """Laws that a scene takes from its material where it names none: effects="auto" and "all"."""
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from taichi_dem.effects.base import SINGLE, Effect
 from taichi_dem.effects.bond_damping import BondDamping
@@ -43,8 +43,9 @@ def chosen_effects(
     """Effects for a word, "auto" or "all": laws of the material, and those given.
 
     given: loads, supports, and laws in place of the usual ones. Bodies may touch at outer faces
-    from the start where the mesh has several parts, else once something has broken. Raises InputError for an unknown word, or, with "auto", a law whose
-    author does not say when it begins to act.
+    from the start where the mesh has several parts, else once something has broken. Raises
+    InputError for an unknown word, or, with "auto", a law whose author does not say when it begins
+    to act.
     """
     if word not in WORDS:
         raise InputError(

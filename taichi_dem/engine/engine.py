@@ -69,7 +69,7 @@ class BlastEngine(Engine):
         self.contacts = Contacts(self.tables, self.state) if self.tables.has_contact else None
         self.schedule = self._schedule(method)
         self.advance = self._advance(method)
-        if self.tables.on_demand:
+        if self.state.sleeping is not None:
             self.schedule.woken = WokenLists(self.state.sleeping, self.schedule, self.advance)
         self.broad_phase = None
         if self.contacts is not None:

@@ -63,4 +63,6 @@ def plot_acting(
         for axes in panels[:, 0]:
             axes.set_ylabel(view.labels()[1])
         figure.colorbar(drawn, ax=panels, label="acts from [ms]", pad=0.02, aspect=30)
-        figure.legend(handles=[area_key("never", fc=_NEVER, ec="#00000030")], loc="outside lower left")
+        figure.legend(
+            handles=[area_key("never", fc=_NEVER, ec="#00000030")], loc="outside lower left"
+        )

@@ -40,7 +40,7 @@ def mixed(number):
 class Audit:
     """List of the bonds that are looked at in a substep, and what was found.
 
-    audited, missed: by kind, see KINDS. A law is missed where it would have given other bits, or a
+    audited, misses: by kind, see KINDS. A law is missed where it would have given other bits, or a
     unit would have failed. A bond asleep is missed where its springs would have given its bodies
     more, in a step, than the momentum at which a body wakes others. aside: memory of a law before
     it was evaluated.
@@ -52,7 +52,7 @@ class Audit:
         self.tables, self.state, self.schedule, self.advance = tables, state, schedule, advance
         self.activity, self.sleeping = state.activity, state.sleeping
         self.first = ti.field(ti.i32, shape=())
-        self.audited, self.missed = (ti.field(ti.i64, shape=len(KINDS)) for _ in range(2))
+        self.audited, self.misses = (ti.field(ti.i64, shape=len(KINDS)) for _ in range(2))
         self.memory = [_memory(law, tables) for law in (tables.tension, tables.shear)]
         self.has_memory = any(self.memory)
 
@@ -92,7 +92,7 @@ class Audit:
             arm = unit_arm(motion, self.tables.vertex_slave[u])
             opening = unit_opening(motion, arm, self.tables.vertex_master[u])
             pull, sliding = stiffness[0] * opening[0], vec2(opening[1], opening[2])
-            self._keep(3 * a + q, u, True)
+            self._remember(3 * a + q, u, True)
             if ti.static(self.activity.laws[SOFTENING]):
                 if not self.activity.has_begun(b, SOFTENING):
                     law = self.tables.tension.traction(stiffness[0], u, opening[0])
@@ -106,7 +106,7 @@ class Audit:
                     straight = stiffness[1] * sliding
                     other = law[0] != straight[0] or law[1] != straight[1] or spent != 0.0
                     self._book(SLIP, other)
-            self._keep(3 * a + q, u, False)
+            self._remember(3 * a + q, u, False)
 
     @ti.func
     def _asleep(self, b):
@@ -120,13 +120,13 @@ class Audit:
         self._book(_ASLEEP, step * self.advance.linear_force(b).norm() > allowed)
 
     @ti.func
-    def _book(self, kind: ti.template(), missed):
+    def _book(self, kind: ti.template(), is_miss):
         ti.atomic_add(self.audited[kind], 1)
-        if missed:
-            ti.atomic_add(self.missed[kind], 1)
+        if is_miss:
+            ti.atomic_add(self.misses[kind], 1)
 
     @ti.func
-    def _keep(self, place, u, aside: ti.template()):
+    def _remember(self, place, u, aside: ti.template()):
         """Put the memory of the laws of a unit, and of its bond, aside, or bring it back."""
         for law in ti.static(range(2)):
             for field, other, units in ti.static(self.memory[law]):

@@ -90,7 +90,7 @@ class Step:
 
     def _rested(self):
         """Phases that find the momentum at which bodies wake others, where some may sleep."""
-        if not self.schedule.sleeps:
+        if self.state.sleeping is None:
             return ()
         chunks = Chunks(self.state.sleeping, self.schedule)
         return (chunks, chunks.add), (Once(), chunks.end)

@@ -251,7 +251,7 @@ class Schedule:
             for a in range(self.store.near_count[None]):
                 for side in ti.static(range(2)):
                     pair = self.store.body[self.store.near_slot[a]]
-                    self.state.sleeping.wake(pair[side], self.state)
+                    self.state.sleeping.awaken(pair[side], self.state)
             self.woken.admit(False)
         self._list_pairs()
         if ti.static(not self.uniform):

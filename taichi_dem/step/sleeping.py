@@ -111,10 +111,10 @@ class Sleeping:
                     b = self.tables.face_bond[4 * i + f]
                     if b >= 0:
                         if state.broken_tick[b] < 0:
-                            self.wake(self.tables.neighbour[4 * i + f], state)
+                            self.awaken(self.tables.neighbour[4 * i + f], state)
 
     @ti.func
-    def wake(self, j, state):
+    def awaken(self, j, state):
         """Wake body j now, if it sleeps; it is listed at the end of this substep."""
         if ti.atomic_max(self.awake[j], AWAKE) == ASLEEP:
             self.since[j] = state.tick[None]
@@ -215,8 +215,9 @@ class WokenLists:
                     if key >= 0 and self.schedule.bonds.key[b] < 0:
                         self.schedule.bonds.insert(b, key)
                         self.sleeping.left_out[b] = self.left_out(b, moved)
-        woken = self.sleeping.woken_count[None]
-        self.sleeping.unsorted[None] = self.sleeping.unsorted[None] + woken
+        self.sleeping.unsorted[None] = (
+            self.sleeping.unsorted[None] + self.sleeping.woken_count[None]
+        )
         self.sleeping.woken_count[None] = 0
 
     @ti.func

@@ -37,7 +37,7 @@ def rate(monkeypatch, compiled_anew):
 
 def missed(simulation):
     """Misses by kind."""
-    return simulation.step.audit.missed.to_numpy().tolist()
+    return simulation.step.audit.misses.to_numpy().tolist()
 
 
 def same_bits(first, second):

@@ -40,7 +40,7 @@ def found(simulation):
     """All that a run says of bodies, bonds, laws, sleep and audit, by name."""
     state, audit = simulation.state, simulation.step.audit
     fields = dict(state.fields())
-    parts = ((state.activity, "since evaluated touched"), (audit, "audited missed"))
+    parts = ((state.activity, "since evaluated touched"), (audit, "audited misses"))
     parts += ((state.sleeping, "awake since stride left_out bound2 mean"),)
     for part, names in parts:
         fields.update({f"{part!r} {name}": getattr(part, name) for name in names.split()})

@@ -107,4 +107,4 @@ def test_less_is_left_out_than_was_allowed(name):
 def test_the_audit_finds_nothing_where_nothing_is_missed(name):
     for options in ({}, {"sleep": 0.0}):
         audit = run(name, **options).simulation.step.audit
-        assert audit.missed.to_numpy().tolist() == [0, 0, 0]
+        assert audit.misses.to_numpy().tolist() == [0, 0, 0]

@@ -1,0 +1,96 @@
+"""How far does a blow reach, and need the rest be computed?
+
+A pile of 100,000 tetrahedra is struck on its head. With effects="auto" a body sleeps until the
+momentum of a neighbour exceeds a share of the mean, and the bonds beyond are not evaluated. Expect
+the zone that is awake to grow a little faster than the wave runs, as dashpots spread momentum
+ahead of it; steps many times cheaper, the more so the longer the pile; and the same displacement to
+some 1e-8 where the bound is 1e-6. In the paper's block of 2 m nothing sleeps for long.
+
+    python experiments/demo_sleeping.py                  # a quarter of an hour, most of it without
+    python experiments/demo_sleeping.py --cells 60       # a pile of 23,000: three minutes
+    python experiments/demo_sleeping.py --sleep 1e-3     # a looser bound
+
+Writes sleeping.png, sleeping.csv and summary.json to results/demo_sleeping/.
+"""
+
+import sys
+from functools import partial
+
+import numpy as np
+
+import taichi_dem as dem
+from _sleeping import draw, write
+from taichi_dem.kit import study
+from taichi_dem.mesh.shapes import bar
+
+NAME = "demo_sleeping"
+SETTINGS = {
+    "cells": (260, 40, study.whole(10, 2000), "boxes along the pile, 0.1 m each, 260"),
+    "until": (5e-4, 1e-4, study.number(0, 1), "simulated time [s], 5e-4"),
+    "sleep": (1e-6, 1e-6, study.number(0, 0.01), "bound of the momentum that wakes, 1e-6"),
+    "across": (8, 2),
+}
+options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
+#: Step [s], edge of a box [m], and looks at the pile.
+STEP, EDGE, LOOKS = 4e-7, 0.1, 20
+
+
+def pile(cells, across):
+    """A square pile along x, ``across`` boxes wide, cut into six tetrahedra a box."""
+    return bar(EDGE * cells, EDGE * across, (cells, across, across))
+
+
+def struck(mesh, sleep, until):
+    """Run a pile that is struck at its left end; returns rows over time and the simulation."""
+    blow = dem.effects.GasPressure("left", peak=3e6, rise=1e-4, decay_ratio=1.0)
+    scene = dem.Scene(mesh, dem.CONCRETE, "auto", loads=[blow], sleep=sleep)
+    simulation, rows = dem.Simulation(scene, dem.ImplicitDashpots(STEP)), []
+    simulation.start()
+    for k in range(1, LOOKS + 1):
+        simulation.advance_to(round(until / STEP * k / LOOKS))
+        rows.append(row_of(simulation))
+    return rows, simulation
+
+
+def row_of(simulation):
+    """Time, place of the wave's front and of the last body awake [m], share awake, CPU so far."""
+    motion, awake = simulation.motion(), simulation.acting_since()["awake"]
+    place, speed = simulation.model.centre[:, 0], np.linalg.norm(motion["velocity"], axis=1)
+    return {
+        "time_s": simulation.time_s,
+        "front_m": place[speed > 0.01 * speed.max()].max(),
+        "awake_m": place[np.isfinite(awake)].max(),
+        "awake_percent": 100.0 * np.isfinite(awake).mean(),
+        "cpu_s": simulation.cpu_seconds(),
+    }
+
+
+def displaced(simulation):
+    """Displacement of all bodies [m]."""
+    return simulation.motion()["position"] - simulation.model.centre
+
+
+def run(options):
+    """Run with sleep and without, compare, draw, print."""
+    folder, mesh = study.begin(options), pile(options.cells, options.across)
+    slept, first = struck(mesh, options.sleep, options.until)
+    certificate, moved = first.report().certificate, displaced(first)
+    compiling = first.compile_seconds
+    whole, second = struck(mesh, 0.0, options.until)
+    full = displaced(second)
+    figures = {
+        "tetrahedra": (mesh.body_count, "1"),
+        "speedup_by_sleep": (whole[-1]["cpu_s"] / slept[-1]["cpu_s"], "1"),
+        "error_by_sleep_percent": (100.0 * np.abs(moved - full).max() / np.abs(full).max(), "%"),
+        "asleep_percent": (100.0 * certificate.asleep, "%"),
+        "left_out_impulse": (certificate.impulse, "1"),
+        "audit_misses": (sum(audit.misses for audit in certificate.audits), "1"),
+    }
+    print(f"\n{certificate}\n")
+    write(folder, slept, whole)
+    draw(folder / "sleeping.png", slept, whole, EDGE * options.cells)
+    study.finish(options, NAME, figures, compiling + second.compile_seconds, see="sleeping.png")
+
+
+if __name__ == "__main__":
+    sys.exit(study.main(run, options_parser()))
