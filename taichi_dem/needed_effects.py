@@ -91,7 +91,7 @@ def _difference(result, names):
     effects = result.scene.effects
     kept = ChosenEffects(_without(effects, names), effects.word)
     try:
-        scene = replace(result.scene, effects=kept)
+        scene = replace(result.scene, effects=kept, loads=())
         simulation = Simulation(scene, result.method, result.report.driver.split("+")[0])
         if result.start is not None:
             simulation.state.set_motion(**result.start)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Optional
 
 from taichi_dem.effects.base import MANY, Effect
-from taichi_dem.effects.chosen import AUTO, ChosenEffects, chosen_effects
+from taichi_dem.effects.chosen import AUTO, LISTED, ChosenEffects, chosen_effects
 from taichi_dem.effects.roles import check_effect
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
@@ -44,8 +44,8 @@ class Scene:
 
     def __post_init__(self):
         _check_body(self)
+        object.__setattr__(self, "loads", _listed("loads", self.loads))
         object.__setattr__(self, "effects", _effects_of(self))
-        object.__setattr__(self, "loads", ())
         _check_types(self)
         object.__setattr__(self, "sleep", _sleep_of(self))
         _check_roles(self.effects)
@@ -87,18 +87,20 @@ def kind_of(scene: Scene) -> Hashable:
 
 
 def _effects_of(scene):
-    """Effects as a ``ChosenEffects``, from a list or a word."""
-    given = _listed("loads", scene.loads)
+    """Effects as a ``ChosenEffects``, from a list, a word, or those of another scene."""
+    given = scene.loads
     if isinstance(scene.effects, str):
         return chosen_effects(scene.effects, scene.mesh, scene.material, given)
     word = getattr(scene.effects, "word", None)
     effects = _listed("effects", scene.effects)
-    if given and word is None:
+    if given and word in (None, LISTED):
         raise InputError(
             "loads must be left out where effects is a list, which holds them, "
             f"got {shown(scene.loads)}"
         )
-    return ChosenEffects((*effects, *given), *([word] if word else []))
+    # A scene that was made from a word hands both on, as dataclasses.replace does.
+    more = [load for load in given if not any(load is effect for effect in effects)]
+    return ChosenEffects((*effects, *more), *([word] if word else []))
 
 
 def _listed(name, effects):

@@ -205,12 +205,18 @@ _DOES = {
 
 def check_activation(effect: Any) -> None:
     """Raise InputError for a law that has no rule for effects="auto"; loads and supports act."""
+    if effect.role in ("tension", "shear") and getattr(effect, "is_silent", False):
+        raise InputError(
+            "effects 'auto' must have laws of bonds that act, as it looks for no limit beside "
+            f"theirs, got a silent {type(effect).name}: list the effects, or take 'all'"
+        )
     rules = ("activation", "begins") if effect.role in ("tension", "shear") else ("activation",)
     order = [kind.__name__ for kind in type(effect).__mro__]
     for rule in rules if effect.role in _DOES else ():
         said = _first(type(effect), rule)
         changed = min(_first(type(effect), member) for member in _DOES[effect.role])
-        if not getattr(effect, rule, None) or said > changed:
+        rightly = callable if rule == "begins" else lambda words: isinstance(words, str) and words
+        if not rightly(getattr(effect, rule, None)) or said > changed:
             what = "the words activation" if rule == "activation" else "a function begins"
             raise InputError(
                 f"effects 'auto' must have laws that say when they begin to act: {order[0]} has no "

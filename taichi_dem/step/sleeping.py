@@ -91,8 +91,10 @@ class Sleeping:
         if self.awake[i] == STIRRED:
             for f in range(4):
                 j = self.tables.neighbour[4 * i + f]
-                if j >= 0 and ti.atomic_max(self.awake[j], AWAKE) == ASLEEP:
-                    self.since[j] = 0
+                # Not in one condition: "and" evaluates both sides.
+                if j >= 0:
+                    if ti.atomic_max(self.awake[j], AWAKE) == ASLEEP:
+                        self.since[j] = 0
 
     @ti.func
     def both_awake(self, i, j):

@@ -73,9 +73,8 @@ def test_twenty_scenes_without_fault_have_no_miss_and_the_same_bits(rate):
         assert same_bits(before[name], made) == [], name
 
 
-@pytest.mark.parametrize(
-    "method", ["controlled", *(pytest.param(m, marks=SLOW) for m in ("drifted", "implicit"))]
-)
+@SLOW
+@pytest.mark.parametrize("method", ["controlled", "drifted", "implicit"])
 def test_other_methods_have_no_miss(rate, method):
     """Also where bonds apply their impulses ahead, and bodies wait for theirs."""
     names = ("far_end 0", "far_end_slips 2", "hit 0", "fragment 0", "one_body 0", "strained 0")
@@ -158,6 +157,7 @@ def loose_bound(self):
     self.bound2[None] = bound * bound
 
 
+@SLOW
 def test_sleep_that_is_too_deep_is_found(rate, monkeypatch):
     monkeypatch.setattr(Sleeping, "renew_bound", loose_bound)
     rate(ALL)
@@ -197,6 +197,7 @@ class CountedSoftening(Softening):
         return traction / (1.0 + 1e-3 * self.calls[u // 3])
 
 
+@SLOW
 def test_memory_of_bonds_survives_the_audit(rate):
     """Of a law of the user's that keeps an entry for each bond, beside those for units."""
     laws, found = (CountedSoftening,), []

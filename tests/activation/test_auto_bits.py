@@ -31,7 +31,7 @@ from tests.scenes import ROOT
 
 SLOW = pytest.mark.slow
 KINDS = {"uniform": METHOD, **METHODS}
-CASES = ["uniform", "controlled", pytest.param("implicit", marks=SLOW)]
+CASES = ["uniform", *(pytest.param(name, marks=SLOW) for name in ("controlled", "implicit"))]
 #: Substeps in which a run goes on to where no largest step ends.
 ODD = 5
 

@@ -1,7 +1,5 @@
 """The same with all kinds of methods: several or controlled steps, limited or solved dashpots."""
 
-import itertools
-
 import numpy as np
 import pytest
 
@@ -22,7 +20,12 @@ METHODS = {
 }
 #: Scenes in which the bond that needs a law is clearly ahead of the others.
 NAMED = ("far_end 0", "far_end_slips 2", "thrown 0", "hit 0", "flight 0", "fragment 0", "aside 0")
-CASES = list(itertools.product(METHODS, NAMED))
+SLOW = pytest.mark.slow
+#: One is run by every change, as each compiles two engines.
+MARKED = [
+    "controlled",
+    *(pytest.param(name, marks=SLOW) for name in METHODS if name != "controlled"),
+]
 
 
 def runs(method, name):
@@ -35,7 +38,8 @@ def runs(method, name):
     )
 
 
-@pytest.mark.parametrize(("method", "name"), CASES)
+@pytest.mark.parametrize("name", NAMED)
+@pytest.mark.parametrize("method", MARKED)
 def test_without_sleep_all_bits_are_those_of_all_effects(method, name):
     every, auto, _ = runs(method, name)
     assert [key for key in BITS if not np.array_equal(auto.fields[key], every.fields[key])] == []
@@ -44,7 +48,8 @@ def test_without_sleep_all_bits_are_those_of_all_effects(method, name):
     assert auto.report.energy_balance == every.report.energy_balance
 
 
-@pytest.mark.parametrize(("method", "name"), CASES)
+@pytest.mark.parametrize("name", NAMED)
+@pytest.mark.parametrize("method", MARKED)
 def test_sleep_finds_what_acts(method, name):
     every, _, auto = runs(method, name)
     apart = np.abs(auto.fields["position"] - every.fields["position"]).max()
@@ -53,7 +58,8 @@ def test_sleep_finds_what_acts(method, name):
     assert np.array_equal(auto.fields["broken_tick"] >= 0, every.fields["broken_tick"] >= 0)
 
 
-@pytest.mark.parametrize(("method", "name"), CASES)
+@pytest.mark.parametrize("name", NAMED)
+@pytest.mark.parametrize("method", MARKED)
 def test_certificates_hold(method, name):
     for made in runs(method, name)[1:]:
         certificate = made.report.certificate
@@ -61,7 +67,7 @@ def test_certificates_hold(method, name):
         assert made.report.linear_momentum_error <= 1e-12
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", MARKED)
 def test_where_it_is_not_needed_it_never_acts(method):
     for name in ("far_end 0", "far_end_slips 2", "flight 0"):
         twin = run(name, needed=False, method=METHODS[method])

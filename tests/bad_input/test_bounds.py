@@ -12,6 +12,8 @@ from taichi_dem import CONCRETE, Multirate, Scene, Simulation, Uniform, effects,
 from taichi_dem.mesh.shapes import bar, single
 from taichi_dem.output.record import Recorder
 from taichi_dem.timeline import MACRO_TICKS
+from tests.activation.late_scenes import late_scene, scene_of
+from tests.activation.late_scenes import simulation as started
 from tests.bar_blast import METHODS
 from tests.scenes import paper_effects
 
@@ -83,6 +85,25 @@ def test_a_body_without_bonds_stays_within_its_fields():
     simulation = Simulation(scene, CONTROLLED)
     simulation.advance_to(50)
     assert np.isfinite(simulation.state.position.to_numpy()).all()
+
+
+ON_DEMAND = {
+    "parallel": ("strained 0", CONTROLLED, "parallel", 50),
+    "drifted": ("fragment 0", DRIFTED, "resident", 200),
+    "implicit": ("strained 0", METHODS["implicit"], "resident", 50),
+}
+
+
+@pytest.mark.parametrize("name", ON_DEMAND)
+def test_effects_on_demand_stay_within_their_fields(name):
+    """Bodies sleep and wake, laws begin, and one in 1024 bonds is audited."""
+    which, method, driver, steps = ON_DEMAND[name]
+    simulation = started(late_scene(which), scene_of(late_scene(which)), method, driver)
+    simulation.start()
+    before = (simulation.state.sleeping.awake.to_numpy() == 0).sum()
+    simulation.advance_to(steps)
+    assert simulation.report().certificate.law_evaluations > 0
+    assert (simulation.state.sleeping.awake.to_numpy() == 0).sum() < before
 
 
 FILLINGS = {
