@@ -21,8 +21,9 @@ from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.bodies import Bodies, vec2
 from ca_damper.spheres.contact_law import Contact, ContactLaw, pair_numbers, wall_numbers
 from ca_damper.spheres.effect_activity import EffectActivity
+from ca_damper.spheres.expected_contacts import SEARCHES
+from ca_damper.spheres.pair_forces import PairForces
 from ca_damper.spheres.rotation import NoRotation, Rotation
-from ca_damper.spheres.search import SEARCHES
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.effect_usage import EffectUse
 
@@ -61,14 +62,15 @@ class DeviceSpheres:
         self.bodies = Bodies(table, options.start is not None)
         self.law, self.rubs = ContactLaw(options.damping), options.rubs
         self.rotation = Rotation() if options.rotation else NoRotation()
-        self.search = SEARCHES[options.search]()
+        self.search = SEARCHES[options.search](table, self.bodies)
+        shared = self.bodies, self.law, self.rotation
+        self.pair_forces = PairForces(table, *shared, self.rubs)
         self.crushed = table.field(ti.i32)
         self.effect_activity = EffectActivity(table)
         self.given = table.field(ti.f64)
         self.lost = table.field(ti.f64)
         self.held = table.field(ti.f64)
         self.rotation.bind(self.bodies)
-        self.search.bind(self.bodies)
         self.contact_of_pair = Contact.field(shape=())
         self.contact_of_wall = Contact.field(shape=())
 
@@ -88,6 +90,7 @@ class DeviceSpheres:
             self.rotation.reset(i)
         self.effect_activity.clear(s)
         self.search.forget(s)
+        self.search.clear(s)
         self.given[s], self.lost[s] = 0.0, -ti.math.inf
 
     @ti.func
@@ -100,36 +103,21 @@ class DeviceSpheres:
         if self.bodies.lead[s] != 0.5 * dt:
             self.bodies.advance_lead(s, 0.5 * dt)
             self.search.forget(s)
-        self.search.refresh(s)
-        contact = self.law.over_step(self.contact_of_pair[None], dt)
-        self.search.each_pair(s, contact, self._pair)
         floor = motion.x + 0.5 * dt * (motion.v + 0.25 * dt * motion.a)
+        low, high = self.bodies.reach_of_walls(floor)
+        self.search.refresh(s, low, high)
+        contact = self.law.over_step(self.contact_of_pair[None], dt)
+        count = 0
+        self.search.each_pair(s, contact, self.pair_forces.note, count)
+        self.pair_forces.add(s, contact, count)
+        self.search.audit(s, step, low, high, contact.reach)
         # Seen from spheres that fall freely, as all that is foreseen of them is their fall.
         speed = motion.v + 0.5 * dt * (motion.a + self.bodies.body[None].gravity)
-        force = self._advance(s, dt, floor, speed)
+        force = self._push_off_walls(s, dt, low, high, speed)
+        self._move(s, dt)
         self.given[s] = self.given[s] + dt * force * (motion.v + 0.5 * dt * motion.a)
         self.bodies.floor[s] = motion.x + dt * (motion.v + 0.5 * dt * motion.a)
         return Action(-dt * force, 0.0)
-
-    @ti.func
-    def _pair(self, i, j, contact):
-        """Forces of two spheres on each other, if they touch."""
-        branch = self.bodies.position[j] - self.bodies.position[i]
-        square = branch.norm_sqr()
-        if square < contact.reach * contact.reach:
-            distance = ti.sqrt(square)
-            normal = branch * (1.0 / distance)
-            relative = self.bodies.velocity[i] - self.bodies.velocity[j]
-            push = self.law.normal(contact, contact.reach - distance, relative.dot(normal))
-            force = -push * normal
-            if ti.static(self.rubs):
-                lever = 0.5 * distance
-                tangent, _, drag = self._rub(i, j, contact, push, normal, relative, lever)
-                force += drag * tangent
-                self.rotation.twist(i, lever * drag)
-                self.rotation.twist(j, lever * drag)
-            self.bodies.push(i, force)
-            self.bodies.push(j, -force)
 
     @ti.func
     def _rub(self, i, j, contact, push, normal, relative, lever):
@@ -139,25 +127,29 @@ class DeviceSpheres:
         return tangent, slip, self.law.friction(contact, push, slip)
 
     @ti.func
-    def _advance(self, s, dt, floor, speed):
-        """Walls and motion; returns the container's force on the spheres along x [N]."""
+    def _push_off_walls(self, s, dt, low, high, speed):
+        """Add the forces of the walls; returns the container's force on the spheres along x [N]."""
         contact = self.law.over_step(self.contact_of_wall[None], dt)
-        body = self.bodies.body[None]
-        high = vec2(0.5 * body.width, floor + body.height) - body.radius
-        low = vec2(-0.5 * body.width, floor) + body.radius
-        total, least, most = 0.0, vec2(ti.math.inf), vec2(-ti.math.inf)
-        for i in range(self.bodies.first(s), self.bodies.last(s)):
+        total = 0.0
+        for k in range(self.search.wall_count(s)):
+            i = self.search.wall_sphere(s, k)
             position = self.bodies.position[i]
-            force = vec2(0.0)
             if (position < low).any() or (position > high).any():
                 force = self._walls(i, contact, position - low, high - position, speed)
-            total += force[1]
-            velocity = self.bodies.kick(i, force, dt)
+                self.bodies.push(i, force)
+                total += force[1]
+        return total
+
+    @ti.func
+    def _move(self, s, dt):
+        """Take the spheres over the step."""
+        body = self.bodies.body[None]
+        least, most = vec2(ti.math.inf), vec2(-ti.math.inf)
+        for i in range(self.bodies.first(s), self.bodies.last(s)):
+            velocity = self.bodies.kick(i, body, dt)
             self.rotation.kick(i, dt)
             least, most = ti.min(least, velocity), ti.max(most, velocity)
-        if ti.static(self.search.tracks_motion):
-            self.search.moved(s, dt * (most - least).norm())
-        return total
+        self.search.note_motion(s, dt * least, dt * most)
 
     @ti.func
     def _walls(self, i, contact, above, below, speed):
@@ -228,7 +220,8 @@ class DeviceSpheres:
         body, dt = self.bodies.body[None], self.table.dt[s]
         self.crushed[s], self.held[s] = self.search.crowded(s), 0.0
         contact = self.law.over_step(self.contact_of_pair[None], dt)
-        self.search.each_pair(s, contact, self._note_pair)
+        seen = 0
+        self.search.each_listed_pair(s, contact, self._note_pair, seen)
         code = ENERGY_GAINED if self._gains(s) else FINE
         if self.crushed[s] > 0:
             code = OVERLAP
@@ -262,9 +255,8 @@ class DeviceSpheres:
         return gain > MOST_GAIN * energy + _WALL_IMPULSE_SHARE * highest
 
     @ti.func
-    def _note_pair(self, i, j, contact):
+    def _note_pair(self, s, i, j, contact, seen: ti.template()):
         """Note the energy of a pair, and whether it touches or overlaps by half its reach."""
-        s = i // self.bodies.stride
         self.held[s] = self.held[s] + self._pair_energy(s, i, j)
         branch = self.bodies.position[j] - self.bodies.position[i]
         distance = branch.norm()

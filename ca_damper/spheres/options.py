@@ -10,7 +10,8 @@ from ca_damper.filling import LEAST_PLACES, Structure
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.contact_law import POWERS, contact_duration, pair_numbers
 from ca_damper.spheres.dynamics import DIVERGENCES, DeviceSpheres
-from ca_damper.spheres.search import SEARCHES, listed_pairs
+from ca_damper.spheres.expected_contacts import SEARCHES
+from ca_damper.spheres.search import listed_pairs
 from taichi_dem.kit.engine_pool import power_of_two
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import (

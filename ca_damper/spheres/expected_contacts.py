@@ -1,0 +1,208 @@
+"""Expected contacts: pairs and spheres at walls that may touch before a lower bound of the time.
+
+All others need no test until the spheres have come nearer to each other, or to a wall, by a
+margin. How much nearer is summed from what moved in each step: the spread of the velocities of the
+spheres, and the floor. So it holds whatever moves them: gravity, contacts, a given motion.
+
+An audit makes all tests of some spheres in some steps, chosen by a counter so that it is one in
+about a thousand of all tests, and counts the contacts that the lists lack. It changes nothing else.
+"""
+
+from typing import Any
+
+import taichi as ti
+
+from ca_damper.random_numbers import bits, stream
+from ca_damper.scenes.scene_fields import SceneFields
+from ca_damper.spheres.bodies import Bodies, vec2
+from ca_damper.spheres.search import AllPairs, CellList
+
+#: Steps that the lists are to serve at the present velocities.
+_STEPS = 32.0
+#: Narrowest margin as a share of the widest, the skin of the search.
+_NARROWEST = 1e-3
+#: What rounding may add up to, as a share of the radius: that of 1e8 steps and more.
+_ROUNDING = 1e-6
+# Purpose of the random numbers that choose what is audited.
+_AUDIT = 7
+# Chance of a step to have a sphere audited, for each sphere of the scene and in units of 2^-32: a
+# test is audited in one step of 1024. Beyond so many spheres the chance grows no further, as all
+# tests of one cost as much as a share of the step that grows with their number.
+_CHANCE, _MOST_CHOSEN = 2**22, 128
+
+
+@ti.data_oriented
+class ExpectedContacts:
+    """Lists of the pairs and of the spheres at walls that are tested in every step.
+
+    pair, pair_count; sphere, sphere_count: the lists; those of scene s begin at s times their
+    stride. margin: how far apart is listed [m]. nearer: by how much two spheres, or a sphere and a
+    wall, may have come nearer since [m]. least, most: bounds of the way of the spheres in the last
+    step [m]. floor: where the floor was then [m]. looseness: factor of the margin, 1 but in tests
+    of the audit. skipped, audited, misses: tests not needed, made all the same, and contacts that
+    these found.
+    """
+
+    skips = True
+
+    def __init__(self, table: SceneFields, bodies: Bodies):
+        self.table, self.bodies, self.cells = table, bodies, CellList(table, bodies)
+        self.pair_stride, self.stride = table.length("pairs"), table.length("spheres")
+        self.pair = table.vector(2, ti.i32, "pairs", flat=True)
+        self.sphere = table.field(ti.i32, "spheres", flat=True)
+        for name in ("pair_count", "sphere_count"):
+            setattr(self, name, table.field(ti.i32))
+        for name in ("margin", "nearer", "floor"):
+            setattr(self, name, table.field(ti.f64))
+        for name in ("least", "most"):
+            setattr(self, name, table.vector(2, ti.f64))
+        for name in ("skipped", "audited", "misses"):
+            setattr(self, name, table.field(ti.i64))
+        self.looseness = ti.field(ti.f64, shape=())
+
+    def load(self, options: Any) -> None:
+        """Write the numbers of the search to the device."""
+        self.cells.load(options)
+        self.loosen(1.0)
+
+    @ti.kernel
+    def loosen(self, factor: ti.f64):
+        """Use the lists for longer than they hold, by a factor: for tests of the audit."""
+        self.looseness[None] = factor
+
+    @ti.func
+    def clear(self, s):
+        """Nothing has been skipped yet."""
+        for field in ti.static((self.skipped, self.audited, self.misses)):
+            field[s] = ti.cast(0, ti.i64)
+
+    @ti.func
+    def forget(self, s):
+        """Empty the lists of scene s; the next refresh renews them."""
+        self.cells.forget(s)
+        self.nearer[s], self.margin[s] = 0.0, 0.0
+        self.least[s], self.most[s] = vec2(0.0), vec2(0.0)
+
+    @ti.func
+    def note_motion(self, s, least, most):
+        """Note between which bounds the spheres have moved in a step [m]."""
+        self.least[s], self.most[s] = least, most
+        self.cells.moved(s, (most - least).norm())
+
+    @ti.func
+    def refresh(self, s, low, high):
+        """Renew the lists if they may lack a contact; low, high: where spheres touch walls [m]."""
+        drift = vec2(0.0, low[1] - self.floor[s])
+        least, most = self.least[s] - drift, self.most[s] - drift
+        way = ti.max((most - least).norm(), ti.max(-least, most).max())
+        nearer = self.nearer[s] + way
+        if self.cells.refresh(s) or not (nearer < self.margin[s]):
+            self._renew(s, low, high, way)
+            nearer = 0.0
+        self.nearer[s], self.floor[s] = nearer, low[1]
+
+    @ti.func
+    def _renew(self, s, low, high, way):
+        """List what may touch before spheres come nearer by a margin; way: of a step [m]."""
+        skin, radius = self.cells.grid[None].skin, self.bodies.body[None].radius
+        margin = ti.max(_NARROWEST * skin, ti.min(_STEPS * way, skin))
+        self.margin[s] = self.looseness[None] * margin
+        reach = 2.0 * radius + margin + _ROUNDING * radius
+        wall = margin + _ROUNDING * radius
+        count = 0
+        self.cells.each_pair(s, reach, self._list_pair, count)
+        self.pair_count[s] = count
+        count = 0
+        for i in range(self.bodies.first(s), self.bodies.last(s)):
+            place = self.bodies.position[i]
+            if (place < low + wall).any() or (place > high - wall).any():
+                self.sphere[s * self.stride + count] = i
+                count += 1
+        self.sphere_count[s] = count
+
+    @ti.func
+    def crowded(self, s):
+        """Whether more spheres lay near each other than spheres that do not interpenetrate can."""
+        return self.cells.crowded(s)
+
+    @ti.func
+    def _list_pair(self, s, i, j, reach, count: ti.template()):
+        branch = self.bodies.position[j] - self.bodies.position[i]
+        if branch.norm_sqr() < reach * reach:
+            self.pair[s * self.pair_stride + count] = ti.Vector([i, j])
+            count += 1
+
+    @ti.func
+    def each_pair(self, s, contact, visit: ti.template(), count: ti.template()):
+        """Call visit(s, i, j, contact, count) for every pair that is expected to touch."""
+        for k in range(s * self.pair_stride, s * self.pair_stride + self.pair_count[s]):
+            pair = self.pair[k]
+            visit(s, pair[0], pair[1], contact, count)
+
+    @ti.func
+    def each_listed_pair(self, s, contact, visit: ti.template(), count: ti.template()):
+        """The same for every pair that was near at the last search."""
+        self.cells.each_pair(s, contact, visit, count)
+
+    @ti.func
+    def audit(self, s, step, low, high, reach):
+        """Count the tests that a step skips; of a sphere that a counter chooses, make them all.
+
+        reach: distance at which two spheres touch [m].
+        """
+        count = self.table.particles[s]
+        pairs = ti.cast(count, ti.i64) * (count - 1) // 2
+        self.skipped[s] = self.skipped[s] + pairs + count - self.pair_count[s] - self.wall_count(s)
+        shared = stream(self.table.seed[s], step)
+        most = ti.cast(ti.min(count, _MOST_CHOSEN), ti.u32)
+        if bits(shared, 0, _AUDIT) < most * ti.u32(_CHANCE):
+            i = self.bodies.first(s) + ti.cast(
+                bits(shared, 1, _AUDIT) % ti.cast(count, ti.u32), ti.i32
+            )
+            self._audit(s, i, low, high, reach * reach)
+
+    @ti.func
+    def _audit(self, s, i, low, high, square):
+        """Make all tests of sphere i; a contact that no list holds is a miss."""
+        tests, contacts = self.table.particles[s], self._is_at_wall(i, low, high)
+        for j in range(self.bodies.first(s), self.bodies.last(s)):
+            if j != i:
+                contacts += self._touch(i, j, square)
+        for k in range(s * self.pair_stride, s * self.pair_stride + self.pair_count[s]):
+            pair = self.pair[k]
+            if pair[0] == i or pair[1] == i:
+                tests -= 1
+                contacts -= self._touch(pair[0], pair[1], square)
+        for k in range(self.wall_count(s)):
+            if self.wall_sphere(s, k) == i:
+                tests -= 1
+                contacts -= self._is_at_wall(i, low, high)
+        self.audited[s] = self.audited[s] + tests
+        self.misses[s] = self.misses[s] + contacts
+
+    @ti.func
+    def _touch(self, i, j, square):
+        """1 for two spheres that touch, else 0; square: of the distance at which they do [m^2]."""
+        return ti.cast(
+            (self.bodies.position[j] - self.bodies.position[i]).norm_sqr() < square, ti.i32
+        )
+
+    @ti.func
+    def _is_at_wall(self, i, low, high):
+        """1 for a sphere that touches a wall, else 0."""
+        place = self.bodies.position[i]
+        return ti.cast((place < low).any() or (place > high).any(), ti.i32)
+
+    @ti.func
+    def wall_count(self, s):
+        """Number of the spheres that are expected to touch a wall."""
+        return self.sphere_count[s]
+
+    @ti.func
+    def wall_sphere(self, s, k):
+        """The k-th of them."""
+        return self.sphere[s * self.stride + k]
+
+
+#: What is tested for contact, by the name of the search.
+SEARCHES = {"cells": ExpectedContacts, "all_pairs": AllPairs}
