@@ -63,7 +63,7 @@ class DeviceSpheres:
         self.law, self.rubs = ContactLaw(options.damping), options.rubs
         self.rotation = Rotation() if options.rotation else NoRotation()
         self.search = SEARCHES[options.search](table, self.bodies)
-        shared = self.bodies, self.law, self.rotation
+        shared = self.bodies, self.search.pair, self.law, self.rotation
         self.pair_forces = PairForces(table, *shared, self.rubs)
         self.crushed = table.field(ti.i32)
         self.effect_activity = EffectActivity(table)
@@ -107,9 +107,8 @@ class DeviceSpheres:
         low, high = self.bodies.reach_of_walls(floor)
         self.search.refresh(s, low, high)
         contact = self.law.over_step(self.contact_of_pair[None], dt)
-        count = 0
-        self.search.each_pair(s, contact, self.pair_forces.note, count)
-        self.pair_forces.add(s, contact, count)
+        which, count = self.search.find(s, contact.reach)
+        self.pair_forces.add(s, contact, which, count)
         self.search.audit(s, step, low, high, contact.reach)
         # Seen from spheres that fall freely, as all that is foreseen of them is their fall.
         speed = motion.v + 0.5 * dt * (motion.a + self.bodies.body[None].gravity)

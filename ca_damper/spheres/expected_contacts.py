@@ -15,7 +15,9 @@ import taichi as ti
 from ca_damper.random_numbers import bits, stream
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.bodies import Bodies, vec2
-from ca_damper.spheres.search import AllPairs, CellList
+from ca_damper.spheres.search import EXPECTED, TOUCHING, AllPairs, CellList
+
+vec2i = ti.types.vector(2, ti.i32)
 
 #: Steps that the lists are to serve at the present velocities.
 _STEPS = 32.0
@@ -23,6 +25,8 @@ _STEPS = 32.0
 _NARROWEST = 1e-3
 #: What rounding may add up to, as a share of the radius: that of 1e8 steps and more.
 _ROUNDING = 1e-6
+# Pairs are not tested where more than two thirds of those listed touch.
+_NEARLY_ALL = 3
 # Purpose of the random numbers that choose what is audited.
 _AUDIT = 7
 # Chance of a step to have a sphere audited, for each sphere of the scene and in units of 2^-32: a
@@ -35,40 +39,39 @@ _CHANCE, _MOST_CHOSEN = 2**22, 128
 class ExpectedContacts:
     """Lists of the pairs and of the spheres at walls that are tested in every step.
 
-    pair, pair_count; sphere, sphere_count: the lists; those of scene s begin at s times their
-    stride. margin: how far apart is listed [m]. nearer: by how much two spheres, or a sphere and a
-    wall, may have come nearer since [m]. least, most: bounds of the way of the spheres in the last
-    step [m]. floor: where the floor was then [m]. looseness: factor of the margin, 1 but in tests
-    of the audit. skipped, audited, misses: tests not needed, made all the same, and contacts that
-    these found.
+    pair, pair_count; sphere, sphere_count: the lists; pair[s, EXPECTED] is that of a scene, and
+    pair[s, TOUCHING] has places for those of them that touch in a step. most_touch: whether nearly
+    all of them do, so that they are evaluated without a test. margin: how far apart two spheres,
+    and a sphere and a wall, are listed [m]. nearer: by how much they may have come nearer since
+    [m]. least, most: bounds of the way of the spheres in the last step [m]. floor: where the floor
+    was then [m]. tightness: share of the margin that is listed, 1 but in tests of the audit.
+    skipped, audited, misses: tests not needed, made all the same, and contacts that these found.
     """
 
     skips = True
 
     def __init__(self, table: SceneFields, bodies: Bodies):
         self.table, self.bodies, self.cells = table, bodies, CellList(table, bodies)
-        self.pair_stride, self.stride = table.length("pairs"), table.length("spheres")
-        self.pair = table.vector(2, ti.i32, "pairs", flat=True)
-        self.sphere = table.field(ti.i32, "spheres", flat=True)
-        for name in ("pair_count", "sphere_count"):
+        self.pair = table.vector(2, ti.i32, 2, "pairs")
+        self.sphere = table.field(ti.i32, "spheres")
+        for name in ("pair_count", "sphere_count", "most_touch"):
             setattr(self, name, table.field(ti.i32))
-        for name in ("margin", "nearer", "floor"):
-            setattr(self, name, table.field(ti.f64))
-        for name in ("least", "most"):
+        self.floor = table.field(ti.f64)
+        for name in ("margin", "nearer", "least", "most"):
             setattr(self, name, table.vector(2, ti.f64))
         for name in ("skipped", "audited", "misses"):
             setattr(self, name, table.field(ti.i64))
-        self.looseness = ti.field(ti.f64, shape=())
+        self.tightness = ti.field(ti.f64, shape=())
 
     def load(self, options: Any) -> None:
         """Write the numbers of the search to the device."""
         self.cells.load(options)
-        self.loosen(1.0)
+        self.tighten(1.0)
 
     @ti.kernel
-    def loosen(self, factor: ti.f64):
-        """Use the lists for longer than they hold, by a factor: for tests of the audit."""
-        self.looseness[None] = factor
+    def tighten(self, share: ti.f64):
+        """List a share of what has to be listed: a fault, for tests of the audit."""
+        self.tightness[None] = share
 
     @ti.func
     def clear(self, s):
@@ -80,7 +83,7 @@ class ExpectedContacts:
     def forget(self, s):
         """Empty the lists of scene s; the next refresh renews them."""
         self.cells.forget(s)
-        self.nearer[s], self.margin[s] = 0.0, 0.0
+        self.nearer[s], self.margin[s] = vec2(0.0), vec2(0.0)
         self.least[s], self.most[s] = vec2(0.0), vec2(0.0)
 
     @ti.func
@@ -93,30 +96,45 @@ class ExpectedContacts:
     def refresh(self, s, low, high):
         """Renew the lists if they may lack a contact; low, high: where spheres touch walls [m]."""
         drift = vec2(0.0, low[1] - self.floor[s])
-        least, most = self.least[s] - drift, self.most[s] - drift
-        way = ti.max((most - least).norm(), ti.max(-least, most).max())
-        nearer = self.nearer[s] + way
-        if self.cells.refresh(s) or not (nearer < self.margin[s]):
-            self._renew(s, low, high, way)
-            nearer = 0.0
+        least, most = self.least[s], self.most[s]
+        way = vec2((most - least).norm(), ti.max(drift - least, most - drift).max())
+        nearer, margin = self.nearer[s] + way, self.margin[s]
+        if self.cells.refresh(s) or not (nearer[0] < margin[0]):
+            margin[0], nearer[0] = self._margin(way[0]), 0.0
+            self._list_pairs(s, margin[0])
+        if not (nearer[1] < margin[1]):
+            margin[1], nearer[1] = self._margin(way[1]), 0.0
+            self._list_spheres(s, low + self._reach(margin[1]), high - self._reach(margin[1]))
+        self.margin[s] = margin
         self.nearer[s], self.floor[s] = nearer, low[1]
 
     @ti.func
-    def _renew(self, s, low, high, way):
-        """List what may touch before spheres come nearer by a margin; way: of a step [m]."""
-        skin, radius = self.cells.grid[None].skin, self.bodies.body[None].radius
-        margin = ti.max(_NARROWEST * skin, ti.min(_STEPS * way, skin))
-        self.margin[s] = self.looseness[None] * margin
-        reach = 2.0 * radius + margin + _ROUNDING * radius
-        wall = margin + _ROUNDING * radius
-        count = 0
-        self.cells.each_pair(s, reach, self._list_pair, count)
-        self.pair_count[s] = count
+    def _margin(self, way):
+        """How far apart to list [m], for a way in a step [m]."""
+        skin = self.cells.grid[None].skin
+        return ti.max(_NARROWEST * skin, ti.min(_STEPS * way, skin))
+
+    @ti.func
+    def _reach(self, margin):
+        """A margin with what rounding may add up to; the lists hold less in tests of the audit."""
+        return self.tightness[None] * margin + _ROUNDING * self.bodies.body[None].radius
+
+    @ti.func
+    def _list_pairs(self, s, margin):
+        """List pairs that may touch before they come nearer by a margin [m]."""
+        reach, count = 2.0 * self.bodies.body[None].radius, vec2i(0)
+        self.cells.each_pair(s, vec2(reach, reach + self._reach(margin)), self._list_pair, count)
+        self.pair_count[s] = count[0]
+        self.most_touch[s] = ti.cast(_NEARLY_ALL * count[1] > (_NEARLY_ALL - 1) * count[0], ti.i32)
+
+    @ti.func
+    def _list_spheres(self, s, low, high):
+        """List spheres beyond places near a wall [m]."""
         count = 0
         for i in range(self.bodies.first(s), self.bodies.last(s)):
             place = self.bodies.position[i]
-            if (place < low + wall).any() or (place > high - wall).any():
-                self.sphere[s * self.stride + count] = i
+            if (place < low).any() or (place > high).any():
+                self.sphere[s, count] = i
                 count += 1
         self.sphere_count[s] = count
 
@@ -127,21 +145,32 @@ class ExpectedContacts:
 
     @ti.func
     def _list_pair(self, s, i, j, reach, count: ti.template()):
-        branch = self.bodies.position[j] - self.bodies.position[i]
-        if branch.norm_sqr() < reach * reach:
-            self.pair[s * self.pair_stride + count] = ti.Vector([i, j])
-            count += 1
+        """List a pair nearer than reach[1]; count those, and those nearer than reach[0]."""
+        square = (self.bodies.position[j] - self.bodies.position[i]).norm_sqr()
+        if square < reach[1] * reach[1]:
+            self.pair[s, EXPECTED, count[0]] = ti.Vector([i, j])
+            count = count + vec2i(1, ti.cast(square < reach[0] * reach[0], ti.i32))
 
     @ti.func
-    def each_pair(self, s, contact, visit: ti.template(), count: ti.template()):
-        """Call visit(s, i, j, contact, count) for every pair that is expected to touch."""
-        for k in range(s * self.pair_stride, s * self.pair_stride + self.pair_count[s]):
-            pair = self.pair[k]
-            visit(s, pair[0], pair[1], contact, count)
+    def find(self, s, reach):
+        """Find the pairs that are to be evaluated: the list that they are in, and their number.
+
+        All that touch, at a distance below reach [m], are among them.
+        """
+        which, count = EXPECTED, self.pair_count[s]
+        if self.most_touch[s] == 0:
+            which, count = TOUCHING, 0
+            for k in range(self.pair_count[s]):
+                pair = self.pair[s, EXPECTED, k]
+                branch = self.bodies.position[pair[1]] - self.bodies.position[pair[0]]
+                if branch.norm_sqr() < reach * reach:
+                    self.pair[s, TOUCHING, count] = pair
+                    count += 1
+        return which, count
 
     @ti.func
     def each_listed_pair(self, s, contact, visit: ti.template(), count: ti.template()):
-        """The same for every pair that was near at the last search."""
+        """Call visit(s, i, j, contact, count) for every pair that was near at the last search."""
         self.cells.each_pair(s, contact, visit, count)
 
     @ti.func
@@ -167,12 +196,12 @@ class ExpectedContacts:
         tests, contacts = self.table.particles[s], self._is_at_wall(i, low, high)
         for j in range(self.bodies.first(s), self.bodies.last(s)):
             if j != i:
-                contacts += self._touch(i, j, square)
-        for k in range(s * self.pair_stride, s * self.pair_stride + self.pair_count[s]):
-            pair = self.pair[k]
+                contacts += self._touching(i, j, square)
+        for k in range(self.pair_count[s]):
+            pair = self.pair[s, EXPECTED, k]
             if pair[0] == i or pair[1] == i:
                 tests -= 1
-                contacts -= self._touch(pair[0], pair[1], square)
+                contacts -= self._touching(pair[0], pair[1], square)
         for k in range(self.wall_count(s)):
             if self.wall_sphere(s, k) == i:
                 tests -= 1
@@ -181,7 +210,7 @@ class ExpectedContacts:
         self.misses[s] = self.misses[s] + contacts
 
     @ti.func
-    def _touch(self, i, j, square):
+    def _touching(self, i, j, square):
         """1 for two spheres that touch, else 0; square: of the distance at which they do [m^2]."""
         return ti.cast(
             (self.bodies.position[j] - self.bodies.position[i]).norm_sqr() < square, ti.i32
@@ -201,7 +230,7 @@ class ExpectedContacts:
     @ti.func
     def wall_sphere(self, s, k):
         """The k-th of them."""
-        return self.sphere[s * self.stride + k]
+        return self.sphere[s, k]
 
 
 #: What is tested for contact, by the name of the search.

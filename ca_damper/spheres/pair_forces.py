@@ -21,41 +21,34 @@ LANES = 4
 class PairForces:
     """Contacts of two spheres in the present step, by scene.
 
-    touching: pairs that touch. force_x, force_y: of a vector of contacts, on their first spheres
-    [N]; torque: on both [N m]. rubs: whether there is friction.
+    pair: lists of pairs, of the search. force_x, force_y: of a vector of contacts, on their first
+    spheres [N]; torque: on both [N m]. rubs: whether there is friction.
     """
 
-    scratch_fields = ("touching", "force_x", "force_y", "torque")
+    scratch_fields = ("force_x", "force_y", "torque")
 
     def __init__(
-        self, table: SceneFields, bodies: Bodies, law: ContactLaw, rotation: Any, rubs: bool
+        self,
+        table: SceneFields,
+        bodies: Bodies,
+        pair: ti.Field,
+        law: ContactLaw,
+        rotation: Any,
+        rubs: bool,
     ):
         self.bodies, self.law, self.rotation, self.rubs = bodies, law, rotation, rubs
         self.turns = rubs and rotation.turns
-        self.places = table.length("pairs")
-        self.touching = ti.Vector.field(2, ti.i32, shape=(table.capacity, self.places))
-        for name in self.scratch_fields[1:]:
+        self.pair = pair
+        for name in self.scratch_fields:
             setattr(self, name, ti.Vector.field(LANES, ti.f64, shape=table.capacity))
 
     @ti.func
-    def note(self, s, i, j, contact, count: ti.template()):
-        """Note two spheres if they touch; count: of those noted in this step.
-
-        Where there is no more room, spheres lie in each other by far, and the scene diverges.
-        """
-        branch = self.bodies.position[j] - self.bodies.position[i]
-        if branch.norm_sqr() < contact.reach * contact.reach:
-            if count < self.places:
-                self.touching[s, count] = ti.Vector([i, j])
-                count += 1
-
-    @ti.func
-    def add(self, s, contact, count):
-        """Add the forces of the contacts that were noted."""
+    def add(self, s, contact, which, count):
+        """Add the forces of so many pairs of a list; those that do not touch add nothing."""
         for vector in range((count + LANES - 1) // LANES):
             first = LANES * vector
             pairs = [
-                self.touching[s, ti.min(first + k, count - 1)] for k in ti.static(range(LANES))
+                self.pair[s, which, ti.min(first + k, count - 1)] for k in ti.static(range(LANES))
             ]
             self._evaluate(s, contact, pairs)
             for lane in ti.static(range(LANES)):
@@ -77,7 +70,8 @@ class PairForces:
         """Forces of a vector of contacts; lanes beyond the last one repeat it."""
         bx, by = self._differences(self.bodies.position, pairs, 1, 0)
         rx, ry = self._differences(self.bodies.velocity, pairs, 0, 1)
-        distance = ti.sqrt(bx * bx + by * by)
+        square = bx * bx + by * by
+        touch, distance = square < contact.reach * contact.reach, ti.sqrt(square)
         share = 1.0 / distance
         nx, ny = bx * share, by * share
         push = self.law.normal(contact, contact.reach - distance, rx * nx + ry * ny)
@@ -89,8 +83,8 @@ class PairForces:
             drag = self.law.friction(contact, push, slip)
             fx, fy = fx - drag * ny, fy + drag * nx
             if ti.static(self.turns):
-                self.torque[s] = lever * drag
-        self.force_x[s], self.force_y[s] = fx, fy
+                self.torque[s] = ti.select(touch, lever * drag, 0.0)
+        self.force_x[s], self.force_y[s] = ti.select(touch, fx, 0.0), ti.select(touch, fy, 0.0)
 
     @ti.func
     def _differences(

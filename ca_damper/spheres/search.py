@@ -14,6 +14,9 @@ from ca_damper.spheres.bodies import Bodies, vec2
 # Pairs near each other per sphere. Discs of one size have three, at most five with the skin.
 _PAIRS_PER_SPHERE = 8
 
+#: Lists of pairs in ``pair``: that may touch, and that do in the present step.
+EXPECTED, TOUCHING = range(2)
+
 
 @ti.dataclass
 class Grid:
@@ -37,6 +40,8 @@ class AllPairs:
 
     def __init__(self, table: SceneFields, bodies: Bodies):
         self.table, self.bodies = table, bodies
+        self.places = table.length("pairs")
+        self.pair = table.vector(2, ti.i32, 2, "pairs")
 
     def load(self, options: Any) -> None:
         """Nothing to write."""
@@ -63,17 +68,29 @@ class AllPairs:
         return False
 
     @ti.func
-    def each_pair(self, s, contact, visit: ti.template(), count: ti.template()):
+    def find(self, s, reach):
+        """Find the pairs that touch: the list that they are in, and their number.
+
+        Where they are more than there is room for, spheres lie in each other by far.
+        """
+        count = 0
+        self.each_listed_pair(s, reach, self._find, count)
+        return TOUCHING, count
+
+    @ti.func
+    def _find(self, s, i, j, reach, count: ti.template()):
+        branch = self.bodies.position[j] - self.bodies.position[i]
+        if branch.norm_sqr() < reach * reach and count < self.places:
+            self.pair[s, TOUCHING, count] = ti.Vector([i, j])
+            count = count + 1
+
+    @ti.func
+    def each_listed_pair(self, s, contact, visit: ti.template(), count: ti.template()):
         """Call visit(s, i, j, contact, count) for every pair of scene s."""
         first, last = self.bodies.first(s), self.bodies.last(s)
         for i in range(first, last):
             for j in range(i + 1, last):
                 visit(s, i, j, contact, count)
-
-    @ti.func
-    def each_listed_pair(self, s, contact, visit: ti.template(), count: ti.template()):
-        """The same: all pairs are listed."""
-        self.each_pair(s, contact, visit, count)
 
     @ti.func
     def audit(self, s, step, low, high, reach):
