@@ -11,7 +11,7 @@ contacts and gravity, to round-off, and the impacts on the container are its exa
 """
 
 import math
-from typing import Any
+from typing import Any, Optional
 
 import numpy as np
 import taichi as ti
@@ -20,11 +20,13 @@ from ca_damper.filling import Action
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.bodies import Bodies, vec2
 from ca_damper.spheres.contact_law import Contact, ContactLaw, pair_numbers, wall_numbers
-from ca_damper.spheres.effect_activity import EffectActivity
+from ca_damper.spheres.effect_activity import FRICTION, PAIRS, WALLS, EffectActivity
 from ca_damper.spheres.expected_contacts import SEARCHES
+from ca_damper.spheres.friction_onset import FrictionOnset
 from ca_damper.spheres.pair_forces import PairForces
 from ca_damper.spheres.rotation import NoRotation, Rotation
 from taichi_dem.kit.allocation import values
+from taichi_dem.kit.audit import Audit
 from taichi_dem.kit.effect_usage import EffectUse
 
 # Codes of divergence; a speed is a runaway's when it crosses more than a radius in a step.
@@ -65,6 +67,7 @@ class DeviceSpheres:
         self.search = SEARCHES[options.search](table, self.bodies)
         shared = self.bodies, self.search.pair, self.law, self.rotation
         self.pair_forces = PairForces(table, *shared, self.rubs)
+        self.friction_onset = FrictionOnset(self.bodies, self.search, self.law, self.rotation)
         self.crushed = table.field(ti.i32)
         self.effect_activity = EffectActivity(table)
         self.given = table.field(ti.f64)
@@ -108,11 +111,18 @@ class DeviceSpheres:
         self.search.refresh(s, low, high)
         contact = self.law.over_step(self.contact_of_pair[None], dt)
         which, count = self.search.find(s, contact.reach)
+        self.effect_activity.note(s, PAIRS, step, count)
         self.pair_forces.add(s, contact, which, count)
         self.search.audit(s, step, low, high, contact.reach)
         # Seen from spheres that fall freely, as all that is foreseen of them is their fall.
         speed = motion.v + 0.5 * dt * (motion.a + self.bodies.body[None].gravity)
-        force = self._push_off_walls(s, dt, low, high, speed)
+        if ti.static(self.rubs):
+            if self.effect_activity.is_new(s, FRICTION):
+                of_wall = self.law.over_step(self.contact_of_wall[None], dt)
+                rubbing = self.friction_onset.pairs(s, contact, which, count)
+                rubbing += self.friction_onset.walls(s, of_wall, low, high, speed)
+                self.effect_activity.note(s, FRICTION, step, rubbing)
+        force = self._push_off_walls(s, step, low, high, speed)
         self._move(s, dt)
         self.given[s] = self.given[s] + dt * force * (motion.v + 0.5 * dt * motion.a)
         self.bodies.floor[s] = motion.x + dt * (motion.v + 0.5 * dt * motion.a)
@@ -126,10 +136,10 @@ class DeviceSpheres:
         return tangent, slip, self.law.friction(contact, push, slip)
 
     @ti.func
-    def _push_off_walls(self, s, dt, low, high, speed):
+    def _push_off_walls(self, s, step, low, high, speed):
         """Add the forces of the walls; returns the container's force on the spheres along x [N]."""
-        contact = self.law.over_step(self.contact_of_wall[None], dt)
-        total = 0.0
+        contact = self.law.over_step(self.contact_of_wall[None], self.table.dt[s])
+        total, touching = 0.0, 0
         for k in range(self.search.wall_count(s)):
             i = self.search.wall_sphere(s, k)
             position = self.bodies.position[i]
@@ -137,6 +147,8 @@ class DeviceSpheres:
                 force = self._walls(i, contact, position - low, high - position, speed)
                 self.bodies.push(i, force)
                 total += force[1]
+                touching += 1
+        self.effect_activity.note(s, WALLS, step, touching)
         return total
 
     @ti.func
@@ -275,6 +287,14 @@ class DeviceSpheres:
     def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:
         """Activity of each of the named effects."""
         return self.effect_activity.uses(effects)
+
+    def first_steps(self, effects: tuple[str, ...]) -> dict[str, np.ndarray]:
+        """Step in which each of the named effects first acted, infinite if never, (scenes,)."""
+        return self.effect_activity.first_steps(effects)
+
+    def audit(self) -> Optional[Audit]:
+        """Audit of the contact tests that were skipped; None where all are made."""
+        return self.search.found()
 
     def snapshot(self, s: int) -> dict[str, np.ndarray]:
         """Places and velocities of the spheres of scene s, and their spins [rad/s] if they turn."""

@@ -16,6 +16,7 @@ from ca_damper.random_numbers import bits, stream
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.bodies import Bodies, vec2
 from ca_damper.spheres.search import EXPECTED, TOUCHING, AllPairs, CellList
+from taichi_dem.kit.audit import Audit
 
 vec2i = ti.types.vector(2, ti.i32)
 
@@ -29,10 +30,10 @@ _ROUNDING = 1e-6
 _NEARLY_ALL = 3
 # Purpose of the random numbers that choose what is audited.
 _AUDIT = 7
-# Chance of a step to have a sphere audited, for each sphere of the scene and in units of 2^-32: a
-# test is audited in one step of 1024. Beyond so many spheres the chance grows no further, as all
-# tests of one cost as much as a share of the step that grows with their number.
-_CHANCE, _MOST_CHOSEN = 2**22, 128
+# Chance of a step to have a sphere audited, for each sphere of the scene and in units of 2^-32: as
+# a pair is tested with either of its spheres, that is one test of a pair in 1024. Beyond so many
+# spheres the chance grows no further: all tests of a sphere would cost a growing share of a step.
+_CHANCE, _MOST_CHOSEN = 2**21, 128
 
 
 @ti.data_oriented
@@ -231,6 +232,11 @@ class ExpectedContacts:
     def wall_sphere(self, s, k):
         """The k-th of them."""
         return self.sphere[s, k]
+
+    def found(self) -> Audit:
+        """Outcome of the audit, over all scenes since their start."""
+        counts = (self.table.in_use(one).sum() for one in (self.skipped, self.audited, self.misses))
+        return Audit(*map(int, counts), what="contact tests")
 
 
 #: What is tested for contact, by the name of the search.
