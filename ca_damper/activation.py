@@ -12,6 +12,7 @@ from typing import Any, Optional
 import numpy as np
 
 from ca_damper.certificate import Certificate, Estimate, Periods, onset
+from ca_damper.filling import check_filling
 from ca_damper.measures import Cycles
 from ca_damper.scenes.table import SceneTable
 from ca_damper.steady_state import period
@@ -22,9 +23,10 @@ ALIKE = 1e-3
 
 def activated(filling: Any, table: Any, effects: str) -> tuple[Any, tuple[Estimate, ...]]:
     """The filling with the effects that are asked for, and estimates of those decided on."""
-    if effects == "listed" or not hasattr(filling, "activated"):
+    if effects == "listed" or not hasattr(check_filling(filling), "activated"):
         return filling, ()
-    return filling.activated(_most_particles(table))
+    chosen: tuple[Any, tuple[Estimate, ...]] = filling.activated(_most_particles(table))
+    return chosen
 
 
 def certificate_of(batch: Any) -> Certificate:

@@ -30,10 +30,11 @@ _ROUNDING = 1e-6
 _NEARLY_ALL = 3
 # Purpose of the random numbers that choose what is audited.
 _AUDIT = 7
-# Chance of a step to have a sphere audited, for each sphere of the scene and in units of 2^-32: as
-# a pair is tested with either of its spheres, that is one test of a pair in 1024. Beyond so many
-# spheres the chance grows no further: all tests of a sphere would cost a growing share of a step.
-_CHANCE, _MOST_CHOSEN = 2**21, 128
+# Steps of which one may have a sphere audited, and the chance of that for each sphere of the scene,
+# in units of 2^-32: as a pair is tested with either of its spheres, that is one test of a pair in
+# 1024. Beyond so many spheres the chance grows no further: all tests of a sphere would cost a
+# growing share of a step.
+_AUDIT_EVERY, _CHANCE, _MOST_CHOSEN = 8, 2**24, 128
 
 
 @ti.data_oriented
@@ -46,7 +47,8 @@ class ExpectedContacts:
     and a sphere and a wall, are listed [m]. nearer: by how much they may have come nearer since
     [m]. least, most: bounds of the way of the spheres in the last step [m]. floor: where the floor
     was then [m]. tightness: share of the margin that is listed, 1 but in tests of the audit.
-    skipped, audited, misses: tests not needed, made all the same, and contacts that these found.
+    unlisted: pairs and spheres that are not listed. skipped, audited, misses: tests not needed,
+    made all the same, and contacts that these found.
     """
 
     skips = True
@@ -60,7 +62,7 @@ class ExpectedContacts:
         self.floor = table.field(ti.f64)
         for name in ("margin", "nearer", "least", "most"):
             setattr(self, name, table.vector(2, ti.f64))
-        for name in ("skipped", "audited", "misses"):
+        for name in ("unlisted", "skipped", "audited", "misses"):
             setattr(self, name, table.field(ti.i64))
         self.tightness = ti.field(ti.f64, shape=())
 
@@ -79,6 +81,7 @@ class ExpectedContacts:
         """Nothing has been skipped yet."""
         for field in ti.static((self.skipped, self.audited, self.misses)):
             field[s] = ti.cast(0, ti.i64)
+        self.pair_count[s], self.sphere_count[s] = 0, 0
 
     @ti.func
     def forget(self, s):
@@ -91,7 +94,6 @@ class ExpectedContacts:
     def note_motion(self, s, least, most):
         """Note between which bounds the spheres have moved in a step [m]."""
         self.least[s], self.most[s] = least, most
-        self.cells.moved(s, (most - least).norm())
 
     @ti.func
     def refresh(self, s, low, high):
@@ -100,14 +102,23 @@ class ExpectedContacts:
         least, most = self.least[s], self.most[s]
         way = vec2((most - least).norm(), ti.max(drift - least, most - drift).max())
         nearer, margin = self.nearer[s] + way, self.margin[s]
+        self.cells.moved(s, way[0])
         if self.cells.refresh(s) or not (nearer[0] < margin[0]):
             margin[0], nearer[0] = self._margin(way[0]), 0.0
             self._list_pairs(s, margin[0])
+            self._count_unlisted(s)
         if not (nearer[1] < margin[1]):
             margin[1], nearer[1] = self._margin(way[1]), 0.0
             self._list_spheres(s, low + self._reach(margin[1]), high - self._reach(margin[1]))
+            self._count_unlisted(s)
         self.margin[s] = margin
         self.nearer[s], self.floor[s] = nearer, low[1]
+
+    @ti.func
+    def _count_unlisted(self, s):
+        count = ti.cast(self.table.particles[s], ti.i64)
+        tests = count * (count - 1) // 2 + count
+        self.unlisted[s] = tests - self.pair_count[s] - self.sphere_count[s]
 
     @ti.func
     def _margin(self, way):
@@ -180,16 +191,13 @@ class ExpectedContacts:
 
         reach: distance at which two spheres touch [m].
         """
-        count = self.table.particles[s]
-        pairs = ti.cast(count, ti.i64) * (count - 1) // 2
-        self.skipped[s] = self.skipped[s] + pairs + count - self.pair_count[s] - self.wall_count(s)
-        shared = stream(self.table.seed[s], step)
-        most = ti.cast(ti.min(count, _MOST_CHOSEN), ti.u32)
-        if bits(shared, 0, _AUDIT) < most * ti.u32(_CHANCE):
-            i = self.bodies.first(s) + ti.cast(
-                bits(shared, 1, _AUDIT) % ti.cast(count, ti.u32), ti.i32
-            )
-            self._audit(s, i, low, high, reach * reach)
+        self.skipped[s] = self.skipped[s] + self.unlisted[s]
+        if step % _AUDIT_EVERY == 0:
+            shared = stream(self.table.seed[s], step)
+            count = ti.cast(self.table.particles[s], ti.u32)
+            if bits(shared, 0, _AUDIT) < ti.min(count, _MOST_CHOSEN) * ti.u32(_CHANCE):
+                chosen = ti.cast(bits(shared, 1, _AUDIT) % count, ti.i32)
+                self._audit(s, self.bodies.first(s) + chosen, low, high, reach * reach)
 
     @ti.func
     def _audit(self, s, i, low, high, square):
@@ -235,8 +243,10 @@ class ExpectedContacts:
 
     def found(self) -> Audit:
         """Outcome of the audit, over all scenes since their start."""
-        counts = (self.table.in_use(one).sum() for one in (self.skipped, self.audited, self.misses))
-        return Audit(*map(int, counts), what="contact tests")
+        skipped, audited, misses = (
+            int(self.table.in_use(one).sum()) for one in (self.skipped, self.audited, self.misses)
+        )
+        return Audit(skipped, audited, misses, "contact tests")
 
 
 #: What is tested for contact, by the name of the search.

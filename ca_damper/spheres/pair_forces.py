@@ -14,7 +14,7 @@ from ca_damper.spheres.bodies import Bodies, vec2
 from ca_damper.spheres.contact_law import ContactLaw
 
 #: Contacts that are evaluated together.
-LANES = 4
+LANES = 8
 
 
 @ti.data_oriented

@@ -178,6 +178,10 @@ def test_certificate_stands_in_report_and_json(tmp_path):
 def test_unknown_word_for_effects_is_refused():
     with pytest.raises(InputError, match="effects must be one of listed, auto, got 'some'"):
         Batch(Spheres(), SceneTable(1, 1, DT), effects="some")
+    with pytest.raises(InputError, match="filling must be one such as"):
+        Batch(Spheres, SceneTable(1, 1, DT), effects="auto")
+    with pytest.raises(InputError, match="table"):
+        Batch(Spheres(), None, effects="auto")
 
 
 def test_a_certificate_reads_as_a_sentence_a_line():
