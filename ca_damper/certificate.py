@@ -76,7 +76,8 @@ class Periods:
 
     def __str__(self) -> str:
         test = f"first harmonic of {self.cycles} cycles within {100.0 * self.tolerance:.2g} %"
-        found = [f"{counted(n, 'scene')} every {counted(p, 'cycle')}" for p, n in self.scenes]
+        every = {p: "every cycle" if p == 1 else f"every {p} cycles" for p, _ in self.scenes}
+        found = [f"{counted(n, 'scene')} {every[p]}" for p, n in self.scenes]
         return f"{', '.join(found) or 'none'}, {self.others} not periodic ({test})"
 
 

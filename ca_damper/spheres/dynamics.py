@@ -25,6 +25,7 @@ from ca_damper.spheres.expected_contacts import SEARCHES
 from ca_damper.spheres.friction_onset import FrictionOnset
 from ca_damper.spheres.pair_forces import PairForces
 from ca_damper.spheres.rotation import NoRotation, Rotation
+from ca_damper.spheres.wall_forces import WallForces
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.audit import Audit
 from taichi_dem.kit.effect_usage import EffectUse
@@ -65,13 +66,13 @@ class DeviceSpheres:
         self.law, self.rubs = ContactLaw(options.damping), options.rubs
         self.rotation = Rotation() if options.rotation else NoRotation()
         self.search = SEARCHES[options.search](table, self.bodies)
-        shared = self.bodies, self.search.pair, self.law, self.rotation
-        self.pair_forces = PairForces(table, *shared, self.rubs)
-        self.friction_onset = FrictionOnset(self.bodies, self.search, self.law, self.rotation)
+        parts = self.bodies, self.search, self.law, self.rotation
+        self.pair_forces = PairForces(table, *parts, self.rubs)
+        self.wall_forces = WallForces(*parts, self.rubs)
+        self.friction_onset = FrictionOnset(*parts)
         self.crushed = table.field(ti.i32)
         self.effect_activity = EffectActivity(table)
-        self.given = table.field(ti.f64)
-        self.lost = table.field(ti.f64)
+        self.given, self.lost = table.field(ti.f64), table.field(ti.f64)
         self.held = table.field(ti.f64)
         self.rotation.bind(self.bodies)
         self.contact_of_pair = Contact.field(shape=())
@@ -108,25 +109,37 @@ class DeviceSpheres:
             self.search.forget(s)
         floor = motion.x + 0.5 * dt * (motion.v + 0.25 * dt * motion.a)
         low, high = self.bodies.reach_of_walls(floor)
+        # Seen from spheres that fall freely, as all that is foreseen of them is their fall.
+        speed = motion.v + 0.5 * dt * (motion.a + self.bodies.body[None].gravity)
         self.search.refresh(s, low, high)
+        force = self._push(s, step, low, high, speed)
+        self._move(s, dt)
+        self.given[s] = self.given[s] + dt * force * (motion.v + 0.5 * dt * motion.a)
+        self.bodies.floor[s] = motion.x + dt * (motion.v + 0.5 * dt * motion.a)
+        return Action(-dt * force, 0.0)
+
+    @ti.func
+    def _push(self, s, step, low, high, speed):
+        """Add the forces of all contacts; returns the container's force on the spheres [N].
+
+        low, high: where spheres begin to touch walls [m]; speed: of the container as they see it.
+        """
+        dt = self.table.dt[s]
         contact = self.law.over_step(self.contact_of_pair[None], dt)
         which, count = self.search.find(s, contact.reach)
         self.effect_activity.note(s, PAIRS, step, count)
-        self.pair_forces.add(s, contact, which, count)
-        self.search.audit(s, step, low, high, contact.reach)
-        # Seen from spheres that fall freely, as all that is foreseen of them is their fall.
-        speed = motion.v + 0.5 * dt * (motion.a + self.bodies.body[None].gravity)
         if ti.static(self.rubs):
             if self.effect_activity.is_new(s, FRICTION):
                 of_wall = self.law.over_step(self.contact_of_wall[None], dt)
                 rubbing = self.friction_onset.pairs(s, contact, which, count)
                 rubbing += self.friction_onset.walls(s, of_wall, low, high, speed)
                 self.effect_activity.note(s, FRICTION, step, rubbing)
-        force = self._push_off_walls(s, step, low, high, speed)
-        self._move(s, dt)
-        self.given[s] = self.given[s] + dt * force * (motion.v + 0.5 * dt * motion.a)
-        self.bodies.floor[s] = motion.x + dt * (motion.v + 0.5 * dt * motion.a)
-        return Action(-dt * force, 0.0)
+        self.pair_forces.add(s, contact, which, count)
+        self.search.audit(s, step, low, high, contact.reach)
+        of_wall = self.law.over_step(self.contact_of_wall[None], dt)
+        force, touching = self.wall_forces.add(s, of_wall, low, high, speed)
+        self.effect_activity.note(s, WALLS, step, touching)
+        return force
 
     @ti.func
     def _rub(self, i, j, contact, push, normal, relative, lever):
@@ -134,22 +147,6 @@ class DeviceSpheres:
         tangent = vec2(-normal[1], normal[0])
         slip = self.rotation.slip_of_pair(i, j, lever, relative.dot(tangent))
         return tangent, slip, self.law.friction(contact, push, slip)
-
-    @ti.func
-    def _push_off_walls(self, s, step, low, high, speed):
-        """Add the forces of the walls; returns the container's force on the spheres along x [N]."""
-        contact = self.law.over_step(self.contact_of_wall[None], self.table.dt[s])
-        total, touching = 0.0, 0
-        for k in range(self.search.wall_count(s)):
-            i = self.search.wall_sphere(s, k)
-            position = self.bodies.position[i]
-            if (position < low).any() or (position > high).any():
-                force = self._walls(i, contact, position - low, high - position, speed)
-                self.bodies.push(i, force)
-                total += force[1]
-                touching += 1
-        self.effect_activity.note(s, WALLS, step, touching)
-        return total
 
     @ti.func
     def _move(self, s, dt):
@@ -163,32 +160,6 @@ class DeviceSpheres:
             least = ti.select(velocity < least, velocity, least)
             most = ti.select(velocity > most, velocity, most)
         self.search.note_motion(s, dt * least, dt * most)
-
-    @ti.func
-    def _walls(self, i, contact, above, below, speed):
-        """Force of the four walls on sphere i [N]; room left to each wall [m]: negative overlap."""
-        relative = self.bodies.velocity[i] - vec2(0.0, speed)
-        force = vec2(0.0)
-        for axis in ti.static(range(2)):
-            for side in ti.static((-1.0, 1.0)):
-                overlap = -(above[axis] if ti.static(side < 0.0) else below[axis])
-                if overlap > 0.0:
-                    normal = side * ti.Vector.unit(2, axis, ti.f64)
-                    force += self._wall(i, contact, normal, overlap, relative)
-        return force
-
-    @ti.func
-    def _wall(self, i, contact, normal, overlap, relative):
-        """Force of the wall that lies along ``normal`` on sphere i [N]."""
-        push = self.law.normal(contact, overlap, relative.dot(normal))
-        force = -push * normal
-        if ti.static(self.rubs):
-            tangent, lever = vec2(-normal[1], normal[0]), contact.reach - overlap
-            slip = self.rotation.slip_at_wall(i, lever, relative.dot(tangent))
-            drag = self.law.friction(contact, push, slip)
-            self.rotation.twist(i, lever * drag)
-            force += drag * tangent
-        return force
 
     @ti.func
     def energy(self, s):

@@ -31,14 +31,14 @@ class PairForces:
         self,
         table: SceneFields,
         bodies: Bodies,
-        pair: ti.Field,
+        search: Any,
         law: ContactLaw,
         rotation: Any,
         rubs: bool,
     ):
         self.bodies, self.law, self.rotation, self.rubs = bodies, law, rotation, rubs
         self.turns = rubs and rotation.turns
-        self.pair = pair
+        self.pair = search.pair
         for name in self.scratch_fields:
             setattr(self, name, ti.Vector.field(LANES, ti.f64, shape=table.capacity))
 

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from ca_damper import Batch, InputError, SceneTable, Spheres, frequency_response
+from ca_damper import Batch, InputError, RigidMass, SceneTable, Spheres, frequency_response
 from ca_damper.certificate import NEEDED, NEGLIGIBLE, UNCLEAR, Certificate, Estimate, onset
 from ca_damper.spheres.contact_law import wall_numbers
 from ca_damper.spheres.estimates import rotation_estimate
@@ -190,3 +190,16 @@ def test_a_certificate_reads_as_a_sentence_a_line():
     assert "friction: never acted" in text
     assert "left out   rotation, negligible, exactly none: there is no sphere" in text
     assert str(onset("friction", [0.25, np.inf])) == "friction: in 1 scene from 0.25 s"
+
+
+@pytest.mark.parametrize(("start", "words"), [("rigid", "2 scenes every cycle"), ("rest", "none")])
+def test_periodic_scenes_are_said_to_be(start, words):
+    """A rigid mass is in its steady state at once, or far from it in the first cycles."""
+    batch = Batch(RigidMass(), SceneTable(30, 1, 1e-4, [5.5, 6.0], 1e-3), measured_cycles=6)
+    batch.start(start)
+    batch.run(0, 6)
+    periods = batch.certificate.periods
+    assert periods.scenes == (((1, 2),) if start == "rigid" else ())
+    assert periods.others == (0 if start == "rigid" else 2)
+    assert str(periods).startswith(words)
+    assert "periodic" in str(batch.report())
