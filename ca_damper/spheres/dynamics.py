@@ -128,15 +128,14 @@ class DeviceSpheres:
         contact = self.law.over_step(self.contact_of_pair[None], dt)
         which, count = self.search.find(s, contact.reach)
         self.effect_activity.note(s, PAIRS, step, count)
-        if ti.static(self.rubs):
-            if self.effect_activity.is_new(s, FRICTION):
-                of_wall = self.law.over_step(self.contact_of_wall[None], dt)
-                rubbing = self.friction_onset.pairs(s, contact, which, count)
-                rubbing += self.friction_onset.walls(s, of_wall, low, high, speed)
-                self.effect_activity.note(s, FRICTION, step, rubbing)
         self.pair_forces.add(s, contact, which, count)
         self.search.audit(s, step, low, high, contact.reach)
         of_wall = self.law.over_step(self.contact_of_wall[None], dt)
+        if ti.static(self.rubs):
+            if self.effect_activity.is_new(s, FRICTION):
+                rubbing = self.friction_onset.pairs(s, contact, which, count)
+                rubbing += self.friction_onset.walls(s, of_wall, low, high, speed)
+                self.effect_activity.note(s, FRICTION, step, rubbing)
         force, touching = self.wall_forces.add(s, of_wall, low, high, speed)
         self.effect_activity.note(s, WALLS, step, touching)
         return force
