@@ -51,8 +51,6 @@ class ExpectedContacts:
     made all the same, and contacts that these found.
     """
 
-    skips = True
-
     def __init__(self, table: SceneFields, bodies: Bodies):
         self.table, self.bodies, self.cells = table, bodies, CellList(table, bodies)
         self.pair = table.vector(2, ti.i32, 2, "pairs")

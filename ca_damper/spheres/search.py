@@ -36,8 +36,6 @@ class Grid:
 class AllPairs:
     """Test every pair and every sphere in every step, as the paper does."""
 
-    skips = False
-
     def __init__(self, table: SceneFields, bodies: Bodies):
         self.table, self.bodies = table, bodies
         self.places = table.length("pairs")
