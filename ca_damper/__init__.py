@@ -6,6 +6,7 @@ from taichi_dem.kit import runtime  # isort: skip
 from ca_damper import goals
 from ca_damper.automaton import Automaton
 from ca_damper.batch import Batch
+from ca_damper.certificate import Certificate
 from ca_damper.errors import InputError, SimulationDiverged
 from ca_damper.fixed_mass import Empty, RigidMass
 from ca_damper.goals import Goal
@@ -30,6 +31,7 @@ __all__ = [
     "Batch",
     "Branch",
     "BranchedAnswer",
+    "Certificate",
     "Empty",
     "Goal",
     "InputError",

@@ -12,6 +12,8 @@ from typing import Any, Optional, Union
 import numpy as np
 
 from ca_damper import measures
+from ca_damper.activation import activated, certificate_of, periods_of
+from ca_damper.certificate import EFFECTS, Certificate, Periods
 from ca_damper.checks import MOST_CYCLES, STARTS, for_all
 from ca_damper.engine.launches import Launches
 from ca_damper.engine.loaded_scenes import LoadedScenes
@@ -38,6 +40,9 @@ class Batch(LoadedScenes):
     makes a cycle of the base: ``steps_per_cycle``, (scenes,). The batch has a table of its own.
     mount: "spring", or "base" for a container that moves like the base whatever the filling does.
     measured_cycles: most cycles that one run may measure. rtol, atol: of RK45, on the spring.
+    effects: "listed", those that the options of the filling ask for, or "auto": what is exactly
+    without effect or estimated to be negligible is left out, and what is needed or unclear is
+    computed; ``certificate`` says what and why. Fillings without a choice are as they are.
     ``run_seconds`` and ``compile_seconds`` tell what was spent, ``report()`` all of it in short.
     Raises InputError for a scene that the filling refuses or a step out of range.
     """
@@ -51,8 +56,12 @@ class Batch(LoadedScenes):
         measured_cycles: int = 1,
         rtol: float = 1e-9,
         atol: float = 1e-12,
+        effects: str = "listed",
     ):
+        self.asked_effects = choice("effects", effects, EFFECTS)
+        filling, self.estimates = activated(filling, table, effects)
         super().__init__(filling, table, mount, measured_cycles, rtol, atol)
+        self.periods: Optional[Periods] = None
         self.launches, self.compile_seconds = Launches(self.count), 0.0
         # Whether the present run goes on from a checkpoint.
         self.going_on = False
@@ -131,7 +140,9 @@ class Batch(LoadedScenes):
         record = np.empty((self.count, measured, len(measures.COLUMNS)))
         if measured:
             self.engine.coupling.read(record)
-        return measures.Cycles(self.table.column("frequency"), self.steps_per_cycle, record)
+        cycles = measures.Cycles(self.table.column("frequency"), self.steps_per_cycle, record)
+        self.periods = periods_of(cycles)
+        return cycles
 
     def measure_each(
         self, cycles: Any, progress: Optional[Listener] = None
@@ -227,7 +238,13 @@ class Batch(LoadedScenes):
             compile_seconds=self.compile_seconds,
             run_seconds=self.run_seconds,
             order=getattr(self.filling, "order", None),
+            certificate=self.certificate,
         )
+
+    @property
+    def certificate(self) -> Certificate:
+        """Effects that acted and from when, what was left out with its size, what was audited."""
+        return certificate_of(self)
 
     def _go(self, steps: np.ndarray, before_measuring: np.ndarray, progress: Any) -> None:
         """Take every scene a number of steps on, in launches of bounded length."""

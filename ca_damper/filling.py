@@ -76,7 +76,8 @@ class Filling(Protocol):
     A filling may also have a property ``structure``, a Structure. Its device then has a method
     ``load(filling)`` that takes over all numbers of a filling of the same structure. Without it the
     filling itself, which must be hashable, is the structure, and other options compile anew.
-    It may have ``order``, that of the error in the step, for the report.
+    It may have ``order``, that of the error in the step, for the report, and choose its effects by
+    itself, as ``activation.py`` says.
     """
 
     @property
@@ -121,7 +122,8 @@ class DeviceFilling(Protocol):
     """A filling on the device, for all scenes of a table; data oriented.
 
     Of its members ``uses`` and ``snapshot`` are Python, the others ti.funcs. ``table.dt`` may
-    change between two steps, when a sweep goes on to its next frequency.
+    change between two steps, when a sweep goes on to its next frequency. It may have two further
+    members for a certificate, in Python: see ``activation.py``.
     """
 
     def reset(self, s: int) -> None:

@@ -58,6 +58,13 @@ class Cycles:
         half = np.pi / np.asarray(self.steps, dtype=np.float64)
         return amplitude / (np.array([sine_and_cosine(a)[0] for a in half.tolist()]) / half)
 
+    def harmonic_by_cycle(self, name: str) -> np.ndarray:
+        """Complex amplitude of x or v in every cycle, (scenes, cycles)."""
+        cosine, sine = (
+            self.record[:, :, COLUMNS.index(f"{name}_{part}")] for part in ("cos", "sin")
+        )
+        return 2.0 * (cosine - 1j * sine) / np.asarray(self.steps)[:, None]
+
     @property
     def omega(self) -> np.ndarray:
         """Angular frequency [rad/s]."""

@@ -140,6 +140,13 @@ def sine_and_cosine(angle):
 def slope(forcing, t, y):
     """d(x, v)/dt of the container for y = (x, v): the right-hand side that RK45 integrates."""
     sine, cosine = sine_and_cosine(forcing.omega * t)
+    return slope_at_phase(forcing, ti.Vector([sine, cosine]), y)
+
+
+@ti.func
+def slope_at_phase(forcing, phase, y):
+    """The same for sine and cosine of omega t, which are the same in every step."""
+    sine, cosine = phase[0], phase[1]
     pushed = forcing.drive * cosine + forcing.quadrature * sine + forcing.constant
     held = forcing.stiffness * y[0] + forcing.damping * y[1]
     return ti.Vector([y[1], pushed - held])

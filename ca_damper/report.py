@@ -4,6 +4,7 @@ import json
 from dataclasses import asdict, dataclass
 from typing import Any, Optional
 
+from ca_damper.certificate import Certificate
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.effect_usage import EffectUse
 from taichi_dem.kit.files import write_text
@@ -28,6 +29,7 @@ class Report:
     compile_seconds, run_seconds: cost. order: of the error in the step, None where the filling
     declares none. sampling: cycles of a response over which means were taken, and by how much of
     itself that of the highest RMS may be off with a confidence of 95 %; None where it is not known.
+    certificate: when effects first acted, what was left out, what was audited.
     """
 
     method: str
@@ -47,6 +49,7 @@ class Report:
     run_seconds: float
     order: Optional[int] = None
     sampling: Optional[tuple[int, float]] = None
+    certificate: Optional[Certificate] = None
 
     def __repr__(self):
         particles = f"{_range(self.particles)} particles"
@@ -75,6 +78,8 @@ class Report:
         """All figures, for a JSON file."""
         figures = asdict(self)
         figures["acted"] = figures.pop("effect_activity")
+        if self.certificate is not None:
+            figures["certificate"] = self.certificate.as_dict()
         derived = ("particle_steps_per_second", "known_error")
         return {**figures, **{name: getattr(self, name) for name in derived}}
 
@@ -90,12 +95,13 @@ class Report:
         return (("step bound by", f"{why}: {most:.3g} s, {self.dt_s[1] / most:.2g} of it taken"),)
 
     def __str__(self):
-        """A table of some twelve lines, and one for each effect that acted."""
+        """A table of some twelve lines, and one for each effect that acted or was left out."""
         step, *others = self.known_error.split("; ")
         rows = [
             ("method", f"{self.method}, container on the {self.mount}"),
             ("effects", ", ".join(self.effects) or "none"),
             *(("", f"{use.effect}: {use}") for use in self.effect_activity),
+            *(self.certificate.rows() if self.certificate is not None else ()),
             ("scenes", f"{self.scenes:,} with {_range(self.particles)} particles"),
             ("simulated", f"{self.simulated_s:.4g} s in steps of {_range(self.dt_s)} s"),
             *self._bound_row(),

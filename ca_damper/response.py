@@ -159,6 +159,7 @@ def frequency_response(
     transient_cycles: int = 150,
     measured_cycles: int = 20,
     start: str = "rest",
+    effects: str = "listed",
     progress: Union[Listener, str, None] = AUTO,
     checkpoint: Optional[Checkpoint] = None,
     resume: Optional[FileName] = None,
@@ -168,9 +169,10 @@ def frequency_response(
     particles: one number or several. ratios: ascending frequency ratios f/f0, f0 of the empty
     container. seeds: how many, counted from 1, or the seeds themselves. oscillator: the primary
     structure, the paper's if None. dt: largest step [s], the filling's own if None.
-    start: the container's motion at the beginning, see ``Batch.start``. progress: "auto"
-    for a bar on a terminal and in Jupyter, None for silence, or a function that is called with a
-    Progress while kernels are compiled, and then about six times a second. checkpoint: a
+    start: the container's motion at the beginning, see ``Batch.start``. effects: "listed" or
+    "auto", see ``Batch``; ``report.certificate`` says what acted and what was left out.
+    progress: "auto" for a bar on a terminal and in Jupyter, None for silence, or a function that is
+    called with a Progress while kernels are compiled, and then six times a second. checkpoint: a
     Checkpoint that says where and when the run saves itself, besides at its end and on Ctrl-C.
     resume: such a file to go on from; the bits are those of a run that was never stopped.
     Raises InputError for what cannot be used, SimulationDiverged.
@@ -179,7 +181,7 @@ def frequency_response(
     check_run(transient_cycles, start, progress)
     job = f"response, {grid.words()}, {transient_cycles} + {measured_cycles} cycles from {start}"
     with reporting(progress, "response") as report_progress:
-        batch = grid.batch(grid.ratios, measured_cycles)
+        batch = grid.batch(grid.ratios, measured_cycles, effects)
         batch.start(start)
         with batch.checkpointed(checkpoint, resume, {"job": job}) as writer:
             cycles = batch.run(transient_cycles, measured_cycles, report_progress)
@@ -258,7 +260,7 @@ class Grid:
         """Of the measures: particles, ratios, seeds."""
         return len(self.particles), len(self.ratios), len(self.seeds)
 
-    def batch(self, ratios: np.ndarray, measured_cycles: int) -> Batch:
+    def batch(self, ratios: np.ndarray, measured_cycles: int, effects: str = "listed") -> Batch:
         """Batch of all scenes at these ratios, the last axis (seeds) running fastest."""
         whole("measured_cycles", measured_cycles, 1, 100_000)
         grids = np.meshgrid(self.particles, ratios, self.seeds, indexing="ij")
@@ -266,7 +268,7 @@ class Grid:
         o = self.oscillator
         structure = (o.base_amplitude, o.mass, o.stiffness, o.damping)
         table = SceneTable(number, seed, self.dt, ratio * o.natural_frequency, *structure)
-        return Batch(self.filling, table, measured_cycles=measured_cycles)
+        return Batch(self.filling, table, measured_cycles=measured_cycles, effects=effects)
 
     def measures(self, cycles: Cycles) -> dict[str, np.ndarray]:
         """Measures of all scenes by name, each (scenes,)."""

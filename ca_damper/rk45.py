@@ -37,17 +37,27 @@ def step(rhs: ti.template(), context, t, y, slope, h):
     step) and the difference to the embedded fourth-order result. In a kernel, unused results cost
     nothing, as they are not computed.
     """
+    t2, t3, t4, t5 = t + h * (1 / 5), t + h * (3 / 10), t + h * (4 / 5), t + h * (8 / 9)
+    return stages(rhs, context, t2, t3, t4, t5, t + h, y, slope, h)
+
+
+@ti.pyfunc
+def stages(rhs: ti.template(), context, t2, t3, t4, t5, t_end, y, slope, h):
+    """The step of ``step`` for given times of its stages, t + h (1/5, 3/10, 4/5, 8/9, 1).
+
+    They are passed to rhs as they are, so that what it needs of them may be calculated before.
+    """
     k1 = slope
-    k2 = rhs(context, t + h * (1 / 5), y + h * (1 / 5 * k1))
-    k3 = rhs(context, t + h * (3 / 10), y + h * (3 / 40 * k1 + 9 / 40 * k2))
-    k4 = rhs(context, t + h * (4 / 5), y + h * (44 / 45 * k1 - 56 / 15 * k2 + 32 / 9 * k3))
+    k2 = rhs(context, t2, y + h * (1 / 5 * k1))
+    k3 = rhs(context, t3, y + h * (3 / 40 * k1 + 9 / 40 * k2))
+    k4 = rhs(context, t4, y + h * (44 / 45 * k1 - 56 / 15 * k2 + 32 / 9 * k3))
     y5 = 19372 / 6561 * k1 - 25360 / 2187 * k2 + 64448 / 6561 * k3 - 212 / 729 * k4
-    k5 = rhs(context, t + h * (8 / 9), y + h * y5)
+    k5 = rhs(context, t5, y + h * y5)
     y6 = 9017 / 3168 * k1 - 355 / 33 * k2 + 46732 / 5247 * k3 + 49 / 176 * k4
-    k6 = rhs(context, t + h, y + h * (y6 - 5103 / 18656 * k5))
+    k6 = rhs(context, t_end, y + h * (y6 - 5103 / 18656 * k5))
     y7 = 35 / 384 * k1 + 500 / 1113 * k3 + 125 / 192 * k4 - 2187 / 6784 * k5 + 11 / 84 * k6
     y_new = y + h * y7
-    k7 = rhs(context, t + h, y_new)
+    k7 = rhs(context, t_end, y_new)
     gap = 71 / 57600 * k1 - 71 / 16695 * k3 + 71 / 1920 * k4 - 17253 / 339200 * k5
     return y_new, k7, h * (gap + 22 / 525 * k6 - 1 / 40 * k7)
 

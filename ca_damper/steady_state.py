@@ -68,6 +68,21 @@ def steady_part(
     return _approach(x, max(allowed, _ROUNDING))
 
 
+def period(series: np.ndarray, tolerance: float) -> int:
+    """Least number of cycles after which all values repeat, up to a third of them; 0 for none.
+
+    series: a value a cycle, complex ones too, (cycles,). tolerance: difference that does not
+    matter, as a share of the largest value. Two values of one cycle each count as alike.
+    """
+    x = np.asarray(series)
+    allowed = tolerance * float(np.abs(x).max())
+    for cycles in range(1, max(1, len(x) // 3) + 1):
+        alike = np.reshape(x[len(x) % cycles :], (-1, cycles))
+        if np.abs(alike - alike[-1]).max() <= allowed:
+            return cycles
+    return 0
+
+
 def mean_and_error(series: np.ndarray) -> tuple[float, float, int]:
     """Mean of correlated values, its standard error, and the degrees of freedom of that error."""
     means, length = batch_means(series)

@@ -9,6 +9,9 @@ swings most) and amplitudes of the shaking base.
     python experiments/demo_damper.py --particles 60 --frequency 0.95
     python experiments/demo_damper.py --filling spheres --amplitude 1.2
 
+With --effects auto, which is the default, the program computes the effects that the scene calls
+for (the spheres turn where friction makes them); "listed" takes the filling as it is.
+
 Writes damper.gif, motion.png, motion.csv, caption.txt and summary.json to results/demo_damper/.
 """
 
@@ -19,10 +22,12 @@ import numpy as np
 
 from _demo_damper import figures_of, sentences, write
 from ca_damper import Automaton, Batch, Empty, Oscillator, SceneTable, Spheres, film
+from ca_damper.certificate import EFFECTS
 from ca_damper.progress import Stages
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_text
 from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.study.summary_entries import add_to_summary
 
 NAME = "demo_damper"
 FILLINGS = {"automaton": Automaton, "spheres": Spheres}
@@ -31,6 +36,7 @@ SETTINGS = {
     "frequency": (1.0, 1.0, study.number(0.2, 3), "by the container's, 1"),
     "amplitude": (0.6, 0.6, study.number(0, 10), "of the base [mm], 0.6"),
     "filling": ("automaton", "automaton", study.one_of(FILLINGS), "automaton"),
+    "effects": ("auto", "auto", study.one_of(EFFECTS), "auto; or listed"),
     "dt": (None, None, study.number(0, 1), "step [s], 1e-4 or 2e-5 of spheres"),
     "seed": (1, 1, study.whole(0, 2**31 - 1), "of the first places, 1"),
     "begin": (40, 10),
@@ -72,7 +78,7 @@ def run(options):
     batches = {}
     for title, one, particles in (("full", filling, options.particles), ("empty", Empty(), 0)):
         table = SceneTable(particles, options.seed, *shaken)
-        batches[title] = Batch(one, table, measured_cycles=measured)
+        batches[title] = Batch(one, table, measured_cycles=measured, effects=options.effects)
     at = study.output_paths(options.out)
     full, empty = (Swing(*pair, options.begin, measured, o) for pair in batches.items())
     figures = figures_of(full.cycles, empty.cycles, o)
@@ -82,6 +88,7 @@ def run(options):
     write_text(at("caption.txt"), " ".join(words) + "\n")
     print(*words, f"\n{report}", sep="\n")
     study.finish(options, NAME, figures, batches.values(), show=False)
+    add_to_summary(options.out, certificate=report.certificate.as_dict())
 
 
 if __name__ == "__main__":

@@ -59,6 +59,7 @@ class DeviceAutomaton:
         pull = self.parameters.gravity[None] * self.table.dt[s]
         shared = stream(self.table.seed[s], step)
         self.velocity[s] = motion.v
+        self.event_counts.begin(s, step)
         pressed = motion.a > -self.parameters.gravity[None]
         impulse = self.ejection.follow(s, step, motion)
         if not pressed:
@@ -105,6 +106,10 @@ class DeviceAutomaton:
     def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:
         """How often each of the named effects acted."""
         return self.event_counts.uses(effects)
+
+    def first_steps(self, effects: tuple[str, ...]) -> dict[str, np.ndarray]:
+        """Step in which each counted effect first acted, infinite if never, (scenes,)."""
+        return self.event_counts.first_steps(effects)
 
     def snapshot(self, s: int) -> dict[str, np.ndarray]:
         """Positions and velocities of the particles, by cell (see ``ca_damper.filling``)."""

@@ -9,19 +9,22 @@ import taichi as ti
 
 from ca_damper import rk45
 from ca_damper.filling import Action, Motion
-from ca_damper.oscillator import Forcing, slope
+from ca_damper.oscillator import Forcing, sine_and_cosine, slope, slope_at_phase
 from ca_damper.scenes.clock import Clock
 from ca_damper.scenes.scene_fields import SceneFields
 
 #: Attempts within one step of the filling after which the container counts as lost.
 _MOST_ATTEMPTS = 1000
+#: Times of the stages of RK45 at which the forcing is needed, as shares of the step.
+_STAGES = (1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0)
 
 
 @ti.data_oriented
 class SprungContainer:
     """The container on its spring, integrated by RK45 within every step of the filling.
 
-    gravity [m/s^2]. tolerance: local error allowed, rtol and atol, the latter in m and m/s.
+    gravity [m/s^2]. tolerance: local error allowed, rtol and atol, the latter in m and m/s. phase:
+    sine and cosine of the base's turn up to each stage of a step, the same in all steps.
     """
 
     def __init__(self, table: SceneFields, clock: Clock):
@@ -29,6 +32,7 @@ class SprungContainer:
         self.state, self.slope = table.vector(2, ti.f64), table.vector(2, ti.f64)
         self.impulse, self.carried = table.field(ti.f64), table.field(ti.f64)
         self.impulse_velocity = table.field(ti.f64)
+        self.phase = table.vector(2, ti.f64, len(_STAGES))
         self.gravity = ti.field(ti.f64, shape=())
         self.tolerance = ti.field(ti.f64, shape=2)
 
@@ -43,6 +47,7 @@ class SprungContainer:
         """Place the container; nothing acts on it but spring, dashpot and base."""
         self.state[s] = ti.Vector([x, v])
         self.impulse_velocity[s] = 0.0
+        self._set_phases(s)
         self._set_action(s, Action(0.0, 0.0))
 
     @ti.func
@@ -55,12 +60,22 @@ class SprungContainer:
     @ti.func
     def renew(self, s):
         """Note that the base has changed its motion, between two frequencies of a sweep."""
+        self._set_phases(s)
         self._set_action(s, Action(self.impulse[s], self.carried[s]))
 
     @ti.func
+    def _set_phases(self, s):
+        omega = 2.0 * ti.math.pi * self.table.frequency[s]
+        for k in ti.static(range(len(_STAGES))):
+            sine, cosine = sine_and_cosine(omega * (self.table.dt[s] * _STAGES[k]))
+            self.phase[s, k] = ti.Vector([sine, cosine])
+
+    @ti.func
     def _set_action(self, s, action):
+        """Take over what acts from now on; at this moment the turn of the base is none."""
         self.impulse[s], self.carried[s] = action.impulse, action.carried
-        self.slope[s] = slope(self._forcing(s, action), 0.0, self.state[s])
+        forcing = self._forcing(s, action)
+        self.slope[s] = slope_at_phase(forcing, ti.Vector([0.0, 1.0]), self.state[s])
 
     @ti.func
     def _forcing(self, s, action):
@@ -88,12 +103,28 @@ class SprungContainer:
             self._set_action(s, action)
         forcing = self._forcing(s, action)
         dt, rtol, atol = self.table.dt[s], self.tolerance[0], self.tolerance[1]
-        y, change, attempts = rk45.integrate(
-            slope, forcing, 0.0, dt, self.state[s], self.slope[s], dt, rtol, atol, _MOST_ATTEMPTS
-        )
+        y, change, error = self._whole_step(s, forcing)
+        attempts = 1
+        if not error <= 1.0:
+            y, change, attempts = rk45.integrate(
+                *(slope, forcing, 0.0, dt, self.state[s], self.slope[s], dt, rtol, atol),
+                _MOST_ATTEMPTS,
+            )
         self.state[s], self.slope[s] = y, change
         self.impulse_velocity[s] = action.impulse / (dt * (self.table.mass[s] + action.carried))
         return attempts
+
+    @ti.func
+    def _whole_step(self, s, forcing):
+        """The first attempt of RK45, by the phases of its stages: the same bits, half the time."""
+        phase = [self.phase[s, k] for k in ti.static(range(len(_STAGES)))]
+        y, dt = self.state[s], self.table.dt[s]
+        y_new, change, gap = rk45.stages(
+            *(slope_at_phase, forcing, phase[0], phase[1], phase[2], phase[3], phase[4]),
+            *(y, self.slope[s], dt),
+        )
+        error = rk45.scaled_norm(gap, y, y_new, self.tolerance[0], self.tolerance[1])
+        return y_new, change, error
 
 
 @ti.data_oriented

@@ -22,6 +22,8 @@ vec2 = ti.types.vector(2, ti.f64)
 class Body:
     """Numbers that all spheres share: radius [m], mass [kg], box [m] and gravity [m/s^2].
 
+    pull: acceleration by gravity, downwards [m/s^2], as a vector that the compiler does not take
+    apart: both components are then divided and subtracted by one instruction.
     columns, rows: of the spheres that fit into the box.
     """
 
@@ -30,6 +32,7 @@ class Body:
     width: ti.f64
     height: ti.f64
     gravity: ti.f64
+    pull: vec2
     columns: ti.i32
     rows: ti.i32
 
@@ -67,7 +70,7 @@ class Bodies:
     @ti.kernel
     def _load(self, radius: ti.f64, mass: ti.f64, gravity: ti.f64):
         self.body[None].radius, self.body[None].mass = radius, mass
-        self.body[None].gravity = gravity
+        self.body[None].gravity, self.body[None].pull = gravity, vec2(0.0, gravity)
 
     @ti.kernel
     def _load_box(self, width: ti.f64, height: ti.f64, columns: ti.i32, rows: ti.i32):
@@ -96,16 +99,22 @@ class Bodies:
         return position + vec2(0.5 * self.body[None].width, -self.floor[s])
 
     @ti.func
+    def reach_of_walls(self, floor):
+        """Lowest and highest place of a sphere that touches no wall; floor: where it is [m]."""
+        body = self.body[None]
+        high = vec2(0.5 * body.width, floor + body.height) - body.radius
+        return vec2(-0.5 * body.width, floor) + body.radius, high
+
+    @ti.func
     def push(self, i, force):
         """Add a contact's force [N] on sphere i."""
         # Not "+=", which would be an atomic addition; a scene is one thread.
         self.force[i] = self.force[i] + force
 
     @ti.func
-    def kick(self, i, force, dt):
-        """Take sphere i over a step under its contacts, another force [N] and gravity."""
-        body = self.body[None]
-        rate = (self.force[i] + force) / body.mass - vec2(0.0, body.gravity)
+    def kick(self, i, body, dt):
+        """Take sphere i over a step under its contacts and gravity; returns its new velocity."""
+        rate = self.force[i] / body.mass - body.pull
         velocity = self.velocity[i] + dt * rate
         self.force[i] = vec2(0.0)
         self.velocity[i] = velocity

@@ -11,7 +11,7 @@ contacts and gravity, to round-off, and the impacts on the container are its exa
 """
 
 import math
-from typing import Any
+from typing import Any, Optional
 
 import numpy as np
 import taichi as ti
@@ -20,10 +20,14 @@ from ca_damper.filling import Action
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.bodies import Bodies, vec2
 from ca_damper.spheres.contact_law import Contact, ContactLaw, pair_numbers, wall_numbers
-from ca_damper.spheres.effect_activity import EffectActivity
+from ca_damper.spheres.effect_activity import FRICTION, PAIRS, WALLS, EffectActivity
+from ca_damper.spheres.expected_contacts import SEARCHES
+from ca_damper.spheres.friction_onset import FrictionOnset
+from ca_damper.spheres.pair_forces import PairForces
 from ca_damper.spheres.rotation import NoRotation, Rotation
-from ca_damper.spheres.search import SEARCHES
+from ca_damper.spheres.wall_forces import WallForces
 from taichi_dem.kit.allocation import values
+from taichi_dem.kit.audit import Audit
 from taichi_dem.kit.effect_usage import EffectUse
 
 # Codes of divergence; a speed is a runaway's when it crosses more than a radius in a step.
@@ -61,14 +65,16 @@ class DeviceSpheres:
         self.bodies = Bodies(table, options.start is not None)
         self.law, self.rubs = ContactLaw(options.damping), options.rubs
         self.rotation = Rotation() if options.rotation else NoRotation()
-        self.search = SEARCHES[options.search]()
+        self.search = SEARCHES[options.search](table, self.bodies)
+        parts = self.bodies, self.search, self.law, self.rotation
+        self.pair_forces = PairForces(table, *parts, self.rubs)
+        self.wall_forces = WallForces(*parts, self.rubs)
+        self.friction_onset = FrictionOnset(*parts)
         self.crushed = table.field(ti.i32)
         self.effect_activity = EffectActivity(table)
-        self.given = table.field(ti.f64)
-        self.lost = table.field(ti.f64)
+        self.given, self.lost = table.field(ti.f64), table.field(ti.f64)
         self.held = table.field(ti.f64)
         self.rotation.bind(self.bodies)
-        self.search.bind(self.bodies)
         self.contact_of_pair = Contact.field(shape=())
         self.contact_of_wall = Contact.field(shape=())
 
@@ -88,6 +94,7 @@ class DeviceSpheres:
             self.rotation.reset(i)
         self.effect_activity.clear(s)
         self.search.forget(s)
+        self.search.clear(s)
         self.given[s], self.lost[s] = 0.0, -ti.math.inf
 
     @ti.func
@@ -100,36 +107,38 @@ class DeviceSpheres:
         if self.bodies.lead[s] != 0.5 * dt:
             self.bodies.advance_lead(s, 0.5 * dt)
             self.search.forget(s)
-        self.search.refresh(s)
-        contact = self.law.over_step(self.contact_of_pair[None], dt)
-        self.search.each_pair(s, contact, self._pair)
         floor = motion.x + 0.5 * dt * (motion.v + 0.25 * dt * motion.a)
+        low, high = self.bodies.reach_of_walls(floor)
         # Seen from spheres that fall freely, as all that is foreseen of them is their fall.
         speed = motion.v + 0.5 * dt * (motion.a + self.bodies.body[None].gravity)
-        force = self._advance(s, dt, floor, speed)
+        self.search.refresh(s, low, high)
+        force = self._push(s, step, low, high, speed)
+        self._move(s, dt)
         self.given[s] = self.given[s] + dt * force * (motion.v + 0.5 * dt * motion.a)
         self.bodies.floor[s] = motion.x + dt * (motion.v + 0.5 * dt * motion.a)
         return Action(-dt * force, 0.0)
 
     @ti.func
-    def _pair(self, i, j, contact):
-        """Forces of two spheres on each other, if they touch."""
-        branch = self.bodies.position[j] - self.bodies.position[i]
-        square = branch.norm_sqr()
-        if square < contact.reach * contact.reach:
-            distance = ti.sqrt(square)
-            normal = branch * (1.0 / distance)
-            relative = self.bodies.velocity[i] - self.bodies.velocity[j]
-            push = self.law.normal(contact, contact.reach - distance, relative.dot(normal))
-            force = -push * normal
-            if ti.static(self.rubs):
-                lever = 0.5 * distance
-                tangent, _, drag = self._rub(i, j, contact, push, normal, relative, lever)
-                force += drag * tangent
-                self.rotation.twist(i, lever * drag)
-                self.rotation.twist(j, lever * drag)
-            self.bodies.push(i, force)
-            self.bodies.push(j, -force)
+    def _push(self, s, step, low, high, speed):
+        """Add the forces of all contacts; returns the container's force on the spheres [N].
+
+        low, high: where spheres begin to touch walls [m]; speed: of the container as they see it.
+        """
+        dt = self.table.dt[s]
+        contact = self.law.over_step(self.contact_of_pair[None], dt)
+        which, count = self.search.find(s, contact.reach)
+        self.effect_activity.note(s, PAIRS, step, count)
+        self.pair_forces.add(s, contact, which, count)
+        self.search.audit(s, step, low, high, contact.reach)
+        of_wall = self.law.over_step(self.contact_of_wall[None], dt)
+        if ti.static(self.rubs):
+            if self.effect_activity.is_new(s, FRICTION):
+                rubbing = self.friction_onset.pairs(s, contact, which, count)
+                rubbing += self.friction_onset.walls(s, of_wall, low, high, speed)
+                self.effect_activity.note(s, FRICTION, step, rubbing)
+        force, touching = self.wall_forces.add(s, of_wall, low, high, speed)
+        self.effect_activity.note(s, WALLS, step, touching)
+        return force
 
     @ti.func
     def _rub(self, i, j, contact, push, normal, relative, lever):
@@ -139,51 +148,17 @@ class DeviceSpheres:
         return tangent, slip, self.law.friction(contact, push, slip)
 
     @ti.func
-    def _advance(self, s, dt, floor, speed):
-        """Walls and motion; returns the container's force on the spheres along x [N]."""
-        contact = self.law.over_step(self.contact_of_wall[None], dt)
+    def _move(self, s, dt):
+        """Take the spheres over the step."""
         body = self.bodies.body[None]
-        high = vec2(0.5 * body.width, floor + body.height) - body.radius
-        low = vec2(-0.5 * body.width, floor) + body.radius
-        total, least, most = 0.0, vec2(ti.math.inf), vec2(-ti.math.inf)
+        least, most = vec2(ti.math.inf), vec2(-ti.math.inf)
         for i in range(self.bodies.first(s), self.bodies.last(s)):
-            position = self.bodies.position[i]
-            force = vec2(0.0)
-            if (position < low).any() or (position > high).any():
-                force = self._walls(i, contact, position - low, high - position, speed)
-            total += force[1]
-            velocity = self.bodies.kick(i, force, dt)
+            velocity = self.bodies.kick(i, body, dt)
             self.rotation.kick(i, dt)
-            least, most = ti.min(least, velocity), ti.max(most, velocity)
-        if ti.static(self.search.tracks_motion):
-            self.search.moved(s, dt * (most - least).norm())
-        return total
-
-    @ti.func
-    def _walls(self, i, contact, above, below, speed):
-        """Force of the four walls on sphere i [N]; room left to each wall [m]: negative overlap."""
-        relative = self.bodies.velocity[i] - vec2(0.0, speed)
-        force = vec2(0.0)
-        for axis in ti.static(range(2)):
-            for side in ti.static((-1.0, 1.0)):
-                overlap = -(above[axis] if ti.static(side < 0.0) else below[axis])
-                if overlap > 0.0:
-                    normal = side * ti.Vector.unit(2, axis, ti.f64)
-                    force += self._wall(i, contact, normal, overlap, relative)
-        return force
-
-    @ti.func
-    def _wall(self, i, contact, normal, overlap, relative):
-        """Force of the wall that lies along ``normal`` on sphere i [N]."""
-        push = self.law.normal(contact, overlap, relative.dot(normal))
-        force = -push * normal
-        if ti.static(self.rubs):
-            tangent, lever = vec2(-normal[1], normal[0]), contact.reach - overlap
-            slip = self.rotation.slip_at_wall(i, lever, relative.dot(tangent))
-            drag = self.law.friction(contact, push, slip)
-            self.rotation.twist(i, lever * drag)
-            force += drag * tangent
-        return force
+            # Not by ti.min and ti.max: what they do about NaN takes five instructions more.
+            least = ti.select(velocity < least, velocity, least)
+            most = ti.select(velocity > most, velocity, most)
+        self.search.note_motion(s, dt * least, dt * most)
 
     @ti.func
     def energy(self, s):
@@ -228,7 +203,8 @@ class DeviceSpheres:
         body, dt = self.bodies.body[None], self.table.dt[s]
         self.crushed[s], self.held[s] = self.search.crowded(s), 0.0
         contact = self.law.over_step(self.contact_of_pair[None], dt)
-        self.search.each_pair(s, contact, self._note_pair)
+        seen = 0
+        self.search.each_listed_pair(s, contact, self._note_pair, seen)
         code = ENERGY_GAINED if self._gains(s) else FINE
         if self.crushed[s] > 0:
             code = OVERLAP
@@ -262,9 +238,8 @@ class DeviceSpheres:
         return gain > MOST_GAIN * energy + _WALL_IMPULSE_SHARE * highest
 
     @ti.func
-    def _note_pair(self, i, j, contact):
+    def _note_pair(self, s, i, j, contact, seen: ti.template()):
         """Note the energy of a pair, and whether it touches or overlaps by half its reach."""
-        s = i // self.bodies.stride
         self.held[s] = self.held[s] + self._pair_energy(s, i, j)
         branch = self.bodies.position[j] - self.bodies.position[i]
         distance = branch.norm()
@@ -284,6 +259,14 @@ class DeviceSpheres:
     def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:
         """Activity of each of the named effects."""
         return self.effect_activity.uses(effects)
+
+    def first_steps(self, effects: tuple[str, ...]) -> dict[str, np.ndarray]:
+        """Step in which each of the named effects first acted, infinite if never, (scenes,)."""
+        return self.effect_activity.first_steps(effects)
+
+    def audit(self) -> Optional[Audit]:
+        """Audit of the contact tests that were skipped; None where all are made."""
+        return self.search.found()
 
     def snapshot(self, s: int) -> dict[str, np.ndarray]:
         """Places and velocities of the spheres of scene s, and their spins [rad/s] if they turn."""

@@ -1,6 +1,7 @@
-"""Activity of the effects of the spheres, sampled when a scene is checked for divergence.
+"""Activity of the effects of the spheres.
 
-Those looks are every few steps: to ask in every step would cost a fifth of it.
+How much they did is sampled when a scene is checked for divergence: to ask in every step would
+cost a fifth of it. When each acted for the first time is noted in the step itself.
 """
 
 from typing import Optional
@@ -13,6 +14,12 @@ from taichi_dem.kit.effect_usage import EffectUse
 
 vec2 = ti.types.vector(2, ti.f64)
 
+#: What is noted when it happens first: two spheres touch, one touches a wall, friction acts.
+PAIRS, WALLS, FRICTION = range(3)
+#: Those by which each effect acts.
+_BY = {"normal contact": (PAIRS, WALLS), "friction": (FRICTION,), "rotation": (FRICTION,)}
+_NEVER = -1
+
 #: Reason why an unseen effect may have acted: an impact is shorter than the time between checks.
 _UNSEEN = "touches between two looks leave no trace"
 
@@ -22,7 +29,8 @@ class EffectActivity:
     """Sums over the checks since the reset, by scene.
 
     touches: of two spheres, or of a sphere and a wall. power: into dashpots and into friction of
-    sphere on sphere [W]. motion: energy of going and of turning [J].
+    sphere on sphere [W]. motion: energy of going and of turning [J]. first: step in which each of
+    PAIRS, WALLS and FRICTION first happened, or -1.
     """
 
     def __init__(self, table: SceneFields):
@@ -30,12 +38,26 @@ class EffectActivity:
         self.touches = table.field(ti.i64)
         self.power = table.vector(2, ti.f64)
         self.motion = table.vector(2, ti.f64)
+        self.first = table.field(ti.i32, FRICTION + 1)
 
     @ti.func
     def clear(self, s):
         """Nothing has been seen yet."""
         self.touches[s] = ti.cast(0, ti.i64)
         self.power[s], self.motion[s] = vec2(0.0), vec2(0.0)
+        for kind in range(FRICTION + 1):
+            self.first[s, kind] = _NEVER
+
+    @ti.func
+    def is_new(self, s, kind):
+        """Whether something has not happened yet."""
+        return self.first[s, kind] == _NEVER
+
+    @ti.func
+    def note(self, s, kind, step, count):
+        """Note how often something happens in a step."""
+        if count > 0 and self.is_new(s, kind):
+            self.first[s, kind] = step
 
     @ti.func
     def note_contact(self, s, dragged, rubbed):
@@ -49,6 +71,12 @@ class EffectActivity:
         """Note a sphere: whether it is at a wall, and the energy of its motion [J]."""
         self.touches[s] = self.touches[s] + at_wall
         self.motion[s] = self.motion[s] + vec2(going, turning)
+
+    def first_steps(self, effects: tuple[str, ...]) -> dict[str, np.ndarray]:
+        """Step in which each of the named effects first acted, infinite if never, (scenes,)."""
+        first = self.table.in_use(self.first).astype(np.float64)
+        first[first == _NEVER] = np.inf
+        return {name: first[:, list(_BY[name])].min(axis=1) for name in effects}
 
     def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:
         """An EffectUse for each of the named effects, over all scenes."""

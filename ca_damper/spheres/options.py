@@ -1,16 +1,19 @@
 """Options of the spheres, and quantities that follow from them."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Optional
 
 import numpy as np
 
+from ca_damper.certificate import NEGLIGIBLE, Estimate
 from ca_damper.filling import LEAST_PLACES, Structure
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.contact_law import POWERS, contact_duration, pair_numbers
 from ca_damper.spheres.dynamics import DIVERGENCES, DeviceSpheres
-from ca_damper.spheres.search import SEARCHES, listed_pairs
+from ca_damper.spheres.estimates import air_estimate, rotation_estimate
+from ca_damper.spheres.expected_contacts import SEARCHES
+from ca_damper.spheres.search import listed_pairs
 from taichi_dem.kit.engine_pool import power_of_two
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import (
@@ -108,6 +111,20 @@ class Spheres:
         """Effects that are computed, in words for the report."""
         asked = {"friction": self.rubs, "rotation": self.rotation}
         return ("normal contact", *(name for name, there in asked.items() if there))
+
+    def activated(self, particles: int) -> tuple["Spheres", tuple[Estimate, ...]]:
+        """These spheres with the effects that at most so many of them call for, and estimates.
+
+        Friction is computed unless its coefficients are zero; rotation unless it is negligible.
+        """
+        estimate = rotation_estimate(self, particles)
+        chosen = replace(self, rotation=estimate.verdict != NEGLIGIBLE)
+        return chosen, (estimate,)
+
+    def left_out(self, particles: int) -> tuple[Estimate, ...]:
+        """Size of the effects that are not computed."""
+        found = () if self.rotation else (rotation_estimate(self, particles),)
+        return (*found, air_estimate(self))
 
     @property
     def radius(self) -> float:

@@ -14,6 +14,7 @@ class NoRotation:
 
     # Share of the effective mass that resists a tangential impulse.
     tangential_share = 1.0
+    turns = False
 
     def bind(self, bodies: Any) -> None:
         """Nothing to allocate."""
@@ -59,6 +60,7 @@ class Rotation:
 
     # A tangential impulse on a solid sphere's surface moves it like 1 / (1 + 5/2) of its mass.
     tangential_share = 2.0 / 7.0
+    turns = True
 
     def bind(self, bodies: Any) -> None:
         """Allocate spins and torques."""

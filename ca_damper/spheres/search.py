@@ -1,4 +1,4 @@
-"""Which pairs of spheres may touch: all of them, or those near each other by a cell grid.
+"""Pairs of spheres: all of them, or those near each other by a cell grid.
 
 Both name the pairs (i, j), i < j, in the same order, so that the forces on a sphere are summed by
 ascending partner and both give the same bits.
@@ -8,10 +8,14 @@ from typing import Any
 
 import taichi as ti
 
-from ca_damper.spheres.bodies import vec2
+from ca_damper.scenes.scene_fields import SceneFields
+from ca_damper.spheres.bodies import Bodies, vec2
 
 # Pairs near each other per sphere. Discs of one size have three, at most five with the skin.
 _PAIRS_PER_SPHERE = 8
+
+#: Lists of pairs in ``pair``: that may touch, and that do in the present step.
+EXPECTED, TOUCHING = range(2)
 
 
 @ti.dataclass
@@ -30,23 +34,30 @@ class Grid:
 
 @ti.data_oriented
 class AllPairs:
-    """Compare every sphere with every other in every step, as the paper does."""
+    """Test every pair and every sphere in every step, as the paper does."""
 
-    tracks_motion = False
-
-    def bind(self, bodies: Any) -> None:
-        """Nothing to allocate."""
-        self.bodies = bodies
+    def __init__(self, table: SceneFields, bodies: Bodies):
+        self.table, self.bodies = table, bodies
+        self.places = table.length("pairs")
+        self.pair = table.vector(2, ti.i32, 2, "pairs")
 
     def load(self, options: Any) -> None:
         """Nothing to write."""
+
+    @ti.func
+    def clear(self, s):
+        """Nothing was counted."""
 
     @ti.func
     def forget(self, s):
         """Nothing was remembered."""
 
     @ti.func
-    def refresh(self, s):
+    def note_motion(self, s, least, most):
+        """Nothing to note."""
+
+    @ti.func
+    def refresh(self, s, low, high):
         """Nothing to refresh."""
 
     @ti.func
@@ -55,12 +66,46 @@ class AllPairs:
         return False
 
     @ti.func
-    def each_pair(self, s, contact, visit: ti.template()):
-        """Call visit(i, j, contact) for every pair of scene s."""
+    def find(self, s, reach):
+        """Find the pairs that touch: the list that they are in, and their number.
+
+        Where they are more than there is room for, spheres lie in each other by far.
+        """
+        count = 0
+        self.each_listed_pair(s, reach, self._find, count)
+        return TOUCHING, count
+
+    @ti.func
+    def _find(self, s, i, j, reach, count: ti.template()):
+        branch = self.bodies.position[j] - self.bodies.position[i]
+        if branch.norm_sqr() < reach * reach and count < self.places:
+            self.pair[s, TOUCHING, count] = ti.Vector([i, j])
+            count = count + 1
+
+    @ti.func
+    def each_listed_pair(self, s, contact, visit: ti.template(), count: ti.template()):
+        """Call visit(s, i, j, contact, count) for every pair of scene s."""
         first, last = self.bodies.first(s), self.bodies.last(s)
         for i in range(first, last):
             for j in range(i + 1, last):
-                visit(i, j, contact)
+                visit(s, i, j, contact, count)
+
+    @ti.func
+    def audit(self, s, step, low, high, reach):
+        """Nothing was skipped."""
+
+    def found(self) -> None:
+        """No audit."""
+
+    @ti.func
+    def wall_count(self, s):
+        """Number of the spheres that are tested against the walls: all."""
+        return self.table.particles[s]
+
+    @ti.func
+    def wall_sphere(self, s, k):
+        """The k-th of them."""
+        return self.bodies.first(s) + k
 
 
 @ti.data_oriented
@@ -72,11 +117,8 @@ class CellList:
     back to pair_first. travel: by how much two spheres may have come nearer since the search [m].
     """
 
-    tracks_motion = True
-
-    def bind(self, bodies: Any) -> None:
-        """Allocate cells and list for all scenes."""
-        self.bodies, table = bodies, bodies.table
+    def __init__(self, table: SceneFields, bodies: Bodies):
+        self.bodies = bodies
         # A cell is larger than a sphere: there are no more of them.
         self.cell_stride, self.list_stride = table.length("spheres"), table.length("pairs")
         self.grid = Grid.field(shape=())
@@ -118,18 +160,23 @@ class CellList:
         return self.full[s] > 0
 
     @ti.func
-    def each_pair(self, s, contact, visit: ti.template()):
-        """Call visit(i, j, contact) for every pair of scene s that may touch."""
+    def each_pair(self, s, contact, visit: ti.template(), count: ti.template()):
+        """Call visit(s, i, j, contact, count) for every pair of scene s that may touch."""
         for k in range(self.pair_first[s], self._list_end(s)):
             near = self.pair[k]
-            visit(near[0], near[1], contact)
+            visit(s, near[0], near[1], contact, count)
 
     @ti.func
     def refresh(self, s):
-        """Renew the list if spheres may have crossed the skin; "not" includes NaN."""
-        if not (self.travel[s] < self.grid[None].skin):
+        """Renew the list if spheres may have crossed the skin; returns whether it did.
+
+        "not" includes NaN.
+        """
+        used_up = not (self.travel[s] < self.grid[None].skin)
+        if used_up:
             self._search(s)
             self.travel[s] = 0.0
+        return used_up
 
     @ti.func
     def _search(self, s):
@@ -187,9 +234,6 @@ class CellList:
                 k += 1
             self.pair[k - 1] = ti.Vector([i, j])
         return new
-
-
-SEARCHES = {"cells": CellList, "all_pairs": AllPairs}
 
 
 def skin_of(options: Any) -> float:

@@ -11,6 +11,7 @@ from ca_damper.steady_state import (
     batch_means,
     correlation,
     mean_and_error,
+    period,
     steady_part,
 )
 from taichi_dem.kit.accuracy.student import t_quantile
@@ -144,3 +145,20 @@ def test_batches_leave_the_first_values_over():
     means, length = batch_means(np.arange(10.0), 3)
     assert length == 3 and means.tolist() == [2.0, 5.0, 8.0]
     assert correlation(np.ones(9)) == 0.0 and correlation(np.arange(50.0)) == 0.98
+
+
+@pytest.mark.parametrize("cycles", [1, 2, 3, 6])
+def test_a_periodic_series_is_seen_with_its_period(cycles):
+    values = np.exp(1j * np.arange(cycles)) + 2.0
+    series = np.tile(values, 20)[:20]
+    assert period(series, 1e-9) == cycles
+    # A difference in a single cycle, twice what is allowed, is enough.
+    series[7] += 2e-3 * np.abs(series).max()
+    assert period(series, 1e-3) == 0
+
+
+def test_fewer_than_three_periods_show_none():
+    assert period(np.tile([1.0, 2.0, 3.0, 5.0], 5)[:11], 1e-9) == 0
+    assert period(np.array([1.0, 1.0]), 0.0) == 1
+    assert period(np.array([1.0, 1.1]), 1e-3) == 0
+    assert period(np.zeros(5), 1e-3) == 1

@@ -82,7 +82,10 @@ def members_asked(path, owner):
 
 @pytest.mark.parametrize(
     ("owner", "contract", "optional"),
-    [("filling", Filling, {"structure"}), ("device", DeviceFilling, {"load"})],
+    [
+        ("filling", Filling, {"structure", "activated"}),
+        ("device", DeviceFilling, {"load", "first_steps", "audit"}),
+    ],
 )
 def test_the_package_asks_for_no_more_than_the_contract_has(owner, contract, optional):
     folders = (PACKAGE, PACKAGE / "engine", PACKAGE / "scenes")

@@ -41,6 +41,7 @@ def test_response_of_two_harmonics_and_a_mean():
     assert cycles.rms == pytest.approx(math.sqrt((4.0 + 0.25) / 2.0), rel=1e-13)
     assert cycles.mean == pytest.approx(0.4, rel=1e-13)
     assert cycles.harmonic("x") == pytest.approx(2.0 * np.exp(0.3j), rel=1e-13)
+    assert cycles.harmonic_by_cycle("x").mean(axis=1) == pytest.approx(cycles.harmonic("x"))
     assert cycles.energy == pytest.approx(4.5)
 
 

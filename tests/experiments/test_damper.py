@@ -168,6 +168,10 @@ def test_demo_damps(shown):
     assert figures["amplitude_left"] < 0.6
     first = rows_of(folder / "motion.csv")[0]
     assert float(first["x_mm"]) == pytest.approx(float(first["x_empty_mm"]), abs=1e-12)
+    certificate = json.loads((folder / "summary.json").read_text())["certificate"]
+    assert certificate["effects"] == "auto"
+    acted = {one["effect"] for one in certificate["onsets"] if one["since_s"] is not None}
+    assert acted == {"pairs", "landing", "ejection", "static contact"}
 
 
 @pytest.mark.slow
@@ -315,6 +319,7 @@ BAD_OPTIONS = [
     ("demo_damper", ("--particles", "161"), ("--particles", "'161'", "0 to 160")),
     ("demo_damper", ("--particles", "-1"), ("--particles", "'-1'")),
     ("demo_damper", ("--filling", "dust"), ("--filling", "dust", "spheres")),
+    ("demo_damper", ("--effects", "some"), ("--effects", "some", "listed, auto")),
     ("demo_damper", ("--frequency", "inf"), ("--frequency", "'inf'")),
     ("demo_damper", ("--amplitude", "0"), ("--amplitude", "'0'", "(0, 10)")),
     ("demo_damper", ("--dt", "2e-3"), ("dt", "0.0012")),

@@ -42,13 +42,14 @@ LAYERS = {
     "ca_damper": (
         (
             *("errors", "random_numbers", "progress", "measures", "report", "contracts"),
-            "steady_state",
+            *("certificate", "steady_state"),
         ),
         ("rk45", "oscillator", "record", "checks", "bouncing"),
         ("scenes",),
         ("filling", "lattice"),
         ("fixed_mass", "automaton", "spheres"),
         ("engine",),
+        ("activation",),
         ("batch", "needed_effects"),
         ("plot",),
         ("response",),

@@ -1,0 +1,132 @@
+"""Certificate of a run: when effects first acted, what was left out, what an audit found."""
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any, Optional
+
+from taichi_dem.kit.audit import Audit
+from taichi_dem.kit.display import counted, in_brief
+
+#: Words for which effects of a filling are computed: those that its options list, or those that an
+#: estimate before the run calls for.
+EFFECTS = ("listed", "auto")
+#: Verdicts of an estimate.
+NEGLIGIBLE, UNCLEAR, NEEDED = "negligible", "unclear", "needed"
+#: Shares below which an effect is negligible, and from which on it is needed.
+_NEGLIGIBLE, _NEEDED = 1e-3, 1e-2
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Size of an effect, estimated before a run.
+
+    share: at most this much of ``whole``, in words; 0 is exact. reason: where it comes from.
+    verdict: "negligible", "unclear" or "needed"; what is unclear is computed.
+    """
+
+    effect: str
+    share: float
+    whole: str
+    reason: str
+
+    @property
+    def verdict(self) -> str:
+        """What the share means."""
+        if self.share < _NEGLIGIBLE:
+            return NEGLIGIBLE
+        return NEEDED if self.share >= _NEEDED else UNCLEAR
+
+    def as_dict(self) -> dict[str, Any]:
+        """All figures, for a JSON file."""
+        return {**asdict(self), "verdict": self.verdict}
+
+    def __str__(self) -> str:
+        size = (
+            f"at most {100.0 * self.share:.2g} % of {self.whole}" if self.share else "exactly none"
+        )
+        return f"{self.verdict}, {size}: {self.reason}"
+
+
+@dataclass(frozen=True)
+class Onset:
+    """Scenes in which an effect acted, and the time when it first did [s]; None if it never did."""
+
+    effect: str
+    scenes: int
+    since_s: Optional[float]
+
+    def __str__(self) -> str:
+        if self.since_s is None:
+            return f"{self.effect}: never acted"
+        return f"{self.effect}: in {counted(self.scenes, 'scene')} from {self.since_s:.4g} s"
+
+
+@dataclass(frozen=True)
+class Periods:
+    """Scenes in a periodic state, in which all measured cycles are alike.
+
+    cycles: measured. tolerance: largest difference of the motion of cycles, a share of it. scenes:
+    number for each period in cycles, (period, scenes); others: scenes without one.
+    """
+
+    cycles: int
+    tolerance: float
+    scenes: tuple[tuple[int, int], ...]
+    others: int
+
+    def __str__(self) -> str:
+        test = f"first harmonic of {self.cycles} cycles within {100.0 * self.tolerance:.2g} %"
+        every = {p: "every cycle" if p == 1 else f"every {p} cycles" for p, _ in self.scenes}
+        found = [f"{counted(n, 'scene')} {every[p]}" for p, n in self.scenes]
+        return f"{', '.join(found) or 'none'}, {self.others} not periodic ({test})"
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """What was computed, what was left out, and how that is known.
+
+    effects: "listed" or "auto". scenes: of the run. onsets: an Onset for each effect that was
+    computed, as far as a filling says when it acted. left_out: an Estimate for each effect that was
+    not computed. estimates: for those that "auto" decided on. audit: of contact tests that were
+    skipped; None where none are. periods: None where fewer than two cycles were measured.
+    """
+
+    effects: str
+    scenes: int
+    onsets: tuple[Onset, ...] = ()
+    left_out: tuple[Estimate, ...] = ()
+    estimates: tuple[Estimate, ...] = ()
+    audit: Optional[Audit] = None
+    periods: Optional[Periods] = None
+
+    def rows(self) -> list[tuple[str, str]]:
+        """(name, text) of each line of a report."""
+        found = [("acted", str(one)) for one in self.onsets]
+        found += [("left out", f"{one.effect}, {one}") for one in self.left_out]
+        found += [("estimated", f"{one.effect}, {one}") for one in self.estimates]
+        audit = self.audit if self.audit is not None and self.audit.skipped else None
+        found += [("audit", str(audit))] if audit else []
+        found += [("periodic", str(self.periods))] if self.periods is not None else []
+        return found
+
+    def as_dict(self) -> dict[str, Any]:
+        """All figures, for a JSON file."""
+        figures = asdict(self)
+        for name in ("left_out", "estimates"):
+            figures[name] = [one.as_dict() for one in getattr(self, name)]
+        figures["audit"] = None if self.audit is None else self.audit.as_dict()
+        return figures
+
+    def __str__(self) -> str:
+        """A line for each finding."""
+        first = ("effects", f"{self.effects}, {counted(self.scenes, 'scene')}")
+        return "\n".join(f"{name:10s} {text}" for name, text in [first, *self.rows()])
+
+    def __repr__(self) -> str:
+        return in_brief(self, self.effects, *(f"{name} {text}" for name, text in self.rows()))
+
+
+def onset(effect: str, times: Any) -> Onset:
+    """Onset of an effect from the times when it first acted, infinite where it never did [s]."""
+    acted = [float(time) for time in times if math.isfinite(time)]
+    return Onset(effect, len(acted), min(acted) if acted else None)

@@ -1,0 +1,251 @@
+"""Expected contacts: pairs and spheres at walls that may touch before a lower bound of the time.
+
+All others need no test until the spheres have come nearer to each other, or to a wall, by a
+margin. How much nearer is summed from what moved in each step: the spread of the velocities of the
+spheres, and the floor. So it holds whatever moves them: gravity, contacts, a given motion.
+
+An audit makes all tests of some spheres in some steps, chosen by a counter so that it is one in
+about a thousand of all tests, and counts the contacts that the lists lack. It changes nothing else.
+"""
+
+from typing import Any
+
+import taichi as ti
+
+from ca_damper.random_numbers import bits, stream
+from ca_damper.scenes.scene_fields import SceneFields
+from ca_damper.spheres.bodies import Bodies, vec2
+from ca_damper.spheres.search import EXPECTED, TOUCHING, AllPairs, CellList
+from taichi_dem.kit.audit import Audit
+
+vec2i = ti.types.vector(2, ti.i32)
+
+#: Steps that the lists are to serve at the present velocities.
+_STEPS = 32.0
+#: Narrowest margin as a share of the widest, the skin of the search.
+_NARROWEST = 1e-3
+#: What rounding may add up to, as a share of the radius: that of 1e8 steps and more.
+_ROUNDING = 1e-6
+# Pairs are not tested where more than two thirds of those listed touch.
+_NEARLY_ALL = 3
+# Purpose of the random numbers that choose what is audited.
+_AUDIT = 7
+# Steps of which one may have a sphere audited, and the chance of that for each sphere of the scene,
+# in units of 2^-32: as a pair is tested with either of its spheres, that is one test of a pair in
+# 1024. Beyond so many spheres the chance grows no further: all tests of a sphere would cost a
+# growing share of a step.
+_AUDIT_EVERY, _CHANCE, _MOST_CHOSEN = 8, 2**24, 128
+
+
+@ti.data_oriented
+class ExpectedContacts:
+    """Lists of the pairs and of the spheres at walls that are tested in every step.
+
+    pair, pair_count; sphere, sphere_count: the lists; pair[s, EXPECTED] is that of a scene, and
+    pair[s, TOUCHING] has places for those of them that touch in a step. most_touch: whether nearly
+    all of them do, so that they are evaluated without a test. margin: how far apart two spheres,
+    and a sphere and a wall, are listed [m]. nearer: by how much they may have come nearer since
+    [m]. least, most: bounds of the way of the spheres in the last step [m]. floor: where the floor
+    was then [m]. tightness: share of the margin that is listed, 1 but in tests of the audit.
+    unlisted: pairs and spheres that are not listed. skipped, audited, misses: tests not needed,
+    made all the same, and contacts that these found.
+    """
+
+    def __init__(self, table: SceneFields, bodies: Bodies):
+        self.table, self.bodies, self.cells = table, bodies, CellList(table, bodies)
+        self.pair = table.vector(2, ti.i32, 2, "pairs")
+        self.sphere = table.field(ti.i32, "spheres")
+        for name in ("pair_count", "sphere_count", "most_touch"):
+            setattr(self, name, table.field(ti.i32))
+        self.floor = table.field(ti.f64)
+        for name in ("margin", "nearer", "least", "most"):
+            setattr(self, name, table.vector(2, ti.f64))
+        for name in ("unlisted", "skipped", "audited", "misses"):
+            setattr(self, name, table.field(ti.i64))
+        self.tightness = ti.field(ti.f64, shape=())
+
+    def load(self, options: Any) -> None:
+        """Write the numbers of the search to the device."""
+        self.cells.load(options)
+        self.tighten(1.0)
+
+    @ti.kernel
+    def tighten(self, share: ti.f64):
+        """List a share of what has to be listed: a fault, for tests of the audit."""
+        self.tightness[None] = share
+
+    @ti.func
+    def clear(self, s):
+        """Nothing has been skipped yet."""
+        for field in ti.static((self.skipped, self.audited, self.misses)):
+            field[s] = ti.cast(0, ti.i64)
+        self.pair_count[s], self.sphere_count[s] = 0, 0
+
+    @ti.func
+    def forget(self, s):
+        """Empty the lists of scene s; the next refresh renews them."""
+        self.cells.forget(s)
+        self.nearer[s], self.margin[s] = vec2(0.0), vec2(0.0)
+        self.least[s], self.most[s] = vec2(0.0), vec2(0.0)
+
+    @ti.func
+    def note_motion(self, s, least, most):
+        """Note between which bounds the spheres have moved in a step [m]."""
+        self.least[s], self.most[s] = least, most
+
+    @ti.func
+    def refresh(self, s, low, high):
+        """Renew the lists if they may lack a contact; low, high: where spheres touch walls [m]."""
+        drift = vec2(0.0, low[1] - self.floor[s])
+        least, most = self.least[s], self.most[s]
+        way = vec2((most - least).norm(), ti.max(drift - least, most - drift).max())
+        nearer, margin = self.nearer[s] + way, self.margin[s]
+        self.cells.moved(s, way[0])
+        if self.cells.refresh(s) or not (nearer[0] < margin[0]):
+            margin[0], nearer[0] = self._margin(way[0]), 0.0
+            self._list_pairs(s, margin[0])
+            self._count_unlisted(s)
+        if not (nearer[1] < margin[1]):
+            margin[1], nearer[1] = self._margin(way[1]), 0.0
+            self._list_spheres(s, low + self._reach(margin[1]), high - self._reach(margin[1]))
+            self._count_unlisted(s)
+        self.margin[s] = margin
+        self.nearer[s], self.floor[s] = nearer, low[1]
+
+    @ti.func
+    def _count_unlisted(self, s):
+        count = ti.cast(self.table.particles[s], ti.i64)
+        tests = count * (count - 1) // 2 + count
+        self.unlisted[s] = tests - self.pair_count[s] - self.sphere_count[s]
+
+    @ti.func
+    def _margin(self, way):
+        """How far apart to list [m], for a way in a step [m]."""
+        skin = self.cells.grid[None].skin
+        return ti.max(_NARROWEST * skin, ti.min(_STEPS * way, skin))
+
+    @ti.func
+    def _reach(self, margin):
+        """A margin with what rounding may add up to; the lists hold less in tests of the audit."""
+        return self.tightness[None] * margin + _ROUNDING * self.bodies.body[None].radius
+
+    @ti.func
+    def _list_pairs(self, s, margin):
+        """List pairs that may touch before they come nearer by a margin [m]."""
+        reach, count = 2.0 * self.bodies.body[None].radius, vec2i(0)
+        self.cells.each_pair(s, vec2(reach, reach + self._reach(margin)), self._list_pair, count)
+        self.pair_count[s] = count[0]
+        self.most_touch[s] = ti.cast(_NEARLY_ALL * count[1] > (_NEARLY_ALL - 1) * count[0], ti.i32)
+
+    @ti.func
+    def _list_spheres(self, s, low, high):
+        """List spheres beyond places near a wall [m]."""
+        count = 0
+        for i in range(self.bodies.first(s), self.bodies.last(s)):
+            place = self.bodies.position[i]
+            if (place < low).any() or (place > high).any():
+                self.sphere[s, count] = i
+                count += 1
+        self.sphere_count[s] = count
+
+    @ti.func
+    def crowded(self, s):
+        """Whether more spheres lay near each other than spheres that do not interpenetrate can."""
+        return self.cells.crowded(s)
+
+    @ti.func
+    def _list_pair(self, s, i, j, reach, count: ti.template()):
+        """List a pair nearer than reach[1]; count those, and those nearer than reach[0]."""
+        square = (self.bodies.position[j] - self.bodies.position[i]).norm_sqr()
+        if square < reach[1] * reach[1]:
+            self.pair[s, EXPECTED, count[0]] = ti.Vector([i, j])
+            count = count + vec2i(1, ti.cast(square < reach[0] * reach[0], ti.i32))
+
+    @ti.func
+    def find(self, s, reach):
+        """Find the pairs that are to be evaluated: the list that they are in, and their number.
+
+        All that touch, at a distance below reach [m], are among them.
+        """
+        which, count = EXPECTED, self.pair_count[s]
+        if self.most_touch[s] == 0:
+            which, count = TOUCHING, 0
+            for k in range(self.pair_count[s]):
+                pair = self.pair[s, EXPECTED, k]
+                branch = self.bodies.position[pair[1]] - self.bodies.position[pair[0]]
+                if branch.norm_sqr() < reach * reach:
+                    self.pair[s, TOUCHING, count] = pair
+                    count += 1
+        return which, count
+
+    @ti.func
+    def each_listed_pair(self, s, contact, visit: ti.template(), count: ti.template()):
+        """Call visit(s, i, j, contact, count) for every pair that was near at the last search."""
+        self.cells.each_pair(s, contact, visit, count)
+
+    @ti.func
+    def audit(self, s, step, low, high, reach):
+        """Count the tests that a step skips; of a sphere that a counter chooses, make them all.
+
+        reach: distance at which two spheres touch [m].
+        """
+        self.skipped[s] = self.skipped[s] + self.unlisted[s]
+        if step % _AUDIT_EVERY == 0:
+            shared = stream(self.table.seed[s], step)
+            count = ti.cast(self.table.particles[s], ti.u32)
+            if bits(shared, 0, _AUDIT) < ti.min(count, _MOST_CHOSEN) * ti.u32(_CHANCE):
+                chosen = ti.cast(bits(shared, 1, _AUDIT) % count, ti.i32)
+                self._audit(s, self.bodies.first(s) + chosen, low, high, reach * reach)
+
+    @ti.func
+    def _audit(self, s, i, low, high, square):
+        """Make all tests of sphere i; a contact that no list holds is a miss."""
+        tests, contacts = self.table.particles[s], self._is_at_wall(i, low, high)
+        for j in range(self.bodies.first(s), self.bodies.last(s)):
+            if j != i:
+                contacts += self._touching(i, j, square)
+        for k in range(self.pair_count[s]):
+            pair = self.pair[s, EXPECTED, k]
+            if pair[0] == i or pair[1] == i:
+                tests -= 1
+                contacts -= self._touching(pair[0], pair[1], square)
+        for k in range(self.wall_count(s)):
+            if self.wall_sphere(s, k) == i:
+                tests -= 1
+                contacts -= self._is_at_wall(i, low, high)
+        self.audited[s] = self.audited[s] + tests
+        self.misses[s] = self.misses[s] + contacts
+
+    @ti.func
+    def _touching(self, i, j, square):
+        """1 for two spheres that touch, else 0; square: of the distance at which they do [m^2]."""
+        return ti.cast(
+            (self.bodies.position[j] - self.bodies.position[i]).norm_sqr() < square, ti.i32
+        )
+
+    @ti.func
+    def _is_at_wall(self, i, low, high):
+        """1 for a sphere that touches a wall, else 0."""
+        place = self.bodies.position[i]
+        return ti.cast((place < low).any() or (place > high).any(), ti.i32)
+
+    @ti.func
+    def wall_count(self, s):
+        """Number of the spheres that are expected to touch a wall."""
+        return self.sphere_count[s]
+
+    @ti.func
+    def wall_sphere(self, s, k):
+        """The k-th of them."""
+        return self.sphere[s, k]
+
+    def found(self) -> Audit:
+        """Outcome of the audit, over all scenes since their start."""
+        skipped, audited, misses = (
+            int(self.table.in_use(one).sum()) for one in (self.skipped, self.audited, self.misses)
+        )
+        return Audit(skipped, audited, misses, "contact tests")
+
+
+#: What is tested for contact, by the name of the search.
+SEARCHES = {"cells": ExpectedContacts, "all_pairs": AllPairs}

@@ -1,0 +1,107 @@
+"""Forces of two spheres on each other: who touches, eight contacts at a time, added one by one.
+
+Arithmetic of vectors is one instruction for two to eight numbers, and rounds as that of single
+numbers does: roots and divisions, which take most of the time of a contact, cost half. Forces are
+added in the order of the pairs, so that no bit depends on which contacts are evaluated together.
+"""
+
+from typing import Any
+
+import taichi as ti
+
+from ca_damper.scenes.scene_fields import SceneFields
+from ca_damper.spheres.bodies import Bodies, vec2
+from ca_damper.spheres.contact_law import ContactLaw
+
+#: Contacts that are evaluated together.
+LANES = 8
+
+
+@ti.data_oriented
+class PairForces:
+    """Contacts of two spheres in the present step, by scene.
+
+    pair: lists of pairs, of the search. force_x, force_y: of a vector of contacts, on their first
+    spheres [N]; torque: on both [N m]. rubs: whether there is friction.
+    """
+
+    scratch_fields = ("force_x", "force_y", "torque")
+
+    def __init__(
+        self,
+        table: SceneFields,
+        bodies: Bodies,
+        search: Any,
+        law: ContactLaw,
+        rotation: Any,
+        rubs: bool,
+    ):
+        self.bodies, self.law, self.rotation, self.rubs = bodies, law, rotation, rubs
+        self.turns = rubs and rotation.turns
+        self.pair = search.pair
+        for name in self.scratch_fields:
+            setattr(self, name, ti.Vector.field(LANES, ti.f64, shape=table.capacity))
+
+    @ti.func
+    def add(self, s, contact, which, count):
+        """Add the forces of so many pairs of a list; those that do not touch add nothing."""
+        for vector in range((count + LANES - 1) // LANES):
+            first = LANES * vector
+            pairs = [
+                self.pair[s, which, ti.min(first + k, count - 1)] for k in ti.static(range(LANES))
+            ]
+            self._evaluate(s, contact, pairs)
+            for lane in ti.static(range(LANES)):
+                if first + lane < count:
+                    self._push(s, pairs[lane], lane)
+
+    @ti.func
+    def _push(self, s, pair, lane: ti.template()):
+        """Add the force of a contact to both spheres."""
+        force = vec2(self.force_x[s][lane], self.force_y[s][lane])
+        self.bodies.push(pair[0], force)
+        self.bodies.push(pair[1], -force)
+        if ti.static(self.turns):
+            self.rotation.twist(pair[0], self.torque[s][lane])
+            self.rotation.twist(pair[1], self.torque[s][lane])
+
+    @ti.func
+    def _evaluate(self, s, contact, pairs: ti.template()):
+        """Forces of a vector of contacts; lanes beyond the last one repeat it."""
+        bx, by = self._differences(self.bodies.position, pairs, 1, 0)
+        rx, ry = self._differences(self.bodies.velocity, pairs, 0, 1)
+        square = bx * bx + by * by
+        touch, distance = square < contact.reach * contact.reach, ti.sqrt(square)
+        share = 1.0 / distance
+        nx, ny = bx * share, by * share
+        push = self.law.normal(contact, contact.reach - distance, rx * nx + ry * ny)
+        fx, fy = -push * nx, -push * ny
+        if ti.static(self.rubs):
+            slip, lever = ry * nx - rx * ny, 0.5 * distance
+            if ti.static(self.turns):
+                slip += lever * self._spins(pairs)
+            drag = self.law.friction(contact, push, slip)
+            fx, fy = fx - drag * ny, fy + drag * nx
+            if ti.static(self.turns):
+                self.torque[s] = ti.select(touch, lever * drag, 0.0)
+        self.force_x[s], self.force_y[s] = ti.select(touch, fx, 0.0), ti.select(touch, fy, 0.0)
+
+    @ti.func
+    def _differences(
+        self, field: ti.template(), pairs: ti.template(), a: ti.template(), b: ti.template()
+    ):
+        """Components of field[pair[a]] - field[pair[b]], a vector each."""
+        found = [field[pairs[k][a]] - field[pairs[k][b]] for k in ti.static(range(LANES))]
+        x = ti.Vector([found[k][0] for k in ti.static(range(LANES))])
+        y = ti.Vector([found[k][1] for k in ti.static(range(LANES))])
+        return x, y
+
+    @ti.func
+    def _spins(self, pairs: ti.template()):
+        """Sum of the spins of both spheres [rad/s]."""
+        return ti.Vector(
+            [
+                self.rotation.spin[pairs[k][0]] + self.rotation.spin[pairs[k][1]]
+                for k in ti.static(range(LANES))
+            ]
+        )
