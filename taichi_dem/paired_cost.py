@@ -14,6 +14,7 @@ import numpy as np
 
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.checkpoint import identity_of
+from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.field_memory import FieldMemory
 from taichi_dem.kit.study.paired_timing import PairedTiming, paired_timing
@@ -40,6 +41,9 @@ class RunState:
     time_s: float
     contact: str
     arrays: dict[str, np.ndarray]
+
+    def __repr__(self):
+        return by_fields(self)
 
 
 @dataclass(frozen=True)

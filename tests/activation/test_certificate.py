@@ -88,7 +88,7 @@ def test_without_sleep_nobody_sleeps():
 
 
 def test_a_scene_that_lists_its_effects_has_no_certificate():
-    listed = replace(pulled(), effects=list(pulled().effects), sleep=None)
+    listed = replace(pulled(), effects=list(pulled().effects), loads=(), sleep=None)
     found = simulate(listed, until=1e-5, method=METHOD)
     assert found.certificate is None and found.acting_since == {}
     assert found.report.as_dict()["certificate"] is None

@@ -39,7 +39,7 @@ def test_the_blast_runs_and_leaves_what_the_page_says(tmp_path):
     # The cell values that docs/paraview.md lists are those of the last snapshot.
     last = meshio.read(sorted((mine / "paraview").glob("*.vtu"))[-1])
     page = words("docs/paraview.md")
-    assert len(last.cell_data) == 6
+    assert len(last.cell_data) == 6 + 2 * 5
     assert all(name in page for name in last.cell_data)
 
 

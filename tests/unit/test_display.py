@@ -83,7 +83,7 @@ def of_the_damper():
     yield from (response, response.report, ca_damper.Sweep(response, response), batch, batch.table)
     yield from (film, film.frames[0][0], cycles, ca_damper.needed_effects(response))
     yield from (rk45.solve(lambda t, y: -y, (0.0, 1.0), [1.0]), ca_damper.Progress(0.5, 1.0))
-    yield ca_damper.ProgressBar("work")
+    yield from (ca_damper.ProgressBar("work"), response.report.certificate)
 
 
 def of_questions():

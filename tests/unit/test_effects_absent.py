@@ -73,7 +73,7 @@ state += [(1, 1, wide), (1, 1, whole), (1, 1)]
 # Of three active lists that of contacts has but one place.
 due = [(k, 1, whole) for size in (n, b, 1) for k in (size, size, size, 22)]
 clock = [(21, 1), *due, *[(1, 1, whole)] * 4, (2 * n + 2 * b + 1, 1, whole), (1, 1, whole)]
-clock += [(5, 1, wide)]
+clock += [(6, 1, wide)]
 
 def bytes_by_hand():
     before = field_bytes()

@@ -148,6 +148,7 @@ def ring(count, uniform, levels):
         faces[[first, second]] = b
         others[[first, second]] = second // 4, first // 4
     tables = SimpleNamespace(
+        on_demand=False,
         capacity=SimpleNamespace(bodies=count, bonds=count),
         body_count=filled(ti.i32, np.array(count)),
         bond_count=filled(ti.i32, np.array(count)),
