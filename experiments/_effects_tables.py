@@ -179,7 +179,8 @@ def why_dearer(name, row, complete, sign):
         for name in COUNTS
         if row.get(name) is not None
     ]
-    reasons = [WHY[name]] * (name in WHY) + [f"a step has {', '.join(counted)}"] * bool(counted)
+    reasons = [WHY[known] for known in (name,) if known in WHY]
+    reasons += [f"a step has {', '.join(counted)}"] * bool(counted)
     ends = f"{-cost:.1f} % ({-most:.1f} to {-least:.1f})"
     return ": ".join([f"{name}: a step {how}, {ends}", *["; ".join(reasons)] * bool(reasons)])
 

@@ -39,3 +39,13 @@ def test_no_number_is_changed_and_the_interval_is_drawn(axes):
     drawn = [tuple(line.get_xdata()) for line in axes.lines[:4]]
     assert np.allclose(drawn, [(-1.2, 0.6), (17.0, 33.0), (-30.0, -8.0), (7.0, 21.0)])
     assert axes.get_yticklabels()[3].get_text() == "some effect\n(added)"
+
+
+@pytest.mark.parametrize("name", ["friction of spheres", "static contact", "softening"])
+def test_a_negative_price_is_told_with_its_reason_or_without(script, name):
+    """Which effects have one is known only once they are measured."""
+    row = dict(zip(("spared_percent", "spared_least_percent", "spared_most_percent"), (-3, -4, -2)))
+    tables = script("_effects_tables")
+    words = tables.why_dearer(name, row, row, 1.0)
+    assert words.startswith(f"{name}: a step without it takes more, 3.0 % (2.0 to 4.0)")
+    assert words.endswith(tables.WHY.get(name, "(2.0 to 4.0)"))
