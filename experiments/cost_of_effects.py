@@ -111,7 +111,9 @@ def run(options):
     show_lists(listed)
     auto = study.call_in_process(certificate, until=options.certified, step=STEPS["blast"])
     compiling = sum(found[0].get("compile_s", 0.0) for found in results.values())
-    figures = {**figures_of(tables, elastic), **overhead_of_auto(listed), **auto}
+    figures = {**figures_of(tables, elastic), **overhead_of_auto(listed)}
+    # What comes from another process has lists for tuples.
+    figures.update({key: tuple(found) for key, found in auto.items()})
     study.finish(options, NAME, figures, compiling)
 
 
