@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 
+from taichi_dem.kit import runtime
 from tests.activation.late_scenes import METHOD, late_scene, scene_of, simulation
 
 #: Role of an effect by its name.
@@ -58,7 +59,11 @@ def acting(simulation):
     return found
 
 
-@cache
 def run(name, word="auto", needed=True, **options):
-    """A run, made once."""
+    """A run, made once in each Taichi session: its fields end with the session."""
+    return _made_in(runtime.session(), name, word, needed, **options)
+
+
+@cache
+def _made_in(_, name, word, needed, **options):
     return Run(name, word, needed, **options)
