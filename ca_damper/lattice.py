@@ -107,10 +107,12 @@ class LatticeSize:
 class Lattice:
     """The tables of a geometry on the device, with room for others.
 
-    size: a LatticeSize, shape ().
+    size: a LatticeSize, shape (). level: height of a cell's centre above the floor of the lower
+    columns, in cells. bottom: lowest cell of its column, a wall. raised: whether that column stands
+    half a cell higher.
     """
 
-    constant_fields = ("size", "neighbour", "blank", "cosine")
+    constant_fields = ("size", "neighbour", "blank", "cosine", "level", "bottom", "raised")
 
     def __init__(self, table: SceneFields):
         most = table.length("cells")
@@ -118,6 +120,8 @@ class Lattice:
         self.neighbour = ti.field(ti.i16, shape=(most, KINDS))
         self.blank = ti.field(ti.i8, shape=most)
         self.cosine = ti.field(ti.f64, shape=(KINDS, DIRECTIONS))
+        self.level = ti.field(ti.f64, shape=most)
+        self.bottom, self.raised = ti.field(ti.i16, shape=most), ti.field(ti.i8, shape=most)
 
     def load(self, geometry: Geometry) -> None:
         """Take over the tables of a geometry."""
@@ -142,6 +146,11 @@ class Lattice:
     @ti.kernel
     def _load(self, neighbours: _TABLE, blank: _TABLE, cosines: _COSINES):
         for cell in range(blank.shape[0]):
+            height = self.size[None].height
+            column, row = cell // height, cell % height
+            self.level[cell] = row - 0.5 + 0.5 * (column % 2)
+            self.bottom[cell] = ti.cast(cell - row, ti.i16)
+            self.raised[cell] = ti.cast(column % 2, ti.i8)
             self.blank[cell] = ti.cast(blank[cell, 0], ti.i8)
             for kind in range(KINDS):
                 self.neighbour[cell, kind] = ti.cast(neighbours[cell, kind], ti.i16)
@@ -162,6 +171,17 @@ class Lattice:
     def row_count(self):
         """Number of rows inside the walls."""
         return self.size[None].rows
+
+    @ti.func
+    def column_height(self):
+        """Number of cells of a column, walls included."""
+        return self.size[None].height
+
+    @ti.func
+    def nearest_row(self, base, height):
+        """Row nearest to a height [cells] in the column whose lowest cell, a wall, is ``base``."""
+        row = ti.cast(ti.floor(height - self.height_of(base + 1) + 0.5), ti.i32)
+        return ti.math.clamp(row, 0, self.size[None].rows - 1)
 
     @ti.func
     def first(self):
@@ -191,8 +211,12 @@ class Lattice:
     @ti.func
     def height_of(self, cell):
         """Height of a cell's centre above the floor of the lower columns, in cells."""
-        height = self.size[None].height
-        return cell % height - 0.5 + 0.5 * ((cell // height) % 2)
+        return self.level[cell]
+
+    @ti.func
+    def column_beside(self, cell, way):
+        """Lowest cell of the column to the right (way 1) or left (-1) of a cell, a wall."""
+        return ti.cast(self.bottom[cell], ti.i32) + way * self.size[None].height
 
     @ti.func
     def in_side_wall(self, cell):

@@ -9,7 +9,7 @@ import taichi as ti
 
 # Purposes in use; a purpose of its own keeps two decisions of one cell apart.
 PURPOSES = 8
-START, MOVE, EVENT, DEFLECT = range(4)
+START, MOVE, EVENT, DEFLECT, HOP, SIDE, GLANCE, LINE = range(8)
 
 
 @ti.func

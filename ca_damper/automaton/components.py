@@ -22,11 +22,13 @@ class Parameters:
     """Parameters that kernels read; in fields, so that another value compiles nothing.
 
     width of a cell [m], mass of a particle [kg], gravity [m/s^2], restitution of particle and wall;
-    threshold of static contact in units of g dt.
+    threshold of static contact in units of g dt; friction of two particles, and wall_friction.
     """
 
     def __init__(self):
         for name in ("width", "mass", "gravity", "particle", "wall", "threshold"):
+            setattr(self, name, ti.field(ti.f64, shape=()))
+        for name in ("friction", "wall_friction"):
             setattr(self, name, ti.field(ti.f64, shape=()))
 
     def load(self, options: Any) -> None:
@@ -35,6 +37,7 @@ class Parameters:
         self._load_collisions(
             options.restitution, options.wall_restitution, options.static_threshold
         )
+        self._load_friction(*options.frictions)
 
     @ti.kernel
     def _load(self, width: ti.f64, mass: ti.f64, gravity: ti.f64):
@@ -44,6 +47,10 @@ class Parameters:
     def _load_collisions(self, particle: ti.f64, wall: ti.f64, threshold: ti.f64):
         self.particle[None], self.wall[None] = particle, wall
         self.threshold[None] = threshold
+
+    @ti.kernel
+    def _load_friction(self, friction: ti.f64, wall_friction: ti.f64):
+        self.friction[None], self.wall_friction[None] = friction, wall_friction
 
 
 @dataclass(frozen=True, eq=False)

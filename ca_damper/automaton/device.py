@@ -9,38 +9,27 @@ from ca_damper.automaton.collisions import Collisions
 from ca_damper.automaton.components import assemble
 from ca_damper.automaton.ejection import Ejection
 from ca_damper.automaton.impulse_balance import GRAVITY, QUANTUM
+from ca_damper.automaton.lattice_device import LatticeDevice
 from ca_damper.automaton.placement import DrawnCells, NamedCells
 from ca_damper.automaton.transport import Transport
 from ca_damper.filling import Action
-from ca_damper.lattice import DIRECTIONS, EMPTY, HELD, WALL, Geometry, unit_vectors
+from ca_damper.lattice import DIRECTIONS, DOWN, EMPTY, HELD, WALL, unit_vectors
 from ca_damper.random_numbers import stream
 from ca_damper.scenes.scene_fields import SceneFields
-from taichi_dem.kit.effect_usage import EffectUse
 
 
 @ti.data_oriented
-class DeviceAutomaton:
+class DeviceAutomaton(LatticeDevice):
     """Automata of all scenes of a table; the protocol is in ``ca_damper.filling``."""
 
     def __init__(self, options: Any, table: SceneFields):
         components = assemble(options, table)
-        self.table, self.parameters, self.lattice = table, components.parameters, components.lattice
-        self.cells, self.conflict_resolution = components.cells, components.conflict_resolution
-        self.accounting = components.accounting
-        self.resting, self.impulse_balance = components.resting, components.impulse_balance
-        self.event_counts = components.event_counts
+        placement = DrawnCells if options.start is None else NamedCells
+        super().__init__(table, components, placement(table, components.cells, DOWN))
+        self.accounting, self.impulse_balance = components.accounting, components.impulse_balance
         self.transport, self.ejection = Transport(table, components), Ejection(table, components)
         both, pairs_first = options.pair_rule == "both", options.priority == "pairs_first"
         self.collisions = Collisions(table, components, both, pairs_first)
-        placement = DrawnCells if options.start is None else NamedCells
-        self.placement = placement(table, self.cells)
-        self.velocity = table.field(ti.f64)
-
-    def load(self, options: Any) -> None:
-        """Take over the numbers of an automaton of the same structure."""
-        self.lattice.load(Geometry(options.columns, options.rows))
-        self.parameters.load(options)
-        self.placement.load(options.start)
 
     @ti.func
     def reset(self, s):
@@ -88,28 +77,12 @@ class DeviceAutomaton:
         return self.parameters.mass[None] * total
 
     @ti.func
-    def momentum(self, s):
-        """Momentum along x [kg m/s]; held particles move as the container did last."""
-        total = self.resting.count(s) * self.velocity[s]
-        for cell in range(self.lattice.cell_count()):
-            total += self.cells.vertical_speed(s, cell)
-        return self.parameters.mass[None] * total
-
-    @ti.func
     def divergence_code(self, s):
         """1 when a particle would cross more than one cell a step, which no rule allows."""
         fastest = 0.0
         for cell in range(self.lattice.cell_count()):
             fastest = max(fastest, self.cells.speed[s, cell])
         return 0 if fastest * self.table.dt[s] < self.parameters.width[None] else 1
-
-    def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:
-        """How often each of the named effects acted."""
-        return self.event_counts.uses(effects)
-
-    def first_steps(self, effects: tuple[str, ...]) -> dict[str, np.ndarray]:
-        """Step in which each counted effect first acted, infinite if never, (scenes,)."""
-        return self.event_counts.first_steps(effects)
 
     def snapshot(self, s: int) -> dict[str, np.ndarray]:
         """Positions and velocities of the particles, by cell (see ``ca_damper.filling``)."""

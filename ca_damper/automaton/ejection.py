@@ -12,12 +12,13 @@ from typing import Any
 import taichi as ti
 
 from ca_damper.automaton.event_counts import PUSHES
+from ca_damper.automaton.staircase import Staircase
 from ca_damper.lattice import DIRECTIONS, DOWN, HELD, UP
 from ca_damper.scenes.scene_fields import SceneFields
 
 
 @ti.data_oriented
-class Ejection:
+class Ejection(Staircase):
     """Follow the container's staircase.
 
     pushed: 1 for a cell in the cluster. border: cells of the cluster still to look around. Both of
@@ -25,31 +26,11 @@ class Ejection:
     """
 
     def __init__(self, table: SceneFields, components: Any):
-        self.cells, self.lattice = components.cells, components.lattice
-        self.parameters = components.parameters
+        super().__init__(components)
         self.accumulator, self.accounting = components.accumulator, components.accounting
         self.event_counts = components.event_counts
         self.pushed = table.field(ti.i8, "cells")
         self.border = table.field(ti.i16, "cells")
-
-    @ti.func
-    def follow(self, s, step, motion):
-        """Take the staircase along; returns counted gain of velocity along x [quanta]."""
-        width = self.parameters.width[None]
-        stair = ti.cast(ti.floor(motion.x / width + 0.5), ti.i32)
-        way = 0
-        if step == 0:
-            self.cells.stair[s] = stair
-        elif stair > self.cells.stair[s]:
-            way = 1
-        elif stair < self.cells.stair[s]:
-            way = -1
-        self.cells.stair[s] = self.cells.stair[s] + way
-        self.cells.offset[s] = motion.x - width * self.cells.stair[s]
-        impulse = ti.cast(0, ti.i64)
-        if way != 0:
-            impulse = self.advance(s, way, motion.v)
-        return impulse
 
     @ti.func
     def advance(self, s, way, velocity):

@@ -8,11 +8,25 @@ from ca_damper.automaton.accounting import ACCOUNTINGS, Accounting
 from ca_damper.automaton.accumulator import READINGS
 from ca_damper.automaton.conflict_resolution import MOST_CELLS
 from ca_damper.automaton.device import DeviceAutomaton
+from ca_damper.automaton.lattice_device import LatticeDevice
+from ca_damper.automaton.place.device import PlaceAutomaton
 from ca_damper.contracts import check_members, members_of
 from ca_damper.filling import Structure
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import choice, flag, fraction, plain_fields, positive, shown, whole
+
+RULES = ("paper", "place")
+#: Options that only the rules of the paper have; the others want these values.
+_OF_THE_PAPER = {
+    "accounting": "all",
+    "pair_rule": "both",
+    "priority": "random",
+    "accumulator": "signed",
+    "ledger": False,
+}
+#: Friction by the rules of place unless the user says otherwise, that of the spheres.
+_FRICTION = 0.5
 
 
 @dataclass(frozen=True)
@@ -34,6 +48,11 @@ class Automaton:
     of every particle, counted from 0 at the lower left; cells are drawn from the seed if None.
     traversal: "list" of particles or "scan" of all cells, same bits. ledger: write down where
     uncounted momentum goes.
+    rules: "paper", those of the paper, or "place": particles fly any way, meet where their places
+    meet, and blows of one step leave the container with one velocity, whatever its mass. With
+    "place" accounting, pair_rule, priority, accumulator and ledger are as by default, and there is
+    Coulomb's friction: of two particles, and wall_friction of particle and wall; None: 0.5 with
+    "place", as that of the spheres, and none in the rules of the paper.
     Raises InputError for what is not allowed.
     """
 
@@ -54,6 +73,9 @@ class Automaton:
     start: Optional[tuple] = None
     traversal: str = "list"
     ledger: bool = False
+    rules: str = "paper"
+    friction: Optional[float] = None
+    wall_friction: Optional[float] = None
 
     def __post_init__(self) -> None:
         plain_fields(self)
@@ -69,10 +91,30 @@ class Automaton:
             positive(name, getattr(self, name))
         for name in ("gravity", "static_threshold"):
             positive(name, getattr(self, name), zero_allowed=True)
+        choice("rules", self.rules, RULES)
+        self._check_friction()
         self._check_rules()
         self._check_lattice()
 
+    def _check_friction(self) -> None:
+        for name in ("friction", "wall_friction"):
+            value = getattr(self, name)
+            if value is not None:
+                positive(name, value, zero_allowed=True)
+                if self.rules != "place":
+                    raise InputError(
+                        f"{name} must be None with rules {self.rules!r}, whose blows have no "
+                        f"friction, got {value:g}"
+                    )
+
     def _check_rules(self) -> None:
+        if self.rules == "place":
+            for name, value in _OF_THE_PAPER.items():
+                if getattr(self, name) != value:
+                    raise InputError(
+                        f"{name} must be {value!r} with rules 'place', which leave no choice, "
+                        f"got {getattr(self, name)!r}"
+                    )
         flag("ledger", self.ledger)
         if self.static_contact is not None:
             flag("static_contact", self.static_contact)
@@ -128,8 +170,18 @@ class Automaton:
         return self._accounting.static_contact if asked is None else asked
 
     @property
+    def frictions(self) -> tuple[float, float]:
+        """Coefficients between particles and between particle and wall; 0 by the paper's rules."""
+        usual = _FRICTION if self.rules == "place" else 0.0
+        asked = (self.friction, self.wall_friction)
+        between, at_wall = (usual if value is None else value for value in asked)
+        return between, at_wall
+
+    @property
     def label(self) -> str:
         """Short word for tables and files."""
+        if self.rules == "place":
+            return "ca_place" if self.particles_rest else "ca_place_no_rest"
         return self._accounting.labels[self.particles_rest]
 
     @property
@@ -137,6 +189,8 @@ class Automaton:
         """Effects that are computed, in words for the report."""
         resting = ("static contact",) if self.particles_rest else ()
         ledger = ("ledger",) if self.ledger else ()
+        if self.rules == "place":
+            return ("pairs", "landing", *resting)
         return ("pairs", "landing", *self._accounting.effects, *resting, *ledger)
 
     @property
@@ -187,10 +241,10 @@ class Automaton:
         """Rules are compiled; numbers, the size of the lattice and the cells of start are not."""
         rules = (self.accounting, self._accounting, self.particles_rest, self.accumulator)
         pairs = self.pair_rule, self.priority
-        key = (*rules, *pairs, self.traversal, self.ledger, self.start is None)
+        key = (self.rules, *rules, *pairs, self.traversal, self.ledger, self.start is None)
         # One more for the cell beyond the lattice.
         return Structure(key, {"cells": (self.columns + 2) * (self.rows + 2) + 1})
 
-    def bind(self, table: SceneFields) -> DeviceAutomaton:
+    def bind(self, table: SceneFields) -> LatticeDevice:
         """The automaton on the device, for all scenes of a table."""
-        return DeviceAutomaton(self, table)
+        return (PlaceAutomaton if self.rules == "place" else DeviceAutomaton)(self, table)

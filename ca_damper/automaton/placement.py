@@ -1,11 +1,10 @@
-"""Where the particles of a scene stand at its start."""
+"""Where the particles of a scene stand at its start; ``way``: direction in which they head."""
 
 from typing import Any
 
 import numpy as np
 import taichi as ti
 
-from ca_damper.lattice import DOWN
 from ca_damper.random_numbers import START, uniform
 from ca_damper.scenes.scene_fields import SceneFields
 
@@ -18,8 +17,9 @@ class DrawnCells:
     (selection sampling, Knuth, The Art of Computer Programming 2, 3.4.2).
     """
 
-    def __init__(self, table: SceneFields, cells: Any):
+    def __init__(self, table: SceneFields, cells: Any, way: int):
         self.cells, self.lattice, self.table = cells, cells.lattice, table
+        self.way = way
 
     def load(self, named: Any) -> None:
         """Nothing to load."""
@@ -33,7 +33,7 @@ class DrawnCells:
             for row in range(self.lattice.row_count()):
                 cell = self.lattice.cell_of(column, row)
                 if left * uniform(self.table.seed[s], 0, cell, START) < count - placed:
-                    self.cells.put(s, cell, DOWN, 0.0, 0.0)
+                    self.cells.put(s, cell, self.way, 0.0, 0.0)
                     self.cells.traversal.placed(s, placed, cell)
                     placed += 1
                 left -= 1
@@ -45,8 +45,8 @@ class NamedCells:
 
     constant_fields = ("named", "count")
 
-    def __init__(self, table: SceneFields, cells: Any):
-        self.cells = cells
+    def __init__(self, table: SceneFields, cells: Any, way: int):
+        self.cells, self.way = cells, way
         self.count = ti.field(ti.i32, shape=())
         self.named = ti.field(ti.i32, shape=table.length("cells"))
 
@@ -66,5 +66,5 @@ class NamedCells:
     def fill(self, s):
         """Put the particles of scene s into the cells, at rest."""
         for k in range(self.count[None]):
-            self.cells.put(s, self.named[k], DOWN, 0.0, 0.0)
+            self.cells.put(s, self.named[k], self.way, 0.0, 0.0)
             self.cells.traversal.placed(s, k, self.named[k])

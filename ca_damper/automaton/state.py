@@ -19,9 +19,9 @@ class Cells:
     Velocities are those of the room, not of the container.
     """
 
-    def __init__(self, table: SceneFields, lattice: Any, traversal: Any, accounting: Any):
+    def __init__(self, table: SceneFields, lattice: Any, traversal: Any, follower: Any):
         self.lattice, self.traversal = lattice, traversal
-        self.followers = (traversal, accounting)
+        self.followers = (traversal, follower)
         self.kind = table.field(ti.i8, "cells")
         self.speed = table.field(ti.f64, "cells")
         self.travelled = table.field(ti.f64, "cells")

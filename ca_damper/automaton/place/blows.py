@@ -1,0 +1,164 @@
+"""Blows of a step carried out: grains with grains, then all blows on the container together."""
+
+from typing import Any
+
+import taichi as ti
+
+from ca_damper.automaton.event_counts import HOLDS, PAIRS, WALLS
+from ca_damper.automaton.impulse_balance import QUANTUM, quanta
+from ca_damper.automaton.place.contacts import BRUSH, END, JOIN, LINE, OBLIQUE, Contacts
+from ca_damper.automaton.place.disc_blows import (
+    chord,
+    common_velocity,
+    dragged,
+    line_of_centres,
+    most_drag,
+    speed_change,
+)
+from ca_damper.random_numbers import LINE as LINE_DRAW
+from ca_damper.random_numbers import bits, unit
+from ca_damper.scenes.scene_fields import SceneFields
+
+
+@ti.data_oriented
+class Blows:
+    """Carry out the encounters of a step; no two of them change the same grain."""
+
+    def __init__(self, table: SceneFields, components: Any):
+        self.table, self.cells, self.heap = table, components.cells, components.resting
+        self.parameters, self.event_counts = components.parameters, components.event_counts
+        self.contacts = Contacts(table, components)
+
+    @ti.func
+    def resolve(self, s, step, shared, pull, pressed, carried):
+        """All blows; returns the velocity along x that the container gave to grains [quanta].
+
+        carried: velocity [m/s] that a grain has where it joins or leaves the heap in this step.
+        """
+        count = self.contacts.find_all(s, step, shared, pull, pressed)
+        impulse, kept = ti.cast(0, ti.i64), 0
+        for k in range(count):
+            if self.contacts.wins(s, k):
+                cell, other, kind = self.contacts.read(s, k)
+                if kind == END or kind == BRUSH:
+                    # Not before all grains that join or leave the heap have done so.
+                    self.contacts.write(s, kept, cell, other, kind)
+                    kept += 1
+                elif kind == JOIN:
+                    self.event_counts.note(s, HOLDS)
+                    impulse += quanta(carried - self.cells.speed[s, cell])
+                    self.heap.join(s, cell)
+                else:
+                    self.event_counts.note(s, PAIRS)
+                    self.meet(s, shared, cell, other, kind, carried)
+        return impulse + self.strike_container(s, kept)
+
+    @ti.func
+    def meet(self, s, shared, cell, other, kind, carried):
+        """Blow of two grains, of which one may have rested."""
+        line = ti.Vector([0.0, 1.0])
+        if kind == OBLIQUE:
+            width = self.parameters.width[None]
+            rise = (self.cells.height(s, other) - self.cells.height(s, cell)) / width
+            line = ti.Vector([chord(rise), rise])
+        else:
+            line = line_of_centres(unit(bits(shared, cell, LINE_DRAW)))
+        self.heap.free(s, cell, carried)
+        self.heap.free(s, other, carried)
+        relative = self.cells.velocity(s, cell) - self.cells.velocity(s, other)
+        change = speed_change(
+            relative, line, self.parameters.particle[None], self.parameters.friction[None]
+        )
+        if kind == LINE:
+            # They cannot pass each other within their column: what is left of the approach is lost.
+            change[1] = ti.min(change[1], -0.5 * relative[1])
+            self.part(s, cell, other)
+        self.cells.accelerate(s, cell, change)
+        self.cells.accelerate(s, other, -change)
+
+    @ti.func
+    def strike_container(self, s, count):
+        """All blows on the container; returns the velocity along x that it gave [quanta].
+
+        Sums are whole numbers, so that they do not depend on the order of the grains.
+        """
+        ends, sides, approaches = 0, 0, ti.cast(0, ti.i64)
+        for k in range(count):
+            cell, _, kind = self.contacts.read(s, k)
+            self.event_counts.note(s, WALLS)
+            if kind == END:
+                ends += 1
+                approaches += quanta(self.approach(s, cell))
+            else:
+                sides += 1
+        impulse = ti.cast(0, ti.i64)
+        if count > 0:
+            mass = self.parameters.mass[None]
+            recoil = mass * self.table.recoil[s]
+            recoil = recoil / (1.0 + recoil * self.heap.held[s])
+            total, share = QUANTUM * ti.cast(approaches, ti.f64), self.parameters.wall[None]
+            after = common_velocity(self.cells.container[s], total, ends, recoil, share)
+            for k in range(count):
+                cell, _, kind = self.contacts.read(s, k)
+                if kind == END:
+                    impulse += self.rebound(s, cell, after)
+                else:
+                    impulse += self.brush(s, cell, after, sides, recoil)
+        return impulse
+
+    @ti.func
+    def since(self, s, cell):
+        """Time [s] between a blow on floor, heap or ceiling and the end of the step.
+
+        By how far the grain has gone too far. 0 where that is more than it can have gone in a step.
+        """
+        approach = self.cells.speed[s, cell] - self.cells.container[s]
+        beyond = self.cells.travelled[s, cell] - self.cells.offset[s]
+        result = 0.0
+        if beyond * approach > 0.0 and ti.abs(beyond) <= ti.abs(approach) * self.table.dt[s]:
+            result = beyond / approach
+        return result
+
+    @ti.func
+    def approach(self, s, cell):
+        """Velocity of a grain seen from the container at the time of the blow [m/s]."""
+        later = self.cells.speed[s, cell] - self.cells.container[s]
+        found = later + self.cells.closing[s] * self.since(s, cell)
+        # A grain that only just reaches the wall does not part from it backwards.
+        return found if found * later > 0.0 else 0.0
+
+    @ti.func
+    def rebound(self, s, cell, after):
+        """Leave floor or ceiling; after: velocity of the container after all blows [m/s].
+
+        The grain has been on its way back since the time of the blow, and so is its place.
+        """
+        approach, since = self.approach(s, cell), self.since(s, cell)
+        share = self.parameters.wall[None]
+        gain = after - self.cells.container[s] - (1.0 + share) * approach
+        friction = self.parameters.wall_friction[None] * ti.abs(gain)
+        self.cells.accelerate(
+            s, cell, ti.Vector([-dragged(self.cells.across.velocity[s, cell], friction), gain])
+        )
+        back = share * approach + 0.5 * self.cells.closing[s] * since
+        self.cells.travelled[s, cell] = self.cells.offset[s] - back * since
+        return quanta(gain)
+
+    @ti.func
+    def part(self, s, lower, upper):
+        """Put two grains of a column that have met a diameter apart; their centre of mass stays."""
+        push = 0.5 * ti.max(0.0, self.cells.overlap(s, lower))
+        self.cells.travelled[s, lower] = self.cells.travelled[s, lower] - push
+        self.cells.travelled[s, upper] = self.cells.travelled[s, upper] + push
+
+    @ti.func
+    def brush(self, s, cell, after, sides, recoil):
+        """Leave a side wall, which drags the grain towards the velocity of the container."""
+        velocity, slip = self.cells.across.velocity[s, cell], self.cells.speed[s, cell] - after
+        push = (1.0 + self.parameters.wall[None]) * velocity
+        most = ti.min(
+            self.parameters.wall_friction[None] * ti.abs(push), most_drag(slip, sides, recoil)
+        )
+        gain = -dragged(slip, most)
+        self.cells.accelerate(s, cell, ti.Vector([-push, gain]))
+        return quanta(gain)

@@ -1,0 +1,110 @@
+"""Changes of cell: along the column by the place, across it by chance."""
+
+from typing import Any
+
+import taichi as ti
+
+from ca_damper.automaton.place.claims import ACROSS, ALONG, rank_in_phase
+from ca_damper.lattice import EMPTY, UP
+from ca_damper.random_numbers import HOP, bits, unit
+from ca_damper.scenes.scene_fields import SceneFields
+
+_NOWHERE = -1
+
+
+@ti.data_oriented
+class Changes:
+    """Grains that change their cells.
+
+    movers, targets: cells that grains leave and enter, shape (scenes, cells).
+    """
+
+    def __init__(self, table: SceneFields, components: Any):
+        self.cells, self.lattice = components.cells, components.lattice
+        self.parameters = components.parameters
+        self.conflict_resolution = components.conflict_resolution
+        self.traversal = components.cells.traversal
+        self.movers, self.targets = table.field(ti.i16, "cells"), table.field(ti.i16, "cells")
+
+    @ti.func
+    def change_all(self, s, step, shared, dt):
+        """First across the columns, then along them."""
+        self.hop_all(s, step, shared, dt)
+        self.climb_all(s, step, shared)
+
+    @ti.func
+    def hop_all(self, s, step, shared, dt):
+        """Move grains to neighbouring columns.
+
+        Anywhere in its column with equal probability, a grain with velocity u leaves it in a step
+        with the probability |u| dt / d. It keeps its height, at which there must be room for it.
+        """
+        count = 0
+        for k in range(self.traversal.begin(), self.traversal.end(s)):
+            cell = self.traversal.cell(s, k)
+            velocity = self.cells.across.velocity[s, cell]
+            if velocity != 0.0:
+                share = ti.abs(velocity) * dt / self.parameters.width[None]
+                if unit(bits(shared, cell, HOP)) < share:
+                    target = self.free_place(s, cell, 1 if velocity > 0.0 else -1)
+                    if target != _NOWHERE:
+                        ranked = rank_in_phase(step, shared, ACROSS, cell, 0)
+                        for near in range(target - 1, target + 2):
+                            self.conflict_resolution.claim(s, near, ranked)
+                        count = self.note(s, count, cell, target)
+        for k in range(count):
+            cell, target = ti.cast(self.movers[s, k], ti.i32), ti.cast(self.targets[s, k], ti.i32)
+            ranked = rank_in_phase(step, shared, ACROSS, cell, 0)
+            alone = True
+            for near in range(target - 1, target + 2):
+                alone = alone and self.conflict_resolution.holds(s, near, ranked)
+            if alone:
+                width = self.parameters.width[None]
+                centre = self.lattice.height_of(target) * width
+                self.cells.relocate(s, cell, target, self.cells.height(s, cell) - centre)
+
+    @ti.func
+    def note(self, s, count, cell, target):
+        """Note a change that is claimed; returns the number of them."""
+        self.movers[s, count] = ti.cast(cell, ti.i16)
+        self.targets[s, count] = ti.cast(target, ti.i16)
+        return count + 1
+
+    @ti.func
+    def free_place(self, s, cell, way):
+        """Cell at a grain's height in the next column (way 1: right), if there is room."""
+        width, result = self.parameters.width[None], _NOWHERE
+        base = self.lattice.column_beside(cell, way)
+        if not self.lattice.in_side_wall(base):
+            height = self.cells.height(s, cell)
+            row = self.lattice.nearest_row(base, height / width)
+            target = base + 1 + row
+            room = self.cells.at(s, target) == EMPTY
+            for near in range(target - 1, target + 2):
+                if self.cells.is_grain(s, near):
+                    room = room and ti.abs(self.cells.height(s, near) - height) >= width
+            # Over the floor of that column, and below its ceiling.
+            over = height - self.lattice.height_of(base + 1) * width - self.cells.offset[s]
+            if room and 0.0 <= over <= (self.lattice.row_count() - 1) * width:
+                result = target
+        return result
+
+    @ti.func
+    def climb_all(self, s, step, shared):
+        """Move grains that are nearer to the next cell of their column into it."""
+        count = 0
+        for k in range(self.traversal.begin(), self.traversal.end(s)):
+            cell = self.traversal.cell(s, k)
+            away = self.cells.travelled[s, cell] / self.parameters.width[None]
+            if ti.abs(away) > 0.5 and self.cells.at(s, cell) == UP:
+                target = cell + (1 if away > 0.0 else -1)
+                if self.cells.at(s, target) == EMPTY:
+                    ranked = rank_in_phase(step, shared, ALONG, cell, 0)
+                    self.conflict_resolution.claim(s, target, ranked)
+                    count = self.note(s, count, cell, target)
+        for k in range(count):
+            cell, target = ti.cast(self.movers[s, k], ti.i32), ti.cast(self.targets[s, k], ti.i32)
+            ranked = rank_in_phase(step, shared, ALONG, cell, 0)
+            if self.conflict_resolution.holds(s, target, ranked):
+                way = self.parameters.width[None] * (target - cell)
+                self.cells.relocate(s, cell, target, self.cells.travelled[s, cell] - way)

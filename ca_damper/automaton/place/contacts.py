@@ -1,0 +1,180 @@
+"""Contacts of the grains: which of them meet in a step, judged by their places."""
+
+from typing import Any
+
+import taichi as ti
+
+from ca_damper.automaton.place.claims import BLOWS, SLOTS, rank_in_phase
+from ca_damper.automaton.place.disc_blows import chord, contact_rate
+from ca_damper.lattice import HELD, UP, WALL
+from ca_damper.random_numbers import GLANCE, SIDE, bits, scrambled, unit
+from ca_damper.scenes.scene_fields import SceneFields
+
+#: Kinds of event: at floor or ceiling, at a side wall, coming to rest, in a column, across columns.
+END, BRUSH, JOIN, LINE, OBLIQUE = range(5)
+_CELL_BITS, _CELL = 12, (1 << 12) - 1
+# Slots of the events of a cell; oblique ones have the last four.
+_AT_END, _AT_SIDE, _ABOVE, _BESIDE = range(4)
+
+
+@ti.data_oriented
+class Contacts:
+    """Find the events of a step and the grains that each of them needs.
+
+    events: cell, second cell and kind in one number; ranks: of their claims; shape (scenes, cells,
+    SLOTS), filled from the first.
+    """
+
+    def __init__(self, table: SceneFields, components: Any):
+        self.table, self.cells, self.lattice = table, components.cells, components.lattice
+        self.parameters, self.heap = components.parameters, components.resting
+        self.conflict_resolution = components.conflict_resolution
+        self.events = table.field(ti.i32, "cells", SLOTS)
+        self.ranks = table.field(ti.i64, "cells", SLOTS)
+
+    @ti.func
+    def find_all(self, s, step, shared, pull, pressed):
+        """Note and claim all events; returns their number."""
+        count, traversal = 0, self.cells.traversal
+        for k in range(traversal.begin(), traversal.end(s)):
+            cell = traversal.cell(s, k)
+            kind = self.cells.at(s, cell)
+            if kind == UP:
+                count = self.at_ends(s, step, shared, count, cell, pull, pressed)
+                count = self.at_side(s, step, shared, count, cell)
+            if kind == UP or kind == HELD:
+                count = self.above(s, step, shared, count, cell, pull, pressed)
+                count = self.beside(s, step, shared, count, cell)
+        return count
+
+    @ti.func
+    def note(self, s, step, shared, count, owner, slot, cell, other, kind: ti.template()):
+        """Note an event and claim its grains; other: second grain, 0 for none."""
+        ranked = rank_in_phase(step, shared, BLOWS, owner, slot)
+        self.conflict_resolution.claim(s, cell, ranked)
+        if other != 0:
+            self.conflict_resolution.claim(s, other, ranked)
+        self.write(s, count, cell, other, kind)
+        self.ranks[s, count // SLOTS, count % SLOTS] = ranked
+        return count + 1
+
+    @ti.func
+    def write(self, s, k, cell, other, kind):
+        """Write event number k."""
+        self.events[s, k // SLOTS, k % SLOTS] = (
+            ((kind << _CELL_BITS) | other) << _CELL_BITS
+        ) | cell
+
+    @ti.func
+    def read(self, s, k):
+        """Cell, second cell and kind of event number k."""
+        entry = self.events[s, k // SLOTS, k % SLOTS]
+        return entry & _CELL, (entry >> _CELL_BITS) & _CELL, entry >> (2 * _CELL_BITS)
+
+    @ti.func
+    def wins(self, s, k):
+        """Whether event number k has all the grains that it needs."""
+        ranked = self.ranks[s, k // SLOTS, k % SLOTS]
+        cell, other, _ = self.read(s, k)
+        result = self.conflict_resolution.holds(s, cell, ranked)
+        return result and (other == 0 or self.conflict_resolution.holds(s, other, ranked))
+
+    @ti.func
+    def at_ends(self, s, step, shared, count, cell, pull, pressed):
+        """Floor and ceiling, where the container has them at the end of the step."""
+        result = count
+        over = self.cells.travelled[s, cell] - self.cells.offset[s]
+        approach = self.cells.container[s] - self.cells.speed[s, cell]
+        if over <= 0.0 and approach > 0.0 and self.cells.at(s, cell - 1) == WALL:
+            if self.heap.takes(approach, pull, pressed):
+                result = self.note(s, step, shared, count, cell, _AT_END, cell, 0, JOIN)
+            else:
+                result = self.note(s, step, shared, count, cell, _AT_END, cell, 0, END)
+        elif over >= 0.0 and approach < 0.0 and self.cells.at(s, cell + 1) == WALL:
+            result = self.note(s, step, shared, count, cell, _AT_END, cell, 0, END)
+        return result
+
+    @ti.func
+    def at_side(self, s, step, shared, count, cell):
+        """Side walls, met as columns are left: by chance, at the rate |u| / d."""
+        result = count
+        velocity = self.cells.across.velocity[s, cell]
+        if velocity != 0.0:
+            way = 1 if velocity > 0.0 else -1
+            if self.lattice.in_side_wall(cell + way * self.lattice.column_height()):
+                share = ti.abs(velocity) * self.table.dt[s] / self.parameters.width[None]
+                if unit(bits(shared, cell, SIDE)) < share:
+                    result = self.note(s, step, shared, count, cell, _AT_SIDE, cell, 0, BRUSH)
+        return result
+
+    @ti.func
+    def above(self, s, step, shared, count, cell, pull, pressed):
+        """The grain above in the column, once its place is less than a diameter away."""
+        result, upper = count, cell + 1
+        held = self.cells.at(s, cell) == HELD
+        if self.cells.is_grain(s, upper) and not (held and self.cells.at(s, upper) == HELD):
+            approach = self.cells.velocity(s, cell)[1] - self.cells.velocity(s, upper)[1]
+            if approach > 0.0 and self.cells.overlap(s, cell) >= 0.0:
+                if held and self.heap.takes(approach, pull, pressed):
+                    result = self.note(s, step, shared, count, cell, _ABOVE, upper, 0, JOIN)
+                elif held:
+                    result = self.note(s, step, shared, count, cell, _ABOVE, upper, 0, END)
+                else:
+                    result = self.note(s, step, shared, count, cell, _ABOVE, cell, upper, LINE)
+        return result
+
+    @ti.func
+    def beside(self, s, step, shared, count, cell):
+        """Grains of the column to the right less than a diameter higher or lower."""
+        result, height = count, self.lattice.column_height()
+        base = self.lattice.column_beside(cell, 1)
+        if not self.lattice.in_side_wall(base):
+            # The columns stand half a cell apart, so that one of five rows is too far.
+            lowest = cell + height - 2 + ti.cast(self.lattice.raised[cell], ti.i32)
+            held = self.cells.at(s, cell) == HELD
+            for k in range(4):
+                other = lowest + k
+                if base < other < base + height - 1 and self.cells.is_grain(s, other):
+                    if not (held and self.cells.at(s, other) == HELD):
+                        # Rows and columns together: the lowest is one cell and a half below.
+                        if self.meets(s, shared, cell, other, k - 1.5):
+                            result = self.note(
+                                *(s, step, shared, result, cell, _BESIDE + k, cell, other, OBLIQUE)
+                            )
+        return result
+
+    @ti.func
+    def meets(self, s, shared, cell, other, rows):
+        """Whether two grains of neighbouring columns touch in this step, by chance.
+
+        rows: by how many cells the second cell is higher.
+        """
+        width, result = self.parameters.width[None], False
+        rise = rows + (self.cells.way(s, other) - self.cells.way(s, cell)) / width
+        if rise * rise < 1.0:
+            line = ti.Vector([chord(rise), rise])
+            approach = (self.cells.velocity(s, cell) - self.cells.velocity(s, other)).dot(line)
+            if approach > 0.0:
+                draw = unit(scrambled(bits(shared, cell, GLANCE) + ti.cast(other, ti.u32)))
+                chance = draw / self.table.dt[s]
+                # Most draws say no whatever stands beside the two, which takes long to find.
+                if chance < contact_rate(approach / width, rise, 0.0):
+                    free = 2.0 - self.taken(s, cell, -1) - self.taken(s, other, 1)
+                    result = chance < contact_rate(approach / width, rise, free)
+        return result
+
+    @ti.func
+    def taken(self, s, cell, way):
+        """Width [diameters] that the grain beside this one takes, on the left (way -1) or right.
+
+        A side wall takes as much as a grain at the same height.
+        """
+        result, base = 1.0, self.lattice.column_beside(cell, way)
+        if not self.lattice.in_side_wall(base):
+            result, width = 0.0, self.parameters.width[None]
+            own = self.cells.height(s, cell) / width
+            nearest = base + 1 + self.lattice.nearest_row(base, own)
+            for near in range(nearest - 1, nearest + 2):
+                if self.cells.is_grain(s, near):
+                    result = ti.max(result, chord(self.cells.height(s, near) / width - own))
+        return result

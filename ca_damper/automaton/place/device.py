@@ -1,0 +1,130 @@
+"""Automaton by the rules of place on the device, and the order in which its rules act."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import taichi as ti
+
+from ca_damper.automaton.components import Parameters
+from ca_damper.automaton.conflict_resolution import ConflictResolution
+from ca_damper.automaton.event_counts import EventCounts
+from ca_damper.automaton.impulse_balance import QUANTUM
+from ca_damper.automaton.lattice_device import LatticeDevice
+from ca_damper.automaton.place.blows import Blows
+from ca_damper.automaton.place.changes import Changes
+from ca_damper.automaton.place.grains import Grains
+from ca_damper.automaton.place.heap import Heap
+from ca_damper.automaton.place.transport import PlaceTransport
+from ca_damper.automaton.placement import DrawnCells, NamedCells
+from ca_damper.automaton.traversal import ParticleList, Scan
+from ca_damper.filling import Action
+from ca_damper.lattice import HELD, UP, Lattice
+from ca_damper.random_numbers import stream
+from ca_damper.scenes.scene_fields import SceneFields
+
+
+@dataclass(frozen=True, eq=False)
+class Components:
+    """State and choices of the rules, put together by ``assemble``."""
+
+    parameters: Parameters
+    lattice: Lattice
+    cells: Grains
+    conflict_resolution: ConflictResolution
+    resting: Heap
+    event_counts: EventCounts
+
+
+def assemble(options: Any, table: SceneFields) -> Components:
+    """Components for a user's options."""
+    lattice, parameters = Lattice(table), Parameters()
+    traversal = (Scan if options.traversal == "scan" else ParticleList)(lattice, table)
+    grains = Grains(table, lattice, traversal, parameters)
+    return Components(
+        parameters=parameters,
+        lattice=lattice,
+        cells=grains,
+        conflict_resolution=ConflictResolution(table, lattice),
+        resting=Heap(table, grains, parameters, options.particles_rest),
+        event_counts=EventCounts(table),
+    )
+
+
+@ti.data_oriented
+class PlaceAutomaton(LatticeDevice):
+    """Automata of all scenes of a table; the protocol is in ``ca_damper.filling``."""
+
+    def __init__(self, options: Any, table: SceneFields):
+        components = assemble(options, table)
+        placement = DrawnCells if options.start is None else NamedCells
+        super().__init__(table, components, placement(table, components.cells, UP))
+        self.transport, self.blows = PlaceTransport(components), Blows(table, components)
+        self.changes = Changes(table, components)
+
+    @ti.func
+    def reset(self, s):
+        """Grains at rest in their first cells."""
+        self.cells.clear_all(s)
+        self.conflict_resolution.clear(s)
+        self.resting.clear(s)
+        self.event_counts.clear(s)
+        self.placement.fill(s)
+        self.velocity[s] = 0.0
+
+    @ti.func
+    def advance(self, s, step, motion):
+        """One step: the lattice follows, grains fly, meet, and change cells."""
+        dt = self.table.dt[s]
+        pull = self.parameters.gravity[None] * dt
+        shared = stream(self.table.seed[s], step)
+        self.velocity[s], self.cells.container[s] = motion.v, motion.v + motion.a * dt
+        self.cells.closing[s] = motion.a + self.parameters.gravity[None]
+        self.event_counts.begin(s, step)
+        self.transport.follow(s, step, motion)
+        pressed = motion.a > -self.parameters.gravity[None]
+        if not pressed:
+            self.resting.release_all(s, motion.v)
+        self.transport.fly_all(s, dt, pull, motion)
+        impulse = self.blows.resolve(s, step, shared, pull, pressed, motion.v - pull)
+        self.changes.change_all(s, step, shared, dt)
+        mass = self.parameters.mass[None]
+        return Action(-mass * QUANTUM * ti.cast(impulse, ti.f64), mass * self.resting.count(s))
+
+    @ti.func
+    def energy(self, s):
+        """Kinetic and potential energy [J]; held grains move as the container did last."""
+        total = 0.0
+        for cell in range(self.lattice.cell_count()):
+            if self.cells.is_grain(s, cell):
+                velocity = self.cells.velocity(s, cell)
+                height = self.cells.height(s, cell) - self.cells.offset[s]
+                total += 0.5 * velocity.dot(velocity) + self.parameters.gravity[None] * height
+        return self.parameters.mass[None] * total
+
+    @ti.func
+    def divergence_code(self, s):
+        """1 when a grain would cross more than one cell a step, which no rule allows."""
+        fastest = 0.0
+        for cell in range(self.lattice.cell_count()):
+            across = ti.abs(self.cells.across.velocity[s, cell])
+            fastest = ti.max(fastest, ti.abs(self.cells.speed[s, cell]), across)
+        return 0 if fastest * self.table.dt[s] < self.parameters.width[None] else 1
+
+    def snapshot(self, s: int) -> dict[str, np.ndarray]:
+        """Positions and velocities of the grains, by cell (see ``ca_damper.filling``).
+
+        Across, grains stand in the middle of their columns.
+        """
+        geometry, cells = self.lattice.geometry, self.cells
+        kind, travelled, speed, across = (
+            self.table.row(field, s)[: geometry.cells]
+            for field in (cells.kind, cells.travelled, cells.speed, cells.across.velocity)
+        )
+        held, present = kind == HELD, (kind == UP) | (kind == HELD)
+        offset = float(self.table.row(cells.offset, s))
+        position = geometry.centres(self.parameters.width[None])
+        position[:, 1] += np.where(held, 0.0, travelled - offset)
+        speed = np.where(held, float(self.table.row(self.velocity, s)), speed)
+        velocity = np.column_stack([across, speed])
+        return {"position": position[present], "velocity": velocity[present]}
