@@ -7,9 +7,10 @@ import taichi as ti
 
 from ca_damper.random_numbers import uniform
 from ca_damper.scenes.scene_fields import SceneFields
+from taichi_dem.kit.allocation import values
 
 # Purposes of the random numbers drawn here; the automaton has those before.
-_CHOOSE, _SHIFT, _STIR = 4, 5, 6
+_CHOOSE, _SHIFT, _STIR, _SIZE = 4, 5, 6, 8
 
 # Random spheres start this fast [m/s] at most in both directions: those that fill a row of the box
 # would otherwise fall in columns that rest on top of each other for ever.
@@ -20,10 +21,10 @@ vec2 = ti.types.vector(2, ti.f64)
 
 @ti.dataclass
 class Body:
-    """Numbers that all spheres share: radius [m], mass [kg], box [m] and gravity [m/s^2].
+    """Numbers of all spheres: radius of the largest [m], mean mass [kg], box [m].
 
-    pull: acceleration by gravity, downwards [m/s^2], as a vector that the compiler does not take
-    apart: both components are then divided and subtracted by one instruction.
+    pull: acceleration by gravity, to the left and downwards [m/s^2], as a vector that the compiler
+    does not take apart: both components are then divided and subtracted by one instruction.
     columns, rows: of the spheres that fit into the box.
     """
 
@@ -31,7 +32,6 @@ class Body:
     mass: ti.f64
     width: ti.f64
     height: ti.f64
-    gravity: ti.f64
     pull: vec2
     columns: ti.i32
     rows: ti.i32
@@ -45,11 +45,12 @@ class Bodies:
     positions count from the middle of the box, so that a mirrored run has the same bits; vertical
     ones from where the floor is at x = 0. Positions run ``lead`` [s] ahead of the velocities, half
     a step in a run. force [N]: of the contacts of this step. floor: where the container's floor is
-    at the time of the velocities [m], as foreseen by the last step.
+    at the time of the velocities [m], as foreseen by the last step. kind: size of each sphere,
+    where there are several; radii [m], masses [kg] and counts of the spheres of each.
     """
 
-    def __init__(self, table: SceneFields, given: bool):
-        self.table, self.given = table, given
+    def __init__(self, table: SceneFields, given: bool, thrown: bool, kinds: int):
+        self.table, self.given, self.thrown, self.kinds = table, given, thrown, kinds
         self.stride = table.length("spheres")
         self.body = Body.field(shape=())
         self.position = table.vector(2, ti.f64, "spheres", flat=True)
@@ -57,20 +58,33 @@ class Bodies:
         self.force = table.vector(2, ti.f64, "spheres", flat=True)
         self.lead = table.field(ti.f64)
         self.floor = table.field(ti.f64)
+        if kinds > 1:
+            self.kind = table.field(ti.i32, "spheres", flat=True)
+            self.radii, self.masses = (ti.field(ti.f64, shape=kinds) for _ in range(2))
+            self.counts = ti.field(ti.i32, shape=kinds)
         if given:
             self.start = ti.Vector.field(2, ti.f64, shape=self.stride)
+        if thrown:
+            self.start_velocity = ti.Vector.field(2, ti.f64, shape=self.stride)
 
     def load(self, options: Any) -> None:
         """Write the numbers of the options to the device."""
-        self._load(options.radius, options.particle_mass, options.gravity)
+        self._load(options.radius, options.particle_mass, *options.fall)
         self._load_box(options.width, options.height, *options.lattice)
+        if self.kinds > 1:
+            for k, (count, _) in enumerate(options.sizes):
+                self.radii[k], self.masses[k] = options.radii[k], options.masses[k]
+                self.counts[k] = count
         if self.given:
-            self._load_start(np.array(options.start).reshape(-1, 2))
+            self._load_pairs(self.start, np.array(options.start).reshape(-1, 2))
+        if self.thrown:
+            velocity = np.array(options.start_velocity).reshape(-1, 2)
+            self._load_pairs(self.start_velocity, velocity)
 
     @ti.kernel
-    def _load(self, radius: ti.f64, mass: ti.f64, gravity: ti.f64):
+    def _load(self, radius: ti.f64, mass: ti.f64, across: ti.f64, down: ti.f64):
         self.body[None].radius, self.body[None].mass = radius, mass
-        self.body[None].gravity, self.body[None].pull = gravity, vec2(0.0, gravity)
+        self.body[None].pull = vec2(0.0 - across, down)
 
     @ti.kernel
     def _load_box(self, width: ti.f64, height: ti.f64, columns: ti.i32, rows: ti.i32):
@@ -78,9 +92,9 @@ class Bodies:
         self.body[None].columns, self.body[None].rows = columns, rows
 
     @ti.kernel
-    def _load_start(self, places: ti.types.ndarray(dtype=ti.f64, ndim=2)):
-        for k in range(places.shape[0]):
-            self.start[k] = vec2(places[k, 0], places[k, 1])
+    def _load_pairs(self, field: ti.template(), pairs: ti.types.ndarray(dtype=ti.f64, ndim=2)):
+        for k in range(pairs.shape[0]):
+            field[k] = vec2(pairs[k, 0], pairs[k, 1])
 
     @ti.func
     def first(self, s):
@@ -91,6 +105,46 @@ class Bodies:
     def last(self, s):
         """One past the index of the last sphere of scene s."""
         return s * self.stride + self.table.particles[s]
+
+    @ti.func
+    def kind_of(self, i):
+        """Size of sphere i, 0 where there is only one."""
+        kind = 0
+        if ti.static(self.kinds > 1):
+            kind = self.kind[i]
+        return kind
+
+    @ti.func
+    def mass(self, i, body):
+        """Mass of sphere i [kg]."""
+        mass = body.mass
+        if ti.static(self.kinds > 1):
+            mass = self.masses[self.kind[i]]
+        return mass
+
+    @ti.func
+    def radius(self, i, body):
+        """Radius of sphere i [m]."""
+        radius = body.radius
+        if ti.static(self.kinds > 1):
+            radius = self.radii[self.kind[i]]
+        return radius
+
+    @ti.func
+    def short_of_reach(self, i, j):
+        """Length by which spheres i and j touch at less than twice the largest radius [m]."""
+        short = 0.0
+        if ti.static(self.kinds > 1):
+            short = self.short_of_radius(i) + self.short_of_radius(j)
+        return short
+
+    @ti.func
+    def short_of_radius(self, i):
+        """Length by which the radius of sphere i is below the largest [m]."""
+        short = 0.0
+        if ti.static(self.kinds > 1):
+            short = self.body[None].radius - self.radii[self.kind[i]]
+        return short
 
     @ti.func
     def position_in_box(self, s, i):
@@ -106,6 +160,14 @@ class Bodies:
         return vec2(-0.5 * body.width, floor) + body.radius, high
 
     @ti.func
+    def height(self, place):
+        """Drop times pull [m^2/s^2] of a place in the box: to the walls that gravity pulls to."""
+        body = self.body[None]
+        size = vec2(body.width, body.height)
+        drop = ti.select(body.pull < 0.0, place - size, place)
+        return body.pull[0] * drop[0] + body.pull[1] * drop[1]
+
+    @ti.func
     def push(self, i, force):
         """Add a contact's force [N] on sphere i."""
         # Not "+=", which would be an atomic addition; a scene is one thread.
@@ -114,7 +176,7 @@ class Bodies:
     @ti.func
     def kick(self, i, body, dt):
         """Take sphere i over a step under its contacts and gravity; returns its new velocity."""
-        rate = self.force[i] / body.mass - body.pull
+        rate = self.force[i] / self.mass(i, body) - body.pull
         velocity = self.velocity[i] + dt * rate
         self.force[i] = vec2(0.0)
         self.velocity[i] = velocity
@@ -138,12 +200,20 @@ class Bodies:
 
     @ti.func
     def reset_positions(self, s):
-        """Place the spheres: given places at rest, or random ones with small velocities."""
+        """Place the spheres: given places at rest, or random ones with small velocities.
+
+        Given velocities replace both.
+        """
+        if ti.static(self.kinds > 1):
+            self._choose_kinds(s)
         if ti.static(self.given):
             for i in range(self.first(s), self.last(s)):
                 self._put(i, self.start[i - self.first(s)], vec2(0.0))
         else:
             self._scatter(s)
+        if ti.static(self.thrown):
+            for i in range(self.first(s), self.last(s)):
+                self.velocity[i] = self.start_velocity[i - self.first(s)]
         self.lead[s], self.floor[s] = 0.0, 0.0
 
     @ti.func
@@ -173,6 +243,40 @@ class Bodies:
                 place = corner + body.radius + shift * (pitch - 2.0 * body.radius)
                 self._put(self.first(s) + taken, place, _STIR_SPEED * stir)
                 taken += 1
+
+    @ti.func
+    def _choose_kinds(self, s):
+        """Choose the size of each sphere: in their order for given places, else at random.
+
+        Random ones with the chance "left of this size over left of all", as ``_scatter``, which
+        fills sites from the floor up.
+        """
+        count = self.table.particles[s]
+        for k in range(count):
+            drawn = ti.cast(k, ti.f64)
+            if ti.static(not self.given):
+                drawn = uniform(self.table.seed[s], 0, k, _SIZE) * (count - k)
+            self._choose_kind(self.first(s), k, drawn)
+
+    @ti.func
+    def _choose_kind(self, first, k, drawn):
+        """Give sphere k the size in whose part of what is left a number lies."""
+        below, chosen = 0, -1
+        for kind in range(self.kinds):
+            left = self.counts[kind]
+            if ti.static(not self.given):
+                for before in range(k):
+                    left -= ti.cast(self.kind[first + before] == kind, ti.i32)
+            below += left
+            if chosen < 0 and drawn < below:
+                chosen = kind
+        self.kind[first + k] = ti.max(chosen, 0)
+
+    def sizes_of(self, rows: slice) -> dict[str, np.ndarray]:
+        """Diameters of some spheres [m], where there are several sizes."""
+        if self.kinds == 1:
+            return {}
+        return {"diameter": 2.0 * values(self.radii)[values(self.kind)[rows]]}
 
     @ti.func
     def _random_pair(self, seed, site, purpose: ti.template()):

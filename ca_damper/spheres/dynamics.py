@@ -10,7 +10,6 @@ Spheres move in the frame at rest, not in the container's: their gain of momentu
 contacts and gravity, to round-off, and the impacts on the container are its exact counterpart.
 """
 
-import math
 from typing import Any, Optional
 
 import numpy as np
@@ -19,35 +18,29 @@ import taichi as ti
 from ca_damper.filling import Action
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.bodies import Bodies, vec2
-from ca_damper.spheres.contact_law import Contact, ContactLaw, pair_numbers, wall_numbers
+from ca_damper.spheres.contact_law import ContactLaw
+from ca_damper.spheres.divergence_codes import (
+    ENERGY_GAINED,
+    FINE,
+    FORGOTTEN,
+    MOST_GAIN,
+    NOT_FINITE,
+    OVERLAP,
+    RUNAWAY,
+    WALL_IMPULSE_SHARE,
+)
 from ca_damper.spheres.effect_activity import FRICTION, PAIRS, WALLS, EffectActivity
 from ca_damper.spheres.expected_contacts import SEARCHES
+from ca_damper.spheres.friction_history import FrictionHistory, NoHistory
 from ca_damper.spheres.friction_onset import FrictionOnset
+from ca_damper.spheres.pair_contacts import PairContacts
 from ca_damper.spheres.pair_forces import PairForces
 from ca_damper.spheres.rotation import NoRotation, Rotation
+from ca_damper.spheres.wall_contacts import WallContacts
 from ca_damper.spheres.wall_forces import WallForces
 from taichi_dem.kit.allocation import values
 from taichi_dem.kit.audit import Audit
 from taichi_dem.kit.effect_usage import EffectUse
-
-# Codes of divergence; a speed is a runaway's when it crosses more than a radius in a step.
-FINE, NOT_FINITE, RUNAWAY, OVERLAP, ENERGY_GAINED = range(5)
-DIVERGENCES = {
-    NOT_FINITE: "has a sphere whose velocity is not a finite number",
-    RUNAWAY: "has a sphere that moves by more than its radius in a step",
-    OVERLAP: "has spheres that overlap, or lie outside the container, by more than a radius",
-    ENERGY_GAINED: "has contacts that give back more energy than they took",
-}
-
-# Share of their energy that spheres may gain from contacts. Measured over 5 to 20 cycles: 2e-4 at
-# 20 us, 6e-3 with restitution 1; at 40 us, three steps a contact, 0.06 to 0.6 where it goes wrong.
-MOST_GAIN = 0.03
-# Further gain allowed to a single sphere: the leapfrog's energy is off by (w dt)^2 / 4 in a
-# contact, half a period of w, of six steps.
-_WALL_IMPULSE_SHARE = (math.pi / 6.0) ** 2 / 4.0
-# Share of a gain that is forgotten at each check: errors of many impacts of either sign add
-# up to a spurious gain, while a diverging run shows within some 100 checks.
-_FORGOTTEN = 1.0 / 256.0
 
 
 @ti.data_oriented
@@ -62,29 +55,33 @@ class DeviceSpheres:
 
     def __init__(self, options: Any, table: SceneFields):
         self.table = table
-        self.bodies = Bodies(table, options.start is not None)
+        given = options.start is not None, options.start_velocity is not None
+        self.bodies = Bodies(table, *given, len(options.radii))
         self.law, self.rubs = ContactLaw(options.damping), options.rubs
         self.rotation = Rotation() if options.rotation else NoRotation()
         self.search = SEARCHES[options.search](table, self.bodies)
         parts = self.bodies, self.search, self.law, self.rotation
-        self.pair_forces = PairForces(table, *parts, self.rubs)
-        self.wall_forces = WallForces(*parts, self.rubs)
-        self.friction_onset = FrictionOnset(*parts)
+        remembers = self.rubs and options.friction_law == "history"
+        of_friction = table, self.bodies, self.law, self.rotation
+        self.history = FrictionHistory(*of_friction) if remembers else NoHistory()
+        share = self.rotation.tangential_share
+        self.pair_contacts = PairContacts(self.bodies, self.law, share)
+        self.wall_contacts = WallContacts(table, self.bodies, self.law, share)
+        self.pair_forces = PairForces(table, *parts, self.pair_contacts, self.history, self.rubs)
+        self.wall_forces = WallForces(*parts, self.wall_contacts, self.history, self.rubs)
+        self.friction_onset = FrictionOnset(*parts, self.pair_contacts, self.wall_contacts)
         self.crushed = table.field(ti.i32)
         self.effect_activity = EffectActivity(table)
         self.given, self.lost = table.field(ti.f64), table.field(ti.f64)
         self.held = table.field(ti.f64)
         self.rotation.bind(self.bodies)
-        self.contact_of_pair = Contact.field(shape=())
-        self.contact_of_wall = Contact.field(shape=())
 
     def load(self, options: Any) -> None:
         """Take over the numbers of spheres of the same structure."""
-        share = self.rotation.tangential_share
         self.bodies.load(options)
         self.search.load(options)
-        self.law.load(self.contact_of_pair, pair_numbers(options), share)
-        self.law.load(self.contact_of_wall, wall_numbers(options), share)
+        self.pair_contacts.load(options)
+        self.wall_contacts.load(options)
 
     @ti.func
     def reset(self, s):
@@ -92,6 +89,8 @@ class DeviceSpheres:
         self.bodies.reset_positions(s)
         for i in range(self.bodies.first(s), self.bodies.last(s)):
             self.rotation.reset(i)
+        self.wall_contacts.reset(s)
+        self.history.reset(s)
         self.effect_activity.clear(s)
         self.search.forget(s)
         self.search.clear(s)
@@ -102,53 +101,74 @@ class DeviceSpheres:
         """Advance the spheres by a step; returns the impulse of their impacts on the container."""
         dt = self.table.dt[s]
         if step == 0:
-            self.bodies.board(s, motion)
-            self.lost[s] = -ti.math.inf
+            self.board(s, motion)
+        since = self.bodies.lead[s] + 0.5 * dt
         if self.bodies.lead[s] != 0.5 * dt:
             self.bodies.advance_lead(s, 0.5 * dt)
             self.search.forget(s)
+        return Action(self.step(s, (step, step), dt, since, motion), 0.0)
+
+    @ti.func
+    def board(self, s, motion):
+        """Take the spheres from where they were placed to the container, which moves."""
+        self.bodies.board(s, motion)
+        self.lost[s] = -ti.math.inf
+
+    @ti.func
+    def step(self, s, numbers: ti.template(), dt, since, motion):
+        """Take spheres whose positions run half a step ahead over it; returns their impulse [N s].
+
+        numbers: of the container's step, and of the spheres' own. since: time that positions have
+        moved on since the last step [s].
+        """
         floor = motion.x + 0.5 * dt * (motion.v + 0.25 * dt * motion.a)
         low, high = self.bodies.reach_of_walls(floor)
         # Seen from spheres that fall freely, as all that is foreseen of them is their fall.
-        speed = motion.v + 0.5 * dt * (motion.a + self.bodies.body[None].gravity)
-        self.search.refresh(s, low, high)
-        force = self._push(s, step, low, high, speed)
-        self._move(s, dt)
-        self.given[s] = self.given[s] + dt * force * (motion.v + 0.5 * dt * motion.a)
+        pull = self.bodies.body[None].pull
+        speed = vec2(0.5 * dt * pull[0], motion.v + 0.5 * dt * (motion.a + pull[1]))
+        self.search.refresh(s, low, high, vec2(0.0))
+        if ti.static(self.history.remembers):
+            self.history.begin(s, numbers[1], motion.v)
+        force = self._push(s, numbers[0], dt, since, low, high, speed)
+        self.move(s, dt)
+        # The container recoils by dt force / M over the step; half of it on the way.
+        recoil = dt * force * self.table.recoil[s]
+        self.given[s] = self.given[s] + dt * force * (motion.v + 0.5 * (dt * motion.a - recoil))
+        if ti.static(self.history.remembers):
+            self.history.end(s, motion.v + dt * motion.a - recoil)
         self.bodies.floor[s] = motion.x + dt * (motion.v + 0.5 * dt * motion.a)
-        return Action(-dt * force, 0.0)
+        return -dt * force
 
     @ti.func
-    def _push(self, s, step, low, high, speed):
+    def _push(self, s, step, dt, since, low, high, speed):
         """Add the forces of all contacts; returns the container's force on the spheres [N].
 
         low, high: where spheres begin to touch walls [m]; speed: of the container as they see it.
         """
-        dt = self.table.dt[s]
-        contact = self.law.over_step(self.contact_of_pair[None], dt)
+        contact = self.pair_contacts.over_step(dt, since)
         which, count = self.search.find(s, contact.reach)
         self.effect_activity.note(s, PAIRS, step, count)
         self.pair_forces.add(s, contact, which, count)
         self.search.audit(s, step, low, high, contact.reach)
-        of_wall = self.law.over_step(self.contact_of_wall[None], dt)
+        of_walls = self.wall_contacts.over_step(s, 0, dt, since)
         if ti.static(self.rubs):
             if self.effect_activity.is_new(s, FRICTION):
                 rubbing = self.friction_onset.pairs(s, contact, which, count)
-                rubbing += self.friction_onset.walls(s, of_wall, low, high, speed)
+                rubbing += self.friction_onset.walls(s, of_walls, low, high, speed)
                 self.effect_activity.note(s, FRICTION, step, rubbing)
-        force, touching = self.wall_forces.add(s, of_wall, low, high, speed)
+        force, touching = self.wall_forces.add(s, of_walls, low, high, speed)
         self.effect_activity.note(s, WALLS, step, touching)
         return force
 
     @ti.func
-    def _rub(self, i, j, contact, push, normal, relative, lever):
+    def _rub(self, i, j, contact, push, normal, relative, distance):
         """Tangent of two spheres that touch, slip [m/s] and friction [N] of the first along it."""
         tangent = vec2(-normal[1], normal[0])
-        slip = self.rotation.slip_of_pair(i, j, lever, relative.dot(tangent))
+        slip = self.rotation.slip_of_pair(i, j, distance, relative.dot(tangent))
         return tangent, slip, self.law.friction(contact, push, slip)
 
     @ti.func
-    def _move(self, s, dt):
+    def move(self, s, dt):
         """Take the spheres over the step."""
         body = self.bodies.body[None]
         least, most = vec2(ti.math.inf), vec2(-ti.math.inf)
@@ -162,12 +182,18 @@ class DeviceSpheres:
 
     @ti.func
     def energy(self, s):
-        """Kinetic and potential energy and that of the contacts [J]; heights from the floor."""
+        """Kinetic and potential energy and that of the contacts [J].
+
+        Heights count from the floor, or from the walls that gravity pulls to.
+        """
         total = 0.0
         for i in range(self.bodies.first(s), self.bodies.last(s)):
             total += self._own_energy(s, i)
             for j in range(i + 1, self.bodies.last(s)):
                 total += self._pair_energy(s, i, j)
+        if ti.static(self.history.remembers):
+            energy, _ = self.history.of_pairs(s, self.pair_contacts)
+            total += energy
         return total
 
     @ti.func
@@ -175,26 +201,30 @@ class DeviceSpheres:
         """Kinetic and potential energy of a sphere and that of its contacts with walls [J]."""
         body = self.bodies.body[None]
         velocity, place = self.bodies.velocity[i], self.bodies.position_in_box(s, i)
-        total = body.mass * (0.5 * velocity.norm_sqr() + body.gravity * place[1])
+        mass, contact = self.bodies.mass(i, body), self.wall_contacts.at_rest(i)
+        total = mass * (0.5 * velocity.norm_sqr() + self.bodies.height(place))
         total += self.rotation.energy(i)
         room = ti.min(place, vec2(body.width, body.height) - place)
         for axis in ti.static(range(2)):
-            total += self.law.stored(self.contact_of_wall[None], body.radius - room[axis])
+            total += self.law.stored(contact, contact.reach - room[axis])
+        if ti.static(self.history.remembers):
+            below = vec2(body.width, body.height) - place
+            total += self.history.of_walls(s, i, contact, place, below)
         return total
 
     @ti.func
     def _pair_energy(self, s, i, j):
         """Energy of the contact of two spheres [J], none where they do not touch."""
-        contact = self.contact_of_pair[None]
+        contact = self.pair_contacts.at_rest(i, j)
         distance = (self.bodies.position_in_box(s, j) - self.bodies.position_in_box(s, i)).norm()
         return self.law.stored(contact, contact.reach - distance)
 
     @ti.func
     def momentum(self, s):
         """Momentum along x [kg m/s]."""
-        total = 0.0
+        total, body = 0.0, self.bodies.body[None]
         for i in range(self.bodies.first(s), self.bodies.last(s)):
-            total += self.bodies.body[None].mass * self.bodies.velocity[i][1]
+            total += self.bodies.mass(i, body) * self.bodies.velocity[i][1]
         return total
 
     @ti.func
@@ -202,9 +232,15 @@ class DeviceSpheres:
         """Code of DIVERGENCES, or 0; "not" makes NaN fail a test."""
         body, dt = self.bodies.body[None], self.table.dt[s]
         self.crushed[s], self.held[s] = self.search.crowded(s), 0.0
-        contact = self.law.over_step(self.contact_of_pair[None], dt)
+        # Positions run half a step of the contacts ahead, and not at all before the first one.
+        last = ti.select(self.bodies.lead[s] > 0.0, 2.0 * self.bodies.lead[s], dt)
+        contact = self.pair_contacts.over_step(last, last)
         seen = 0
         self.search.each_listed_pair(s, contact, self._note_pair, seen)
+        if ti.static(self.history.remembers):
+            energy, power = self.history.of_pairs(s, self.pair_contacts)
+            self.held[s] = self.held[s] + energy
+            self.effect_activity.note_power(s, power)
         code = ENERGY_GAINED if self._gains(s) else FINE
         if self.crushed[s] > 0:
             code = OVERLAP
@@ -212,13 +248,14 @@ class DeviceSpheres:
             place, speed = self.bodies.position_in_box(s, i), self.bodies.velocity[i].norm()
             if (place < 0.0).any() or (place > vec2(body.width, body.height)).any():
                 code = OVERLAP
-            if not (speed * dt < body.radius):
+            radius = self.bodies.radius(i, body)
+            if not (speed * dt < radius):
                 code = RUNAWAY
             if not (speed < ti.math.inf):
                 code = NOT_FINITE
             room = ti.min(place, vec2(body.width, body.height) - place)
-            at_wall = ti.cast((room < body.radius).any(), ti.i32)
-            going = 0.5 * body.mass * speed * speed
+            at_wall = ti.cast((room < radius).any(), ti.i32)
+            going = 0.5 * self.bodies.mass(i, body) * speed * speed
             self.effect_activity.note_sphere(s, at_wall, going, self.rotation.energy(i))
         return code
 
@@ -226,23 +263,23 @@ class DeviceSpheres:
     def _gains(self, s):
         """Whether contacts have created a good part of the energy present, which is impossible."""
         body = self.bodies.body[None]
-        weight = self.table.particles[s] * body.mass * body.gravity
+        weight = self.table.particles[s] * body.mass * body.pull[1]
         energy, highest = self.held[s], 0.0
         for i in range(self.bodies.first(s), self.bodies.last(s)):
             own = self._own_energy(s, i)
             energy += own
             highest = ti.max(highest, own)
         lost = self.given[s] - energy - weight * self.bodies.floor[s]
-        gain = ti.max(0.0, self.lost[s] - lost) * (1.0 - _FORGOTTEN)
+        gain = ti.max(0.0, self.lost[s] - lost) * (1.0 - FORGOTTEN)
         self.lost[s] = lost + gain
-        return gain > MOST_GAIN * energy + _WALL_IMPULSE_SHARE * highest
+        return gain > MOST_GAIN * energy + WALL_IMPULSE_SHARE * highest
 
     @ti.func
-    def _note_pair(self, s, i, j, contact, seen: ti.template()):
+    def _note_pair(self, s, i, j, for_step, seen: ti.template()):
         """Note the energy of a pair, and whether it touches or overlaps by half its reach."""
         self.held[s] = self.held[s] + self._pair_energy(s, i, j)
         branch = self.bodies.position[j] - self.bodies.position[i]
-        distance = branch.norm()
+        distance, contact = branch.norm(), self.pair_contacts.between(i, j, for_step)
         if distance < 0.5 * contact.reach:
             self.crushed[s] = 1
         if distance < contact.reach:
@@ -250,8 +287,8 @@ class DeviceSpheres:
             relative = self.bodies.velocity[i] - self.bodies.velocity[j]
             approach, overlap, rubbed = relative.dot(normal), contact.reach - distance, 0.0
             push = self.law.normal(contact, overlap, approach)
-            if ti.static(self.rubs):
-                _, slip, drag = self._rub(i, j, contact, push, normal, relative, 0.5 * distance)
+            if ti.static(self.rubs and not self.history.remembers):
+                _, slip, drag = self._rub(i, j, contact, push, normal, relative, distance)
                 rubbed = -drag * slip
             dragged = (push - self.law.elastic(contact, overlap)) * approach
             self.effect_activity.note_contact(s, dragged, rubbed)
@@ -269,10 +306,14 @@ class DeviceSpheres:
         return self.search.found()
 
     def snapshot(self, s: int) -> dict[str, np.ndarray]:
-        """Places and velocities of the spheres of scene s, and their spins [rad/s] if they turn."""
+        """Places and velocities of the spheres of scene s.
+
+        And their spins [rad/s] if they turn, and diameters [m] if there are several sizes.
+        """
         count = self.table.particles[s]
         rows = slice(s * self.bodies.stride, s * self.bodies.stride + count)
         velocity = values(self.bodies.velocity)[rows]
         position = values(self.bodies.position)[rows] - self.bodies.lead[s] * velocity
         shift = np.array([0.5 * self.bodies.body[None].width, -self.bodies.floor[s]])
-        return {"position": position + shift, "velocity": velocity, **self.rotation.snapshot(rows)}
+        more = {**self.rotation.snapshot(rows), **self.bodies.sizes_of(rows)}
+        return {"position": position + shift, "velocity": velocity, **more}

@@ -67,6 +67,11 @@ class EffectActivity:
         self.power[s] = self.power[s] + vec2(dragged, rubbed)
 
     @ti.func
+    def note_power(self, s, rubbed):
+        """Note the power into the friction of spheres on each other [W]."""
+        self.power[s] = self.power[s] + vec2(0.0, rubbed)
+
+    @ti.func
     def note_sphere(self, s, at_wall, going, turning):
         """Note a sphere: whether it is at a wall, and the energy of its motion [J]."""
         self.touches[s] = self.touches[s] + at_wall

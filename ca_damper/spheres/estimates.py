@@ -42,8 +42,6 @@ def rotation_estimate(spheres: "Spheres", particles: int) -> Estimate:
 
 def air_estimate(spheres: "Spheres") -> Estimate:
     """Share of its energy that a sphere loses to the air from floor to lid; never computed."""
-    air = _AIR_DENSITY * math.pi * spheres.radius**2 * spheres.height
+    air = _AIR_DENSITY * math.pi * min(spheres.radii) ** 2 * spheres.height
     why = "drag coefficient 1; this filling has no air"
-    return Estimate(
-        "air drag", min(1.0, air / spheres.particle_mass), "the energy of a flight", why
-    )
+    return Estimate("air drag", min(1.0, air / min(spheres.masses)), "the energy of a flight", why)

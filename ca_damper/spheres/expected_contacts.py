@@ -94,19 +94,55 @@ class ExpectedContacts:
         self.least[s], self.most[s] = least, most
 
     @ti.func
-    def refresh(self, s, low, high):
-        """Renew the lists if they may lack a contact; low, high: where spheres touch walls [m]."""
+    def shifted(self, s, share):
+        """Note that all spheres have gone on by a share of their last way, or back if negative."""
+        one, other = share * self.least[s], share * self.most[s]
+        self.note_motion(s, ti.min(one, other), ti.max(one, other))
+
+    @ti.func
+    def longest_way(self):
+        """Longest way ahead that lists can serve [m]."""
+        return self.cells.grid[None].skin
+
+    @ti.func
+    def is_clear(self, s, time, low, high, fall):
+        """Whether nothing touches within a time [s] in which all spheres fall freely.
+
+        Asked after a ``refresh`` whose lists serve as long. low, high: where spheres begin to touch
+        walls [m]; fall: most that walls gain on a sphere beside the sphere's own way [m]. Two
+        spheres go straight, as seen from each other.
+        """
+        clear, reach = True, (2.0 + _ROUNDING) * self.bodies.body[None].radius
+        for k in range(self.pair_count[s]):
+            i, j = self.pair[s, EXPECTED, k][0], self.pair[s, EXPECTED, k][1]
+            branch = self.bodies.position[j] - self.bodies.position[i]
+            relative = self.bodies.velocity[j] - self.bodies.velocity[i]
+            clear = clear and nearest(branch, relative, time) > reach * reach
+        for k in range(self.sphere_count[s]):
+            i = self.sphere[s, k]
+            way = time * self.bodies.velocity[i]
+            place, slack = self.bodies.position[i], fall + _ROUNDING * reach
+            least, most = place + ti.min(way, 0.0) - slack, place + ti.max(way, 0.0) + slack
+            clear = clear and not ((least < low).any() or (most > high).any())
+        return clear
+
+    @ti.func
+    def refresh(self, s, low, high, ahead):
+        """Renew the lists if they may lack a contact; low, high: where spheres touch walls [m].
+
+        ahead: further ways that they are to serve, of two spheres, and of a sphere and a wall [m].
+        """
         drift = vec2(0.0, low[1] - self.floor[s])
         least, most = self.least[s], self.most[s]
         way = vec2((most - least).norm(), ti.max(drift - least, most - drift).max())
         nearer, margin = self.nearer[s] + way, self.margin[s]
         self.cells.moved(s, way[0])
-        if self.cells.refresh(s) or not (nearer[0] < margin[0]):
-            margin[0], nearer[0] = self._margin(way[0]), 0.0
+        if self.cells.refresh(s, ahead[0]) or not (nearer[0] + ahead[0] < margin[0]):
+            margin[0], nearer[0] = self._margin(way[0], ahead[0]), 0.0
             self._list_pairs(s, margin[0])
             self._count_unlisted(s)
-        if not (nearer[1] < margin[1]):
-            margin[1], nearer[1] = self._margin(way[1]), 0.0
+        if not (nearer[1] + ahead[1] < margin[1]):
+            margin[1], nearer[1] = self._margin(way[1], ahead[1]), 0.0
             self._list_spheres(s, low + self._reach(margin[1]), high - self._reach(margin[1]))
             self._count_unlisted(s)
         self.margin[s] = margin
@@ -119,10 +155,10 @@ class ExpectedContacts:
         self.unlisted[s] = tests - self.pair_count[s] - self.sphere_count[s]
 
     @ti.func
-    def _margin(self, way):
-        """How far apart to list [m], for a way in a step [m]."""
+    def _margin(self, way, ahead):
+        """How far apart to list [m], for a way in a step and a further way [m]."""
         skin = self.cells.grid[None].skin
-        return ti.max(_NARROWEST * skin, ti.min(_STEPS * way, skin))
+        return ti.max(_NARROWEST * skin, ti.min(ti.max(_STEPS * way, 4.0 * ahead), skin))
 
     @ti.func
     def _reach(self, margin):
@@ -157,9 +193,11 @@ class ExpectedContacts:
     def _list_pair(self, s, i, j, reach, count: ti.template()):
         """List a pair nearer than reach[1]; count those, and those nearer than reach[0]."""
         square = (self.bodies.position[j] - self.bodies.position[i]).norm_sqr()
-        if square < reach[1] * reach[1]:
+        short = self.bodies.short_of_reach(i, j)
+        touching, near = reach[0] - short, reach[1] - short
+        if square < near * near:
             self.pair[s, EXPECTED, count[0]] = ti.Vector([i, j])
-            count = count + vec2i(1, ti.cast(square < reach[0] * reach[0], ti.i32))
+            count = count + vec2i(1, ti.cast(square < touching * touching, ti.i32))
 
     @ti.func
     def find(self, s, reach):
@@ -173,7 +211,8 @@ class ExpectedContacts:
             for k in range(self.pair_count[s]):
                 pair = self.pair[s, EXPECTED, k]
                 branch = self.bodies.position[pair[1]] - self.bodies.position[pair[0]]
-                if branch.norm_sqr() < reach * reach:
+                touching = reach - self.bodies.short_of_reach(pair[0], pair[1])
+                if branch.norm_sqr() < touching * touching:
                     self.pair[s, TOUCHING, count] = pair
                     count += 1
         return which, count
@@ -195,20 +234,20 @@ class ExpectedContacts:
             count = ti.cast(self.table.particles[s], ti.u32)
             if bits(shared, 0, _AUDIT) < ti.min(count, _MOST_CHOSEN) * ti.u32(_CHANCE):
                 chosen = ti.cast(bits(shared, 1, _AUDIT) % count, ti.i32)
-                self._audit(s, self.bodies.first(s) + chosen, low, high, reach * reach)
+                self._audit(s, self.bodies.first(s) + chosen, low, high, reach)
 
     @ti.func
-    def _audit(self, s, i, low, high, square):
+    def _audit(self, s, i, low, high, reach):
         """Make all tests of sphere i; a contact that no list holds is a miss."""
         tests, contacts = self.table.particles[s], self._is_at_wall(i, low, high)
         for j in range(self.bodies.first(s), self.bodies.last(s)):
             if j != i:
-                contacts += self._touching(i, j, square)
+                contacts += self._touching(i, j, reach)
         for k in range(self.pair_count[s]):
             pair = self.pair[s, EXPECTED, k]
             if pair[0] == i or pair[1] == i:
                 tests -= 1
-                contacts -= self._touching(pair[0], pair[1], square)
+                contacts -= self._touching(pair[0], pair[1], reach)
         for k in range(self.wall_count(s)):
             if self.wall_sphere(s, k) == i:
                 tests -= 1
@@ -217,11 +256,11 @@ class ExpectedContacts:
         self.misses[s] = self.misses[s] + contacts
 
     @ti.func
-    def _touching(self, i, j, square):
-        """1 for two spheres that touch, else 0; square: of the distance at which they do [m^2]."""
-        return ti.cast(
-            (self.bodies.position[j] - self.bodies.position[i]).norm_sqr() < square, ti.i32
-        )
+    def _touching(self, i, j, reach):
+        """1 for two spheres that touch, else 0; reach: distance at which the largest do [m]."""
+        branch = self.bodies.position[j] - self.bodies.position[i]
+        touching = reach - self.bodies.short_of_reach(i, j)
+        return ti.cast(branch.norm_sqr() < touching * touching, ti.i32)
 
     @ti.func
     def _is_at_wall(self, i, low, high):
@@ -245,6 +284,16 @@ class ExpectedContacts:
             int(self.table.in_use(one).sum()) for one in (self.skipped, self.audited, self.misses)
         )
         return Audit(skipped, audited, misses, "contact tests")
+
+
+@ti.func
+def nearest(branch, relative, time):
+    """Square of the least distance [m^2] within a time [s], from a branch that changes evenly."""
+    speed, closing = relative.norm_sqr(), -branch.dot(relative)
+    when = 0.0
+    if closing > 0.0:
+        when = ti.min(time, closing / speed)
+    return (branch + when * relative).norm_sqr()
 
 
 #: What is tested for contact, by the name of the search.

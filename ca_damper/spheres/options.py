@@ -2,18 +2,24 @@
 
 import math
 from dataclasses import dataclass, replace
-from typing import ClassVar, Optional
-
-import numpy as np
+from operator import mul
+from typing import ClassVar, Optional, Union
 
 from ca_damper.certificate import NEGLIGIBLE, Estimate
-from ca_damper.filling import LEAST_PLACES, Structure
+from ca_damper.filling import LEAST_PLACES, DeviceFilling, Structure
+from ca_damper.gravity import checked_gravity, gravity_along
 from ca_damper.scenes.scene_fields import SceneFields
-from ca_damper.spheres.contact_law import POWERS, contact_duration, pair_numbers
-from ca_damper.spheres.dynamics import DIVERGENCES, DeviceSpheres
+from ca_damper.spheres.contact_law import FRICTION_LAWS, POWERS, contact_duration, pair_numbers
+from ca_damper.spheres.divergence_codes import DIVERGENCES
+from ca_damper.spheres.dynamics import DeviceSpheres
 from ca_damper.spheres.estimates import air_estimate, rotation_estimate
 from ca_damper.spheres.expected_contacts import SEARCHES
 from ca_damper.spheres.search import listed_pairs
+from ca_damper.spheres.start_values import (
+    checked_sizes,
+    checked_start,
+    checked_start_velocity,
+)
 from taichi_dem.kit.engine_pool import power_of_two
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import (
@@ -42,18 +48,25 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Spheres:
-    """Spheres of one size in a box, by discrete elements (section 4 of the paper).
+    """Spheres of one size, or of several, in a box, by discrete elements (section 4 of the paper).
 
     damping: "tsuji", a dashpot with d^(1/4), for one restitution at every speed, or "printed", with
     d^(1/2) as in eq. (3), for the restitution at ``reference_speed`` [m/s] only: slower contacts
     rebound more, faster ones less.
     restitution, friction [-], young [Pa], poisson [-]: of two spheres; with ``wall_``: of sphere
     and container, whose modulus and Poisson's ratio these are.
-    diameter [m], particle_mass [kg]. width, height [m]: of the box inside. gravity [m/s^2].
-    rotation: whether spheres turn; the paper leaves it out.
+    diameter [m]; with sizes the largest. particle_mass [kg]: with sizes the mean of all, and all of
+    one density. sizes: (number, diameter [m]) of each size; the box holds as many as of the
+    largest. width, height [m]: of the box inside. gravity [m/s^2]:
+    downwards, or (to the right, downwards), as for a box that lies on its side or is tilted.
+    friction_law: "viscous", which at small slip grows with it, so that heaps creep, or "history",
+    with a tangential spring for each contact, which holds. rotation: whether spheres turn; the
+    paper leaves it out.
     search: "cells", or "all_pairs" as in the paper; the same bits, but slower above 10 spheres.
     start: places of the spheres [m], shape (particles, 2), from the lower left inner corner, for
-    all scenes alike; by default random ones from each scene's seed.
+    all scenes alike; by default random ones from each scene's seed. start_velocity: of the spheres
+    [m/s], shape (particles, 2), seen from the container; by default none, or a little at random
+    places.
 
     Restitution and reference speed are not printed in the paper; 0.75 and 0.5 m/s are ours.
     """
@@ -72,10 +85,13 @@ class Spheres:
     particle_mass: float = 0.2e-3
     width: float = 60e-3
     height: float = 96e-3
-    gravity: float = 9.8
+    gravity: Union[float, tuple] = 9.8
     rotation: bool = False
     search: str = "cells"
     start: Optional[tuple] = None
+    friction_law: str = "viscous"
+    sizes: Optional[tuple] = None
+    start_velocity: Optional[tuple] = None
 
     label: ClassVar[str] = "dem"
     default_dt: ClassVar[float] = 2e-5
@@ -84,13 +100,18 @@ class Spheres:
     def __post_init__(self) -> None:
         """InputError for a number or word outside its range."""
         plain_fields(self)
+        if self.sizes is not None:
+            object.__setattr__(self, "sizes", checked_sizes(self.sizes))
+            object.__setattr__(self, "diameter", max(size for _, size in self.sizes))
         choice("damping", self.damping, POWERS)
+        choice("friction_law", self.friction_law, FRICTION_LAWS)
         choice("search", self.search, SEARCHES)
         flag("rotation", self.rotation)
         for name in ("reference_speed", "young", "wall_young", "diameter", "particle_mass"):
             positive(name, getattr(self, name))
-        for name in ("friction", "wall_friction", "gravity"):
+        for name in ("friction", "wall_friction"):
             positive(name, getattr(self, name), zero_allowed=True)
+        object.__setattr__(self, "gravity", checked_gravity(self.gravity))
         for name in ("restitution", "wall_restitution"):
             self._check_restitution(name)
         for name in ("poisson", "wall_poisson"):
@@ -98,8 +119,12 @@ class Spheres:
         for name in ("width", "height"):
             self._check_size(name)
         self._check_capacity()
+        if self.sizes is not None:
+            whole("spheres in sizes", sum(count for count, _ in self.sizes), 1, self.capacity)
         if self.start is not None:
-            object.__setattr__(self, "start", self._checked_start())
+            object.__setattr__(self, "start", checked_start(self))
+        if self.start_velocity is not None:
+            object.__setattr__(self, "start_velocity", checked_start_velocity(self))
 
     @property
     def rubs(self) -> bool:
@@ -128,8 +153,29 @@ class Spheres:
 
     @property
     def radius(self) -> float:
-        """Radius of a sphere [m]."""
+        """Radius of a sphere [m], the largest one of several sizes."""
         return 0.5 * self.diameter
+
+    @property
+    def radii(self) -> tuple[float, ...]:
+        """Radius of the spheres of each size [m]."""
+        return tuple(0.5 * size for _, size in self.sizes or ((1, self.diameter),))
+
+    @property
+    def masses(self) -> tuple[float, ...]:
+        """Mass of a sphere of each size [kg], of one density."""
+        if len(self.radii) == 1:
+            return (self.particle_mass,)
+        volumes = [(size / self.diameter) ** 3 for _, size in self.sizes or ()]
+        counts = [count for count, _ in self.sizes or ()]
+        mean = sum(map(mul, counts, volumes)) / sum(counts)
+        return tuple(self.particle_mass * (volume / mean) for volume in volumes)
+
+    @property
+    def fall(self) -> tuple[float, float]:
+        """Acceleration by gravity [m/s^2], to the right and downwards."""
+        across = self.gravity[0] if isinstance(self.gravity, tuple) else 0.0
+        return across, gravity_along(self)
 
     @property
     def lattice(self) -> tuple[int, int]:
@@ -150,10 +196,15 @@ class Spheres:
         """
         whole("particles", particles, 0, self.capacity)
         positive("dt", dt)
-        if self.start is not None and particles != len(self.start):
-            raise InputError(
-                f"particles must be {len(self.start)}, as many as places in start, got {particles}"
-            )
+        for name, what in (("start", "places"), ("start_velocity", "velocities")):
+            given = getattr(self, name)
+            if given is not None and particles != len(given):
+                raise InputError(
+                    f"particles must be {len(given)}, as many as {what} in {name}, got {particles}"
+                )
+        if self.sizes is not None and particles != sum(count for count, _ in self.sizes):
+            total = sum(count for count, _ in self.sizes)
+            raise InputError(f"particles must be {total}, as many as in sizes, got {particles}")
 
     def divergence(self, code: int, particles: int, dt: float) -> tuple[str, float]:
         """Meaning of a code of ``divergence_code``, and a step that avoids it [s]."""
@@ -161,8 +212,11 @@ class Spheres:
 
     def safe_step(self) -> float:
         """Step [s] that resolves the contact of two spheres that fell through the box."""
-        numbers = pair_numbers(self)
-        speed = math.sqrt(2.0 * max(self.gravity, 1.0) * self.height)
+        smallest = min(range(len(self.radii)), key=self.radii.__getitem__)
+        numbers = pair_numbers(self, smallest, smallest)
+        across, down = self.fall
+        drop = abs(across) * self.width + abs(down) * self.height
+        speed = math.sqrt(2.0 * max(drop, self.height))
         duration = contact_duration(numbers["mass"], numbers["stiffness"], speed)
         return float(f"{duration / _STEPS_PER_CONTACT:.1e}")
 
@@ -174,12 +228,16 @@ class Spheres:
     @property
     def structure(self) -> Structure:
         """Effects, laws and the search are compiled; numbers, box and places of start are not."""
-        key = (self.damping, self.rubs, self.rotation, self.search, self.start is None)
+        remembers = self.rubs and self.friction_law == "history"
+        key = (self.damping, self.rubs, remembers, self.rotation, self.search)
+        given = self.start is not None, self.start_velocity is not None
         # As many as go with the spheres of an engine, so that both find room or neither.
         pairs = listed_pairs(power_of_two(self.capacity, LEAST_PLACES))
-        return Structure(key, {"spheres": self.capacity, "pairs": pairs})
+        return Structure(
+            (*key, *given, len(self.radii)), {"spheres": self.capacity, "pairs": pairs}
+        )
 
-    def bind(self, table: SceneFields) -> DeviceSpheres:
+    def bind(self, table: SceneFields) -> DeviceFilling:
         """The spheres on the device, for all scenes of a table."""
         return DeviceSpheres(self, table)
 
@@ -205,26 +263,3 @@ class Spheres:
                 f"width and height must hold at most {_MOST_SPHERES} spheres of the diameter "
                 f"{self.diameter}, got {shown(columns)} x {shown(rows)}"
             )
-
-    def _checked_start(self) -> tuple:
-        """The places as a tuple of pairs, none in a wall or in another sphere."""
-        try:
-            places = np.array(self.start, dtype=np.float64).reshape(-1, 2)
-            whole("places in start", len(places), 0, self.capacity)
-        except (TypeError, ValueError, OverflowError):
-            raise InputError(
-                f"start must hold two coordinates [m] for each of at most {self.capacity} spheres, "
-                f"got {shown(self.start)}"
-            ) from None
-        size, slack = np.array([self.width, self.height]), _ROUNDING * self.diameter
-        inside = (places >= self.radius - slack) & (places <= size - self.radius + slack)
-        if not inside.all():
-            k = int(np.flatnonzero(~inside.all(axis=1))[0])
-            raise InputError(
-                f"start must keep spheres off the walls, got {places[k]} for number {k}"
-            )
-        gaps = np.linalg.norm(places[:, None] - places[None, :], axis=2)
-        near = np.argwhere(np.triu(gaps < self.diameter - slack, 1))
-        if len(near):
-            raise InputError(f"start must not let spheres overlap, numbers {near[0]} do")
-        return tuple(map(tuple, places.tolist()))

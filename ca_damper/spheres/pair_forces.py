@@ -12,9 +12,7 @@ import taichi as ti
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.bodies import Bodies, vec2
 from ca_damper.spheres.contact_law import ContactLaw
-
-#: Contacts that are evaluated together.
-LANES = 8
+from ca_damper.spheres.pair_contacts import LANES, PairContacts
 
 
 @ti.data_oriented
@@ -22,10 +20,11 @@ class PairForces:
     """Contacts of two spheres in the present step, by scene.
 
     pair: lists of pairs, of the search. force_x, force_y: of a vector of contacts, on their first
-    spheres [N]; torque: on both [N m]. rubs: whether there is friction.
+    spheres [N]; torque: on both by their shares [N m]. rubs: whether there is friction.
+    history: of friction; spring, root: of its springs.
     """
 
-    scratch_fields = ("force_x", "force_y", "torque")
+    scratch_fields = ("force_x", "force_y", "torque", "spring", "root")
 
     def __init__(
         self,
@@ -34,9 +33,12 @@ class PairForces:
         search: Any,
         law: ContactLaw,
         rotation: Any,
+        contacts: PairContacts,
+        history: Any,
         rubs: bool,
     ):
         self.bodies, self.law, self.rotation, self.rubs = bodies, law, rotation, rubs
+        self.contacts, self.history = contacts, history
         self.turns = rubs and rotation.turns
         self.pair = search.pair
         for name in self.scratch_fields:
@@ -45,12 +47,16 @@ class PairForces:
     @ti.func
     def add(self, s, contact, which, count):
         """Add the forces of so many pairs of a list; those that do not touch add nothing."""
+        if ti.static(self.history.remembers):
+            self.history.recall(s, self.pair, which, count)
         for vector in range((count + LANES - 1) // LANES):
             first = LANES * vector
             pairs = [
                 self.pair[s, which, ti.min(first + k, count - 1)] for k in ti.static(range(LANES))
             ]
-            self._evaluate(s, contact, pairs)
+            if ti.static(self.history.remembers):
+                self._recall(s, first, count)
+            self._evaluate(s, self.contacts.of_lanes(pairs, contact), pairs)
             for lane in ti.static(range(LANES)):
                 if first + lane < count:
                     self._push(s, pairs[lane], lane)
@@ -58,12 +64,38 @@ class PairForces:
     @ti.func
     def _push(self, s, pair, lane: ti.template()):
         """Add the force of a contact to both spheres."""
+        if ti.static(self.history.remembers):
+            self.history.store_pair(s, pair, vec2(self.spring[s][lane], self.root[s][lane]))
         force = vec2(self.force_x[s][lane], self.force_y[s][lane])
         self.bodies.push(pair[0], force)
         self.bodies.push(pair[1], -force)
         if ti.static(self.turns):
-            self.rotation.twist(pair[0], self.torque[s][lane])
-            self.rotation.twist(pair[1], self.torque[s][lane])
+            share, torque = self.rotation.share(pair[0], pair[1]), self.torque[s][lane]
+            self.rotation.twist(pair[0], share * torque)
+            self.rotation.twist(pair[1], (1.0 - share) * torque)
+
+    @ti.func
+    def _recall(self, s, first, count):
+        """Take the springs of a vector of contacts from the history."""
+        kept = [
+            self.history.recalled[s, ti.min(first + k, count - 1)] for k in ti.static(range(LANES))
+        ]
+        self.spring[s] = ti.Vector([kept[k][0] for k in ti.static(range(LANES))])
+        self.root[s] = ti.Vector([kept[k][1] for k in ti.static(range(LANES))])
+
+    @ti.func
+    def _friction(self, s, contact, overlap, push, slip):
+        """Friction of a vector of contacts [N]."""
+        if ti.static(self.history.remembers):
+            way, kept, last_root = contact.since * slip, self.spring[s], self.root[s]
+            drag, spring, root = self.history.force(
+                *(contact, overlap, push, slip, way, kept, last_root)
+            )
+            touch = overlap > 0.0
+            self.spring[s] = ti.select(touch, spring, 0.0)
+            self.root[s] = ti.select(touch, root, 0.0)
+            return drag
+        return self.law.friction(contact, push, slip)
 
     @ti.func
     def _evaluate(self, s, contact, pairs: ti.template()):
@@ -77,13 +109,13 @@ class PairForces:
         push = self.law.normal(contact, contact.reach - distance, rx * nx + ry * ny)
         fx, fy = -push * nx, -push * ny
         if ti.static(self.rubs):
-            slip, lever = ry * nx - rx * ny, 0.5 * distance
+            slip = ry * nx - rx * ny
             if ti.static(self.turns):
-                slip += lever * self._spins(pairs)
-            drag = self.law.friction(contact, push, slip)
+                slip += distance * self._turning(pairs)
+            drag = self._friction(s, contact, contact.reach - distance, push, slip)
             fx, fy = fx - drag * ny, fy + drag * nx
             if ti.static(self.turns):
-                self.torque[s] = ti.select(touch, lever * drag, 0.0)
+                self.torque[s] = ti.select(touch, distance * drag, 0.0)
         self.force_x[s], self.force_y[s] = ti.select(touch, fx, 0.0), ti.select(touch, fy, 0.0)
 
     @ti.func
@@ -97,11 +129,8 @@ class PairForces:
         return x, y
 
     @ti.func
-    def _spins(self, pairs: ti.template()):
-        """Sum of the spins of both spheres [rad/s]."""
+    def _turning(self, pairs: ti.template()):
+        """Slip by the spins of both spheres over their distance [1/s]."""
         return ti.Vector(
-            [
-                self.rotation.spin[pairs[k][0]] + self.rotation.spin[pairs[k][1]]
-                for k in ti.static(range(LANES))
-            ]
+            [self.rotation.turning(pairs[k][0], pairs[k][1]) for k in ti.static(range(LANES))]
         )

@@ -24,7 +24,7 @@ class NoRotation:
         """Nothing to reset."""
 
     @ti.func
-    def slip_of_pair(self, i, j, lever, slip):
+    def slip_of_pair(self, i, j, distance, slip):
         """Slip [m/s] of two spheres."""
         return slip
 
@@ -74,9 +74,25 @@ class Rotation:
         self.spin[i], self.torque[i] = 0.0, 0.0
 
     @ti.func
-    def slip_of_pair(self, i, j, lever, slip):
-        """Slip [m/s] of two spheres whose centres are a lever [m] each from the contact."""
-        return slip + lever * (self.spin[i] + self.spin[j])
+    def share(self, i, j):
+        """Share of the distance of two spheres that lies on the side of the first."""
+        share = 0.5
+        if ti.static(self.bodies.kinds > 1):
+            body = self.bodies.body[None]
+            own = self.bodies.radius(i, body)
+            share = own / (own + self.bodies.radius(j, body))
+        return share
+
+    @ti.func
+    def turning(self, i, j):
+        """Slip of two spheres by their spins over their distance [1/s]."""
+        share = self.share(i, j)
+        return share * self.spin[i] + (1.0 - share) * self.spin[j]
+
+    @ti.func
+    def slip_of_pair(self, i, j, distance, slip):
+        """Slip [m/s] of two spheres whose centres are a distance [m] apart."""
+        return slip + distance * self.turning(i, j)
 
     @ti.func
     def slip_at_wall(self, i, lever, slip):
@@ -92,19 +108,20 @@ class Rotation:
     @ti.func
     def kick(self, i, dt):
         """Change the spin of sphere i by its torques over a step [s]."""
-        self.spin[i] = self.spin[i] + dt * self.torque[i] / self._inertia()
+        self.spin[i] = self.spin[i] + dt * self.torque[i] / self._inertia(i)
         self.torque[i] = 0.0
 
     @ti.func
     def energy(self, i):
         """Energy [J] of the turning."""
-        return 0.5 * self._inertia() * self.spin[i] * self.spin[i]
+        return 0.5 * self._inertia(i) * self.spin[i] * self.spin[i]
 
     def snapshot(self, rows: slice) -> dict[str, np.ndarray]:
         """Spins [rad/s] of some spheres."""
         return {"spin": values(self.spin)[rows]}
 
     @ti.func
-    def _inertia(self):
+    def _inertia(self, i):
         body = self.bodies.body[None]
-        return 0.4 * body.mass * body.radius * body.radius
+        radius = self.bodies.radius(i, body)
+        return 0.4 * self.bodies.mass(i, body) * radius * radius

@@ -57,7 +57,7 @@ class AllPairs:
         """Nothing to note."""
 
     @ti.func
-    def refresh(self, s, low, high):
+    def refresh(self, s, low, high, ahead):
         """Nothing to refresh."""
 
     @ti.func
@@ -78,7 +78,8 @@ class AllPairs:
     @ti.func
     def _find(self, s, i, j, reach, count: ti.template()):
         branch = self.bodies.position[j] - self.bodies.position[i]
-        if branch.norm_sqr() < reach * reach and count < self.places:
+        touching = reach - self.bodies.short_of_reach(i, j)
+        if branch.norm_sqr() < touching * touching and count < self.places:
             self.pair[s, TOUCHING, count] = ti.Vector([i, j])
             count = count + 1
 
@@ -167,12 +168,12 @@ class CellList:
             visit(s, near[0], near[1], contact, count)
 
     @ti.func
-    def refresh(self, s):
-        """Renew the list if spheres may have crossed the skin; returns whether it did.
+    def refresh(self, s, ahead):
+        """Renew the list if spheres may cross the skin in a way ahead [m]; returns whether it did.
 
         "not" includes NaN.
         """
-        used_up = not (self.travel[s] < self.grid[None].skin)
+        used_up = not (self.travel[s] + ahead < self.grid[None].skin)
         if used_up:
             self._search(s)
             self.travel[s] = 0.0
@@ -215,7 +216,8 @@ class CellList:
             for c in range(ti.max(column - 1, 0), ti.min(column + 2, grid.columns)):
                 j = self.cell_first[s * self.cell_stride + r * grid.columns + c]
                 while j >= 0:
-                    if (self.bodies.position[j] - position).norm_sqr() < reach * reach:
+                    near = reach - self.bodies.short_of_reach(i, j)
+                    if (self.bodies.position[j] - position).norm_sqr() < near * near:
                         start = self._insert(s, i, j, start, row_end)
                     j = self.next[j]
         return start
@@ -238,7 +240,7 @@ class CellList:
 
 def skin_of(options: Any) -> float:
     """Skin [m]; from 10 to 160 spheres this one is the fastest, if by little."""
-    return options.radius / 3.0
+    return min(options.radii) / 3.0
 
 
 def grid_of(options: Any) -> tuple[int, int]:

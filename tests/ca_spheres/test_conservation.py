@@ -12,13 +12,11 @@ EPS = np.finfo(float).eps
 
 
 @pytest.mark.parametrize("search", ["cells", "all_pairs"])
-@pytest.mark.parametrize("rotation", [False, True])
-def test_blows_on_the_container_are_the_particles_change_of_momentum(search, rotation):
+@pytest.mark.parametrize("turning", [{}, {"rotation": True}, {"friction_law": "history"}])
+def test_blows_on_the_container_are_the_particles_change_of_momentum(search, turning):
     # p' = -impulse' - N m g; each of the steps rounds each momentum, of 2 m/s at most, once.
     steps, particles = 15_000, [1, 50, 160]
-    rig = Rig(
-        Spheres(search=search, rotation=rotation), particles, DT, frequency=6.0, amplitude=0.02
-    )
+    rig = Rig(Spheres(search=search, **turning), particles, DT, frequency=6.0, amplitude=0.02)
     rig.run(1)
     before = [rig.momentum(s) for s in range(3)]
     rig.impulse.fill(0.0)
@@ -33,9 +31,11 @@ def test_blows_on_the_container_are_the_particles_change_of_momentum(search, rot
 
 @pytest.mark.parametrize("damping", ["tsuji", "printed"])
 @pytest.mark.parametrize("rotation", [False, True])
-def test_energy_in_a_still_container_falls_until_the_spheres_rest(damping, rotation):
+@pytest.mark.parametrize("law", ["viscous", "history"])
+def test_energy_in_a_still_container_falls_until_the_spheres_rest(damping, rotation, law):
     particles = [1, 30, 100, 160]
-    rig = Rig(Spheres(damping=damping, rotation=rotation), particles, DT, seed=[1, 2, 3, 4])
+    filling = Spheres(damping=damping, rotation=rotation, friction_law=law)
+    rig = Rig(filling, particles, DT, seed=[1, 2, 3, 4])
     energy = [[rig.energy(s) for s in range(4)]]
     for _ in range(150):
         rig.run(1000)

@@ -65,13 +65,14 @@ def test_sphere_slides_for_two_sevenths_of_v_over_mu_g():
     assert rig.run(later).state()[1][0, 0] > 1.02 * plain.run(later).state()[1][0, 0]
 
 
+@pytest.mark.parametrize("law", ["viscous", "history"])
 @pytest.mark.parametrize(("normal", "wall"), [((0, -1), 0), ((0, 1), 1), ((-1, 0), 2), ((1, 0), 3)])
-def test_blow_that_slides_takes_mu_times_the_normal_impulse(normal, wall):
+def test_blow_that_slides_takes_mu_times_the_normal_impulse(normal, wall, law):
     # Friction is mu times the push in every step, so the impulses have that ratio to round-off.
     places = [(0.03, 0.0035), (0.03, 0.0925), (0.0035, 0.05), (0.0565, 0.05)]
     normal = np.array(normal, dtype=float)
     tangent = np.array([-normal[1], normal[0]])
-    rig = Rig(Spheres(gravity=0.0, start=[places[wall]]), 1, DT)
+    rig = Rig(Spheres(gravity=0.0, start=[places[wall]], friction_law=law), 1, DT)
     before = 0.5 * normal + 2.0 * tangent
     rig.throw(before)
     change = rig.run(200).state()[1][0] - before
@@ -91,8 +92,9 @@ def test_container_feels_side_walls_drag():
 OBLIQUE = [(0.025, 0.05), (0.0315, 0.052)]
 
 
-def oblique_pair(rotation):
-    rig = Rig(Spheres(gravity=0.0, rotation=rotation, start=OBLIQUE), 2, DT)
+def oblique_pair(rotation, law="viscous"):
+    options = {"gravity": 0.0, "rotation": rotation, "start": OBLIQUE}
+    rig = Rig(Spheres(friction_law=law, **options), 2, DT)
     rig.throw([[0.5, 0.3], [-0.4, -0.1]])
     return rig
 
@@ -105,9 +107,10 @@ def angular_momentum(rig):
     return orbital + 0.4 * MASS * RADIUS**2 * rig.device.snapshot(0)["spin"].sum()
 
 
-def test_oblique_blow_of_turning_spheres_keeps_momentum_and_angular_momentum():
+@pytest.mark.parametrize("law", ["viscous", "history"])
+def test_oblique_blow_of_turning_spheres_keeps_momentum_and_angular_momentum(law):
     # Forces are opposite and act at one point: both are kept step by step, to a rounding each.
-    rig, steps = oblique_pair(rotation=True), 300
+    rig, steps = oblique_pair(rotation=True, law=law), 300
     rig.run(1)
     angular, linear = angular_momentum(rig), rig.state()[1].sum(axis=0)
     rig.run(steps)

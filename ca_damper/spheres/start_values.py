@@ -1,0 +1,93 @@
+"""Checks of what users give of the spheres one by one: places and velocities at the start."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import LARGEST, positive, shown, whole
+
+if TYPE_CHECKING:
+    from ca_damper.spheres.options import Spheres
+
+# Sizes have a contact law for each pair of them.
+_MOST_SIZES, _MOST_OF_A_SIZE = 8, 1_000_000
+# Room that rounding may take from spheres that touch exactly.
+_ROUNDING = 1e-9
+
+
+def checked_start(options: "Spheres") -> tuple:
+    """Places as a tuple of pairs, none in a wall or in another sphere."""
+    places = _pairs("start", options.start, "coordinates [m]", options.capacity)
+    whole("places in start", len(places), 0, options.capacity)
+    radius, slack = _radii(options, len(places))[:, None], _ROUNDING * options.diameter
+    inside = places >= radius - slack
+    inside &= places <= np.array([options.width, options.height]) - radius + slack
+    if not inside.all():
+        k = int(np.flatnonzero(~inside.all(axis=1))[0])
+        raise InputError(f"start must keep spheres off the walls, got {places[k]} for number {k}")
+    gaps = np.linalg.norm(places[:, None] - places[None, :], axis=2)
+    near = np.argwhere(np.triu(gaps < radius + radius.T - slack, 1))
+    if len(near):
+        raise InputError(f"start must not let spheres overlap, numbers {near[0]} do")
+    return tuple(map(tuple, places.tolist()))
+
+
+def checked_start_velocity(options: "Spheres") -> tuple:
+    """Velocities as a tuple of pairs, as many as places where these are given."""
+    velocity = _pairs("start_velocity", options.start_velocity, "speeds [m/s]", options.capacity)
+    slow = np.abs(velocity) <= LARGEST
+    if not slow.all():
+        k = int(np.flatnonzero(~slow.all(axis=1))[0])
+        raise InputError(
+            f"start_velocity must hold finite speeds of at most {LARGEST:g} m/s, "
+            f"got {velocity[k]} for number {k}"
+        )
+    if options.start is not None and len(options.start) != len(velocity):
+        raise InputError(
+            f"start_velocity must hold {len(options.start)} velocities, as many as places in "
+            f"start, got {len(velocity)}"
+        )
+    whole("velocities in start_velocity", len(velocity), 0, options.capacity)
+    return tuple(map(tuple, velocity.tolist()))
+
+
+def checked_sizes(sizes: Any) -> tuple:
+    """Pairs of a number and a diameter; InputError for anything else."""
+    try:
+        pairs = tuple((number, diameter) for number, diameter in sizes)
+    except (TypeError, ValueError):
+        pairs = ()
+    if not 1 <= len(pairs) <= _MOST_SIZES:
+        raise InputError(
+            f"sizes must hold a number and a diameter [m] for each of 1 to {_MOST_SIZES} sizes, "
+            f"got {shown(sizes)}"
+        )
+    return tuple(
+        (whole("number in sizes", number, 1, _MOST_OF_A_SIZE), positive("diameter in sizes", size))
+        for number, size in pairs
+    )
+
+
+def _radii(options: "Spheres", count: int) -> np.ndarray:
+    """Radius of each sphere whose place is given [m], (count,)."""
+    if options.sizes is None:
+        return np.full(count, options.radius)
+    numbers = [number for number, _ in options.sizes]
+    if sum(numbers) != count:
+        raise InputError(
+            f"start must hold {sum(numbers)} places, as many as there are in sizes, got {count}"
+        )
+    return np.repeat(options.radii, numbers)
+
+
+def _pairs(name: str, value: Any, what: str, most: int) -> np.ndarray:
+    try:
+        pairs = np.array(value, dtype=np.float64).reshape(-1, 2)
+        if pairs.size != np.size(value):
+            raise ValueError
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(
+            f"{name} must hold two {what} for each of at most {most} spheres, got {shown(value)}"
+        ) from None
+    return pairs
