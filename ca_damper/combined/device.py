@@ -1,0 +1,167 @@
+"""One step of the combined filling: a flight of all grains, or short steps of spheres.
+
+Both are steps of one leapfrog, whose velocities belong to the times between steps and whose
+positions run half a step ahead. Another length of step shifts the positions along the velocities,
+which changes neither momentum nor energy, so that grains pass from one way to the other exactly.
+In short steps the container is foreseen from its motion at the beginning and its recoil, as the
+structure moves it at the end of the whole step only.
+"""
+
+from typing import Any, Optional
+
+import numpy as np
+import taichi as ti
+
+from ca_damper.filling import Action, Motion
+from ca_damper.scenes.scene_fields import SceneFields
+from ca_damper.spheres.bodies import vec2
+from ca_damper.spheres.dynamics import DeviceSpheres
+from taichi_dem.kit.audit import Audit
+from taichi_dem.kit.effect_usage import EffectUse
+
+# Steps that a flight must be clear of contacts: itself, and half of one, by which positions lead.
+_CLEAR = 1.5
+FLIGHTS = "long flights"
+
+
+@ti.data_oriented
+class DeviceCombined:
+    """The grains of all scenes of a table; see ``ca_damper.filling``.
+
+    spheres: all grains, and what moves them. substeps: short steps of a step, shape (). step: short
+    steps and flights since the reset. flights: of them; first: step of the first, or -1.
+    """
+
+    def __init__(self, options: Any, table: SceneFields):
+        self.table, self.spheres = table, DeviceSpheres(options, table)
+        self.substeps = ti.field(ti.i32, shape=())
+        self.step, self.flights, self.first = (table.field(ti.i32) for _ in range(3))
+
+    def load(self, options: Any) -> None:
+        """Take over the numbers of grains of the same structure."""
+        self.spheres.load(options)
+        self._load(options.substeps)
+
+    @ti.kernel
+    def _load(self, substeps: ti.i32):
+        self.substeps[None] = substeps
+
+    @ti.func
+    def reset(self, s):
+        """Place the grains of scene s, at rest."""
+        self.spheres.reset(s)
+        self.step[s], self.flights[s], self.first[s] = 0, 0, -1
+
+    @ti.func
+    def advance(self, s, step, motion):
+        """Advance the grains by a step; returns the impulse of their impacts on the container."""
+        dt, impulse = self.table.dt[s], 0.0
+        if step == 0:
+            self.spheres.board(s, motion)
+        if self._is_clear(s, dt, motion):
+            self._fly(s, dt, motion)
+            self.flights[s] = self.flights[s] + 1
+            if self.first[s] < 0:
+                self.first[s] = step
+        else:
+            impulse = self._take_short_steps(s, step, dt, motion)
+        return Action(impulse, 0.0)
+
+    @ti.func
+    def _is_clear(self, s, dt, motion):
+        """Whether nothing can touch in a step; never before the first one."""
+        bodies, search = self.spheres.bodies, self.spheres.search
+        lead, clear = bodies.lead[s], False
+        if lead > 0.0:
+            low, high = bodies.reach_of_walls(motion.x + lead * (motion.v + 0.5 * lead * motion.a))
+            least, most = 0.5 / lead * search.least[s], 0.5 / lead * search.most[s]
+            time, pull = _CLEAR * dt, ti.abs(bodies.body[None].pull)
+            walls = ti.abs(motion.v) + time * ti.abs(motion.a)
+            fall = time * (vec2(0.0, walls) + time * pull)
+            fastest = ti.max(ti.abs(least), ti.abs(most)).max()
+            ahead = vec2(time * (most - least).norm(), time * fastest + fall.norm())
+            if (ahead < search.longest_way()).all():
+                search.refresh(s, low, high, ahead)
+                clear = search.is_clear(s, time, low, high, fall)
+            else:
+                search.refresh(s, low, high, vec2(0.0))
+            # The way that is noted next is that of a shift: a share of the way in 1 s.
+            search.note_motion(s, least, most)
+        return clear
+
+    @ti.func
+    def _shift(self, s, lead):
+        """Have positions run another time [s] ahead of the velocities."""
+        bodies, search = self.spheres.bodies, self.spheres.search
+        by = lead - bodies.lead[s]
+        if bodies.lead[s] > 0.0:
+            search.shifted(s, by)
+        else:
+            search.forget(s)
+        bodies.advance_lead(s, lead)
+        return by
+
+    @ti.func
+    def _fly(self, s, dt, motion):
+        """Take all grains over a step in which none of them touches anything."""
+        bodies, search = self.spheres.bodies, self.spheres.search
+        self._shift(s, 0.5 * dt)
+        back, fore = search.least[s], search.most[s]
+        self.spheres.move(s, dt)
+        self.spheres.history.reset(s)
+        search.note_motion(s, search.least[s] + back, search.most[s] + fore)
+        bodies.floor[s] = motion.x + dt * (motion.v + 0.5 * dt * motion.a)
+        self.step[s] = self.step[s] + 1
+
+    @ti.func
+    def _take_short_steps(self, s, step, whole, motion):
+        """Take the grains over a step by short ones; returns the impulse of all [N s]."""
+        count, total = self.substeps[None], 0.0
+        dt = whole / count
+        since = dt + self._shift(s, 0.5 * dt)
+        x, v = motion.x, motion.v
+        for _ in range(count):
+            now = Motion(x, v, motion.a)
+            numbers = step, self.step[s]
+            impulse = self.spheres.step(s, numbers, dt, since, now)
+            gain = dt * motion.a + impulse * self.table.recoil[s]
+            x, v, total = x + dt * (v + 0.5 * gain), v + gain, total + impulse
+            self.step[s], since = self.step[s] + 1, dt
+        return total
+
+    @ti.func
+    def energy(self, s):
+        """Kinetic and potential energy and that of the contacts [J]."""
+        return self.spheres.energy(s)
+
+    @ti.func
+    def momentum(self, s):
+        """Momentum along x [kg m/s]."""
+        return self.spheres.momentum(s)
+
+    @ti.func
+    def divergence_code(self, s):
+        """As that of the spheres."""
+        return self.spheres.divergence_code(s)
+
+    def uses(self, effects: tuple[str, ...]) -> tuple[EffectUse, ...]:
+        """Activity of each of the named effects."""
+        flights = int(self.table.in_use(self.flights).sum())
+        flown = EffectUse(FLIGHTS, "flights", flights)
+        rest = tuple(name for name in effects if name != FLIGHTS)
+        return (*self.spheres.uses(rest), *((flown,) if FLIGHTS in effects else ()))
+
+    def first_steps(self, effects: tuple[str, ...]) -> dict[str, np.ndarray]:
+        """Step in which each of the named effects first acted, infinite if never, (scenes,)."""
+        first = self.table.in_use(self.first).astype(np.float64)
+        first[first < 0] = np.inf
+        rest = tuple(name for name in effects if name != FLIGHTS)
+        return {**self.spheres.first_steps(rest), FLIGHTS: first}
+
+    def audit(self) -> Optional[Audit]:
+        """Audit of the contact tests that short steps skipped."""
+        return self.spheres.audit()
+
+    def snapshot(self, s: int) -> dict[str, np.ndarray]:
+        """Places and velocities of the grains of scene s."""
+        return self.spheres.snapshot(s)
