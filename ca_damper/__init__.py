@@ -3,10 +3,14 @@
 # First, out of order: it prepares the environment for ``import taichi``.
 from taichi_dem.kit import runtime  # isort: skip
 
-from ca_damper import goals
+from ca_damper import excitation, goals
+from ca_damper.amplitude_response import AmplitudeResponse
 from ca_damper.automaton import Automaton
 from ca_damper.batch import Batch
 from ca_damper.certificate import Certificate
+from ca_damper.collect_and_collide import CollectAndCollide, collect_and_collide
+from ca_damper.combined import Combined
+from ca_damper.damper_map import DamperMap, damper_map
 from ca_damper.errors import InputError, SimulationDiverged
 from ca_damper.fixed_mass import Empty, RigidMass
 from ca_damper.goals import Goal
@@ -16,6 +20,7 @@ from ca_damper.record import film
 from ca_damper.report import Report
 from ca_damper.response import Response, frequency_response
 from ca_damper.scenes.table import SceneTable
+from ca_damper.shake import TimeHistory, shake
 from ca_damper.solve_response import solve_response
 from ca_damper.spheres import Spheres
 from ca_damper.sweep import Sweep, sweep_up_and_down
@@ -26,12 +31,16 @@ from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.kit.version import __version__
 
 __all__ = [
+    "AmplitudeResponse",
     "Answer",
     "Automaton",
     "Batch",
     "Branch",
     "BranchedAnswer",
     "Certificate",
+    "CollectAndCollide",
+    "Combined",
+    "DamperMap",
     "Empty",
     "Goal",
     "InputError",
@@ -45,12 +54,17 @@ __all__ = [
     "SimulationDiverged",
     "Spheres",
     "Sweep",
+    "TimeHistory",
     "__version__",
+    "collect_and_collide",
+    "damper_map",
+    "excitation",
     "film",
     "frequency_response",
     "goals",
     "needed_effects",
     "runtime",
+    "shake",
     "solve_response",
     "sweep_up_and_down",
 ]

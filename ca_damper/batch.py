@@ -14,9 +14,17 @@ import numpy as np
 from ca_damper import measures
 from ca_damper.activation import activated, certificate_of, periods_of
 from ca_damper.certificate import EFFECTS, Certificate, Periods
-from ca_damper.checks import MOST_CYCLES, STARTS, for_all
+from ca_damper.checks import (
+    MOST_CYCLES,
+    check_finite_start,
+    check_single_sine,
+    check_within,
+    for_all,
+    starts_of,
+)
 from ca_damper.engine.launches import Launches
 from ca_damper.engine.loaded_scenes import LoadedScenes
+from ca_damper.excitation.excitation import Excitation
 from ca_damper.filling import Filling
 from ca_damper.progress import BatchProgress
 from ca_damper.report import RK45_STAGES, Report
@@ -40,6 +48,9 @@ class Batch(LoadedScenes):
     makes a cycle of the base: ``steps_per_cycle``, (scenes,). The batch has a table of its own.
     mount: "spring", or "base" for a container that moves like the base whatever the filling does.
     measured_cycles: most cycles that one run may measure. rtol, atol: of RK45, on the spring.
+    excitation: a Signal, as the base's motion, or an Excitation; the table's sine if None. Under a
+    Signal a cycle is a window: the runs count, and the sums are of, windows of 1 / frequency, and
+    the table's base_amplitude is not used. recorded_samples: most samples that a run may record.
     effects: "listed", those that the options of the filling ask for, or "auto": what is exactly
     without effect or estimated to be negligible is left out, and what is needed or unclear is
     computed; ``certificate`` says what and why. Fillings without a choice are as they are.
@@ -57,10 +68,13 @@ class Batch(LoadedScenes):
         rtol: float = 1e-9,
         atol: float = 1e-12,
         effects: str = "listed",
+        excitation: Any = None,
+        recorded_samples: int = 0,
     ):
         self.asked_effects = choice("effects", effects, EFFECTS)
         filling, self.estimates = activated(filling, table, effects)
-        super().__init__(filling, table, mount, measured_cycles, rtol, atol)
+        many = measured_cycles, rtol, atol, excitation, recorded_samples
+        super().__init__(filling, table, mount, *many)
         self.periods: Optional[Periods] = None
         self.launches, self.compile_seconds = Launches(self.count), 0.0
         # Whether the present run goes on from a checkpoint.
@@ -80,16 +94,22 @@ class Batch(LoadedScenes):
         """Steps of all scenes in all runs."""
         return self.launches.scene_steps
 
-    def start(self, start: str = "rest") -> None:
+    def start(self, start: str = "rest", *, displacement: Any = 0.0, velocity: Any = 0.0) -> None:
         """Place the particles at their start and begin at time zero, the base passing zero upwards.
 
         start: the container begins at "rest", or in the steady state of the "empty" container, or
-        in that of a container with the particles as "rigid" mass.
+        in that of a container with the particles as "rigid" mass; but for a single sine of the base
+        "rest" only. displacement [m], velocity [m/s] of the container beside it, one number or
+        (scenes,).
         """
         coupling = self.engine.coupling
-        choice("start", start, STARTS)
+        choice("start", start, starts_of(self.excitation))
+        more = for_all("displacement", displacement, self.count)
+        initial = self.numbers.initial(start)
+        initial += np.column_stack([more, for_all("velocity", velocity, self.count)])
+        check_finite_start(initial)
         self._tell_compiling("placing", 0.2)
-        coupling.start(np.ascontiguousarray(self.numbers.initial(start)))
+        coupling.start(np.ascontiguousarray(initial))
         self._started = True
         self.time_origin[:] = 0.0
         self._check_divergence()
@@ -109,8 +129,10 @@ class Batch(LoadedScenes):
     def drive(self, frequency: Any) -> None:
         """Go on at another frequency [Hz], a scalar or (scenes,), at the end of a cycle.
 
-        The base keeps its place and changes its speed. Raises InputError within a cycle.
+        The base keeps its place and changes its speed. Raises InputError within a cycle, and for
+        any excitation but a single sine of the base.
         """
+        check_single_sine(self.excitation, "drive")
         self._check_cycle_is_full()
         before = self.time_s
         self.numbers.drive(for_all("frequency", frequency, self.count))
@@ -123,12 +145,15 @@ class Batch(LoadedScenes):
         transient_cycles: int,
         measured_cycles: int,
         progress: Optional[Listener] = None,
+        *,
+        record_every: int = 0,
     ) -> measures.Cycles:
         """Run whole cycles and measure the last of them; returns ``measures.Cycles``.
 
-        progress: called with a BatchProgress about six times a second.
-        Raises InputError for numbers of cycles that are none, or within a cycle;
-        SimulationDiverged.
+        progress: called with a BatchProgress about six times a second. record_every: steps between
+        samples for ``time_series``, from the beginning of this run on; 0 for none.
+        Raises InputError for numbers of cycles that are none, or within a cycle, and beyond the end
+        of an excitation; SimulationDiverged.
         """
         transient = whole("transient_cycles", transient_cycles, 0, MOST_CYCLES)
         measured = whole("measured_cycles", measured_cycles, 0, self.measured_cycles)
@@ -136,6 +161,7 @@ class Batch(LoadedScenes):
         if not self.going_on:
             self._check_cycle_is_full()
         steps = self.steps_per_cycle.astype(np.int64)
+        self._set_recorder((transient + measured) * steps, record_every)
         self._go((transient + measured) * steps, transient * steps, progress)
         record = np.empty((self.count, measured, len(measures.COLUMNS)))
         if measured:
@@ -182,6 +208,8 @@ class Batch(LoadedScenes):
         """
         self._check_started()
         own = {"version": version_text(), "filling": identity_of(self.filling)}
+        if self.excitation != Excitation():
+            own["excitation"] = self.excitation.identity()
         with claiming():
             yield from self._checkpointed(checkpoint, resume, {**own, **identity}, owners)
 
@@ -259,6 +287,7 @@ class Batch(LoadedScenes):
         begin = self._read_status()[0].astype(np.int64)
         if (begin + steps).max() > _MOST_STEPS:
             raise InputError(f"steps since the start must stay below {_MOST_STEPS}: run fewer")
+        check_within(self.excitation, (begin + steps) * self.table.column("dt"))
         order = dealt((1 + self.table.column("particles")) * steps, runtime.settings().threads)
         plan = np.stack([begin, begin + steps, begin + before_measuring, order])
         self.engine.coupling.aim(plan.astype(np.int32))

@@ -5,12 +5,15 @@ from typing import Any, Optional
 import numpy as np
 
 from ca_damper import measures
+from ca_damper.excitation.excitation import Excitation, excitation_of
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import choice, progress_option, shown, whole
+from taichi_dem.kit.validation import LARGEST, choice, progress_option, shown, whole
 
 #: Motion of the container at the beginning of a run.
 STARTS = ("rest", "empty", "rigid")
 MOST_CYCLES = 10_000_000
+#: Scenes of a run, and the largest seed.
+MOST_SCENES, MOST_SEED = 2**24, 2**31 - 1
 #: Largest field of measured sums: 1 GiB, half of the most that Taichi can index.
 _MOST_NUMBERS = 2**27
 
@@ -49,3 +52,55 @@ def for_all(name: str, value: Any, scenes: int, most: Optional[int] = None) -> n
     if bad:
         raise InputError(f"{name} must be {words}, one for all or {scenes}, got {shown(value)}")
     return numbers
+
+
+def checked_excitation(value: Any, mount: str) -> Excitation:
+    """Excitation that a user means; InputError for a force on a container that the base moves."""
+    excitation = excitation_of(value)
+    if excitation.force is not None and mount != "spring":
+        raise InputError(
+            f"force must be None on the mount {mount!r}, where nothing but the base moves the "
+            f"container, got {shown(excitation.force)}"
+        )
+    return excitation
+
+
+def checked_samples(value: Any, scenes: int) -> int:
+    """Number of samples to record; InputError where those of all scenes find no memory."""
+    return whole("recorded_samples", value, 0, _MOST_NUMBERS // (4 * max(1, scenes)))
+
+
+def starts_of(excitation: Excitation) -> tuple[str, ...]:
+    """Words for the motion of the container at the beginning that an excitation allows."""
+    return STARTS if excitation == Excitation() else STARTS[:1]
+
+
+def check_finite_start(initial: np.ndarray) -> None:
+    """InputError unless (x, v) of every container, (scenes, 2), are finite numbers."""
+    bad = ~(np.abs(initial) <= LARGEST)
+    if bad.any():
+        s, k = map(int, np.argwhere(bad)[0])
+        name = ("displacement", "velocity")[k]
+        raise InputError(
+            f"{name} must be finite numbers up to {LARGEST:g}, got {initial[s, k]} in scene {s}"
+        )
+
+
+def check_single_sine(excitation: Excitation, what: str) -> None:
+    """InputError for any excitation but a single sine of the base; what: is asked for."""
+    if excitation != Excitation():
+        raise InputError(
+            f"excitation must be None, a single sine of the base, for {what}, got "
+            f"{shown(excitation)}"
+        )
+
+
+def check_within(excitation: Excitation, ends: np.ndarray) -> None:
+    """InputError where a run to times ``ends`` [s], (scenes,), goes beyond its excitation."""
+    late = ends > excitation.duration(len(ends)) * (1.0 + 1e-9)
+    if late.any():
+        s = int(np.flatnonzero(late)[0])
+        raise InputError(
+            f"a run must end within its excitation of {excitation.duration(len(ends))[s]:.6g} s, "
+            f"got {ends[s]:.6g} s in scene {s}: run fewer cycles, or shorter windows"
+        )

@@ -7,7 +7,7 @@ batch of a filling with the same ``Structure``. ``fixed_mass.py`` has a complete
 
 from collections.abc import Hashable
 from dataclasses import dataclass, field
-from typing import Any, Optional, Protocol
+from typing import Any, Optional, Protocol, Union
 
 import numpy as np
 import taichi as ti
@@ -97,8 +97,8 @@ class Filling(Protocol):
         """Mass of a particle [kg]."""
 
     @property
-    def gravity(self) -> float:
-        """Gravity that acts on the particles, downwards [m/s^2]."""
+    def gravity(self) -> Union[float, tuple]:
+        """Gravity on the particles [m/s^2]: downwards, or (to the right, downwards)."""
 
     @property
     def effects(self) -> tuple[str, ...]:

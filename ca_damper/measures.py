@@ -76,6 +76,16 @@ class Cycles:
         return np.sqrt(self._variance.mean(axis=1))
 
     @property
+    def rms_about_all(self) -> np.ndarray:
+        """Root mean square of x about its mean over all cycles [m].
+
+        It counts motions slower than a cycle, which ``rms`` loses with the mean of each cycle.
+        """
+        # Variance within cycles, and that of their means: no difference of large numbers.
+        means = self.record[:, :, COLUMNS.index("x")] / np.asarray(self.steps)[:, None]
+        return np.sqrt(self._variance.mean(axis=1) + means.var(axis=1))
+
+    @property
     def rms_by_cycle(self) -> np.ndarray:
         """The same of every cycle [m], (scenes, cycles)."""
         return np.sqrt(self._variance)

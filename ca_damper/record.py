@@ -21,7 +21,8 @@ class Frame:
     """One scene at one time.
 
     time_s; x, y: displacement of container and base [m]; position, velocity: of the particles,
-    (particles, 2), horizontal and vertical, as the filling's ``snapshot`` gives them.
+    (particles, 2), horizontal and vertical, as the filling's ``snapshot`` gives them. diameter: of
+    each particle [m], (particles,), where they are of several sizes, else None.
     """
 
     time_s: float
@@ -29,6 +30,7 @@ class Frame:
     y: float
     position: np.ndarray
     velocity: np.ndarray
+    diameter: Optional[np.ndarray] = None
 
     def __repr__(self):
         return by_fields(self)
@@ -106,6 +108,6 @@ def frames_of(batch: Any, present: Optional[dict[str, np.ndarray]] = None) -> tu
     time_s, x, y = (found[name].tolist() for name in ("time_s", "x", "y"))
     shots = [batch.snapshot(s) for s in range(batch.count)]
     return tuple(
-        Frame(time_s[s], x[s], y[s], shot["position"], shot["velocity"])
+        Frame(time_s[s], x[s], y[s], shot["position"], shot["velocity"], shot.get("diameter"))
         for s, shot in enumerate(shots)
     )

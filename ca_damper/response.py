@@ -7,13 +7,14 @@ from typing import Any, Optional, Union
 
 import numpy as np
 
+from ca_damper.amplitude_response import AmplitudeResponse
 from ca_damper.batch import Batch
-from ca_damper.checks import check_run
+from ca_damper.checks import MOST_SCENES, MOST_SEED, check_run
 from ca_damper.filling import Filling, check_filling
 from ca_damper.measures import Cycles, peak
 from ca_damper.oscillator import Oscillator
 from ca_damper.report import Report
-from ca_damper.scenes.clock import steps_per_cycle
+from ca_damper.scenes.clock import automatic_dt, steps_per_cycle
 from ca_damper.scenes.table import SceneTable
 from ca_damper.steady_state import mean_and_error
 from taichi_dem.kit.accuracy.student import t_quantile
@@ -36,13 +37,12 @@ UNITS = {
     "loss_factor": "",
     "damping_ratio": "",
     "energy": "J",
+    "rms_about_all": "m",
 }
 #: Particle numbers that a notebook shows, evenly over those there are.
 _MOST_SHOWN = 8
 #: In tables, of a peak at an end of the ratios, where its height cannot be known.
 OUTSIDE = "outside"
-_MOST_SEEDS = 2**31 - 1
-_MOST_SCENES = 2**24
 #: Of the sampling error in a report.
 _CONFIDENCE = 0.95
 
@@ -61,9 +61,10 @@ class Response:
     the empty container, ascending. steps_per_cycle, dt [s]: of each ratio, (ratios,): dt is the
     step asked for, shortened so that whole steps make a cycle.
 
-    rms: root mean square of the displacement about its mean in each cycle [m]. amplitude: half the
-    way from lowest to highest [m]. mean: displacement [m]. mean_force: of the filling on the
-    container [N]. apparent_mass [kg], apparent_damping [N s/m], loss_factor, damping_ratio: of
+    rms: root mean square of the displacement about its mean in each cycle [m]. rms_about_all: about
+    its mean in all cycles, which counts slower motions too [m]. amplitude: half the way from lowest
+    to highest [m]. mean: displacement [m]. mean_force: of the filling on the container [N].
+    apparent_mass [kg], apparent_damping [N s/m], loss_factor, damping_ratio: of
     ``measures.Cycles``. energy: of the particles [J]. report: what was done and what it cost; None
     for one way of a sweep.
 
@@ -87,6 +88,7 @@ class Response:
     loss_factor: np.ndarray
     damping_ratio: np.ndarray
     energy: np.ndarray
+    rms_about_all: np.ndarray
     report: Optional[Report] = None
 
     def __repr__(self):
@@ -140,12 +142,16 @@ class Response:
 
         Raises InputError when the file cannot be written.
         """
+        write_csv(path, self.columns())
+
+    def columns(self) -> dict[str, Any]:
+        """Columns of equal length with a row a scene, as they are written, by name and unit."""
         grids = np.meshgrid(self.particles, self.ratios, self.seeds, indexing="ij")
         columns = dict(zip(("particles", "ratio", "seed"), (grid.ravel() for grid in grids)))
         columns["frequency_Hz"] = columns["ratio"] * self.oscillator.natural_frequency
         for name, unit in UNITS.items():
             columns[f"{name}_{unit}" if unit else name] = getattr(self, name).ravel()
-        write_csv(path, {"filling": [self.label] * grids[0].size, **columns})
+        return {"filling": [self.label] * grids[0].size, **columns}
 
 
 def frequency_response(
@@ -156,6 +162,7 @@ def frequency_response(
     seeds: Union[int, Sequence[int]] = 5,
     oscillator: Optional[Oscillator] = None,
     dt: Optional[float] = None,
+    base_amplitude: Union[float, Sequence[float], None] = None,
     transient_cycles: int = 150,
     measured_cycles: int = 20,
     start: str = "rest",
@@ -163,21 +170,23 @@ def frequency_response(
     progress: Union[Listener, str, None] = AUTO,
     checkpoint: Optional[Checkpoint] = None,
     resume: Optional[FileName] = None,
-) -> Response:
+) -> Any:
     """Response curves of a filling, all scenes in one batch; returns a Response.
 
     particles: one number or several. ratios: ascending frequency ratios f/f0, f0 of the empty
     container. seeds: how many, counted from 1, or the seeds themselves. oscillator: the primary
-    structure, the paper's if None. dt: largest step [s], the filling's own if None.
-    start: the container's motion at the beginning, see ``Batch.start``. effects: "listed" or
-    "auto", see ``Batch``; ``report.certificate`` says what acted and what was left out.
+    structure, the paper's if None. dt: largest step [s], the filling's own if None. base_amplitude:
+    of the base [m], that of the oscillator if None; for several of them an AmplitudeResponse is
+    returned, with a Response for each. start: the container's motion at the beginning, see
+    ``Batch.start``. effects: "listed" or "auto", see ``Batch``; ``report.certificate`` says what
+    acted and what was left out.
     progress: "auto" for a bar on a terminal and in Jupyter, None for silence, or a function that is
     called with a Progress while kernels are compiled, and then six times a second. checkpoint: a
     Checkpoint that says where and when the run saves itself, besides at its end and on Ctrl-C.
     resume: such a file to go on from; the bits are those of a run that was never stopped.
     Raises InputError for what cannot be used, SimulationDiverged.
     """
-    grid = Grid(filling, particles, ratios, seeds, oscillator, dt)
+    grid = Grid(filling, particles, ratios, seeds, oscillator, dt, base_amplitude)
     check_run(transient_cycles, start, progress)
     job = f"response, {grid.words()}, {transient_cycles} + {measured_cycles} cycles from {start}"
     with reporting(progress, "response") as report_progress:
@@ -186,11 +195,21 @@ def frequency_response(
         with batch.checkpointed(checkpoint, resume, {"job": job}) as writer:
             cycles = batch.run(transient_cycles, measured_cycles, report_progress)
             writer.save()
-    shape = grid.shape
-    steps = batch.steps_per_cycle.reshape(shape)[0, :, 0]
-    values = {name: value.reshape(shape) for name, value in grid.measures(cycles).items()}
     report = replace(batch.report(), sampling=_sampling(cycles))
-    return replace(grid.response(steps, values), report=report)
+    return _by_amplitude(grid, batch.steps_per_cycle, grid.measures(cycles), report)
+
+
+def _by_amplitude(grid, steps, values, report):
+    """A Response for each amplitude, or the one there is; steps, values: of all scenes."""
+    shape = (len(grid.amplitudes), *grid.shape)
+    steps = steps.reshape(shape)[0, 0, :, 0]
+    values = {name: value.reshape(shape) for name, value in values.items()}
+    made = []
+    for k, amplitude in enumerate(grid.amplitudes):
+        one = grid.response(steps, {name: value[k] for name, value in values.items()})
+        oscillator = replace(grid.oscillator, base_amplitude=amplitude)
+        made.append(replace(one, oscillator=oscillator, report=report))
+    return AmplitudeResponse(grid.amplitudes, tuple(made)) if grid.is_several else made[0]
 
 
 def _sampling(cycles):
@@ -208,7 +227,7 @@ def _sampling(cycles):
 
 
 class Grid:
-    """The checked axes of a response: particle numbers, frequency ratios, seeds, and the step."""
+    """The checked axes of a response: particles, ratios, seeds, amplitudes, and the step."""
 
     def __init__(
         self,
@@ -218,24 +237,37 @@ class Grid:
         seeds: Union[int, Sequence[int]],
         oscillator: Optional[Oscillator],
         dt: Optional[float],
+        base_amplitude: Union[float, Sequence[float], None] = None,
     ):
         self.filling = check_filling(filling)
         self.oscillator = Oscillator() if oscillator is None else oscillator
         instance("oscillator", self.oscillator, Oscillator)
+        self._take_amplitudes(base_amplitude)
         self.particles = several("particles", particles, self._particles)
         self.ratios = np.array(several("ratios", ratios, positive))
         if (np.diff(self.ratios) <= 0.0).any():
             raise InputError(f"ratios must ascend, got {self.ratios.tolist()}")
         if not hasattr(seeds, "__iter__") or isinstance(seeds, (str, bytes, dict)):
             seeds = range(1, whole("seeds", seeds, 1, 1_000_000) + 1)
-        self.seeds = several("seeds", seeds, lambda name, x: whole(name, x, 0, _MOST_SEEDS))
-        self.dt = filling.default_dt if dt is None else positive("dt", dt)
-        scenes = math.prod(self.shape)
-        if scenes > _MOST_SCENES:
+        self.seeds = several("seeds", seeds, lambda name, x: whole(name, x, 0, MOST_SEED))
+        highest = float(self.ratios[-1]) * self.oscillator.natural_frequency
+        own = automatic_dt(filling.default_dt, highest)
+        self.dt = own if dt is None else positive("dt", dt)
+        scenes = len(self.amplitudes) * math.prod(self.shape)
+        if scenes > MOST_SCENES:
             raise InputError(
-                f"particles x ratios x seeds must make at most {_MOST_SCENES} scenes, got {scenes}"
+                f"particles x ratios x seeds must make at most {MOST_SCENES} scenes, got {scenes}"
             )
         self._check_steps()
+
+    def _take_amplitudes(self, given):
+        """Amplitudes of the base [m]; is_several: whether a sequence was asked for."""
+        self.is_several = hasattr(given, "__iter__")
+        own = self.oscillator.base_amplitude if given is None else given
+        self.amplitudes = several(
+            "base_amplitude", own, lambda name, x: positive(name, x, zero_allowed=True)
+        )
+        self.oscillator = replace(self.oscillator, base_amplitude=self.amplitudes[0])
 
     def _check_steps(self):
         """InputError for a step that fits no cycle, or that the filling refuses."""
@@ -250,9 +282,10 @@ class Grid:
     def words(self) -> str:
         """The run without the filling, in words."""
         ratios = self.ratios.tolist()
+        amplitudes = f", base_amplitude {self.amplitudes}" if self.is_several else ""
         return (
             f"particles {self.particles}, ratios {ratios}, seeds {self.seeds}, dt {self.dt}, "
-            f"{self.oscillator}"
+            f"{self.oscillator}{amplitudes}"
         )
 
     @property
@@ -261,12 +294,13 @@ class Grid:
         return len(self.particles), len(self.ratios), len(self.seeds)
 
     def batch(self, ratios: np.ndarray, measured_cycles: int, effects: str = "listed") -> Batch:
-        """Batch of all scenes at these ratios, the last axis (seeds) running fastest."""
+        """Batch of all scenes at these ratios, amplitude by amplitude, seeds running fastest."""
         whole("measured_cycles", measured_cycles, 1, 100_000)
-        grids = np.meshgrid(self.particles, ratios, self.seeds, indexing="ij")
-        number, ratio, seed = (grid.ravel() for grid in grids)
+        axes = self.amplitudes, self.particles, ratios, self.seeds
+        grids = np.meshgrid(*axes, indexing="ij")
+        amplitude, number, ratio, seed = (grid.ravel() for grid in grids)
         o = self.oscillator
-        structure = (o.base_amplitude, o.mass, o.stiffness, o.damping)
+        structure = (amplitude, o.mass, o.stiffness, o.damping)
         table = SceneTable(number, seed, self.dt, ratio * o.natural_frequency, *structure)
         return Batch(self.filling, table, measured_cycles=measured_cycles, effects=effects)
 

@@ -9,6 +9,7 @@ import numpy as np
 from ca_damper.errors import SimulationDiverged
 from ca_damper.filling import Filling
 from ca_damper.force_check import checked_response
+from ca_damper.gravity import gravity_along
 from ca_damper.measures import curve_distance, seed_variance
 from ca_damper.oscillator import Oscillator
 from ca_damper.response import Response, frequency_response
@@ -99,7 +100,7 @@ class StepStudy:
 
         residual: share of the particles' weight that the mean force on the container misses.
         """
-        weight = self.particles * self.filling.particle_mass * self.filling.gravity
+        weight = self.particles * self.filling.particle_mass * gravity_along(self.filling)
         cycles = self.job["transient_cycles"] + self.job["measured_cycles"]
         frequency = np.array(self.job["ratios"]) * Oscillator().natural_frequency
         scenes, found = self.particles * len(self.seeds) * cycles, []

@@ -35,7 +35,7 @@ class FrozenBatch:
     """Scenes of a damper in some states, from each of which steps are timed again and again."""
 
     #: Fields with numbers of the filling's options.
-    OWN = ("device.contact_of_", "device.parameters.")
+    OWN = ("device.pair_contacts.", "device.wall_contacts.", "device.parameters.")
     #: Share of the steps that are not timed: the state comes to the cache.
     WARM = 0.2
 

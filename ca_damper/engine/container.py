@@ -1,8 +1,10 @@
 """Motion of the container: on its spring, driven by base and filling, or fixed to the base.
 
 Both have ``load`` for the numbers of a batch, and the ti.funcs ``start(s, x, v)``, ``motion(s)`` at
-the beginning of a step, and ``advance(s, action)`` over it, which returns the attempts of the
-integration, or -1.
+the beginning of a step, with ``base(s)``, the base's displacement [m], ``recoil(s)``, the speed
+that a unit impulse gives it [1/kg], and ``advance(s, action)`` over the step, which returns the
+attempts of the integration, or -1. Those under any other excitation than a single sine of the base
+are in ``excited_container.py``.
 """
 
 import taichi as ti
@@ -14,7 +16,7 @@ from ca_damper.scenes.clock import Clock
 from ca_damper.scenes.scene_fields import SceneFields
 
 #: Attempts within one step of the filling after which the container counts as lost.
-_MOST_ATTEMPTS = 1000
+MOST_ATTEMPTS = 1000
 #: Times of the stages of RK45 at which the forcing is needed, as shares of the step.
 _STAGES = (1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0)
 
@@ -49,6 +51,16 @@ class SprungContainer:
         self.impulse_velocity[s] = 0.0
         self._set_phases(s)
         self._set_action(s, Action(0.0, 0.0))
+
+    @ti.func
+    def recoil(self, s):
+        """Of the mass alone: spring and dashpot take no part in an impulse."""
+        return 1.0 / self.table.mass[s]
+
+    @ti.func
+    def base(self, s):
+        """Displacement of the base [m]."""
+        return self.table.base_amplitude[s] * self.clock.circle[s][0]
 
     @ti.func
     def motion(self, s):
@@ -108,7 +120,7 @@ class SprungContainer:
         if not error <= 1.0:
             y, change, attempts = rk45.integrate(
                 *(slope, forcing, 0.0, dt, self.state[s], self.slope[s], dt, rtol, atol),
-                _MOST_ATTEMPTS,
+                MOST_ATTEMPTS,
             )
         self.state[s], self.slope[s] = y, change
         self.impulse_velocity[s] = action.impulse / (dt * (self.table.mass[s] + action.carried))
@@ -142,8 +154,18 @@ class DrivenContainer:
         """Position of the base; x and v are not used."""
 
     @ti.func
+    def recoil(self, s):
+        """None: no impulse changes the motion of the base."""
+        return 0.0
+
+    @ti.func
     def renew(self, s):
         """Nothing to do: the motion is prescribed."""
+
+    @ti.func
+    def base(self, s):
+        """Displacement of the base [m]."""
+        return self.table.base_amplitude[s] * self.clock.circle[s][0]
 
     @ti.func
     def motion(self, s):

@@ -32,8 +32,9 @@ _F64 = ti.types.ndarray(dtype=ti.f64, ndim=2)
 class Coupling:
     """Filling, container and clock of all scenes, tied together.
 
-    device: what ``filling.bind`` gave. account: a MomentumAccount. gravity [m/s^2]. record: of the
-    measured cycles, shape (scenes, cycles, columns of ``measures.COLUMNS``).
+    device: what ``filling.bind`` gave. account: a MomentumAccount. recorder: a Recorder or a
+    NoRecorder. gravity [m/s^2]. record: of the measured cycles, shape (scenes, cycles, columns of
+    ``measures.COLUMNS``).
     """
 
     def __init__(
@@ -43,9 +44,10 @@ class Coupling:
         container: Any,
         device: Any,
         account: MomentumAccount,
+        recorder: Any,
     ):
         self.table, self.clock, self.container, self.device = table, clock, container, device
-        self.account = account
+        self.account, self.recorder = account, recorder
         self.padding = _CPU_BLOCK if runtime.settings().arch == "cpu" else 1
         self.gravity = ti.field(ti.f64, shape=())
         for name in ("order", "step", "begin", "goal", "measure_from", "cycle", "status"):
@@ -68,6 +70,7 @@ class Coupling:
                 self.step[s], self.attempts[s], self.force[s] = 0, 0, 0.0
                 self.clock.start(s)
                 self.container.start(s, initial[s, 0], initial[s, 1])
+                self.table.recoil[s] = self.container.recoil(s)
                 self.device.reset(s)
                 self.status[s] = self.device.divergence_code(s)
 
@@ -105,6 +108,9 @@ class Coupling:
         """The order of a step: filling, container, clock, measures, divergence."""
         step, now, middle = self.step[s], self.clock.circle[s], self.clock.middle(s)
         before = self.container.motion(s)
+        if ti.static(self.recorder.active):
+            y, since = self.container.base(s), step - self.begin[s]
+            self.recorder.note(s, since, before, y, self.force[s])
         action = self.device.advance(s, step, before)
         attempts = self.container.advance(s, action)
         full = self.clock.tick(s)
@@ -169,9 +175,8 @@ class Coupling:
         """Fill values[k, s] with the quantities of ``measures.SAMPLE``."""
         for s in range(self.table.scenes[None]):
             motion = self.container.motion(s)
-            y = self.table.base_amplitude[s] * self.clock.circle[s][0]
             values[0, s], values[1, s], values[2, s] = motion.x, motion.v, motion.a
-            values[3, s], values[4, s] = y, self.force[s]
+            values[3, s], values[4, s] = self.container.base(s), self.force[s]
             values[5, s], values[6, s] = self.device.energy(s), self.device.momentum(s)
 
     @ti.kernel

@@ -9,7 +9,11 @@ from taichi.lang import impl
 from ca_damper.engine.account import MomentumAccount
 from ca_damper.engine.container import CONTAINERS
 from ca_damper.engine.coupling import Coupling
+from ca_damper.engine.excited_container import excited_container
+from ca_damper.engine.recorder import NoRecorder, Recorder
+from ca_damper.excitation.excitation import Excitation, ExcitationKind
 from ca_damper.filling import LEAST_PLACES, check_device, check_places, structure_of
+from ca_damper.gravity import gravity_along
 from ca_damper.scenes.clock import Clock
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.scenes.table import SceneTable
@@ -18,17 +22,20 @@ from taichi_dem.kit.errors import InputError
 
 #: Least room for scenes, measured cycles, and places of a scene: below, nothing is saved.
 _LEAST = (64, 32, *(LEAST_PLACES,) * 32)
+_SINE = Excitation()
 
 
 @dataclass(frozen=True)
 class EngineStructure:
     """Compiled structure of a batch: key of its filling's structure, mount, names of sizes.
 
-    filling: one of that structure, which declares the fields.
+    excitation: kind of it. filling: one of that structure, which declares the fields. A batch with
+    a size called "samples" has a recorder.
     """
 
     key: Hashable
     mount: str
+    excitation: ExcitationKind
     sizes: tuple[str, ...]
     filling: Any = field(compare=False)
 
@@ -48,11 +55,19 @@ class DamperEngine(Engine):
         sizes = dict(zip(self.structure.sizes, places))
         self.table = SceneFields(scenes, {"cycles": cycles, **sizes})
         self.clock = Clock(self.table)
-        self.container = CONTAINERS[self.structure.mount](self.table, self.clock)
+        self.container = self._container()
         self.device = self._bound()
         self.account = MomentumAccount(self.table)
-        self.coupling = Coupling(self.table, self.clock, self.container, self.device, self.account)
+        self.recorder = Recorder(self.table) if "samples" in sizes else NoRecorder()
+        parts = self.container, self.device, self.account, self.recorder
+        self.coupling = Coupling(self.table, self.clock, *parts)
         self.is_compiled = False
+
+    def _container(self) -> Any:
+        mount, kind = self.structure.mount, self.structure.excitation
+        if kind == ExcitationKind():
+            return CONTAINERS[mount](self.table, self.clock)
+        return excited_container(mount, self.table, self.clock, kind)
 
     def _bound(self) -> Any:
         filling, builder = self.structure.filling, impl._root_fb
@@ -66,12 +81,22 @@ class DamperEngine(Engine):
                     f"values in 'load', got {type(filling).__name__}"
                 )
 
-    def load(self, filling: Any, table: SceneTable, rtol: float, atol: float) -> None:
+    def load(
+        self,
+        filling: Any,
+        table: SceneTable,
+        rtol: float,
+        atol: float,
+        excitation: Excitation = _SINE,
+    ) -> None:
         """Take over the numbers of a batch; the state follows with ``coupling.start``."""
         self.table.load(table)
-        self.container.load(filling.gravity, rtol, atol)
-        self.coupling.load(filling.gravity)
-        self.account.load(filling.particle_mass * filling.gravity)
+        gravity = gravity_along(filling)
+        self.container.load(gravity, rtol, atol)
+        if self.structure.excitation != ExcitationKind():
+            self.container.excite(excitation, table.count)
+        self.coupling.load(gravity)
+        self.account.load(filling.particle_mass * gravity)
         if hasattr(filling, "structure"):
             self.device.load(filling)
 
@@ -79,10 +104,16 @@ class DamperEngine(Engine):
 _POOL = EnginePool(DamperEngine, _LEAST)
 
 
-def borrow(filling: Any, mount: str, scenes: int, cycles: int) -> Loan:
-    """Borrow an engine in which so many scenes of a filling find room; InputError if none can."""
+def borrow(
+    filling: Any, mount: str, kind: ExcitationKind, counts: tuple[int, int], more: dict[str, int]
+) -> Loan:
+    """Borrow an engine in which so many scenes of a filling find room; InputError if none can.
+
+    counts: scenes and measured cycles. more: sizes by name beside those of the filling.
+    """
     structure = structure_of(filling)
-    places = tuple(structure.sizes.values())
-    check_places(scenes, max((1, *places[:1])))
-    asked = EngineStructure(structure.key, mount, tuple(structure.sizes), filling)
-    return _POOL.borrow(asked, (scenes, max(1, cycles), *places), filling, "batch")
+    check_places(counts[0], max((1, *tuple(structure.sizes.values())[:1])))
+    sizes = {**structure.sizes, **more}
+    asked = EngineStructure(structure.key, mount, kind, tuple(sizes), filling)
+    capacity = (counts[0], max(1, counts[1]), *sizes.values())
+    return _POOL.borrow(asked, capacity, filling, "batch")

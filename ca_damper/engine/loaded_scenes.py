@@ -4,15 +4,16 @@ The engine is that of their structure: more or larger scenes, or other numbers, 
 and compile nothing. Those that are alive at once on one engine take turns.
 """
 
-from typing import Any
+from typing import Any, Optional
 
 import numpy as np
 
 from ca_damper import measures
-from ca_damper.checks import check_record_fits
+from ca_damper.checks import check_record_fits, checked_excitation, checked_samples
 from ca_damper.engine.container import CONTAINERS
 from ca_damper.engine.damper_engine import DamperEngine, borrow
 from ca_damper.engine.divergence import divergence
+from ca_damper.engine.recorder import SAMPLED
 from ca_damper.filling import Filling, check_filling, structure_of
 from ca_damper.scenes.scene_memory import SceneMemory
 from ca_damper.scenes.scene_numbers import SceneNumbers
@@ -41,6 +42,8 @@ class LoadedScenes(Uncopied):
         measured_cycles: int,
         rtol: float,
         atol: float,
+        excitation: Any = None,
+        recorded_samples: int = 0,
     ):
         runtime.session()
         self.filling = check_filling(filling)
@@ -51,14 +54,22 @@ class LoadedScenes(Uncopied):
         rtol = positive("rtol", rtol, zero_allowed=True)
         atol = positive("atol", atol)
         self.numbers = SceneNumbers(self.filling, table)
-        self.loan = borrow(self.filling, mount, self.count, self.measured_cycles)
+        self.excitation = checked_excitation(excitation, mount)
+        self.recorded_samples = checked_samples(recorded_samples, self.count)
+        self._more_sizes = self.excitation.sizes(self.count)
+        if self.recorded_samples:
+            self._more_sizes["samples"] = self.recorded_samples
+        counts = self.count, self.measured_cycles
+        self.loan = borrow(self.filling, mount, self.excitation.kind, counts, self._more_sizes)
         engine = self.engine
         self._tell_compiling("set-up", 0.0)
         engine.clear()
-        engine.load(self.filling, self.table, rtol, atol)
+        engine.load(self.filling, self.table, rtol, atol, self.excitation)
         self._load_pace()
         self.time_origin = np.zeros(self.count)
         self._started = False
+        # Steps of the last run if it was recorded, those between samples, and number of samples.
+        self._recording: Optional[tuple[int, int, int]] = None
 
     @property
     def table(self) -> SceneTable:
@@ -89,7 +100,7 @@ class LoadedScenes(Uncopied):
     def memory(self) -> SceneMemory:
         """State of the batch on the device, as arrays."""
         sizes = {"cycles": max(1, self.measured_cycles), **structure_of(self.filling).sizes}
-        return SceneMemory(self.loan, sizes)
+        return SceneMemory(self.loan, {**sizes, **self._more_sizes})
 
     @property
     def time_s(self) -> np.ndarray:
@@ -107,6 +118,45 @@ class LoadedScenes(Uncopied):
         values = np.empty((len(measures.SAMPLE), self.count))
         self.engine.coupling.sample(values)
         return {"time_s": self.time_s, **dict(zip(measures.SAMPLE, values))}
+
+    def time_series(self) -> dict[str, np.ndarray]:
+        """Samples that the last run recorded, and its end: arrays (samples, scenes) by name.
+
+        time_s; x [m], v [m/s] of the container, y [m] of the base, force [N] of the filling on the
+        container: mean since the sample before, in the first one that of the last step. Raises
+        InputError where nothing was recorded.
+        """
+        if self._recording is None:
+            raise InputError("record_every of a run must be at least 1 before time_series, got 0")
+        steps, every, count = self._recording
+        read = self.engine.recorder.read(count).transpose(1, 2, 0)
+        end = self.sample()
+        end["force"] = self.engine.recorder.mean_force(end["force"], steps - every * (count - 1))
+        series = {
+            name: np.concatenate([read[:, k], end[name][None]]) for k, name in enumerate(SAMPLED)
+        }
+        # Counted back from the present, as the run may have gone on from a checkpoint.
+        marks = self._read_status()[0] - steps + np.append(every * np.arange(count), steps)[:, None]
+        return {"time_s": self.time_origin + marks * self.table.column("dt"), **series}
+
+    def _set_recorder(self, steps: np.ndarray, every: int) -> None:
+        """Record the next run of so many steps, (scenes,), every so many of them."""
+        every = whole("record_every", every, 0, 2**31 - 1)
+        self._recording = None
+        if every:
+            count = -(-int(steps.max()) // every)
+            if steps.min() != steps.max():
+                raise InputError(
+                    "record_every must be 0 in a batch whose scenes have different steps a cycle, "
+                    f"{steps.min()} to {steps.max()} in this run, got {every}"
+                )
+            if count > self.recorded_samples:
+                raise InputError(
+                    f"recorded_samples of the batch must be at least {count} for this run, got "
+                    f"{self.recorded_samples}"
+                )
+            self._recording = int(steps.max()), every, count
+        self.engine.recorder.aim(every)
 
     def snapshot(self, s: int) -> dict[str, np.ndarray]:
         """Positions and velocities of the particles of scene s, from the filling."""

@@ -19,19 +19,22 @@ class Box:
     """Inside of the container: width and height [m], and the diameter of a particle [m].
 
     The automaton's box is ``staggered``: every other column, the first of them too, stands half a
-    cell higher, and the box moves by whole cells.
+    cell higher. By the rules of the paper it moves ``by_cells``.
     """
 
     width: float
     height: float
     diameter: float
     staggered: bool = False
+    by_cells: bool = False
 
     @classmethod
     def of_automaton(cls, automaton: Any) -> Any:
         """Of an Automaton."""
         cell = automaton.width
-        return cls(automaton.columns * cell, automaton.rows * cell, cell, True)
+        return cls(
+            automaton.columns * cell, automaton.rows * cell, cell, True, automaton.rules == "paper"
+        )
 
     @classmethod
     def of_spheres(cls, spheres: Any) -> Any:
@@ -46,7 +49,7 @@ class Box:
     def lift(self, x: Any) -> Any:
         """Height of the box [m] when the container is displaced by x [m]."""
         cell = self.diameter
-        return np.floor(np.asarray(x) / cell + 0.5) * cell if self.staggered else np.asarray(x)
+        return np.floor(np.asarray(x) / cell + 0.5) * cell if self.by_cells else np.asarray(x)
 
     def floor_at(self, horizontal: Any) -> Any:
         """Height of the floor [m] at places counted from the left wall [m]."""
@@ -91,6 +94,9 @@ class DrawnBox:
         self.walls.set_data(walls[:, 0], walls[:, 1])
         self.particles.set_offsets(1e3 * (frame.position + shift))
         self.particles.set_array(frame.velocity[:, 1])
+        if frame.diameter is not None:
+            self.particles.set_widths(1e3 * frame.diameter)
+            self.particles.set_heights(1e3 * frame.diameter)
 
 
 def frame_panel(axes: Any, box: "Box", amplitude: float, margin: float = 3.0) -> None:

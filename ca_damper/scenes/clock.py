@@ -33,6 +33,11 @@ def steps_per_cycle(frequency: float, largest_dt: float) -> int:
     return count
 
 
+def automatic_dt(default_dt: float, highest: float) -> float:
+    """Step [s]: the default, or shorter where a cycle of the highest frequency [Hz] demands it."""
+    return min(default_dt, 1.0 / (LEAST_STEPS_PER_CYCLE * highest))
+
+
 @ti.data_oriented
 class Clock:
     """Phase of the base of every scene, as a count of steps in the cycle, with sine and cosine.

@@ -39,6 +39,8 @@ class SceneFields:
 
     particles [-], seed [-] (cast to u32 for hashing), dt [s], frequency [Hz] and base_amplitude [m]
     of the base motion, and the primary structure: mass [kg], stiffness [N/m], damping [N s/m].
+    recoil: speed that a unit impulse gives the container [1/kg], 1 / mass on a spring and 0 for one
+    whose motion is prescribed; written at the start of a run.
 
     capacity: most scenes. sizes: most places that a scene can have, by name. scenes: number of
     scenes in use, shape (); scene_count: the same in Python. Whatever a scene does depends on its
@@ -52,6 +54,7 @@ class SceneFields:
         for name in SceneTable.COLUMNS:
             kind = ti.i32 if name in ("particles", "seed") else ti.f64
             setattr(self, name, self.field(kind))
+        self.recoil = self.field(ti.f64)
 
     def field(self, dtype: Any, *lengths: Length, flat: bool = False) -> ti.Field:
         """Declare a field of the scenes; lengths: of its axes after that of the scenes."""

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from ca_damper.gravity import gravity_along
 from ca_damper.oscillator import Oscillator
 from ca_damper.scenes.clock import steps_per_cycle
 from ca_damper.scenes.table import SceneTable
@@ -54,11 +55,11 @@ class SceneNumbers:
 
     def initial(self, start: str) -> np.ndarray:
         """(x, v) of the container at the beginning, (scenes, 2); start: one of checks.STARTS."""
-        state = np.zeros((self.table.count, 2))
+        state, gravity = np.zeros((self.table.count, 2)), gravity_along(self.filling)
         if start == "rest":
             return state
         for s, oscillator in enumerate(self.oscillators):
             row = self.table.row(s)
             fixed = row["particles"] * self.filling.particle_mass if start == "rigid" else 0.0
-            state[s] = oscillator.steady_state(row["frequency"], fixed, self.filling.gravity)
+            state[s] = oscillator.steady_state(row["frequency"], fixed, gravity)
         return state

@@ -41,6 +41,7 @@ STYLE = {
 BLUE, RED, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
 ORANGE, SKY, BLACK, GREY = "#E69F00", "#56B4E9", "#222222", "#8A8A8A"
 BROWN, VIOLET = "#8C6D31", "#6A51A3"
+WINE, OLIVE = "#882255", "#999933"
 
 
 @dataclass(frozen=True)
@@ -66,11 +67,13 @@ STYLES = {
     "fixed": MethodStyle("one fixed step, full dashpots", BLACK, "X"),
     "reference": MethodStyle("reference", GREY, "."),
     "ca_static": MethodStyle("automaton, static contact", BLUE, "o"),
+    "ca_place": MethodStyle("automaton, rules of place", WINE, "P"),
     "ca_ejection": MethodStyle("automaton, landing + ejection", GREEN, "s"),
     "ca_landing": MethodStyle("automaton, landing", ORANGE, "D"),
     "dem": MethodStyle("spheres", RED, "^"),
     "dem_printed": MethodStyle("spheres, damping as printed", PURPLE, "v"),
     "dem_soft": MethodStyle("spheres, modulus / 100", SKY, "P"),
+    "combined": MethodStyle("spheres and long flights", OLIVE, "v"),
     "empty": MethodStyle("empty container", GREY, "X", ":"),
     "rk45_tolerance": MethodStyle("RK45 in the kernel, tolerance swept", BROWN, "o"),
     "rk45_step": MethodStyle("RK45 in the kernel, longest step swept", VIOLET, "s"),

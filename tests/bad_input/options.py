@@ -63,6 +63,11 @@ def checkpoint(**options):
     return Checkpoint(**{"path": "run.npz", **options})
 
 
+def placed(**options):
+    """An automaton by the rules of place."""
+    return Automaton(rules="place", **options)
+
+
 def solved(**options):
     """A solution of y' = -y."""
     arguments = {"span": (0.0, 1.0), "y0": [1.0], **options}
@@ -147,13 +152,15 @@ _NUMBERS = ("width", "particle_mass", "v_max")
 _MODULI = ("reference_speed", "young", "wall_young", "diameter", "particle_mass")
 DAMPER = [
     *taken(Automaton, "word", ("accounting", "pair_rule", "priority", "accumulator", "traversal")),
+    *taken(Automaton, "word", ("rules",)),
+    *taken(placed, "zero or positive", ("friction", "wall_friction"), (None,)),
     *taken(Automaton, "share", ("restitution", "wall_restitution")),
     *taken(Automaton, "positive", _NUMBERS),
     *taken(Automaton, "zero or positive", ("gravity", "static_threshold")),
     *taken(Automaton, "whole", ("columns", "rows")),
     *taken(Automaton, "flag", ("ledger",)),
     *taken(Automaton, "flag", ("static_contact",), (None,)),
-    *taken(Spheres, "word", ("damping", "search")),
+    *taken(Spheres, "word", ("damping", "search", "friction_law")),
     *taken(Spheres, "share", ("restitution", "wall_restitution")),
     *taken(Spheres, "positive", (*_MODULI, "width", "height")),
     *taken(Spheres, "zero or positive", ("friction", "wall_friction", "gravity")),

@@ -114,6 +114,8 @@ FILLINGS = {
     "one cell": (Automaton(columns=1, rows=1), 1e-3),
     "spheres": (Spheres(), 2e-5),
     "turning spheres": (Spheres(rotation=True, search="all_pairs"), 2e-5),
+    "spheres that stick": (Spheres(friction_law="history", rotation=True), 2e-5),
+    "two sizes": (Spheres(friction_law="history", sizes=((30, 6e-3), (60, 4e-3))), 2e-5),
     "one sphere": (Spheres(width=6e-3, height=6e-3), 2e-5),
     "rigid": (RigidMass(), 1e-3),
 }
@@ -124,7 +126,7 @@ def test_a_shaken_filling_stays_within_its_fields(name):
     """Empty, nearly empty and full boxes, shaken over two cycles by four of gravity."""
     filling, dt = FILLINGS[name]
     most = min(filling.capacity, 160)
-    counts = [0, 1, most // 2, most]
+    counts = [0, 1, most // 2, most] if name != "two sizes" else [90]
     if getattr(filling, "start", None) is not None:
         counts = [len(filling.start)]
     table = SceneTable(counts, range(1, 1 + len(counts)), dt, 8.0, 4.0 * 10.0 / 50.0**2)

@@ -85,6 +85,7 @@ LINES = [
     ("damper_response", ("--accuracy", "101%"), ("--accuracy", "up to 100%")),
     ("damper_response", ("--accuracy", "%"), ("--accuracy", "up to 100%")),
     ("damper_response", ("--accuracy", "1%", "--resume"), ("accuracy must be left out",)),
+    ("damper_validity", ("--seeds", "0"), ("--seeds", "1 to 1000")),
     ("demo_damper", ("--particles", "161"), ("--particles", "0 to 160")),
     ("demo_damper", ("--frequency", "0"), ("--frequency",)),
     ("demo_damper", ("--seed", "-1"), ("--seed",)),

@@ -45,6 +45,19 @@ def test_response_of_two_harmonics_and_a_mean():
     assert cycles.energy == pytest.approx(4.5)
 
 
+def test_a_motion_of_half_the_frequency_counts_about_the_mean_of_all_cycles():
+    """The mean of each cycle takes half of it away; that of all cycles takes nothing."""
+    cycles = cycles_of(lambda t: 0.2 + np.sin(0.5 * OMEGA * t), nothing, nothing)
+    assert cycles.rms_about_all == pytest.approx(math.sqrt(0.5), rel=1e-6)
+    # Mean of half a wave: 2 / pi.
+    assert cycles.rms == pytest.approx(math.sqrt(0.5 - (2.0 / math.pi) ** 2), rel=1e-4)
+
+
+def test_both_rms_agree_for_whole_waves():
+    cycles = cycles_of(lambda t: 0.4 + 2.0 * np.cos(OMEGA * t + 0.3), nothing, nothing)
+    assert cycles.rms_about_all == pytest.approx(cycles.rms, rel=1e-13)
+
+
 def test_amplitude_is_half_the_range():
     cycles = cycles_of(lambda t: 0.1 + 2.0 * np.sin(OMEGA * t), nothing, nothing)
     # Quarter cycles are steps here, so the extremes are samples.

@@ -17,6 +17,7 @@ from ca_damper import (
     frequency_response,
     sweep_up_and_down,
 )
+from ca_damper.response import UNITS
 
 PAPER = Oscillator()
 RATIOS = np.linspace(0.9, 1.1, 5)
@@ -45,6 +46,32 @@ def test_response_has_a_place_for_every_scene():
         np.ceil(1e4 / (RATIOS * PAPER.natural_frequency))
     )
     assert (response.dt <= 1e-4).all()
+
+
+def test_several_amplitudes_are_an_axis_of_the_same_bits(tmp_path):
+    """The rigid mass is linear; each amplitude has the bits of a response of its own."""
+    amplitudes = [0.3e-3, 1.2e-3]
+    made = rigid_response(base_amplitude=amplitudes)
+    assert made.amplitudes == tuple(amplitudes) and len(made) == 2
+    assert made.measure("rms").shape == (2, 2, 5, 2)
+    for amplitude, one in zip(amplitudes, made):
+        alone = rigid_response(base_amplitude=amplitude)
+        assert one.oscillator == alone.oscillator == Oscillator(base_amplitude=amplitude)
+        for name in UNITS:
+            assert np.array_equal(getattr(one, name), getattr(alone, name)), name
+    assert made.measure("rms")[1] == pytest.approx(4.0 * made.measure("rms")[0], rel=1e-8)
+    assert made.peaks()[1].shape == (2, 2, 2) and made[1] is made.responses[1]
+    made.write_csv(tmp_path / "curves.csv")
+    with open(tmp_path / "curves.csv", newline="") as handle:
+        rows = list(csv.DictReader(handle))
+    assert len(rows) == 40 and float(rows[-1]["base_amplitude_m"]) == 1.2e-3
+    assert float(rows[-1]["rms_m"]) == made.measure("rms")[1, -1, -1, -1]
+
+
+def test_amplitudes_that_mean_nothing_are_refused():
+    for bad in (-1e-3, [1e-3, math.nan], []):
+        with pytest.raises(InputError, match="base_amplitude must"):
+            rigid_response(base_amplitude=bad)
 
 
 def test_oscillator_and_step_are_the_user_s():

@@ -38,8 +38,8 @@ def test_a_frozen_batch_goes_on_with_the_bits_of_its_run(script):
 def test_options_stay_those_of_the_batch(script):
     (_, other), states = batches(script, "spheres", {}, {"friction": 0.0})
     other.freeze(states, 5)
-    assert other.batch.device.contact_of_pair.friction[None] == 0.0
-    assert other.batch.device.contact_of_wall.friction[None] == 0.5
+    assert other.batch.device.pair_contacts.contact[0].friction == 0.0
+    assert other.batch.device.wall_contacts.contact[0].friction == 0.5
 
 
 def test_without_static_contact_the_same_grains_are_released_where_they_are(script):
@@ -55,9 +55,9 @@ def test_without_static_contact_the_same_grains_are_released_where_they_are(scri
 
 
 def kinds(frozen, state):
-    """Contents of the cells in a state."""
+    """Contents of the cells of its scenes in a state; an engine may hold those of others too."""
     frozen._memory().write(frozen.states[state])
-    return frozen.batch.device.cells.kind.to_numpy()
+    return frozen.batch.engine.table.in_use(frozen.batch.device.cells.kind)
 
 
 def test_a_state_that_the_filling_does_not_bear_is_refused(script):

@@ -32,6 +32,7 @@ IDENTIFYING = (
     taichi_dem.StepControl(),
     ca_damper.Automaton(),
     ca_damper.Spheres(),
+    ca_damper.Combined(),
     ca_damper.RigidMass(),
     ca_damper.Empty(),
     ca_damper.Oscillator(),
@@ -76,11 +77,21 @@ def of_the_damper():
     few = {"particles": [0, 10], "ratios": np.linspace(0.9, 1.1, 5), "seeds": 2}
     few.update(transient_cycles=0, measured_cycles=2, start="rigid")
     response = ca_damper.frequency_response(ca_damper.RigidMass(), **few)
+    yield ca_damper.frequency_response(
+        ca_damper.RigidMass(), **{**few, "base_amplitude": [1e-4, 2e-4]}
+    )
     batch = ca_damper.Batch(ca_damper.RigidMass(), ca_damper.SceneTable([1, 2], 1, 1e-4))
     batch.start()
     film = ca_damper.film(batch, 10, frame_every=5)
     cycles = measures.Cycles(np.ones(2), np.ones(2), np.zeros((2, 1, len(measures.COLUMNS))))
     yield from (response, response.report, ca_damper.Sweep(response, response), batch, batch.table)
+    few = {"amplitudes": 1e-3, "frequencies": 6.0, "particles": 1, "seeds": 1}
+    yield ca_damper.damper_map(ca_damper.RigidMass(), **few)
+    yield ca_damper.collect_and_collide(1.0, 2.0)
+    motion = ca_damper.excitation.sines([5.0, 7.0], 1e-3, 0.1)
+    force = ca_damper.excitation.SineForce(1.0, 5.0)
+    yield from (motion, force, ca_damper.excitation.Excitation(motion, force))
+    yield ca_damper.shake(ca_damper.RigidMass(), motion, particles=1, seeds=1)
     yield from (film, film.frames[0][0], cycles, ca_damper.needed_effects(response))
     yield from (rk45.solve(lambda t, y: -y, (0.0, 1.0), [1.0]), ca_damper.Progress(0.5, 1.0))
     yield from (ca_damper.ProgressBar("work"), response.report.certificate)

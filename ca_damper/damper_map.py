@@ -1,0 +1,247 @@
+"""Maps of a driven damper: loss and apparent mass over amplitude, frequency, number, clearance."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Optional, Union
+
+import numpy as np
+
+from ca_damper.automaton import Automaton
+from ca_damper.batch import Batch
+from ca_damper.checks import MOST_CYCLES, MOST_SCENES, MOST_SEED
+from ca_damper.collect_and_collide import CollectAndCollide, collect_and_collide
+from ca_damper.filling import Filling, check_filling
+from ca_damper.progress import Stages
+from ca_damper.report import Report
+from ca_damper.scenes.clock import automatic_dt
+from ca_damper.scenes.table import SceneTable
+from ca_damper.spheres import Spheres
+from taichi_dem.kit.display import in_brief, listed
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.files import write_csv
+from taichi_dem.kit.progress.progress import Listener
+from taichi_dem.kit.progress.progress_bar import reporting
+from taichi_dem.kit.validation import (
+    AUTO,
+    FileName,
+    positive,
+    progress_option,
+    several,
+    shown,
+    whole,
+)
+
+_AXES = ("clearances", "particles", "amplitudes", "frequencies", "seeds")
+
+
+@dataclass(frozen=True, eq=False)
+class DamperMap:
+    """Measures of a container that is driven as A sin(2 pi f t), whatever its filling does.
+
+    label: of the filling. Axes: clearances [m], particles, amplitudes [m], frequencies [Hz], seeds;
+    clearance is the way of the settled grains to the lid. All measures have them in this order.
+    apparent_damping [N s/m], apparent_mass [kg]: of ``measures.Cycles``. particle_mass [kg].
+    gaps: the clearances, (clearances, particles) [m]: those asked for, or of the filling's own box.
+    theory: of a block of grains without gravity, (clearances, particles, amplitudes).
+    """
+
+    label: str
+    particle_mass: float
+    clearances: tuple
+    particles: tuple
+    amplitudes: tuple
+    frequencies: tuple
+    seeds: tuple
+    gaps: np.ndarray
+    apparent_damping: np.ndarray
+    apparent_mass: np.ndarray
+    reports: tuple[Report, ...] = ()
+
+    def __repr__(self) -> str:
+        names = ("particles", "amplitudes", "frequencies")
+        axes = (f"{name} {listed(getattr(self, name))}" for name in names)
+        return in_brief(self, self.label, *axes, f"largest loss {np.nanmax(self.loss):.4g}")
+
+    @property
+    def omega(self) -> np.ndarray:
+        """Angular frequencies [rad/s], (frequencies, 1), to be divided by."""
+        return 2.0 * np.pi * np.array(self.frequencies)[:, None]
+
+    @property
+    def mass(self) -> np.ndarray:
+        """Mass of the filling [kg], (particles, 1, 1, 1)."""
+        return self.particle_mass * np.array(self.particles, float)[:, None, None, None]
+
+    @property
+    def loss(self) -> np.ndarray:
+        """Apparent damping by N m w: 1 for grains that take N m A^2 w^2 / 2 in a radian."""
+        return self.apparent_damping / (self.mass * self.omega)
+
+    @property
+    def mass_share(self) -> np.ndarray:
+        """Apparent mass by N m: 1 for grains that move along."""
+        return self.apparent_mass / self.mass
+
+    @property
+    def energy(self) -> np.ndarray:
+        """Energy taken in a cycle by N m A^2 w^2."""
+        return np.pi * self.loss
+
+    def loss_factor(self, container_mass: float) -> np.ndarray:
+        """Energy taken a radian per energy in motion, c / (w (M + m)), M [kg] of the container."""
+        moving = positive("container_mass", container_mass) + self.apparent_mass
+        return self.apparent_damping / (self.omega * moving)
+
+    @property
+    def theory(self) -> CollectAndCollide:
+        """Collect and collide without gravity, at every clearance, number and amplitude."""
+        return collect_and_collide(np.array(self.amplitudes), self.gaps[:, :, None])
+
+    def write_csv(self, path: FileName) -> None:
+        """Write a row a scene: its place on the axes, measures, and the theory's loss and mass.
+
+        Raises InputError when the file cannot be written.
+        """
+        indices = np.indices(self.loss.shape).reshape(len(_AXES), -1)
+        clearance, number, amplitude = indices[:3]
+        columns: dict[str, Any] = {"filling": [self.label] * len(clearance)}
+        columns["clearance_m"] = self.gaps[clearance, number]
+        units = {"particles": "particles", "amplitudes": "amplitude_m"}
+        units.update(frequencies="frequency_Hz", seeds="seed")
+        for name, axis in zip(_AXES[1:], indices[1:]):
+            columns[units[name]] = np.array(getattr(self, name))[axis]
+        for name in ("loss", "mass_share", "energy"):
+            columns[name] = getattr(self, name).ravel()
+        made = self.theory
+        for name in ("loss", "mass"):
+            columns[f"{name}_theory"] = getattr(made, name)[clearance, number, amplitude]
+        write_csv(path, columns)
+
+
+def damper_map(
+    filling: Filling,
+    *,
+    amplitudes: Union[float, Sequence[float]],
+    frequencies: Union[float, Sequence[float]],
+    particles: Union[int, Sequence[int]],
+    clearances: Union[float, Sequence[float], None] = None,
+    seeds: Union[int, Sequence[int]] = 3,
+    dt: Optional[float] = None,
+    transient_cycles: int = 50,
+    measured_cycles: int = 50,
+    progress: Union[Listener, str, None] = AUTO,
+) -> DamperMap:
+    """Loss and apparent mass of a driven damper over all its axes; returns a DamperMap.
+
+    amplitudes [m], frequencies [Hz], particles: one or several of each. clearances: ways from the
+    settled grains, of N / columns layers, to the lid [m]; the box of the filling, Spheres or an
+    Automaton, is made as high as each of them needs with each number. None: the box as it is.
+    seeds: how many, counted from 1, or which. dt: largest step [s], chosen if None. progress: as in
+    ``frequency_response``. Raises InputError, SimulationDiverged.
+    """
+    check_filling(filling)
+    progress_option("progress", progress)
+    plan = _Plan(filling, amplitudes, frequencies, particles, seeds)
+    plan.transient = whole("transient_cycles", transient_cycles, 0, MOST_CYCLES)
+    plan.measured = whole("measured_cycles", measured_cycles, 1, 100_000)
+    plan.dt = automatic_dt(filling.default_dt, max(plan.frequencies))
+    plan.dt = plan.dt if dt is None else positive("dt", dt)
+    jobs = plan.jobs(clearances)
+    with reporting(progress, "map") as report_progress:
+        tell = Stages(report_progress, [(k + 1.0) / len(jobs) for k in range(len(jobs))])
+        runs = [plan.run(one, numbers, tell) for one, numbers in jobs]
+    return plan.map(clearances, jobs, runs)
+
+
+class _Plan:
+    """The checked axes of a map."""
+
+    transient: int
+    measured: int
+    dt: float
+
+    def __init__(self, filling, amplitudes, frequencies, particles, seeds):
+        self.filling = filling
+        self.amplitudes = several("amplitudes", amplitudes, positive)
+        self.frequencies = several("frequencies", frequencies, positive)
+        self.particles = several("particles", particles, lambda n, x: whole(n, x, 1, 1_000_000))
+        if not hasattr(seeds, "__iter__") or isinstance(seeds, (str, bytes, dict)):
+            seeds = range(1, whole("seeds", seeds, 1, 1_000_000) + 1)
+        self.seeds = several("seeds", seeds, lambda n, x: whole(n, x, 0, MOST_SEED))
+        self.scenes = len(self.amplitudes) * len(self.frequencies) * len(self.seeds)
+        if self.scenes * len(self.particles) > MOST_SCENES:
+            raise InputError(
+                f"amplitudes x frequencies x particles x seeds must make at most {MOST_SCENES} "
+                f"scenes, got {self.scenes * len(self.particles)}"
+            )
+
+    def jobs(self, clearances):
+        """(filling, particle numbers) of each batch."""
+        if clearances is None:
+            return [(self.filling, self.particles)]
+        ways = several("clearances", clearances, positive)
+        return [
+            (with_clearance(self.filling, number, way), (number,))
+            for way in ways
+            for number in self.particles
+        ]
+
+    def run(self, filling, numbers, progress):
+        """Cycles of all scenes of a batch, and its report."""
+        axes = numbers, self.amplitudes, self.frequencies, self.seeds
+        number, size, frequency, seed = (axis.ravel() for axis in np.meshgrid(*axes, indexing="ij"))
+        table = SceneTable(number, seed, self.dt, frequency, size)
+        batch = Batch(filling, table, mount="base", measured_cycles=self.measured)
+        batch.start()
+        return batch.run(self.transient, self.measured, progress), batch.report()
+
+    def map(self, clearances, jobs, runs):
+        """The map of all runs."""
+        ways = (None,) if clearances is None else several("clearances", clearances, positive)
+        shape = len(ways), len(self.particles), len(self.amplitudes), len(self.frequencies)
+        gaps = [clearance_of(one, number) for one, numbers in jobs for number in numbers]
+
+        def joined(name):
+            values = [getattr(cycles, name) for cycles, _ in runs]
+            return np.concatenate(values).reshape(*shape, len(self.seeds))
+
+        return DamperMap(
+            *(self.filling.label, self.filling.particle_mass, ways, self.particles),
+            *(self.amplitudes, self.frequencies, self.seeds),
+            gaps=np.array(gaps).reshape(shape[:2]),
+            apparent_damping=joined("apparent_damping"),
+            apparent_mass=joined("apparent_mass"),
+            reports=tuple(report for _, report in runs),
+        )
+
+
+def clearance_of(filling: Any, particles: int) -> float:
+    """Way of settled grains, in N / columns layers, to the lid of a filling's box [m]."""
+    if isinstance(filling, Spheres):
+        return filling.height - filling.diameter * particles / filling.lattice[0]
+    if isinstance(filling, Automaton):
+        return filling.width * (filling.rows - particles / filling.columns)
+    return math.nan
+
+
+def with_clearance(filling: Any, particles: int, clearance: float) -> Any:
+    """The filling in a box with a clearance [m] above so many settled grains.
+
+    InputError for a filling without a box, and for an automaton whose box would end within a cell.
+    """
+    if isinstance(filling, Spheres):
+        layers = particles / filling.lattice[0]
+        return replace(filling, height=filling.diameter * layers + clearance)
+    if isinstance(filling, Automaton):
+        rows = clearance / filling.width + particles / filling.columns
+        if abs(rows - round(rows)) > 1e-6:
+            raise InputError(
+                f"clearances above {particles} particles must leave whole cells of "
+                f"{filling.width:g} m, got {clearance:g}: {rows:.4g} rows"
+            )
+        return replace(filling, rows=round(rows))
+    raise InputError(
+        f"clearances must be None for a filling without a box, got {shown(clearance)} for "
+        f"{shown(filling)}"
+    )

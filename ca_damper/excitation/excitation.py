@@ -1,0 +1,170 @@
+"""Base motion and force of the scenes of a batch."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Optional, Union
+
+import numpy as np
+
+from ca_damper.excitation.signal import Signal
+from taichi_dem.kit.checkpoint import identity_of
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import shown
+
+
+class ExcitationKind(NamedTuple):
+    """Compiled structure of an excitation: base "sine" or "signal"; force "none" or as base."""
+
+    base: str = "sine"
+    force: str = "none"
+
+
+@dataclass(frozen=True)
+class SineForce:
+    """Force on the container, amplitude * sin(2 pi frequency t + phase), upwards.
+
+    amplitude [N], frequency [Hz], phase [rad]: each one number for all scenes or one for each.
+    Raises InputError unless they are finite, and for a frequency that is not positive.
+    """
+
+    amplitude: Any
+    frequency: Any
+    phase: Any = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("amplitude", "frequency", "phase"):
+            object.__setattr__(self, name, _numbers(name, getattr(self, name)))
+        if min(np.atleast_1d(self.frequency)) <= 0.0:
+            raise InputError(f"frequency must be positive, got {shown(self.frequency)}")
+
+    def rows(self, scenes: int) -> np.ndarray:
+        """Amplitude, frequency and phase of each scene, (3, scenes); InputError if they misfit."""
+        values = (self.amplitude, self.frequency, self.phase)
+        try:
+            return np.stack([np.broadcast_to(one, scenes) for one in map(np.asarray, values)])
+        except ValueError:
+            raise InputError(
+                f"numbers of a SineForce must be one for all or {scenes}, got {shown(self)}"
+            ) from None
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """What shakes the scenes of a batch.
+
+    base: displacement of the base as a Signal [m], or one for each scene; None for the sine of the
+    scenes' table. force: on the container, upwards: a SineForce, a Signal [N] or one for each
+    scene, or None.
+    """
+
+    base: Union[Signal, Sequence[Signal], None] = None
+    force: Union[SineForce, Signal, Sequence[Signal], None] = None
+
+    def __post_init__(self) -> None:
+        for name in ("base", "force"):
+            value = getattr(self, name)
+            if isinstance(value, list):
+                object.__setattr__(self, name, tuple(value))
+        _signals("base", self.base)
+        if not isinstance(self.force, SineForce):
+            _signals("force", self.force)
+
+    @property
+    def kind(self) -> ExcitationKind:
+        """What of it is compiled."""
+        base = "sine" if self.base is None else "signal"
+        if isinstance(self.force, SineForce):
+            return ExcitationKind(base, "sine")
+        return ExcitationKind(base, "none" if self.force is None else "signal")
+
+    def signals(self, role: str, scenes: int) -> tuple[Signal, ...]:
+        """Signal of each scene for "base" or "force"; empty where there is none.
+
+        InputError for another number of signals than scenes.
+        """
+        value = getattr(self, role)
+        if value is None or isinstance(value, SineForce):
+            return ()
+        given = (value,) if isinstance(value, Signal) else value
+        if len(given) not in (1, scenes):
+            raise InputError(f"{role} must be one Signal or {scenes}, got {len(given)}")
+        return given * scenes if len(given) == 1 else given
+
+    def sizes(self, scenes: int) -> dict[str, int]:
+        """Nodes of all signals, by role."""
+        made = {role: self.signals(role, scenes) for role in ("base", "force")}
+        return {f"{role}_nodes": len(packed(given)[0]) for role, given in made.items() if given}
+
+    def identity(self) -> str:
+        """Words that are the same for equal excitations, whatever their labels."""
+        return f"base {_identity(self.base)}, force {_identity(self.force)}"
+
+    def duration(self, scenes: int) -> np.ndarray:
+        """Time up to which each scene is excited [s], infinite for sines, (scenes,)."""
+        ends = np.full(scenes, np.inf)
+        for role in ("base", "force"):
+            given = self.signals(role, scenes)
+            if given:
+                ends = np.minimum(ends, [one.duration for one in given])
+        return ends
+
+
+def excitation_of(value: Any) -> Excitation:
+    """Excitation that a user means by a Signal, several of them, an Excitation or None."""
+    if isinstance(value, Excitation):
+        return value
+    if value is None or isinstance(value, (Signal, list, tuple)):
+        return Excitation(base=value)
+    raise InputError(f"excitation must be a Signal, an Excitation or None, got {shown(value)}")
+
+
+def packed(given: Sequence[Signal]) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes of signals one after the other, each once, and where to find them.
+
+    Returns (value and second derivative, (nodes, 2)) and rows (first node, nodes, step [s]) of each
+    signal, (signals, 3).
+    """
+    first: dict[int, int] = {}
+    columns, total = [], 0
+    for one in given:
+        if id(one) not in first:
+            first[id(one)] = total
+            columns.append(np.column_stack([one.value, one.bend]))
+            total += len(one.value)
+    rows = [(first[id(one)], len(one.value), one.step) for one in given]
+    return np.concatenate(columns), np.array(rows, dtype=np.float64)
+
+
+def _identity(value: Any) -> str:
+    given = (value,) if isinstance(value, Signal) else value
+    if isinstance(given, tuple):
+        given = tuple((one.step, one.value, one.bend) for one in given)
+    return identity_of(given)
+
+
+def _signals(name: str, value: Any) -> Optional[tuple[Signal, ...]]:
+    """InputError unless a value is a Signal, several or None."""
+    given = (value,) if isinstance(value, Signal) else value
+    if given is None:
+        return None
+    if not isinstance(given, tuple) or not given:
+        raise InputError(
+            f"{name} must be a Signal, one for each scene, or None, got {shown(value)}"
+        )
+    for one in given:
+        if not isinstance(one, Signal):
+            raise InputError(f"{name} must hold Signals only, got {shown(one)}")
+    return given
+
+
+def _numbers(name, value):
+    """A float, or a tuple of them; InputError for anything else."""
+    try:
+        numbers = np.asarray(value)
+    except ValueError:
+        numbers = np.empty(0, dtype=object)
+    if numbers.dtype.kind not in "iuf" or numbers.ndim > 1 or not np.isfinite(numbers).all():
+        raise InputError(
+            f"{name} must be a finite number or one for each scene, got {shown(value)}"
+        )
+    return float(numbers) if numbers.ndim == 0 else tuple(map(float, numbers))

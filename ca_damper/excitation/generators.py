@@ -1,0 +1,169 @@
+"""Signals from formulas: several sines, sweeps, random vibration of a given spectral density.
+
+They are sampled so finely that their spline cannot be told from the formula: with 40 nodes in a
+cycle it is off by 2e-6 of the amplitude, and its second derivative by (2 pi / 40)^2 / 12 or 0.2 %.
+"""
+
+import math
+from typing import Any, Optional
+
+import numpy as np
+
+from ca_damper.excitation.samples import OF
+from ca_damper.excitation.signal import MOST_NODES, Signal, spline
+from taichi_dem.kit.elementary import sines_and_cosines
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import choice, finite, positive, several, shown, whole
+
+#: Nodes in a cycle of the highest frequency, unless the user gives a step.
+NODES_A_CYCLE = 40
+WAYS = ("linear", "logarithmic")
+
+
+def sines(
+    frequencies: Any,
+    amplitudes: Any,
+    duration: float,
+    *,
+    phases: Any = 0.0,
+    of: str = "value",
+    step: Optional[float] = None,
+) -> Signal:
+    """Sum of sines, amplitude * sin(2 pi frequency t + phase).
+
+    frequencies [Hz], amplitudes, phases [rad]: one or several, broadcast against each other.
+    duration [s]. of: amplitudes are those of the "value" or of its "acceleration" (its second
+    derivative; the value is then divided by -(2 pi frequency)^2). step: between nodes [s], a
+    fortieth of the shortest cycle if None.
+    """
+    choice("of", of, OF)
+    lists = [several("frequencies", frequencies, positive)]
+    lists += [several(n, x, _number) for n, x in (("amplitudes", amplitudes), ("phases", phases))]
+    try:
+        rows = np.broadcast_arrays(*map(np.array, lists))
+    except ValueError:
+        counts = [len(one) for one in lists]
+        raise InputError(
+            f"frequencies, amplitudes and phases must be one or as many as each other, got {counts}"
+        ) from None
+    time = _grid(duration, max(lists[0]), step)
+    value = np.zeros(len(time))
+    for frequency, amplitude, phase in zip(*(row.tolist() for row in rows)):
+        omega = 2.0 * math.pi * frequency
+        size = amplitude if of == "value" else -amplitude / omega**2
+        value += size * sines_and_cosines(omega * time + phase)[0]
+    return spline(time[1], value, f"sines of {shown(lists[0])} Hz")
+
+
+def sweep(
+    low: float,
+    high: float,
+    amplitude: float,
+    duration: float,
+    *,
+    way: str = "linear",
+    of: str = "value",
+    step: Optional[float] = None,
+) -> Signal:
+    """Sine whose frequency goes from ``low`` to ``high`` [Hz], or down, within the duration [s].
+
+    way: "linear", by the same number of Hz in any second, or "logarithmic", by the same number of
+    octaves. of: what keeps its amplitude, the "value", or its "acceleration" (but for the slow
+    change of the frequency). step: as in ``sines``.
+    """
+    low, high, amplitude = (
+        positive("low", low),
+        positive("high", high),
+        _number("amplitude", amplitude),
+    )
+    choice("way", way, WAYS)
+    choice("of", of, OF)
+    time = _grid(duration, max(low, high), step)
+    end = float(time[-1])
+    if way == "linear" or low == high:
+        frequency = low + (high - low) / end * time
+        turns = (low + 0.5 * (high - low) / end * time) * time
+    else:
+        octaves = math.log(high / low) / end
+        frequency = low * np.exp(octaves * time)
+        turns = (frequency - low) / octaves
+    size = amplitude if of == "value" else -amplitude / (2.0 * np.pi * frequency) ** 2
+    value = size * sines_and_cosines(2.0 * np.pi * turns)[0]
+    return spline(time[1], value, f"{way} sweep from {low:g} to {high:g} Hz")
+
+
+def random_vibration(
+    frequencies: Any,
+    density: Any,
+    duration: float,
+    *,
+    seed: int = 1,
+    of: str = "acceleration",
+    step: Optional[float] = None,
+) -> Signal:
+    """Stationary random vibration of a one-sided power spectral density.
+
+    frequencies [Hz]: ascending break points. density: there, [unit^2/Hz] with the unit of
+    the "acceleration", m/s^2, or of the "value", as ``of`` says; between them straight lines in a
+    doubly logarithmic diagram, beyond them nothing. Lines of the spectrum lie 1 / duration apart,
+    with amplitudes sqrt(2 density / duration) and phases at random from the seed: the mean square
+    over the duration is that of the density. step: as in ``sines``.
+    """
+    choice("of", of, OF)
+    points = np.array(several("frequencies", frequencies, positive))
+    levels = np.array(several("density", density, positive))
+    if len(points) != len(levels) or len(points) < 2 or (np.diff(points) <= 0.0).any():
+        raise InputError(
+            "frequencies must ascend and be as many as densities, at least 2, got "
+            f"{len(points)} and {len(levels)}: {shown(points.tolist())}"
+        )
+    time = _grid(duration, float(points[-1]), step)
+    end = float(time[-1])
+    lines = np.arange(math.ceil(points[0] * end - 1e-9), math.floor(points[-1] * end + 1e-9) + 1)
+    if not len(lines):
+        raise InputError(
+            f"duration must be at least {1.0 / (points[-1] - points[0]):.3g} s, so that lines of "
+            f"the spectrum lie between {points[0]:g} and {points[-1]:g} Hz, got {duration:g}"
+        )
+    amplitude = np.sqrt(2.0 * _between(points, levels, lines / end) / end)
+    if of == "acceleration":
+        amplitude = -amplitude / (2.0 * np.pi * lines / end) ** 2
+    generator = np.random.default_rng(whole("seed", seed, 0, 2**31 - 1))
+    sine, cosine = sines_and_cosines(2.0 * np.pi * generator.random(len(lines)))
+    count = len(time) - 1
+    spectrum = np.zeros(count // 2 + 1, dtype=complex)
+    # a sin(2 pi k t + p) is the real part of a (sin p - i cos p) exp(2 pi i k t).
+    spectrum[lines] = 0.5 * count * amplitude * (sine - 1j * cosine)
+    value = np.fft.irfft(spectrum, count)
+    label = f"random vibration from {points[0]:g} to {points[-1]:g} Hz, seed {seed}"
+    return spline(time[1], np.append(value, value[0]), label)
+
+
+def _between(points, levels, frequency):
+    """Density at frequencies, by straight lines in a doubly logarithmic diagram."""
+    inside = np.clip(frequency, points[0], points[-1])
+    return np.exp(np.interp(np.log(inside), np.log(points), np.log(levels)))
+
+
+def _grid(duration, highest, step):
+    """Times of the nodes [s]: an even number of equal steps, none longer than asked for."""
+    duration = positive("duration", duration)
+    step = 1.0 / (NODES_A_CYCLE * highest) if step is None else positive("step", step)
+    if step > 1.0 / (4.0 * highest):
+        raise InputError(
+            f"step must be at most {1.0 / (4.0 * highest):.3g} s, a quarter of the shortest cycle, "
+            f"got {step:g}"
+        )
+    if duration / step > MOST_NODES - 3:
+        raise InputError(
+            f"duration must be at most {(MOST_NODES - 3) * step:.3g} s in steps of {step:.3g} s, "
+            f"got {duration:g}"
+        )
+    count = max(4, 2 * math.ceil(0.5 * duration / step * (1.0 - 1e-12)))
+    return duration / count * np.arange(count + 1)
+
+
+def _number(name, value):
+    if not finite(value):
+        raise InputError(f"{name} must be finite numbers, got {shown(value)}")
+    return float(value)

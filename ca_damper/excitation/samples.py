@@ -1,0 +1,126 @@
+"""A Signal from samples that were measured, after checks that a spline through them means anything.
+
+A spline through samples follows a component that is sampled at least four times a cycle: its gain
+sinc^4(f) 3 / (2 + cos(2 pi f)), f by the sampling rate, is then within 1.5 % of 1, and the image at
+1 - f has at most 1.3 % of its amplitude. So 99 % of the samples' power must lie below a quarter of
+the sampling rate.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from ca_damper.excitation.signal import LEAST_NODES, Signal, end_slope, integral, spline
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import choice, flag, shown
+
+#: What samples are of: the signal itself or its second derivative.
+OF = ("value", "acceleration")
+#: Distance of a time from the even grid, as a share of the step: times may be rounded.
+_UNEVEN = 0.1
+#: Samples that a cycle needs, and the share of the power in slower cycles.
+SAMPLES_A_CYCLE, POWER_SHARE = 4.0, 0.99
+
+
+def from_samples(
+    time_s: Any, values: Any, *, of: str = "value", correct_baseline: bool = True
+) -> Signal:
+    """Signal through measured samples; its own time counts from the first of them.
+
+    time_s: evenly spaced times [s], (samples,). values: (samples,), of: the signal's "value", such
+    as a displacement [m] or a force [N], or its "acceleration" [m/s^2], which is integrated twice
+    from rest. correct_baseline: take from an acceleration the straight line that lets the motion
+    end at rest where it began; without it, small offsets integrate to large drifts.
+    Raises InputError for samples that are no finite numbers, for times with gaps or that run
+    backwards, and for a step that is too coarse for the samples' spectrum.
+    """
+    choice("of", of, OF)
+    flag("correct_baseline", correct_baseline)
+    times, samples = _column("time_s", time_s), _column("values", values)
+    if len(times) != len(samples):
+        raise InputError(f"values must be {len(times)}, as many as times, got {len(samples)}")
+    return checked_signal(times, samples, of, correct_baseline, "samples")
+
+
+def checked_signal(
+    times: np.ndarray, samples: np.ndarray, of: str, correct_baseline: bool, label: str
+) -> Signal:
+    """Signal of samples as ``from_samples``, for columns of finite numbers."""
+    step = _even_step(times)
+    _check_spectrum(step, samples)
+    if of == "value":
+        return spline(step, samples, label)
+    return (
+        _at_rest_again(step, samples, label) if correct_baseline else integral(step, samples, label)
+    )
+
+
+def _column(name, values):
+    try:
+        column = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        column = np.empty(0)
+    if column.ndim != 1 or len(column) < LEAST_NODES or not np.isfinite(column).all():
+        raise InputError(
+            f"{name} must be at least {LEAST_NODES} finite numbers, got {shown(values)}"
+        )
+    return column
+
+
+def _even_step(times):
+    """Step of evenly spaced times; InputError that names the first one that is not."""
+    steps = np.diff(times)
+    usual = float(np.median(steps))
+    if (steps <= 0.0).any():
+        k = int(np.flatnonzero(steps <= 0.0)[0]) + 1
+        raise InputError(
+            f"times must ascend, got {times[k]:g} s after {times[k - 1]:g} s in sample {k + 1}"
+        )
+    if (steps > 1.5 * usual).any():
+        k = int(np.flatnonzero(steps > 1.5 * usual)[0]) + 1
+        raise InputError(
+            f"times must have no gaps in steps of {usual:g} s, got {times[k]:g} s after "
+            f"{times[k - 1]:g} s in sample {k + 1}: fill it, or read one part at a time"
+        )
+    step = float(times[-1] - times[0]) / (len(times) - 1)
+    late = np.abs(times - times[0] - step * np.arange(len(times)))
+    if late.max() > _UNEVEN * step:
+        k = int(np.argmax(late))
+        raise InputError(
+            f"times must be even to {_UNEVEN:g} of their step of {step:g} s, got {times[k]:g} s in "
+            f"sample {k + 1}, {late[k]:.3g} s off"
+        )
+    return step
+
+
+def _check_spectrum(step, samples):
+    """InputError unless nearly all of the power lies where a spline follows."""
+    count = len(samples)
+    line = np.polynomial.Polynomial.fit(np.arange(count), samples, 1)
+    rest = (samples - line(np.arange(count))) * np.hanning(count)
+    power = np.abs(np.fft.rfft(rest)) ** 2
+    total = power.sum()
+    # What a straight line leaves of one is rounding, which has no spectrum.
+    if total <= 1e-20 * (samples**2).sum():
+        return
+    frequency = np.fft.rfftfreq(count, step)
+    most = float(frequency[np.searchsorted(np.cumsum(power), POWER_SHARE * total)])
+    # To within the width of the window's lobe.
+    if most > 1.0 / (SAMPLES_A_CYCLE * step) + 2.0 / (count * step):
+        raise InputError(
+            f"the step of the samples must be at most {1.0 / (SAMPLES_A_CYCLE * most):.3g} s, as "
+            f"{100 * POWER_SHARE:g} % of their power reaches to {most:.4g} Hz, got {step:.3g} s"
+        )
+
+
+def _at_rest_again(step, samples, label):
+    """Double integral less that of the line a + b t that lets it end at rest in zero.
+
+    At the end T the line has the speed a T + b T^2 / 2 and the place a T^2 / 2 + b T^3 / 6.
+    """
+    rough = integral(step, samples, label)
+    total, speed, place = rough.duration, end_slope(rough), float(rough.value[-1])
+    slope = 6.0 * (speed * total - 2.0 * place) / total**3
+    offset = speed / total - 0.5 * slope * total
+    line = offset + slope * step * np.arange(len(samples))
+    return integral(step, samples - line, label)

@@ -1,0 +1,138 @@
+"""A function of time on a uniform grid, with a smooth interpolant: the one form of any excitation.
+
+The interpolant is a cubic spline with two continuous derivatives, so that displacement, velocity
+and acceleration of a base belong to one motion. In the interval of length h from node 0 to node 1,
+with u = (t - t0) / h, w = 1 - u, values y and second derivatives m,
+
+    y(t) = w y0 + u y1 + h^2 / 6 ((w^3 - w) m0 + (u^3 - u) m1).
+
+The second derivative is then linear between the nodes. Samples of an acceleration are the m
+themselves, and their double integral is exact; for samples of the function the m follow from its
+continuity (de Boor, A Practical Guide to Splines, chapter IV, with the condition "not a knot").
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from taichi_dem.kit.display import counted, in_brief
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import finite, positive, shown
+
+#: Nodes of a signal: fewer determine no spline with "not a knot", more find no memory.
+LEAST_NODES, MOST_NODES = 4, 2**24
+
+
+@dataclass(frozen=True, eq=False)
+class Signal:
+    """A smooth function of time from t = 0, such as a base displacement [m] or a force [N].
+
+    step: between nodes [s]. value: at the nodes, (nodes,). bend: second derivative there, (nodes,).
+    label: what it is, in words. Made by the functions of ``ca_damper.excitation``.
+    Raises InputError unless the arrays are finite and of one length.
+    """
+
+    step: float
+    value: np.ndarray
+    bend: np.ndarray
+    label: str = "signal"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "step", positive("step", self.step))
+        for name in ("value", "bend"):
+            object.__setattr__(self, name, _nodes(name, getattr(self, name)))
+        if len(self.value) != len(self.bend):
+            raise InputError(
+                f"bend must have as many nodes as value, {len(self.value)}, got {len(self.bend)}"
+            )
+
+    def __repr__(self) -> str:
+        size = f"{counted(len(self.value), 'node')} in {self.duration:.6g} s"
+        return in_brief(self, self.label, size, f"largest {np.abs(self.value).max():.4g}")
+
+    @property
+    def duration(self) -> float:
+        """Time of the last node [s]."""
+        return self.step * (len(self.value) - 1)
+
+    def at(self, time_s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Value, first and second derivative at times [s] within the duration, as the kernels."""
+        place = np.asarray(time_s, dtype=np.float64) / self.step
+        k = np.clip(np.floor(place).astype(np.int64), 0, len(self.value) - 2)
+        u, h = place - k, self.step
+        w = 1.0 - u
+        y0, y1, m0, m1 = self.value[k], self.value[k + 1], self.bend[k], self.bend[k + 1]
+        value = w * y0 + u * y1 + h * h / 6.0 * ((w**3 - w) * m0 + (u**3 - u) * m1)
+        slope = (y1 - y0) / h + h / 6.0 * ((3.0 * u * u - 1.0) * m1 - (3.0 * w * w - 1.0) * m0)
+        return value, slope, w * m0 + u * m1
+
+    def scaled(self, factor: float) -> "Signal":
+        """The same, multiplied by a factor."""
+        if not finite(factor):
+            raise InputError(f"factor must be a finite number, got {shown(factor)}")
+        label = f"{factor:g} times {self.label}"
+        return Signal(self.step, float(factor) * self.value, float(factor) * self.bend, label)
+
+
+def spline(step: float, value: np.ndarray, label: str) -> Signal:
+    """Signal through values at the nodes.
+
+    m[k-1] + 4 m[k] + m[k+1] = 6 (y[k-1] - 2 y[k] + y[k+1]) / h^2 = r[k] inside. "Not a knot" makes
+    the third derivative continuous at the first and last inner node, where this leaves 6 m = r.
+    """
+    value = _nodes("value", value)
+    right = (6.0 * (value[:-2] - 2.0 * value[1:-1] + value[2:]) / step**2).tolist()
+    bend = np.empty(len(value))
+    bend[1:-1] = _inner(right)
+    bend[0], bend[-1] = 2.0 * bend[1] - bend[2], 2.0 * bend[-2] - bend[-3]
+    return Signal(step, value, bend, label)
+
+
+def integral(step: float, bend: np.ndarray, label: str) -> Signal:
+    """Signal that begins at rest in zero, from its second derivative at the nodes: exact."""
+    bend = _nodes("bend", bend)
+    first, second = bend[:-1], bend[1:]
+    slope = np.concatenate([[0.0], np.cumsum(0.5 * step * (first + second))])
+    more = step * slope[:-1] + step**2 / 6.0 * (2.0 * first + second)
+    return Signal(step, np.concatenate([[0.0], np.cumsum(more)]), bend, label)
+
+
+def end_slope(signal: Signal) -> float:
+    """First derivative at the end of a signal."""
+    return float(signal.at(np.array([signal.duration]))[1][0])
+
+
+def _inner(right):
+    """Second derivatives at the inner nodes, by elimination without a search for pivots."""
+    # First and last equation are 6 m = r, so that those between see known neighbours.
+    first, last = right[0] / 6.0, right[-1] / 6.0
+    if len(right) < 3:
+        return [first, last][: len(right)] if len(right) == 2 else [first]
+    middle = right[1:-1]
+    middle[0] -= first
+    middle[-1] -= last
+    factors, sums = [0.25], [0.25 * middle[0]]
+    for r in middle[1:]:
+        pivot = 1.0 / (4.0 - factors[-1])
+        factors.append(pivot)
+        sums.append((r - sums[-1]) * pivot)
+    for k in range(len(sums) - 2, -1, -1):
+        sums[k] -= factors[k] * sums[k + 1]
+    return [first, *sums, last]
+
+
+def _nodes(name, values):
+    """A copy of finite numbers (nodes,) that refuses to be written."""
+    try:
+        nodes = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        nodes = np.empty(0)
+    if nodes.ndim != 1 or not LEAST_NODES <= len(nodes) <= MOST_NODES:
+        raise InputError(
+            f"{name} must be from {LEAST_NODES} to {MOST_NODES} numbers, got {shown(values)}"
+        )
+    if not np.isfinite(nodes).all():
+        k = int(np.flatnonzero(~np.isfinite(nodes))[0])
+        raise InputError(f"{name} must be finite, got {nodes[k]} at node {k}")
+    nodes.flags.writeable = False
+    return nodes

@@ -1,0 +1,218 @@
+"""Time histories of the damped structure under a motion of its base or a force that is no sine."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Optional, Union
+
+import numpy as np
+
+from ca_damper.batch import Batch
+from ca_damper.checks import MOST_SCENES, MOST_SEED, STARTS, check_run
+from ca_damper.excitation.excitation import Excitation, excitation_of
+from ca_damper.excitation.signal import Signal
+from ca_damper.filling import Filling, check_filling
+from ca_damper.oscillator import Oscillator
+from ca_damper.report import Report
+from ca_damper.scenes.clock import MOST_STEPS_PER_CYCLE
+from ca_damper.scenes.table import SceneTable
+from taichi_dem.kit.checkpoint import Checkpoint
+from taichi_dem.kit.display import counted, in_brief, listed
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.files import write_csv
+from taichi_dem.kit.progress.progress import Listener
+from taichi_dem.kit.progress.progress_bar import reporting
+from taichi_dem.kit.validation import AUTO, FileName, instance, positive, several, shown, whole
+
+
+@dataclass(frozen=True, eq=False)
+class TimeHistory:
+    """Motions of containers under one excitation.
+
+    label: of the filling. particles, seeds: whole numbers. time_s [s], base: displacement of the
+    base [m], both (samples,). x [m], v [m/s]: of the container; force [N]: of the filling on it,
+    mean since the sample before; all (samples, particles, seeds).
+    rms: root mean square of the displacement about its mean, and peak: its largest magnitude [m],
+    both of all steps, (particles, seeds). report: what was done and what it cost.
+    """
+
+    label: str
+    oscillator: Oscillator
+    excitation: Excitation
+    particles: tuple
+    seeds: tuple
+    time_s: np.ndarray
+    base: np.ndarray
+    x: np.ndarray
+    v: np.ndarray
+    force: np.ndarray
+    rms: np.ndarray
+    peak: np.ndarray
+    report: Optional[Report] = None
+
+    def __repr__(self) -> str:
+        axes = f"particles {listed(self.particles)}, {counted(len(self.seeds), 'seed')}"
+        size = f"{counted(len(self.time_s), 'sample')} in {self.time_s[-1]:.6g} s"
+        return in_brief(self, self.label, axes, size, f"largest RMS {1e3 * self.rms.max():.4g} mm")
+
+    @property
+    def relative(self) -> np.ndarray:
+        """Displacement of the container from the base [m], (samples, particles, seeds)."""
+        return self.x - self.base[:, None, None]
+
+    @property
+    def relative_rms(self) -> np.ndarray:
+        """RMS of the samples of ``relative`` about their mean [m], (particles, seeds)."""
+        return self.relative.std(axis=0)
+
+    @property
+    def relative_peak(self) -> np.ndarray:
+        """Largest magnitude of ``relative`` [m], of the samples, (particles, seeds)."""
+        return np.abs(self.relative).max(axis=0)
+
+    @property
+    def added_damping(self) -> np.ndarray:
+        """Coefficient of a dashpot on the base that takes the filling's work [N s/m].
+
+        -int F dx / int (x' - y')^2 dt over the run, (particles, seeds); NaN where the container
+        never moves on the base. Between samples the force counts by its mean and the speed as even,
+        so that they must be close together.
+        """
+        work = -(self.force[1:] * np.diff(self.x, axis=0)).sum(axis=0)
+        stretch = np.diff(self.relative, axis=0) ** 2
+        moved = (stretch / np.diff(self.time_s)[:, None, None]).sum(axis=0)
+        return np.divide(work, moved, out=np.full_like(work, np.nan), where=moved > 0.0)
+
+    @property
+    def damping_ratio(self) -> np.ndarray:
+        """Share of critical damping by the structure's own dashpot and ``added_damping``."""
+        o = self.oscillator
+        critical = 2.0 * math.sqrt(o.stiffness * o.mass)
+        return (o.damping + self.added_damping) / critical
+
+    def write_csv(self, path: FileName) -> None:
+        """Write a row a sample: time, base, and x and force of each particle number and seed.
+
+        Raises InputError when the file cannot be written.
+        """
+        columns = {"time_s": self.time_s, "base_m": self.base}
+        for name, values in (("x_m", self.x), ("force_N", self.force)):
+            for k, number in enumerate(self.particles):
+                for j, seed in enumerate(self.seeds):
+                    columns[f"{name}_N{number}_seed{seed}"] = values[:, k, j]
+        write_csv(path, columns)
+
+
+def shake(
+    filling: Filling,
+    excitation: Union[Signal, Excitation],
+    *,
+    particles: Union[int, Sequence[int]],
+    seeds: Union[int, Sequence[int]] = 5,
+    oscillator: Optional[Oscillator] = None,
+    dt: Optional[float] = None,
+    mount: str = "spring",
+    duration: Optional[float] = None,
+    interval: float = 1e-3,
+    effects: str = "listed",
+    progress: Union[Listener, str, None] = AUTO,
+    checkpoint: Optional[Checkpoint] = None,
+    resume: Optional[FileName] = None,
+) -> TimeHistory:
+    """Shake a structure from rest and record its motion; returns a TimeHistory.
+
+    excitation: the base's motion as a Signal [m], or an Excitation; its base stands still where it
+    is None. particles: one number or several; seeds: how many, or which. oscillator: the structure,
+    the paper's if None; its base_amplitude is not used. dt: largest step [s], the filling's own if
+    None. duration [s]: that of the excitation if None. interval: between samples [s] at most; the
+    measures count all steps. The other arguments and errors are those of ``frequency_response``.
+    """
+    check_run(0, STARTS[0], progress)
+    plan = _Plan(filling, excitation, particles, seeds, oscillator, dt, duration, interval)
+    with reporting(progress, "shaking") as report_progress:
+        batch = plan.batch(mount, effects)
+        batch.start()
+        with batch.checkpointed(checkpoint, resume, {"job": plan.words(mount)}) as writer:
+            cycles = batch.run(0, 1, report_progress, record_every=plan.every)
+            writer.save()
+    return plan.history(batch, cycles)
+
+
+class _Plan:
+    """The checked arguments: one window that lasts as long as the run, in even samples."""
+
+    def __init__(self, filling, excitation, particles, seeds, oscillator, dt, duration, interval):
+        self.filling = check_filling(filling)
+        self.excitation = _of_all_scenes(excitation)
+        self.oscillator = Oscillator() if oscillator is None else oscillator
+        instance("oscillator", self.oscillator, Oscillator)
+        most = filling.capacity
+        self.particles = several("particles", particles, lambda n, x: whole(n, x, 0, most))
+        if not hasattr(seeds, "__iter__") or isinstance(seeds, (str, bytes, dict)):
+            seeds = range(1, whole("seeds", seeds, 1, 1_000_000) + 1)
+        self.seeds = several("seeds", seeds, lambda n, x: whole(n, x, 0, MOST_SEED))
+        if len(self.particles) * len(self.seeds) > MOST_SCENES:
+            raise InputError(f"particles x seeds must make at most {MOST_SCENES} scenes")
+        self.duration = self._duration(duration)
+        self._choose_step(filling.default_dt if dt is None else positive("dt", dt), interval)
+
+    def _duration(self, duration):
+        own = float(self.excitation.duration(1)[0])
+        if duration is None and math.isinf(own):
+            raise InputError("duration must be given for an excitation without an end, got None")
+        return own if duration is None else positive("duration", duration)
+
+    def _choose_step(self, dt, interval):
+        """Largest step that makes a whole number of samples, none longer than asked for."""
+        self.samples = math.ceil(self.duration / positive("interval", interval) * (1 - 1e-12))
+        self.every = math.ceil(self.duration / (self.samples * dt) * (1.0 - 1e-12))
+        self.every = max(self.every, math.ceil(40 / self.samples))
+        if self.samples * self.every > MOST_STEPS_PER_CYCLE:
+            raise InputError(
+                f"duration must be at most {MOST_STEPS_PER_CYCLE * dt:.4g} s in steps of {dt:.3g} "
+                f"s, got {self.duration:g}"
+            )
+        self.dt = self.duration / (self.samples * self.every)
+
+    def words(self, mount):
+        """The run without the filling, in words."""
+        axes = f"particles {self.particles}, seeds {self.seeds}, dt {self.dt}, every {self.every}"
+        return f"shaken for {self.duration} s on the {mount}, {axes}, {self.oscillator}"
+
+    def batch(self, mount, effects):
+        """Batch of all scenes, the last axis (seeds) running fastest."""
+        numbers, seeds = np.meshgrid(self.particles, self.seeds, indexing="ij")
+        o = self.oscillator
+        structure = (0.0, o.mass, o.stiffness, o.damping)
+        one = 1.0 / self.duration
+        table = SceneTable(numbers.ravel(), seeds.ravel(), self.dt, one, *structure)
+        options = {"excitation": self.excitation, "recorded_samples": self.samples}
+        return Batch(
+            self.filling, table, mount=mount, measured_cycles=1, effects=effects, **options
+        )
+
+    def history(self, batch, cycles):
+        """What the batch recorded."""
+        series, shape = batch.time_series(), (len(self.particles), len(self.seeds))
+        highest = np.maximum(cycles.mean_of("x_max"), -cycles.mean_of("x_min"))
+        return TimeHistory(
+            *(self.filling.label, self.oscillator, self.excitation, self.particles, self.seeds),
+            time_s=series["time_s"][:, 0],
+            base=series["y"][:, 0],
+            rms=cycles.rms.reshape(shape),
+            peak=highest.reshape(shape),
+            report=batch.report(),
+            **{name: series[name].reshape(-1, *shape) for name in ("x", "v", "force")},
+        )
+
+
+def _of_all_scenes(value: Any) -> Excitation:
+    """Excitation of one Signal or SineForce for all scenes."""
+    if value is None:
+        raise InputError("excitation must be a Signal or an Excitation, got None")
+    excitation = excitation_of(value)
+    if isinstance(excitation.base, tuple) or isinstance(excitation.force, tuple):
+        raise InputError(
+            f"excitation must be one for all scenes here, got several: {shown(excitation)}"
+        )
+    return excitation
