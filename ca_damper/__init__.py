@@ -11,6 +11,7 @@ from ca_damper.certificate import Certificate
 from ca_damper.collect_and_collide import CollectAndCollide, collect_and_collide
 from ca_damper.combined import Combined
 from ca_damper.damper_map import DamperMap, damper_map
+from ca_damper.decay import logarithmic_decrement
 from ca_damper.errors import InputError, SimulationDiverged
 from ca_damper.fixed_mass import Empty, RigidMass
 from ca_damper.goals import Goal
@@ -62,6 +63,7 @@ __all__ = [
     "film",
     "frequency_response",
     "goals",
+    "logarithmic_decrement",
     "needed_effects",
     "runtime",
     "shake",

@@ -46,7 +46,8 @@ class Batch(LoadedScenes):
 
     table.dt holds the largest step of every scene; it is shortened so that a whole number of steps
     makes a cycle of the base: ``steps_per_cycle``, (scenes,). The batch has a table of its own.
-    mount: "spring", or "base" for a container that moves like the base whatever the filling does.
+    mount: "spring", or "base" for a container that moves like the base whatever the filling does,
+    or "floor" for one that lies on it by its weight, on stiffness and damping that never pull.
     measured_cycles: most cycles that one run may measure. rtol, atol: of RK45, on the spring.
     excitation: a Signal, as the base's motion, or an Excitation; the table's sine if None. Under a
     Signal a cycle is a window: the runs count, and the sums are of, windows of 1 / frequency, and
@@ -103,7 +104,7 @@ class Batch(LoadedScenes):
         (scenes,).
         """
         coupling = self.engine.coupling
-        choice("start", start, starts_of(self.excitation))
+        choice("start", start, starts_of(self.excitation, self.mount))
         more = for_all("displacement", displacement, self.count)
         initial = self.numbers.initial(start)
         initial += np.column_stack([more, for_all("velocity", velocity, self.count)])
@@ -248,7 +249,7 @@ class Batch(LoadedScenes):
     def report(self) -> Report:
         """Figures and cost of the run, a ``report.Report``."""
         particles, dt = self.table.column("particles"), self.table.column("dt")
-        sprung = self.mount == "spring"
+        sprung = self.mount != "base"
         return Report(
             method=self.filling.label,
             mount=self.mount,

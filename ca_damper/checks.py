@@ -57,7 +57,7 @@ def for_all(name: str, value: Any, scenes: int, most: Optional[int] = None) -> n
 def checked_excitation(value: Any, mount: str) -> Excitation:
     """Excitation that a user means; InputError for a force on a container that the base moves."""
     excitation = excitation_of(value)
-    if excitation.force is not None and mount != "spring":
+    if excitation.force is not None and mount == "base":
         raise InputError(
             f"force must be None on the mount {mount!r}, where nothing but the base moves the "
             f"container, got {shown(excitation.force)}"
@@ -70,9 +70,9 @@ def checked_samples(value: Any, scenes: int) -> int:
     return whole("recorded_samples", value, 0, _MOST_NUMBERS // (4 * max(1, scenes)))
 
 
-def starts_of(excitation: Excitation) -> tuple[str, ...]:
-    """Words for the motion of the container at the beginning that an excitation allows."""
-    return STARTS if excitation == Excitation() else STARTS[:1]
+def starts_of(excitation: Excitation, mount: str) -> tuple[str, ...]:
+    """Words for the motion of the container at the beginning: steady ones are those of a spring."""
+    return STARTS if excitation == Excitation() and mount != "floor" else STARTS[:1]
 
 
 def check_finite_start(initial: np.ndarray) -> None:

@@ -2,12 +2,11 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Optional, Union
 
 import numpy as np
 
-from ca_damper.automaton import Automaton
 from ca_damper.batch import Batch
 from ca_damper.checks import MOST_CYCLES, MOST_SCENES, MOST_SEED
 from ca_damper.collect_and_collide import CollectAndCollide, collect_and_collide
@@ -16,7 +15,6 @@ from ca_damper.progress import Stages
 from ca_damper.report import Report
 from ca_damper.scenes.clock import automatic_dt
 from ca_damper.scenes.table import SceneTable
-from ca_damper.spheres import Spheres
 from taichi_dem.kit.display import in_brief, listed
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import write_csv
@@ -217,12 +215,8 @@ class _Plan:
 
 
 def clearance_of(filling: Any, particles: int) -> float:
-    """Way of settled grains, in N / columns layers, to the lid of a filling's box [m]."""
-    if isinstance(filling, Spheres):
-        return filling.height - filling.diameter * particles / filling.lattice[0]
-    if isinstance(filling, Automaton):
-        return filling.width * (filling.rows - particles / filling.columns)
-    return math.nan
+    """Way of settled grains, in N / columns layers, to the lid of a filling's box [m], or NaN."""
+    return float(filling.clearance(particles)) if hasattr(filling, "clearance") else math.nan
 
 
 def with_clearance(filling: Any, particles: int, clearance: float) -> Any:
@@ -230,18 +224,9 @@ def with_clearance(filling: Any, particles: int, clearance: float) -> Any:
 
     InputError for a filling without a box, and for an automaton whose box would end within a cell.
     """
-    if isinstance(filling, Spheres):
-        layers = particles / filling.lattice[0]
-        return replace(filling, height=filling.diameter * layers + clearance)
-    if isinstance(filling, Automaton):
-        rows = clearance / filling.width + particles / filling.columns
-        if abs(rows - round(rows)) > 1e-6:
-            raise InputError(
-                f"clearances above {particles} particles must leave whole cells of "
-                f"{filling.width:g} m, got {clearance:g}: {rows:.4g} rows"
-            )
-        return replace(filling, rows=round(rows))
-    raise InputError(
-        f"clearances must be None for a filling without a box, got {shown(clearance)} for "
-        f"{shown(filling)}"
-    )
+    if not hasattr(filling, "with_clearance"):
+        raise InputError(
+            f"clearances must be None for a filling without a box, got {shown(clearance)} for "
+            f"{shown(filling)}"
+        )
+    return filling.with_clearance(particles, clearance)

@@ -76,8 +76,9 @@ class Filling(Protocol):
     A filling may also have a property ``structure``, a Structure. Its device then has a method
     ``load(filling)`` that takes over all numbers of a filling of the same structure. Without it the
     filling itself, which must be hashable, is the structure, and other options compile anew.
-    It may have ``order``, that of the error in the step, for the report, and choose its effects by
-    itself, as ``activation.py`` says.
+    It may have ``order``, that of the error in the step, for the report, choose its effects by
+    itself, as ``activation.py`` says, and tell the ``clearance(particles)`` [m] above settled
+    particles, or make a box ``with_clearance(particles, clearance)``, for ``damper_map``.
     """
 
     @property

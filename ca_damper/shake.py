@@ -114,25 +114,30 @@ def shake(
     mount: str = "spring",
     duration: Optional[float] = None,
     interval: float = 1e-3,
+    displacement: float = 0.0,
+    velocity: float = 0.0,
     effects: str = "listed",
     progress: Union[Listener, str, None] = AUTO,
     checkpoint: Optional[Checkpoint] = None,
     resume: Optional[FileName] = None,
 ) -> TimeHistory:
-    """Shake a structure from rest and record its motion; returns a TimeHistory.
+    """Shake a structure and record its motion; returns a TimeHistory.
 
     excitation: the base's motion as a Signal [m], or an Excitation; its base stands still where it
     is None. particles: one number or several; seeds: how many, or which. oscillator: the structure,
     the paper's if None; its base_amplitude is not used. dt: largest step [s], the filling's own if
     None. duration [s]: that of the excitation if None. interval: between samples [s] at most; the
-    measures count all steps. The other arguments and errors are those of ``frequency_response``.
+    measures count all steps. displacement [m], velocity [m/s]: of the container at the beginning;
+    with an excitation that is zero the record is a free decay. The other arguments and errors are
+    those of ``frequency_response``.
     """
     check_run(0, STARTS[0], progress)
     plan = _Plan(filling, excitation, particles, seeds, oscillator, dt, duration, interval)
     with reporting(progress, "shaking") as report_progress:
         batch = plan.batch(mount, effects)
-        batch.start()
-        with batch.checkpointed(checkpoint, resume, {"job": plan.words(mount)}) as writer:
+        batch.start(displacement=displacement, velocity=velocity)
+        words = f"{plan.words(mount)}, from {displacement} m and {velocity} m/s"
+        with batch.checkpointed(checkpoint, resume, {"job": words}) as writer:
             cycles = batch.run(0, 1, report_progress, record_every=plan.every)
             writer.save()
     return plan.history(batch, cycles)

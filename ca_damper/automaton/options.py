@@ -1,6 +1,6 @@
 """Options of the automaton."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Integral
 from typing import Any, Optional
 
@@ -217,6 +217,20 @@ class Automaton:
     def step_bound(self) -> tuple[float, str]:
         """Longest step [s], and why."""
         return self.longest_dt, "a cell crossed at v_max"
+
+    def clearance(self, particles: int) -> float:
+        """Way from so many settled particles to the lid [m]."""
+        return self.width * (self.rows - particles / self.columns)
+
+    def with_clearance(self, particles: int, clearance: float) -> "Automaton":
+        """The same in a box with a clearance [m] above so many; InputError for parts of a cell."""
+        rows = clearance / self.width + particles / self.columns
+        if abs(rows - round(rows)) > 1e-6:
+            raise InputError(
+                f"clearances above {particles} particles must leave whole cells of "
+                f"{self.width:g} m, got {clearance:g}: {rows:.4g} rows"
+            )
+        return replace(self, rows=round(rows))
 
     def check(self, particles: int, dt: float) -> None:
         """InputError unless so many particles fit and the step is shorter than width / v_max."""

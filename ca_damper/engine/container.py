@@ -180,5 +180,5 @@ class DrivenContainer:
         return 1
 
 
-#: Containers by the word for their mount.
+#: Containers under a single sine of the base, by the word for their mount.
 CONTAINERS = {"spring": SprungContainer, "base": DrivenContainer}

@@ -65,7 +65,7 @@ class DamperEngine(Engine):
 
     def _container(self) -> Any:
         mount, kind = self.structure.mount, self.structure.excitation
-        if kind == ExcitationKind():
+        if kind == ExcitationKind() and mount in CONTAINERS:
             return CONTAINERS[mount](self.table, self.clock)
         return excited_container(mount, self.table, self.clock, kind)
 
@@ -93,7 +93,7 @@ class DamperEngine(Engine):
         self.table.load(table)
         gravity = gravity_along(filling)
         self.container.load(gravity, rtol, atol)
-        if self.structure.excitation != ExcitationKind():
+        if hasattr(self.container, "excite"):
             self.container.excite(excitation, table.count)
         self.coupling.load(gravity)
         self.account.load(filling.particle_mass * gravity)

@@ -3,6 +3,7 @@
 They count the steps since the start, as an excitation is a function of time.
 """
 
+from functools import partial
 from typing import Any
 
 import taichi as ti
@@ -35,11 +36,13 @@ class Load:
 class ExcitedContainer:
     """The container on its spring, its base and a force moving as an Excitation says.
 
-    elapsed: steps since the start. The other members are those of a SprungContainer.
+    elapsed: steps since the start. lifts: whether it lies on the base by its weight, and spring and
+    dashpot push but never pull; x = 0 is where it just touches a base at rest. The other members
+    are those of a SprungContainer.
     """
 
-    def __init__(self, table: SceneFields, clock: Clock, kind: ExcitationKind):
-        self.table = table
+    def __init__(self, table: SceneFields, clock: Clock, kind: ExcitationKind, lifts: bool = False):
+        self.table, self.lifts = table, lifts
         self.excited_base, self.force = BASES[kind.base](table, clock), FORCES[kind.force](table)
         self.state, self.slope = table.vector(2, ti.f64), table.vector(2, ti.f64)
         self.impulse, self.carried = table.field(ti.f64), table.field(ti.f64)
@@ -100,7 +103,11 @@ class ExcitedContainer:
     def _load(self, s, action):
         """Load over the step that begins now."""
         per_mass = 1.0 / (self.table.mass[s] + action.carried)
-        force = action.impulse / self.table.dt[s] - action.carried * self.gravity[None]
+        heavy = action.carried
+        if ti.static(self.lifts):
+            # On a spring the weight of the container itself is in x = 0.
+            heavy += self.table.mass[s]
+        force = action.impulse / self.table.dt[s] - heavy * self.gravity[None]
         return Load(
             scene=s,
             start=self._time(s),
@@ -115,6 +122,9 @@ class ExcitedContainer:
         """d(x, v)/dt for y = (x, v): the right-hand side that RK45 integrates."""
         base = self.excited_base.at(load.scene, load.start, t)
         pull = load.stiffness * (base[0] - y[0]) + load.damping * (base[1] - y[1])
+        if ti.static(self.lifts):
+            # Nothing at a distance, where a dashpot alone would already act.
+            pull = ti.select(y[0] < base[0], ti.max(0.0, pull), 0.0)
         push = self.force.at(load.scene, load.start, t) * load.per_mass
         return ti.Vector([y[1], pull + push + load.constant])
 
@@ -181,7 +191,11 @@ class ShakenContainer:
         return 1
 
 
-_EXCITED = {"spring": ExcitedContainer, "base": ShakenContainer}
+_EXCITED: dict[str, Any] = {
+    "spring": ExcitedContainer,
+    "base": ShakenContainer,
+    "floor": partial(ExcitedContainer, lifts=True),
+}
 
 
 def excited_container(mount: str, table: SceneFields, clock: Clock, kind: ExcitationKind) -> Any:

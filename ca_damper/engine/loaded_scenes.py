@@ -10,7 +10,6 @@ import numpy as np
 
 from ca_damper import measures
 from ca_damper.checks import check_record_fits, checked_excitation, checked_samples
-from ca_damper.engine.container import CONTAINERS
 from ca_damper.engine.damper_engine import DamperEngine, borrow
 from ca_damper.engine.divergence import divergence
 from ca_damper.engine.recorder import SAMPLED
@@ -24,7 +23,7 @@ from taichi_dem.kit.progress.progress import compiling
 from taichi_dem.kit.uncopied import Uncopied
 from taichi_dem.kit.validation import choice, instance, positive, whole
 
-MOUNTS = tuple(CONTAINERS)
+MOUNTS = ("spring", "base", "floor")
 
 
 class LoadedScenes(Uncopied):

@@ -116,11 +116,8 @@ class FrictionHistory:
 
         Positions move on by the velocities as they are; slip belongs to the middle of the step.
         """
-        kept, relative = (
-            self.wall_spring[i, wall],
-            self.bodies.velocity[i] - vec2(0.0, self.speed[s]),
-        )
-        lever = contact.reach - overlap
+        kept, lever = self.wall_spring[i, wall], contact.reach - overlap
+        relative = self.bodies.velocity[i] - vec2(0.0, self.speed[s])
         way = contact.since * self.rotation.slip_at_wall(i, lever, relative.dot(tangent))
         drag, spring, root = self.force(contact, overlap, push, slip, way, kept[0], kept[1])
         self.wall_spring[i, wall] = vec2(spring, root)

@@ -55,10 +55,11 @@ class Spheres:
     rebound more, faster ones less.
     restitution, friction [-], young [Pa], poisson [-]: of two spheres; with ``wall_``: of sphere
     and container, whose modulus and Poisson's ratio these are.
-    diameter [m]; with sizes the largest. particle_mass [kg]: with sizes the mean of all, and all of
-    one density. sizes: (number, diameter [m]) of each size; the box holds as many as of the
-    largest. width, height [m]: of the box inside. gravity [m/s^2]:
-    downwards, or (to the right, downwards), as for a box that lies on its side or is tilted.
+    diameter [m], particle_mass [kg]: of a sphere; with ``sizes`` the largest diameter, and the mean
+    mass of all spheres, which are of one density. sizes: (number, diameter [m]) of each size; the
+    box holds as many as there would be of the largest.
+    width, height [m]: of the box inside. gravity [m/s^2]: downwards, or (to the right, downwards),
+    as for a box that lies on its side or is tilted.
     friction_law: "viscous", which at small slip grows with it, so that heaps creep, or "history",
     with a tangential spring for each contact, which holds. rotation: whether spheres turn; the
     paper leaves it out.
@@ -187,6 +188,15 @@ class Spheres:
     def capacity(self) -> int:
         """Most spheres: those of the square packing."""
         return self.lattice[0] * self.lattice[1]
+
+    def clearance(self, particles: int) -> float:
+        """Way from so many settled spheres to the lid [m]."""
+        return self.height - self.diameter * particles / self.lattice[0]
+
+    def with_clearance(self, particles: int, clearance: float) -> "Spheres":
+        """The same in a box with a clearance [m] above so many settled spheres."""
+        layers = particles / self.lattice[0]
+        return replace(self, height=self.diameter * layers + clearance)
 
     def check(self, particles: int, dt: float) -> None:
         """Raise InputError for an invalid number of spheres or step [s].

@@ -83,7 +83,7 @@ def members_asked(path, owner):
 @pytest.mark.parametrize(
     ("owner", "contract", "optional"),
     [
-        ("filling", Filling, {"structure", "activated"}),
+        ("filling", Filling, {"structure", "activated", "clearance", "with_clearance"}),
         ("device", DeviceFilling, {"load", "first_steps", "audit"}),
     ],
 )

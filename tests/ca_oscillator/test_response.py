@@ -223,7 +223,7 @@ def test_bad_numbers_of_a_table_are_refused(column, value):
 @pytest.mark.parametrize(
     ("options", "name"),
     [
-        ({"mount": "floor"}, "mount must be one of spring, base, got 'floor'"),
+        ({"mount": "ceiling"}, "mount must be one of spring, base, floor, got 'ceiling'"),
         ({"rtol": -1.0}, "rtol"),
         ({"rtol": math.nan}, "rtol"),
         ({"atol": 0.0}, "atol"),

@@ -178,6 +178,22 @@ def test_given_places_take_the_sizes_in_their_order():
     assert diameters(rig).tolist() == [6e-3, 4e-3, 4e-3]
 
 
+def test_numbers_of_sizes_compile_nothing_and_take_turns():
+    """Two mixtures on one engine, by turns, have the bits that each has alone."""
+    options = [{"sizes": MIXED}, {"sizes": ((5, 5e-3), (20, 3e-3)), "gravity": (3.0, 4.0)}]
+    counts, alone = (70, 25), []
+    for one, count in zip(options, counts):
+        alone.append(Rig(Spheres(**one), count, **SHAKEN).run(2000).state())
+    together = [Rig(Spheres(**one), count, **SHAKEN) for one, count in zip(options, counts)]
+    assert together[0].engine is together[1].engine
+    for _ in range(4):
+        for rig in together:
+            rig.run(500)
+    for rig, expected in zip(together, alone):
+        for found, state in zip(rig.state(), expected):
+            assert np.array_equal(found, state)
+
+
 def test_a_picture_shows_the_sizes():
     from matplotlib.figure import Figure
 

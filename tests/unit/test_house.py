@@ -45,7 +45,7 @@ LAYERS = {
             *("certificate", "steady_state"),
         ),
         ("rk45", "oscillator", "record", "excitation", "bouncing"),
-        ("gravity", "collect_and_collide"),
+        ("gravity", "collect_and_collide", "decay"),
         ("checks", "scenes"),
         ("filling", "lattice"),
         ("fixed_mass", "automaton", "spheres"),
