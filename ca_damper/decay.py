@@ -19,7 +19,7 @@ def logarithmic_decrement(x: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     is 2 pi z / sqrt(1 - z^2) at every amplitude; grains make it depend on the amplitude.
     Extremes are those of parabolas through three samples. A motion that has ended, or that grains
     push to and fro within a few samples, ends the decay.
-    Raises InputError unless x is a series of finite numbers with three extremes at least.
+    Raises InputError unless x is a series of finite numbers with four extremes at least.
     """
     series = np.asarray(x, dtype=np.float64)
     if series.ndim != 1 or not np.isfinite(series).all():

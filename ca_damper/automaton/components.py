@@ -12,7 +12,7 @@ from ca_damper.automaton.event_counts import EventCounts
 from ca_damper.automaton.impulse_balance import ImpulseBalance, NoImpulseBalance
 from ca_damper.automaton.state import Cells
 from ca_damper.automaton.static_contact import NoStaticContact, StaticContact
-from ca_damper.automaton.traversal import ParticleList, Scan
+from ca_damper.automaton.traversal import traversal_of
 from ca_damper.lattice import Lattice
 from ca_damper.scenes.scene_fields import SceneFields
 
@@ -71,7 +71,7 @@ class Components:
 def assemble(options: Any, table: SceneFields) -> Components:
     """Components for a user's options; those left out are neither stored nor evaluated."""
     lattice, parameters = Lattice(table), Parameters()
-    traversal = (Scan if options.traversal == "scan" else ParticleList)(lattice, table)
+    traversal = traversal_of(options, lattice, table)
     impulse_balance = ImpulseBalance(table) if options.ledger else NoImpulseBalance()
     accounting = ACCOUNTINGS[options.accounting](table, lattice, impulse_balance)
     cells = Cells(table, lattice, traversal, accounting)

@@ -35,12 +35,8 @@ class DeviceAutomaton(LatticeDevice):
     def reset(self, s):
         """Particles at rest in their first cells, headed down."""
         self.cells.clear(s)
-        self.conflict_resolution.clear(s)
-        self.resting.clear(s)
         self.accounting.clear(s)
-        self.event_counts.clear(s)
-        self.placement.fill(s)
-        self.velocity[s] = 0.0
+        self.place_all(s)
 
     @ti.func
     def advance(self, s, step, motion):

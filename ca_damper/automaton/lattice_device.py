@@ -31,6 +31,15 @@ class LatticeDevice:
         self.placement.load(options.start)
 
     @ti.func
+    def place_all(self, s):
+        """Particles at rest in their first cells, which are clear; nothing has happened."""
+        self.conflict_resolution.clear(s)
+        self.resting.clear(s)
+        self.event_counts.clear(s)
+        self.placement.fill(s)
+        self.velocity[s] = 0.0
+
+    @ti.func
     def momentum(self, s):
         """Momentum along x [kg m/s]; held particles move as the container did last."""
         total = self.resting.count(s) * self.velocity[s]

@@ -248,7 +248,8 @@ class Automaton:
 
     def divergence(self, code: int, particles: int, dt: float) -> tuple[str, float]:
         """Meaning of the code of ``divergence_code``, and a step that avoids it [s]."""
-        return "holds a particle faster than one cell a step", 0.2 * dt
+        words = "holds a particle faster than one cell a step", "has lost a particle from its box"
+        return words[code - 1], 0.2 * dt
 
     @property
     def structure(self) -> Structure:

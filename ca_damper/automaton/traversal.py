@@ -95,3 +95,8 @@ class ParticleList:
             if kind != EMPTY and kind != WALL:
                 self.placed(s, count, cell)
                 count += 1
+
+
+def traversal_of(options: Any, lattice: Any, table: SceneFields) -> Any:
+    """The traversal that the options name."""
+    return (Scan if options.traversal == "scan" else ParticleList)(lattice, table)

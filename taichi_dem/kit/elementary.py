@@ -20,11 +20,10 @@ _C4, _C5, _C6 = -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.1359
 
 
 @ti.pyfunc
-def sine_and_cosine(angle):
-    """Sine and cosine of an angle [rad].
+def _of_rest(angle):
+    """Sine and cosine of what an angle [rad] is beyond whole quarter turns, and their number.
 
-    Within a unit in the last place of 1 up to a million turns; beyond, the angle's own rounding is
-    larger.
+    Within -pi/4 and pi/4; the number of quarter turns is 0 to 3. In Python also of arrays.
     """
     turns = (_QUARTERS_PER_RADIAN * angle + 0.5) // 1.0
     r = angle - turns * _QUARTER[0] - turns * _QUARTER[1] - turns * _QUARTER[2]
@@ -34,6 +33,17 @@ def sine_and_cosine(angle):
     half = 1.0 - 0.5 * z
     cosine = half + ((1.0 - half - 0.5 * z) + rest)
     quarter = turns - 4.0 * (turns // 4.0)
+    return sine, cosine, quarter
+
+
+@ti.pyfunc
+def sine_and_cosine(angle):
+    """Sine and cosine of an angle [rad].
+
+    Within a unit in the last place of 1 up to a million turns; beyond, the angle's own rounding is
+    larger.
+    """
+    sine, cosine, quarter = _of_rest(angle)
     if quarter == 1.0 or quarter == 3.0:
         sine, cosine = cosine, -sine
     if quarter > 1.5:
@@ -59,14 +69,7 @@ def fifth_root(value):
 
 def sines_and_cosines(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Sine and cosine of each angle [rad]: the bits of ``sine_and_cosine``, without its loop."""
-    turns = (_QUARTERS_PER_RADIAN * angles + 0.5) // 1.0
-    r = angles - turns * _QUARTER[0] - turns * _QUARTER[1] - turns * _QUARTER[2]
-    z = r * r
-    sine = r + r * z * (_S1 + z * (_S2 + z * (_S3 + z * (_S4 + z * (_S5 + z * _S6)))))
-    rest = z * z * (_C1 + z * (_C2 + z * (_C3 + z * (_C4 + z * (_C5 + z * _C6)))))
-    half = 1.0 - 0.5 * z
-    cosine = half + ((1.0 - half - 0.5 * z) + rest)
-    quarter = turns - 4.0 * (turns // 4.0)
+    sine, cosine, quarter = _of_rest(angles)
     odd, behind = (quarter == 1.0) | (quarter == 3.0), quarter > 1.5
     turned, other = np.where(odd, cosine, sine), np.where(odd, -sine, cosine)
     return np.where(behind, -turned, turned), np.where(behind, -other, other)

@@ -18,7 +18,7 @@ from ca_damper.batch import Batch
 from ca_damper.oscillator import Oscillator
 from ca_damper.plot import Box
 from ca_damper.scenes.table import SceneTable
-from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.errors import InputError, SimulationDiverged
 from tests.ca_automaton.shaken import Shaken
 
 GRAVITY, WIDTH, MASS, DT = 10.0, 6e-3, 0.2e-3, 1e-4
@@ -225,14 +225,23 @@ def test_side_walls_take_grains_along():
     assert np.all(speed <= wall)
 
 
-def test_passing_grains_meet_with_probability_one_half():
-    """Two grains of neighbouring columns, alone: 1000 passages, four standard deviations."""
-    start = ((4, 1), (5, 10))
+@pytest.mark.parametrize("columns", [(4, 5), (5, 4), (5, 6)])
+def test_passing_grains_meet_with_probability_one_half(columns):
+    """Two grains of neighbouring columns, alone: 1000 passages, four standard deviations.
+
+    Either column may be the higher one, on either side. They meet only while one is less than a
+    diameter higher than the other.
+    """
+    start = ((columns[0], 1), (columns[1], 10))
     box = Shaken(place(start=start, gravity=0.0), [2] * 1000, seed=np.arange(1000), dt=DT)
-    kick(box, (4, 1), up=1.0)
-    box.run(800)
-    share = (box.in_use(box.device.event_counts.events)[:, PAIRS] > 0).mean()
-    assert share == pytest.approx(0.5, abs=4 * 0.5 / np.sqrt(1000))
+    kick(box, start[0], up=1.0)
+    heights = box.geometry.centres(WIDTH)[[box.geometry.cell_of(*cell) for cell in start], 1]
+    rise, met = heights[1] - heights[0], []
+    for way in (rise - WIDTH, rise + WIDTH, rise + 2.0 * WIDTH):
+        box.run(round(way / DT) + (1 if met else -1) - box.done)
+        met.append((box.in_use(box.device.event_counts.events)[:, PAIRS] > 0).mean())
+    assert met[0] == 0.0
+    assert met[1] == met[2] == pytest.approx(0.5, abs=4 * 0.5 / np.sqrt(1000))
 
 
 def test_list_and_scan_agree():
@@ -316,3 +325,17 @@ def test_no_state_is_absorbing():
 def test_options_that_do_not_belong_together_are_refused(options, words):
     with pytest.raises(InputError, match=words):
         Automaton(**{"rules": "place", **options})
+
+
+def test_grains_that_leave_the_box_are_named():
+    """Pushed below the floor by others in long steps: refused in words, with a step that does."""
+    options = {"restitution": 1.0, "wall_restitution": 0.99, "friction": 4.0, "width": 12.6e-3}
+    crowd = place(columns=4, rows=14, gravity=118.0, **options)
+    table = SceneTable(49, range(4), 1.4e-3, 1.19, 3.8e-3, 0.35, 7600.0, 0.2)
+    batch = Batch(crowd, table)
+    batch.start()
+    with pytest.raises(SimulationDiverged, match=r"box; dt must be at most 0\.00028 s"):
+        batch.advance(2000)
+    finer = Batch(crowd, SceneTable(49, range(4), 2.8e-4, 1.19, 3.8e-3, 0.35, 7600.0, 0.2))
+    finer.start()
+    finer.advance(2000)

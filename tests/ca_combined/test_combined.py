@@ -124,8 +124,8 @@ def test_one_grain_responds_as_the_impact_damper():
         lasting, alone = case.lasting(speed)
         container, grain = lasting.start(alone)
         place, velocity = grain - container
-        options = {"particle_mass": case.mass, "wall_restitution": case.e, "diameter": 6e-3}
-        box = {"gravity": 0.0, "height": case.clearance + 6e-3}
+        options = {"particle_mass": case.particle_mass, "wall_restitution": case.restitution}
+        box = {"gravity": 0.0, "diameter": 6e-3, "height": case.clearance + 6e-3}
         start = [(0.03, 0.5 * (case.clearance + 6e-3) + place)]
         filling = Combined(start=start, **options, **box)
         batch = Batch(filling, SceneTable(1, 1, 1e-4, case.frequency, 0.6e-3), measured_cycles=10)

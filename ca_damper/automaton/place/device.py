@@ -17,7 +17,7 @@ from ca_damper.automaton.place.grains import Grains
 from ca_damper.automaton.place.heap import Heap
 from ca_damper.automaton.place.transport import PlaceTransport
 from ca_damper.automaton.placement import DrawnCells, NamedCells
-from ca_damper.automaton.traversal import ParticleList, Scan
+from ca_damper.automaton.traversal import traversal_of
 from ca_damper.filling import Action
 from ca_damper.lattice import HELD, UP, Lattice
 from ca_damper.random_numbers import stream
@@ -39,8 +39,7 @@ class Components:
 def assemble(options: Any, table: SceneFields) -> Components:
     """Components for a user's options."""
     lattice, parameters = Lattice(table), Parameters()
-    traversal = (Scan if options.traversal == "scan" else ParticleList)(lattice, table)
-    grains = Grains(table, lattice, traversal, parameters)
+    grains = Grains(table, lattice, traversal_of(options, lattice, table), parameters)
     return Components(
         parameters=parameters,
         lattice=lattice,
@@ -66,11 +65,7 @@ class PlaceAutomaton(LatticeDevice):
     def reset(self, s):
         """Grains at rest in their first cells."""
         self.cells.clear_all(s)
-        self.conflict_resolution.clear(s)
-        self.resting.clear(s)
-        self.event_counts.clear(s)
-        self.placement.fill(s)
-        self.velocity[s] = 0.0
+        self.place_all(s)
 
     @ti.func
     def advance(self, s, step, motion):
@@ -104,12 +99,26 @@ class PlaceAutomaton(LatticeDevice):
 
     @ti.func
     def divergence_code(self, s):
-        """1 when a grain would cross more than one cell a step, which no rule allows."""
-        fastest = 0.0
+        """1 when a grain would cross more than one cell a step, which no rule allows.
+
+        2 when one is more than a diameter outside the box: pushed beyond floor or ceiling by others
+        more often than it could turn over there.
+        """
+        fastest, farthest, width = 0.0, 0.0, self.parameters.width[None]
         for cell in range(self.lattice.cell_count()):
             across = ti.abs(self.cells.across.velocity[s, cell])
             fastest = ti.max(fastest, ti.abs(self.cells.speed[s, cell]), across)
-        return 0 if fastest * self.table.dt[s] < self.parameters.width[None] else 1
+            if self.cells.is_grain(s, cell):
+                farthest = ti.max(farthest, self.outside(s, cell))
+        result = 0 if fastest * self.table.dt[s] < width else 1
+        return 2 if farthest > width else result
+
+    @ti.func
+    def outside(self, s, cell):
+        """By how much a grain is farther out than those at floor and ceiling can be [m]."""
+        most = ti.cast(self.lattice.row_count(), ti.f64) * self.parameters.width[None]
+        height = self.cells.height(s, cell) - self.cells.offset[s]
+        return ti.max(-height, height - most)
 
     def snapshot(self, s: int) -> dict[str, np.ndarray]:
         """Positions and velocities of the grains, by cell (see ``ca_damper.filling``).

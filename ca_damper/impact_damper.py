@@ -1,0 +1,144 @@
+"""The impact damper in closed form: one grain that meets floor and ceiling in turn.
+
+Source: Masri, J. Acoust. Soc. Am. 47 (1970) 229; Bapat and Sankar, J. Sound Vib. 99 (1985) 85. No
+gravity, sudden blows, and two symmetric ones in a cycle of the base.
+
+The motion turns over in half a cycle, x(t + T/2) = -x(t), and obeys the linear equation of the
+empty container but for the impulses +J at t = 0 (ceiling) and -J at T/2 (floor).
+
+Response to the impulses: x = J q(t), free motion with q'(0+) = q'(0-) + 1 / M, q(T/2) = -q(0) and
+q'(T/2) = -q'(0-): two linear equations for q(0) and q'(0+). The grain, of mass m, leaves the
+ceiling at -u and the floor at u, so J = 2 m u. It meets the ceiling at x0 = x(0) and the floor at
+-x0, the clearance D lower: u T / 2 = D + 2 x0. With v = x'(0-), restitution asks for
+(v + J / M) + u = e (u - v), so v = u (e - 1 - 2 m / M) / (1 + e). Of the forced motion
+X sin(w t + phase) it follows that X sin(phase) = x0 - J q(0) and w X cos(phase) = v - J q'(0-);
+squares add up to X^2: a quadratic equation for u.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ca_damper.oscillator import Oscillator
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import between, plain_fields, positive
+
+#: Points of half a cycle: an odd number, for Simpson's rule.
+_POINTS = 401
+_ROUNDING = 1e-12
+
+
+@dataclass(frozen=True)
+class ImpactDamper:
+    """A grain between the floor and the ceiling of a container that is shaken by a sine.
+
+    oscillator: the container on its spring. particle_mass: of the grain [kg]. restitution: of its
+    blows, 0 to 1. clearance: its way between floor and ceiling [m]. frequency: of the base [Hz].
+    A speed u of the grain [m/s] that a method takes is one of ``speeds``.
+    Raises InputError unless mass, clearance and frequency are positive and the damping ratio of the
+    oscillator is below 1.
+    """
+
+    oscillator: Oscillator
+    particle_mass: float
+    restitution: float
+    clearance: float
+    frequency: float
+
+    def __post_init__(self) -> None:
+        plain_fields(self)
+        for name in ("particle_mass", "clearance", "frequency"):
+            positive(name, getattr(self, name))
+        between("restitution", self.restitution, 0.0, 1.0)
+        ratio = self.oscillator.damping_ratio
+        if not ratio < 1.0:
+            raise InputError(f"damping_ratio of the oscillator must be below 1, got {ratio:.6g}")
+
+    @property
+    def mass_ratio(self) -> float:
+        """Mass of the grain by that of the container."""
+        return self.particle_mass / self.oscillator.mass
+
+    @property
+    def half_cycle(self) -> float:
+        """Half a cycle of the base [s]."""
+        return 0.5 / self.frequency
+
+    @property
+    def omega(self) -> float:
+        """Of the base [rad/s]."""
+        return 2.0 * math.pi * self.frequency
+
+    @cached_property
+    def speeds(self) -> tuple[float, ...]:
+        """Speeds between the blows [m/s] of all such motions; none where there is no motion."""
+        (a, b), (c, d) = self._forced
+        size = self.oscillator.base_amplitude * abs(self.oscillator.transfer(self.frequency))
+        square = [a * a + c * c, 2.0 * (a * b + c * d), b * b + d * d - size * size]
+        return tuple(r.real for r in np.roots(square) if abs(r.imag) < _ROUNDING and r.real > 0.0)
+
+    @cached_property
+    def _after(self) -> np.ndarray:
+        """(q, q') after the blow on the ceiling, for a unit impulse."""
+        turned = self.free(self.half_cycle) + np.eye(2)
+        return np.linalg.solve(turned, [0.0, 1.0 / self.oscillator.mass])
+
+    @cached_property
+    def approach(self) -> float:
+        """Velocity of the container before the blow on the ceiling, by the grain's speed."""
+        return (self.restitution - 1.0 - 2.0 * self.mass_ratio) / (1.0 + self.restitution)
+
+    @cached_property
+    def _forced(self) -> np.ndarray:
+        """X sin(phase) and X cos(phase) of the forced motion [m]: factors of u, and constants."""
+        place, speed = self._after - [0.0, 1.0 / self.oscillator.mass]
+        a = 0.5 * self.half_cycle - 2.0 * self.particle_mass * place
+        b = (self.approach - 2.0 * self.particle_mass * speed) / self.omega
+        return np.array([[a, -0.5 * self.clearance], [b, 0.0]])
+
+    def free(self, t: float) -> np.ndarray:
+        """Matrix that takes (x, v) of the container a time t [s] on, without forces."""
+        own = self.oscillator
+        decay, square = 0.5 * own.damping / own.mass, own.stiffness / own.mass
+        turn = math.sqrt(square - decay * decay)
+        c, s = math.cos(turn * t), math.sin(turn * t) / turn
+        return math.exp(-decay * t) * np.array([[c + decay * s, s], [-square * s, c - decay * s]])
+
+    def motion(self, u: float, t: float) -> np.ndarray:
+        """(x, v) of the container [m, m/s] at 0 to half a cycle after the blow on the ceiling."""
+        sine, cosine = self._forced @ [u, 1.0]
+        c, s = math.cos(self.omega * t), math.sin(self.omega * t)
+        forced = np.array([sine * c + cosine * s, self.omega * (cosine * c - sine * s)])
+        return forced + 2.0 * self.particle_mass * u * self.free(t) @ self._after
+
+    def position(self, u: float, t: float) -> float:
+        """Position of the grain [m] then, from where the middle of the box is at x = 0."""
+        return 0.5 * u * self.half_cycle - u * t
+
+    def start(self, u: float) -> Any:
+        """(x, v) of the container and of the grain as the base passes zero upwards, (2, 2).
+
+        The phase of the forced motion is then that of the transfer function.
+        """
+        sine, cosine = self._forced @ [u, 1.0]
+        turn = np.angle(self.oscillator.transfer(self.frequency)) - math.atan2(sine, cosine)
+        since = turn / self.omega
+        t = since % self.half_cycle
+        sign = 1.0 if round((since - t) / self.half_cycle) % 2 == 0 else -1.0
+        return sign * np.array([self.motion(u, t), [self.position(u, t), -u]])
+
+    def is_possible(self, u: float) -> bool:
+        """Whether the grain flies from wall to wall without another blow."""
+        times = np.linspace(0.0, self.half_cycle, _POINTS)
+        places = [self.position(u, t) - self.motion(u, t)[0] for t in times]
+        return bool(np.abs(places).max() < 0.5 * self.clearance * (1.0 + 1e-6))
+
+    def rms(self, u: float) -> float:
+        """RMS of x over a cycle [m], by Simpson's rule."""
+        times = np.linspace(0.0, self.half_cycle, _POINTS)
+        squares = np.array([self.motion(u, t)[0] ** 2 for t in times])
+        inner = 4.0 * squares[1::2].sum() + 2.0 * squares[2:-1:2].sum()
+        return math.sqrt((inner + squares[0] + squares[-1]) / (3.0 * (_POINTS - 1)))
