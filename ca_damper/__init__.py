@@ -15,6 +15,7 @@ from ca_damper.decay import logarithmic_decrement
 from ca_damper.errors import InputError, SimulationDiverged
 from ca_damper.fixed_mass import Empty, RigidMass
 from ca_damper.goals import Goal
+from ca_damper.impact_damper import ImpactDamper
 from ca_damper.needed_effects import needed_effects
 from ca_damper.oscillator import Oscillator
 from ca_damper.record import film
@@ -22,8 +23,10 @@ from ca_damper.report import Report
 from ca_damper.response import Response, frequency_response
 from ca_damper.scenes.table import SceneTable
 from ca_damper.shake import TimeHistory, shake
+from ca_damper.shake_structure import StructureHistory, shake_structure
 from ca_damper.solve_response import solve_response
 from ca_damper.spheres import Spheres
+from ca_damper.structure import Box, ModalStructure
 from ca_damper.sweep import Sweep, sweep_up_and_down
 from taichi_dem.kit.accuracy.answer import Answer
 from taichi_dem.kit.accuracy.branches import Branch, BranchedAnswer
@@ -36,6 +39,7 @@ __all__ = [
     "Answer",
     "Automaton",
     "Batch",
+    "Box",
     "Branch",
     "BranchedAnswer",
     "Certificate",
@@ -44,7 +48,9 @@ __all__ = [
     "DamperMap",
     "Empty",
     "Goal",
+    "ImpactDamper",
     "InputError",
+    "ModalStructure",
     "Oscillator",
     "Progress",
     "ProgressBar",
@@ -54,6 +60,7 @@ __all__ = [
     "SceneTable",
     "SimulationDiverged",
     "Spheres",
+    "StructureHistory",
     "Sweep",
     "TimeHistory",
     "__version__",
@@ -67,6 +74,7 @@ __all__ = [
     "needed_effects",
     "runtime",
     "shake",
+    "shake_structure",
     "solve_response",
     "sweep_up_and_down",
 ]

@@ -24,6 +24,7 @@ from ca_damper.checks import (
 )
 from ca_damper.engine.launches import Launches
 from ca_damper.engine.loaded_scenes import LoadedScenes
+from ca_damper.engine.modal_mount import ModalMount
 from ca_damper.excitation.excitation import Excitation
 from ca_damper.filling import Filling
 from ca_damper.progress import BatchProgress
@@ -52,6 +53,8 @@ class Batch(LoadedScenes):
     excitation: a Signal, as the base's motion, or an Excitation; the table's sine if None. Under a
     Signal a cycle is a window: the runs count, and the sums are of, windows of 1 / frequency, and
     the table's base_amplitude is not used. recorded_samples: most samples that a run may record.
+    structure: a ModalMount, for boxes at places of structures given by their modes, in groups of
+    scenes; see ``shake_structure``. None for a container of its own in each scene.
     effects: "listed", those that the options of the filling ask for, or "auto": what is exactly
     without effect or estimated to be negligible is left out, and what is needed or unclear is
     computed; ``certificate`` says what and why. Fillings without a choice are as they are.
@@ -71,10 +74,11 @@ class Batch(LoadedScenes):
         effects: str = "listed",
         excitation: Any = None,
         recorded_samples: int = 0,
+        structure: Optional[ModalMount] = None,
     ):
         self.asked_effects = choice("effects", effects, EFFECTS)
         filling, self.estimates = activated(filling, table, effects)
-        many = measured_cycles, rtol, atol, excitation, recorded_samples
+        many = measured_cycles, rtol, atol, excitation, recorded_samples, structure
         super().__init__(filling, table, mount, *many)
         self.periods: Optional[Periods] = None
         self.launches, self.compile_seconds = Launches(self.count), 0.0
@@ -122,7 +126,7 @@ class Batch(LoadedScenes):
         InputError where that batch would be refused; this one then stays unchanged.
         """
         engine = self.engine
-        self.numbers = self.numbers.changed(**numbers)
+        self.numbers = self._checked(self.numbers.changed(**numbers))
         self._started = False
         engine.table.load(self.table)
         self._load_pace()
@@ -289,7 +293,8 @@ class Batch(LoadedScenes):
         if (begin + steps).max() > _MOST_STEPS:
             raise InputError(f"steps since the start must stay below {_MOST_STEPS}: run fewer")
         check_within(self.excitation, (begin + steps) * self.table.column("dt"))
-        order = dealt((1 + self.table.column("particles")) * steps, runtime.settings().threads)
+        deal = dealt if self.modal is None else self.modal.order
+        order = deal((1 + self.table.column("particles")) * steps, runtime.settings().threads)
         plan = np.stack([begin, begin + steps, begin + before_measuring, order])
         self.engine.coupling.aim(plan.astype(np.int32))
         self.launches.begin()

@@ -72,7 +72,7 @@ def checked_samples(value: Any, scenes: int) -> int:
 
 def starts_of(excitation: Excitation, mount: str) -> tuple[str, ...]:
     """Words for the motion of the container at the beginning: steady ones are those of a spring."""
-    return STARTS if excitation == Excitation() and mount != "floor" else STARTS[:1]
+    return STARTS if excitation == Excitation() and mount in ("spring", "base") else STARTS[:1]
 
 
 def check_finite_start(initial: np.ndarray) -> None:

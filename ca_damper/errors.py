@@ -10,7 +10,8 @@ class SimulationDiverged(_SimulationDiverged):
     """A scene left the range in which its numbers mean anything.
 
     scene: dict of the numbers of the scene's row. step: number of the step after which it was
-    found. time_s: when that was [s]. dt: the step used [s]. dt_allowed: a step that would do [s].
+    found. time_s: when that was [s]. dt: the step used [s]. dt_allowed: a step that would do [s],
+    also in ``advice``.
     """
 
     def __init__(
@@ -26,6 +27,7 @@ class SimulationDiverged(_SimulationDiverged):
         super().__init__(sentence)
         self.scene, self.step, self.time_s = scene, step, time_s
         self.dt, self.dt_allowed = dt, dt_allowed
+        self.advice = {"dt": dt_allowed}
 
 
 __all__ = ["InputError", "SimulationDiverged"]

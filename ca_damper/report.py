@@ -18,12 +18,12 @@ RK45_STAGES = 6
 class Report:
     """Figures and cost of a batch since it was made.
 
-    method: label of the filling. mount: "spring" or "base". effects: what the filling was asked to
-    compute. effect_activity: an ``EffectUse`` for each of them that can be counted, since the
-    start. scenes: number; particles, dt_s: fewest and most. simulated_s: longest time of a scene
-    since its start. step_bound: longest step [s] that the filling allows or advises, and why; None
-    where any does. momentum_error: momentum of the particles out of nothing, as a share of what
-    they and the container exchanged, of the worst scene.
+    method: label of the filling. mount: "spring", "base", "floor" or "structure". effects: what the
+    filling was asked to compute. effect_activity: an ``EffectUse`` for each of them that can be
+    counted, since the start. scenes: number; particles, dt_s: fewest and most. simulated_s: longest
+    time of a scene since its start. step_bound: longest step [s] that the filling allows or
+    advises, and why; None where any does. momentum_error: momentum of the particles out of nothing,
+    as a share of what they and the container exchanged, of the worst scene.
     scene_steps, particle_steps: steps of all scenes, and times their particles.
     container_evaluations: of the container's right-hand side since the start; 0 on the base.
     compile_seconds, run_seconds: cost. order: of the error in the step, None where the filling

@@ -8,21 +8,21 @@ from typing import Any, Optional, Union
 import numpy as np
 
 from ca_damper.batch import Batch
-from ca_damper.checks import MOST_SCENES, MOST_SEED, STARTS, check_run
-from ca_damper.excitation.excitation import Excitation, excitation_of
+from ca_damper.checks import MOST_SCENES, STARTS, check_run
+from ca_damper.excitation.excitation import Excitation
 from ca_damper.excitation.signal import Signal
 from ca_damper.filling import Filling, check_filling
 from ca_damper.oscillator import Oscillator
 from ca_damper.report import Report
-from ca_damper.scenes.clock import MOST_STEPS_PER_CYCLE
 from ca_damper.scenes.table import SceneTable
+from ca_damper.window import one_for_all, run_duration, run_seeds, window
 from taichi_dem.kit.checkpoint import Checkpoint
 from taichi_dem.kit.display import counted, in_brief, listed
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.progress.progress_bar import reporting
-from taichi_dem.kit.validation import AUTO, FileName, instance, positive, several, shown, whole
+from taichi_dem.kit.validation import AUTO, FileName, instance, positive, several, whole
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,36 +148,17 @@ class _Plan:
 
     def __init__(self, filling, excitation, particles, seeds, oscillator, dt, duration, interval):
         self.filling = check_filling(filling)
-        self.excitation = _of_all_scenes(excitation)
+        self.excitation = one_for_all(excitation)
         self.oscillator = Oscillator() if oscillator is None else oscillator
         instance("oscillator", self.oscillator, Oscillator)
         most = filling.capacity
         self.particles = several("particles", particles, lambda n, x: whole(n, x, 0, most))
-        if not hasattr(seeds, "__iter__") or isinstance(seeds, (str, bytes, dict)):
-            seeds = range(1, whole("seeds", seeds, 1, 1_000_000) + 1)
-        self.seeds = several("seeds", seeds, lambda n, x: whole(n, x, 0, MOST_SEED))
+        self.seeds = run_seeds(seeds)
         if len(self.particles) * len(self.seeds) > MOST_SCENES:
             raise InputError(f"particles x seeds must make at most {MOST_SCENES} scenes")
-        self.duration = self._duration(duration)
-        self._choose_step(filling.default_dt if dt is None else positive("dt", dt), interval)
-
-    def _duration(self, duration):
-        own = float(self.excitation.duration(1)[0])
-        if duration is None and math.isinf(own):
-            raise InputError("duration must be given for an excitation without an end, got None")
-        return own if duration is None else positive("duration", duration)
-
-    def _choose_step(self, dt, interval):
-        """Largest step that makes a whole number of samples, none longer than asked for."""
-        self.samples = math.ceil(self.duration / positive("interval", interval) * (1 - 1e-12))
-        self.every = math.ceil(self.duration / (self.samples * dt) * (1.0 - 1e-12))
-        self.every = max(self.every, math.ceil(40 / self.samples))
-        if self.samples * self.every > MOST_STEPS_PER_CYCLE:
-            raise InputError(
-                f"duration must be at most {MOST_STEPS_PER_CYCLE * dt:.4g} s in steps of {dt:.3g} "
-                f"s, got {self.duration:g}"
-            )
-        self.dt = self.duration / (self.samples * self.every)
+        lasting = run_duration(self.excitation, duration)
+        dt = filling.default_dt if dt is None else positive("dt", dt)
+        self.duration, self.samples, self.every, self.dt = window(lasting, dt, interval)
 
     def words(self, mount):
         """The run without the filling, in words."""
@@ -191,7 +172,7 @@ class _Plan:
         structure = (0.0, o.mass, o.stiffness, o.damping)
         one = 1.0 / self.duration
         table = SceneTable(numbers.ravel(), seeds.ravel(), self.dt, one, *structure)
-        options = {"excitation": self.excitation, "recorded_samples": self.samples}
+        options: dict[str, Any] = {"excitation": self.excitation, "recorded_samples": self.samples}
         return Batch(
             self.filling, table, mount=mount, measured_cycles=1, effects=effects, **options
         )
@@ -209,15 +190,3 @@ class _Plan:
             report=batch.report(),
             **{name: series[name].reshape(-1, *shape) for name in ("x", "v", "force")},
         )
-
-
-def _of_all_scenes(value: Any) -> Excitation:
-    """Excitation of one Signal or SineForce for all scenes."""
-    if value is None:
-        raise InputError("excitation must be a Signal or an Excitation, got None")
-    excitation = excitation_of(value)
-    if isinstance(excitation.base, tuple) or isinstance(excitation.force, tuple):
-        raise InputError(
-            f"excitation must be one for all scenes here, got several: {shown(excitation)}"
-        )
-    return excitation

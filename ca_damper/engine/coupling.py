@@ -67,12 +67,20 @@ class Coupling:
         for t in range(self.padding * self.table.scenes[None]):
             if t % self.padding == 0:
                 s = t // self.padding
-                self.step[s], self.attempts[s], self.force[s] = 0, 0, 0.0
-                self.clock.start(s)
-                self.container.start(s, initial[s, 0], initial[s, 1])
-                self.table.recoil[s] = self.container.recoil(s)
-                self.device.reset(s)
-                self.status[s] = self.device.divergence_code(s)
+                self._start_container(s, initial[s, 0], initial[s, 1])
+                self._start_filling(s)
+
+    @ti.func
+    def _start_container(self, s, x, v):
+        self.step[s], self.attempts[s], self.force[s] = 0, 0, 0.0
+        self.clock.start(s)
+        self.container.start(s, x, v)
+
+    @ti.func
+    def _start_filling(self, s):
+        self.table.recoil[s] = self.container.recoil(s)
+        self.device.reset(s)
+        self.status[s] = self.device.divergence_code(s)
 
     @ti.kernel
     def renew(self):
@@ -100,19 +108,33 @@ class Coupling:
     def _advance_scene(self, s, share):
         begin, way = self.begin[s], self.goal[s] - self.begin[s]
         target = begin + ti.cast(ti.floor(share * way), ti.i32)
-        while self.step[s] < target and self.status[s] == 0:
+        while self.step[s] < target and self._is_sound(s):
             self._advance_step(s)
+
+    @ti.func
+    def _is_sound(self, s):
+        return self.status[s] == 0
 
     @ti.func
     def _advance_step(self, s):
         """The order of a step: filling, container, clock, measures, divergence."""
-        step, now, middle = self.step[s], self.clock.circle[s], self.clock.middle(s)
         before = self.container.motion(s)
-        if ti.static(self.recorder.active):
-            y, since = self.container.base(s), step - self.begin[s]
-            self.recorder.note(s, since, before, y, self.force[s])
-        action = self.device.advance(s, step, before)
+        self._record(s, before)
+        action = self.device.advance(s, self.step[s], before)
         attempts = self.container.advance(s, action)
+        self._book(s, before, action, attempts)
+
+    @ti.func
+    def _record(self, s, before):
+        """Take a sample at the beginning of a step if one is due."""
+        if ti.static(self.recorder.active):
+            y, since = self.container.base(s), self.step[s] - self.begin[s]
+            self.recorder.note(s, since, before, y, self.force[s])
+
+    @ti.func
+    def _book(self, s, before, action, attempts):
+        """Enter a step that filling and container have taken: clock, measures, divergence."""
+        step, now, middle = self.step[s], self.clock.circle[s], self.clock.middle(s)
         full = self.clock.tick(s)
         after = self.container.motion(s)
         self.force[s] = self._force(s, action, after.v - before.v)

@@ -10,6 +10,9 @@ from ca_damper.engine.account import MomentumAccount
 from ca_damper.engine.container import CONTAINERS
 from ca_damper.engine.coupling import Coupling
 from ca_damper.engine.excited_container import excited_container
+from ca_damper.engine.group_coupling import GroupCoupling
+from ca_damper.engine.modal_container import ModalContainer
+from ca_damper.engine.modal_mount import ModalKind
 from ca_damper.engine.recorder import NoRecorder, Recorder
 from ca_damper.excitation.excitation import Excitation, ExcitationKind
 from ca_damper.filling import LEAST_PLACES, check_device, check_places, structure_of
@@ -29,12 +32,12 @@ _SINE = Excitation()
 class EngineStructure:
     """Compiled structure of a batch: key of its filling's structure, mount, names of sizes.
 
-    excitation: kind of it. filling: one of that structure, which declares the fields. A batch with
-    a size called "samples" has a recorder.
+    mount: its word, or a ModalKind. excitation: kind of it. filling: one of that structure, which
+    declares the fields. A batch with a size called "samples" has a recorder.
     """
 
     key: Hashable
-    mount: str
+    mount: Hashable
     excitation: ExcitationKind
     sizes: tuple[str, ...]
     filling: Any = field(compare=False)
@@ -60,11 +63,15 @@ class DamperEngine(Engine):
         self.account = MomentumAccount(self.table)
         self.recorder = Recorder(self.table) if "samples" in sizes else NoRecorder()
         parts = self.container, self.device, self.account, self.recorder
-        self.coupling = Coupling(self.table, self.clock, *parts)
+        coupling = GroupCoupling if isinstance(self.structure.mount, ModalKind) else Coupling
+        self.coupling = coupling(self.table, self.clock, *parts)
         self.is_compiled = False
 
     def _container(self) -> Any:
-        mount, kind = self.structure.mount, self.structure.excitation
+        mount: Any = self.structure.mount
+        kind = self.structure.excitation
+        if isinstance(mount, ModalKind):
+            return ModalContainer(self.table, self.clock, kind, mount.modes)
         if kind == ExcitationKind() and mount in CONTAINERS:
             return CONTAINERS[mount](self.table, self.clock)
         return excited_container(mount, self.table, self.clock, kind)
@@ -105,11 +112,16 @@ _POOL = EnginePool(DamperEngine, _LEAST)
 
 
 def borrow(
-    filling: Any, mount: str, kind: ExcitationKind, counts: tuple[int, int], more: dict[str, int]
+    filling: Any,
+    mount: Hashable,
+    kind: ExcitationKind,
+    counts: tuple[int, int],
+    more: dict[str, int],
 ) -> Loan:
     """Borrow an engine in which so many scenes of a filling find room; InputError if none can.
 
-    counts: scenes and measured cycles. more: sizes by name beside those of the filling.
+    mount: its word, or a ModalKind. counts: scenes and measured cycles. more: sizes by name beside
+    those of the filling.
     """
     structure = structure_of(filling)
     check_places(counts[0], max((1, *tuple(structure.sizes.values())[:1])))

@@ -9,9 +9,14 @@ from typing import Any, Optional
 import numpy as np
 
 from ca_damper import measures
-from ca_damper.checks import check_record_fits, checked_excitation, checked_samples
+from ca_damper.checks import (
+    check_record_fits,
+    checked_excitation,
+    checked_samples,
+)
 from ca_damper.engine.damper_engine import DamperEngine, borrow
 from ca_damper.engine.divergence import divergence
+from ca_damper.engine.modal_mount import ModalMount, checked_mount
 from ca_damper.engine.recorder import SAMPLED
 from ca_damper.filling import Filling, check_filling, structure_of
 from ca_damper.scenes.scene_memory import SceneMemory
@@ -21,9 +26,7 @@ from taichi_dem.kit import runtime
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import compiling
 from taichi_dem.kit.uncopied import Uncopied
-from taichi_dem.kit.validation import choice, instance, positive, whole
-
-MOUNTS = ("spring", "base", "floor")
+from taichi_dem.kit.validation import instance, positive, whole
 
 
 class LoadedScenes(Uncopied):
@@ -43,32 +46,47 @@ class LoadedScenes(Uncopied):
         atol: float,
         excitation: Any = None,
         recorded_samples: int = 0,
+        structure: Optional[ModalMount] = None,
     ):
         runtime.session()
         self.filling = check_filling(filling)
         self.count = instance("table", table, SceneTable).count
-        self.mount = choice("mount", mount, MOUNTS)
+        self.mount, self.modal = checked_mount(mount, structure)
         self.measured_cycles = whole("measured_cycles", measured_cycles, 0, 100_000)
         check_record_fits(self.count, self.measured_cycles)
         rtol = positive("rtol", rtol, zero_allowed=True)
         atol = positive("atol", atol)
-        self.numbers = SceneNumbers(self.filling, table)
+        self.numbers = self._checked(SceneNumbers(self.filling, table, self._has_box))
         self.excitation = checked_excitation(excitation, mount)
         self.recorded_samples = checked_samples(recorded_samples, self.count)
         self._more_sizes = self.excitation.sizes(self.count)
         if self.recorded_samples:
             self._more_sizes["samples"] = self.recorded_samples
         counts = self.count, self.measured_cycles
-        self.loan = borrow(self.filling, mount, self.excitation.kind, counts, self._more_sizes)
+        kind = self.mount if self.modal is None else self.modal.kind
+        self.loan = borrow(self.filling, kind, self.excitation.kind, counts, self._more_sizes)
         engine = self.engine
         self._tell_compiling("set-up", 0.0)
         engine.clear()
         engine.load(self.filling, self.table, rtol, atol, self.excitation)
+        if self.modal is not None:
+            engine.container.hang(self.modal)
         self._load_pace()
         self.time_origin = np.zeros(self.count)
         self._started = False
         # Steps of the last run if it was recorded, those between samples, and number of samples.
         self._recording: Optional[tuple[int, int, int]] = None
+
+    @property
+    def _has_box(self) -> Optional[np.ndarray]:
+        """Scenes with a box, (scenes,); None for all."""
+        return None if self.modal is None else self.modal.has_box(self.count)
+
+    def _checked(self, numbers: SceneNumbers) -> SceneNumbers:
+        """The numbers; InputError where they do not fit the structure."""
+        if self.modal is not None:
+            self.modal.check(numbers.table)
+        return numbers
 
     @property
     def table(self) -> SceneTable:

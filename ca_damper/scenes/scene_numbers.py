@@ -1,7 +1,7 @@
 """Numbers of the scenes of a batch, checked against its filling, with steps that fit the cycle."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Optional
 
 import numpy as np
 
@@ -17,12 +17,14 @@ class SceneNumbers:
     """A table of its own, whose steps are shortened so that a whole number of them makes a cycle.
 
     largest_dt: the steps asked for [s]. steps_per_cycle: of each scene. Both (scenes,).
-    oscillators: what each scene hangs on. Plain NumPy. Raises InputError for a scene that the
+    oscillators: what each scene hangs on. has_box: scenes whose number of particles the filling
+    checks, None for all. Plain NumPy. Raises InputError for a scene that the
     filling refuses or a step out of range.
     """
 
-    def __init__(self, filling: Any, table: SceneTable):
+    def __init__(self, filling: Any, table: SceneTable, has_box: Optional[np.ndarray] = None):
         self.filling, self.table = filling, table.copy()
+        self.has_box = has_box
         structure = zip(*map(self.table.column, _STRUCTURE))
         self.oscillators = [Oscillator(*row) for row in structure]
         self.largest_dt = self.table.column("dt")
@@ -32,14 +34,16 @@ class SceneNumbers:
         """The same with other numbers, as ``SceneTable.change``."""
         table = self.table.copy()
         table.change(**{"dt": self.largest_dt, **numbers})
-        return SceneNumbers(self.filling, table)
+        return SceneNumbers(self.filling, table, self.has_box)
 
     def drive(self, frequency: np.ndarray) -> None:
         """Take other frequencies [Hz], (scenes,), and fit the steps to the cycles."""
         asked = zip(frequency, self.largest_dt)
         steps = np.array([steps_per_cycle(float(f), float(dt)) for f, dt in asked], np.int32)
         dt = 1.0 / (frequency * steps)
-        for particles, step in sorted(set(zip(self.table.column("particles").tolist(), dt))):
+        checked = slice(None) if self.has_box is None else self.has_box
+        particles_of = self.table.column("particles")[checked].tolist()
+        for particles, step in sorted(set(zip(particles_of, dt[checked]))):
             self.filling.check(particles, float(step))
         self.table.drive(frequency, dt)
         self.steps_per_cycle = steps

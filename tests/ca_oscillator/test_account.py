@@ -1,12 +1,10 @@
 """What the report says of momentum and of the step: nothing comes from nowhere, or it is said."""
 
-import numpy as np
 import pytest
 
 from ca_damper import Automaton, Batch, Empty, RigidMass, SceneTable, Spheres
-from ca_damper.automaton.impulse_balance import QUANTUM
+from tests.rounding import momentum_rounding
 
-EPS = np.finfo(float).eps
 PARTICLES = (1, 40)
 
 
@@ -17,13 +15,7 @@ def reported(filling, mount):
     batch = Batch(filling, table, mount=mount)
     batch.start()
     batch.run(3, 0)
-    exchanged = batch.engine.table.in_use(batch.engine.account.exchanged)
-    steps = batch.engine.table.in_use(batch.engine.coupling.step)
-    mass = table.column("particles") * filling.particle_mass
-    # The automaton rounds a particle's blow and its entries to half a quantum, at most three times
-    # a step; sums of n terms round by n eps of their magnitude, at most some m/s times the mass.
-    rounding = mass * 1.5 * QUANTUM * steps + 4.0 * EPS * steps * (exchanged + 10.0 * mass)
-    return batch.report(), float((rounding / np.maximum(exchanged, 1e-300)).max())
+    return batch.report(), momentum_rounding(batch)
 
 
 @pytest.mark.parametrize("mount", ["spring", "base"])

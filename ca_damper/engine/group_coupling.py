@@ -1,0 +1,70 @@
+"""The step of a group of scenes whose boxes are at places of one structure; one group a thread."""
+
+from typing import Any
+
+import taichi as ti
+
+from ca_damper.engine.coupling import _F64, Coupling
+from ca_damper.filling import Action, Motion
+from ca_damper.scenes.scene_fields import SceneFields
+
+
+@ti.data_oriented
+class GroupCoupling(Coupling):
+    """Fillings of a group, in order, then their structure; as ``Coupling`` for one container.
+
+    container: a ModalContainer. order[g]: first scene of the g-th group. before: motion of each
+    place at the beginning of a step.
+    """
+
+    def __init__(self, table: SceneFields, *parts: Any):
+        super().__init__(table, *parts)
+        self.before = table.vector(3, ti.f64)
+
+    @ti.kernel
+    def start(self, initial: _F64):
+        """Begin at step 0, places at initial[s] = (x, v) of their scenes."""
+        for t in range(self.padding * self.table.scenes[None]):
+            if t % self.padding == 0:
+                first = t // self.padding
+                if first == self.container.first(first):
+                    for s in range(first, first + self.container.group[None]):
+                        self._start_container(s, initial[s, 0], initial[s, 1])
+                    self.container.complete_start(first)
+                    for s in range(first, first + self.container.group[None]):
+                        self._start_filling(s)
+
+    @ti.kernel
+    def advance(self, share: ti.f64):
+        """Step every group to a share of the steps from its begin to its goal."""
+        for t in range(self.padding * (self.table.scenes[None] // self.container.group[None])):
+            if t % self.padding == 0:
+                self._advance_scene(self.order[t // self.padding], share)
+
+    @ti.func
+    def _is_sound(self, s):
+        sound = True
+        for other in range(s, s + self.container.group[None]):
+            if self.status[other] != 0:
+                sound = False
+        return sound
+
+    @ti.func
+    def _advance_step(self, s):
+        """A step of the group that begins with scene s."""
+        end = s + self.container.group[None]
+        for each in range(s, end):
+            motion = self.container.motion(each)
+            self.before[each] = ti.Vector([motion.x, motion.v, motion.a])
+            action = Action(0.0, 0.0)
+            self._record(each, motion)
+            if self.container.has_box(each):
+                action = self.device.advance(each, self.step[each], motion)
+            self.container.set_action(each, action)
+        attempts = self.container.advance(s)
+        for each in range(s, end):
+            before, ours = self.before[each], 0
+            if each == s:
+                ours = attempts
+            action = Action(self.container.impulse[each], self.container.carried[each])
+            self._book(each, Motion(before[0], before[1], before[2]), action, ours)

@@ -1,0 +1,257 @@
+"""Boxes at places of a structure given by its modes; interface as that of ``container.py``.
+
+The modes of a group belong to its first scene, and RK45 takes them over a step at once: between
+``set_action`` of every scene and the motion after ``advance``.
+"""
+
+import taichi as ti
+
+from ca_damper import rk45
+from ca_damper.engine.container import MOST_ATTEMPTS
+from ca_damper.engine.modal_mount import ModalMount
+from ca_damper.engine.signals import BASES, FORCES
+from ca_damper.excitation.excitation import Excitation, ExcitationKind
+from ca_damper.filling import Motion
+from ca_damper.scenes.clock import Clock
+from ca_damper.scenes.scene_fields import SceneFields
+
+_F64 = ti.types.ndarray(dtype=ti.f64, ndim=2)
+
+
+@ti.data_oriented
+class ModalContainer:
+    """Boxes of all groups, and their modes in metres as ``ModalMount`` counts them.
+
+    Of the batch: group, boxes: scenes of a group, and those of them with a box; mass [kg],
+    stiffness [N/m], damping [N s/m] of each mode, share: of the base's motion, pushed: by the
+    force of the excitation. Of a scene: shape at its place; lift: what motion of the place adds to
+    the modes; residual; impulse [N s] and carried [kg] in the present step; seen: motion of the
+    place. Of a group, at its first scene: state, slope: modal coordinates and speeds, and their
+    change; inverse of the modal masses [1/kg] with all that is carried; constant [N]: forces of
+    the fillings on the modes, lag [kg]: by the acceleration of the base; elapsed: steps since the
+    start; changed: whether slope and inverse are out of date; scratch for forces on the modes
+    (pull), their accelerations (gain) and motion (tried).
+    """
+
+    def __init__(self, table: SceneFields, clock: Clock, kind: ExcitationKind, modes: int):
+        self.table, self.modes = table, modes
+        self.excited_base, self.force = BASES[kind.base](table, clock), FORCES[kind.force](table)
+        for name in ("mass", "stiffness", "damping", "share", "pushed"):
+            setattr(self, name, ti.field(ti.f64, shape=modes))
+        self.group, self.boxes = ti.field(ti.i32, shape=()), ti.field(ti.i32, shape=())
+        for name in ("shape", "lift", "constant", "lag", "pull", "gain"):
+            setattr(self, name, table.field(ti.f64, modes))
+        self.inverse, self.tried = table.field(ti.f64, modes, modes), table.field(ti.f64, 2 * modes)
+        self.state, self.slope = table.vector(2 * modes, ti.f64), table.vector(2 * modes, ti.f64)
+        self.residual, self.seen = table.field(ti.f64), table.vector(3, ti.f64)
+        self.impulse, self.carried = table.field(ti.f64), table.field(ti.f64)
+        self.elapsed, self.changed = table.field(ti.i32), table.field(ti.i32)
+        self.gravity = ti.field(ti.f64, shape=())
+        self.tolerance = ti.field(ti.f64, shape=2)
+
+    @ti.kernel
+    def load(self, gravity: ti.f64, rtol: ti.f64, atol: ti.f64):
+        """Take over the numbers of a batch."""
+        self.gravity[None] = gravity
+        self.tolerance[0], self.tolerance[1] = rtol, atol
+
+    def excite(self, excitation: Excitation, scenes: int) -> None:
+        """Take over the excitation of a batch."""
+        self.excited_base.load(excitation, scenes)
+        self.force.load(excitation, scenes)
+
+    def hang(self, mount: ModalMount) -> None:
+        """Take over the structure of a batch and the places of its boxes."""
+        self._hang_modes(mount.of_modes(), mount.of_force()[None], len(mount.places))
+        self._hang_scenes(mount.of_scenes())
+
+    @ti.kernel
+    def _hang_modes(self, rows: _F64, force: _F64, boxes: ti.i32):
+        for _ in range(1):
+            self.boxes[None] = boxes
+            for k in range(rows.shape[1]):
+                self.mass[k], self.stiffness[k] = rows[0, k], rows[1, k]
+                self.damping[k], self.share[k] = rows[2, k], rows[3, k]
+                self.pushed[k] = force[0, k]
+
+    @ti.kernel
+    def _hang_scenes(self, rows: _F64):
+        for _ in range(1):
+            self.group[None] = rows.shape[0]
+        for s in range(self.table.scenes[None]):
+            row = s % rows.shape[0]
+            for k in range(self.modes):
+                self.shape[s, k], self.lift[s, k] = rows[row, k], rows[row, self.modes + k]
+            self.residual[s] = rows[row, 2 * self.modes]
+
+    @ti.func
+    def first(self, s):
+        """First scene of the group of scene s."""
+        return s - s % self.group[None]
+
+    @ti.func
+    def has_box(self, s):
+        """Whether there is a box at the place of scene s, and not the place alone."""
+        return s % self.group[None] < self.boxes[None]
+
+    @ti.func
+    def start(self, s, x, v):
+        """Add the motion of a place to the modes; in order, and then ``settle``."""
+        first = self.first(s)
+        if s == first:
+            self.state[first], self.elapsed[first] = ti.Vector.zero(ti.f64, 2 * self.modes), 0
+        for k in ti.static(range(self.modes)):
+            self.state[first][k] = self.state[first][k] + self.lift[s, k] * x
+            speed = self.state[first][self.modes + k] + self.lift[s, k] * v
+            self.state[first][self.modes + k] = speed
+        self.impulse[s], self.carried[s] = 0.0, 0.0
+
+    @ti.func
+    def complete_start(self, first):
+        """Complete the start of a group."""
+        self._renew_load(first)
+        self._renew_slope(first)
+        self._see(first, 0.0)
+
+    @ti.func
+    def recoil(self, s):
+        """Of all modes together, with nothing carried."""
+        speed = 0.0
+        for k in range(self.modes):
+            speed += self.shape[s, k] * self.shape[s, k] / self.mass[k]
+        return speed
+
+    @ti.func
+    def base(self, s):
+        """Displacement of the base at the beginning of the step [m]."""
+        return self.excited_base.at(s, self._time(self.first(s)), 0.0)[0]
+
+    @ti.func
+    def motion(self, s):
+        """Of the place: displacement, velocity, and acceleration without impacts."""
+        return Motion(self.seen[s][0], self.seen[s][1], self.seen[s][2])
+
+    @ti.func
+    def renew(self, s):
+        """Note that the base has changed its motion."""
+        if s == self.first(s):
+            self.changed[s] = 1
+
+    @ti.func
+    def set_action(self, s, action):
+        """Take over the action of the filling of a scene on its place over the step."""
+        if action.impulse != self.impulse[s] or action.carried != self.carried[s]:
+            self.impulse[s], self.carried[s] = action.impulse, action.carried
+            self.changed[self.first(s)] = 1
+
+    @ti.func
+    def advance(self, first):
+        """Take the modes of a group over the step, and see where its places come to."""
+        if self.changed[first] != 0:
+            self._renew_load(first)
+            self._renew_slope(first)
+        dt = self.table.dt[first]
+        y, change, attempts = rk45.integrate(
+            *(self._change, first, 0.0, dt, self.state[first], self.slope[first], dt),
+            *(self.tolerance[0], self.tolerance[1], MOST_ATTEMPTS),
+        )
+        self.state[first], self.slope[first] = y, change
+        self._see(first, dt)
+        self.elapsed[first] = self.elapsed[first] + 1
+        return attempts
+
+    @ti.func
+    def _time(self, first):
+        return self.elapsed[first] * self.table.dt[first]
+
+    @ti.func
+    def _change(self, first, t, y):
+        """d(q, q')/dt of a group's modes for y = (q, q'): the right-hand side of RK45."""
+        # By fields and rolled loops: unrolled, eight modes take a minute to compile.
+        for k in ti.static(range(2 * self.modes)):
+            self.tried[first, k] = y[k]
+        start = self._time(first)
+        base = self.excited_base.at(first, start, t)
+        push = self.force.at(first, start, t)
+        for k in range(self.modes):
+            spring = self.stiffness[k] * (self.share[k] * base[0] - self.tried[first, k])
+            speed = self.share[k] * base[1] - self.tried[first, self.modes + k]
+            by_filling = self.constant[first, k] - base[2] * self.lag[first, k]
+            by_structure = spring + self.damping[k] * speed
+            self.pull[first, k] = by_structure + self.pushed[k] * push + by_filling
+        self._set_gain(first)
+        change = y
+        for k in ti.static(range(self.modes)):
+            change[k], change[self.modes + k] = y[self.modes + k], self.gain[first, k]
+        return change
+
+    @ti.func
+    def _set_gain(self, first):
+        """Accelerations of the modes by the forces ``pull``."""
+        for i in range(self.modes):
+            gain = 0.0
+            for j in range(self.modes):
+                gain += self.inverse[first, i, j] * self.pull[first, j]
+            self.gain[first, i] = gain
+
+    @ti.func
+    def _renew_slope(self, first):
+        self.slope[first] = self._change(first, 0.0, self.state[first])
+
+    @ti.func
+    def _renew_load(self, first):
+        """Forces on the modes, and the inverse of m + sum carried shape shape^T.
+
+        By one box after the other, with g = inverse shape: inverse - c g g^T / (1 + c shape.g)
+        (Sherman and Morrison, Ann. Math. Stat. 21 (1950) 124).
+        """
+        for i in range(self.modes):
+            for j in range(self.modes):
+                self.inverse[first, i, j] = 0.0
+            self.inverse[first, i, i] = 1.0 / self.mass[i]
+            self.constant[first, i], self.lag[first, i] = 0.0, 0.0
+        for s in range(first, first + self.boxes[None]):
+            c, dt = self.carried[s], self.table.dt[first]
+            force = self.impulse[s] / dt - c * self.gravity[None]
+            for k in range(self.modes):
+                shape = self.shape[s, k]
+                self.constant[first, k] = self.constant[first, k] + force * shape
+                self.lag[first, k] = self.lag[first, k] + c * self.residual[s] * shape
+            if c > 0.0:
+                self._carry(first, s, c)
+        self.changed[first] = 0
+
+    @ti.func
+    def _carry(self, first, s, c):
+        """Add a mass at the place of a scene to the modal masses."""
+        for k in range(self.modes):
+            self.pull[first, k] = self.shape[s, k]
+        self._set_gain(first)
+        more = 1.0
+        for k in range(self.modes):
+            more += c * self.shape[s, k] * self.gain[first, k]
+        for i in range(self.modes):
+            for j in range(self.modes):
+                less = c / more * self.gain[first, i] * self.gain[first, j]
+                self.inverse[first, i, j] = self.inverse[first, i, j] - less
+
+    @ti.func
+    def _see(self, first, t):
+        """Motion of all places at t in the step; its impacts are left out of the acceleration."""
+        base = self.excited_base.at(first, self._time(first), t)
+        for k in range(self.modes):
+            struck = 0.0
+            for s in range(first, first + self.boxes[None]):
+                struck += self.impulse[s] / self.table.dt[first] * self.shape[s, k]
+            self.pull[first, k] = struck
+        self._set_gain(first)
+        for k in ti.static(range(self.modes)):
+            self.gain[first, k] = self.slope[first][self.modes + k] - self.gain[first, k]
+            self.tried[first, k] = self.state[first][k]
+            self.tried[first, self.modes + k] = self.state[first][self.modes + k]
+        for s in range(first, first + self.group[None]):
+            seen = self.residual[s] * base
+            for k in range(self.modes):
+                x, v = self.tried[first, k], self.tried[first, self.modes + k]
+                seen += self.shape[s, k] * ti.Vector([x, v, self.gain[first, k]])
+            self.seen[s] = seen

@@ -1,0 +1,252 @@
+"""Time histories of a structure of several modes with boxes of particles at some of its places."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Optional, Union
+
+import numpy as np
+
+from ca_damper.batch import Batch
+from ca_damper.checks import MOST_SCENES, MOST_SEED, STARTS, check_run
+from ca_damper.engine.modal_mount import ModalMount
+from ca_damper.excitation.excitation import Excitation
+from ca_damper.excitation.signal import Signal
+from ca_damper.filling import Filling, check_filling
+from ca_damper.report import Report
+from ca_damper.scenes.clock import LEAST_STEPS_PER_CYCLE, automatic_dt
+from ca_damper.scenes.table import SceneTable
+from ca_damper.structure import Box, ModalStructure
+from ca_damper.window import one_for_all, run_duration, run_seeds, window
+from taichi_dem.kit.checkpoint import Checkpoint, identity_of
+from taichi_dem.kit.display import counted, in_brief
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.files import write_csv
+from taichi_dem.kit.progress.progress import Listener
+from taichi_dem.kit.progress.progress_bar import reporting
+from taichi_dem.kit.validation import AUTO, FileName, instance, positive, shown, whole
+
+# Between the seeds of two boxes: larger than the seeds that users count, and prime.
+_BETWEEN_BOXES = 15_485_863
+# Share of a motion at the start that may lie outside the modes.
+_OUTSIDE_MODES = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class StructureHistory:
+    """Motions of a structure with boxes under one excitation.
+
+    label: of the filling. boxes: tuple of Box. seeds: whole numbers. time_s [s], base: displacement
+    of the base [m], both (samples,). x [m], v [m/s]: of all places, (samples, places, seeds).
+    force [N]: of the filling on each box, mean since the sample before, (samples, boxes, seeds).
+    rms: root mean square of the displacement about its mean, and peak: its largest magnitude [m],
+    both of all steps, (places, seeds). report: what was done and what it cost; a place without a
+    box counts there as a scene without particles.
+    """
+
+    label: str
+    structure: ModalStructure
+    boxes: tuple
+    excitation: Excitation
+    seeds: tuple
+    time_s: np.ndarray
+    base: np.ndarray
+    x: np.ndarray
+    v: np.ndarray
+    force: np.ndarray
+    rms: np.ndarray
+    peak: np.ndarray
+    report: Optional[Report] = None
+
+    def __repr__(self) -> str:
+        number = len(self.boxes)
+        axes = f"{number} box{'es' * (number > 1)}, {counted(len(self.seeds), 'seed')}"
+        size = f"{counted(len(self.time_s), 'sample')} in {self.time_s[-1]:.6g} s"
+        return in_brief(self, self.label, axes, size, f"largest RMS {1e3 * self.rms.max():.4g} mm")
+
+    @property
+    def relative(self) -> np.ndarray:
+        """Displacement of the places from the base [m], (samples, places, seeds)."""
+        return self.x - self.base[:, None, None]
+
+    @property
+    def modal(self) -> np.ndarray:
+        """Modal coordinates of the motion from the base [kg^1/2 m], (samples, modes, seeds).
+
+        They are p - G y of ``structure``, and ``relative`` is the sum of shapes times these.
+        """
+        return np.moveaxis(self.structure.modal(np.moveaxis(self.relative, 1, -1)), -1, 1)
+
+    def write_csv(self, path: FileName) -> None:
+        """Write a row a sample: time, base, x of each place and force of each box, for each seed.
+
+        Raises InputError when the file cannot be written.
+        """
+        columns = {"time_s": self.time_s, "base_m": self.base}
+        for name, values in (("x_m_place", self.x), ("force_N_box", self.force)):
+            for i in range(values.shape[1]):
+                for j, seed in enumerate(self.seeds):
+                    columns[f"{name}{i}_seed{seed}"] = values[:, i, j]
+        write_csv(path, columns)
+
+
+def shake_structure(
+    filling: Filling,
+    structure: ModalStructure,
+    boxes: Union[Box, Sequence[Box]],
+    excitation: Union[Signal, Excitation],
+    *,
+    seeds: Union[int, Sequence[int]] = 5,
+    dt: Optional[float] = None,
+    duration: Optional[float] = None,
+    interval: float = 1e-3,
+    force_place: Optional[int] = None,
+    displacement: Any = 0.0,
+    velocity: Any = 0.0,
+    effects: str = "listed",
+    progress: Union[Listener, str, None] = AUTO,
+    checkpoint: Optional[Checkpoint] = None,
+    resume: Optional[FileName] = None,
+) -> StructureHistory:
+    """Shake a structure with boxes and record its motion; returns a StructureHistory.
+
+    boxes: a Box or several; several may share a place. excitation: the base's motion as a Signal
+    [m], or an Excitation, whose force acts at force_place. dt: largest step [s]; the filling's own
+    if None, or a fortieth of a cycle of the highest mode where that is shorter. displacement [m],
+    velocity [m/s]: of the places at the beginning, one number or (places,), and a sum of the modes.
+    The other arguments are those of ``shake``.
+    Raises InputError, also for a step that is too long for the highest mode; SimulationDiverged.
+    """
+    check_run(0, STARTS[0], progress)
+    plan = _Plan(filling, structure, boxes, one_for_all(excitation), seeds, force_place)
+    plan.choose_steps(dt, duration, interval)
+    start = plan.start(displacement=displacement, velocity=velocity)
+    with reporting(progress, "shaking") as report_progress:
+        batch = plan.batch(effects)
+        batch.start(**start)
+        words = f"{plan.words()}, from {identity_of(start)}"
+        with batch.checkpointed(checkpoint, resume, {"job": words}) as writer:
+            cycles = batch.run(0, 1, report_progress, record_every=plan.window.every)
+            writer.save()
+    return plan.history(batch, cycles)
+
+
+class _Plan:
+    """The checked arguments: a group of scenes a seed, over one window."""
+
+    def __init__(self, filling, structure, boxes, excitation, seeds, force_place):
+        self.filling, self.excitation = check_filling(filling), excitation
+        self.boxes = _checked_boxes(boxes)
+        if (excitation.force is None) != (force_place is None):
+            wanted = "None without" if excitation.force is None else "a place for"
+            raise InputError(
+                f"force_place must be {wanted} a force in the excitation, got {shown(force_place)}"
+            )
+        self.mount = ModalMount(structure, [box.place for box in self.boxes], force_place)
+        self.structure, self.seeds = structure, run_seeds(seeds)
+        for box in self.boxes:
+            whole("particles", box.particles, 0, self.filling.capacity)
+        if self.mount.group * len(self.seeds) > MOST_SCENES:
+            raise InputError(f"(boxes + empty places) x seeds must be at most {MOST_SCENES}")
+
+    def choose_steps(self, dt, duration, interval):
+        """Set the window of the run."""
+        highest = float(self.structure.frequencies.max())
+        most = automatic_dt(self.filling.default_dt, highest)
+        if dt is not None:
+            most = positive("dt", dt)
+            longest = 1.0 / (LEAST_STEPS_PER_CYCLE * highest)
+            if most > longest * (1.0 + 1e-12):
+                raise InputError(
+                    f"dt must be at most {longest:.3g} s, {LEAST_STEPS_PER_CYCLE} steps to a cycle "
+                    f"of the highest mode of {highest:.6g} Hz, got {most:g}: keep fewer modes, or "
+                    "take shorter steps"
+                )
+        self.window = window(run_duration(self.excitation, duration), most, interval)
+
+    def start(self, **motion):
+        """Motion of the place of each scene at the beginning, by name; InputError."""
+        places = list(self.mount.scene_places)
+        made = {}
+        for name, value in motion.items():
+            of_places = _of_places(name, value, self.structure)
+            made[name] = np.tile(of_places[places], len(self.seeds))
+        return made
+
+    def words(self):
+        """The run without the filling, in words."""
+        many = self.boxes, self.seeds, self.window, self.mount.force_place
+        return f"shaken structure {identity_of(self.structure)}, {identity_of(many)}"
+
+    def batch(self, effects):
+        """Batch of all groups, the scenes of a group running fastest."""
+        empty = self.mount.group - len(self.boxes)
+        particles = [*(box.particles for box in self.boxes), *[0] * empty]
+        seeds = np.concatenate([[*self._box_seeds(seed), *[0] * empty] for seed in self.seeds])
+        mass = float(self.structure.masses.sum())
+        omega = 2.0 * np.pi * float(self.structure.frequencies.min())
+        damping = 2.0 * mass * omega * float(self.structure.damping_ratios[0])
+        table = SceneTable(
+            *(np.tile(particles, len(self.seeds)), seeds, self.window.dt),
+            *(1.0 / self.window.duration, 0.0, mass, mass * omega**2, damping),
+        )
+        options = {"excitation": self.excitation, "recorded_samples": self.window.samples}
+        return Batch(
+            *(self.filling, table),
+            structure=self.mount,
+            measured_cycles=1,
+            effects=effects,
+            **options,
+        )
+
+    def _box_seeds(self, seed):
+        """Seed of each box in the run of a seed: that of the run for box 0."""
+        numbers = (k if box.seed is None else box.seed for k, box in enumerate(self.boxes))
+        return [(seed + number * _BETWEEN_BOXES) % (MOST_SEED + 1) for number in numbers]
+
+    def history(self, batch, cycles):
+        """What the batch recorded."""
+        series, group = batch.time_series(), self.mount.group
+        # A place is that of the first scene there.
+        of_place = [self.mount.scene_places.index(i) for i in range(self.structure.place_count)]
+        highest = np.maximum(cycles.mean_of("x_max"), -cycles.mean_of("x_min"))
+        rms, peak = (one.reshape(-1, group).T[of_place] for one in (cycles.rms, highest))
+        x, v, force = (
+            np.swapaxes(series[name].reshape(-1, len(self.seeds), group), 1, 2)
+            for name in ("x", "v", "force")
+        )
+        return StructureHistory(
+            *(self.filling.label, self.structure, self.boxes, self.excitation, self.seeds),
+            *(series["time_s"][:, 0], series["y"][:, 0]),
+            *(x[:, of_place], v[:, of_place], force[:, : len(self.boxes)], rms, peak),
+            batch.report(),
+        )
+
+
+def _checked_boxes(boxes):
+    """Boxes as a tuple; InputError."""
+    given = (boxes,) if isinstance(boxes, Box) else boxes
+    if not isinstance(given, (list, tuple)) or not given:
+        raise InputError(f"boxes must be a Box or a list of at least one, got {shown(boxes)}")
+    return tuple(instance("boxes", box, Box) for box in given)
+
+
+def _of_places(name, value, structure):
+    """Motion at the beginning, (places,); InputError unless it is a sum of the modes."""
+    places = structure.place_count
+    try:
+        given = np.asarray(value)
+        motion = np.broadcast_to(given, places).astype(np.float64)
+        fits = given.dtype.kind in "iuf" and bool(np.isfinite(motion).all())
+    except (TypeError, ValueError):
+        fits = False
+    if not fits:
+        raise InputError(
+            f"{name} must be a finite number or {places}, one for each place, got {shown(value)}"
+        )
+    left = motion - structure.shapes @ structure.modal(motion)
+    if np.abs(left).max() > _OUTSIDE_MODES * np.abs(motion).max():
+        raise InputError(
+            f"{name} must be a sum of the modes of the structure, got {shown(value)}, of which "
+            f"{np.abs(left).max():.3g} is none: keep more modes"
+        )
+    return motion

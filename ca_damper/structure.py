@@ -1,0 +1,295 @@
+"""A structure of several degrees of freedom, given by its modes.
+
+Source: Craig and Kurdila, Fundamentals of Structural Dynamics, 2nd edition, chapters 10 and 11.
+
+Its places move along the axis of the boxes, up positive, and hang on a base: where the base moves
+by y and nothing else happens slowly, all places move by y. With masses M, shapes phi, natural
+angular frequencies w_k and damping ratios z_k, phi^T M phi = 1, the modal coordinates p obey
+
+    p_k'' + 2 z_k w_k p_k' + w_k^2 p_k = G_k (2 z_k w_k y' + w_k^2 y) + sum_i phi_ik F_i
+
+with G = phi^T M 1 and forces F_i at the places, which are at x = phi p + r y, r = 1 - phi G. All
+modes together leave r = 0. Where some are left out, r y is their share in a translation of all:
+the motion relative to the base, x - y = phi (p - G y), has then the modes that are kept and no
+others, and a base that moves slowly still takes all places along. What is lost is the flexibility
+that the others lend to a place where a force acts, and their resonances.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Optional
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from taichi_dem.kit.display import counted, in_brief
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import LARGEST, SMALLEST, positive, shown, whole
+
+#: Most places of a structure.
+MOST_PLACES = 1000
+#: Largest error of phi^T M phi: as large as that is the share by which the motion may be wrong.
+ORTHONORMAL_TO = 1e-4
+# Largest asymmetry of a matrix, as a share of its largest entry.
+_SYMMETRIC_TO = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class ModalStructure:
+    """Places of a structure that move along one axis, and the modes in which they move.
+
+    masses: (places,) [kg], or their matrix (places, places). frequencies: natural ones of the modes
+    [Hz], and damping_ratios: shares of critical damping, both (modes,), the latter also one for
+    all. shapes: (places, modes) [kg^-1/2], with shapes^T masses shapes = 1.
+    Raises InputError for arrays that do not fit, masses that are not positive (definite),
+    frequencies that are not positive, negative damping, or shapes that are not orthonormal.
+    """
+
+    masses: np.ndarray
+    frequencies: np.ndarray
+    damping_ratios: np.ndarray
+    shapes: np.ndarray
+
+    def __post_init__(self) -> None:
+        masses = _mass_matrix("masses", self.masses)
+        shapes = _array("shapes", self.shapes, 2)
+        places, modes = shapes.shape
+        if places != len(masses):
+            raise InputError(
+                f"shapes must have a row for each of {counted(len(masses), 'place')}, got "
+                f"{places} x {modes} numbers"
+            )
+        if not 1 <= modes <= places:
+            raise InputError(f"shapes must have from 1 to {places} modes, as places, got {modes}")
+        frequencies = _of_modes("frequencies", self.frequencies, modes)
+        damping_ratios = _of_modes("damping_ratios", self.damping_ratios, modes, zero_allowed=True)
+        _check_orthonormal(shapes.T @ masses @ shapes)
+        for name, value in (
+            *(("masses", masses), ("frequencies", frequencies)),
+            *(("damping_ratios", damping_ratios), ("shapes", shapes)),
+        ):
+            value.flags.writeable = False
+            object.__setattr__(self, name, value)
+
+    @classmethod
+    def from_matrices(
+        cls,
+        mass: ArrayLike,
+        stiffness: ArrayLike,
+        damping_ratios: ArrayLike,
+        modes: Optional[int] = None,
+    ) -> "ModalStructure":
+        """Structure of the lowest modes of K phi = w^2 M phi.
+
+        mass: as ``masses``. stiffness: (places, places) [N/m], with the base at rest.
+        damping_ratios: (modes,), or one for all. modes: how many, all if None. In each shape the
+        largest number is positive. Raises InputError also for a stiffness that is not symmetric
+        and positive definite, as that of a structure which does not hang on the base.
+        """
+        m = _mass_matrix("mass", mass)
+        k = _array("stiffness", stiffness, 2)
+        if k.shape != m.shape:
+            raise InputError(
+                f"stiffness must be {len(m)} x {len(m)} numbers, as mass, got "
+                f"{' x '.join(map(str, k.shape))}"
+            )
+        kept = len(m) if modes is None else whole("modes", modes, 1, len(m))
+        _check_definite("stiffness", k)
+        to_unit_mass = np.linalg.inv(np.linalg.cholesky(m))
+        squares, vectors = np.linalg.eigh(to_unit_mass @ k @ to_unit_mass.T)
+        shapes = (to_unit_mass.T @ vectors)[:, :kept]
+        largest = shapes[np.abs(shapes).argmax(axis=0), range(kept)]
+        frequencies = np.sqrt(squares[:kept]) / (2.0 * np.pi)
+        damping: Any = damping_ratios
+        return cls(m, frequencies, damping, shapes * np.sign(largest))
+
+    def __repr__(self) -> str:
+        ends = " to ".join(f"{f:.4g}" for f in sorted({*_ends(self.frequencies)}))
+        size = f"{counted(self.place_count, 'place')}, {counted(self.mode_count, 'mode')}"
+        return in_brief(self, size, f"{ends} Hz")
+
+    @property
+    def place_count(self) -> int:
+        """Number of places."""
+        return len(self.shapes)
+
+    @property
+    def mode_count(self) -> int:
+        """Number of modes."""
+        return self.shapes.shape[1]
+
+    @property
+    def participation(self) -> np.ndarray:
+        """Share G of each mode in a translation of all places, (modes,) [kg^1/2]."""
+        return self.shapes.T @ self.masses @ np.ones(self.place_count)
+
+    @property
+    def residual(self) -> np.ndarray:
+        """Share r of the base's motion that no mode carries, (places,); 0 with all modes."""
+        return 1.0 - self.shapes @ self.participation
+
+    def recoil(self, place: int) -> float:
+        """Speed that a unit impulse gives a place [1/kg]."""
+        row = self.shapes[whole("place", place, 0, self.place_count - 1)]
+        return float(row @ row)
+
+    def modal(self, motion: ArrayLike) -> np.ndarray:
+        """Modal coordinates p of a motion (..., places) of the places, (..., modes)."""
+        return np.asarray(motion) @ self.masses @ self.shapes
+
+    def transfer(self, frequency: ArrayLike, added_masses: Any = None) -> np.ndarray:
+        """Complex x / y of all places in the steady state at frequencies [Hz], (..., places).
+
+        added_masses: fixed to the places [kg], (places,); none if None.
+        """
+        omega, added = self._asked(frequency, added_masses)
+        held = (2.0 * np.pi * self.frequencies) ** 2 + 1j * omega * self._damping
+        pull = held * self.participation + omega**2 * (self.shapes.T @ (added * self.residual))
+        return self._moved(omega, added, pull) + self.residual
+
+    def force_transfer(
+        self, frequency: ArrayLike, place: int, added_masses: Any = None
+    ) -> np.ndarray:
+        """Complex x [m] of all places per newton of a force at one of them, as ``transfer``."""
+        omega, added = self._asked(frequency, added_masses)
+        row = self.shapes[whole("place", place, 0, self.place_count - 1)]
+        return self._moved(omega, added, np.broadcast_to(row, (*omega.shape[:-1], len(row))))
+
+    @property
+    def _damping(self) -> np.ndarray:
+        """2 z w of each mode [1/s]."""
+        return 4.0 * np.pi * self.damping_ratios * self.frequencies
+
+    def _asked(self, frequency: Any, added_masses: Any) -> tuple[np.ndarray, np.ndarray]:
+        """Angular frequencies (..., 1) and added masses (places,)."""
+        omega = 2.0 * np.pi * np.asarray(frequency, dtype=np.float64)[..., None]
+        if added_masses is None:
+            return omega, np.zeros(self.place_count)
+        added = _array("added_masses", added_masses, 1)
+        if len(added) != self.place_count or added.min() < 0.0:
+            raise InputError(
+                f"added_masses must be {counted(self.place_count, 'number')} from zero, got "
+                f"{shown(added_masses)}"
+            )
+        return omega, added
+
+    def _moved(self, omega: np.ndarray, added: np.ndarray, pull: np.ndarray) -> np.ndarray:
+        """Motion phi p under a pull on the modes (..., modes), with masses added to the places."""
+        own = (2.0 * np.pi * self.frequencies) ** 2 - omega**2 + 1j * omega * self._damping
+        more = (self.shapes.T * added) @ self.shapes
+        matrix = own[..., None] * np.eye(self.mode_count) - omega[..., None] ** 2 * more
+        return np.linalg.solve(matrix, pull[..., None])[..., 0] @ self.shapes.T
+
+
+@dataclass(frozen=True)
+class Box:
+    """A container with particles, of the filling's own size, at a place of a structure.
+
+    place: from 0. particles: number. seed: None, or a whole number that together with the seed of
+    the run starts its particles; None takes the box's number in the list, so that boxes differ.
+    Its own mass is part of the structure's masses. Raises InputError.
+    """
+
+    place: int
+    particles: int
+    seed: Optional[int] = None
+
+    def __post_init__(self) -> None:
+        for name, most in (("place", MOST_PLACES - 1), ("particles", 2**31 - 1)):
+            object.__setattr__(self, name, whole(name, getattr(self, name), 0, most))
+        if self.seed is not None:
+            object.__setattr__(self, "seed", whole("seed", self.seed, 0, 1_000_000))
+
+
+def _ends(values: np.ndarray) -> tuple[float, float]:
+    return float(values.min()), float(values.max())
+
+
+def _array(name: str, value: Any, axes: int) -> np.ndarray:
+    """A copy in 64 bits; InputError unless it has so many axes and finite numbers."""
+    try:
+        given = np.asarray(value)
+    except (TypeError, ValueError):
+        given = np.zeros(0)
+    if given.dtype.kind not in "iuf" or given.ndim != axes or not given.size:
+        kind = "a list of numbers" if axes == 1 else "a matrix of numbers"
+        raise InputError(f"{name} must be {kind}, got {shown(value)}")
+    numbers = np.array(given, dtype=np.float64)
+    bad = ~(np.abs(numbers) <= LARGEST)
+    if bad.any():
+        at = tuple(map(int, np.argwhere(bad)[0]))
+        place = ", ".join(map(str, at))
+        raise InputError(
+            f"{name} must be finite numbers up to {LARGEST:g}, got {numbers[at]} at [{place}]"
+        )
+    return numbers
+
+
+def _of_modes(name: str, value: Any, modes: int, zero_allowed: bool = False) -> np.ndarray:
+    """Numbers of the modes, (modes,); InputError unless they are positive."""
+    if zero_allowed and not np.iterable(value):
+        value = [positive(name, value, zero_allowed=True)] * modes
+    numbers = _array(name, value, 1)
+    if len(numbers) != modes:
+        wanted = counted(modes, "number")
+        raise InputError(f"{name} must be {wanted}, one for each mode, got {shown(value)}")
+    bad = (numbers < SMALLEST) & ~(zero_allowed & (numbers == 0.0))
+    if bad.any():
+        k = int(np.flatnonzero(bad)[0])
+        limit = "zero or positive" if zero_allowed else "positive"
+        raise InputError(f"{name} must be {limit} numbers, got {numbers[k]:g} of mode {k}")
+    return numbers
+
+
+def _mass_matrix(name: str, value: Any) -> np.ndarray:
+    """Matrix of masses given as that or as its diagonal; InputError unless it is positive."""
+    try:
+        axes = 1 if np.ndim(value) == 1 else 2
+    except ValueError:
+        axes = 2
+    numbers = _array(name, value, axes)
+    if len(numbers) > MOST_PLACES:
+        raise InputError(f"{name} must be of at most {MOST_PLACES} places, got {len(numbers)}")
+    if axes == 1:
+        if numbers.min() < SMALLEST:
+            k = int(numbers.argmin())
+            raise InputError(f"{name} must be positive numbers, got {numbers[k]:g} at place {k}")
+        return np.diag(numbers)
+    _check_definite(name, numbers)
+    return numbers
+
+
+def _check_definite(name: str, matrix: np.ndarray) -> None:
+    """InputError unless a matrix is square, symmetric and positive definite."""
+    rows, columns = matrix.shape
+    if rows != columns:
+        raise InputError(f"{name} must be a square matrix, got {rows} x {columns} numbers")
+    uneven = np.abs(matrix - matrix.T)
+    i, j = map(int, np.unravel_index(uneven.argmax(), uneven.shape))
+    if uneven[i, j] > _SYMMETRIC_TO * np.abs(matrix).max():
+        raise InputError(
+            f"{name} must be a symmetric matrix, got {matrix[i, j]:g} at [{i}, {j}] and "
+            f"{matrix[j, i]:g} at [{j}, {i}]"
+        )
+    # Scaled to a diagonal of ones, so that units and unequal places do not count.
+    diagonal = np.diag(matrix)
+    least = float(diagonal.min())
+    if least > 0.0:
+        scale = 1.0 / np.sqrt(diagonal)
+        least = float(np.linalg.eigvalsh(matrix * scale[:, None] * scale)[0])
+    if least <= 1e-13:
+        raise InputError(
+            f"{name} must be a positive definite matrix, got one whose least eigenvalue, scaled to "
+            f"a diagonal of ones, is {least:.3g}"
+        )
+
+
+def _check_orthonormal(products: np.ndarray) -> None:
+    """InputError unless phi^T M phi is the unit matrix, with the product that is worst."""
+    wrong = np.abs(products - np.eye(len(products)))
+    i, j = sorted(map(int, np.unravel_index(wrong.argmax(), wrong.shape)))
+    if not wrong[i, j] <= ORTHONORMAL_TO:
+        wanted = 1 if i == j else 0
+        raise InputError(
+            f"shapes must be orthonormal, shapes^T masses shapes = 1 within {ORTHONORMAL_TO:g}, "
+            f"got {products[i, j]:.6g} in place of {wanted} for modes {i} and {j}"
+        )
