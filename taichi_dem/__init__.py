@@ -18,6 +18,8 @@ A scene is a mesh, a material and the effects that act; ``simulate`` runs it::
 from taichi_dem.kit import runtime  # isort: skip
 
 from taichi_dem import effects, goals, methods
+from taichi_dem.calibration.calibrate import Targets, calibrate
+from taichi_dem.elasticity.mesh_stiffness import mesh_stiffness
 from taichi_dem.goals import Goal
 from taichi_dem.kit.accuracy.answer import Answer
 from taichi_dem.kit.accuracy.branches import Branch, BranchedAnswer
@@ -39,6 +41,7 @@ from taichi_dem.scene import Scene
 from taichi_dem.simulate import simulate
 from taichi_dem.simulation import Simulation
 from taichi_dem.solve import solve
+from taichi_dem.stability.elastic_report import elastic_report
 from taichi_dem.stability.quality import quality_report
 from taichi_dem.stability.step_control import StepControl
 from taichi_dem.stability.step_report import step_report
@@ -67,13 +70,17 @@ __all__ = [
     "Simulation",
     "SimulationDiverged",
     "StepControl",
+    "Targets",
     "Uniform",
     "__version__",
+    "calibrate",
     "checked_mesh",
     "effects",
+    "elastic_report",
     "estimated_effects",
     "goals",
     "in_space_order",
+    "mesh_stiffness",
     "methods",
     "needed_effects",
     "quality_report",

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from taichi_dem.elasticity.bond_rules import per_bond
 from taichi_dem.materials import Material
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.topology import body_properties, topology_of
@@ -13,16 +14,16 @@ from taichi_dem.mesh.topology import body_properties, topology_of
 def damped_opening(
     mass: float, stiffness: float, damping: float, opening: float, speed: float, time_s: ArrayLike
 ) -> np.ndarray:
-    """Opening [m] of two bodies tied along a line by a spring and a dashpot, overdamped.
+    """Opening [m] of two bodies tied along a line by a spring and a dashpot, not critical.
 
     mass: reduced [kg]. stiffness [N/m], damping [N s/m]. opening [m], speed [m/s]: at the start.
     m u'' + c u' + k u = 0: u = A exp(r t) + B exp(s t) with the roots r, s of m x^2 + c x + k.
     """
-    fast = -0.5 * (damping + np.sqrt(damping**2 - 4.0 * mass * stiffness)) / mass
+    fast = -0.5 * (damping + np.emath.sqrt(damping**2 - 4.0 * mass * stiffness)) / mass
     slow = stiffness / (mass * fast)
     first = (speed - fast * opening) / (slow - fast)
     time = np.asarray(time_s)
-    return first * np.exp(slow * time) + (opening - first) * np.exp(fast * time)
+    return np.real(first * np.exp(slow * time) + (opening - first) * np.exp(fast * time))
 
 
 def velocity_after_impact(
@@ -63,7 +64,7 @@ def bond_tension(material: Material, opening: ArrayLike) -> np.ndarray:
     limit = np.maximum.accumulate(np.maximum(opening, material.onset_opening))
     left = material.failure_opening - limit
     stiffness = np.where(
-        opening > 0.0, material.softening_slope * left / limit, material.normal_stiffness
+        opening > 0.0, material.softening_slope * left / limit, float(material.normal_stiffness)
     )
     return np.where(left > 0.0, stiffness * opening, 0.0)
 
@@ -75,10 +76,11 @@ def bond_shear(material: Material, sliding: ArrayLike, pressure: float) -> np.nd
     friction x pressure, and goes back elastically.
     """
     bound = max(0.0, material.cohesion + material.friction * pressure)
-    slip, found = 0.0, []
+    slip, stiffness = 0.0, float(material.shear_stiffness)
+    found: list[float] = []
     for reach in np.asarray(sliding, dtype=float):
-        found.append(float(np.clip(material.shear_stiffness * (reach - slip), -bound, bound)))
-        slip = reach - found[-1] / material.shear_stiffness
+        found.append(float(np.clip(stiffness * (reach - slip), -bound, bound)))
+        slip = reach - found[-1] / stiffness
     return np.array(found)
 
 
@@ -98,16 +100,20 @@ class LinearBonds:
             self.mass[linear, linear] = mass[body] * np.eye(3)
             self.mass[turning, turning] = inertia[body]
         topology = topology_of(mesh)
-        for bodies, face in zip(zip(topology.master, topology.slave), topology.vertices):
-            self._add_bond(mesh.points[face], bodies, centre, material)
+        springs = material.normal_stiffness, material.shear_stiffness
+        dashpots = material.normal_damping, material.shear_damping
+        laws = [per_bond(mesh, topology, material.density, pair) for pair in (springs, dashpots)]
+        for b, bodies in enumerate(zip(topology.master, topology.slave)):
+            corners = mesh.points[topology.vertices[b]]
+            share = topology.bonded_share[b]
+            self._add_bond(corners, bodies, centre, [share * law[b] for law in laws])
 
-    def _add_bond(self, corners, bodies, centre, material):
+    def _add_bond(self, corners, bodies, centre, laws):
         normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
         unit_area = 0.5 * np.linalg.norm(normal) / 3.0
         along = np.outer(normal, normal) / (normal @ normal)
         across = np.eye(3) - along
-        elastic = material.normal_stiffness * along + material.shear_stiffness * across
-        viscous = material.normal_damping * along + material.shear_damping * across
+        elastic, viscous = (normal * along + shear * across for normal, shear in laws)
         for corner in corners:
             jacobian = np.zeros((3, len(self.mass)))
             for sign, body in zip((-1.0, 1.0), bodies):

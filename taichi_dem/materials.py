@@ -3,14 +3,38 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
+from typing import Any
 
+from taichi_dem.elasticity.bond_rules import (
+    BondRule,
+    Constant,
+    ContactRule,
+    ContactShareOfCritical,
+    FaceStiffness,
+    ModulusOverDistance,
+    Rule,
+    ShareOfCritical,
+    bond_geometry,
+    per_bond,
+)
+from taichi_dem.elasticity.moduli import bond_moduli
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import LARGEST, SMALLEST, finite, plain_fields, shown
+from taichi_dem.kit.validation import LARGEST, SMALLEST, finite, plain_fields, positive, shown
+from taichi_dem.mesh.mesh import Mesh
+from taichi_dem.mesh.topology import topology_of
 
 _MAY_BE_ZERO = frozenset(
     {"normal_damping", "shear_damping", "cohesion", "friction", "contact_damping"}
 )
+#: Kind of rule that may stand for a number, by field.
+_RULES: dict[str, type] = {
+    **dict.fromkeys(
+        ("normal_stiffness", "shear_stiffness", "normal_damping", "shear_damping"), BondRule
+    ),
+    **dict.fromkeys(("contact_stiffness", "contact_damping"), ContactRule),
+}
 
 
 @dataclass(frozen=True)
@@ -20,40 +44,104 @@ class Material:
     density [kg/m3]; normal_stiffness, shear_stiffness [Pa/m] of a bond per area;
     normal_damping, shear_damping [Pa s/m] of a bond per area; tensile_strength, cohesion [Pa];
     friction [-]; fracture_energy [J/m2]; contact_stiffness [N/m] and contact_damping [N s/m] of
-    one sphere contact after fracture.
+    one sphere contact after fracture. Stiffnesses and dashpots are numbers, the same for all bonds,
+    or follow from moduli and the sizes of the bodies (``from_elastic``).
 
     Raises InputError for a value that is no finite number, is negative, is zero where it must be
     positive, or where the bond would fail before it reaches its strength.
     """
 
     density: float
-    normal_stiffness: float
-    shear_stiffness: float
-    normal_damping: float
-    shear_damping: float
+    normal_stiffness: Constant
+    shear_stiffness: Constant
+    normal_damping: Constant
+    shear_damping: Constant
     tensile_strength: float
     cohesion: float
     friction: float
     fracture_energy: float
-    contact_stiffness: float
-    contact_damping: float
+    contact_stiffness: Constant
+    contact_damping: Constant
 
     def __post_init__(self):
         plain_fields(self)
         for field in dataclasses.fields(self):
-            _check_number(field.name, getattr(self, field.name))
+            value = getattr(self, field.name)
+            if not isinstance(value, _RULES.get(field.name, ())):
+                _check_number(field.name, value)
+        if not isinstance(self.normal_stiffness, BondRule):
+            self._check_energy()
+
+    def _check_energy(self, where: str = "") -> None:
+        """Raise InputError where a bond would fail before it reaches its strength.
+
+        where: which bond, in words, for a stiffness that is not the same for all.
+        """
         if self.failure_opening <= self.onset_opening:
-            least = self.tensile_strength**2 / (2.0 * self.normal_stiffness)
+            least = self.tensile_strength**2 / (2.0 * float(self.normal_stiffness))
             raise InputError(
                 f"fracture_energy must be larger than tensile_strength^2 / (2 normal_stiffness) = "
-                f"{least:.6g} J/m2, or the bond would fail before it reaches its strength, "
+                f"{least:.6g} J/m2{where}, or the bond would fail before it reaches its strength, "
                 f"got {self.fracture_energy}"
             )
+
+    @classmethod
+    def from_elastic(
+        cls,
+        *,
+        young: float,
+        poisson: float,
+        density: float,
+        tensile_strength: float,
+        fracture_energy: float,
+        friction_angle: float,
+        cohesion: float,
+        damping_ratio: float = 0.05,
+    ) -> Material:
+        """A material from what is measured; its bonds are the stiffer, the nearer their bodies.
+
+        young [Pa] and poisson of a block, which does not depend on the size of its elements: a
+        bond has the stiffness modulus / distance per area (``elasticity.moduli``). density [kg/m3];
+        tensile_strength [Pa], fracture_energy [J/m2] and cohesion [Pa] of a bond; friction_angle
+        [degrees]: of bonds, and of spheres that touch. damping_ratio: share of the critical damping
+        of a bond between its two bodies, and of contacts; 0 for none. Contact spheres are as stiff
+        as the bond they replace (``elasticity.bond_rules.FaceStiffness``).
+
+        Raises InputError for a value out of its range. Whether the fracture energy suffices for the
+        largest elements is checked by the scene, which has the mesh.
+        """
+        normal, shear = bond_moduli(young, poisson)
+        ratio = positive("damping_ratio", damping_ratio, zero_allowed=True)
+        return cls(
+            density=density,
+            normal_stiffness=ModulusOverDistance(normal),
+            shear_stiffness=ModulusOverDistance(shear),
+            normal_damping=ShareOfCritical(ratio, normal) if ratio else 0.0,
+            shear_damping=ShareOfCritical(ratio, shear) if ratio else 0.0,
+            tensile_strength=tensile_strength,
+            cohesion=cohesion,
+            friction=math.tan(math.radians(_checked_angle(friction_angle))),
+            fracture_energy=fracture_energy,
+            contact_stiffness=FaceStiffness(normal),
+            contact_damping=ContactShareOfCritical(ratio, normal) if ratio else 0.0,
+        )
+
+    @property
+    def has_bond_damping(self) -> bool:
+        """Whether bonds have dashpots."""
+        constants = self.normal_damping, self.shear_damping
+        return any(isinstance(value, Rule) or value > 0.0 for value in constants)
+
+    @property
+    def has_contact_damping(self) -> bool:
+        """Whether contacts have dashpots."""
+        value = self.contact_damping
+        return isinstance(value, Rule) or value > 0.0
 
     @property
     def onset_opening(self) -> float:
         """Opening at which softening begins [m] (Konno et al., Fig 2: u_E)."""
-        return self.tensile_strength / self.normal_stiffness
+        return self.tensile_strength / float(self.normal_stiffness)
 
     @property
     def failure_opening(self) -> float:
@@ -64,6 +152,54 @@ class Material:
     def softening_slope(self) -> float:
         """Fall of the traction with the opening beyond the onset, a positive number [Pa/m]."""
         return self.tensile_strength / (self.failure_opening - self.onset_opening)
+
+
+def material_on(mesh: Mesh, material: Material) -> Material:
+    """The material with the numbers that contacts have in a mesh; bonds keep their rules."""
+    given = {name: getattr(material, name) for name in ("contact_stiffness", "contact_damping")}
+    numbers = {
+        name: rule.of_mesh(mesh, material.density)
+        for name, rule in given.items()
+        if isinstance(rule, ContactRule)
+    }
+    return replace(material, **numbers) if numbers else material
+
+
+def softest_bond(mesh: Mesh, material: Material) -> Material:
+    """The material with the numbers of the bond of least stiffness in a mesh.
+
+    Raises InputError where the fracture energy is too small for it: the larger the elements, the
+    softer their bonds, and the more energy they have stored when they reach their strength.
+    """
+    springs = material.normal_stiffness, material.shear_stiffness
+    if not any(isinstance(constant, BondRule) for constant in springs):
+        return material
+    topology = topology_of(mesh)
+    if not topology.bond_count:
+        return material
+    stiffness = per_bond(mesh, topology, material.density, springs)
+    bond = int(stiffness[:, 0].argmin())
+    normal, shear = stiffness[bond, 0], stiffness[:, 1].min()
+    distance = bond_geometry(mesh, topology, material.density).distance[bond]
+    made = _unchecked(material, normal_stiffness=float(normal), shear_stiffness=float(shear))
+    made._check_energy(f" at bond {bond}, whose bodies are {distance:.4g} m apart")
+    return made
+
+
+def _unchecked(material, **values):
+    """A copy of a material with other values, without a check."""
+    made = object.__new__(Material)
+    made.__dict__.update(vars(material), **values)
+    return made
+
+
+def _checked_angle(angle: Any) -> float:
+    """Angle of friction [degrees]; InputError unless it is a number from 0 and below 90."""
+    if not finite(angle) or not 0.0 <= float(angle) < 90.0:
+        raise InputError(
+            f"friction_angle must be a number from 0 to below 90 degrees, got {shown(angle)}"
+        )
+    return float(angle)
 
 
 def _check_number(name, value):

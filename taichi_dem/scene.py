@@ -1,7 +1,7 @@
 """Scene: mesh, material and the effects that act in it."""
 
-from collections.abc import Hashable, Iterable
-from dataclasses import dataclass
+from collections.abc import Hashable, Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import Any, Optional
 
 from taichi_dem.effects.base import MANY, Effect
@@ -9,10 +9,11 @@ from taichi_dem.effects.chosen import AUTO, LISTED, ChosenEffects, chosen_effect
 from taichi_dem.effects.roles import check_effect
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import between, positive, shown
-from taichi_dem.materials import Material
+from taichi_dem.kit.validation import between, finite, positive, shown
+from taichi_dem.materials import Material, softest_bond
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.parts import may_meet, parts_of
+from taichi_dem.mesh.topology import check_free
 
 #: Bound of the momentum of a body that wakes no neighbour, as a share of the mean of all.
 SLEEP = 1e-6
@@ -31,6 +32,12 @@ class Scene:
     which a run counts as diverged. sleep: with "auto", largest momentum of a body, as a share of
     the mean of all, at which its neighbours still count as not reached by any wave and are not
     evaluated; 1e-6 by default, at most 0.01, 0 for none.
+    unbonded: names of groups of inner faces, which two bodies share, without bonds from the start,
+    as a notch or an open joint: both sides are free, and carry contact spheres as broken faces do.
+    weaker: name of such a group -> share, above 0 and at most 1, of the area of its faces that is
+    bonded. Stiffness, damping, strength, cohesion and fracture energy per area of the face are that
+    share of the material's; openings at the limits, and the friction angle, stay. The least share
+    counts where a face is in several groups.
     Raises InputError for a wrong type, an effect listed twice in a role that takes one, friction
     without contact, a group that the mesh does not have, or a bound that is no positive number.
     """
@@ -41,19 +48,24 @@ class Scene:
     max_speed: float = 1e4
     loads: Iterable[Effect] = ()
     sleep: Optional[float] = None
+    unbonded: Iterable[str] = ()
+    weaker: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self):
         _check_body(self)
+        object.__setattr__(self, "mesh", _bonded(self))
         object.__setattr__(self, "loads", _listed("loads", self.loads))
         object.__setattr__(self, "effects", _effects_of(self))
         _check_types(self)
         object.__setattr__(self, "sleep", _sleep_of(self))
         _check_roles(self.effects)
+        material = softest_bond(self.mesh, self.material)
         for effect in self.effects:
-            effect.check_material(self.material)
+            effect.check_material(material)
         for effect in self.effects:
             if hasattr(effect, "group"):
                 self.mesh.group_faces(effect.group)
+                check_free(self.mesh, effect.group)
         object.__setattr__(self, "max_speed", positive("max_speed", self.max_speed))
 
     def __repr__(self):
@@ -73,8 +85,8 @@ class Scene:
     def damped(self, touching: bool = True) -> bool:
         """Whether a dashpot acts: of bonds, or, where bodies are touching, of contacts."""
         material, roles = self.material, {effect.role for effect in self.effects if effect.name}
-        bonds = "dashpot" in roles and material.normal_damping + material.shear_damping > 0.0
-        return bonds or (touching and "contact" in roles and material.contact_damping > 0.0)
+        bonds = "dashpot" in roles and material.has_bond_damping
+        return bonds or (touching and "contact" in roles and material.has_contact_damping)
 
     def has(self, name: str) -> bool:
         """Whether an effect of this name is listed."""
@@ -109,6 +121,24 @@ def _listed(name, effects):
     if unordered or not listed:
         raise InputError(f"{name} must be a list of effects, got {shown(effects)}")
     return tuple(effects)
+
+
+def _bonded(scene):
+    """The mesh with the bonds that its scene asks for; keeps both options for good."""
+    names, weaker = scene.unbonded, scene.weaker
+    if not isinstance(names, (list, tuple)) or not all(isinstance(name, str) for name in names):
+        raise InputError(f"unbonded must be a list of names of groups, got {shown(names)}")
+    if not isinstance(weaker, Mapping):
+        raise InputError(f"weaker must be a dict of group to share, got {shown(weaker)}")
+    if not all(finite(share) and 0.0 < share <= 1.0 for share in weaker.values()):
+        raise InputError(f"weaker must have shares above 0 and at most 1, got {shown(weaker)}")
+    shares = {name: float(share) for name, share in weaker.items()}
+    both = sorted(name for name in names if name in shares)
+    if both:
+        raise InputError(f"weaker must not have a group that is unbonded, got {both[0]} in both")
+    object.__setattr__(scene, "unbonded", tuple(names))
+    object.__setattr__(scene, "weaker", shares)
+    return scene.mesh.bonded_by({**shares, **dict.fromkeys(names, 0.0)})
 
 
 def _sleep_of(scene):
@@ -162,7 +192,7 @@ def _friction_warnings(scene):
     """Friction without springs is a drag up to its limit, so without a dashpot it is none."""
     rubs = [effect for effect in scene.effects if effect.role == "friction"]
     material = scene.material
-    if not rubs or rubs[0].remembers or material.contact_damping or not material.friction:
+    if not rubs or rubs[0].remembers or material.has_contact_damping or not material.friction:
         return ()
     return (
         f"{rubs[0].name} never acts: it is at most contact_damping times the sliding speed, and "
@@ -182,7 +212,8 @@ def outer_faces_warnings(scene: Any) -> tuple[str, ...]:
     contact are expected to have meeting bodies: any with several parts is reported. Scenes without
     contact may hold independent solids: they are not reported where they stay at rest, fall alike,
     or are too far from each other (``parts.may_meet``). Faces that lie on each other without a bond
-    (``Mesh.keep_coincident``) meet in a solid of one piece too.
+    (``Mesh.keep_coincident``, ``Scene.unbonded``) meet in a solid of one piece too; unbonded ones
+    have spheres with any contact.
     scene: a Scene, or a Model, which has the same mesh and effects.
     """
     contact = next((effect for effect in scene.effects if effect.role == "contact"), None)
@@ -191,13 +222,17 @@ def outer_faces_warnings(scene: Any) -> tuple[str, ...]:
     part = parts_of(scene.mesh)
     count = part.max() + 1
     apart = count > 1 and (contact or may_meet(scene, part))
-    if not (apart or scene.mesh.keep_coincident):
+    cut = not contact and scene.mesh.has_open_faces
+    if not (apart or cut or scene.mesh.keep_coincident):
         return ()
     lack = "their outer faces carry no contact spheres" if contact else "no contact is listed"
     if not apart:
+        why = "coincident points of the mesh are kept apart, no bond joins the faces on them"
+        if not scene.mesh.keep_coincident:
+            why = "faces of the mesh are unbonded"
         return (
-            f"coincident points of the mesh are kept apart, no bond joins the faces on them, and "
-            f"{lack}: bodies pass through each other there; {remedy(contact)} lets them touch",
+            f"{why}, and {lack}: bodies pass through each other there; {remedy(contact)} lets them "
+            "touch",
         )
     return (
         f"the mesh has {count} parts that no bond joins, and {lack}: "

@@ -34,8 +34,8 @@ class Job:
         """The method for this scene, at any step."""
         scene, material = self.scene, self.scene.material
         present = {effect.role for effect in scene.effects if effect.name}
-        damped = "dashpot" in present and material.normal_damping + material.shear_damping > 0.0
-        damped |= "contact" in present and material.contact_damping > 0.0
+        damped = "dashpot" in present and material.has_bond_damping
+        damped |= "contact" in present and material.has_contact_damping
         steps = max(_FEWEST, math.ceil(self.until / self._longest_step()))
         return Methods(ImplicitDashpots if damped else Uniform, self.until, steps)
 

@@ -5,6 +5,8 @@ from taichi_dem.effects.face_contact import FaceContact
 from taichi_dem.effects.friction import Friction
 from taichi_dem.effects.gas_pressure import GasPressure
 from taichi_dem.effects.gravity import Gravity
+from taichi_dem.effects.pressure import Pressure
+from taichi_dem.effects.quiet_boundary import QuietBoundary
 from taichi_dem.effects.shear_slip import ShearSlip
 from taichi_dem.effects.slip_weakening import SlipWeakening
 from taichi_dem.effects.softening import Softening
@@ -20,6 +22,8 @@ __all__ = [
     "GasPressure",
     "Gravity",
     "PrescribedMotion",
+    "Pressure",
+    "QuietBoundary",
     "Roller",
     "ShearSlip",
     "SlipWeakening",

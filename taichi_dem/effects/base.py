@@ -4,8 +4,8 @@ A user's effect holds numbers on the host. An engine holds a bound copy of it wi
 kernels, into which each scene of the engine loads its numbers. The ``role`` determines where
 ``step/advance.py`` calls it, and the members that it must have (``effects.roles``): tension, shear
 and dashpot are laws of the contact units of bonds, contact and friction those of contact spheres,
-loads push bodies, supports hold them. Roles ``load`` and ``support`` take any number of effects,
-the others at most one.
+loads push bodies, supports hold them, ground drags on them. Roles ``load``, ``support`` and
+``ground`` take any number of effects, the others at most one.
 """
 
 import copy
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from taichi_dem.engine.model import Model
     from taichi_dem.engine.tables import Tables
 
-MANY = ("load", "support")
+MANY = ("load", "support", "ground")
 #: Lowest and highest displacement along x, y and z [m].
 Travel = tuple[tuple[float, ...], tuple[float, ...]]
 #: Roles that take one effect, in the order in which effects are listed, bound and reported.
@@ -118,7 +118,7 @@ class Effect(Sealed):
         return {}
 
     def stress(self, material: Material, size: float) -> float:
-        """Stress that a load or support may cause in a block of some size [m], in Pa; NaN: unknown.
+        """Stress that a load, support or ground may cause in a block of a size [m]; NaN: unknown.
 
         Used by estimates before a run.
         """
@@ -277,7 +277,7 @@ class NoDashpot(Effect):
     is_null = True
 
     @ti.func
-    def traction(self, velocity):
+    def traction(self, b, velocity):
         """No traction at any velocity."""
         return vec3(0.0, 0.0, 0.0)
 

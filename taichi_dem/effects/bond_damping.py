@@ -1,12 +1,18 @@
 """Dashpots of bonds (Konno et al., 2.1, end; Table 1)."""
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import taichi as ti
 
 from taichi_dem.effects.base import Effect
-from taichi_dem.kit.types import vec3
+from taichi_dem.kit.allocation import assign
+from taichi_dem.kit.types import real, vec3
 from taichi_dem.materials import Material
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.capacity import Capacity
+    from taichi_dem.engine.model import Model
 
 
 @ti.data_oriented
@@ -17,15 +23,20 @@ class BondDamping(Effect):
     name = "bond_damping"
     activation = "bonds are strained at a rate"
 
-    def numbers(self, material: Material) -> tuple[float, ...]:
-        """Normal and tangential damping coefficient [Pa s/m]."""
-        return material.normal_damping, material.shear_damping
-
     def harmless(self, material: Material) -> Material:
         """No damping."""
         return replace(material, normal_damping=0.0, shear_damping=0.0)
 
+    def declare(self, capacity: "Capacity") -> None:
+        """Normal and tangential coefficient of every bond per area [Pa s/m]."""
+        self.coefficient = ti.Vector.field(2, real, shape=capacity.bonds)
+
+    def load(self, model: "Model") -> None:
+        """Take the coefficients of the material."""
+        assign(self.coefficient, model.bond_damping)
+
     @ti.func
-    def traction(self, velocity):
-        """Traction [Pa] at a relative velocity in the face frame [m/s]."""
-        return vec3(self.law[0] * velocity[0], self.law[1] * velocity[1], self.law[1] * velocity[2])
+    def traction(self, b, velocity):
+        """Traction [Pa] of bond b at a relative velocity in the face frame [m/s]."""
+        c = self.coefficient[b]
+        return vec3(c[0] * velocity[0], c[1] * velocity[1], c[1] * velocity[2])

@@ -68,17 +68,17 @@ def chosen_effects(
 def _laws(mesh, material, taken):
     """The laws that a material has numbers for; a coefficient of zero needs none."""
     laws = [Softening(), ShearSlip()]
-    if material.normal_damping + material.shear_damping > 0.0:
+    if material.has_bond_damping:
         laws.append(BondDamping())
     if "contact" not in taken:
         # Nothing meets a solid of one piece at its outer faces before something has come loose.
         laws.append(SphereContact(outer_faces=True if _may_meet(mesh) else ONCE_BROKEN))
     if material.friction > 0.0:
         # Friction without springs is a dashpot's force up to its limit: none without a dashpot.
-        laws.append(Friction() if material.contact_damping > 0.0 else StickingFriction())
+        laws.append(Friction() if material.has_contact_damping else StickingFriction())
     return laws
 
 
 def _may_meet(mesh):
     """Whether outer faces of a mesh may meet before anything breaks."""
-    return bool(parts_of(mesh).max() > 0 or mesh.keep_coincident)
+    return bool(parts_of(mesh).max() > 0 or mesh.has_open_faces)

@@ -1,24 +1,15 @@
 """Pressure of the blast gas on the wall of the hole (Konno et al., 4.1, eq. 4, Fig. 11)."""
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 import taichi as ti
 from numpy.typing import ArrayLike
 
-from taichi_dem.effects.base import Effect
-from taichi_dem.kit.allocation import assign
+from taichi_dem.effects.pressure import FacePressure
 from taichi_dem.kit.elementary import sine_and_cosine
 from taichi_dem.kit.validation import positive, word
 from taichi_dem.materials import Material
-from taichi_dem.mesh.tetrahedra import area_vectors
-from taichi_dem.mesh.topology import face_vertices, faces_of_group
-from taichi_dem.physics.rotation import zero3
-
-if TYPE_CHECKING:
-    from taichi_dem.engine.capacity import Capacity
-    from taichi_dem.engine.model import Model
 
 
 @ti.func
@@ -36,14 +27,13 @@ def pulse(peak, rise, decay_ratio, t):
 
 
 @ti.data_oriented
-class GasPressure(Effect):
+class GasPressure(FacePressure):
     """Pressure on the faces of a group along their current normal, also after they came loose.
 
     group: name of the face group. peak [Pa]: 575 MPa. rise [s]: time to the peak. decay_ratio:
     time from the peak to zero over the rise. The area stays the mesh's.
     """
 
-    role = "load"
     name = "gas_pressure"
 
     def __init__(
@@ -71,37 +61,10 @@ class GasPressure(Effect):
         """The peak pressure."""
         return self.peak
 
-    def declare(self, capacity: "Capacity") -> None:
-        """Loaded faces of every body: area vectors [m^2] and arms from the centre [m]."""
-        self.first = ti.field(ti.i32, shape=capacity.bodies + 1)
-        self.area = ti.Vector.field(3, ti.f64, shape=capacity.faces)
-        self.arm = ti.Vector.field(3, ti.f64, shape=capacity.faces)
-
-    def load(self, model: "Model") -> None:
-        """Find the loaded faces; InputError when the mesh has no such group."""
-        body, face = faces_of_group(model.mesh, model.topology, self.group)
-        order = np.argsort(body, kind="stable")
-        body = body[order]
-        corners = face_vertices(model.mesh, body, face[order])
-        assign(self.first, np.searchsorted(body, np.arange(model.body_count + 1)))
-        assign(self.area, area_vectors(model.mesh.points, corners))
-        assign(self.arm, model.mesh.points[corners].mean(axis=1) - model.centre[body])
-
     @ti.func
-    def acts_on(self, i):
-        """Nonzero for a body with a face in the group."""
-        return self.first[i + 1] - self.first[i]
-
-    @ti.func
-    def wrench(self, i, motion):
-        """Force [N] and torque about the centre [N m] on body i in a motion."""
-        pressure = pulse(self.law[0], self.law[1], self.law[2], motion.time)
-        force, torque = zero3(), zero3()
-        for k in range(self.first[i], self.first[i + 1]):
-            push = -pressure * self.area[k]
-            force += push
-            torque += self.arm[k].cross(push)
-        return motion.rotation @ force, motion.rotation @ torque
+    def pressure(self, t):
+        """Pressure [Pa] at a time [s]."""
+        return pulse(self.law[0], self.law[1], self.law[2], t)
 
     def pressure_at(self, times: ArrayLike) -> np.ndarray:
         """Pressure [Pa] at an array of times [s], for pictures."""

@@ -10,6 +10,7 @@ import taichi as ti
 
 from taichi_dem.effects.body_motion import BodyMotion
 from taichi_dem.kit.errors import InputError
+from taichi_dem.physics.wrench import Block
 
 
 class TensionLaw(Protocol):
@@ -64,8 +65,8 @@ class ShearFailure(Protocol):
 class DashpotLaw(Protocol):
     """Damping of a bond's contact units; role "dashpot"."""
 
-    def traction(self, velocity: ti.Vector) -> ti.Vector:
-        """Traction [Pa] at a relative velocity in the face frame [m/s]."""
+    def traction(self, b: int, velocity: ti.Vector) -> ti.Vector:
+        """Traction [Pa] of a bond at a relative velocity in the face frame [m/s]."""
 
 
 class ContactLaw(Protocol):
@@ -162,6 +163,22 @@ class Support(Protocol):
         """Velocity [m/s] and angular momentum [kg m^2/s] that it allows at a time [s]."""
 
 
+class Ground(Protocol):
+    """Dashpots between bodies and ground at rest; role "ground".
+
+    The step solves them in the body's own update, so that they limit no step.
+    """
+
+    def acts_on(self, i: int) -> int:
+        """Nonzero for a body that is joined to the ground."""
+
+    def resistance(self, i: int) -> Block:
+        """Force [N] and moment [N m] by which the ground resists velocity and spin, a ``Block``.
+
+        World axes, about the centre, positive semidefinite.
+        """
+
+
 class Activation(Protocol):
     """Rule by which effects="auto" knows where a law of bonds need not be evaluated.
 
@@ -186,6 +203,7 @@ CONTRACTS = {
     "friction": FrictionLaw,
     "load": Load,
     "support": Support,
+    "ground": Ground,
 }
 
 

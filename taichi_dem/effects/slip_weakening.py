@@ -49,7 +49,7 @@ class SlipWeakening(Effect):
                 "cohesion of the material must be more than 0 Pa with the effect slip_weakening, "
                 "which degrades it, got 0"
             )
-        least = material.cohesion**2 / (2.0 * material.shear_stiffness)
+        least = material.cohesion**2 / (2.0 * float(material.shear_stiffness))
         if not self.fracture_energy > least:
             raise InputError(
                 "fracture_energy of slip_weakening must be larger than cohesion^2 / (2 "

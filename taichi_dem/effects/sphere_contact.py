@@ -75,7 +75,7 @@ class SphereContact(Effect):
 
     def numbers(self, material: Material) -> tuple[float, ...]:
         """Stiffness [N/m] and damping [N s/m] of a contact."""
-        return material.contact_stiffness, material.contact_damping
+        return float(material.contact_stiffness), float(material.contact_damping)
 
     def spheres(self, model: "Model") -> ContactSpheres:
         """Spheres of a model, in balls that hold all of a face, or of a body, that can touch."""

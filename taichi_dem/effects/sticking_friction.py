@@ -38,7 +38,7 @@ class StickingFriction(Friction):
 
     def numbers(self, material: Material) -> tuple[float, ...]:
         """Friction coefficient, and stiffness of the spring [N/m]."""
-        return material.friction, self.stiffness_ratio * material.contact_stiffness
+        return material.friction, self.stiffness_ratio * float(material.contact_stiffness)
 
     def declare_columns(self, store: "PairStore") -> None:
         """Keep the stretch [m] of the spring of each sphere pair, in the first body's frame."""

@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import taichi as ti
 
-from taichi_dem.effects.base import Effect, Travel, along
+from taichi_dem.effects.base import Effect, Travel
+from taichi_dem.effects.history import History, history_points
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.elementary import sine_and_cosine
 from taichi_dem.kit.errors import InputError
@@ -152,22 +153,43 @@ def _right_angled(planes):
 class PrescribedMotion(_Support):
     """Bodies with a face in the group move with a given velocity and do not turn.
 
-    velocity [m/s]: v cos(2 pi frequency t); frequency [Hz], zero for a constant velocity.
+    velocity [m/s]: v cos(2 pi frequency t); frequency [Hz], zero for a constant velocity. ramp:
+    time [s] in which the velocity rises from zero, in a straight line. history: in place of a ramp,
+    (times [s], shares): the velocity is multiplied by the shares, linear between the times and
+    constant before the first and after the last.
     """
 
     name = "prescribed_motion"
 
-    def __init__(self, group: str, velocity: Sequence[float], frequency: float = 0.0):
+    def __init__(
+        self,
+        group: str,
+        velocity: Sequence[float],
+        frequency: float = 0.0,
+        ramp: float = 0.0,
+        history: Any = None,
+    ):
         super().__init__(group)
         self._velocity = direction("velocity", velocity)
         self._frequency = positive("frequency", frequency, zero_allowed=True)
+        self._ramp = positive("ramp", ramp, zero_allowed=True)
+        if history is not None and self._ramp:
+            raise InputError(f"ramp must be 0 where there is a history, got {self._ramp:g}")
+        self._points = _shares(self._ramp, history)
+        self._history = self._points if history is not None else None
+
+    def declare(self, capacity: "Capacity") -> None:
+        """Marks of the bodies, and the shares of the velocity."""
+        super().declare(capacity)
+        self.shares = History()
 
     def load(self, model: "Model") -> None:
         """Mark the bodies; InputError where another support asks for another motion."""
         super().load(model)
+        self.shares.load(*self._points)
         mine = set(faces_of_group(model.mesh, model.topology, self.group)[0].tolist())
         for effect in model.supports:
-            if _allows(effect, self._velocity, self._frequency):
+            if _allows(effect, self):
                 continue
             both = mine & set(faces_of_group(model.mesh, model.topology, effect.group)[0].tolist())
             if both:
@@ -183,9 +205,14 @@ class PrescribedMotion(_Support):
 
     def travel(self) -> Travel:
         """As far as it swings, or without end along a constant velocity."""
+        times, shares = (np.array(points) for points in self._points)
         if not self._frequency:
-            return along(self._velocity)
-        swing = [abs(x) / (2.0 * math.pi * self._frequency) for x in self._velocity]
+            back, on = _reach(times, shares)
+            ways = [sorted((_times(x, back), _times(x, on))) for x in self._velocity]
+            return tuple(way[0] for way in ways), tuple(way[1] for way in ways)
+        # By parts: |integral of s cos| is at most (|s| + the variation of s) / (angular frequency).
+        most = np.abs(shares).max() + np.abs(np.diff(shares)).sum()
+        swing = [most * abs(x) / (2.0 * math.pi * self._frequency) for x in self._velocity]
         return tuple(-x for x in swing), tuple(swing)
 
     @ti.func
@@ -193,16 +220,47 @@ class PrescribedMotion(_Support):
         """The prescribed velocity at time t [s] and no spin."""
         amplitude = vec3(self.law[0], self.law[1], self.law[2])
         _, swing = sine_and_cosine(self.law[3] * t)
-        return amplitude * swing, zero3()
+        return amplitude * swing * self.shares.at(t), zero3()
 
 
-def _allows(effect, velocity, frequency):
-    """Whether a support of the package allows a prescribed velocity [m/s] at a frequency [Hz]."""
+def _shares(ramp, history):
+    """Points of the history of a velocity: times [s] and shares of it."""
+    if history is None:
+        return history_points(*(((0.0, ramp), (0.0, 1.0)) if ramp else ((0.0,), (1.0,))))
+    refused = f"history must be a pair of times and shares, got {shown(history)}"
+    if not isinstance(history, (tuple, list)) or len(history) != 2:
+        raise InputError(refused)
+    try:
+        return history_points(*history)
+    except InputError as error:
+        raise InputError(f"{refused}: {error}") from None
+
+
+def _reach(times, shares):
+    """Lowest and highest integral of shares over time [s], from zero to any time."""
+    parts = 0.5 * (shares[1:] + shares[:-1]) * np.diff(times)
+    ends = np.array([0.0, *np.cumsum([shares[0] * times[0], *parts])])
+    # Where the share changes sign within a part, the integral turns between its ends.
+    turning = shares[1:] * shares[:-1] < 0.0
+    turns = (np.abs(shares).max() * np.diff(times))[turning].sum()
+    low, high = ends.min() - turns, ends.max() + turns
+    return low if shares[-1] >= 0.0 else -np.inf, high if shares[-1] <= 0.0 else np.inf
+
+
+def _times(speed, reach):
+    return speed * reach if speed else 0.0
+
+
+def _allows(effect, motion):
+    """Whether a support of the package allows a prescribed motion."""
+    velocity = motion._velocity
     if isinstance(effect, Fixed):
         return not any(velocity)
     if isinstance(effect, Roller):
         return sum(a * b for a, b in zip(effect._normal.tolist(), velocity)) == 0.0
     if isinstance(effect, PrescribedMotion):
-        same = tuple(effect._velocity) == tuple(velocity) and effect._frequency == frequency
-        return same or not any((*velocity, *effect._velocity))
+        mine, theirs = (
+            (tuple(one._velocity), one._frequency, one._points) for one in (motion, effect)
+        )
+        return mine == theirs or not any((*velocity, *effect._velocity))
     return True

@@ -7,27 +7,30 @@ from typing import Any
 import numpy as np
 
 from taichi_dem.effects.base import ROLES, Effect
+from taichi_dem.elasticity.bond_rules import per_bond
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.fixed_order import length, product, transposed
-from taichi_dem.materials import Material
+from taichi_dem.materials import Material, material_on
 from taichi_dem.mesh.colouring import edge_colours
 from taichi_dem.mesh.contact_spheres import ContactSpheres
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.mesh.topology import body_properties, topology_of
+from taichi_dem.stability.mesh_limits import dashpots_of, springs_of
 
 
 class Model:
     """Constant arrays of a scene and its effects by role; NumPy only.
 
-    mesh, material: of the scene. topology: its faces and bonds. body_mass [kg], centre [m] and
-    body_inertia [kg m^2], body_radius [m] (of the ball around a body): an entry a body. by_role:
-    lists of effects. contact: the effect of this role, None without.
+    mesh: of the scene. material: of the scene, with the numbers that its contacts have in the mesh.
+    topology: its faces and bonds. body_mass [kg], centre [m] and body_inertia [kg m^2], body_radius
+    [m] (of the ball around a body): an entry a body. by_role: lists of effects. contact: the effect
+    of this role, None without.
     Source: Konno et al., section 2.
     """
 
     def __init__(self, mesh: Mesh, material: Material, effects: Iterable[Effect]):
-        self.mesh, self.material = mesh, material
+        self.mesh, self.material = mesh, material_on(mesh, material)
         self.topology = topology_of(mesh)
         self.body_count, self.bond_count = mesh.body_count, self.topology.bond_count
         self.body_mass, self.centre, self.body_inertia = body_properties(mesh, material.density)
@@ -43,7 +46,7 @@ class Model:
 
     @property
     def effects(self) -> tuple:
-        """All effects in the order of roles; loads and supports in that of the scene."""
+        """All effects in the order of roles; those of one role in that of the scene."""
         return tuple(effect for role in ROLES for effect in self.by_role[role])
 
     @property
@@ -55,6 +58,11 @@ class Model:
     def supports(self) -> tuple:
         """Effects of the role support, in the order of the scene."""
         return tuple(self.by_role["support"])
+
+    @property
+    def ground(self) -> tuple:
+        """Effects of the role ground, in the order of the scene."""
+        return tuple(self.by_role["ground"])
 
     @cached_property
     def spheres(self) -> ContactSpheres:
@@ -72,8 +80,9 @@ class Model:
         """Arrays of all bonds by name.
 
         slots (n, 2): master's and slave's face as 4 body + local face. frame (n, 3, 3): normal, xi
-        and eta in the master's body frame. area (n,): of a contact unit [m^2]. on_master, on_slave
-        (n, 3, 3): vertices in the face frame and in the slave's body frame [m].
+        and eta in the master's body frame. area (n,): of a contact unit, so far as it is bonded
+        [m^2]. on_master, on_slave (n, 3, 3): vertices in the face frame and in the slave's body
+        frame [m].
         """
         top, points = self.topology, self.mesh.points
         slots = np.stack([4 * top.master + top.master_face, 4 * top.slave + top.slave_face], axis=1)
@@ -88,7 +97,7 @@ class Model:
         return {
             "slots": slots.astype(np.int32),
             "frame": frame,
-            "area": size / 3.0,
+            "area": size / 3.0 * top.bonded_share,
             "on_master": product(from_master, transposed(frame)),
             "on_slave": corners - self.centre[top.slave][:, None],
         }
@@ -96,6 +105,12 @@ class Model:
     @property
     def bond_stiffness(self) -> np.ndarray:
         """Normal and shear stiffness of every bond per area [Pa/m], (bond_count, 2)."""
-        material = self.material
-        stiffness = [material.normal_stiffness, material.shear_stiffness]
-        return np.tile(stiffness, (self.bond_count, 1))
+        return self._per_bond(springs_of(self.material))
+
+    @property
+    def bond_damping(self) -> np.ndarray:
+        """Normal and shear dashpot of every bond per area [Pa s/m], (bond_count, 2)."""
+        return self._per_bond(dashpots_of(self.material))
+
+    def _per_bond(self, constants):
+        return per_bond(self.mesh, self.topology, self.material.density, constants)

@@ -45,14 +45,15 @@ class State:
     contact_heat: energy taken by sphere dashpots and by friction, and energy injected by releases
     [J], booked to the first body of a pair; with contact only. injected_tick: last tick whose
     releases have been booked there.
-    load_work: work [J], one component a load and a last one for supports; load_impulse: total
-    impulse of all of them on a body (linear, and angular about the origin). tick: present time.
+    load_work: work [J], one component a load, one for all supports, one a ground; load_impulse:
+    total impulse of all of them on a body (linear, and angular about the origin). tick: present
+    time.
     bad_body: lowest body out of bounds, body_count if none.
-    active_effects: bits of each body: of the loads and then the supports that changed its motion,
-    CONTACT and RUBBED. limits: tensile strength, cohesion [Pa] and friction coefficient whose
-    excess in a bond is noted, without bound where an effect serves them; passed: ticks at which a
-    bond first exceeded its tensile and its shear limit, NEVER before. activity: the ``Activity``
-    of bonds whose laws act on demand, sleeping: the ``Sleeping`` of bodies; else None.
+    active_effects: bits of each body: of the loads, then the supports, then the ground that changed
+    its motion, CONTACT and RUBBED. limits: tensile strength, cohesion [Pa] and friction coefficient
+    whose excess in a bond is noted, without bound where an effect serves them; passed: ticks at
+    which a bond first exceeded its tensile and its shear limit, NEVER before. activity: the
+    ``Activity`` of bonds whose laws act on demand, sleeping: the ``Sleeping`` of bodies; else None.
     """
 
     def __init__(self, tables: Tables):
@@ -80,7 +81,8 @@ class State:
         self.active_effects = ti.field(ti.i64, shape=n)
         self.limits = ti.Vector.field(3, real, shape=())
         self.passed = ti.Vector.field(2, ti.i64, shape=bonds)
-        self.load_work = ti.Vector.field(len(tables.loads) + 1, real, shape=n)
+        accounts = len(tables.loads) + 1 + len(tables.ground)
+        self.load_work = ti.Vector.field(accounts, real, shape=n)
         self.load_impulse = ti.Vector.field(6, real, shape=n)
         self.tick = ti.field(ti.i64, shape=())
         self.bad_body = ti.field(ti.i32, shape=())
@@ -187,10 +189,13 @@ class State:
         """Bodies of the scene."""
         return int(values(self.tables.body_count))
 
-    def expose(self, topology: Topology) -> None:
-        """Put contact spheres on all outer faces from the start."""
-        marks = values(self.exposed_tick)
-        marks[4 * topology.outer_body + topology.outer_face] = 0
+    def expose(self, topology: Topology, outer: bool) -> None:
+        """Put contact spheres on faces without a bond from the start.
+
+        outer: on all of them, else on those that another body lies behind.
+        """
+        marks, chosen = values(self.exposed_tick), topology.is_open | outer
+        marks[4 * topology.outer_body[chosen] + topology.outer_face[chosen]] = 0
         assign(self.exposed_tick, marks)
 
     def motion(self) -> dict[str, np.ndarray]:

@@ -65,9 +65,21 @@ class Tables:
             single += listed
         self.loads = tuple(bound(effect, self) for effect in by_role["load"])
         self.supports = tuple(bound(effect, self) for effect in by_role["support"])
-        self.effects = (*single, *self.loads, *self.supports)
+        self.ground = tuple(bound(effect, self) for effect in by_role["ground"])
+        self.effects = (*single, *self.loads, *self.supports, *self.ground)
+        self.drives = self._drives()
         self.has_contact = self.contact is not None
         self.has_bond_heat = any(effect.name for effect in (self.tension, self.shear, self.dashpot))
+
+    def _drives(self):
+        """Loads and ground with the row of their impulse, account of work, and bit of activity."""
+        loads, held = len(self.loads), len(self.supports)
+        pushes = [(effect, e, e, e) for e, effect in enumerate(self.loads)]
+        drags = [
+            (effect, loads + e, loads + 1 + e, loads + held + e)
+            for e, effect in enumerate(self.ground)
+        ]
+        return (*pushes, *drags)
 
     def _declare_bodies(self, n):
         self.mass = ti.field(real, shape=n)

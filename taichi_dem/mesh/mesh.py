@@ -1,4 +1,4 @@
-"""Mesh of tetrahedra with named groups of outer faces, checked once at the border.
+"""Mesh of tetrahedra with named groups of faces, checked once at the border.
 
 x points to the right, y up, z towards the viewer.
 """
@@ -6,7 +6,7 @@ x points to the right, y up, z towards the viewer.
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +15,7 @@ from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import FileName, flag, shown, word
 from taichi_dem.mesh import tetrahedra as geometry
+from taichi_dem.mesh.checked_groups import checked_groups
 from taichi_dem.mesh.parts_in_files import parts_of
 from taichi_dem.mesh.weld import COINCIDENT, weld_labels
 
@@ -30,19 +31,22 @@ _LEAST_EXTENT, _MOST_EXTENT = 1e-30, 1e30
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Tetrahedra and named groups of outer faces, as ``checked_mesh`` makes them: for good.
+    """Tetrahedra and named groups of faces, as ``checked_mesh`` makes them: for good.
 
     Made directly from arrays it is checked alike, but nothing is mended. The arrays and the groups
     cannot be changed; ``dataclasses.replace`` gives another mesh.
 
     points: (point_count, 3) float64 [m].
     tetrahedra: (body_count, 4) int32 point indices, all of positive volume.
-    groups: name -> (n, 3) int32 point indices of outer faces, normals outward.
+    groups: name -> (n, 3) int32 point indices of outer faces, normals outward, or of inner faces
+    that two bodies share; inner_groups: names of the latter.
     notes: sentences about what the checks mended or found remarkable.
     source: name of the file, "" for a mesh built in memory.
     unread: groups of the file that are not of faces, pairs of name and what they are of.
     keep_coincident: points that coincide stay apart, and so do the faces on them: no bond joins
     them, as at a joint or a crack (see ``checked_mesh``).
+    bonded_shares: pairs of an inner group and the share of its faces' area that is bonded, 0 for
+    none; a Scene sets them from its options.
     Raises InputError for arrays that ``checked_mesh`` would refuse or mend.
     """
 
@@ -63,8 +67,13 @@ class Mesh:
         if mended:
             raise InputError(f"a Mesh takes what checked_mesh gives, which here {mended[0]}")
 
-    def _hold(self, points, tetrahedra, groups):
+    #: Not among the options: see ``bonded_by``.
+    bonded_shares: ClassVar[tuple[tuple[str, float], ...]] = ()
+    inner_groups: ClassVar[tuple[str, ...]] = ()
+
+    def _hold(self, points, tetrahedra, groups, inner_groups):
         """Keep arrays that cannot be written to."""
+        object.__setattr__(self, "inner_groups", inner_groups)
         for array in (points, tetrahedra, *groups.values()):
             array.setflags(write=False)
         for name, value in zip(("points", "tetrahedra"), (points, tetrahedra)):
@@ -76,7 +85,7 @@ class Mesh:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
-        self._hold(self.points, self.tetrahedra, self.groups)
+        self._hold(self.points, self.tetrahedra, self.groups, self.inner_groups)
 
     def __repr__(self):
         groups = f"groups {', '.join(self.groups)}" if self.groups else "no groups"
@@ -96,13 +105,37 @@ class Mesh:
         return len(self.points)
 
     def group_faces(self, name: str) -> np.ndarray:
-        """Outer faces of the group ``name``, shape (n, 3); InputError when there is none."""
+        """Faces of the group ``name``, shape (n, 3); InputError when there is none."""
         if not isinstance(name, str) or name not in self.groups:
             known = ", ".join(sorted(self.groups)) or "none"
             kinds = [kind for other, kind in self.unread if other == name]
             why = f" ({name} is a group of {kinds[0]}: make one of faces)" if kinds else ""
             raise InputError(f"mesh has no face group {shown(name)}{why}; its groups are: {known}")
         return self.groups[name]
+
+    def bonded_by(self, shares: Mapping[str, float]) -> "Mesh":
+        """The same mesh with only a share of the area of some inner faces bonded.
+
+        shares: name of an inner group -> share from 0, no bond, to 1; the least counts where a face
+        is in several. Raises InputError for a group that is not there, or is of outer faces.
+        """
+        if not shares and not self.bonded_shares:
+            return self
+        for name in shares:
+            self.group_faces(name)
+            if name not in self.inner_groups:
+                raise InputError(
+                    f"group {name} must be of inner faces, which two bodies share, to be unbonded "
+                    "or bonded weaker, got one of outer faces"
+                )
+        made = object.__new__(Mesh)
+        made.__dict__.update({**vars(self), "bonded_shares": tuple(sorted(shares.items()))})
+        return made
+
+    @property
+    def has_open_faces(self) -> bool:
+        """Whether faces may lie on each other that no bond joins."""
+        return self.keep_coincident or any(share == 0.0 for _, share in self.bonded_shares)
 
 
 def volumes(mesh: Mesh) -> np.ndarray:
@@ -127,11 +160,11 @@ def checked_mesh(
     """Build a Mesh from arrays; repair and report small defects, refuse others.
 
     points: (n, 3) [m].  tetrahedra: (m, 4) point indices, either orientation. groups: name -> (k,
-    3) point indices of outer faces, either orientation. weld_tolerance: points not farther apart
-    [m] become one; 0 welds nothing. keep_coincident: accept distinct points at one place; faces on
-    them are free surfaces, as of two blocks that touch, a joint or a crack, and meet by the contact
-    of outer faces. Without it such points are refused, as bodies that seem joined there would not
-    be bonded.
+    3) point indices of outer faces, or of inner ones that two bodies share, either orientation.
+    weld_tolerance: points not farther apart [m] become one; 0 welds nothing. keep_coincident:
+    accept distinct points at one place; faces on them are free surfaces, as of two blocks that
+    touch, a joint or a crack, and meet by the contact of outer faces. Without it such points are
+    refused, as bodies that seem joined there would not be bonded.
 
     Repaired: negative volumes, points without a tetrahedron, faces twice in a group.
     Raises InputError, with the numbers (counted from 0) of the defects.
@@ -162,7 +195,7 @@ def _checked(points, tetrahedra, groups, weld_tolerance, keep_coincident, notes)
     _refuse_bad_sharing(corners)
     if keep_coincident:
         _check_coincident(places, corners, weld_tolerance, notes)
-    return places, corners, _outer_groups(corners, faces, notes)
+    return places, corners, *checked_groups(corners, faces, notes)
 
 
 def welded_numbers(
@@ -334,35 +367,6 @@ def _refuse_overlap(tetrahedra):
         raise InputError(
             f"tetrahedra {_listed(rows[bad[0]] // 4)} lie on the same side of the face they share"
         )
-
-
-def _outer_groups(tetrahedra, groups, notes):
-    """Groups with their faces in outward order; refuse faces that are no outer face."""
-    faces = geometry.all_faces(tetrahedra)
-    names = list(groups)
-    number = geometry.face_numbers(np.vstack([faces, *(groups[name] for name in names)]))
-    row_of = np.full(number.max() + 1, -1)
-    row_of[number[: len(faces)]] = np.arange(len(faces))
-    row_of[np.bincount(number[: len(faces)], minlength=len(row_of)) != 1] = -1
-    result, start = {}, len(faces)
-    for name in names:
-        rows = row_of[number[start : start + len(groups[name])]]
-        start += len(rows)
-        result[name] = faces[_checked_rows(name, rows, notes)]
-    return result
-
-
-def _checked_rows(name, rows, notes):
-    """Outer faces of one group, each once, in the order of the bodies."""
-    inner = int(np.sum(rows < 0))
-    if inner:
-        raise InputError(
-            f"group {name!r}: {inner} of its {len(rows)} faces are not outer faces of the mesh"
-        )
-    once = np.unique(rows)
-    if len(once) < len(rows):
-        notes.append(f"dropped {len(rows) - len(once)} repeated faces of group {name!r}")
-    return once
 
 
 def _note_parts(tetrahedra, notes):

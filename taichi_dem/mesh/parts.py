@@ -8,8 +8,8 @@ from typing import Any, Union
 import numpy as np
 
 from taichi_dem.mesh.mesh import Mesh
-from taichi_dem.mesh.tetrahedra import components, shared_faces
-from taichi_dem.mesh.topology import faces_of_group, topology_of
+from taichi_dem.mesh.tetrahedra import components
+from taichi_dem.mesh.topology import bonded_bodies, faces_of_group, topology_of
 
 #: How far a part may come by deforming and breaking, as a share of its longest side. Nobody can
 #: know before the run; so parts count as near each other up to the length of one of them.
@@ -18,8 +18,8 @@ NEARNESS = 0.5
 
 def parts_of(mesh: Mesh) -> np.ndarray:
     """Number of the part of each body, from 0, (body_count,)."""
-    bonded = shared_faces(mesh.tetrahedra) // 4
-    return np.unique(components(mesh.body_count, bonded), return_inverse=True)[1].reshape(-1)
+    joined = components(mesh.body_count, bonded_bodies(mesh))
+    return np.unique(joined, return_inverse=True)[1].reshape(-1)
 
 
 def part_boxes(corners: np.ndarray, part: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

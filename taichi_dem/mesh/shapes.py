@@ -63,6 +63,7 @@ def with_neighbours(edge: float, heights: Mapping[int, float]) -> tuple[Mesh, np
     corners = alone.points[alone.tetrahedra[0]]
     points, bodies, outward = [*corners], [[0, 1, 2, 3]], []
     for k, height in heights.items():
+        positive("height of a neighbour", height)
         face = [j for j in range(4) if j != k]
         bodies.append([*face, len(points)])
         away = corners[face].mean(axis=0) - corners[k]

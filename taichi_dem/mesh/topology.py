@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichi_dem.kit.display import by_fields
+from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import product, transposed
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.mesh import Mesh
@@ -17,13 +18,15 @@ from taichi_dem.mesh.mesh import Mesh
 
 @dataclass(frozen=True, eq=False)
 class Topology:
-    """Shared faces (bonds) and outer faces of a mesh.
+    """Bonds, which are shared faces, and free faces of a mesh.
 
     master, slave: (bond_count,) int32 bodies, master < slave; sorted by (master, slave).
     master_face, slave_face: (bond_count,) int32 local faces.
     vertices: (bond_count, 3) int32 points of the face; right-hand normal out of the master.
     body_bond: (body_count, 4) int32 bond at local face f, -1 at an outer face.
-    outer_body, outer_face: (outer_count,) int32 body and local face of the outer faces.
+    outer_body, outer_face: (outer_count,) int32 body and local face of the free faces.
+    is_open: (outer_count,) whether another body lies behind the free face: no bond joins them.
+    bonded_share: (bond_count,) share of the face's area that is bonded (``Mesh.bonded_by``).
     Source: Konno et al., section 2.1 (master is the body of lower index).
     """
 
@@ -35,6 +38,8 @@ class Topology:
     body_bond: np.ndarray
     outer_body: np.ndarray
     outer_face: np.ndarray
+    is_open: np.ndarray
+    bonded_share: np.ndarray
 
     def __repr__(self):
         return by_fields(self)
@@ -46,19 +51,22 @@ class Topology:
 
     @property
     def outer_count(self) -> int:
-        """Number of faces that belong to one body only."""
+        """Number of faces without a bond."""
         return len(self.outer_body)
 
 
 def topology_of(mesh: Mesh) -> Topology:
     """Match the faces of all bodies."""
-    rows = geometry.shared_faces(mesh.tetrahedra)
-    rows = rows[np.lexsort((rows[:, 1] // 4, rows[:, 0] // 4))].astype(np.int32)
+    rows, share = _bonded_faces(mesh)
+    order = np.lexsort((rows[:, 1] // 4, rows[:, 0] // 4))
+    rows, share = rows[order].astype(np.int32), share[order]
     body, face = rows // 4, rows % 4
     body_bond = np.full((mesh.body_count, 4), -1, dtype=np.int32)
     for side in (0, 1):
         body_bond[body[:, side], face[:, side]] = np.arange(len(rows))
     outer_body, outer_face = np.nonzero(body_bond < 0)
+    shared = np.zeros(4 * mesh.body_count, dtype=bool)
+    shared[geometry.shared_faces(mesh.tetrahedra).ravel()] = True
     return Topology(
         master=body[:, 0].copy(),
         slave=body[:, 1].copy(),
@@ -68,7 +76,34 @@ def topology_of(mesh: Mesh) -> Topology:
         body_bond=body_bond,
         outer_body=outer_body.astype(np.int32),
         outer_face=outer_face.astype(np.int32),
+        is_open=shared[4 * outer_body + outer_face],
+        bonded_share=share,
     )
+
+
+def bonded_bodies(mesh: Mesh) -> np.ndarray:
+    """Pairs of bodies that a bond joins, (n, 2)."""
+    return _bonded_faces(mesh)[0] // 4
+
+
+def _bonded_faces(mesh):
+    """Pairs of faces 4 * body + f with a bond, (n, 2), and the share of each that is bonded, (n,).
+
+    The least share of the groups that a face is in; all of one in none.
+    """
+    rows = geometry.shared_faces(mesh.tetrahedra)
+    share = np.ones(len(rows))
+    if mesh.bonded_shares:
+        faces = geometry.all_faces(mesh.tetrahedra)[rows[:, 0]]
+        groups = [mesh.group_faces(name) for name, _ in mesh.bonded_shares]
+        number = geometry.face_numbers(np.vstack([faces, *groups]))
+        of_face, start = np.ones(number.max() + 1), len(faces)
+        for (_, least), group in zip(mesh.bonded_shares, groups):
+            mine = number[start : start + len(group)]
+            of_face[mine] = np.minimum(of_face[mine], least)
+            start += len(group)
+        share = of_face[number[: len(faces)]]
+    return rows[share > 0.0], share[share > 0.0]
 
 
 def face_vertices(mesh: Mesh, body: np.ndarray, face: np.ndarray) -> np.ndarray:
@@ -82,15 +117,39 @@ def face_vertices(mesh: Mesh, body: np.ndarray, face: np.ndarray) -> np.ndarray:
 def faces_of_group(mesh: Mesh, topology: Topology, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Body and local face of every face of a group, two arrays (n,) int32, in the group's order.
 
-    Raises InputError when the mesh has no such group.
+    Of inner faces without bonds both sides, one after the other. Raises InputError when the mesh
+    has no such group, or bonds join its faces.
     """
     wanted = mesh.group_faces(name)
+    check_free(mesh, name)
+    if name in mesh.inner_groups:
+        return _sides_of(mesh, topology, wanted)
     outer = face_vertices(mesh, topology.outer_body, topology.outer_face)
     number = geometry.face_numbers(np.vstack([outer, wanted]))
     index_of = np.full(number.max() + 1, -1)
     index_of[number[: len(outer)]] = np.arange(len(outer))
     index = index_of[number[len(outer) :]]
     return topology.outer_body[index], topology.outer_face[index]
+
+
+def check_free(mesh: Mesh, name: str) -> None:
+    """Raise InputError for a group of inner faces that bonds join: nothing acts on them."""
+    if name in mesh.inner_groups and (name, 0.0) not in mesh.bonded_shares:
+        raise InputError(
+            f"group {name} must be of outer faces, or unbonded (Scene(unbonded=[{name!r}])), "
+            "got inner faces that are bonded"
+        )
+
+
+def _sides_of(mesh, topology, wanted):
+    """Free faces on both sides of inner faces, body and local face."""
+    outer = face_vertices(mesh, topology.outer_body, topology.outer_face)
+    number = geometry.face_numbers(np.vstack([outer, wanted]))
+    place = np.full(number.max() + 1, -1)
+    place[number[len(outer) :]] = np.arange(len(wanted))
+    found = np.flatnonzero(place[number[: len(outer)]] >= 0)
+    found = found[np.argsort(place[number[found]], kind="stable")]
+    return topology.outer_body[found], topology.outer_face[found]
 
 
 def body_properties(mesh: Mesh, density: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

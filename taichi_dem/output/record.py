@@ -102,6 +102,8 @@ class Recorder:
             row["monitor_displacement_mm"] = 1e3 * monitor
         row["broken_faces"] = int((self.state.broken_tick.to_numpy() != NEVER).sum())
         row.update({f"{name}_J": account[name] for name in ENERGY_COLUMNS})
+        if self.model.ground:
+            row["ground_dashpot_J"] = account["ground_dashpot"]
         row["smallest_step_s"] = sim.method.dt0 / 2.0 ** int(motion["level"].max())
         row["load_work_J"], row["support_work_J"] = account["load_work"], account["support_work"]
         speed = np.linalg.norm(motion["velocity"], axis=1)

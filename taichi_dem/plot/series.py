@@ -20,6 +20,7 @@ _TERMS = {
     "release_J": ("release", "#5C1A00"),
     "sphere_dashpot_J": ("sphere dashpots", "#C7E5B4"),
     "friction_J": ("friction", "#3E9B52"),
+    "ground_dashpot_J": ("ground dashpots", "#8C8C8C"),
 }
 _GIVEN = {
     "gas_work_J": ("gas work", "black", "--"),
@@ -84,7 +85,8 @@ def plot_history(path: FileName, history: Mapping[str, np.ndarray]) -> None:
 def plot_energy(path: FileName, history: Mapping[str, np.ndarray]) -> None:
     """Energy account: where the work went, every term by size, and what is unexplained."""
     time = 1e3 * history["time_s"]
-    terms = {key: look for key, look in _TERMS.items() if np.abs(history[key]).max() > 0.0}
+    present = {key: look for key, look in _TERMS.items() if key in history}
+    terms = {key: look for key, look in present.items() if np.abs(history[key]).max() > 0.0}
     with picture(
         path, 2, 2, size=(10.8, 5.6), sharex=True, gridspec_kw={"height_ratios": [3.2, 1]}
     ) as (figure, panels):

@@ -35,7 +35,10 @@ _ENERGIES: dict[str, Any] = {
     "kinetic": (("kinetic",), {"color": "#08306B"}),
     "strain": (("bond_strain", "sphere_strain"), {"color": "#3A87C2"}),
     "dissipated": (
-        ("bond_dashpot", "softening", "release", "slip", "sphere_dashpot", "friction"),
+        (
+            *("bond_dashpot", "softening", "release", "slip", "sphere_dashpot", "friction"),
+            "ground_dashpot",
+        ),
         {"color": "#E6700F"},
     ),
 }
@@ -141,9 +144,12 @@ def _draw_curves(panels, history):
     time_s = history.get("time_s", np.zeros(0))
     factor, unit = scale(_largest(time_s), "s")
     none = np.full(len(time_s), np.nan)
-    sums = [
-        sum(history.get(f"{term}_J", none) for term in terms) for terms, _ in _ENERGIES.values()
+    # A term that no effect of the scene has is no column.
+    known = [
+        [history[f"{term}_J"] for term in terms if f"{term}_J" in history]
+        for terms, _ in _ENERGIES.values()
     ]
+    sums = [sum(columns) if columns else none for columns in known]
     per_joule, joule = scale(max(map(_largest, sums)), "J")
     for (name, (_, look)), values in zip(_ENERGIES.items(), sums):
         _line(panels["energy"], factor * time_s, per_joule * values, label=name, **look)

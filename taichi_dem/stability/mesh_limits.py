@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from taichi_dem.elasticity.bond_rules import Constant, per_bond
 from taichi_dem.kit.fixed_order import (
     inverse_factor,
     largest_eigenvalues,
@@ -19,18 +20,18 @@ from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.topology import Topology, body_properties, face_vertices
 
 
-def dashpots_of(material: Material) -> tuple[float, float]:
-    """Normal and tangential damping per area of a bond [Pa s/m]."""
+def dashpots_of(material: Material) -> tuple[Constant, Constant]:
+    """Normal and tangential dashpot per area of bonds [Pa s/m], numbers or rules."""
     return material.normal_damping, material.shear_damping
 
 
-def springs_of(material: Material) -> tuple[float, float]:
-    """Normal and tangential stiffness per area of a bond [Pa/m]."""
+def springs_of(material: Material) -> tuple[Constant, Constant]:
+    """Normal and tangential stiffness per area of bonds [Pa/m], numbers or rules."""
     return material.normal_stiffness, material.shear_stiffness
 
 
 def bond_rates(
-    mesh: Mesh, topology: Topology, density: float, coefficients: tuple[float, float]
+    mesh: Mesh, topology: Topology, density: float, coefficients: tuple[Constant, Constant]
 ) -> np.ndarray:
     """Largest eigenvalue of M^-1/2 G M^-1/2 of every body, shape (body_count,).
 
@@ -38,8 +39,8 @@ def bond_rates(
     neighbours stand still: the sum of (A / 3) J^T diag(normal, tangential) J over the three
     contact units of each bonded face, J the map from (velocity, spin) to the velocity at the
     vertex (Konno et al., section 2.1, units at the vertices).  M holds mass and inertia.
-    coefficients: normal and tangential coefficient per area; [Pa s/m] gives rates [1/s],
-    [Pa/m] gives squared angular frequencies [1/s2].
+    coefficients: normal and tangential coefficient per area, numbers or rules (``springs_of``);
+    [Pa s/m] gives rates [1/s], [Pa/m] gives squared angular frequencies [1/s2].
     """
     return subset_rates(mesh, topology, density, coefficients, subsets=(15,))[:, 0]
 
@@ -48,7 +49,7 @@ def subset_rates(
     mesh: Mesh,
     topology: Topology,
     density: float,
-    coefficients: tuple[float, float],
+    coefficients: tuple[Constant, Constant],
     subsets: Sequence[int] = range(16),
 ) -> np.ndarray:
     """``bond_rates`` with only some of a body's bonds intact, shape (body_count, len(subsets)).
@@ -57,7 +58,8 @@ def subset_rates(
     """
     mass, centre, inertia = body_properties(mesh, density)
     body, face = np.nonzero(topology.body_bond >= 0)
-    blocks = _face_blocks(mesh, body, face, centre[body], coefficients)
+    laws = per_bond(mesh, topology, density, coefficients)[topology.body_bond[body, face]]
+    blocks = _face_blocks(mesh, body, face, centre[body], laws)
     root = inverse_root(mass, inertia)
     rates = np.zeros((mesh.body_count, len(subsets)))
     for column, subset in enumerate(subsets):
@@ -69,14 +71,13 @@ def subset_rates(
 
 
 def _face_blocks(mesh, body, face, centre, coefficients):
-    """The block G of single faces, shape (n, 6, 6)."""
+    """The block G of single faces, shape (n, 6, 6); coefficients: of each, (n, 2)."""
     vertices = face_vertices(mesh, body, face)
     vector = geometry.area_vectors(mesh.points, vertices)
     area = length(vector)
     normal = vector / area[:, None]
-    law = coefficients[1] * np.eye(3) + (coefficients[0] - coefficients[1]) * (
-        normal[:, :, None] * normal[:, None, :]
-    )
+    normally, across = coefficients[:, 0, None, None], coefficients[:, 1, None, None]
+    law = across * np.eye(3) + (normally - across) * (normal[:, :, None] * normal[:, None, :])
     arms = mesh.points[vertices] - centre[:, None]
     return area[:, None, None] / 3.0 * point_blocks(arms, law)
 

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import length
-from taichi_dem.materials import Material
+from taichi_dem.materials import Material, material_on
 from taichi_dem.mesh.contact_spheres import spheres_of_faces
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.tetrahedra import all_faces, area_vectors
@@ -220,7 +220,7 @@ def step_report(scene: Union[Scene, Mesh], material: Optional[Material] = None) 
 
 
 def _report(mesh, material, damped, friction, divisions, warnings=()):
-    topology = topology_of(mesh)
+    topology, material = topology_of(mesh), material_on(mesh, material)
     rates = bond_rates(mesh, topology, material.density, springs_of(material))
     limits = {"bond_stiffness": spring_step(rates)}
     if damped:

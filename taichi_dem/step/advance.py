@@ -17,6 +17,7 @@ from taichi_dem.physics.rotation import mean_spin, rotation_matrix, spin_of, tur
 from taichi_dem.stability.body_limits import RELEASE
 from taichi_dem.step.bond_laws import BondLaws
 from taichi_dem.step.contact_force import ContactForce
+from taichi_dem.step.ground import GroundDashpots
 from taichi_dem.step.tangential_springs import TangentialSprings
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ class Advance(BondLaws, ContactForce):
         self.on_demand = state.activity.laws if tables.on_demand else (False, False)
         # Where both laws act on demand, none is missing and none is to be watched for.
         self.notes_limits = not all(self.on_demand)
+        self.ground = GroundDashpots(tables, state)
         self.solver, self.solves = solver, solver is not None
         self.solves_bonds = self.solves and solver.has_bonds
         self.contacts = contacts
@@ -89,7 +91,7 @@ class Advance(BondLaws, ContactForce):
                 traction = vec3(pull, shear[0], shear[1])
                 if ti.static(self.has_dashpot):
                     velocity = unit_velocity(motion, arm)
-                    drag = self.tables.dashpot.traction(velocity)
+                    drag = self.tables.dashpot.traction(b, velocity)
                     if ti.static(self.limited):
                         drag *= scale
                     traction += drag
@@ -211,7 +213,7 @@ class Advance(BondLaws, ContactForce):
             motion = self.solver.bonds.mean(b, motion)
         for q in range(3):
             velocity = unit_velocity(motion, unit_arm(motion, self.tables.vertex_slave[3 * b + q]))
-            power += scale * self.tables.dashpot.traction(velocity).dot(velocity)
+            power += scale * self.tables.dashpot.traction(b, velocity).dot(velocity)
         return power * self.tables.unit_area[b]
 
     @ti.func
@@ -304,14 +306,16 @@ class Advance(BondLaws, ContactForce):
     def _kicked(self, i, elapsed, linear, angular):
         """Velocity and angular momentum after all impulses, as the supports allow; books work."""
         linear, angular, kick = self._loaded(i, elapsed, linear, angular)
+        if ti.static(self.ground.present):
+            linear, angular, kick = self.ground.brake(i, elapsed, linear, angular, kick)
         velocity = self.state.velocity[i] + linear * self.tables.mass_inverse[i]
         momentum = self.state.angular_momentum[i] + angular
         return self._supported(i, elapsed, kick, velocity, momentum)
 
     @ti.func
     def _loaded(self, i, elapsed, linear, angular):
-        """Impulse and moment with those of the loads added, and each load's own, a row each."""
-        kick = ti.Matrix.zero(real, ti.static(max(1, len(self.tables.loads))), 6)
+        """Impulse and moment with those of the loads added, and a row for each of ``drives``."""
+        kick = ti.Matrix.zero(real, ti.static(max(1, len(self.tables.drives))), 6)
         motion = self.state.body_motion(i, self._load_time(elapsed), elapsed)
         for e in ti.static(range(len(self.tables.loads))):
             if self.tables.loads[e].acts_on(i):
@@ -338,15 +342,15 @@ class Advance(BondLaws, ContactForce):
 
     @ti.func
     def _book_loads(self, i, kick, velocity, momentum):
-        """Book work and impulse of the loads on body i, at a mean velocity and angular momentum."""
-        for e in ti.static(range(len(self.tables.loads))):
-            if self.tables.loads[e].acts_on(i):
+        """Book loads and ground of body i at a mean velocity and angular momentum."""
+        for effect, e, account, bit in ti.static(self.tables.drives):
+            if effect.acts_on(i):
                 push = vec3(kick[e, 0], kick[e, 1], kick[e, 2])
                 twist = vec3(kick[e, 3], kick[e, 4], kick[e, 5])
                 if push.norm_sqr() + twist.norm_sqr() > 0.0:
-                    self.state.note_active(i, ti.i64(1 << e))
+                    self.state.note_active(i, ti.i64(1 << bit))
                 work = push.dot(velocity) + twist.dot(self.spin(i, momentum))
-                self._book(i, e, work, push, twist)
+                self._book(i, account, work, push, twist)
 
     @ti.func
     def spin(self, i, momentum):

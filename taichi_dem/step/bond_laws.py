@@ -82,7 +82,7 @@ class BondLaws:
             opening = unit_opening(motion, arm, self.tables.vertex_master[u])
             before = opening - last * unit_velocity(motion, arm)
             pull = vec3(stiffness[0], stiffness[1], stiffness[1]) * before
-            force += pull + self.tables.dashpot.traction(before / elapsed)
+            force += pull + self.tables.dashpot.traction(b, before / elapsed)
             energy += 0.5 * pull.dot(opening)
         return self.tables.unit_area[b] * vec2(elapsed * force.norm(), ti.abs(energy))
 

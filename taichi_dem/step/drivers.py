@@ -217,7 +217,8 @@ class SolvedStep(Step):
         if self.has_contact:
             pairs = tuple((PairColour(solver.pairs, c), solver.pair) for c in range(COLOURS))
             pairs += ((Once(), solver.last_pairs),)
-        return (*bonds, *pairs, (Once(), solver.check_convergence))
+        ground = ((self.schedule.bodies, solver.joined),) if solver.has_ground else ()
+        return (*bonds, *pairs, *ground, (Once(), solver.check_convergence))
 
     def repeats(self, part: int) -> bool:
         """Whether a part, the sweep, is called for once more."""

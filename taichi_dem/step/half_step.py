@@ -22,6 +22,7 @@ class HalfStep:
     def __init__(self, advance: Advance):
         self.advance, self.tables, self.state = advance, advance.tables, advance.state
         self.schedule, self.staggered = advance.schedule, advance.staggered
+        self.ground = advance.ground
 
     @ti.func
     def is_due(self, i):
@@ -44,18 +45,18 @@ class HalfStep:
         return held
 
     @ti.func
-    def impulse(self, i, linear, angular):
-        """Impulse and moment on body i by which it is behind, and those of each load, a row each.
+    def impulse(self, i, linear, angular, back):
+        """Impulse and moment on body i by which it is behind, and a row for each of ``drives``.
 
         linear [N s], angular [N m s]: of its contacts, from ``Readings.pushes``. A bond adds half
         of what waits in its slot, also where the other body steps finer: the impulses of all but
-        the last of its steps have been taken.
+        the last of its steps have been taken. back: 1 where the body is to be set back.
         """
         for f in range(4):
             linear += 0.5 * self.state.slot[4 * i + f][0:3]
             angular += 0.5 * self.state.slot[4 * i + f][3:6]
         half = 0.5 * self.schedule.own_step(i)
-        kick = ti.Matrix.zero(real, ti.static(max(1, len(self.tables.loads))), 6)
+        kick = ti.Matrix.zero(real, ti.static(max(1, len(self.tables.drives))), 6)
         step = self.schedule.own_step(i)
         motion = self.state.body_motion(i, self.schedule.seconds(self.state.tick[None]), step)
         for e in ti.static(range(len(self.tables.loads))):
@@ -65,6 +66,12 @@ class HalfStep:
                 angular += twist * half
                 for k in ti.static(range(3)):
                     kick[e, k], kick[e, 3 + k] = push[k] * half, twist[k] * half
+        if ti.static(self.ground.present):
+            rows = 0.5 * self.ground.impulses(i, step, 2.0 * linear, 2.0 * angular)
+            if back == 1:
+                rows = self.ground.impulses_before(i, half)
+            pushed, turned = self.ground.total(rows)
+            linear, angular, kick = linear + pushed, angular + turned, self.ground.noted(kick, rows)
         return linear, angular, kick
 
     @ti.func
@@ -81,14 +88,14 @@ class HalfStep:
         """Velocity [m/s] and angular momentum [kg m^2/s] of body i now, and works in half a step.
 
         pushed, turned: impulse [N s] and moment [N m s] of its contacts in half a step. Works [J]:
-        of each load, and of all supports last. back: 1 to set the body, whose motion is
+        of each load, of all supports, and of each ground. back: 1 to set the body, whose motion is
         given at time zero, half a step back instead; held bodies stay.
         """
-        account = ti.Vector.zero(real, ti.static(len(self.tables.loads) + 1))
+        account = ti.Vector.zero(real, ti.static(len(self.tables.drives) + 1))
         before, spun = self.state.velocity[i], self.state.angular_momentum[i]
         velocity, momentum = before, spun
         if self.is_due(i) == 1:
-            linear, angular, kick = self.impulse(i, pushed, turned)
+            linear, angular, kick = self.impulse(i, pushed, turned, back)
             linear *= self.tables.mass_inverse[i]
             if back == 1:
                 self.state.velocity[i], self.state.angular_momentum[i] = (
@@ -100,10 +107,10 @@ class HalfStep:
                 velocity, momentum = self.held(i, before + linear, spun + angular)
                 mean = 0.5 * (before + velocity)
                 turning = self.advance.spin(i, 0.5 * (spun + momentum))
-                for e in ti.static(range(len(self.tables.loads))):
+                for _effect, e, place, _bit in ti.static(self.tables.drives):
                     for k in ti.static(range(3)):
                         work = kick[e, k] * mean[k] + kick[e, 3 + k] * turning[k]
-                        account[e] = account[e] + work
+                        account[place] = account[place] + work
                 if ti.static(len(self.tables.supports) > 0):
                     push = self.tables.mass[i] * (velocity - (before + linear))
                     work = push.dot(mean) + (momentum - (spun + angular)).dot(turning)

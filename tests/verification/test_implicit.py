@@ -36,7 +36,8 @@ def damped(rig, share):
     Returns the square of the frequency 2 k A / m and the damping rate 2 c A / m, in 1/s^2 and 1/s.
     """
     law = share * np.array([CONCRETE.normal_damping, CONCRETE.shear_damping])
-    rig.simulation.tables.dashpot.law.from_numpy(law)
+    coefficient = rig.simulation.tables.dashpot.coefficient
+    coefficient.from_numpy(np.tile(law, (*coefficient.shape, 1)))
     per_mass = 2.0 * 3.0 * rig.simulation.tables.unit_area[0] / rig.simulation.model.body_mass[0]
     return CONCRETE.normal_stiffness * per_mass, law[0] * per_mass
 

@@ -23,6 +23,9 @@ class SolvedAdvance(Advance):
         elapsed = self.schedule.elapsed(i)
         linear, angular = self._gathered(i)
         linear, angular, _ = self._loaded(i, elapsed, linear, angular)
+        if ti.static(self.ground.present):
+            pushed, twisted = self.ground.total(self.solver.ground.impulse[i])
+            linear, angular = linear + pushed, angular + twisted
         self.solver.velocities.predict(i, self, linear, angular)
         raise_to(self.solver.speed2, self.state.velocity[i].norm_sqr())
 
@@ -32,6 +35,8 @@ class SolvedAdvance(Advance):
         elapsed = self.schedule.elapsed(i)
         velocity, momentum = self.solver.velocities.found(i)
         _, _, kick = self._loaded(i, elapsed, zero3(), zero3())
+        if ti.static(self.ground.present):
+            kick = self.ground.noted(kick, self.solver.ground.impulse[i])
         velocity, momentum = self._supported(i, elapsed, kick, velocity, momentum)
         spin = self.spin(i, momentum)
         self._drift(i, elapsed, velocity, momentum, spin)

@@ -135,7 +135,7 @@ class BondDashpots:
     def _refresh(self, b, k, i, j):
         dt = self.schedule.step_seconds[0]
         axes = self.tables.bond_frame[b] @ self.state.rotation[i].transpose()
-        along = self.tables.dashpot.traction(vec3(1.0, 1.0, 1.0))
+        along = self.tables.dashpot.traction(b, vec3(1.0, 1.0, 1.0))
         # A trace of the springs keeps the block invertible where a coefficient is zero.
         stiffness = self.tables.bond_stiffness[b]
         along += 1e-9 * dt * vec3(stiffness[0], stiffness[1], stiffness[1])

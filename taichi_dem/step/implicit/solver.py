@@ -10,6 +10,7 @@ from taichi_dem.kit.allocation import assign, raise_to
 from taichi_dem.kit.types import real
 from taichi_dem.methods import ImplicitDashpots
 from taichi_dem.step.implicit.bonds import BondDashpots
+from taichi_dem.step.implicit.ground import GroundSweeps
 from taichi_dem.step.implicit.pairs import COLOURS, PairDashpots
 from taichi_dem.step.implicit.velocities import Velocities
 
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 @ti.data_oriented
 class Solver:
-    """Gauss-Seidel over bonds with dashpots, then touching pairs, in the order of their colours.
+    """Gauss-Seidel over bonds with dashpots, touching pairs, by their colours, then the ground.
 
     Members of one colour share no body: they may be visited in parallel, and their order changes no
     bit. So one core and many cores run the same sweeps to the same bits.
@@ -46,6 +47,9 @@ class Solver:
         self.has_bonds = bool(tables.dashpot.name)
         if self.has_bonds:
             self.bonds = BondDashpots(tables, state, schedule, self.velocities)
+        self.has_ground = bool(tables.ground)
+        if self.has_ground:
+            self.ground = GroundSweeps(tables, state, schedule, self.velocities)
         self.pairs = None
         self.has_contact = contacts is not None
         if contacts is not None:
@@ -84,6 +88,9 @@ class Solver:
             if ti.static(self.has_contact):
                 for a in range(self.pairs.count[None]):
                     self.pair(self.pairs.order[a])
+            if ti.static(self.has_ground):
+                for a in range(self.schedule.bodies.count(0)):
+                    self.joined(self.schedule.bodies.pick(a))
             self.check_convergence(0)
 
     @ti.func
@@ -95,6 +102,11 @@ class Solver:
     def pair(self, a):
         """Visit the touching spheres of the pair at place a."""
         raise_to(self.change2, self.pairs.visit(self.pairs.active[a]))
+
+    @ti.func
+    def joined(self, i):
+        """Visit the dashpots between body i and the ground."""
+        raise_to(self.change2, self.ground.visit(i))
 
     @ti.func
     def last_pairs(self, one):

@@ -123,6 +123,16 @@ class Velocities:
             self.twist[j][3 + k] = self.twist[j][3 + k] - back[k]
 
     @ti.func
+    def push(self, i, force, moment):
+        """Apply an impulse and a moment at its centre to body i."""
+        velocity, spin = self.slack(i) @ force, self.turn[i] @ moment
+        if ti.static(self.has_supports):
+            self._add_impulse(i, force, moment)
+        for k in ti.static(range(3)):
+            self.twist[i][k] = self.twist[i][k] + velocity[k]
+            self.twist[i][3 + k] = self.twist[i][3 + k] + spin[k]
+
+    @ti.func
     def _add_impulse(self, i, impulse, moment):
         for k in ti.static(range(3)):
             self.given[i][k] = self.given[i][k] + impulse[k]

@@ -1,0 +1,1 @@
+"""Constants of bonds from the strengths and moduli that specimens of a mesh are to show."""

@@ -1,0 +1,114 @@
+"""Pressure on a group of outer faces, and its history."""
+
+from abc import abstractmethod
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import taichi as ti
+
+from taichi_dem.effects.base import Effect
+from taichi_dem.effects.history import History, history_points
+from taichi_dem.kit.allocation import assign
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import finite, positive, shown, word
+from taichi_dem.materials import Material
+from taichi_dem.mesh.tetrahedra import area_vectors
+from taichi_dem.mesh.topology import face_vertices, faces_of_group
+from taichi_dem.physics.rotation import zero3
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.capacity import Capacity
+    from taichi_dem.engine.model import Model
+
+
+@ti.data_oriented
+class FacePressure(Effect):
+    """Base of loads that push on the faces of a group along their current normal.
+
+    A derived class has ``pressure(t)``, in Pa at a time [s]. The area stays the mesh's.
+    """
+
+    role = "load"
+
+    @abstractmethod
+    def pressure(self, t: Any) -> Any:
+        """Pressure [Pa] at a time [s]; a ti.func."""
+
+    def declare(self, capacity: "Capacity") -> None:
+        """Loaded faces of every body: area vectors [m^2] and arms from the centre [m]."""
+        self.first = ti.field(ti.i32, shape=capacity.bodies + 1)
+        self.area = ti.Vector.field(3, ti.f64, shape=capacity.faces)
+        self.arm = ti.Vector.field(3, ti.f64, shape=capacity.faces)
+
+    def load(self, model: "Model") -> None:
+        """Find the loaded faces; InputError when the mesh has no such group."""
+        body, face = faces_of_group(model.mesh, model.topology, self.group)
+        order = np.argsort(body, kind="stable")
+        body = body[order]
+        corners = face_vertices(model.mesh, body, face[order])
+        assign(self.first, np.searchsorted(body, np.arange(model.body_count + 1)))
+        assign(self.area, area_vectors(model.mesh.points, corners))
+        assign(self.arm, model.mesh.points[corners].mean(axis=1) - model.centre[body])
+
+    @ti.func
+    def acts_on(self, i):
+        """Nonzero for a body with a face in the group."""
+        return self.first[i + 1] - self.first[i]
+
+    @ti.func
+    def wrench(self, i, motion):
+        """Force [N] and torque about the centre [N m] on body i in a motion."""
+        pressure = self.pressure(motion.time)
+        force, torque = zero3(), zero3()
+        for k in range(self.first[i], self.first[i + 1]):
+            push = -pressure * self.area[k]
+            force += push
+            torque += self.arm[k].cross(push)
+        return motion.rotation @ force, motion.rotation @ torque
+
+
+@ti.data_oriented
+class Pressure(FacePressure):
+    """Pressure on the faces of a group along their current normal, also after they came loose.
+
+    group: name of a group of outer faces, or of inner ones without bonds, whose both sides it
+    pushes apart. values [Pa] at times [s]: linear between them, and constant before the first and
+    after the last; a single number is a constant pressure from time zero. Negative values pull.
+    Raises InputError for times that do not rise, or as many values as there are not times.
+    """
+
+    name = "pressure"
+
+    def __init__(self, group: str, values: Any, times: Any = (0.0,)):
+        self.group = word("group", group)
+        points = (values,) if finite(values) else values
+        self.times, self.values = history_points(times, points)
+
+    @classmethod
+    def triangle(cls, group: str, peak: float, rise: float, fall: float) -> "Pressure":
+        """A triangular pulse: up to peak [Pa] in a time rise [s], which may be 0, down in fall."""
+        rise, fall = positive("rise", rise, zero_allowed=True), positive("fall", fall)
+        if not finite(peak) or peak == 0.0:
+            raise InputError(f"peak must be a finite number other than 0, got {shown(peak)}")
+        times, values = [0.0, rise, rise + fall], [0.0, peak, 0.0]
+        first = 0 if rise > 0.0 else 1
+        return cls(group, values[first:], times[first:])
+
+    def stress(self, material: Material, size: float) -> float:
+        """The largest pressure."""
+        return max(map(abs, self.values))
+
+    def declare(self, capacity: "Capacity") -> None:
+        """The loaded faces, and the history."""
+        super().declare(capacity)
+        self.history = History()
+
+    def load(self, model: "Model") -> None:
+        """Find the loaded faces and load the history; InputError for an unknown group."""
+        super().load(model)
+        self.history.load(self.times, self.values)
+
+    @ti.func
+    def pressure(self, t):
+        """Pressure [Pa] at a time [s]."""
+        return self.history.at(t)

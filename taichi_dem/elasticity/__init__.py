@@ -1,0 +1,1 @@
+"""Elasticity of bonded tetrahedra: constants of bonds from moduli, and those of a mesh."""

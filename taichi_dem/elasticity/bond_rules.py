@@ -1,0 +1,195 @@
+"""Constants of bonds and contacts that follow from moduli and the size of the bodies (NumPy only).
+
+A constant of a ``Material`` is a number, the same for all bonds, or a rule of this module. With
+stiffness = modulus / distance the modulus of a block does not depend on the size of its elements.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Union
+
+import numpy as np
+
+from taichi_dem.kit.display import by_fields
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.fixed_order import dot, length
+from taichi_dem.kit.validation import plain_fields, positive
+from taichi_dem.mesh.mesh import Mesh, volumes
+from taichi_dem.mesh.tetrahedra import all_faces, area_vectors
+from taichi_dem.mesh.topology import Topology, body_properties
+
+#: Contact spheres that share the stiffness of a face: those of five divisions.
+FACE_SPHERES = 6
+
+
+@dataclass(frozen=True, eq=False)
+class BondGeometry:
+    """Sizes of bonds, arrays (bond_count,).
+
+    distance: of the centres of the two bodies along the normal of their face [m]. area: of the face
+    [m^2]. pair_mass: m1 m2 / (m1 + m2) of the two bodies [kg].
+    """
+
+    distance: np.ndarray
+    area: np.ndarray
+    pair_mass: np.ndarray
+
+    def __repr__(self):
+        return by_fields(self)
+
+
+def bond_geometry(mesh: Mesh, topology: Topology, density: float) -> BondGeometry:
+    """Sizes of all bonds of a mesh; density [kg/m3]."""
+    mass, centre, _ = body_properties(mesh, density)
+    vector = area_vectors(mesh.points, topology.vertices)
+    area = length(vector)
+    master, slave = topology.master, topology.slave
+    distance = dot(centre[slave] - centre[master], vector) / area
+    pair_mass = mass[master] * mass[slave] / (mass[master] + mass[slave])
+    return BondGeometry(distance, area, pair_mass)
+
+
+class Rule:
+    """Base of rules: a constant that depends on the sizes of the bodies."""
+
+    def __repr__(self) -> str:
+        return by_fields(self)
+
+    def __float__(self) -> float:
+        raise InputError(
+            f"this needs a material of constants per area, got {self}, which depends on the mesh"
+        )
+
+
+class BondRule(Rule):
+    """Base of rules for a constant that each bond has of its own."""
+
+    def per_bond(self, bonds: BondGeometry) -> np.ndarray:
+        """The constant of every bond, per area, (bond_count,)."""
+        raise NotImplementedError
+
+
+class ContactRule(Rule):
+    """Base of rules for a constant of sphere contacts, one number a mesh."""
+
+    def of_mesh(self, mesh: Mesh, density: float) -> float:
+        """The constant for the bodies of a mesh; density [kg/m3]."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, repr=False)
+class ModulusOverDistance(BondRule):
+    """Stiffness of a bond per area [Pa/m]: a modulus [Pa] over the distance of the two bodies.
+
+    Raises InputError unless the modulus is a positive number.
+    """
+
+    modulus: float
+
+    def __post_init__(self):
+        plain_fields(self)
+        positive("modulus", self.modulus)
+
+    def per_bond(self, bonds: BondGeometry) -> np.ndarray:
+        """Stiffness of every bond per area [Pa/m], (bond_count,)."""
+        return self.modulus / bonds.distance
+
+
+@dataclass(frozen=True, repr=False)
+class ShareOfCritical(BondRule):
+    """Dashpot of a bond per area [Pa s/m], as a share of the critical one between its two bodies.
+
+    2 ratio sqrt(k m / A) with the stiffness per area k = modulus / distance, the pair's mass m =
+    m1 m2 / (m1 + m2) and the area A: for bodies of one shape it does not depend on their size.
+    Raises InputError unless both are positive numbers.
+    """
+
+    ratio: float
+    modulus: float
+
+    def __post_init__(self):
+        plain_fields(self)
+        positive("ratio", self.ratio)
+        positive("modulus", self.modulus)
+
+    def per_bond(self, bonds: BondGeometry) -> np.ndarray:
+        """Dashpot of every bond per area [Pa s/m], (bond_count,)."""
+        stiffness = self.modulus / bonds.distance
+        return 2.0 * self.ratio * np.sqrt(stiffness * bonds.pair_mass / bonds.area)
+
+
+@dataclass(frozen=True, repr=False)
+class FaceStiffness(ContactRule):
+    """Stiffness of one sphere contact [N/m]: as stiff as a bond where a face's six spheres touch.
+
+    The median over all faces of modulus area / (6 distance), where the distance is twice that of
+    the face from its body's centre: one number a mesh, as a contact has. A step that the bonds of a
+    body bear is then borne by a contact of all spheres of a face, in a mesh of even size.
+    Raises InputError unless the modulus is a positive number.
+    """
+
+    modulus: float
+
+    def __post_init__(self):
+        plain_fields(self)
+        positive("modulus", self.modulus)
+
+    def of_mesh(self, mesh: Mesh, density: float) -> float:
+        """Stiffness of a contact of two bodies of a mesh [N/m]."""
+        area = length(area_vectors(mesh.points, all_faces(mesh.tetrahedra))).reshape(-1, 4)
+        # The centre is a quarter of the altitude 3 V / A away from a face.
+        distance = 2.0 * 0.75 * volumes(mesh)[:, None] / area
+        return float(np.median(self.modulus * area / distance)) / FACE_SPHERES
+
+
+@dataclass(frozen=True, repr=False)
+class ContactShareOfCritical(ContactRule):
+    """Dashpot of one sphere contact [N s/m], as a share of the critical one.
+
+    2 ratio sqrt(k m), k by ``FaceStiffness``, m half the median mass of a body.
+    Raises InputError unless both are positive numbers.
+    """
+
+    ratio: float
+    modulus: float
+
+    def __post_init__(self):
+        plain_fields(self)
+        positive("ratio", self.ratio)
+        positive("modulus", self.modulus)
+
+    def of_mesh(self, mesh: Mesh, density: float) -> float:
+        """Dashpot of a contact of two bodies of a mesh [N s/m]."""
+        stiffness = FaceStiffness(self.modulus).of_mesh(mesh, density)
+        mass = 0.5 * density * float(np.median(volumes(mesh)))
+        return 2.0 * self.ratio * math.sqrt(stiffness * mass)
+
+
+#: A number that holds for all bonds or contacts, or a rule.
+Constant = Union[float, Rule]
+
+
+def per_bond(
+    mesh: Mesh, topology: Topology, density: float, constants: tuple[Constant, Constant]
+) -> np.ndarray:
+    """Normal and tangential constant of every bond per area, (bond_count, 2).
+
+    constants: both, numbers or rules. THE answer to "what is the stiffness, or dashpot, of this
+    bond".
+    """
+    if not any(isinstance(constant, BondRule) for constant in constants):
+        return np.tile(np.array(constants, dtype=float), (topology.bond_count, 1))
+    return evaluated(constants, bond_geometry(mesh, topology, density))
+
+
+def evaluated(constants: tuple[Constant, Constant], bonds: BondGeometry) -> np.ndarray:
+    """Two constants, numbers or rules, for bonds of given sizes, (n, 2)."""
+    columns = [
+        constant.per_bond(bonds)
+        if isinstance(constant, BondRule)
+        else np.full(len(bonds.area), float(constant))
+        for constant in constants
+    ]
+    return np.stack(columns, axis=1)

@@ -1,0 +1,178 @@
+"""Young's modulus, Poisson's ratio and wave speeds that a block of a mesh shows, in statics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from taichi_dem.elasticity.bond_rules import BondGeometry, evaluated, per_bond
+from taichi_dem.elasticity.statics import BondStatics
+from taichi_dem.kit.display import in_brief
+from taichi_dem.kit.fixed_order import dot, length
+from taichi_dem.mesh.mesh import Mesh, volumes
+from taichi_dem.mesh.tetrahedra import area_vectors
+from taichi_dem.mesh.topology import body_properties, face_vertices, topology_of
+
+if TYPE_CHECKING:
+    from taichi_dem.materials import Material
+
+#: Components of stress and strain, in Voigt's order; strains yz, zx and xy are twice the tensor's.
+VOIGT = ((0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1))
+_NAMES = "xyz"
+
+
+@dataclass(frozen=True, eq=False)
+class MeshStiffness:
+    """Elastic constants of a block of a mesh.
+
+    compliance: strains per stress [1/Pa], (6, 6) in the order xx, yy, zz, yz, zx, xy, shear strains
+    as angles. density [kg/m3].
+    """
+
+    compliance: np.ndarray
+    density: float
+
+    @property
+    def stiffness(self) -> np.ndarray:
+        """Stresses per strain [Pa], (6, 6): the diagonal holds the moduli of uniaxial strain."""
+        return np.linalg.inv(self.compliance)
+
+    @property
+    def young_along(self) -> np.ndarray:
+        """Stress over strain along x, y and z in a block pulled along it alone [Pa], (3,)."""
+        return 1.0 / np.diag(self.compliance)[:3]
+
+    @property
+    def poisson_along(self) -> np.ndarray:
+        """Mean contraction across over the strain along x, y and z, (3,)."""
+        across = self.compliance[:3, :3].sum(axis=0) - np.diag(self.compliance)[:3]
+        return -0.5 * across * self.young_along
+
+    @property
+    def shear_across(self) -> np.ndarray:
+        """Shear moduli in the planes yz, zx and xy [Pa], (3,)."""
+        return 1.0 / np.diag(self.compliance)[3:]
+
+    @property
+    def bulk(self) -> float:
+        """Bulk modulus [Pa], the mean of the bounds over all directions (Hill 1952)."""
+        return 0.5 * (self.stiffness[:3, :3].sum() / 9.0 + 1.0 / self.compliance[:3, :3].sum())
+
+    @property
+    def shear(self) -> float:
+        """Shear modulus [Pa], likewise."""
+        s, c = self.compliance, self.stiffness
+        most = (3.0 * np.trace(c[:3, :3]) - c[:3, :3].sum()) / 30.0 + np.trace(c[3:, 3:]) / 5.0
+        least = 7.5 / (3.0 * np.trace(s[:3, :3]) - s[:3, :3].sum() + 1.5 * np.trace(s[3:, 3:]))
+        return 0.5 * float(most + least)
+
+    @property
+    def young(self) -> float:
+        """Young's modulus [Pa], the mean over all directions."""
+        return 9.0 * self.bulk * self.shear / (3.0 * self.bulk + self.shear)
+
+    @property
+    def poisson(self) -> float:
+        """Poisson's ratio, the mean over all directions."""
+        return 0.5 * self.young / self.shear - 1.0
+
+    @property
+    def wave_speeds(self) -> dict[str, float]:
+        """Speeds of long waves [m/s]: "pressure" and "shear" in the solid, "bar" in a thin bar."""
+        confined = self.bulk + 4.0 / 3.0 * self.shear
+        moduli = {"pressure": confined, "shear": self.shear, "bar": self.young}
+        return {name: float(np.sqrt(value / self.density)) for name, value in moduli.items()}
+
+    def __repr__(self):
+        return in_brief(self, f"E {self.young:.4g} Pa", f"nu {self.poisson:.3g}")
+
+    def __str__(self):
+        """A line for each axis, the means, and the wave speeds."""
+        head = f"{'block of the mesh':24s}{'E GPa':>10s}{'nu':>8s}{'G GPa':>10s}"
+        lines = [f"{head}{'uniaxial strain GPa':>21s}"]
+        confined = np.diag(self.stiffness)[:3]
+        across = self.shear_across
+        for k, name in enumerate(_NAMES):
+            shear = f"{across[k] * 1e-9:10.4g}"
+            lines.append(
+                f"{'along ' + name:24s}{self.young_along[k] * 1e-9:10.4g}"
+                f"{self.poisson_along[k]:8.3f}{shear}{confined[k] * 1e-9:21.4g}"
+            )
+        mean = self.bulk + 4.0 / 3.0 * self.shear
+        lines.append(
+            f"{'all directions':24s}{self.young * 1e-9:10.4g}{self.poisson:8.3f}"
+            f"{self.shear * 1e-9:10.4g}{mean * 1e-9:21.4g}"
+        )
+        speeds = ", ".join(f"{name} {speed:.4g} m/s" for name, speed in self.wave_speeds.items())
+        return "\n".join([*lines, f"long waves: {speeds}"])
+
+
+def mesh_stiffness(mesh: Mesh, material: Material) -> MeshStiffness:
+    """Elastic constants of the block that a mesh is, with the bonds of a material.
+
+    The whole mesh under six uniform stresses, tractions on its outer faces, one linear static
+    solve each; the mean strain follows from the displacement of the outer faces, which give way
+    like half a bond, as if the solid went on behind them. Of all fields of stress in equilibrium
+    this is the softest answer: blocks of few elements show some per cent less than large ones.
+    Raises InputError where the springs cannot be solved.
+    """
+    topology = topology_of(mesh)
+    constants = material.normal_stiffness, material.shear_stiffness
+    springs = per_bond(mesh, topology, material.density, constants)
+    statics = BondStatics(mesh, topology, springs)
+    outer = _OuterFaces(mesh, material)
+    loads = np.stack([outer.wrenches(stress) for stress in _unit_stresses()], axis=2)
+    motions = statics.motions(loads)
+    total = float(volumes(mesh).sum())
+    strains = [
+        outer.strain(motions[:, :, k], stress) / total for k, stress in enumerate(_unit_stresses())
+    ]
+    compliance = np.array(strains).T
+    return MeshStiffness(0.5 * (compliance + compliance.T), material.density)
+
+
+def _unit_stresses():
+    """Stresses of 1 Pa, one for each component, (6, 3, 3)."""
+    made = np.zeros((6, 3, 3))
+    for k, (i, j) in enumerate(VOIGT):
+        made[k, i, j] = made[k, j, i] = 1.0
+    return made
+
+
+class _OuterFaces:
+    """Outer faces of a mesh, which carry tractions and give way like half a bond."""
+
+    def __init__(self, mesh, material):
+        topology = topology_of(mesh)
+        self.body, self.count = topology.outer_body, mesh.body_count
+        vertices = face_vertices(mesh, self.body, topology.outer_face)
+        mass, centre, _ = body_properties(mesh, material.density)
+        self.vector = area_vectors(mesh.points, vertices)
+        self.area = length(self.vector)
+        self.arm = mesh.points[vertices].mean(axis=1) - centre[self.body]
+        # A bond to its mirror image: half of it is twice as stiff.
+        distance = 2.0 * dot(self.arm, self.vector) / self.area
+        mirrored = BondGeometry(distance, self.area, 0.5 * mass[self.body])
+        constants = material.normal_stiffness, material.shear_stiffness
+        self.springs = 2.0 * evaluated(constants, mirrored)
+
+    def wrenches(self, stress):
+        """Forces and moments of the tractions of a uniform stress on the bodies, (bodies, 6)."""
+        force = self.vector @ stress
+        total = np.zeros((self.count, 6))
+        np.add.at(total, self.body, np.hstack([force, np.cross(self.arm, force)]))
+        return total
+
+    def strain(self, motion, stress):
+        """Mean strain times the volume at a motion (bodies, 6) under a uniform stress, (6,)."""
+        moved = motion[self.body, :3] + np.cross(motion[self.body, 3:], self.arm)
+        normal = self.vector / self.area[:, None]
+        traction = normal @ stress
+        along = dot(traction, normal)[:, None] * normal
+        normally, across = self.springs.T[:, :, None]
+        moved = moved + along / normally + (traction - along) / across
+        mean = self.vector.T @ moved
+        mean = mean + mean.T
+        return np.array([0.5 * mean[i, i] if i == j else mean[i, j] for i, j in VOIGT])

@@ -1,0 +1,116 @@
+"""What a scene's mesh makes of its material, before a run: elastic constants, cracks, steps."""
+
+import contextlib
+from dataclasses import dataclass
+from typing import Optional
+
+import numpy as np
+
+from taichi_dem.elasticity.bond_rules import ModulusOverDistance
+from taichi_dem.elasticity.mesh_stiffness import MeshStiffness, mesh_stiffness
+from taichi_dem.elasticity.moduli import elastic_constants
+from taichi_dem.kit.display import in_brief
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import instance
+from taichi_dem.materials import Material
+from taichi_dem.mesh.mesh import Mesh, volumes
+from taichi_dem.scene import Scene
+from taichi_dem.stability.step_report import METHODS, StepReport, step_report
+
+#: Elements in a characteristic length below which cracks are those of the mesh.
+ELEMENTS = 4.0
+
+
+@dataclass(frozen=True, eq=False)
+class ElasticReport:
+    """Elastic constants of a scene's mesh beside those asked for, and what follows from them.
+
+    stiffness: of the block that the mesh is. asked: Young's modulus [Pa] and Poisson's ratio that
+    the material was made for, None for a material of constants per area. crack_length: the
+    characteristic length E G_f / tensile_strength^2 of a crack's tip [m]. element_size: edge of the
+    regular tetrahedron of the volume of each body [m], (body_count,). steps: largest stable ones.
+    """
+
+    stiffness: MeshStiffness
+    asked: Optional[tuple[float, float]]
+    crack_length: float
+    element_size: np.ndarray
+    steps: StepReport
+
+    @property
+    def elements(self) -> np.ndarray:
+        """Elements in a characteristic length at each body, (body_count,)."""
+        return self.crack_length / self.element_size
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences about the scene: elements too large for its cracks, and those of its steps."""
+        coarse = int((self.elements < ELEMENTS).sum())
+        if not coarse:
+            return self.steps.warnings
+        largest = float(self.element_size.max())
+        words = (
+            f"the characteristic length E G_f / tensile_strength^2 = {self.crack_length:.3g} m is "
+            f"less than {ELEMENTS:g} elements at {coarse} of {len(self.element_size)} bodies, with "
+            f"edges of up to {largest:.3g} m: strength and paths of cracks there are the mesh's"
+        )
+        return (words, *self.steps.warnings)
+
+    def __repr__(self):
+        stiffness = f"E {self.stiffness.young:.4g} Pa, nu {self.stiffness.poisson:.3g}"
+        return in_brief(self, stiffness, *self.warnings, "print it for the table")
+
+    def __str__(self):
+        """Elastic constants, wave speeds, elements in a characteristic length, steps, warnings."""
+        lines = [str(self.stiffness)]
+        if self.asked:
+            head = f"{'asked for':24s}{self.asked[0] * 1e-9:10.4g}{self.asked[1]:8.3f}"
+            lines.insert(0, f"{head}{0.5e-9 * self.asked[0] / (1.0 + self.asked[1]):10.4g}")
+        fewest, median = self.elements.min(), float(np.median(self.elements))
+        lines.append(
+            f"characteristic length of cracks {self.crack_length:.3g} m: {fewest:.2g} of the "
+            f"largest element, {median:.2g} of the median one"
+        )
+        lines += [f"warning: {warning}" for warning in self.warnings]
+        return "\n".join([*lines, *self._step_lines()])
+
+    def _step_lines(self):
+        """Largest stable step of each method, of bonds and of all spheres of a face in contact."""
+        lines = []
+        for dashpots, words in METHODS.items():
+            bond, contact = (self.steps.borne(dashpots, link).min() for link in ("bond", "contact"))
+            text = ", ".join(
+                f"{name} {step:.3g} s"
+                for name, step in (("bonds", bond), ("contact", contact))
+                if np.isfinite(step)
+            )
+            lines.append(f"largest stable step, {words}: {text or 'unlimited'}")
+        return lines
+
+
+def elastic_report(scene: Scene) -> ElasticReport:
+    """Elastic constants that the mesh of a scene shows with its material; print it before a run.
+
+    Six linear static solves of the whole mesh: some seconds for ten thousand bodies.
+    Raises InputError for anything else than a Scene, or springs that cannot be solved.
+    """
+    instance("scene", scene, Scene)
+    mesh, material = scene.mesh, scene.material
+    stiffness = mesh_stiffness(mesh, material)
+    crack = stiffness.young * material.fracture_energy / material.tensile_strength**2
+    steps = step_report(scene)
+    return ElasticReport(stiffness, _asked(material), crack, element_sizes(mesh), steps)
+
+
+def element_sizes(mesh: Mesh) -> np.ndarray:
+    """Edge of the regular tetrahedron of the volume of each body [m], (body_count,)."""
+    return np.cbrt(6.0 * np.sqrt(2.0) * volumes(mesh))
+
+
+def _asked(material: Material) -> Optional[tuple[float, float]]:
+    """E [Pa] and Poisson's ratio for which a material was made, None where it names none."""
+    normal, shear = material.normal_stiffness, material.shear_stiffness
+    if isinstance(normal, ModulusOverDistance) and isinstance(shear, ModulusOverDistance):
+        with contextlib.suppress(InputError):
+            return elastic_constants(normal.modulus, shear.modulus)
+    return None

@@ -1,0 +1,67 @@
+"""Dashpots between bodies and the ground in the sweeps of a solved step."""
+
+from typing import TYPE_CHECKING
+
+import taichi as ti
+
+from taichi_dem.kit.types import real
+from taichi_dem.physics.ground import braked_twist, twist_of
+from taichi_dem.step.implicit.velocities import Velocities
+
+if TYPE_CHECKING:
+    from taichi_dem.engine.state import State
+    from taichi_dem.engine.tables import Tables
+    from taichi_dem.step.schedule import Schedule
+
+
+@ti.data_oriented
+class GroundSweeps:
+    """Impulses of the ground, one row of impulse and moment for each effect of a body.
+
+    impulse: [N s] and [N m s], that of the step before as a first guess. They are those of the mean
+    of the velocities at both ends of the step, as of every ``GroundDashpots``.
+    """
+
+    def __init__(
+        self, tables: "Tables", state: "State", schedule: "Schedule", velocities: Velocities
+    ):
+        self.tables, self.state = tables, state
+        self.schedule, self.velocities = schedule, velocities
+        rows, n = len(tables.ground), tables.capacity.bodies
+        self.impulse = ti.Matrix.field(rows, 6, real, shape=n)
+
+    @ti.func
+    def visit(self, i):
+        """Solve the dashpots of body i; square of the velocity it changed."""
+        change2 = 0.0
+        for e in ti.static(range(len(self.tables.ground))):
+            if self.tables.ground[e].acts_on(i):
+                change2 = ti.max(change2, self._visit(i, e))
+        return change2
+
+    @ti.func
+    def _visit(self, i, e: ti.template()):
+        """Change the impulse by what is missing, as far as the body then gives way.
+
+        The mass of a free body bounds the change where supports hold it: it converges all the same.
+        """
+        dt, resistance = self.schedule.step_seconds[0], self.tables.ground[e].resistance(i)
+        twist, mass = self.velocities.twist[i], self.tables.mass[i]
+        rotation = self.state.rotation[i]
+        inertia = rotation @ self.tables.inertia[i] @ rotation.transpose()
+        force, moment = twist_of(
+            resistance,
+            0.5 * (self.state.velocity[i] + twist[0:3]),
+            0.5 * (self.state.spin[i] + twist[3:6]),
+        )
+        force, moment = -dt * force, -dt * moment
+        for k in ti.static(range(3)):
+            force[k] -= self.impulse[i][e, k]
+            moment[k] -= self.impulse[i][e, 3 + k]
+        velocity, spin = braked_twist(mass, inertia, resistance, force, moment, dt)
+        force, moment = mass * velocity, inertia @ spin
+        self.velocities.push(i, force, moment)
+        for k in ti.static(range(3)):
+            self.impulse[i][e, k] = self.impulse[i][e, k] + force[k]
+            self.impulse[i][e, 3 + k] = self.impulse[i][e, 3 + k] + moment[k]
+        return velocity.norm_sqr()
