@@ -9,6 +9,7 @@ TEST := -m pytest -q -n 2 --dist loadfile
 TEST_OPTIONS ?=
 BENCH_OPTIONS ?=
 ATTACK_OPTIONS ?=
+FUZZ_OPTIONS ?=
 MESH_OPTIONS ?=
 GALLERY_OPTIONS ?=
 LESSONS_OPTIONS ?=
@@ -27,7 +28,7 @@ ifeq ($(strip $(HOME)),)
 export HOME := $(CURDIR)/.venv/home
 endif
 
-.PHONY: help venv demo test test-slow test-bounds attack lint bench gallery lessons api mesh clean
+.PHONY: help venv demo test test-slow test-bounds attack fuzz lint bench gallery lessons api mesh clean
 
 help: ## print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-11s %s\n", $$1, $$2}' Makefile
@@ -48,6 +49,9 @@ test-bounds: $(STAMP) ## run small scenes with every access to a field checked (
 
 attack: $(STAMP) ## attack it at random, minutes (ATTACK_OPTIONS="--attacks 100 --attack-seed 20": longer)
 	$(BIN)/python -m pytest -q -n 2 tests/attack --attacks 20 --attack-table docs/reliability.md $(ATTACK_OPTIONS)
+
+fuzz: $(STAMP) ## run 10,000 random scenes, each briefly (FUZZ_OPTIONS="--number 500 --seed 7": some)
+	$(BIN)/python -m tests.fuzz --number 10000 $(FUZZ_OPTIONS)
 
 lint: $(STAMP) ## check style, format and types
 	$(BIN)/python -m ruff check .

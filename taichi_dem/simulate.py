@@ -196,6 +196,7 @@ def run_identity(scene: Scene, method: Method) -> dict[str, str]:
     return {
         "version": version_text(),
         "mesh": f"{mesh.body_count} tetrahedra ({content})",
+        "bonded shares": identity_of(mesh.bonded_shares),
         "material": identity_of(scene.material),
         "effects": ", ".join(
             f"{effect.name} {identity_of(vars(effect))}" for effect in scene.effects

@@ -14,7 +14,7 @@ from taichi_dem.diagnostics.bond_slip import BondSlips
 from taichi_dem.diagnostics.certificate import acting_since, certificate_of
 from taichi_dem.diagnostics.divergence import DivergenceCheck
 from taichi_dem.diagnostics.effect_activity import effect_activity
-from taichi_dem.diagnostics.energy_balance import EnergyBalance
+from taichi_dem.diagnostics.energy_balance import EnergyBalance, open_account
 from taichi_dem.diagnostics.known_error import known_error
 from taichi_dem.diagnostics.missing_effects import MissingEffects
 from taichi_dem.diagnostics.readings import Readings
@@ -193,8 +193,8 @@ class Simulation(Uncopied):
         motion = self.state.motion()
         names = ("position", "orientation", "velocity", "spin")
         self.first_motion = {name: motion[name] for name in names}
-        if self.model.has_contact and self.model.contact.outer_faces is True:
-            self.state.expose(self.model.topology)
+        if self.model.has_contact:
+            self.state.expose(self.model.topology, self.model.contact.outer_faces is True)
         self.step.prime()
         if self.contacts is not None:
             self.broad_phase.ask(everywhere=True)
@@ -359,6 +359,7 @@ class Simulation(Uncopied):
                 *self.step_resolution.findings(),
                 *self.missing_effects.unseen(),
                 *shared_volume.findings(),
+                *open_account(account, self.divergence_check.round_off()),
             ),
             interpenetration=shared_volume.worst,
             bound_by=counted_criteria(self.state.bound.to_numpy()),

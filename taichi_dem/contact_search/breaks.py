@@ -45,7 +45,8 @@ class Breaks:
             if broken:
                 self.contacts.outer_waits[None] = 0
                 for face in range(4 * self.tables.body_count[None]):
-                    if self.tables.face_bond[face] < 0:
+                    bare = self.state.exposed_tick[face] < 0
+                    if bare and self.tables.face_bond[face] < 0:
                         self.state.exposed_tick[face] = self.state.tick[None]
 
     @ti.func

@@ -10,6 +10,10 @@ if TYPE_CHECKING:
     from taichi_dem.engine.state import State
     from taichi_dem.engine.tables import Tables
 
+#: Coordinates beyond this [m], and those that are no number, count as this: a run that diverges is
+#: named after the step in which it does, and until then every body must have a cell.
+_FAR = 1e30
+
 
 @ti.data_oriented
 class CellGrid:
@@ -38,7 +42,7 @@ class CellGrid:
         self._size()
         counts = self.counts[None]
         for i in range(self.tables.body_count[None]):
-            cell = self._cell_of(self.state.position[i])
+            cell = self._cell_of(self._bounded(i))
             self.cell[i] = (cell[2] * counts[1] + cell[1]) * counts[0] + cell[0]
         total = counts[0] * counts[1] * counts[2]
         group(self.first, self.member, total, self.tables.body_count[None], self._cell_of_member)
@@ -46,7 +50,7 @@ class CellGrid:
     @ti.func
     def around(self, i):
         """Cells with the centres of all whose balls meet that of body i: lowest, past highest."""
-        position = self.state.position[i]
+        position = self._bounded(i)
         reach = self.ball[i] + self.largest[None]
         low = ti.max(self._cell_of(position - reach), 0)
         high = ti.min(self._cell_of(position + reach) + 1, self.counts[None])
@@ -63,10 +67,11 @@ class CellGrid:
 
     @ti.func
     def _size(self):
-        low, high, mean = self.state.position[0], self.state.position[0], 0.0
+        low, high, mean = self._bounded(0), self._bounded(0), 0.0
         self.largest[None] = 0.0
         for i in range(self.tables.body_count[None]):
-            low, high = ti.min(low, self.state.position[i]), ti.max(high, self.state.position[i])
+            place = self._bounded(i)
+            low, high = ti.min(low, place), ti.max(high, place)
             mean += self.ball[i] / self.tables.body_count[None]
             self.largest[None] = ti.max(self.largest[None], self.ball[i])
         edge = 2.0 * mean
@@ -76,6 +81,11 @@ class CellGrid:
             edge *= 1.25
         self.edge[None], self.corner[None] = edge, low
         self.counts[None] = ti.cast((high - low) / edge, ti.i32) + 1
+
+    @ti.func
+    def _bounded(self, i):
+        """Position of a body, as far as it is one."""
+        return ti.max(ti.min(self.state.position[i], _FAR), -_FAR)
 
     @ti.func
     def _cell_of(self, position):

@@ -1,5 +1,6 @@
 """Detect diverged runs, and describe where and why."""
 
+import math
 import time
 from typing import TYPE_CHECKING, Optional
 
@@ -7,11 +8,9 @@ import numpy as np
 
 from taichi_dem.contact_search.contacts import FARTHEST, Contacts
 from taichi_dem.diagnostics.energy_balance import EnergyBalance
+from taichi_dem.diagnostics.remedy import Remedies, Remedy, shorter_step
 from taichi_dem.diagnostics.shared_volume import SharedVolume
 from taichi_dem.kit.errors import SimulationDiverged
-from taichi_dem.stability.contact_limits import contact_rates
-from taichi_dem.stability.quality import quality_report
-from taichi_dem.stability.stable_step import dashpot_step, spring_step
 from taichi_dem.step.drivers import CALL_SECONDS
 from taichi_dem.step.schedule import Schedule
 
@@ -47,8 +46,8 @@ class DivergenceCheck:
         energy_balance: EnergyBalance,
         solves: bool = False,
     ):
-        self.model, self.state, self.schedule, self.solves = model, state, schedule, solves
-        self.limited = schedule.has_limits and schedule.limits.limited
+        self.model, self.state, self.schedule = model, state, schedule
+        self.remedies = Remedies(model, state, schedule, contacts, energy_balance, solves)
         self.contacts, self.energy_balance = contacts, energy_balance
         self.rounded_once = self._rounded_once()
         self.rest_until = 0.0
@@ -75,15 +74,18 @@ class DivergenceCheck:
         body = self.state.bad_body[None]
         if body < self.model.body_count:
             motion = self.state.motion()
-            speed = np.linalg.norm(motion["velocity"][body])
+            speed = math.hypot(*motion["velocity"][body])
             words = f"moves at {speed:.3g} m/s"
+            links = self._links(body)
             if speed < self.state.max_speed2[None] ** 0.5 and self.contacts is not None:
                 extent = float(self.model.spheres.extent[body])
-                whole = speed + np.linalg.norm(motion["spin"][body]) * extent
+                whole = speed + math.hypot(*motion["spin"][body]) * extent
                 words += ", too far in a step for its contacts to be followed"
-                advice = f"try a step of {0.5 * FARTHEST * extent / whole:.2g} s"
-                raise SimulationDiverged(self._sentence(body, motion, words, advice))
-            raise SimulationDiverged(self._sentence(body, motion, words))
+                allowed = FARTHEST * extent / whole
+                remedy = shorter_step(0.5 * allowed, f"contacts allow {allowed:.3g} s")
+                raise self._exception(body, motion, words, links, remedy)
+            remedy = self.remedies.of_speed(body, _partners(links), speed)
+            raise self._exception(body, motion, words, links, remedy)
 
     def _check_overlap(self):
         if self.contacts is None or not self.contacts.store.near_count[None]:
@@ -96,8 +98,7 @@ class DivergenceCheck:
             if self.contacts.law.meets_faces:
                 inside, size = f"body {other}", "its radius"
             share = f"{100 * deepest[pair]:.0f} % of {size}"
-            what = f"has a contact sphere inside {inside} ({share})"
-            raise SimulationDiverged(self._sentence(body, self.state.motion(), what))
+            self._raise_overlap(body, f"has a contact sphere inside {inside} ({share})")
 
     def check_shared(self, volume: SharedVolume) -> None:
         """Raise SimulationDiverged where contact of all faces has not kept two bodies apart."""
@@ -107,8 +108,13 @@ class DivergenceCheck:
         place = int(volume.share.argmax())
         if volume.share[place] > DEEPEST_SHARE:
             body, other = volume.pairs[place].tolist()
-            what = f"shares {100 * volume.share[place]:.0f} % of its volume with body {other}"
-            raise SimulationDiverged(self._sentence(body, self.state.motion(), what))
+            share = f"{100 * volume.share[place]:.0f} %"
+            self._raise_overlap(body, f"shares {share} of its volume with body {other}")
+
+    def _raise_overlap(self, body, what):
+        links = self._links(body)
+        remedy = self.remedies.of_overlap(body, _partners(links))
+        raise self._exception(body, self.state.motion(), what, links, remedy)
 
     def _check_energy(self):
         account = self.energy_balance.account()
@@ -123,7 +129,9 @@ class DivergenceCheck:
             motion = self.state.motion()
             body = int(np.linalg.norm(motion["velocity"], axis=1).argmax())
             what = f"is the fastest while {-account['residual']:.3g} J came from nowhere"
-            raise SimulationDiverged(self._sentence(body, motion, what))
+            links = self._links(body)
+            remedy = self.remedies.of_energy(body, _partners(links))
+            raise self._exception(body, motion, what, links, remedy)
 
     def round_off(self) -> float:
         """Bound of the energy [J] that rounding of positions has put into the bonds so far."""
@@ -136,16 +144,18 @@ class DivergenceCheck:
         place = 4.0 * np.finfo(float).eps * np.abs(self.model.mesh.points).max()
         return max(0.5 * float(np.sum(area * stiffness)) * place**2, 1e-300)
 
-    def _sentence(self, body, motion, what, advice=""):
+    def _exception(self, body, motion, what, links, remedy: Remedy):
+        """SimulationDiverged that says what is wrong with a body, and what to change."""
         level = int(motion["level"][body])
         time_s = self.state.tick[None] * self.schedule.tick_seconds
         step = self.schedule.dt0 / 2.0**level
-        links = self._links(body)
-        return (
+        error = SimulationDiverged(
             f"diverged at t = {time_s:.6g} s: body {body} {what}; "
             f"{_partner(body, motion, links)}; its step was {step:.3g} s (level {level}), "
-            f"{advice or self._advice(body, links)}"
+            f"{remedy.words}"
         )
+        error.advice = remedy.advice
+        return error
 
     def _links(self, body):
         """Bodies that a body is tied to or near, and how, as pairs."""
@@ -166,37 +176,10 @@ class DivergenceCheck:
             return np.zeros((0, 2), dtype=int)
         return self.contacts.store.near_table()[0]
 
-    def _advice(self, body, links):
-        """Criterion that limits the step near a body, and a step that meets it.
 
-        Runaways are often thrown by a neighbour of a shorter step, so the tightest limit counts.
-        """
-        limits = self._limits()
-        near = [body, *(other for other, _ in links)]
-        limit, cause, tight = min((limits[name][k], name, k) for name in limits for k in near)
-        if not np.isfinite(limit):
-            return "which nothing near it limits"
-        whose = f"its {cause}" if tight == body else f"the {cause} of body {tight} beside it"
-        return f"{whose} allow {limit:.3g} s: try a step of {0.5 * limit:.2g} s"
-
-    def _limits(self):
-        """Largest stable explicit steps [s] by criterion, arrays (body_count,).
-
-        Dashpots that are solved or limited set none.
-        """
-        steps = quality_report(self.model.mesh, self.model.material)
-        limits = {"bond springs": steps.spring_step_s}
-        tame = self.solves or self.limited
-        if self.model.by_role["dashpot"] and not tame:
-            limits["bond dashpots"] = steps.dashpot_step_s
-        if self.contacts is not None:
-            material = self.model.material
-            pairs, counts, _ = self.contacts.store.near_table()
-            rates = contact_rates(pairs, counts, self.model.body_mass)
-            limits["contact springs"] = spring_step(material.contact_stiffness * rates)
-            if not tame:
-                limits["sphere dashpots"] = dashpot_step(material.contact_damping * rates)
-        return limits
+def _partners(links):
+    """Bodies of the links."""
+    return [other for other, _ in links]
 
 
 def _partner(body, motion, links):
@@ -204,6 +187,6 @@ def _partner(body, motion, links):
     if not links:
         return "it touches nothing"
     velocity = motion["velocity"]
-    apart = [np.linalg.norm(velocity[other] - velocity[body]) for other, _ in links]
+    apart = [math.hypot(*(velocity[other] - velocity[body])) for other, _ in links]
     other, tie = links[int(np.nanargmax(np.nan_to_num(apart, nan=np.inf)))]
     return f"the fastest against it is {tie} {other}"

@@ -19,11 +19,12 @@ _EPSILON = np.finfo(np.float64).eps
 _THROUGH_BONDS = ("bond_strain", "bond_dashpot", "softening", "release", "slip")
 #: Roles judged by whether they acted: a crack, slip, wall or sticking contact can decide the
 #: outcome at little energy.
-_STEERING = ("tension", "shear", "contact", "friction", "support")
+_STEERING = ("tension", "shear", "contact", "friction", "support", "ground")
 #: Roles that define the problem, so that they are kept whatever work they did.
 _POSED = {
     "load": "a load is part of the question",
     "support": "a support is part of the question",
+    "ground": "the ground is part of the question",
 }
 _WITHOUT_WORK = ", and holds without doing work"
 _OWN = "the account need not show what an effect of your own does"
@@ -82,6 +83,11 @@ def _by_role(model, energy_balance, tables, active, rounding, effect):
         how = "driven" if done > rounding.work and np.any(effect.travel()) else "held"
         count = _with_bit(bits, 1 << len(model.loads) + place)
         return effect, f"bodies {how}", count, done
+    if effect.role == "ground":
+        place = model.ground.index(effect)
+        heat = np.abs(energy_balance.ground_heats(place)).sum()
+        count = _with_bit(bits, 1 << len(model.loads) + len(model.supports) + place)
+        return effect, "bodies braked", count, heat
     damped = _count(bond[:, 1] > rounding.heat)
     return {
         "tension": (effect, "bonds softened", _count(marks[:, 0]), ("softening", "release")),

@@ -1,7 +1,8 @@
 """Energy and momentum account of a run, term by term (spec, section 6).
 
 work of loads and supports + energy at the start = kinetic + bond strain + sphere strain
-+ bond dashpots + slip + softening + release + friction + sphere dashpots - injected + residual.
++ bond dashpots + slip + softening + release + friction + sphere dashpots + ground dashpots
+- injected + residual.
 """
 
 from collections.abc import Mapping
@@ -29,6 +30,7 @@ TERMS = (
     "slip",
     "sphere_dashpot",
     "friction",
+    "ground_dashpot",
     "injected",
     "load_work",
     "support_work",
@@ -37,6 +39,31 @@ TERMS = (
 
 #: Terms that the bodies hold; all others are booked as they are given or taken.
 _HELD = ("kinetic", "bond_strain", "sphere_strain", "residual")
+
+
+#: Share of the energy beyond which an account counts as open.
+OPEN = 0.5
+
+
+def unexplained_share(account: Mapping[str, float], round_off: float = 0.0) -> float:
+    """Residual of an account over all energy that went through it; NaN where a term is none.
+
+    round_off: energy [J] below which all may be rounding.
+    """
+    through = sum(abs(value) for name, value in account.items() if name != "residual")
+    return abs(account["residual"]) / max(through, 100.0 * round_off, 1e-300)
+
+
+def open_account(account: Mapping[str, float], round_off: float) -> tuple[str, ...]:
+    """Sentence about an account that explains less than half of its energy; else none."""
+    share = unexplained_share(account, round_off)
+    if share <= OPEN:
+        return ()
+    return (
+        f"the account of energy leaves {account['residual']:.3g} J unexplained, {share:.2g} of all "
+        "that went through it: take a shorter step, or begin with velocities of bonded bodies that "
+        "dashpots do not stop within one",
+    )
 
 
 class EnergyBalance:
@@ -50,7 +77,8 @@ class EnergyBalance:
     ):
         self.model, self.state, self.readings, self.contacts = model, state, readings, contacts
         self.start_energy, self.start = 0.0, np.zeros(len(TERMS))
-        self.start_works = np.zeros((model.body_count, len(model.loads) + 1))
+        accounts = len(model.loads) + 1 + len(model.ground)
+        self.start_works = np.zeros((model.body_count, accounts))
         first = self.account()
         self.start_energy = first["kinetic"] + first["bond_strain"] + first["sphere_strain"]
         # Half a step of what acts from the start is booked at time zero.
@@ -85,6 +113,7 @@ class EnergyBalance:
             "sphere_dashpot": body[:, 3].sum() + pair[:, 1].sum(),
             "friction": body[:, 4].sum() + pair[:, 2].sum(),
             "injected": body[:, 5].sum() + pair[:, 3].sum(),
+            "ground_dashpot": body[:, 6].sum(),
             "load_work": body[:, 1].sum(),
             "support_work": body[:, 2].sum(),
         }
@@ -95,8 +124,8 @@ class EnergyBalance:
     def tables(self) -> EnergyTables:
         """Tables that the terms are summed from [J].
 
-        A row a body: kinetic, loads, supports, sphere dashpots, friction, injected. A row a bond:
-        strain, dashpot, slip, release, softening. A row a pair: strain, dashpots, friction,
+        A row a body: kinetic, loads, supports, sphere dashpots, friction, injected, ground. A row a
+        bond: strain, dashpot, slip, release, softening. A row a pair: strain, dashpots, friction,
         injected, so far as its first body has not taken them.
         """
         bond = np.zeros((self.model.bond_count, 5))
@@ -120,8 +149,12 @@ class EnergyBalance:
         return self._works()[:, index]
 
     def _works(self):
-        """Work of each load, and of all supports last, on every body since the start [J]."""
+        """Work of each load, of all supports and of each ground on every body, since the start."""
         return self.readings.works() - self.start_works
+
+    def ground_heats(self, index: int) -> np.ndarray:
+        """Heat [J] in the dashpots of one ground at every body, (body_count,), by its place."""
+        return 0.0 - self._works()[:, len(self.model.loads) + 1 + index]
 
     def support_works(self, index: int) -> np.ndarray:
         """Work [J] of all supports on the bodies that one of them holds, (body_count,).
@@ -130,7 +163,7 @@ class EnergyBalance:
         """
         marks = np.zeros(self.model.body_count, dtype=np.int32)
         self.readings.supported(index, marks)
-        return np.where(marks == 1, self._works()[:, -1], np.nan)
+        return np.where(marks == 1, self._works()[:, len(self.model.loads)], np.nan)
 
     def momentum(self) -> np.ndarray:
         """Linear [N s] and angular momentum about the origin [N m s], less external impulses."""

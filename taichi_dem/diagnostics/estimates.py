@@ -54,7 +54,7 @@ def estimates_before(model: "Model", until: float) -> tuple[Estimate, ...]:
     # An unknown load is NaN, and with it all that follows.
     stress = float(sum(given))
     spacing = float(2.0 * model.body_radius.mean())
-    wave = math.sqrt(material.normal_stiffness * spacing / material.density)
+    wave = math.sqrt(_normal_stiffness(model) * spacing / material.density)
     speed = stress / (material.density * wave)
     softening = stress / material.tensile_strength
     shear = stress / max(material.cohesion, 1e-300)
@@ -74,10 +74,18 @@ def estimates_before(model: "Model", until: float) -> tuple[Estimate, ...]:
 
 def _damping(model):
     """Share of its energy that a bond between two bodies of mean size loses in a cycle."""
-    material, area = model.material, 3.0 * float(model.bonds["area"].mean())
+    area = 3.0 * float(model.bonds["area"].mean())
     pair = 0.5 * float(model.body_mass.mean())
-    ratio = 0.5 * material.normal_damping * math.sqrt(area / (material.normal_stiffness * pair))
+    damping = float(np.median(model.bond_damping[:, 0]))
+    ratio = 0.5 * damping * math.sqrt(area / (_normal_stiffness(model) * pair))
     return 4.0 * math.pi * ratio
+
+
+def _normal_stiffness(model):
+    """Normal stiffness of a bond per area [Pa/m], the median where bonds differ."""
+    if not model.bond_count:
+        return float(model.material.normal_stiffness)
+    return float(np.median(model.bond_stiffness[:, 0]))
 
 
 def _drag(material, speed, until, spacing):

@@ -98,7 +98,7 @@ def unserved(model: "Model") -> dict[str, MissingEffect]:
     listed = {
         "tension": "tension" not in roles,
         "shear": "shear" not in roles,
-        "dashpot": "dashpot" not in roles and material.normal_damping + material.shear_damping > 0,
+        "dashpot": "dashpot" not in roles and material.has_bond_damping,
         "contact": "contact" not in roles,
         "friction": "contact" in roles and "friction" not in roles and material.friction > 0.0,
         "bodies": "contact" not in roles,
@@ -111,7 +111,7 @@ def unserved(model: "Model") -> dict[str, MissingEffect]:
     }
     if "bare" in found:
         found["bare"].effect = remedy(model.contact)
-    if "friction" in found and material.contact_damping == 0.0:
+    if "friction" in found and not material.has_contact_damping:
         # Friction is a dashpot's force up to a limit: without a dashpot springs alone hold.
         found["friction"].effect = "StickingFriction"
     return found

@@ -54,15 +54,16 @@ class Readings:
             table[a, 12], table[a, 13] = half * found.dragged, half * found.rubbed
 
     def bodies(self) -> np.ndarray:
-        """Kinetic energy, work of loads and supports, contact heats of every body [J], (n, 6)."""
-        return self._table()[:, :6]
+        """Kinetic energy, work of loads, supports, contact heats, ground's heat [J], (n, 7)."""
+        table, ground = self._table(), len(self.tables.loads) + 16
+        return np.column_stack([table[:, :6], 0.0 - table[:, ground:].sum(axis=1)])
 
     def motion(self) -> np.ndarray:
         """Velocity, spin and angular momentum of every body at the time of its position, (n, 9)."""
         return self._table()[:, 6:15]
 
     def works(self) -> np.ndarray:
-        """Work of each load, and of all supports last, on every body [J], (n, loads + 1)."""
+        """Work of each load, of all supports, of each ground, on every body [J], (n, accounts)."""
         return self._table()[:, 15:]
 
     def step_back(self) -> None:
@@ -71,7 +72,7 @@ class Readings:
 
     def _table(self, back=0):
         pushed, _ = self.pushes()
-        table = np.zeros((len(pushed), 16 + len(self.tables.loads)))
+        table = np.zeros((len(pushed), 16 + len(self.tables.drives)))
         self._visit(pushed, back, table)
         return table
 
@@ -96,7 +97,7 @@ class Readings:
                 table[i, 12 + k] = momentum[k]
                 if ti.static(self.tables.has_contact):
                     table[i, 3 + k] = self.state.contact_heat[i][k]
-            for e in ti.static(range(len(self.tables.loads) + 1)):
+            for e in ti.static(range(len(self.tables.drives) + 1)):
                 table[i, 15 + e] = self.state.load_work[i][e] + works[e]
             for e in ti.static(range(len(self.tables.loads))):
                 table[i, 1] = table[i, 1] + table[i, 15 + e]

@@ -83,8 +83,10 @@ class SharedVolume:
     def way(self) -> float:
         """Longest way of a body since the last look, as a share of its radius."""
         place, turn = self._now()
-        way = np.linalg.norm(place - self.seen[0], axis=1) / self.model.body_radius
-        return float((way + np.linalg.norm(turn - self.seen[1], axis=(1, 2))).max())
+        # A motion whose square is no number is that of a runaway, which the divergence check names.
+        with np.errstate(over="ignore"):
+            way = np.linalg.norm(place - self.seen[0], axis=1) / self.model.body_radius
+            return float((way + np.linalg.norm(turn - self.seen[1], axis=(1, 2))).max())
 
     def _now(self):
         """Positions [m] and rotations of the bodies."""

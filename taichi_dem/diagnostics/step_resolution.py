@@ -166,10 +166,11 @@ class StepResolution:
         ``stability/body_limits.py``. Contacts that took energy have acted; it is booked to the
         first body of a pair.
         """
-        if self.contacts is None or not self.limited:
+        damping = float(self.model.material.contact_damping)
+        if self.contacts is None or not self.limited or not damping:
             return self.pair_share
         acted = self.state.contact_heat.to_numpy()[:, :2].sum(axis=1) > 0.0
-        x = 2.0 * self.model.material.contact_damping * self.step / self.lightest
+        x = 2.0 * damping * self.step / self.lightest
         return np.minimum(self.pair_share, np.where(acted, 1.0 / np.maximum(1.0, x), 1.0))
 
     def _openings_at_failure(self):

@@ -50,4 +50,4 @@ def test_method_bears_the_case_or_refuses_it_in_words(case, method):
 
 
 def test_there_are_enough_cases():
-    assert len({param.values[0].name for param in ASKED}) >= 28
+    assert len({param.values[0].name for param in ASKED}) >= 48

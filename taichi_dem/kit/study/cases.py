@@ -4,6 +4,7 @@ A ``Case`` is a function of a ``Trial``. It runs the trial's method on a small j
 trial figures with their bounds, and a curve to draw. ``assess`` tells how the method fared.
 """
 
+import difflib
 import math
 import time
 from collections.abc import Iterable, Sequence
@@ -14,10 +15,12 @@ import numpy as np
 
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.errors import InputError, SimulationDiverged
-from taichi_dem.kit.validation import choice
+from taichi_dem.kit.validation import shown
 
 #: Status of a method in a case.
 PASSED, REFUSED, FAILED = "passed", "refused", "failed"
+#: Names of cases that the refusal of another one gives.
+_NAMED = 6
 
 
 class Limit(NamedTuple):
@@ -177,4 +180,14 @@ def _closeness(limit):
 def cases_named(cases: Iterable[Case], names: Iterable[str]) -> list[Case]:
     """The cases of these names in this order. Raises InputError for a name that is none."""
     known = {case.name: case for case in cases}
-    return [known[choice("case", name, tuple(known))] for name in names]
+    return [known[_checked(name, known)] for name in names]
+
+
+def _checked(name, known):
+    """The name; a wrong one is answered with those that are like it, not with all."""
+    if name in known:
+        return name
+    alike = difflib.get_close_matches(str(name), known, _NAMED, 0.0)
+    raise InputError(
+        f"case must be one of {len(known)} names, such as {', '.join(alike)}, got {shown(name)}"
+    )
