@@ -131,7 +131,13 @@ def test_a_sequence_is_kept_as_it_was_given(kind, seed):
             kind(**group, **{name: [1.0, strange, 2.0]})
 
 
-ARGUMENTS = {"Fixed": ("a",), "Roller": ("a", (1, 0, 0)), "SlipWeakening": (1000.0,)}
+ARGUMENTS = {
+    "Fixed": ("a",),
+    "Pressure": ("a", 1e6),
+    "QuietBoundary": ("a",),
+    "Roller": ("a", (1, 0, 0)),
+    "SlipWeakening": (1000.0,),
+}
 SHIPPED = [
     getattr(effects, name)(*ARGUMENTS.get(name, ()))
     for name in effects.__all__

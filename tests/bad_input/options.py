@@ -3,7 +3,19 @@
 from dataclasses import fields, replace
 from typing import Callable, NamedTuple
 
-from ca_damper import Automaton, Batch, Oscillator, RigidMass, SceneTable, Spheres, rk45
+from ca_damper import (
+    Automaton,
+    Batch,
+    Box,
+    ModalStructure,
+    Oscillator,
+    RigidMass,
+    SceneTable,
+    Spheres,
+    excitation,
+    rk45,
+    shake_structure,
+)
 from ca_damper.scenes.clock import steps_per_cycle
 from taichi_dem import (
     CONCRETE,
@@ -19,6 +31,7 @@ from taichi_dem import (
     runtime,
 )
 from taichi_dem.mesh import shapes as mesh_shapes
+from taichi_dem.mesh.face_groups import with_inner_group
 from taichi_dem.mesh.gmsh import block_with_hole
 
 
@@ -46,6 +59,11 @@ def taken(make, kind, names, allowed=()):
 def concrete(**changes):
     """Concrete with something else in it."""
     return replace(CONCRETE, **changes)
+
+
+def rock(**options):
+    """A material from what is measured."""
+    return Material.from_elastic(**{**ROCK, **options})
 
 
 def scene(**options):
@@ -84,6 +102,23 @@ def block(**options):
     return block_with_hole("none/block.msh", **options)
 
 
+def one_mode(**options):
+    """A structure of one place, from its matrices."""
+    return ModalStructure.from_matrices([1.0], [[1e3]], options.get("damping_ratios", 0.01))
+
+
+def box(**options):
+    """An empty box at the first place."""
+    return Box(**{"place": 0, "particles": 0, **options})
+
+
+def shaken_structure(**options):
+    """A shaken structure of one place; all but the option is valid."""
+    still = excitation.sines(1.0, 0.0, 0.1)
+    given = {"seeds": 1, "progress": None, **options}
+    return shake_structure(RigidMass(), one_mode(), box(), still, **given)
+
+
 def cycle(**options):
     """Steps of a cycle."""
     arguments = {"frequency": 6.0, "dt": 1e-4, **options}
@@ -95,6 +130,28 @@ def support(**options):
     return effects.PrescribedMotion(**{"group": "left", "velocity": (1, 0, 0), **options})
 
 
+def pressure(**options):
+    """A pressure that rises."""
+    return effects.Pressure(**{"group": "left", "values": (0, 1), "times": (0, 1), **options})
+
+
+def triangle(**options):
+    """A pulse of pressure."""
+    arguments = {"group": "left", "peak": 1.0, "rise": 1.0, "fall": 1.0, **options}
+    return effects.Pressure.triangle(**arguments)
+
+
+def quiet(**options):
+    """A quiet boundary."""
+    return effects.QuietBoundary(**{"group": "left", **options})
+
+
+def cut(**options):
+    """A scene of two bodies that share the group notch."""
+    mesh = with_inner_group(mesh_shapes.pair(), "notch", lambda x: x[:, 0] < 1.0)
+    return Scene(mesh, CONCRETE, **options)
+
+
 def roller(**options):
     """A support that slides."""
     return effects.Roller(**{"group": "left", "normal": (1, 0, 0), **options})
@@ -104,7 +161,20 @@ _MATERIAL = [field.name for field in fields(Material)]
 _MAY_VANISH = ["normal_damping", "shear_damping", "cohesion", "friction", "contact_damping"]
 _ROOM = ("neighbours_per_body", "pairs_per_body", "spheres_per_body")
 _SIZES = ("width", "height", "depth", "hole_diameter", "size_hole", "size_far", "distance_far")
+ROCK = {
+    "young": 32e9,
+    "poisson": 0.2,
+    "density": 2450.0,
+    "tensile_strength": 5e6,
+    "fracture_energy": 100.0,
+    "friction_angle": 40.0,
+    "cohesion": 10e6,
+}
 BLAST = [
+    *taken(rock, "positive", ("young", "density", "tensile_strength", "fracture_energy")),
+    *taken(rock, "zero or positive", ("cohesion", "damping_ratio")),
+    *taken(rock, "poisson", ("poisson",)),
+    *taken(rock, "up to one", ("friction_angle",), (1.5,)),
     *taken(concrete, "positive", [name for name in _MATERIAL if name not in _MAY_VANISH]),
     *taken(concrete, "zero or positive", _MAY_VANISH),
     *taken(Uniform, "positive", ("dt0",)),
@@ -132,7 +202,16 @@ BLAST = [
     *taken(effects.Gravity, "three numbers", ("acceleration",)),
     *taken(roller, "three numbers", ("normal",)),
     *taken(support, "three numbers", ("velocity",)),
-    *taken(support, "zero or positive", ("frequency",)),
+    *taken(support, "zero or positive", ("frequency", "ramp")),
+    *taken(support, "history", ("history",)),
+    *taken(pressure, "numbers", ("values", "times")),
+    *taken(pressure, "group", ("group",)),
+    *taken(triangle, "zero or positive", ("rise",)),
+    *taken(triangle, "positive", ("fall",)),
+    *taken(quiet, "positive", ("p_speed", "s_speed"), (None,)),
+    *taken(quiet, "group", ("group",)),
+    *taken(cut, "names", ("unbonded",)),
+    *taken(cut, "shares", ("weaker",)),
     *taken(scene, "positive", ("max_speed",)),
     *taken(checkpoint, "path", ("path",)),
     *taken(checkpoint, "whole", ("every_steps",), (None,)),
@@ -170,6 +249,13 @@ DAMPER = [
     *taken(RigidMass, "zero or positive", ("gravity",)),
     *taken(Oscillator, "positive", ("mass", "stiffness")),
     *taken(Oscillator, "zero or positive", ("damping", "base_amplitude")),
+    *taken(one_mode, "zero or positive", ("damping_ratios",)),
+    *taken(box, "whole", ("place", "particles")),
+    *taken(box, "whole", ("seed",), (None,)),
+    *taken(shaken_structure, "positive", ("dt", "duration"), (None,)),
+    *taken(shaken_structure, "positive", ("interval",)),
+    *taken(shaken_structure, "whole", ("force_place",), (None,)),
+    *taken(shaken_structure, "word", ("effects",)),
     *taken(cycle, "positive", ("frequency", "dt")),
     *taken(batch, "zero or positive", ("rtol",)),
     *taken(batch, "positive", ("atol",)),

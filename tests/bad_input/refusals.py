@@ -80,6 +80,10 @@ WRONG = {
         *((0, 0, 10**400), (0, 0, 1e200), {1: 2}),
     ],
     "group": [3, None, "", [], True, 'a"b', "a\nb", b"hole"],
+    "numbers": [None, "abc", b"ab", [], {1: 2}, True, 3j, *([x] for x in _NO_NUMBER)],
+    "history": [3, "ab", [1], [[0], [1], [2]], [[0, 1], [1]], [[1, 0], [1, 1]], [[0], ["1"]]],
+    "names": [None, 3, "notch", [3], [None], {"notch"}],
+    "shares": [None, 3, "notch", [("notch", 0.5)], *({"notch": x} for x in (0, -1, 2, "1", None))],
     "path": ["", None, 3, [], "a\0b", b"run.npz", True],
     "object": [None, 3, "x", [], object],
 }

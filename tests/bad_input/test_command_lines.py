@@ -98,6 +98,10 @@ LINES = [
     ("demo_step_too_large", ("--peak", "0"), ("--peak",)),
     ("demo_wave_and_spall", ("--cells", "5"), ("--cells", "20 to 160")),
     ("hard_cases", ("--only", "nonsense"), ("nonsense",)),
+    ("trust", ("--only", "nonsense"), ("nonsense", "bar_wave")),
+    ("trust", ("--meshes", "0"), ("--meshes", "1 to 100")),
+    ("trust", ("--sizes", "4"), ("--sizes", "1 to 3")),
+    ("trust", ("--seed", "-1"), ("--seed",)),
     ("hard_cases", ("--columns", "0"), ("--columns", "1 to 8")),
 ]
 

@@ -52,7 +52,7 @@ class UnsaidShear(effects.SlipWeakening):
 class UnsaidDashpot(effects.BondDamping):
     """A dashpot likewise."""
 
-    def traction(self, velocity):
+    def traction(self, b, velocity):
         """No traction [Pa]."""
         return velocity
 

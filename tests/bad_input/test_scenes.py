@@ -41,10 +41,12 @@ from taichi_dem import (
     simulate,
     step_report,
 )
+from taichi_dem.mesh.face_groups import with_cut, with_inner_group, with_outer_group
 from taichi_dem.mesh.shapes import bar, pair, single
 from tests.bad_input.refusals import assert_refused, steady
 
 PAIR = pair()
+CUT = with_inner_group(PAIR, "notch", lambda x: x[:, 0] < 1.0)
 POINTS, BODIES, GROUPS = PAIR.points, PAIR.tetrahedra, PAIR.groups
 
 
@@ -95,7 +97,10 @@ MESHES = {
     "group line": (lambda: mesh(groups={"a\nb": GROUPS["left"]}), "name of a group"),
     "group empty": (lambda: mesh(groups={"left": []}), "must not be empty"),
     "group ragged": (lambda: mesh(groups={"left": [[0, 1], [2]]}), "rows of 3"),
-    "group inside": (lambda: mesh(groups={"left": [[0, 1, 2]]}), "not outer faces"),
+    "group half inside": (
+        lambda: mesh(groups={"left": [[0, 1, 2], *PAIR.groups["left"]]}),
+        "1 of its 4 faces are not outer faces",
+    ),
     "weld edge": (lambda: mesh(weld_tolerance=1.0), "weld_tolerance must lie in"),
     "weld NaN": (lambda: mesh(weld_tolerance=math.nan), "weld_tolerance must lie in"),
     "weld huge": (lambda: mesh(weld_tolerance=10**400), "weld_tolerance must lie in"),
@@ -126,6 +131,44 @@ SCENES = {
     "effect alone": (lambda: Scene(PAIR, CONCRETE, effects.Gravity()), "effects must be a list"),
     "roles": (lambda: scene(effects.Softening(), effects.Softening()), "both take the role"),
     "no contact": (lambda: scene(effects.Friction()), "list SphereContact too"),
+    "no notch": (lambda: scene(unbonded=["notch"]), "no face group 'notch'; its groups are:"),
+    "no joint": (lambda: scene(weaker={"joint": 0.5}), "no face group 'joint'; its groups are:"),
+    "joint of no name": (lambda: scene(weaker={3: 0.5}), "no face group 3; its groups are:"),
+    "notch outside": (lambda: scene(unbonded=["left"]), "group left must be of inner faces"),
+    "joint outside": (lambda: scene(weaker={"left": 0.5}), "group left must be of inner faces"),
+    "notch and joint": (
+        lambda: Scene(CUT, CONCRETE, unbonded=["notch"], weaker={"notch": 0.5}),
+        "weaker must not have a group that is unbonded, got notch in both",
+    ),
+    "pressure inside": (
+        lambda: Scene(CUT, CONCRETE, [effects.Pressure("notch", 1.0)]),
+        "group notch must be of outer faces, or unbonded",
+    ),
+    "pressure on a weak joint": (
+        lambda: Scene(CUT, CONCRETE, [effects.Pressure("notch", 1.0)], weaker={"notch": 0.5}),
+        "group notch must be of outer faces, or unbonded",
+    ),
+    "quiet inside": (
+        lambda: Scene(CUT, CONCRETE, [effects.QuietBoundary("notch")]),
+        "group notch must be of outer faces, or unbonded",
+    ),
+    "quiet body alone": (
+        lambda: run(scene=Scene(single(), CONCRETE, [effects.QuietBoundary("base")])),
+        "p_speed of quiet_boundary must be given where no bond is near",
+    ),
+    "unequal histories": (lambda: effects.Pressure("left", [1, 2, 3], [0, 1]), "as many as times"),
+    "times fall": (lambda: effects.Pressure("left", [1, 2], [1, 0]), "times must rise"),
+    "times before 0": (lambda: effects.Pressure("left", [1, 2], [-1, 0]), "times must rise"),
+    "no peak": (lambda: effects.Pressure.triangle("left", 0, 1, 1), "peak must be"),
+    "ramp and history": (
+        lambda: effects.PrescribedMotion("left", (1, 0, 0), ramp=1.0, history=([0], [1])),
+        "ramp must be 0 where there is a history",
+    ),
+    "taken name": (lambda: with_cut(PAIR, "left", (0, 0, 0), (1, 0, 0)), "name must be that of"),
+    "cut nowhere": (lambda: with_cut(PAIR, "cut", (9, 0, 0), (1, 0, 0)), "at least one face"),
+    "cut no way": (lambda: with_cut(PAIR, "cut", (0, 0, 0), (0, 0, 0)), "normal must be longer"),
+    "choice": (lambda: with_outer_group(PAIR, "cut", 3), "chosen must be a function"),
+    "choices": (lambda: with_inner_group(PAIR, "cut", lambda x: x), "one truth value for each"),
     "no group": (lambda: scene(effects.GasPressure()), "no face group 'hole'"),
     "floor": (lambda: Uniform(control=JUMPY), "dashpot_floor must be 0 unless"),
     "sweeps": (lambda: ImplicitDashpots(sweeps=(5, 2)), "sweeps must be two whole numbers"),

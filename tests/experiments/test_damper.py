@@ -386,7 +386,7 @@ BAD_OPTIONS = [
     ("demo_damper", ("--amplitude", "0"), ("--amplitude", "'0'", "(0, 10)")),
     ("demo_damper", ("--dt", "2e-3"), ("dt", "0.0012")),
     ("cost_of_accuracy_damper", ("--methods", "dust"), ("--methods",)),
-    ("hard_cases", ("--only", "dust"), ("dust", "full_box")),
+    ("hard_cases", ("--only", "dust"), ("dust", "case must be one of")),
     ("hard_cases", ("--columns", "0"), ("--columns", "'0'", "1 to")),
     ("demo_damper", ("--threads", "0"), ("--threads", "'0'")),
     ("damper_response", ("--resume",), ("resume", "no checkpoint")),

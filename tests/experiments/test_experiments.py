@@ -40,6 +40,10 @@ FIGURES = {
         "contact_evaluations",
         "seconds_per_simulated_ms",
     },
+    "trust": {
+        *("numbers", "numbers_that_hold", "rotation_spin_value", "rotation_spin_error_percent"),
+        *("bar_wave_20_value", "bar_wave_20_error_percent", "bar_wave_20_published"),
+    },
     "blast_methods": {
         f"{what}_{method}"
         for method in (
@@ -104,6 +108,7 @@ FIGURES = {
     },
 }
 FILES = {
+    "trust": ("trust.csv", "trust.md", "bar_wave.png", "rotation.png"),
     "blast_fracture": (
         *("history.csv", "mesh.msh", "report.json", "bonds.csv", "bodies.csv", "pressure.csv"),
         *("pressure.png", "cracks.png", "energy.png", "history.png", "acting.png"),

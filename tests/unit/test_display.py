@@ -44,7 +44,8 @@ EFFECTS = (
     effects.FaceContact(),
     *(effects.Friction(), effects.StickingFriction(), effects.Gravity()),
     effects.SlipWeakening(1000.0),
-    *(effects.GasPressure("left"), effects.Fixed("left")),
+    *(effects.GasPressure("left"), effects.Fixed("left"), effects.Pressure("left", 1e6)),
+    effects.QuietBoundary("right"),
     effects.Roller("bottom", (0.0, 2.0, 0.0)),
     effects.PrescribedMotion("right", (1.0, 0.0, 0.0), 50.0),
 )
@@ -67,6 +68,18 @@ def of_the_blast():
         MissingEffect("Softening", "bonds are stretched"),
     )
     yield from (taichi_dem.step_report(scene), taichi_dem.quality_report(mesh, CONCRETE))
+    rock = taichi_dem.Material.from_elastic(
+        young=32e9,
+        poisson=0.2,
+        density=2450.0,
+        tensile_strength=5e6,
+        fracture_energy=100.0,
+        friction_angle=40.0,
+        cohesion=1e7,
+    )
+    wanted = taichi_dem.Targets(young=2e10, poisson=0.25)
+    report = taichi_dem.elastic_report(scene)
+    yield from (rock, wanted, report, report.stiffness, taichi_dem.calibrate(mesh, rock, wanted))
     yield from (taichi_dem.Checkpoint("run.npz"), taichi_dem.Every(steps=10), taichi_dem.At([0.0]))
     yield taichi_dem.RunView(simulation, None)
     yield taichi_dem.Collector(taichi_dem.Every(steps=1), time_s=lambda view: view.time_s)
@@ -88,10 +101,14 @@ def of_the_damper():
     few = {"amplitudes": 1e-3, "frequencies": 6.0, "particles": 1, "seeds": 1}
     yield ca_damper.damper_map(ca_damper.RigidMass(), **few)
     yield ca_damper.collect_and_collide(1.0, 2.0)
+    yield ca_damper.ImpactDamper(ca_damper.Oscillator(), 0.01, 0.5, 0.012, 6.0)
     motion = ca_damper.excitation.sines([5.0, 7.0], 1e-3, 0.1)
     force = ca_damper.excitation.SineForce(1.0, 5.0)
     yield from (motion, force, ca_damper.excitation.Excitation(motion, force))
     yield ca_damper.shake(ca_damper.RigidMass(), motion, particles=1, seeds=1)
+    storeys, box = ca_damper.ModalStructure.from_matrices([1.0], [[1e3]], 0.01), ca_damper.Box(0, 1)
+    yield from (storeys, box)
+    yield ca_damper.shake_structure(ca_damper.RigidMass(), storeys, box, motion, seeds=1)
     yield from (film, film.frames[0][0], cycles, ca_damper.needed_effects(response))
     yield from (rk45.solve(lambda t, y: -y, (0.0, 1.0), [1.0]), ca_damper.Progress(0.5, 1.0))
     yield from (ca_damper.ProgressBar("work"), response.report.certificate)

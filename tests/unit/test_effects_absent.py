@@ -129,7 +129,7 @@ def test_a_scene_without_effects_allocates_what_is_listed_by_hand(count):
 
 
 @pytest.mark.parametrize(
-    ("effect", "own"), [("bond_damping", (2, 0)), ("softening", (2, 6)), ("shear_slip", (2, 6))]
+    ("effect", "own"), [("bond_damping", (0, 2)), ("softening", (2, 6)), ("shear_slip", (2, 6))]
 )
 def test_an_effect_adds_its_own_fields_and_the_account_of_heat(count, effect, own):
     """own: numbers of the law, and of each bond beside three of heat; 8 bytes, for all room."""

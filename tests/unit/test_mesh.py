@@ -157,7 +157,8 @@ def test_parts_that_share_no_face_are_counted():
 @pytest.mark.parametrize(
     ("faces", "words"),
     [
-        ([[0, 1, 2]], "group 'wall': 1 of its 1 faces are not outer faces"),
+        ([[0, 3, 4]], "group 'wall': 1 of its 1 faces are not outer faces"),
+        ([[0, 1, 2], [0, 3, 4]], "group 'wall': 2 of its 2 faces are not outer faces"),
         ([[1, 2, 3], [1, 3, 4], [0, 3, 4]], "2 of its 3 faces"),
         ([[0, 1]], "group 'wall' must have shape (n, 3), got (1, 2)"),
         ([[0, 1, 9]], "group 'wall': point numbers must lie in [0, 4]"),

@@ -1,0 +1,90 @@
+"""Random meshes of plates and bars: triangles about jittered points, three tetrahedra a prism."""
+
+import numpy as np
+
+from taichi_dem import step_report
+from taichi_dem.elasticity.mesh_stiffness import mesh_stiffness
+from taichi_dem.materials import Material
+from taichi_dem.mesh.mesh import checked_mesh
+
+#: Shift of inner points, as a share of their distance.
+JITTER = 0.25
+
+
+def plate(length, height, edge, seed, layers=1):
+    """Plate of triangles about points ``edge`` apart in rows, one of them at half the height.
+
+    length, height, edge [m]: along x, along y, of the elements; the thickness is as many edges as
+    there are layers. Points on the outline and in the middle row move along it only. Groups: left,
+    right, bottom, top, back, front.
+    """
+    draw = np.random.default_rng(seed)
+    # Numbers say which way a prism is cut: in order of the rows all would be cut alike.
+    flat = draw.permutation(_points(length, height, edge, draw))
+    triangles = _triangles(flat)
+    grid = np.vstack(
+        [np.column_stack([flat, np.full(len(flat), k * edge)]) for k in range(layers + 1)]
+    )
+    bodies = np.vstack([_prisms(triangles, len(flat), k) for k in range(layers)])
+    faces = np.sort(bodies[:, [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]].reshape(-1, 3), axis=1)
+    outer, count = np.unique(faces, axis=0, return_counts=True)
+    outer = outer[count == 1]
+    ends = ("left", "right"), ("bottom", "top"), ("back", "front")
+    sizes, groups = (length, height, layers * edge), {}
+    for axis, names in enumerate(ends):
+        for name, place in zip(names, (0.0, sizes[axis])):
+            groups[name] = outer[
+                np.isclose(grid[outer, axis], place, atol=1e-9 * length).all(axis=1)
+            ]
+    return checked_mesh(grid, bodies, groups)
+
+
+def _points(length, height, edge, draw):
+    """Points in the plane, (n, 2)."""
+    half = max(1, round(0.5 * height / (edge * np.sqrt(0.75))))
+    along, rows = max(1, round(length / edge)), []
+    for row in range(2 * half + 1):
+        shift = 0.5 * (row % 2)
+        x = np.unique(np.clip(np.arange(along + 1) + shift, 0, along)) * length / along
+        x = np.unique(np.append(x, 0.0))
+        y = np.full(len(x), 0.5 * height * row / half)
+        x[1:-1] += JITTER * edge * draw.uniform(-1, 1, len(x) - 2)
+        if row not in (0, half, 2 * half):
+            y += JITTER * edge * draw.uniform(-1, 1, len(y))
+        rows.append(np.column_stack([x, y]))
+    return np.vstack(rows)
+
+
+def _triangles(points):
+    """Delaunay triangles without flat ones, anticlockwise."""
+    from scipy.spatial import Delaunay
+
+    found = Delaunay(points).simplices
+    corner = points[found]
+    a, b = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    area = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    found[area < 0.0] = found[area < 0.0][:, [0, 2, 1]]
+    return found[np.abs(area) > 1e-6 * np.median(np.abs(area))]
+
+
+def _prisms(triangles, points, layer):
+    """Three tetrahedra for each prism on a triangle; neighbours match as low numbers go first."""
+    low = np.sort(triangles, axis=1) + layer * points
+    up = low + points
+    a, b, c = low.T
+    d, e, f = up.T
+    parts = [np.column_stack(rows) for rows in ((a, b, c, f), (a, b, e, f), (a, d, e, f))]
+    return np.vstack(parts)
+
+
+def material_of(mesh, young, poisson, axes=(0, 1), **options):
+    """A material of which a mesh shows this Young's modulus [Pa] along axes, and what it showed."""
+    made = Material.from_elastic(young=young, poisson=poisson, **options)
+    shown = mesh_stiffness(mesh, made)
+    scale = young / float(np.mean(shown.young_along[list(axes)]))
+    return Material.from_elastic(young=scale * young, poisson=poisson, **options), shown
+
+
+def springs_step(scene, share=0.5):
+    """A share of the largest step that the springs of all bonds allow [s]."""
+    return share * float(step_report(scene).borne("solved").min())

@@ -1,0 +1,78 @@
+"""Spall of a bar by a triangular pulse: planes at lambda sigma_t / (2 s0) from the free end."""
+
+from functools import partial
+
+import numpy as np
+
+from _trust.meshes import material_of, plate, springs_step
+from _trust.number import Number
+from _trust.pieces import pieces_of
+from taichi_dem import ImplicitDashpots, Scene, effects, simulate
+from taichi_dem.kit.plot_style import BLACK, RED
+
+SOURCE = "one-dimensional waves, Kolsky"
+#: Bar: length [m], speed of waves [m/s], density [kg/m3], strength [Pa]. Pulse: peak [Pa], its
+#: length [m].
+LENGTH, SPEED, DENSITY, STRENGTH, PEAK, PULSE = 0.3, 3500.0, 2350.0, 5e6, 20e6, 0.3
+#: Size of an element, width of the bar [m]; fracture energy [J/m2].
+EDGE, WIDTH, ENERGY = 5e-3, 10e-3, 2.0
+#: The pulse's front [m], and the share of critical damping, without which elements ring behind it.
+FRONT, DAMPING = 25e-3, 0.1
+DEPTH = 0.5 * PULSE * STRENGTH / PEAK
+LEAVES = (2.0 * PEAK - STRENGTH) / (DENSITY * SPEED)
+PLANES = PEAK / STRENGTH
+
+
+def spall(effort):
+    """Depth of the first plane, speed at which its piece leaves, and the number of planes."""
+    found = [spalled(seed) for seed in effort.seeds]
+    depth, speed, planes, ends = zip(*found)
+    miss = "each new end rings at the length of an element, and breaks further pieces off"
+    numbers = (
+        Number(
+            *("spall_depth", "first plane from the free end", "mm", SOURCE, 1e3 * DEPTH),
+            *(1e3 * np.array(depth), 1e3 * (DEPTH - EDGE), 1e3 * (DEPTH + EDGE)),
+        ),
+        Number("spall_speed", "it leaves at", "m/s", SOURCE, LEAVES, np.array(speed), allowed=0.03),
+        Number("spall_planes", "planes", "1", SOURCE, PLANES, np.array(planes), note=miss),
+    )
+    return numbers, partial(draw, ends=ends)
+
+
+def spalled(seed):
+    """Depth [m] of the first plane, speed [m/s] of the piece, planes, and pieces' ends [m]."""
+    mesh = plate(LENGTH, WIDTH, EDGE, seed, layers=round(WIDTH / EDGE))
+    options = {"density": DENSITY, "tensile_strength": STRENGTH, "fracture_energy": ENERGY}
+    more = {"friction_angle": 30.0, "cohesion": 10 * STRENGTH, "damping_ratio": DAMPING}
+    material, _ = material_of(mesh, DENSITY * SPEED**2, 0.0, axes=(0,), **options, **more)
+    # Dashpots take some of the peak on its way: the published one is that which arrives.
+    weak = run(mesh, material, PEAK, [])
+    last = weak.model.centre[:, 0] > LENGTH - EDGE
+    fastest = max(frame.velocity[last, 0].mean() for frame in weak.frames)
+    arrived = 0.5 * DENSITY * SPEED * fastest
+    result = run(mesh, material, PEAK * PEAK / arrived, [effects.Softening()])
+    pieces = pieces_of(result)
+    first = max(pieces, key=lambda piece: piece.high[0])
+    ends = sorted(piece.high[0] for piece in pieces)
+    return first.mass / (DENSITY * WIDTH**2), first.velocity[0], len(pieces) - 1, ends
+
+
+def run(mesh, material, peak, laws):
+    """A pulse of a peak [Pa] through the bar, with fracture or without."""
+    times = 0.0, FRONT / SPEED, (FRONT + PULSE) / SPEED
+    pulse = effects.Pressure("left", (0.0, peak, 0.0), times)
+    scene = Scene(mesh, material, [effects.BondDamping(), *laws, pulse])
+    until = (LENGTH + FRONT + 1.2 * PULSE) / SPEED
+    method = ImplicitDashpots(springs_step(scene))
+    return simulate(scene, method=method, until=until, samples=1, frames=120, progress=None)
+
+
+def draw(axes, ends):
+    """Where the bars came apart."""
+    for k, places in enumerate(ends):
+        axes.plot(
+            1e3 * (LENGTH - np.array(places)), np.full(len(places), k + 1.0), "|", color=RED, ms=14
+        )
+    for k in range(1, 5):
+        axes.axvline(1e3 * k * DEPTH, color=BLACK, lw=0.8, ls=":")
+    axes.set(xlabel="distance from the free end [mm]", ylabel="mesh", ylim=(0.4, len(ends) + 0.6))
