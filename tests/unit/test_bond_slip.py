@@ -34,12 +34,17 @@ def write_slip(simulation, name, share):
     field.from_numpy(slip)
 
 
+def needs_of(report):
+    """Needs but for the account of energy, which does not know of bodies that were put there."""
+    return [need for need in report.needs if "account of energy" not in need]
+
+
 def test_share_is_that_of_the_shortest_edge():
     """To the rounding of a length over another."""
     report = slid(0.03, FULL).report()
     (found,) = report.bond_slip
     assert found.share == pytest.approx(0.03, abs=16 * EPS)
-    assert found.bond == 0 and not found.excessive and report.needs == ()
+    assert found.bond == 0 and not found.excessive and needs_of(report) == []
     assert "3 % of the shortest edge of its face (bond 0)" in str(report)
     assert found.place_m == pytest.approx((0.0, 0.0, 0.0), abs=EPS)
 
@@ -47,7 +52,7 @@ def test_share_is_that_of_the_shortest_edge():
 @pytest.mark.parametrize(("law", "words"), [(FULL, "SlipWeakening in place"), (WEAK, "coarser")])
 def test_far_slip_is_warned_of_with_bond_share_and_remedy(law, words):
     report = slid(2.0 * MOST_SLIP, law).report()
-    (need,) = report.needs
+    (need,) = needs_of(report)
     assert "bond 0 " in need and "by 10 %" in need and words in need
     listed = [finding.effect for finding in needed_effects(report).missing]
     assert listed == (["SlipWeakening"] if law is FULL else [])

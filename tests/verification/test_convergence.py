@@ -62,9 +62,9 @@ class MovingBar:
         for name, field in self.fields.items():
             field.from_numpy(self.first[name])
         state.level.from_numpy(levels)
-        material = simulation.model.material
-        for k, value in enumerate((material.normal_damping, material.shear_damping)):
-            simulation.tables.dashpot.law[k] = value if damped else 0.0
+        damping = np.array([CONCRETE.normal_damping, CONCRETE.shear_damping])
+        coefficient = simulation.tables.dashpot.coefficient
+        coefficient.from_numpy(np.tile(damping * damped, (*coefficient.shape, 1)))
         dt0 = UNTIL / steps
         for k in range(MAX_LEVEL + 1):
             simulation.schedule.step_seconds[k] = dt0 / 2.0**k
