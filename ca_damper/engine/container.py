@@ -22,19 +22,16 @@ _STAGES = (1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0)
 
 
 @ti.data_oriented
-class SprungContainer:
-    """The container on its spring, integrated by RK45 within every step of the filling.
+class IntegratedContainer:
+    """Base of containers that RK45 moves on under the action of the filling.
 
-    gravity [m/s^2]. tolerance: local error allowed, rtol and atol, the latter in m and m/s. phase:
-    sine and cosine of the base's turn up to each stage of a step, the same in all steps.
+    impulse [N s] and carried [kg] in the present step. gravity [m/s^2]. tolerance: local error
+    allowed, rtol and atol, the latter in m and m/s.
     """
 
-    def __init__(self, table: SceneFields, clock: Clock):
-        self.table, self.clock = table, clock
-        self.state, self.slope = table.vector(2, ti.f64), table.vector(2, ti.f64)
+    def __init__(self, table: SceneFields):
+        self.table = table
         self.impulse, self.carried = table.field(ti.f64), table.field(ti.f64)
-        self.impulse_velocity = table.field(ti.f64)
-        self.phase = table.vector(2, ti.f64, len(_STAGES))
         self.gravity = ti.field(ti.f64, shape=())
         self.tolerance = ti.field(ti.f64, shape=2)
 
@@ -43,6 +40,45 @@ class SprungContainer:
         """Take over the numbers of a batch."""
         self.gravity[None] = gravity
         self.tolerance[0], self.tolerance[1] = rtol, atol
+
+
+@ti.data_oriented
+class SpringContainer(IntegratedContainer):
+    """Base of integrated containers with one spring and dashpot each.
+
+    state, slope: displacement and speed, and their change. impulse_velocity: share of the present
+    acceleration that is due to impacts [m/s^2].
+    """
+
+    def __init__(self, table: SceneFields):
+        super().__init__(table)
+        self.state, self.slope = table.vector(2, ti.f64), table.vector(2, ti.f64)
+        self.impulse_velocity = table.field(ti.f64)
+
+    @ti.func
+    def recoil(self, s):
+        """Of the mass alone: spring and dashpot take no part in an impulse."""
+        return 1.0 / self.table.mass[s]
+
+    @ti.func
+    def motion(self, s):
+        """Displacement, velocity, and acceleration without the impacts of the step before."""
+        return Motion(
+            self.state[s][0], self.state[s][1], self.slope[s][1] - self.impulse_velocity[s]
+        )
+
+
+@ti.data_oriented
+class SprungContainer(SpringContainer):
+    """The container on its spring, integrated by RK45 within every step of the filling.
+
+    phase: sine and cosine of the base's turn up to each stage of a step, the same in all steps.
+    """
+
+    def __init__(self, table: SceneFields, clock: Clock):
+        super().__init__(table)
+        self.clock = clock
+        self.phase = table.vector(2, ti.f64, len(_STAGES))
 
     @ti.func
     def start(self, s, x, v):
@@ -53,21 +89,9 @@ class SprungContainer:
         self._set_action(s, Action(0.0, 0.0))
 
     @ti.func
-    def recoil(self, s):
-        """Of the mass alone: spring and dashpot take no part in an impulse."""
-        return 1.0 / self.table.mass[s]
-
-    @ti.func
     def base(self, s):
         """Displacement of the base [m]."""
         return self.table.base_amplitude[s] * self.clock.circle[s][0]
-
-    @ti.func
-    def motion(self, s):
-        """Displacement, velocity, and acceleration without the impacts of the step before."""
-        return Motion(
-            self.state[s][0], self.state[s][1], self.slope[s][1] - self.impulse_velocity[s]
-        )
 
     @ti.func
     def renew(self, s):
@@ -140,18 +164,11 @@ class SprungContainer:
 
 
 @ti.data_oriented
-class DrivenContainer:
-    """The container fixed to the base: x = y0 sin(2 pi f t), whatever the filling does."""
-
-    def __init__(self, table: SceneFields, clock: Clock):
-        self.table, self.clock = table, clock
+class PrescribedContainer:
+    """Base of containers fixed to the base, whose motion is prescribed, whatever fills them."""
 
     def load(self, gravity: float, rtol: float, atol: float) -> None:
         """Nothing to load: nothing is integrated."""
-
-    @ti.func
-    def start(self, s, x, v):
-        """Position of the base; x and v are not used."""
 
     @ti.func
     def recoil(self, s):
@@ -161,6 +178,18 @@ class DrivenContainer:
     @ti.func
     def renew(self, s):
         """Nothing to do: the motion is prescribed."""
+
+
+@ti.data_oriented
+class DrivenContainer(PrescribedContainer):
+    """The container fixed to the base: x = y0 sin(2 pi f t)."""
+
+    def __init__(self, table: SceneFields, clock: Clock):
+        self.table, self.clock = table, clock
+
+    @ti.func
+    def start(self, s, x, v):
+        """Position of the base; x and v are not used."""
 
     @ti.func
     def base(self, s):

@@ -9,7 +9,7 @@ from typing import Any
 import taichi as ti
 
 from ca_damper import rk45
-from ca_damper.engine.container import MOST_ATTEMPTS
+from ca_damper.engine.container import MOST_ATTEMPTS, PrescribedContainer, SpringContainer
 from ca_damper.engine.signals import BASES, FORCES
 from ca_damper.excitation.excitation import Excitation, ExcitationKind
 from ca_damper.filling import Action, Motion
@@ -33,28 +33,17 @@ class Load:
 
 
 @ti.data_oriented
-class ExcitedContainer:
+class ExcitedContainer(SpringContainer):
     """The container on its spring, its base and a force moving as an Excitation says.
 
     elapsed: steps since the start. lifts: whether it lies on the base by its weight, and spring and
-    dashpot push but never pull; x = 0 is where it just touches a base at rest. The other members
-    are those of a SprungContainer.
+    dashpot push but never pull; x = 0 is where it just touches a base at rest.
     """
 
     def __init__(self, table: SceneFields, clock: Clock, kind: ExcitationKind, lifts: bool = False):
-        self.table, self.lifts = table, lifts
+        super().__init__(table)
+        self.lifts, self.elapsed = lifts, table.field(ti.i32)
         self.excited_base, self.force = BASES[kind.base](table, clock), FORCES[kind.force](table)
-        self.state, self.slope = table.vector(2, ti.f64), table.vector(2, ti.f64)
-        self.impulse, self.carried = table.field(ti.f64), table.field(ti.f64)
-        self.impulse_velocity, self.elapsed = table.field(ti.f64), table.field(ti.i32)
-        self.gravity = ti.field(ti.f64, shape=())
-        self.tolerance = ti.field(ti.f64, shape=2)
-
-    @ti.kernel
-    def load(self, gravity: ti.f64, rtol: ti.f64, atol: ti.f64):
-        """Take over the numbers of a batch."""
-        self.gravity[None] = gravity
-        self.tolerance[0], self.tolerance[1] = rtol, atol
 
     def excite(self, excitation: Excitation, scenes: int) -> None:
         """Take over the excitation of a batch."""
@@ -69,21 +58,9 @@ class ExcitedContainer:
         self._set_action(s, Action(0.0, 0.0))
 
     @ti.func
-    def recoil(self, s):
-        """Speed that a unit impulse gives the container [1/kg]."""
-        return 1.0 / self.table.mass[s]
-
-    @ti.func
     def base(self, s):
         """Displacement of the base at the beginning of the step [m]."""
         return self.excited_base.at(s, self._time(s), 0.0)[0]
-
-    @ti.func
-    def motion(self, s):
-        """Displacement, velocity, and acceleration without the impacts of the step before."""
-        return Motion(
-            self.state[s][0], self.state[s][1], self.slope[s][1] - self.impulse_velocity[s]
-        )
 
     @ti.func
     def renew(self, s):
@@ -145,15 +122,12 @@ class ExcitedContainer:
 
 
 @ti.data_oriented
-class ShakenContainer:
+class ShakenContainer(PrescribedContainer):
     """The container fixed to a base that moves as an Excitation says."""
 
     def __init__(self, table: SceneFields, clock: Clock, kind: ExcitationKind):
         self.table, self.excited_base = table, BASES[kind.base](table, clock)
         self.elapsed = table.field(ti.i32)
-
-    def load(self, gravity: float, rtol: float, atol: float) -> None:
-        """Nothing to load: nothing is integrated."""
 
     def excite(self, excitation: Excitation, scenes: int) -> None:
         """Take over the base motions of a batch."""
@@ -163,15 +137,6 @@ class ShakenContainer:
     def start(self, s, x, v):
         """Time zero; x and v are not used."""
         self.elapsed[s] = 0
-
-    @ti.func
-    def recoil(self, s):
-        """None: no impulse changes the motion of the base."""
-        return 0.0
-
-    @ti.func
-    def renew(self, s):
-        """Nothing to do: the motion is prescribed."""
 
     @ti.func
     def base(self, s):

@@ -7,7 +7,7 @@ The modes of a group belong to its first scene, and RK45 takes them over a step 
 import taichi as ti
 
 from ca_damper import rk45
-from ca_damper.engine.container import MOST_ATTEMPTS
+from ca_damper.engine.container import MOST_ATTEMPTS, IntegratedContainer
 from ca_damper.engine.modal_mount import ModalMount
 from ca_damper.engine.signals import BASES, FORCES
 from ca_damper.excitation.excitation import Excitation, ExcitationKind
@@ -19,22 +19,22 @@ _F64 = ti.types.ndarray(dtype=ti.f64, ndim=2)
 
 
 @ti.data_oriented
-class ModalContainer:
+class ModalContainer(IntegratedContainer):
     """Boxes of all groups, and their modes in metres as ``ModalMount`` counts them.
 
     Of the batch: group, boxes: scenes of a group, and those of them with a box; mass [kg],
-    stiffness [N/m], damping [N s/m] of each mode, share: of the base's motion, pushed: by the
-    force of the excitation. Of a scene: shape at its place; lift: what motion of the place adds to
-    the modes; residual; impulse [N s] and carried [kg] in the present step; seen: motion of the
-    place. Of a group, at its first scene: state, slope: modal coordinates and speeds, and their
-    change; inverse of the modal masses [1/kg] with all that is carried; constant [N]: forces of
-    the fillings on the modes, lag [kg]: by the acceleration of the base; elapsed: steps since the
-    start; changed: whether slope and inverse are out of date; scratch for forces on the modes
-    (pull), their accelerations (gain) and motion (tried).
+    stiffness [N/m], damping [N s/m] of each mode, share: of the base's motion, pushed: by the force
+    of the excitation. Of a scene: shape at its place; lift: what motion of the place adds to the
+    modes; residual; seen: motion of the place. Of a group, at its first scene: state, slope: modal
+    coordinates and speeds, and their change; inverse of the modal masses [1/kg] with all that is
+    carried; constant [N]: forces of the fillings on the modes, lag [kg]: by the acceleration of the
+    base; elapsed: steps since the start; changed: whether slope and inverse are out of date;
+    scratch for forces on the modes (pull), their accelerations (gain) and motion (tried).
     """
 
     def __init__(self, table: SceneFields, clock: Clock, kind: ExcitationKind, modes: int):
-        self.table, self.modes = table, modes
+        super().__init__(table)
+        self.modes = modes
         self.excited_base, self.force = BASES[kind.base](table, clock), FORCES[kind.force](table)
         for name in ("mass", "stiffness", "damping", "share", "pushed"):
             setattr(self, name, ti.field(ti.f64, shape=modes))
@@ -44,16 +44,7 @@ class ModalContainer:
         self.inverse, self.tried = table.field(ti.f64, modes, modes), table.field(ti.f64, 2 * modes)
         self.state, self.slope = table.vector(2 * modes, ti.f64), table.vector(2 * modes, ti.f64)
         self.residual, self.seen = table.field(ti.f64), table.vector(3, ti.f64)
-        self.impulse, self.carried = table.field(ti.f64), table.field(ti.f64)
         self.elapsed, self.changed = table.field(ti.i32), table.field(ti.i32)
-        self.gravity = ti.field(ti.f64, shape=())
-        self.tolerance = ti.field(ti.f64, shape=2)
-
-    @ti.kernel
-    def load(self, gravity: ti.f64, rtol: ti.f64, atol: ti.f64):
-        """Take over the numbers of a batch."""
-        self.gravity[None] = gravity
-        self.tolerance[0], self.tolerance[1] = rtol, atol
 
     def excite(self, excitation: Excitation, scenes: int) -> None:
         """Take over the excitation of a batch."""
