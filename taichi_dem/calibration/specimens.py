@@ -4,7 +4,7 @@ import numpy as np
 
 from taichi_dem.kit.fixed_order import length
 from taichi_dem.mesh.mesh import Mesh, checked_mesh
-from taichi_dem.mesh.shapes import bar
+from taichi_dem.mesh.shapes import bar, with_moved_nodes
 from taichi_dem.mesh.tetrahedra import all_faces, area_vectors, shared_faces
 
 #: Boxes across and along a prism, across the diameter of a disc, and through it.
@@ -22,7 +22,8 @@ def prism(element: float, seed: int) -> Mesh:
     points.
     """
     box = _box(element)
-    return _shifted(bar(_ALONG * box, _ACROSS * box, (_ALONG, _ACROSS, _ACROSS)), box, seed)
+    straight = bar(_ALONG * box, _ACROSS * box, (_ALONG, _ACROSS, _ACROSS))
+    return with_moved_nodes(straight, _SHIFT * box, seed)
 
 
 def disc(element: float, seed: int) -> Mesh:
@@ -34,7 +35,7 @@ def disc(element: float, seed: int) -> Mesh:
     width = _DIAMETER * box
     square = bar(width, width, (_DIAMETER, _DIAMETER, _THROUGH))
     points = square.points * [1.0, 1.0, _THROUGH / _DIAMETER] - [0.5 * width, 0.5 * width, 0.0]
-    block = _shifted(checked_mesh(points, square.tetrahedra, {}), box, seed)
+    block = with_moved_nodes(checked_mesh(points, square.tetrahedra, {}), _SHIFT * box, seed)
     middle = block.points[block.tetrahedra].mean(axis=1)
     bodies = block.tetrahedra[np.hypot(middle[:, 0], middle[:, 1]) < 0.5 * width]
     return checked_mesh(block.points, bodies, _arcs(block.points, bodies, 0.5 * width))
@@ -43,15 +44,6 @@ def disc(element: float, seed: int) -> Mesh:
 def _box(element):
     """Edge of a box cut into six bodies [m]: edge^3 / (6 sqrt 2) = box^3 / 6."""
     return element / 2.0 ** (1.0 / 6.0)
-
-
-def _shifted(mesh, box, seed):
-    """The mesh with its inner points shifted at random, and those of faces within them."""
-    shift = np.random.default_rng(seed).uniform(-_SHIFT, _SHIFT, mesh.points.shape) * box
-    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
-    near = 1e-6 * box
-    shift[(mesh.points < low + near) | (mesh.points > high - near)] = 0.0
-    return checked_mesh(mesh.points + shift, mesh.tetrahedra, dict(mesh.groups))
 
 
 def _arcs(points, bodies, radius):

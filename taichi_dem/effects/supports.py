@@ -14,7 +14,7 @@ from taichi_dem.kit.elementary import sine_and_cosine
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import length
 from taichi_dem.kit.types import vec3
-from taichi_dem.kit.validation import direction, positive, shown, word
+from taichi_dem.kit.validation import direction, positive, shown, unit_vector, word
 from taichi_dem.materials import Material
 from taichi_dem.mesh.topology import faces_of_group
 from taichi_dem.physics.rotation import zero3
@@ -85,10 +85,7 @@ class Roller(_Support):
 
     def __init__(self, group: str, normal: Sequence[float]):
         super().__init__(group)
-        numbers = np.array(direction("normal", normal))
-        if not length(numbers) > 0.0:
-            raise InputError(f"normal must be longer than zero, got {shown(normal)}")
-        self._normal = numbers / length(numbers)
+        self._normal = unit_vector("normal", normal)
 
     def declare(self, capacity: "Capacity") -> None:
         """Direction that each body may not move in, and whether it may turn about the normal."""

@@ -52,7 +52,15 @@ def bond_geometry(mesh: Mesh, topology: Topology, density: float) -> BondGeometr
 
 
 class Rule:
-    """Base of rules: a constant that depends on the sizes of the bodies."""
+    """Base of rules: a constant that depends on the sizes of the bodies.
+
+    Derived classes are dataclasses. Raises InputError unless all their fields are positive numbers.
+    """
+
+    def __post_init__(self):
+        plain_fields(self)
+        for name, value in vars(self).items():
+            positive(name, value)
 
     def __repr__(self) -> str:
         return by_fields(self)
@@ -88,10 +96,6 @@ class ModulusOverDistance(BondRule):
 
     modulus: float
 
-    def __post_init__(self):
-        plain_fields(self)
-        positive("modulus", self.modulus)
-
     def per_bond(self, bonds: BondGeometry) -> np.ndarray:
         """Stiffness of every bond per area [Pa/m], (bond_count,)."""
         return self.modulus / bonds.distance
@@ -108,11 +112,6 @@ class ShareOfCritical(BondRule):
 
     ratio: float
     modulus: float
-
-    def __post_init__(self):
-        plain_fields(self)
-        positive("ratio", self.ratio)
-        positive("modulus", self.modulus)
 
     def per_bond(self, bonds: BondGeometry) -> np.ndarray:
         """Dashpot of every bond per area [Pa s/m], (bond_count,)."""
@@ -132,10 +131,6 @@ class FaceStiffness(ContactRule):
 
     modulus: float
 
-    def __post_init__(self):
-        plain_fields(self)
-        positive("modulus", self.modulus)
-
     def of_mesh(self, mesh: Mesh, density: float) -> float:
         """Stiffness of a contact of two bodies of a mesh [N/m]."""
         area = length(area_vectors(mesh.points, all_faces(mesh.tetrahedra))).reshape(-1, 4)
@@ -154,11 +149,6 @@ class ContactShareOfCritical(ContactRule):
 
     ratio: float
     modulus: float
-
-    def __post_init__(self):
-        plain_fields(self)
-        positive("ratio", self.ratio)
-        positive("modulus", self.modulus)
 
     def of_mesh(self, mesh: Mesh, density: float) -> float:
         """Dashpot of a contact of two bodies of a mesh [N s/m]."""

@@ -7,7 +7,10 @@ import os
 from collections.abc import Callable, Collection
 from typing import Any, TypeVar, Union
 
+import numpy as np
+
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.fixed_order import length
 
 #: Name of a file or folder.
 FileName = Union[str, os.PathLike]
@@ -189,3 +192,11 @@ def direction(name: str, value: Any) -> tuple[float, ...]:
             f"{name} must be three finite numbers, none above {LARGEST:g}, got {shown(value)}"
         )
     return tuple(float(x) for x in three)
+
+
+def unit_vector(name: str, value: Any) -> np.ndarray:
+    """The direction of three finite numbers, (3,), of length one; InputError where all are zero."""
+    vector = np.array(direction(name, value))
+    if not length(vector) > 0.0:
+        raise InputError(f"{name} must be longer than zero, got {shown(value)}")
+    return vector / length(vector)

@@ -7,8 +7,8 @@ from typing import Any, Callable, Optional
 import numpy as np
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.fixed_order import dot, length
-from taichi_dem.kit.validation import direction, shown, word
+from taichi_dem.kit.fixed_order import dot
+from taichi_dem.kit.validation import direction, shown, unit_vector, word
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.mesh import Mesh
 
@@ -52,12 +52,10 @@ def with_cut(
     and normal: of the plane. chosen: which of them, by the centres of the faces, as for
     ``with_outer_group``; None for all. Raises InputError as that, and for a normal of zero.
     """
-    origin, along = np.array(direction("point", point)), np.array(direction("normal", normal))
-    if not length(along) > 0.0:
-        raise InputError(f"normal must be longer than zero, got {shown(normal)}")
+    origin, along = np.array(direction("point", point)), unit_vector("normal", normal)
     inner, bodies = _inner_faces(mesh)
     centre = mesh.points[mesh.tetrahedra].mean(axis=1)
-    before = dot(centre - origin, along / length(along)) > 0.0
+    before = dot(centre - origin, along) > 0.0
     faces = inner[before[bodies[:, 0]] != before[bodies[:, 1]]]
     if chosen is not None:
         faces = faces[_choose(mesh, faces, chosen)]

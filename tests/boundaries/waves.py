@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects
-from taichi_dem.mesh.shapes import bar
+from taichi_dem.mesh.shapes import bar, with_moved_nodes
 
 #: Concrete whose bonds have no dashpots, so that no wave fades.
 UNDAMPED = replace(CONCRETE, normal_damping=0.0, shear_damping=0.0)
@@ -16,15 +16,9 @@ QUIET = (effects.QuietBoundary("left"), effects.QuietBoundary("right"))
 
 def perturbed(mesh, share, seed):
     """Nodes moved by up to a share of the shortest edge along each axis, outer ones in plane."""
-    points, extent = mesh.points.copy(), np.ptp(mesh.points, axis=0)
-    edges = (
-        points[mesh.tetrahedra[:, [0, 0, 0, 1, 1, 2]]]
-        - points[mesh.tetrahedra[:, [1, 2, 3, 2, 3, 3]]]
-    )
-    size = np.linalg.norm(edges, axis=2).min()
-    moved = share * size * np.random.default_rng(seed).uniform(-1.0, 1.0, points.shape)
-    moved[(points < 1e-9 * extent) | (points > (1.0 - 1e-9) * extent)] = 0.0
-    return replace(mesh, points=points + moved)
+    corners = mesh.points[mesh.tetrahedra]
+    edges = corners[:, [0, 0, 0, 1, 1, 2]] - corners[:, [1, 2, 3, 2, 3, 3]]
+    return with_moved_nodes(mesh, share * np.linalg.norm(edges, axis=2).min(), seed)
 
 
 def plane_bar(boxes, across=2, share=0.0, seed=1):

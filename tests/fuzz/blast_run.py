@@ -8,6 +8,7 @@ import time
 import numpy as np
 
 from taichi_dem import Checkpoint, Simulation, simulate
+from taichi_dem.diagnostics.energy_balance import unexplained_share
 from taichi_dem.kit.checkpoint import Interrupted
 from taichi_dem.observers import Collector, Every
 from taichi_dem.simulate import run_simulation
@@ -87,16 +88,9 @@ def judge(result):
     moved = result.history["kinetic_J"].max() > report.round_off_J
     if moved and not report.linear_momentum_error <= MOMENTUM:
         raise Wrong(f"momentum error {report.linear_momentum_error:.3g} of that exchanged")
-    share = unexplained_share(report)
+    share = unexplained_share(report.energy_balance, report.round_off_J)
     if not share <= UNEXPLAINED and not report.unresolved:
         raise Wrong(f"{100.0 * share:.3g} % of the energy unexplained, and no warning")
-
-
-def unexplained_share(report):
-    """Residual of the account over all energy that went through the scene."""
-    terms = {name: abs(value) for name, value in report.energy_balance.items()}
-    residual = terms.pop("residual")
-    return residual / max(sum(terms.values()), 100.0 * report.round_off_J, 1e-300)
 
 
 def same_bits(first, second, what):

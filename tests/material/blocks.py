@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 
 from taichi_dem import Material, checked_mesh
-from taichi_dem.mesh.shapes import bar
+from taichi_dem.mesh.shapes import bar, with_moved_nodes
 
 E, NU, DENSITY = 32e9, 0.2, 2450.0
 
@@ -26,11 +26,7 @@ def rock(**changed):
 
 def random_block(cells, seed, amount=0.25, size=1.0):
     """Cube of boxes cut in six, its points shifted by up to a share of a box; faces stay flat."""
-    mesh = bar(size, size, (cells,) * 3)
-    shift = np.random.default_rng(seed).uniform(-amount, amount, mesh.points.shape) * size / cells
-    outer = (mesh.points < 1e-9 * size) | (mesh.points > (1.0 - 1e-9) * size)
-    shift[outer] = 0.0
-    return checked_mesh(mesh.points + shift, mesh.tetrahedra, dict(mesh.groups))
+    return with_moved_nodes(bar(size, size, (cells,) * 3), amount * size / cells, seed)
 
 
 def disphenoids(cells, size=1.0):
