@@ -4,6 +4,12 @@
 Options of the attacks are those of ``tests/attacks.py``.
 """
 
+import contextlib
+import ctypes
+import gc
+import os
+from pathlib import Path
+
 import pytest
 
 from ca_damper.engine import damper_engine
@@ -26,8 +32,9 @@ def pytest_configure(config):
     arch.choose(config.getoption("--arch"))
 
 
-#: Bytes of fields beyond which the next file begins with a session of its own.
-_MOST_BYTES = 2e9
+#: Bytes of the process beyond which the next file begins with a session of its own: two workers and
+#: the processes that tests start share a machine.
+_MOST_BYTES = 3e9
 _MOST_TREES = 200
 
 
@@ -39,6 +46,7 @@ def taichi_session():
     """
     if runtime.settings() is not None and _is_full():
         runtime.stop()
+        _return_memory()
     if arch.chosen() == "cuda" and not runtime.cuda_present():
         pytest.skip("no CUDA device answers here")
     runtime.start(arch.chosen(), threads=2)
@@ -47,7 +55,23 @@ def taichi_session():
 def _is_full():
     started = runtime.settings()
     other = (started.arch, started.threads, started.debug) != (arch.chosen(), 2, False)
-    return other or field_bytes() > _MOST_BYTES or tree_count() > _MOST_TREES
+    return other or _resident_bytes() > _MOST_BYTES or tree_count() > _MOST_TREES
+
+
+def _resident_bytes():
+    """Memory that this process occupies; where the system does not tell, that of the fields."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text().split()[1])
+    except OSError:
+        return field_bytes()
+    return pages * os.sysconf("SC_PAGE_SIZE")
+
+
+def _return_memory():
+    """Give what is free back to the system, where the C library can: compilers leave gigabytes."""
+    gc.collect()
+    with contextlib.suppress(OSError, AttributeError):
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 @pytest.fixture

@@ -27,6 +27,7 @@ from tests.accuracy.drawn import blast_question, dropped_question
 from tests.accuracy.small_bar import UNTIL, struck_bar
 from tests.equivalence.test_bits import ENVIRONMENT
 from tests.scenes import ROOT, apart
+from tests.slow import slow_but
 
 GOALS = (
     goals.broken_faces(),
@@ -67,6 +68,7 @@ def edge_of_breaking(level, until=3e-4):
             held = middle
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", [0, 1])
 def test_no_number_is_bare_where_a_bond_is_on_its_edge(level):
     """One rounding decides at a step; the bar holds what finer steps decide, or is too wide."""
@@ -79,6 +81,7 @@ def test_no_number_is_bare_where_a_bond_is_on_its_edge(level):
             assert answer.reached == (answer.share <= 0.01 or answer.error == 0.0)
 
 
+@pytest.mark.slow
 def test_bodies_that_bounce_have_no_single_number():
     asked = dropped_question()
     answer = solve(asked.scene, until=asked.until, goal=asked.goal, progress=None)
@@ -99,7 +102,7 @@ def test_bodies_that_bounce_have_no_single_number():
     assert "part from" in said.report.known_error
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", slow_but(range(4), 3))
 def test_bars_of_drawn_questions_hold(seed):
     """Four of those of experiments/accuracy_on_request.py, where about 95 of 100 hold."""
     asked = blast_question(500 + seed)
@@ -130,6 +133,7 @@ print(answer.value.hex(), answer.error.hex(), answer.plan.runs)
 """
 
 
+@pytest.mark.slow
 def test_threads_change_no_bit():
     said = [
         subprocess.run(
@@ -175,6 +179,7 @@ def test_a_finished_run_leaves_nothing_on_the_engine():
     assert [*simulation.loan.engine.loans] == [simulation.loan]
 
 
+@pytest.mark.slow
 def test_the_mean_of_bodies_that_bounce_is_found():
     asked = dropped_question()
     looks = {"until": 0.005, "tolerance": 0.5, "progress": None}

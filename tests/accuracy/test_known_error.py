@@ -29,6 +29,7 @@ from taichi_dem.scene import kind_of
 from tests.accuracy.small_bar import UNTIL, struck_bar
 from tests.bar_blast import METHODS as BAR_METHODS
 from tests.bar_blast import bar_scene
+from tests.slow import slow_but
 
 #: Half of an order would be another scheme; what the next order adds is a few hundredths here.
 SEEN = 0.1
@@ -116,7 +117,7 @@ WORDS = {
 }
 
 
-@pytest.mark.parametrize("name", WORDS)
+@pytest.mark.parametrize("name", slow_but(WORDS, "uniform"))
 def test_a_bar_that_breaks_says_so(name):
     looks = {"until": 6e-5, "samples": 1, "progress": None}
     report = simulate(bar_scene(), method=BAR_METHODS[name], **looks).report

@@ -45,6 +45,7 @@ def same_bits(first, second):
     return [name for name in BITS if not np.array_equal(first.fields[name], second.fields[name])]
 
 
+@pytest.mark.slow
 def test_one_bond_in_1024_is_audited():
     """The number of a run is binomial: within five standard deviations."""
     made = [run(name, sleep=0.0).simulation for name in DRAWN]
@@ -54,6 +55,7 @@ def test_one_bond_in_1024_is_audited():
     assert abs(audited - expected) < 5.0 * math.sqrt(expected)
 
 
+@pytest.mark.slow
 def test_twenty_scenes_without_fault_have_no_miss_and_the_same_bits(rate):
     """With every bond audited in every substep.
 
@@ -123,6 +125,7 @@ class Loose:
         self.fields = {k: f.to_numpy() for k, f in self.simulation.state.fields().items()}
 
 
+@pytest.mark.slow
 def test_laws_that_begin_too_late_are_found_and_no_bit_changes(rate):
     """Each bond that should act is a miss in every substep, and the certificate does not hold."""
     names = {

@@ -53,6 +53,7 @@ def differing(first, second):
     return [name for name in first if first[name].tobytes() != second[name].tobytes()]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["hit 0", "fragment 0"])
 @pytest.mark.parametrize("kind", CASES)
 def test_both_drivers_give_the_same_bits(kind, name):
@@ -84,6 +85,7 @@ print(json.dumps(told))
 """
 
 
+@pytest.mark.slow
 def test_threads_change_no_bit():
     """Taichi spreads loops of more than 512 items; the bar has 666 bodies."""
     told = []

@@ -87,6 +87,7 @@ def test_without_sleep_nobody_sleeps():
     assert "sleep is 0" in str(found)
 
 
+@pytest.mark.slow
 def test_a_scene_that_lists_its_effects_has_no_certificate():
     listed = replace(pulled(), effects=list(pulled().effects), loads=(), sleep=None)
     found = simulate(listed, until=1e-5, method=METHOD)

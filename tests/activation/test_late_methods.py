@@ -20,12 +20,8 @@ METHODS = {
 }
 #: Scenes in which the bond that needs a law is clearly ahead of the others.
 NAMED = ("far_end 0", "far_end_slips 2", "thrown 0", "hit 0", "flight 0", "fragment 0", "aside 0")
-SLOW = pytest.mark.slow
-#: One is run by every change, as each compiles two engines.
-MARKED = [
-    "controlled",
-    *(pytest.param(name, marks=SLOW) for name in METHODS if name != "controlled"),
-]
+#: Each compiles two engines.
+pytestmark = pytest.mark.slow
 
 
 def runs(method, name):
@@ -39,7 +35,7 @@ def runs(method, name):
 
 
 @pytest.mark.parametrize("name", NAMED)
-@pytest.mark.parametrize("method", MARKED)
+@pytest.mark.parametrize("method", METHODS)
 def test_without_sleep_all_bits_are_those_of_all_effects(method, name):
     every, auto, _ = runs(method, name)
     assert [key for key in BITS if not np.array_equal(auto.fields[key], every.fields[key])] == []
@@ -49,7 +45,7 @@ def test_without_sleep_all_bits_are_those_of_all_effects(method, name):
 
 
 @pytest.mark.parametrize("name", NAMED)
-@pytest.mark.parametrize("method", MARKED)
+@pytest.mark.parametrize("method", METHODS)
 def test_sleep_finds_what_acts(method, name):
     every, _, auto = runs(method, name)
     apart = np.abs(auto.fields["position"] - every.fields["position"]).max()
@@ -59,7 +55,7 @@ def test_sleep_finds_what_acts(method, name):
 
 
 @pytest.mark.parametrize("name", NAMED)
-@pytest.mark.parametrize("method", MARKED)
+@pytest.mark.parametrize("method", METHODS)
 def test_certificates_hold(method, name):
     for made in runs(method, name)[1:]:
         certificate = made.report.certificate
@@ -67,7 +63,7 @@ def test_certificates_hold(method, name):
         assert made.report.linear_momentum_error <= 1e-12
 
 
-@pytest.mark.parametrize("method", MARKED)
+@pytest.mark.parametrize("method", METHODS)
 def test_where_it_is_not_needed_it_never_acts(method):
     for name in ("far_end 0", "far_end_slips 2", "flight 0"):
         twin = run(name, needed=False, method=METHODS[method])

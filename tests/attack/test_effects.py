@@ -99,6 +99,7 @@ def same_bits(first, second):
     )
 
 
+@pytest.mark.slow
 def test_an_effect_acted_if_a_bit_depends_on_it(seed):
     """And if it acted, some bit does: each acts by an energy of its own, which has a column.
 
@@ -115,6 +116,7 @@ def test_an_effect_acted_if_a_bit_depends_on_it(seed):
                 assert same_bits(whole, other) == idle, (name, str(use))
 
 
+@pytest.mark.slow
 def test_an_effect_is_missed_if_it_acts_where_it_is_listed(seed):
     """Up to its first act the two runs are one: the limits of bonds are watched at every step.
 
@@ -162,6 +164,7 @@ def gentle():
     return scene
 
 
+@pytest.mark.slow
 def test_what_advice_calls_droppable_can_be_dropped_at_once(gentle):
     whole = gentle.run()
     droppable = needed_effects(whole).droppable
@@ -191,6 +194,7 @@ def test_weight_that_throws_back_what_it_catches_is_not_idle(seed):
     assert needed_effects(result).droppable == ()
 
 
+@pytest.mark.slow
 def test_a_bounce_between_two_samples_is_counted(seed):
     """Without dashpots nothing is left of it but the motion that it turned round."""
     draw = np.random.default_rng(seed)
@@ -216,6 +220,7 @@ def test_a_support_that_holds_a_loaded_bar_is_not_idle(seed):
     assert use.events == 2 and use.energy_J == 0.0 and use.kept.endswith("without doing work")
 
 
+@pytest.mark.slow
 def test_bodies_that_are_apart_miss_nothing(seed):
     """A tenth of a metre, and a drift of a millimetre."""
     draw = np.random.default_rng(seed)
@@ -248,6 +253,7 @@ def thrown(contact, material):
     return run_simulation(simulation, until=CELL / 75.0, samples=SAMPLES, progress=None)
 
 
+@pytest.mark.slow
 def test_blocks_do_not_pass_through_each_other_unseen():
     # A tenth, so that the step resolves the dashpots of all spheres of a body.
     stopped = thrown(effects.SphereContact(), softened(0.1))
@@ -261,6 +267,7 @@ def test_blocks_do_not_pass_through_each_other_unseen():
     )
 
 
+@pytest.mark.slow
 def test_contact_that_is_too_soft_diverges_in_words_or_warns(seed):
     """Spheres of 1.5 kN/m, a hundred by 5 mm, take 2 J of the 370 J: nothing is stopped."""
     draw = np.random.default_rng(seed)

@@ -3,6 +3,7 @@
 import warnings
 
 import numpy as np
+import pytest
 
 from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, effects, read_mesh
 from taichi_dem.mesh.files import write_mesh
@@ -71,6 +72,7 @@ def moving(seed, speed, steps, step):
     return simulation, velocity
 
 
+@pytest.mark.slow
 def test_a_cut_solid_rests_in_itself(seed):
     """Spheres meet at a gap of zero, known to ten roundings of a place of 0.1 m.
 

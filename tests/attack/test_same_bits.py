@@ -56,12 +56,14 @@ def here():
     return bits("runs")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["blas", "blas_with_avx", "numpy", "libm"])
 def test_tables_have_the_same_bits_on_another_processor(here, kind):
     found = bits(**OLDER[kind])
     assert found == {name: here[name] for name in found}
 
 
+@pytest.mark.slow
 def test_runs_have_the_same_bits_on_an_older_processor(here):
     assert bits("runs", **OLDER["all"]) == here
 

@@ -22,6 +22,7 @@ from taichi_dem import (
     simulate,
 )
 from taichi_dem.mesh.shapes import bar, placed_together
+from tests.slow import slow_but
 
 ATTACKS = "units: a scene in others is the same run"
 #: Powers of four by which a unit may be larger or smaller: a mm and a km are within 4^5 of a metre.
@@ -134,7 +135,7 @@ def run_in(u, name, *drawn):
     return {**found, **joules}, result.report
 
 
-@pytest.mark.parametrize("name", methods_in(Units()))
+@pytest.mark.parametrize("name", slow_but(methods_in(Units()), "uniform"))
 def test_units_change_no_bit(seed, name):
     random = np.random.default_rng(seed)
     # Half of the methods with each contact, the other half at the next seed.

@@ -141,6 +141,7 @@ def test_motions_of_other_histories_must_not_share_bodies():
     Simulation(Scene(mesh, CONCRETE, same), Uniform(STEP))
 
 
+@pytest.mark.slow
 def test_plane_strain_by_rollers_on_two_faces():
     """Bodies on both faces keep their z to the bit, and the block contracts more along y.
 

@@ -163,7 +163,7 @@ METHODS = {
 
 
 #: Methods that the quick tests compile.
-QUICK = ("uniform", "solved")
+QUICK = ("uniform",)
 EACH = [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in METHODS]
 
 
@@ -231,10 +231,8 @@ def blown():
 QUIETLY = {"until": 2e-4, "progress": None, "samples": 4, "frames": 2}
 
 
-@pytest.mark.parametrize(
-    "method",
-    [pytest.param(Multirate(1e-7, 1e-6), marks=pytest.mark.slow), ImplicitDashpots(1e-6)],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("method", [Multirate(1e-7, 1e-6), ImplicitDashpots(1e-6)])
 def test_drivers_and_threads_give_the_same_bits(method):
     runs = [
         simulate(blown(), method=method, driver=driver, **{**QUIETLY, "until": 4e-5})

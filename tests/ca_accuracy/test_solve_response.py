@@ -308,6 +308,7 @@ for answer in solve_response(Automaton(), particles=9, goal=asked, tolerance=0.1
 """
 
 
+@pytest.mark.slow
 def test_the_number_of_threads_changes_no_bit():
     assert runtime.settings().threads == 2
     asked = [goals.rms_at(0.97), goals.peak_rms()]

@@ -14,6 +14,7 @@ from ca_damper import (
 )
 from ca_damper.combined import device
 from tests.ca_spheres.impact_damper import drawn
+from tests.slow import slow_but
 
 FREQUENCIES = [5.5, 5.9, 6.1, 8.0]
 
@@ -40,8 +41,10 @@ def differing(first, second):
     ]
 
 
-@pytest.mark.parametrize("options", [{}, {"friction_law": "history", "rotation": True}])
-@pytest.mark.parametrize("particles", [1, 10, 40])
+@pytest.mark.parametrize(
+    "options", slow_but([{}, {"friction_law": "history", "rotation": True}], {})
+)
+@pytest.mark.parametrize("particles", slow_but([1, 10, 40], 10))
 def test_with_one_short_step_a_flight_changes_no_bit(particles, options):
     """Flights skip only what cannot touch: a contact that one missed would show in the bits."""
     made = shaken(Combined(substeps=1, **options), particles, 2e-5)

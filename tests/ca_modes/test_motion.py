@@ -64,6 +64,7 @@ def test_one_mode_at_one_place_is_the_oscillator(filling):
     assert made.peak == pytest.approx(alone.peak, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_three_modes_under_base_and_force_move_as_the_exact_solution():
     """With masses in two boxes, of which one place has none, and their weight from t = 0 on."""
     structure, pushed = frame(), (3.1, 0.05, 0.4)

@@ -15,6 +15,7 @@ from ca_damper.engine.damper_engine import _POOL
 from ca_damper.fixed_mass import FixedMass
 from taichi_dem.kit import allocation
 from tests.ca_oscillator.kicks import Kicks
+from tests.slow import slow_but
 
 
 @pytest.fixture(autouse=True)
@@ -118,7 +119,7 @@ def digest(*arrays):
     return hashlib.sha256(whole).hexdigest()
 
 
-@pytest.mark.parametrize("mount", ["spring", "base"])
+@pytest.mark.parametrize("mount", slow_but(["spring", "base"], "spring"))
 @pytest.mark.parametrize("make", FILLINGS)
 def test_a_second_batch_compiles_nothing_and_has_its_bits_as_alone(make, mount, compiled):
     first = some_batch(make, 0, mount)

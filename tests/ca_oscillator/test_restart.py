@@ -98,7 +98,7 @@ def test_an_interrupted_batch_goes_on_to_the_same_bits(shaken, tmp_path):
         batch.checkpointed(None, checkpoint.path, {"job": "another"}).__enter__()
 
 
-def test_a_checkpoint_goes_on_in_an_engine_with_more_room(tmp_path):
+def test_a_checkpoint_goes_on_in_an_engine_with_more_room(tmp_path, compiled_anew):
     """As in another session, where a larger batch came first: a box, scenes and cycles more."""
     table = SceneTable([4, 7], [1, 2], 1e-3, [5.0, 6.0], 3e-3)
     checkpoint = Checkpoint(tmp_path / "run.npz")

@@ -6,6 +6,7 @@ import pytest
 from ca_damper.spheres import Spheres
 from ca_damper.spheres.contact_law import contact_duration, wall_numbers
 from tests.ca_spheres.rig import Rig
+from tests.slow import slow_but
 
 G, DT, MASS, RADIUS = 9.8, 2e-5, 0.2e-3, 3e-3
 EPS = np.finfo(float).eps
@@ -29,7 +30,7 @@ def test_blows_on_the_container_are_the_particles_change_of_momentum(search, tur
         assert change == pytest.approx(fall - rig.impulse[s], abs=bound)
 
 
-@pytest.mark.parametrize("damping", ["tsuji", "printed"])
+@pytest.mark.parametrize("damping", slow_but(["tsuji", "printed"], "tsuji"))
 @pytest.mark.parametrize("rotation", [False, True])
 @pytest.mark.parametrize("law", ["viscous", "history"])
 def test_energy_in_a_still_container_falls_until_the_spheres_rest(damping, rotation, law):

@@ -13,6 +13,7 @@ from ca_damper.spheres.contact_law import wall_numbers
 G, MASS, STIFFNESS = 9.8, 0.2e-3, 123.4
 
 
+@pytest.mark.slow
 def test_heap_that_never_lifts_is_a_rigid_mass():
     """While x_amp w^2 < g: the transfer function with M + N m, hanging lower by N m g / K.
 

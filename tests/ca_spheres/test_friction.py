@@ -139,6 +139,7 @@ def test_turning_spheres_keep_their_energy_without_friction():
     assert np.all(rig.device.snapshot(0)["spin"] == 0.0)
 
 
+@pytest.mark.slow
 def test_smooth_spheres_compile_no_friction_and_keep_their_bits(monkeypatch):
     """The least coefficient there is computes friction that no place and no speed can feel."""
     runtime.clear()

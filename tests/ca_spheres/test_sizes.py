@@ -8,6 +8,7 @@ from ca_damper.plot.box import Box, DrawnBox
 from ca_damper.spheres import Spheres
 from ca_damper.spheres.contact_law import hertz_stiffness, pair_numbers, wall_numbers
 from tests.ca_spheres.rig import Rig
+from tests.slow import slow_but
 
 G, DT, MASS = 9.8, 2e-5, 0.2e-3
 MIXED = ((25, 6e-3), (45, 4e-3))
@@ -24,7 +25,7 @@ def diameters(rig, s=0):
     return rig.device.snapshot(s)["diameter"]
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", slow_but(LAWS, LAWS[2]))
 def test_sizes_that_are_the_same_have_the_bits_of_one(law):
     one = Rig(Spheres(**law), 40, **SHAKEN).run(5000)
     two = Rig(Spheres(sizes=((25, 6e-3), (15, 6e-3)), **law), 40, **SHAKEN).run(5000)
@@ -135,6 +136,7 @@ def test_energy_of_a_mixture_falls_until_it_rests(law):
     assert np.abs(rig.state()[1]).max() < 1e-2
 
 
+@pytest.mark.slow
 def test_a_mixture_carries_its_weight_and_loses_no_momentum():
     """What is left is the momentum kept at the ends, below 2 m/s against the time of 10 s."""
     batch = Batch(Spheres(sizes=MIXED), SceneTable(70, 1, DT, 6.0, 0.6e-3), measured_cycles=60)

@@ -12,6 +12,7 @@ import pytest
 from tests.docs.pages import PAGES, blocks, run_pasted
 from tests.processes import users_environment
 from tests.scenes import ROOT
+from tests.slow import slow_but
 
 #: What the tests below look at, in the program of the one block of a page.
 WANTED = {
@@ -29,6 +30,11 @@ APART = ("README.md", "docs/hard_cases.md")
 BLOCKS = [
     (page, number) for page in PAGES if page not in APART for number in range(len(blocks(page)))
 ]
+#: Pages whose blocks take longer: of runs to an accuracy, of several kinds of structures.
+LONG = [
+    f"docs/{name}.md" for name in ("accuracy", "boundaries", "damper_engineering", "effects_auto")
+]
+QUICK = [block for block in BLOCKS if block[0] not in LONG]
 
 
 @pytest.fixture(scope="module")
@@ -56,11 +62,14 @@ def test_each_how_to_has_a_block():
     assert {page for page, _ in BLOCKS} >= {page for page in PAGES if page.startswith("docs/add_")}
 
 
-@pytest.mark.parametrize(("page", "number"), BLOCKS)
-def test_a_block_runs_as_it_stands_and_says_something(program, page, number):
-    assert program(page, number).said.strip()
+@pytest.mark.parametrize(
+    "block", slow_but(BLOCKS, *QUICK), ids=lambda block: "{}-{}".format(*block)
+)
+def test_a_block_runs_as_it_stands_and_says_something(program, block):
+    assert program(*block).said.strip()
 
 
+@pytest.mark.slow
 def test_the_hard_case_is_found_in_its_file_and_passes(tmp_path):
     """The block as a file beside the others, asked for by its name."""
     experiments = tmp_path / "experiments"

@@ -25,6 +25,7 @@ from taichi_dem.engine.engine import ENGINES
 from taichi_dem.kit import allocation
 from taichi_dem.mesh.shapes import bar, single
 from taichi_dem.physics.rotation import zero3
+from tests.slow import slow_but
 
 #: Largest steps of a run: bonds break at the left end, and what they held touches.
 STEPS = 60
@@ -127,7 +128,7 @@ def compilations(monkeypatch):
     return made
 
 
-@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
+@pytest.mark.parametrize("kind", slow_but(KINDS, fixed), ids=lambda kind: kind.__name__)
 def test_other_numbers_compile_nothing_and_leave_no_trace(kind, compilations, compiled_anew):
     """Scenes of one structure, each with all numbers drawn anew, one after the other."""
     drawn = [
@@ -143,6 +144,7 @@ def test_other_numbers_compile_nothing_and_leave_no_trace(kind, compilations, co
     assert same(run_alone(*drawn[0]), first)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS[:2], ids=lambda kind: kind.__name__)
 def test_two_live_simulations_have_the_bits_of_each_alone(kind):
     drawn = [

@@ -78,6 +78,7 @@ def test_points_have_the_times_of_twins_and_failed_ones_the_work_of_the_next(stu
     assert study.points(outcome())[0].evaluations == 6.0
 
 
+@pytest.mark.slow
 def test_a_twin_is_run_where_the_first_was_fast_enough():
     made = StepStudy("implicit", ImplicitDashpots, bar_scene(), 1.6e-5)
     made.run(1.6e-6)

@@ -332,6 +332,7 @@ def test_spheres_beyond_their_limit_end_as_diverged(tmp_path, name, options):
     assert not (tmp_path / "summary.json").exists()
 
 
+@pytest.mark.slow
 def test_peaks_are_found_to_an_accuracy(shown, quick_run):
     """30 grains of 0.2 g as a rigid mass peak at sqrt(86 / 92) f0; bars are as narrow as asked."""
     options = "--accuracy 5% --fillings ca_static --particles 30".split()
@@ -355,6 +356,7 @@ def test_the_record_in_the_repository_is_that_of_its_formula():
     assert RECORD.stat().st_size < 60_000
 
 
+@pytest.mark.slow
 def test_grains_damp_a_measured_motion_alike_by_spheres_and_by_automaton(shown):
     _, figures = shown("damper_measured_motion")
     assert figures["damping_ratio_empty"] == pytest.approx(0.01228, abs=1e-5)

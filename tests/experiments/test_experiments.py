@@ -166,6 +166,7 @@ def shown(quick_run):
     return run
 
 
+@pytest.mark.slow
 def test_the_displacement_of_the_hole_is_found_to_an_accuracy(quick_run):
     """The answer, its bar and its price, and no files of a run that nobody asked for."""
     folder, done = quick_run("blast_fracture", "--accuracy", "2%")

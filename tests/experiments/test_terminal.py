@@ -14,7 +14,7 @@ from tests.processes import users_environment
 from tests.terminal import run_in_terminal
 
 #: Those whose quick run takes a few seconds, one for each way of telling how far it is.
-SHORT = ("demo_fracture_law", "demo_step_too_large", "damper_rebound")
+SHORT = ("demo_fracture_law", "demo_step_too_large")
 SMALLEST = "demo_step_too_large"
 
 

@@ -209,6 +209,7 @@ def test_answers_hold_the_truth_and_narrower_ones_cost_more_runs(engine):
         assert len(np.unique(np.asarray(image.convert("L")))) > 20
 
 
+@pytest.mark.slow
 def test_what_a_choice_costs_is_known_once_it_was_measured(engine):
     unknown, known = (engine.ask(work, _needs.ALL, 0.2) for work in (_needs.answer, _needs.price))
     assert all(map(math.isnan, unknown.step_s)) and min(known.step_s) > 0.0

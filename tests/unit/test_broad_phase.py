@@ -237,6 +237,7 @@ def test_one_list_of_neighbours_serves_until_a_body_has_left_its_reach(again, dr
     assert 3 <= made <= 40 // 5
 
 
+@pytest.mark.slow
 def test_a_full_row_drops_what_its_body_has_left(monkeypatch, compiled_anew):
     """Two bodies leap among the others, and rows have room for a few that come.
 

@@ -5,6 +5,7 @@ import pytest
 from taichi_dem import CONCRETE, InputError, Scene, Uniform, effects, needed_effects, simulate
 from taichi_dem.engine.engine import ENGINES
 from taichi_dem.mesh.shapes import bar, pair
+from tests.slow import slow_but
 
 CAN = {
     "softening": effects.Softening,
@@ -22,7 +23,9 @@ def pulled(*listed):
     return simulate(scene, method=Uniform(1e-7), until=4e-4, **looks)
 
 
-@pytest.mark.parametrize("acting", [(), ("bond_damping",), ("softening", "shear_slip")])
+@pytest.mark.parametrize(
+    "acting", slow_but([(), ("bond_damping",), ("softening", "shear_slip")], ("bond_damping",))
+)
 def test_a_silent_effect_leaves_every_bit_and_report_of_a_scene_without_it(acting):
     silent = pulled(*(kind() if name in acting else kind().silent() for name, kind in CAN.items()))
     without = pulled(*(CAN[name]() for name in acting))

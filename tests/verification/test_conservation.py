@@ -9,6 +9,7 @@ from taichi_dem import CONCRETE, Multirate, Scene, Simulation, Uniform, effects
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import bar, single
 from tests.scenes import brisk_scene
+from tests.slow import slow_but
 from tests.turns import matrix, quaternion
 
 EPS = np.finfo(float).eps
@@ -37,7 +38,7 @@ def reports():
     return report
 
 
-@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("name", slow_but(METHODS, "uniform", "held"))
 def test_momentum_is_kept_through_fracture_and_contact(reports, name):
     """Momentum less the impulse of the gas, linear and angular about the origin.
 

@@ -34,6 +34,7 @@ def reports(block):
     return [after(block, step, UNTIL) for step in (STEP, STEP / 2)]
 
 
+@pytest.mark.slow
 def test_momentum_is_kept_through_fracture_and_contact(reports):
     """As in ``test_conservation``: sqrt(updates) eps of what was exchanged, at most.
 

@@ -256,7 +256,8 @@ def _refresh(limits: ti.template(), count: ti.i32):
         limits.refresh(i)
 
 
-@pytest.mark.parametrize("friction", [False, pytest.param(True, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("friction", [False, True])
 def test_near_contacts_are_counted_before_they_touch_and_limit_as_the_report_says(friction):
     """Six spheres that will meet within twice the largest step, none of which touches yet.
 
@@ -280,6 +281,7 @@ def test_near_contacts_are_counted_before_they_touch_and_limit_as_the_report_say
     assert limits.limit[0] == 1e-6
 
 
+@pytest.mark.slow
 def test_limited_dashpots_never_throw_back_at_any_step():
     """A contact keeps 1 / X of its coefficient, X = 2 dt lambda: bodies that meet stop together.
 

@@ -25,6 +25,7 @@ from taichi_dem import (
 )
 from taichi_dem.effects.base import Effect
 from taichi_dem.mesh.shapes import single
+from tests.slow import slow_but
 
 EPS = np.finfo(float).eps
 GROUND, EDGE, G, MU = 2e4, 0.1, 9.81, 0.3
@@ -91,7 +92,7 @@ def check_rest(way, speed, settled, account):
     assert abs(account["residual"]) < 0.006 * account["load_work"]
 
 
-@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("name", slow_but(METHODS, "implicit"))
 def test_a_body_below_the_friction_angle_stays(name):
     check_rest(*stays(METHODS[name], 2.0))
 
@@ -102,6 +103,7 @@ def test_a_body_below_the_friction_angle_stays_for_a_million_steps(name):
     check_rest(*stays(METHODS[name], 1e6 * STEP))
 
 
+@pytest.mark.slow
 def test_friction_without_a_spring_creeps():
     """So the tests above would fail: weight drives it against 39 dashpots."""
     run = Slope(0.2, effects.Friction(), METHODS["uniform"])

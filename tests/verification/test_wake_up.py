@@ -65,6 +65,7 @@ def test_energy_never_grows_when_a_fast_fragment_hits_a_sleeping_block():
     assert max(simulation.energy_balance.momentum_errors()) < 1e-13
 
 
+@pytest.mark.slow
 def test_a_hit_wakes_a_boulder_that_is_kicked_away_in_its_sleep():
     """Of the events only "hit" is on, or none: asleep, lambda dt is a hundred, and energy is made.
 
