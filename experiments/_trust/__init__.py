@@ -6,6 +6,8 @@ It returns its numbers, and a function that draws them on axes.
 from dataclasses import dataclass
 
 from _trust.bar_wave import bar_wave
+from _trust.crack import crack
+from _trust.disc import disc
 from _trust.rotation import rotation
 from _trust.slope import slope
 from _trust.spall import spall
@@ -14,6 +16,8 @@ from _trust.spall import spall
 CASES = {
     "bar_wave": bar_wave,
     "spall": spall,
+    "disc": disc,
+    "crack": crack,
     "slope": slope,
     "rotation": rotation,
 }

@@ -11,7 +11,7 @@ from taichi_dem.mesh.tetrahedra import all_faces, area_vectors, shared_faces
 _ACROSS, _ALONG, _DIAMETER, _THROUGH = 4, 8, 12, 2
 #: Largest shift of a point, as a share of a box.
 _SHIFT = 0.15
-#: Half of the angle of the arcs on which a disc is loaded [degrees].
+#: Half of the angle of the arcs on which a disc is loaded by default [degrees].
 ARC = 10.0
 
 
@@ -26,10 +26,10 @@ def prism(element: float, seed: int) -> Mesh:
     return with_moved_nodes(straight, _SHIFT * box, seed)
 
 
-def disc(element: float, seed: int) -> Mesh:
-    """Disc about z, cut from boxes; groups bottom and top are arcs of 20 degrees of its rim.
+def disc(element: float, seed: int, arc: float = ARC) -> Mesh:
+    """Disc about z, cut from boxes; groups bottom and top are arcs of its rim.
 
-    element, seed: as for ``prism``.
+    element, seed: as for ``prism``. arc: half of their angle [degrees].
     """
     box = _box(element)
     width = _DIAMETER * box
@@ -38,7 +38,7 @@ def disc(element: float, seed: int) -> Mesh:
     block = with_moved_nodes(checked_mesh(points, square.tetrahedra, {}), _SHIFT * box, seed)
     middle = block.points[block.tetrahedra].mean(axis=1)
     bodies = block.tetrahedra[np.hypot(middle[:, 0], middle[:, 1]) < 0.5 * width]
-    return checked_mesh(block.points, bodies, _arcs(block.points, bodies, 0.5 * width))
+    return checked_mesh(block.points, bodies, _arcs(block.points, bodies, 0.5 * width, arc))
 
 
 def _box(element):
@@ -46,7 +46,7 @@ def _box(element):
     return element / 2.0 ** (1.0 / 6.0)
 
 
-def _arcs(points, bodies, radius):
+def _arcs(points, bodies, radius, arc):
     """Outer faces of the rim around its lowest and its highest line."""
     faces = all_faces(bodies)
     free = np.ones(len(faces), dtype=bool)
@@ -55,5 +55,5 @@ def _arcs(points, bodies, radius):
     x, y, _ = points[faces].mean(axis=1).T
     normal = area_vectors(points, faces)
     rim = np.abs(normal[:, 2]) < 0.9 * length(normal)
-    rim &= (np.degrees(np.arctan2(np.abs(x), np.abs(y))) < ARC) & (np.hypot(x, y) > 0.7 * radius)
+    rim &= (np.degrees(np.arctan2(np.abs(x), np.abs(y))) < arc) & (np.hypot(x, y) > 0.7 * radius)
     return {"bottom": faces[rim & (y < 0.0)], "top": faces[rim & (y > 0.0)]}

@@ -110,7 +110,7 @@ def picture_margins(path: str, trials: Sequence[Trial], alias: Optional[Alias] =
     packages = dict.fromkeys(trial.case.package for trial in trials)
     panels = {name: [trial for trial in trials if trial.case.package == name] for name in packages}
     size = (
-        4.4 * len(panels),
+        5.4 * len(panels),
         1.4 + 0.17 * max(len(_distinct(own, "case")) for own in panels.values()),
     )
     with picture(path, 1, len(panels), size, squeeze=False) as (_, axes):
@@ -140,7 +140,7 @@ def _draw_margins(axis, own, looks):
     axis.set_yticks(range(len(cases)), [case_title(case.name) for case in cases], fontsize=6.5)
     axis.set_xticks(list(_TICKS), list(_TICKS.values()), fontsize=7.0)
     axis.set_xticks([], minor=True)
-    axis.set_xlabel("margin: bound of physics / worst figure [1]")
+    axis.set_xlabel("margin: bound of physics / worst figure [1]", fontsize=9.0)
 
 
 def _place_of(trial):
