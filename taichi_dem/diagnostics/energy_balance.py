@@ -43,6 +43,8 @@ _HELD = ("kinetic", "bond_strain", "sphere_strain", "residual")
 
 #: Share of the energy beyond which an account counts as open.
 OPEN = 0.5
+#: Share of all impulses of loads and supports, by their sizes, below which no momentum is a scale.
+_LEAST_SHARE = 1e-6
 
 
 def unexplained_share(account: Mapping[str, float], round_off: float = 0.0) -> float:
@@ -167,31 +169,35 @@ class EnergyBalance:
 
     def momentum(self) -> np.ndarray:
         """Linear [N s] and angular momentum about the origin [N m s], less external impulses."""
-        rows = np.zeros((self.model.body_count, 12))
-        self.readings.momentum(rows)
-        return rows[:, :6].sum(axis=0) - rows[:, 6:].sum(axis=0)
+        rows = self._momentum_rows()
+        return rows[:, :6].sum(axis=0) - rows[:, 6:12].sum(axis=0)
 
     def momentum_errors(self) -> tuple[float, float]:
         """Errors of linear and angular momentum, relative to the momentum exchanged.
 
-        The scale is the sum over bodies of the size of momentum and of load impulse.
+        The scale is the sum over bodies of the size of momentum, or of load impulse if that is
+        larger; at least a millionth of the impulses of loads and supports added by their sizes, of
+        which nothing is left where a support takes what a load gives.
         """
-        rows = np.zeros((self.model.body_count, 12))
-        self.readings.momentum(rows)
+        rows = self._momentum_rows()
         # The squares of a run that has diverged may be beyond all numbers.
         with np.errstate(over="ignore", invalid="ignore"):
-            lost = rows[:, :6].sum(axis=0) - rows[:, 6:].sum(axis=0) - self.start_momentum
+            lost = rows[:, :6].sum(axis=0) - rows[:, 6:12].sum(axis=0) - self.start_momentum
             linear, angular = _exchanged(rows)
             return np.linalg.norm(lost[:3]) / linear, np.linalg.norm(lost[3:]) / angular
 
     def momentum_exchanged(self) -> float:
         """Sum over the bodies of the size of momentum, or of load impulse if larger [N s]."""
-        rows = np.zeros((self.model.body_count, 12))
+        return _exchanged(self._momentum_rows())[0]
+
+    def _momentum_rows(self):
+        rows = np.zeros((self.model.body_count, 14))
         self.readings.momentum(rows)
-        return _exchanged(rows)[0]
+        return rows
 
 
 def _exchanged(rows):
     """Linear and angular momentum that bodies have, or have got from loads if that is more."""
     sizes = [np.linalg.norm(rows[:, k : k + 3], axis=1).sum() for k in (0, 3, 6, 9)]
-    return max(sizes[0], sizes[2], 1e-300), max(sizes[1], sizes[3], 1e-300)
+    given = _LEAST_SHARE * rows[:, 12:].sum(axis=0)
+    return max(*sizes[0::2], given[0], 1e-300), max(*sizes[1::2], given[1], 1e-300)

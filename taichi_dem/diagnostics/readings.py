@@ -143,7 +143,7 @@ class Readings:
 
     @ti.kernel
     def momentum(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
-        """Linear and angular momentum of every body, and impulses from loads and supports."""
+        """Momentum of every body; impulses of loads and supports, their sums and sizes."""
         for i in range(self.tables.body_count[None]):
             linear = self.tables.mass[i] * self.state.velocity[i]
             angular = self.state.angular_momentum[i] + self.state.position[i].cross(linear)
@@ -151,6 +151,8 @@ class Readings:
                 table[i, k], table[i, 3 + k] = linear[k], angular[k]
             for k in ti.static(range(6)):
                 table[i, 6 + k] = self.state.load_impulse[i][k]
+            for k in ti.static(range(2)):
+                table[i, 12 + k] = self.state.impulse_sizes[i][k]
 
     @ti.kernel
     def left_out(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):

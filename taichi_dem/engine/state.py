@@ -46,8 +46,8 @@ class State:
     [J], booked to the first body of a pair; with contact only. injected_tick: last tick whose
     releases have been booked there.
     load_work: work [J], one component a load, one for all supports, one a ground; load_impulse:
-    total impulse of all of them on a body (linear, and angular about the origin). tick: present
-    time.
+    total impulse of all of them on a body (linear, and angular about the origin); impulse_sizes:
+    sums of the sizes of both. tick: present time.
     bad_body: lowest body out of bounds, body_count if none.
     active_effects: bits of each body: of the loads, then the supports, then the ground that changed
     its motion, CONTACT and RUBBED. limits: tensile strength, cohesion [Pa] and friction coefficient
@@ -84,6 +84,7 @@ class State:
         accounts = len(tables.loads) + 1 + len(tables.ground)
         self.load_work = ti.Vector.field(accounts, real, shape=n)
         self.load_impulse = ti.Vector.field(6, real, shape=n)
+        self.impulse_sizes = ti.Vector.field(2, real, shape=n)
         self.tick = ti.field(ti.i64, shape=())
         self.bad_body = ti.field(ti.i32, shape=())
         self.max_speed2 = ti.field(real, shape=())

@@ -394,3 +394,4 @@ class Advance(BondLaws, ContactForce):
         for k in ti.static(range(3)):
             self.state.load_impulse[i][k] = self.state.load_impulse[i][k] + push[k]
             self.state.load_impulse[i][3 + k] = self.state.load_impulse[i][3 + k] + twist[k]
+        self.state.impulse_sizes[i] = self.state.impulse_sizes[i] + vec2(push.norm(), twist.norm())

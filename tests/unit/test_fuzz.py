@@ -207,6 +207,7 @@ MENDED = {
     42037: "a search for bodies whose place was no number wrote where no cell is",
     687: "a step beyond the limit of dashpots left nearly all energy open, and nothing said so",
     50929: "the momentum of a runaway overflowed in the report of the run",
+    40741: "what a support takes from a load left no momentum to measure an error by",
 }
 
 

@@ -5,7 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE, Multirate, Scene, Simulation, Uniform, effects
+from taichi_dem import (
+    CONCRETE,
+    ImplicitDashpots,
+    Multirate,
+    Scene,
+    Simulation,
+    Uniform,
+    effects,
+)
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import bar, single
 from tests.scenes import brisk_scene
@@ -208,3 +216,12 @@ def test_an_uneven_body_keeps_its_angular_momentum_while_it_tumbles():
     assert np.array_equal(first["angular_momentum"], last["angular_momentum"])
     assert np.abs(last["spin"] - spin).max() > 100.0
     assert simulation.energy_balance.account()["kinetic"] == pytest.approx(energy, rel=1e-3)
+
+
+def test_momentum_that_a_support_takes_from_a_load_is_no_error():
+    """Gas and support leave nothing but rounding: n eps of all that they gave each other."""
+    acting = [effects.GasPressure("sides", rise=1e-5, decay_ratio=2.75), effects.Fixed("base")]
+    simulation = Simulation(Scene(single(), CONCRETE, acting), ImplicitDashpots(1e-6))
+    simulation.advance_to(1000)
+    # Relative to a millionth of it.
+    assert max(simulation.energy_balance.momentum_errors()) < 1000 * EPS / 1e-6
