@@ -5,9 +5,9 @@ from functools import partial
 
 import numpy as np
 
-from _hard_cases._blast_run import EPS, FREE, TOUCHING, Run, beside, right_half
+from _hard_cases._blast_run import AREA, EDGE, EPS, FREE, TOUCHING, Run, beside, right_half
 from _hard_cases.blast_bonds import apart, free
-from taichi_dem import CONCRETE, ImplicitDashpots, Multirate, Scene, Uniform, simulate
+from taichi_dem import CONCRETE, ImplicitDashpots, Multirate, Scene, Uniform, effects, simulate
 from taichi_dem.closed_forms import damped_opening
 from taichi_dem.kit.study.cases import Cases
 from taichi_dem.mesh.mesh import checked_mesh
@@ -47,7 +47,7 @@ def undamped_block_for_long(trial):
     if trial.method != "uniform":
         method = Multirate(dt, 1e-5, trial.method[10:])
     shape = np.sin(np.arange(3 * mesh.body_count).reshape(-1, 3))
-    until = (20_000 if trial.quick else 1_000_000) * dt
+    until = (20_000 if trial.quick else 10_000_000) * dt
     given = {"effects": (), "velocity": 0.1 * shape}
     run = Run(trial, mesh, until, methods={trial.method: method}, **given)
     account = run.simulation.energy_balance.account()
@@ -55,6 +55,58 @@ def undamped_block_for_long(trial):
     held = abs(account["residual"]) / run.kinetic_energy[0]
     trial.limit("energy error / given", held, 0.01, "no trend, and (w dt)^2 / 4")
     run.momentum_kept()
+
+
+@case(("multirate_held", "multirate_drifted"))
+def levels_that_flip(trial):
+    """A pair swings so fast that levels change in every quarter period: no energy is made.
+
+    Each change of a step costs energy, in proportion to the step, until none is needed any more.
+    """
+    k = AREA * CONCRETE.normal_stiffness
+    mass = CONCRETE.density * EDGE**3 / (6.0 * 2.0**0.5)
+    dt = 2.0 * np.pi * (0.5 * mass / k) ** 0.5 / 64.0
+    # A quarter of the largest speed is what the largest step bears.
+    method = Multirate(dt, 0.25 * dt, trial.method[10:])
+    steps = 20_000 if trial.quick else 1_000_000
+    given = {"effects": (), "velocity": [X, -X], "methods": {trial.method: method}}
+    run = Run(trial, pair(), steps * dt, **given)
+    run.momentum_kept()
+    run.no_energy_made()
+    few = 3.0 / len(np.unique(run["level"]))
+    trial.limit("3 / levels seen", few, 1.0, "speeds up to four times what the largest step bears")
+
+
+def vertices_at_faces(trial, contact):
+    """Bodies fired at 50 m/s, vertex first, at faces four times their size; they do not pass."""
+    draw, parts = np.random.default_rng(0), {}
+    for k in range(4 if trial.quick else 16):
+        y, z = draw.uniform(0.05, 0.15, 2)
+        parts[f"shot{k}"] = right_half(), (-0.041, y, z + 1.0 * k)
+        parts[f"wall{k}"] = bar(0.1, 0.2, (1, 1, 1)), (0.0, 0.0, 1.0 * k)
+    mesh = placed_together(parts)
+    first = np.arange(mesh.body_count) % 7 == 0
+    options = {"velocity": np.outer(first, SHOT * X), "effects": [contact]}
+    run = Run(trial, mesh, 1e-3, **options)
+    run.momentum_kept()
+    run.no_energy_made()
+    way = run.moved[-1, first, 0].max() / EDGE
+    trial.limit("way / size", way, 0.5, "half of the vertex is in before its spheres touch")
+
+
+case.add(
+    "vertices_at_coarse_faces",
+    "Sixteen bodies fired at 50 m/s, vertex first, at coarse faces: none passes.",
+    partial(vertices_at_faces, contact=effects.FaceContact()),
+    ["implicit"],
+)
+case.add(
+    "vertices_between_spheres",
+    "The same where faces are six spheres: they pass between, and the run says so.",
+    partial(vertices_at_faces, contact=effects.SphereContact()),
+    [],
+    (["implicit"], "volume"),
+)
 
 
 def eases_at_scale(trial, edge):

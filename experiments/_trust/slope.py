@@ -1,19 +1,19 @@
 """A block on a slope: it slides beyond tan a = mu, and topples beyond tan a = b / h."""
 
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
+from _piles import GRAVITY, STEP, loose, softened
 from _trust.number import Number
-from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, effects
+from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation
 from taichi_dem.kit.plot_style import BLACK, BLUE, RED
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import bar, placed_together
 
-SOURCE, GRAVITY = "statics of a rigid block", 9.81
-#: Softer than concrete, for long steps: the block sinks in by a micrometre. Step and time [s].
-SOFT, STEP, TIME = 0.01, 1e-5, 0.12
+SOURCE = "statics of a rigid block"
+#: Time [s].
+TIME = 0.12
 #: Angles, as shares of the limit: one at which it stands, two from which the limit follows.
 SHARES = 0.99, 1.05, 1.1
 #: Divisions of the contact's faces, and sphere pairs for each body that they bring.
@@ -82,9 +82,7 @@ def on_slope(turn, tangent, ratio, friction, contact):
     parts = {"plate": (plate, (-0.05, -0.2, -0.2)), "block": (block, (1e-9, 0.0, 0.0))}
     mesh, law = placed_together(parts), softened(friction)
     weight = GRAVITY * (np.sin(angle) * down - np.cos(angle) * np.array([1.0, 0.0, 0.0]))
-    acting = [effects.BondDamping(), effects.FaceContact(**contact), effects.StickingFriction()]
-    held = [effects.Gravity(tuple(weight)), effects.Fixed("plate_left")]
-    simulation = Simulation(Scene(mesh, law, [*acting, *held]), ImplicitDashpots(STEP))
+    simulation = Simulation(Scene(mesh, law, loose(weight, **contact)), ImplicitDashpots(STEP))
     simulation.advance_to(round(TIME / STEP))
     own = slice(plate.body_count, None)
     centre = simulation.model.centre[own]
@@ -97,15 +95,6 @@ def turned(ratio, turn):
     points = mesh.points - np.array([0.0, 0.5 * WIDTH, 0.5 * WIDTH])
     c, s = np.cos(turn), np.sin(turn)
     return checked_mesh(points @ np.array([[1, 0, 0], [0, c, s], [0, -s, c]]), mesh.tetrahedra, {})
-
-
-def softened(friction):
-    """Concrete with all springs softer."""
-    names = ("normal_stiffness", "shear_stiffness", "contact_stiffness")
-    dashpots = ("normal_damping", "shear_damping", "contact_damping")
-    values = {name: SOFT * getattr(CONCRETE, name) for name in names}
-    values.update({name: SOFT**0.5 * getattr(CONCRETE, name) for name in dashpots})
-    return replace(CONCRETE, friction=friction, fracture_energy=1e5, **values)
 
 
 def draw(axes, curves):

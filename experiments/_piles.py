@@ -1,0 +1,40 @@
+"""Loose blocks that stand on a plate by weight and friction: material, effects and shapes."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from taichi_dem import CONCRETE, effects
+from taichi_dem.mesh.mesh import checked_mesh
+from taichi_dem.mesh.shapes import bar
+
+#: Acceleration [m/s2], down along x.
+GRAVITY = 9.81
+#: Softer than concrete, for long steps: a block sinks in by a micrometre. Step [s].
+SOFT, STEP = 0.01, 1e-5
+
+
+def softened(friction):
+    """Concrete with all springs softer."""
+    names = ("normal_stiffness", "shear_stiffness", "contact_stiffness")
+    dashpots = ("normal_damping", "shear_damping", "contact_damping")
+    values = {name: SOFT * getattr(CONCRETE, name) for name in names}
+    values.update({name: SOFT**0.5 * getattr(CONCRETE, name) for name in dashpots})
+    return replace(CONCRETE, friction=friction, fracture_energy=1e5, **values)
+
+
+def loose(weight=(-GRAVITY, 0.0, 0.0), fixed=("plate_left",), **contact):
+    """Effects of blocks that touch and stick, on plates that are held at groups ``fixed``."""
+    touch = effects.BondDamping(), effects.FaceContact(**contact), effects.StickingFriction()
+    return [*touch, effects.Gravity(tuple(weight)), *map(effects.Fixed, fixed)]
+
+
+def hexahedron(place):
+    """A block of six bodies; place: of points (n, 3) of the unit cube, their places [m]."""
+    cube = bar(1.0, 1.0, (1, 1, 1))
+    return checked_mesh(np.asarray(place(cube.points)), cube.tetrahedra, dict(cube.groups))
+
+
+def brick(size, corner=(0.0, 0.0, 0.0)):
+    """A block of six bodies with edges ``size`` [m] from a corner on."""
+    return hexahedron(lambda unit: np.asarray(corner) + unit * np.asarray(size, dtype=float))
