@@ -3,7 +3,7 @@
 Each case has a number from a formula, another program or a test of real material. Ours is the mean
 over random meshes with half of their range; a miss is printed as a miss, with its reason.
 
-    python experiments/trust.py                           # about twenty minutes on one core
+    python experiments/trust.py                           # about an hour on one core
     python experiments/trust.py --only slope,rotation
     python experiments/trust.py --quick
 

@@ -73,8 +73,8 @@ def levels_that_flip(trial):
     run = Run(trial, pair(), steps * dt, **given)
     run.momentum_kept()
     run.no_energy_made()
-    few = 3.0 / len(np.unique(run["level"]))
-    trial.limit("3 / levels seen", few, 1.0, "speeds up to four times what the largest step bears")
+    few = 2.0 / len(np.unique(run["level"]))
+    trial.limit("2 / levels seen", few, 1.0, "speeds up to four times what the largest step bears")
 
 
 def vertices_at_faces(trial, contact):

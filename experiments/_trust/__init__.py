@@ -6,6 +6,8 @@ It returns its numbers, and a function that draws them on axes.
 from dataclasses import dataclass
 
 from _trust.bar_wave import bar_wave
+from _trust.blast import blast
+from _trust.branching import branching
 from _trust.crack import crack
 from _trust.disc import disc
 from _trust.rotation import rotation
@@ -18,6 +20,8 @@ CASES = {
     "spall": spall,
     "disc": disc,
     "crack": crack,
+    "branching": branching,
+    "blast": blast,
     "slope": slope,
     "rotation": rotation,
 }

@@ -9,9 +9,11 @@ from taichi_dem.mesh.mesh import checked_mesh
 
 #: Shift of inner points, as a share of their distance.
 JITTER = 0.25
+#: Least distance of points without rows, which are then as many.
+DISTANCE = 0.78
 
 
-def plate(length, height, edge, seed, layers=1):
+def plate(length, height, edge, seed, layers=1, in_rows=True):
     """Plate of triangles about points ``edge`` apart in rows, one of them at half the height.
 
     length, height, edge [m]: along x, along y, of the elements; the thickness is as many edges as
@@ -20,7 +22,8 @@ def plate(length, height, edge, seed, layers=1):
     """
     draw = np.random.default_rng(seed)
     # Numbers say which way a prism is cut: in order of the rows all would be cut alike.
-    flat = draw.permutation(_points(length, height, edge, draw))
+    points = (_points if in_rows else _scattered)(length, height, edge, draw)
+    flat = draw.permutation(points)
     triangles = _triangles(flat)
     grid = np.vstack(
         [np.column_stack([flat, np.full(len(flat), k * edge)]) for k in range(layers + 1)]
@@ -53,6 +56,21 @@ def _points(length, height, edge, draw):
             y += JITTER * edge * draw.uniform(-1, 1, len(y))
         rows.append(np.column_stack([x, y]))
     return np.vstack(rows)
+
+
+def _scattered(length, height, edge, draw):
+    """Points in the plane, (n, 2): evenly on the outline, inside anywhere but near others."""
+    from scipy.stats.qmc import PoissonDisk
+
+    sides = [np.linspace(0.0, side, round(side / edge) + 1) for side in (length, height)]
+    x, y = (grid.ravel() for grid in np.meshgrid(*sides))
+    outline = np.isin(x, (0.0, length)) | np.isin(y, (0.0, height))
+    low = 0.5 * edge
+    inner = np.array([length - edge, height - edge])
+    sampler = PoissonDisk(2, radius=DISTANCE * edge / inner.max(), seed=draw)
+    found = low + inner.max() * sampler.fill_space()
+    within = (found <= low + inner).all(axis=1)
+    return np.vstack([np.column_stack([x, y])[outline], found[within]])
 
 
 def _triangles(points):

@@ -19,14 +19,14 @@ class Piece(NamedTuple):
     high: np.ndarray
 
 
-def pieces_of(result):
-    """Pieces at the end of a run, without dust."""
+def pieces_of(result, least=LEAST):
+    """Pieces at the end of a run whose share of all mass is larger than ``least``."""
     model, held = result.model, np.isnan(result.broken_time)
     links = np.stack([model.topology.master, model.topology.slave], axis=1)[held]
     piece = np.unique(components(model.body_count, links), return_inverse=True)[1].reshape(-1)
     mass, velocity = np.bincount(piece, model.body_mass), result.frames[-1].velocity
     corners, found = model.mesh.points[model.mesh.tetrahedra], []
-    for k in np.flatnonzero(mass > LEAST * mass.sum()):
+    for k in np.flatnonzero(mass > least * mass.sum()):
         own = piece == k
         mean = (model.body_mass[own, None] * velocity[own]).sum(axis=0) / mass[k]
         ends = corners[own].min(axis=(0, 1)), corners[own].max(axis=(0, 1))

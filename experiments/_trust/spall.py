@@ -14,8 +14,8 @@ SOURCE = "one-dimensional waves, Kolsky"
 #: Bar: length [m], speed of waves [m/s], density [kg/m3], strength [Pa]. Pulse: peak [Pa], its
 #: length [m].
 LENGTH, SPEED, DENSITY, STRENGTH, PEAK, PULSE = 0.3, 3500.0, 2350.0, 5e6, 20e6, 0.3
-#: Size of an element, width of the bar [m]; fracture energy [J/m2].
-EDGE, WIDTH, ENERGY = 5e-3, 10e-3, 2.0
+#: Width of the bar [m], elements across it; fracture energy [J/m2].
+WIDTH, ACROSS, ENERGY = 10e-3, (2, 3), 2.0
 #: The pulse's front [m], and the share of critical damping, without which elements ring behind it.
 FRONT, DAMPING = 25e-3, 0.1
 DEPTH = 0.5 * PULSE * STRENGTH / PEAK
@@ -25,29 +25,39 @@ PLANES = PEAK / STRENGTH
 
 def spall(effort):
     """Depth of the first plane, speed at which its piece leaves, and the number of planes."""
-    found = [spalled(seed) for seed in effort.seeds]
-    depth, speed, planes, ends = zip(*found)
+    sizes = ACROSS[: effort.sizes]
+    found = [[spalled(WIDTH / across, seed) for seed in effort.seeds] for across in sizes]
+    numbers = [
+        number for across, bars in zip(sizes, found) for number in of_size(WIDTH / across, bars)
+    ]
+    return numbers, partial(draw, ends=[ends for *_, ends in found[-1]])
+
+
+def of_size(edge, bars):
+    """Numbers of the bars with elements of one size [m]."""
+    depth, speed, planes, _ = zip(*bars)
+    tag, size = f"{1e3 * edge:.2g}_mm", f"elements of {1e3 * edge:.2g} mm"
     miss = "each new end rings at the length of an element, and breaks further pieces off"
-    numbers = (
-        Number(
-            *("spall_depth", "first plane from the free end", "mm", SOURCE, 1e3 * DEPTH),
-            *(1e3 * np.array(depth), 1e3 * (DEPTH - EDGE), 1e3 * (DEPTH + EDGE)),
-        ),
-        Number("spall_speed", "it leaves at", "m/s", SOURCE, LEAVES, np.array(speed), allowed=0.03),
-        Number("spall_planes", "planes", "1", SOURCE, PLANES, np.array(planes), note=miss),
+    near = 1e3 * (DEPTH - edge), 1e3 * (DEPTH + edge)
+    first = f"spall_depth_{tag}", f"first plane from the free end, {size}", "mm", SOURCE
+    leaves = f"spall_speed_{tag}", f"it leaves at, {size}", "m/s", SOURCE, LEAVES
+    count = f"spall_planes_{tag}", f"planes, {size}", "1", SOURCE, PLANES, np.array(planes)
+    return (
+        Number(*first, 1e3 * DEPTH, 1e3 * np.array(depth), *near, note="a bar broke near its end"),
+        Number(*leaves, np.array(speed), allowed=0.03),
+        Number(*count, note=miss),
     )
-    return numbers, partial(draw, ends=ends)
 
 
-def spalled(seed):
+def spalled(edge, seed):
     """Depth [m] of the first plane, speed [m/s] of the piece, planes, and pieces' ends [m]."""
-    mesh = plate(LENGTH, WIDTH, EDGE, seed, layers=round(WIDTH / EDGE))
+    mesh = plate(LENGTH, WIDTH, edge, seed, layers=round(WIDTH / edge))
     options = {"density": DENSITY, "tensile_strength": STRENGTH, "fracture_energy": ENERGY}
     more = {"friction_angle": 30.0, "cohesion": 10 * STRENGTH, "damping_ratio": DAMPING}
     material, _ = material_of(mesh, DENSITY * SPEED**2, 0.0, axes=(0,), **options, **more)
     # Dashpots take some of the peak on its way: the published one is that which arrives.
     weak = run(mesh, material, PEAK, [])
-    last = weak.model.centre[:, 0] > LENGTH - EDGE
+    last = weak.model.centre[:, 0] > LENGTH - edge
     fastest = max(frame.velocity[last, 0].mean() for frame in weak.frames)
     arrived = 0.5 * DENSITY * SPEED * fastest
     result = run(mesh, material, PEAK * PEAK / arrived, [effects.Softening()])

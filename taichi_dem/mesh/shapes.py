@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Optional
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import positive, shown, whole
@@ -88,13 +89,14 @@ def bar(length: float, width: float, cells: Sequence[int]) -> Mesh:
     return checked_mesh(points, tetrahedra, _sides(grid.reshape(-1, 3), boxes, tetrahedra))
 
 
-def with_moved_nodes(mesh: Mesh, most: float, seed: int) -> Mesh:
+def with_moved_nodes(mesh: Mesh, most: ArrayLike, seed: int) -> Mesh:
     """The mesh with its nodes moved at random by up to ``most`` [m] along each axis.
 
-    Nodes in a plane that bounds the mesh across an axis stay in it, so that a bar keeps its form.
+    most: for all nodes, or (nodes, 1), for each. Nodes in a plane that bounds the mesh across an
+    axis stay in it, so that a bar keeps its form.
     """
     low, extent = mesh.points.min(axis=0), np.ptp(mesh.points, axis=0)
-    moved = most * np.random.default_rng(seed).uniform(-1.0, 1.0, mesh.points.shape)
+    moved = np.asarray(most) * np.random.default_rng(seed).uniform(-1.0, 1.0, mesh.points.shape)
     near = 1e-9 * extent
     moved[(mesh.points < low + near) | (mesh.points > low + extent - near)] = 0.0
     return checked_mesh(mesh.points + moved, mesh.tetrahedra, dict(mesh.groups))
