@@ -9,7 +9,7 @@ from taichi_dem.mesh.mesh import checked_mesh
 
 #: Shift of inner points, as a share of their distance.
 JITTER = 0.25
-#: Least distance of points without rows, which are then as many.
+#: Least distance of points without rows, in edges: one of them on the square of an edge.
 DISTANCE = 0.78
 
 
