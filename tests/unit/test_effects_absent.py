@@ -68,7 +68,7 @@ model += [(b, 2, whole), (b, 9), (b, 2), (b, 1), (3 * b, 3), (3 * b, 3)]
 model += [(4 * n, 1, whole), (4 * n, 1, whole)]
 state = [(n, 3), (n, 4), (n, 9), (n, 3), (n, 3), (n, 3), (n, 1, whole), (n, 1, whole)]
 state += [(n, 1, wide), (4 * n, 6), (b, 1, wide), (n, 1, wide), (1, 3), (b, 2, wide)]
-state += [(n, 1), (n, 6)]
+state += [(n, 1), (n, 6), (n, 2)]
 state += [(1, 1, wide), (1, 1, whole), (1, 1)]
 # Of three active lists that of contacts has but one place.
 due = [(k, 1, whole) for size in (n, b, 1) for k in (size, size, size, 22)]
