@@ -11,6 +11,10 @@ from taichi_dem.stability.step_control import StepControl
 BLAST_DRIVERS = ("auto", "resident", "parallel")
 #: Fracture energy of mode II [J/m^2], ten times that of mode I.
 MODE_TWO = 1000.0
+#: Step of a run of the full block, 3 m deep, with dashpots solved [s].
+BLOCK_STEP = 4e-7
+#: Radius of the hole [m], and how many of them away the fall of peak velocities is fitted from.
+HOLE_RADIUS, FROM_RADII = 0.025, 4.0
 EFFECTS = {
     "bond_damping": effects.BondDamping,
     "softening": effects.Softening,

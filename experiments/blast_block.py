@@ -27,7 +27,15 @@ from importlib.util import find_spec
 
 import numpy as np
 
-from _blast import blast_parser, paper_effects, print_quality, run_options
+from _blast import (
+    BLOCK_STEP,
+    FROM_RADII,
+    HOLE_RADIUS,
+    blast_parser,
+    paper_effects,
+    print_quality,
+    run_options,
+)
 from taichi_dem import CONCRETE, PAPER_BLOCK, ImplicitDashpots, Scene, plot, read_mesh, simulate
 from taichi_dem.kit import study
 from taichi_dem.kit.allocation import field_bytes
@@ -49,9 +57,6 @@ SETTINGS = {
     # Copies of the flat block that stand in for a mesh by Gmsh.
     "copies": (15, 3),
 }
-STEP = 4e-7
-#: Radius of the hole [m], and how many of them away the fall of peak velocities is fitted from.
-RADIUS, FROM_RADII = 0.025, 4.0
 #: Sizes of elements at the hole and far from it [m] at a scale of one, the paper's at the hole.
 SIZE_HOLE, SIZE_FAR = 0.055, 0.22
 #: Scales of both, and the tetrahedra that Gmsh then makes of a block 3 m deep: measured.
@@ -98,7 +103,7 @@ def figures_of(result, exponent):
         "ppv_exponent": (exponent, "1"),
         "hole_radial_displacement_mm": (float(history["hole_radial_displacement_mm"][-1]), "mm"),
         "ms_a_step": (step_ms, "ms"),
-        "seconds_per_simulated_ms": (1e-6 * step_ms / STEP, "s"),
+        "seconds_per_simulated_ms": (1e-6 * step_ms / BLOCK_STEP, "s"),
         "memory_MB": (peak_memory_mb(), "MB"),
         "fields_MB": (1e-6 * field_bytes(), "MB"),
         "ledger_residual_fraction": (report.energy_residual_fraction, "1"),
@@ -111,9 +116,9 @@ def run(options):
     scene = Scene(mesh_of(options), CONCRETE, paper_effects())
     print_quality(scene)
     looks = {"title": "blasting", "observers": [ProgressLines(options.until)]}
-    result = simulate(scene, method=ImplicitDashpots(STEP), **run_options(options), **looks)
+    result = simulate(scene, method=ImplicitDashpots(BLOCK_STEP), **run_options(options), **looks)
     started = time.perf_counter()
-    fall = Attenuation.of(result.model, result.peak_speed, RADIUS)
+    fall = Attenuation.of(result.model, result.peak_speed, HOLE_RADIUS)
     draw(result, fall, study.output_paths(options.out))
     figures = figures_of(result, fall.power_law(FROM_RADII)[0])
     figures["picture_seconds"] = (time.perf_counter() - started, "s")

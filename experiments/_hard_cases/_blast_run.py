@@ -13,9 +13,10 @@ EPS = np.finfo(float).eps
 SAMPLES = 40
 #: By how much a method that claims a case may miss what it has to converge to, as a share.
 ACCURACY = 0.01
-#: Edge of most bodies [m], and the area of their faces [m^2].
+#: Edge of most bodies [m], the area of their faces [m^2], and their mass [kg].
 EDGE = 0.05
 AREA = 0.25 * 3.0**0.5 * EDGE**2
+MASS = CONCRETE.density * EDGE**3 / (6.0 * 2.0**0.5)
 #: Methods of bodies that nothing touches.
 FREE = {
     "uniform": Uniform(1e-7),

@@ -4,7 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from _hard_cases._blast_run import FREE, TOUCHING, Run, beside, right_half, shot_at_block, soon
+from _hard_cases._blast_run import (
+    FREE,
+    MASS,
+    TOUCHING,
+    Run,
+    beside,
+    right_half,
+    shot_at_block,
+    soon,
+)
 from taichi_dem import CONCRETE, ImplicitDashpots, Multirate, StepControl, Uniform, effects
 from taichi_dem.closed_forms import damped_opening, velocity_after_impact
 from taichi_dem.kit.study.cases import Cases
@@ -98,8 +107,7 @@ def sphere_on_base(mesh):
 def damping_ratio_300(trial):
     """Contacts damped 300 times critical bring two bodies to one speed, and never to throw back."""
     mesh = beside(single(), -1e-7 * X, right_half())
-    mass = 0.5 * CONCRETE.density * 0.05**3 / (6.0 * 2.0**0.5)
-    critical = 2.0 * (mass * CONCRETE.contact_stiffness) ** 0.5
+    critical = 2.0 * (0.5 * MASS * CONCRETE.contact_stiffness) ** 0.5
     material = replace(CONCRETE, contact_damping=300.0 * critical)
     run = Run(trial, mesh, material=material, velocity=MEETING)
     speed = run["velocity"][:, :, 0]

@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from _hard_cases._blast_run import AREA, EDGE, EPS, FREE, TOUCHING, Run, beside, right_half
+from _hard_cases._blast_run import AREA, EDGE, EPS, FREE, MASS, TOUCHING, Run, beside, right_half
 from _hard_cases.blast_bonds import apart, free
 from taichi_dem import CONCRETE, ImplicitDashpots, Multirate, Scene, Uniform, effects, simulate
 from taichi_dem.closed_forms import damped_opening
@@ -64,8 +64,7 @@ def levels_that_flip(trial):
     Each change of a step costs energy, in proportion to the step, until none is needed any more.
     """
     k = AREA * CONCRETE.normal_stiffness
-    mass = CONCRETE.density * EDGE**3 / (6.0 * 2.0**0.5)
-    dt = 2.0 * np.pi * (0.5 * mass / k) ** 0.5 / 64.0
+    dt = 2.0 * np.pi * (0.5 * MASS / k) ** 0.5 / 64.0
     # A quarter of the largest speed is what the largest step bears.
     method = Multirate(dt, 0.25 * dt, trial.method[10:])
     steps = 20_000 if trial.quick else 1_000_000

@@ -19,7 +19,7 @@ STANDS, FALLS, TIME = 5e-5, 1e-3, 0.12
 
 
 def piled(trial, parts, friction, step=STEP, fixed=("plate_left",), **more):
-    """A run of blocks on the plate ``plate``, whose bodies come first; limits on energy."""
+    """A run of blocks on parts held at groups ``fixed``, which come first; limits on energy."""
     blocks = {name: (mesh, ZERO) for name, mesh in parts.items()}
     mesh = placed_together(blocks, keep_coincident=True)
     methods = {"implicit": ImplicitDashpots(step)}

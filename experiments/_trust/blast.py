@@ -4,20 +4,18 @@ from functools import partial
 
 import numpy as np
 
-from _blast import paper_effects
+from _blast import BLOCK_STEP, FROM_RADII, HOLE_RADIUS, paper_effects
 from _trust.number import Number
 from _trust.pieces import pieces_of
 from taichi_dem import CONCRETE, PAPER_BLOCK, ImplicitDashpots, Scene, read_mesh, simulate
 from taichi_dem.kit.plot_style import BLACK, GREY, RED
 from taichi_dem.mesh.reorder import in_space_order
 from taichi_dem.mesh.shapes import mirrored_copies, with_moved_nodes
-from taichi_dem.mesh.tetrahedra import all_faces, face_numbers
+from taichi_dem.mesh.tetrahedra import all_faces, outer_rows
 from taichi_dem.output.attenuation import Attenuation
 
-#: Copies of the paper's block, one behind the other; step and end of a run [s].
-COPIES, STEP, UNTIL = 15, 4e-7, 1e-3
-#: Radius of the hole [m], and how many of them away the fall of peak velocities is fitted from.
-RADIUS, FROM_RADII = 0.025, 4.0
+#: Copies of the paper's block, one behind the other; end of a run [s].
+COPIES, UNTIL = 15, 1e-3
 #: Largest shift of a node within the block, as a share of the shortest edge at it.
 SHIFT = 0.15
 #: Sizes of bodies below which fragments are those of the mesh; sieves, from a tenth of it.
@@ -54,8 +52,8 @@ def blasted(seed):
     """Peak velocities over distance, and what ``sieving`` makes of the fragments."""
     scene = Scene(block(seed), CONCRETE, paper_effects())
     looks = {"until": UNTIL, "samples": 200, "frames": 1, "progress": None}
-    result = simulate(scene, method=ImplicitDashpots(STEP), **looks)
-    return Attenuation.of(result.model, result.peak_speed, RADIUS), sieving(result)
+    result = simulate(scene, method=ImplicitDashpots(BLOCK_STEP), **looks)
+    return Attenuation.of(result.model, result.peak_speed, HOLE_RADIUS), sieving(result)
 
 
 def block(seed):
@@ -67,8 +65,7 @@ def block(seed):
     most = np.full(mesh.point_count, np.inf)
     np.minimum.at(most, mesh.tetrahedra, SHIFT * edges.min(axis=2))
     faces = all_faces(mesh.tetrahedra)
-    number = face_numbers(faces)
-    most[faces[np.bincount(number)[number] == 1]] = 0.0
+    most[faces[outer_rows(faces)]] = 0.0
     return in_space_order(with_moved_nodes(mesh, most[:, None], seed))
 
 

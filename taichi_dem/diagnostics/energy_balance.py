@@ -169,8 +169,7 @@ class EnergyBalance:
 
     def momentum(self) -> np.ndarray:
         """Linear [N s] and angular momentum about the origin [N m s], less external impulses."""
-        rows = self._momentum_rows()
-        return rows[:, :6].sum(axis=0) - rows[:, 6:12].sum(axis=0)
+        return _own(self._momentum_rows())
 
     def momentum_errors(self) -> tuple[float, float]:
         """Errors of linear and angular momentum, relative to the momentum exchanged.
@@ -182,7 +181,7 @@ class EnergyBalance:
         rows = self._momentum_rows()
         # The squares of a run that has diverged may be beyond all numbers.
         with np.errstate(over="ignore", invalid="ignore"):
-            lost = rows[:, :6].sum(axis=0) - rows[:, 6:12].sum(axis=0) - self.start_momentum
+            lost = _own(rows) - self.start_momentum
             linear, angular = _exchanged(rows)
             return np.linalg.norm(lost[:3]) / linear, np.linalg.norm(lost[3:]) / angular
 
@@ -194,6 +193,11 @@ class EnergyBalance:
         rows = np.zeros((self.model.body_count, 14))
         self.readings.momentum(rows)
         return rows
+
+
+def _own(rows):
+    """Linear and angular momentum of all bodies less what loads and supports gave, (6,)."""
+    return rows[:, :6].sum(axis=0) - rows[:, 6:12].sum(axis=0)
 
 
 def _exchanged(rows):

@@ -23,8 +23,7 @@ def with_outer_group(mesh: Mesh, name: str, chosen: Choice) -> Mesh:
     1] > 0.5``. Raises InputError for a name that is taken, a choice of no face, or other values.
     """
     faces = geometry.all_faces(mesh.tetrahedra)
-    number = geometry.face_numbers(faces)
-    outer = faces[np.bincount(number)[number] == 1]
+    outer = faces[geometry.outer_rows(faces)]
     return _with_group(mesh, name, outer[_choose(mesh, outer, chosen)])
 
 

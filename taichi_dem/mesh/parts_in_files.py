@@ -53,8 +53,7 @@ def _crossed_quadrangles(points, tetrahedra):
     same way; a hole of the shape of one tetrahedron has none, as its faces look at each other.
     """
     faces = geometry.all_faces(tetrahedra)
-    number = geometry.face_numbers(faces)
-    outer = np.flatnonzero(np.bincount(number)[number] == 1)
+    outer = geometry.outer_rows(faces)
     faces, body = faces[outer], outer // 4
     normal = geometry.area_vectors(points, faces)
     first, second = _pairs_at_edges(faces)

@@ -57,6 +57,12 @@ def face_numbers(faces: np.ndarray) -> np.ndarray:
     return number.reshape(-1)  # NumPy 2.0 returns a column
 
 
+def outer_rows(faces: np.ndarray) -> np.ndarray:
+    """Rows of ``all_faces`` that are the face of one body only, in order, shape (n,)."""
+    number = face_numbers(faces)
+    return np.flatnonzero(np.bincount(number)[number] == 1)
+
+
 def shared_faces(tetrahedra: np.ndarray) -> np.ndarray:
     """Rows of ``all_faces`` that are one face of two bodies, shape (n, 2), smaller row first.
 
