@@ -1,0 +1,76 @@
+"""Tests spread over workers by file, so that a worker that dies stops nothing and loses no test.
+
+The scheduler of pytest-xdist 3.8 gives the files of a dead worker to others, those that are done as
+well: a worker that is given a file without a test left waits for ever, and the session with it.
+
+The test in which a worker died runs once more in another worker, and the summary names it: Taichi
+has ended a worker of a quarter of an hour about once in five sessions, in different tests. A test
+in which a second worker dies has failed.
+A test that hangs, also in a kernel, ends its worker after ``MOST_SECONDS``.
+"""
+
+import faulthandler
+
+import pytest
+
+#: Longest time of one test [s]; the longest takes two minutes on a busy machine.
+MOST_SECONDS = 900
+
+_DIED = pytest.StashKey()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item):
+    """End a worker whose test hangs, by a thread that needs no Python."""
+    if not hasattr(item.config, "workerinput"):
+        return (yield)
+    faulthandler.dump_traceback_later(MOST_SECONDS, exit=True)
+    try:
+        return (yield)
+    finally:
+        faulthandler.cancel_dump_traceback_later()
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """Take the place of ``--dist loadfile``; None for all others."""
+    if config.getoption("dist") != "loadfile":
+        return None
+    from xdist.scheduler import LoadFileScheduling
+
+    class CrashSafeScheduling(LoadFileScheduling):
+        """Files by worker; of a dead worker's files, tests that are not done run in others."""
+
+        def remove_node(self, node):
+            """Take a worker away; return the test that has killed two, None without one."""
+            left = _unfinished(self.assigned_work.pop(node))
+            if not left:
+                return None
+            tests = next(iter(left.values()))
+            test = next(test for test, done in tests.items() if not done)
+            tests[test] = test in config.stash[_DIED]
+            config.stash[_DIED].append(test)
+            self.workqueue.update(_unfinished(left))
+            for other in self.assigned_work:
+                self._reschedule(other)
+            return test if tests[test] else None
+
+        def _reschedule(self, node):
+            """Give a worker files until it has two tests, which it needs to begin, if there are."""
+            super()._reschedule(node)
+            while not node.shutting_down and self._pending_of(self.assigned_work[node]) < 2:
+                super()._reschedule(node)
+
+    config.stash[_DIED] = []
+    return CrashSafeScheduling(config, log)
+
+
+def _unfinished(files):
+    """Files with a test that is not done."""
+    return {name: tests for name, tests in files.items() if not all(tests.values())}
+
+
+def pytest_terminal_summary(terminalreporter, config):
+    """Name the tests in which a worker died."""
+    for test in config.stash.get(_DIED, ()):
+        terminalreporter.write_line(f"WORKER DIED in {test}; it ran once more in another")
