@@ -85,10 +85,22 @@ class Periods:
 class Certificate:
     """What was computed, what was left out, and how that is known.
 
-    effects: "listed" or "auto". scenes: of the run. onsets: an Onset for each effect that was
-    computed, as far as a filling says when it acted. left_out: an Estimate for each effect that was
-    not computed. estimates: for those that "auto" decided on. audit: of contact tests that were
-    skipped; None where none are. periods: None where fewer than two cycles were measured.
+    Parameters
+    ----------
+    effects : str
+        ``"listed"`` or ``"auto"``, as asked for.
+    scenes : int
+        Number of scenes of the run.
+    onsets : tuple of Onset, default ()
+        For each effect that was computed, when it first acted, as far as the filling counts it.
+    left_out : tuple of Estimate, default ()
+        Estimated size of each effect that was not computed.
+    estimates : tuple of Estimate, default ()
+        Estimates of the effects that ``"auto"`` decided on.
+    audit : Audit, optional
+        Audit of contact tests that were skipped; None where none were.
+    periods : Periods, optional
+        Periodicity of the motion; None where fewer than two cycles were measured.
     """
 
     effects: str
@@ -100,7 +112,13 @@ class Certificate:
     periods: Optional[Periods] = None
 
     def rows(self) -> list[tuple[str, str]]:
-        """(name, text) of each line of a report."""
+        """Lines of a report.
+
+        Returns
+        -------
+        list of tuple
+            (name, text) of each line.
+        """
         found = [("acted", str(one)) for one in self.onsets]
         found += [("left out", f"{one.effect}, {one}") for one in self.left_out]
         found += [("estimated", f"{one.effect}, {one}") for one in self.estimates]
@@ -110,7 +128,13 @@ class Certificate:
         return found
 
     def as_dict(self) -> dict[str, Any]:
-        """All figures, for a JSON file."""
+        """All figures, for a JSON file.
+
+        Returns
+        -------
+        dict
+            Figures by name.
+        """
         figures = asdict(self)
         for name in ("left_out", "estimates"):
             figures[name] = [one.as_dict() for one in getattr(self, name)]

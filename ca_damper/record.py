@@ -62,11 +62,36 @@ def film(
     frame_every: Optional[int] = None,
     progress: Union[Listener, str, None] = AUTO,
 ) -> Film:
-    """Run a batch of few scenes on by a number of steps and record it; returns a Film.
+    """Run a batch of few scenes on by a number of steps and record it.
 
-    The present state is recorded first, then every so many steps; frame_every: None for no frames.
-    progress: as in ``frequency_response``.
-    Raises InputError for numbers that are none, SimulationDiverged.
+    Parameters
+    ----------
+    batch : Batch
+        Batch that has been started.
+    steps : int
+        Number of steps.
+    sample_every : int, default 1
+        Steps between samples; the present state is the first sample.
+    frame_every : int, optional
+        Steps between frames; None for no frames.
+    progress : callable or str or None, default "auto"
+        As in ``frequency_response``.
+
+    Returns
+    -------
+    Film
+        Samples of all scenes, and frames with the positions of the particles.
+
+    Raises
+    ------
+    InputError
+        The batch was not started, or a number is out of range.
+    SimulationDiverged
+        A scene left the range in which its numbers mean anything.
+
+    Examples
+    --------
+    >>> shot = film(batch, steps=2000, frame_every=100)  # doctest: +SKIP
     """
     if not hasattr(batch, "sample") or isinstance(batch, type):
         raise InputError(f"batch must be a Batch that has been started, got {shown(batch)}")

@@ -112,11 +112,35 @@ class MeshStiffness:
 def mesh_stiffness(mesh: Mesh, material: Material) -> MeshStiffness:
     """Elastic constants of the block that a mesh is, with the bonds of a material.
 
-    The whole mesh under six uniform stresses, tractions on its outer faces, one linear static
-    solve each; the mean strain follows from the displacement of the outer faces, which give way
-    like half a bond, as if the solid went on behind them. Of all fields of stress in equilibrium
-    this is the softest answer: blocks of few elements show some per cent less than large ones.
-    Raises InputError where the springs cannot be solved.
+    The whole mesh is loaded by six uniform stresses, as tractions on its outer faces, with one
+    linear static solve each. The mean strain follows from the displacement of the outer faces,
+    which are as compliant as half a bond, as if the solid went on behind them.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Mesh.
+    material : Material
+        Material with the stiffness of the bonds.
+
+    Returns
+    -------
+    MeshStiffness
+        Compliance, moduli and wave speeds.
+
+    Raises
+    ------
+    InputError
+        The springs cannot be solved.
+
+    Notes
+    -----
+    Among all stress fields in equilibrium this is the most compliant answer: blocks of few elements
+    show some per cent less than large ones.
+
+    Examples
+    --------
+    >>> mesh_stiffness(read_mesh(PAPER_BLOCK), CONCRETE).young  # doctest: +SKIP
     """
     topology = topology_of(mesh)
     constants = material.normal_stiffness, material.shear_stiffness

@@ -237,12 +237,34 @@ def write_paraview(
 ) -> None:
     """Write frames as a ParaView series: folder/name.pvd and a VTU file a frame.
 
-    name: of the files, that of the folder if None (``series_name``).
-    Cells carry body_id, level, speed_m_s, displacement_m, damage and step_bound_by, the place
-    in ``step_control.CRITERIA`` of what bounds a body's step. acting_since: times [s] by name,
-    (body_count,), NaN for never; cells then carry NAME_acts, 1 where an effect has begun to act by
-    the time of the frame, and NAME_since_s. An earlier series of that name in the folder is removed
-    first.
+    Parameters
+    ----------
+    folder : path
+        Folder of the series; it is made where it does not exist.
+    model : Model
+        Arrays of the scene, ``result.model``.
+    frames : sequence of Frame
+        Snapshots, ``result.frames``.
+    name : str, optional
+        Name of the files; that of the folder if None.
+    acting_since : mapping, optional
+        Times from which effects acted on each body [s], (body_count,) by name, NaN for never. Cells
+        then carry NAME_acts, 1 from that time, and NAME_since_s.
+
+    Raises
+    ------
+    InputError
+        The folder cannot be written to.
+
+    Notes
+    -----
+    Cells carry body_id, level, speed_m_s, displacement_m, damage and step_bound_by, the place in
+    ``step_control.CRITERIA`` of what bounds a body's step. An earlier series of that name is
+    removed.
+
+    Examples
+    --------
+    >>> write_paraview("results/series", result.model, result.frames)  # doctest: +SKIP
     """
     folder = output_folder(folder)
     name = series_name(folder) if name is None else name

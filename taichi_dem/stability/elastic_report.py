@@ -91,8 +91,24 @@ class ElasticReport:
 def elastic_report(scene: Scene) -> ElasticReport:
     """Elastic constants that the mesh of a scene shows with its material; print it before a run.
 
+    Parameters
+    ----------
+    scene : Scene
+        Scene to judge.
+
+    Returns
+    -------
+    ElasticReport
+        Print it for the table.
+
+    Raises
+    ------
+    InputError
+        The argument is no Scene, or the springs cannot be solved.
+
+    Notes
+    -----
     Six linear static solves of the whole mesh: some seconds for ten thousand bodies.
-    Raises InputError for anything else than a Scene, or springs that cannot be solved.
     """
     instance("scene", scene, Scene)
     mesh, material = scene.mesh, scene.material

@@ -113,9 +113,28 @@ class QualityReport:
 
 
 def quality_report(mesh: Mesh, material: Material) -> QualityReport:
-    """Shape and explicit step limits of every body of a mesh; infinite for one without bonds.
+    """Shape and explicit step limits of every body of a mesh.
 
-    Raises InputError for what is no mesh or material.
+    Parameters
+    ----------
+    mesh : Mesh
+        Mesh.
+    material : Material
+        Material of the bonds.
+
+    Returns
+    -------
+    QualityReport
+        Arrays (body_count,); limits are infinite for a body without bonds. Print it for a table.
+
+    Raises
+    ------
+    InputError
+        The arguments are no mesh and material.
+
+    Examples
+    --------
+    >>> print(quality_report(read_mesh(PAPER_BLOCK), CONCRETE))  # doctest: +SKIP
     """
     instance("mesh", mesh, Mesh)
     instance("material", material, Material)

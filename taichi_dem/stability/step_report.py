@@ -201,10 +201,31 @@ def stable_together(springs: ArrayLike, drags: ArrayLike) -> np.ndarray:
 def step_report(scene: Union[Scene, Mesh], material: Optional[Material] = None) -> StepReport:
     """Judge a scene, or a mesh and a material with all effects, before a run.
 
-    scene: a Scene, or a Mesh if material is given. Limits hold for a pair of equal bodies that
-    move against each other (``dashpot_step``, ``spring_step``): a mesh bears no
-    less, and at most twice as much.
-    Raises InputError for anything else.
+    Parameters
+    ----------
+    scene : Scene or Mesh
+        Scene, or a Mesh where a material is given.
+    material : Material, optional
+        Material of a mesh.
+
+    Returns
+    -------
+    StepReport
+        Largest stable step of each body by criterion and method. Print it for a table.
+
+    Raises
+    ------
+    InputError
+        The arguments are of another kind.
+
+    Notes
+    -----
+    Limits hold for a pair of equal bodies that move against each other: no mesh has a smaller
+    limit, and none more than twice the limit.
+
+    Examples
+    --------
+    >>> print(step_report(read_mesh(PAPER_BLOCK), CONCRETE))  # doctest: +SKIP
     """
     if isinstance(scene, Scene) and material is None:
         damped, friction, contact = map(scene.effect, ("dashpot", "friction", "contact"))

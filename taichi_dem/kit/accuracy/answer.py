@@ -87,11 +87,33 @@ class Plan:
 class Answer:
     """Value of a goal with its error bar.
 
-    goal, unit: what was asked. value: a number, or one a place of a curve. error: half-width of the
-    bar that holds the true value with the given confidence. parts: of it, by source. tolerance:
-    the largest error that was allowed, as a share of the value. plan: how it was found.
-    result: of the finest run. cost_curve: what other tolerances would cost. shortfall: why the
-    error is larger than asked, and what would help; "" where it is not.
+    Parameters
+    ----------
+    goal : str
+        Name of the goal.
+    unit : str
+        Unit of the value, ``"1"`` for none.
+    value : float or ndarray
+        A number, or one for each place of a curve, in the unit of the goal.
+    parts : ErrorParts
+        Half-widths of the error bar by source.
+    tolerance : float
+        Largest error that was allowed, as a share of the value.
+    confidence : float
+        Probability [-] with which the bar holds the true value.
+    plan : Plan
+        How the answer was found, and what it cost.
+    result : object, optional
+        Result of the finest run.
+    cost_curve : sequence of Expense, optional
+        What other tolerances would cost.
+    shortfall : str, default ""
+        Why the error is larger than asked, and what would help; ``""`` where it is not.
+
+    Examples
+    --------
+    >>> answer = solve(scene, until=1e-4, goal=goals.hole_displacement())  # doctest: +SKIP
+    >>> answer.value, answer.error, answer.reached  # doctest: +SKIP
     """
 
     goal: str
