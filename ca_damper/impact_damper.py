@@ -61,9 +61,9 @@ class ImpactDamper:
 
     Examples
     --------
-    >>> damper = ImpactDamper(Oscillator(), 6e-3, 0.75, 0.09, frequency=6.0)
-    >>> len(damper.speeds)
-    2
+    >>> damper = ImpactDamper(Oscillator(), 2e-3, 0.75, 0.02, frequency=6.0)
+    >>> round(float(damper.speeds[0]), 3)
+    0.65
     """
 
     oscillator: Oscillator
