@@ -17,6 +17,9 @@ from docs.site.public_api import (
     public_names,
 )
 
+#: Signs that Markdown takes for marks.
+_MARKS = r"([*_\[\]<>|])"
+
 
 def api_pages():
     """(name of the file, Page) for each public module of both packages."""
@@ -175,11 +178,12 @@ def _marked(text):
 
 def _blocks(text):
     """Text of a docstring as Markdown: code between double backquotes, blocks after "::"."""
-    # Marks of Markdown that docstrings use as signs.
-    plain = re.sub(r"(?<!`)([*_\[\]<>|])", r"\\\1", text)
-    return re.sub(r"::\n\n((?:    .*\n?|\n)+)", _fenced, plain)
+    parts = re.split(r"(``.+?``)", text)
+    # Outside of code, marks of Markdown are signs.
+    plain = (re.sub(_MARKS, r"\\\1", part) if part[:2] != "``" else part for part in parts)
+    return re.sub(r"::\n\n((?:    .*\n?|\n)+)", _fenced, "".join(plain))
 
 
 def _fenced(found):
-    code = inspect.cleandoc(re.sub(r"\\([*_\[\]<>|])", r"\1", found[1]))
+    code = inspect.cleandoc(re.sub(r"\\" + _MARKS, r"\1", found[1]))
     return f":\n\n```python\n{code}\n```\n"
