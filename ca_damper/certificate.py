@@ -20,8 +20,16 @@ _NEGLIGIBLE, _NEEDED = 1e-3, 1e-2
 class Estimate:
     """Size of an effect, estimated before a run.
 
-    share: at most this much of ``whole``, in words; 0 is exact. reason: where it comes from.
-    verdict: "negligible", "unclear" or "needed"; what is unclear is computed.
+    Parameters
+    ----------
+    effect : str
+        Name of the effect.
+    share : float
+        Upper bound of its size, as a share of ``whole``; 0 is exact.
+    whole : str
+        What the share is of, in words.
+    reason : str
+        Where the estimate comes from.
     """
 
     effect: str
@@ -31,13 +39,19 @@ class Estimate:
 
     @property
     def verdict(self) -> str:
-        """What the share means."""
+        """Verdict of the share: "negligible", "needed" or "unclear", which is computed."""
         if self.share < _NEGLIGIBLE:
             return NEGLIGIBLE
         return NEEDED if self.share >= _NEEDED else UNCLEAR
 
     def as_dict(self) -> dict[str, Any]:
-        """All figures, for a JSON file."""
+        """All figures, for a JSON file.
+
+        Returns
+        -------
+        dict
+            Figures by name.
+        """
         return {**asdict(self), "verdict": self.verdict}
 
     def __str__(self) -> str:
@@ -49,7 +63,17 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Onset:
-    """Scenes in which an effect acted, and the time when it first did [s]; None if it never did."""
+    """Scenes in which an effect acted, and the time when it first did.
+
+    Parameters
+    ----------
+    effect : str
+        Name of the effect.
+    scenes : int
+        Number of scenes.
+    since_s : float or None
+        Time [s]; None if it never acted.
+    """
 
     effect: str
     scenes: int
@@ -65,8 +89,16 @@ class Onset:
 class Periods:
     """Scenes in a periodic state, in which all measured cycles are alike.
 
-    cycles: measured. tolerance: largest difference of the motion of cycles, a share of it. scenes:
-    number for each period in cycles, (period, scenes); others: scenes without one.
+    Parameters
+    ----------
+    cycles : int
+        Number of measured cycles.
+    tolerance : float
+        Largest difference of the motion of cycles, as a share of it.
+    scenes : tuple of tuple of (int, int)
+        (period in cycles, number of scenes) for each period.
+    others : int
+        Number of scenes without a period.
     """
 
     cycles: int

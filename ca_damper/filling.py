@@ -58,9 +58,13 @@ _MOST_PLACES = 2**25
 class Structure:
     """Compiled structure of a filling; fillings of equal ``key`` share their compiled kernels.
 
-    key: the options that decide what is compiled. sizes: places that a scene needs, by name, for
-    ``SceneFields.field``, those for particles first; an engine has room for more, so that smaller
-    ones compile nothing.
+    Parameters
+    ----------
+    key : Hashable
+        Options that decide what is compiled.
+    sizes : dict, optional
+        Number of places that a scene needs, by name, for ``SceneFields.field``, those for particles
+        first. An engine has more, so that smaller ones compile nothing.
     """
 
     key: Hashable

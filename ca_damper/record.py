@@ -18,11 +18,24 @@ _MOST_MARKS = 1_000_000
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """One scene at one time.
+    """Snapshot of one scene.
 
-    time_s; x, y: displacement of container and base [m]; position, velocity: of the particles,
-    (particles, 2), horizontal and vertical, as the filling's ``snapshot`` gives them. diameter: of
-    each particle [m], (particles,), where they are of several sizes, else None.
+    Parameters
+    ----------
+    time_s : float
+        Time [s].
+    x : float
+        Displacement of the container [m].
+    y : float
+        Displacement of the base [m].
+    position : ndarray
+        Positions of the particles, horizontal and vertical, as the ``snapshot`` of the filling [m],
+        shape (particles, 2).
+    velocity : ndarray
+        Velocities of the particles [m/s], shape (particles, 2).
+    diameter : ndarray, optional
+        Diameter of each particle [m], shape (particles,), where they are of several sizes; else
+        None.
     """
 
     time_s: float
@@ -40,8 +53,12 @@ class Frame:
 class Film:
     """A recorded run.
 
-    history: arrays (samples, scenes) by name, see ``Batch.sample``. frames: a tuple of Frames for
-    each scene.
+    Parameters
+    ----------
+    history : dict
+        Arrays (samples, scenes) by name, see ``Batch.sample``.
+    frames : tuple of tuple of Frame
+        Frames of each scene.
     """
 
     history: dict[str, np.ndarray]

@@ -15,6 +15,7 @@ from docs.site.public_api import (
     members,
     modules,
     public_names,
+    returned,
 )
 
 #: Signs that Markdown takes for marks.
@@ -29,6 +30,7 @@ def api_pages():
             if module.__name__.startswith(package) or package == PACKAGES[0]:
                 label = label_of(package, module)
                 yield f"api_{label}.html", module_page(label, module)
+        yield f"api_{package}_results.html", results_page(package)
 
 
 def module_page(label, module):
@@ -49,6 +51,16 @@ def module_page(label, module):
         parts += map(_object, contracts)
     headings = [Heading(2, short(entry), anchor(entry)) for entry in [*things, *contracts]]
     return Page(label, "\n".join(parts), tuple(headings), ())
+
+
+def results_page(package):
+    """Page of the classes that users get from a package without making them."""
+    things = [entry for entry in returned(package) if entry.owner is None]
+    title = f"{package} results"
+    words = f"Objects that functions of <code>{package}</code> return, and their parts."
+    parts = [f"<h1>{title}</h1><p>{words}</p>", _overview(things), *map(_object, things)]
+    headings = [Heading(2, short(entry), anchor(entry)) for entry in things]
+    return Page(title, "\n".join(parts), tuple(headings), ())
 
 
 def bases_of(entry):

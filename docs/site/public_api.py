@@ -1,13 +1,15 @@
 """Walk over the public API of both packages: what ``__all__`` lists, and its public members.
 
-A member that a base class or a Protocol declares is documented there: overrides need a summary
-only. Functions that run in kernels are left out, as their contracts are those of the roles.
+Dataclasses that public functions return, or that are fields of such, are public too. A member that
+a base class or a Protocol declares is documented there: overrides need a summary only. Functions
+that run in kernels are left out, as their contracts are those of the roles.
 """
 
 import dataclasses
 import importlib
 import inspect
 import sys
+import typing
 from functools import cached_property
 from typing import Any, NamedTuple, Protocol
 
@@ -83,6 +85,42 @@ def entries(package):
                 yield Entry(f"{label}.{name}", thing)
                 if inspect.isclass(thing):
                     yield from members(Entry(f"{label}.{name}", thing))
+
+
+def returned(package):
+    """Entries of the dataclasses that users get without making them, and of their members."""
+    todo = list(entries(package))
+    known = {entry.thing for entry in todo if inspect.isclass(entry.thing)}
+    while todo:
+        for kind in results_of(todo.pop(0)):
+            if kind not in known and dataclasses.is_dataclass(kind) and ours(kind):
+                known.add(kind)
+                found = Entry(f"{kind.__module__}.{kind.__qualname__}", kind)
+                more = [found, *members(found)]
+                todo += more
+                yield from more
+
+
+def results_of(entry):
+    """Classes that a function returns, or that the fields of a class are of."""
+    if inspect.isclass(entry.thing):
+        for kind in filter(ours, entry.thing.__mro__):
+            names = {**vars(typing), **vars(sys.modules[kind.__module__])}
+            for annotation in vars(kind).get("__annotations__", {}).values():
+                yield from classes_in(annotation, names)
+    elif entry.function is not None:
+        result = inspect.signature(entry.function).return_annotation
+        yield from classes_in(result, entry.function.__globals__)
+
+
+def classes_in(annotation, names):
+    """Classes of an annotation; text is looked up by its names."""
+    if isinstance(annotation, str):
+        annotation = vars(typing).get(annotation, names.get(annotation))
+    if inspect.isclass(annotation) and not typing.get_args(annotation):
+        yield annotation
+    for part in typing.get_args(annotation):
+        yield from classes_in(getattr(part, "__forward_arg__", part), names)
 
 
 def label_of(package, module):

@@ -79,7 +79,19 @@ class Targets:
 
 @dataclass(frozen=True)
 class Match:
-    """A target and what was found. set: whether a constant of the bonds was free to meet it."""
+    """A target of a calibration and what was found.
+
+    Parameters
+    ----------
+    name : str
+        Name of the target.
+    target : float
+        Wanted value [Pa], of Poisson's ratio [-].
+    found : float
+        Value that was found, in the same unit [Pa or -].
+    set : bool
+        Whether a constant of the bonds was free to meet it.
+    """
 
     name: str
     target: float
@@ -88,12 +100,23 @@ class Match:
 
     @property
     def misfit(self) -> float:
-        """Deviation: of Poisson's ratio as it is, of all else as a share of the target."""
+        """Deviation as a share of the target; of Poisson's ratio, as it is."""
         apart = self.found - self.target
         return apart if self.name == "poisson" else apart / self.target
 
     def is_met(self, tolerance: float) -> bool:
-        """Whether the misfit is within a tolerance; False where nothing was found."""
+        """Whether the misfit is within a tolerance; False where nothing was found.
+
+        Parameters
+        ----------
+        tolerance : float
+            Largest misfit, a share of the target.
+
+        Returns
+        -------
+        bool
+            True where the target is met.
+        """
         return abs(self.misfit) <= tolerance
 
 
@@ -101,8 +124,18 @@ class Match:
 class Calibration:
     """A material, and how well it meets each target.
 
-    matches: a ``Match`` a target. tolerance: misfit up to which a target counts as met. runs: of
-    specimens. reach: sentences on targets that no constants meet.
+    Parameters
+    ----------
+    material : Material
+        The calibrated material.
+    matches : tuple of Match
+        Match of each target.
+    tolerance : float
+        Misfit up to which a target counts as met, as a share.
+    runs : int
+        Number of runs of specimens.
+    reach : tuple of str, default ()
+        Sentences on targets that no constants meet.
     """
 
     material: Material

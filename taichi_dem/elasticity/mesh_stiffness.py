@@ -27,8 +27,13 @@ _NAMES = "xyz"
 class MeshStiffness:
     """Elastic constants of a block of a mesh.
 
-    compliance: strains per stress [1/Pa], (6, 6) in the order xx, yy, zz, yz, zx, xy, shear strains
-    as angles. density [kg/m3].
+    Parameters
+    ----------
+    compliance : ndarray
+        Strains per stress [1/Pa], shape (6, 6), in the order xx, yy, zz, yz, zx, xy; shear strains
+        as angles.
+    density : float
+        Density [kg/m^3].
     """
 
     compliance: np.ndarray
@@ -46,7 +51,7 @@ class MeshStiffness:
 
     @property
     def poisson_along(self) -> np.ndarray:
-        """Mean contraction across over the strain along x, y and z, (3,)."""
+        """Mean contraction across over the strain along x, y and z [-], (3,)."""
         across = self.compliance[:3, :3].sum(axis=0) - np.diag(self.compliance)[:3]
         return -0.5 * across * self.young_along
 
@@ -75,7 +80,7 @@ class MeshStiffness:
 
     @property
     def poisson(self) -> float:
-        """Poisson's ratio, the mean over all directions."""
+        """Poisson's ratio [-], the mean over all directions."""
         return 0.5 * self.young / self.shear - 1.0
 
     @property

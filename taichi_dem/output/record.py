@@ -41,11 +41,27 @@ _LONGEST_NAME = 50
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """The block at one time.
+    """Snapshot of the block at one time.
 
-    time_s; position, displacement, velocity (n, 3) in m and m/s; rotation (n, 3, 3), body to
-    world; level (n,); damage (n,) in [0, 1], the mean over a body's bonds; bound (n,): what
-    asked for the level, a place in ``step_control.CRITERIA``.
+    Parameters
+    ----------
+    time_s : float
+        Time [s].
+    position : ndarray
+        Positions of the centres [m], shape (body_count, 3).
+    rotation : ndarray
+        Rotation matrices, from body to world axes [-], shape (body_count, 3, 3).
+    displacement : ndarray
+        Displacements from the start [m], shape (body_count, 3).
+    velocity : ndarray
+        Velocities of the centres [m/s], shape (body_count, 3).
+    level : ndarray
+        Levels of the step, dt0 / 2^level, shape (body_count,).
+    damage : ndarray
+        Share of the fracture energy that the bonds of a body have spent, from 0 to 1, shape
+        (body_count,).
+    bound : ndarray
+        Index in ``step_control.CRITERIA`` of what bounds the step, shape (body_count,).
     """
 
     time_s: float

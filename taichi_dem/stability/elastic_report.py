@@ -25,10 +25,19 @@ ELEMENTS = 4.0
 class ElasticReport:
     """Elastic constants of a scene's mesh beside those asked for, and what follows from them.
 
-    stiffness: of the block that the mesh is. asked: Young's modulus [Pa] and Poisson's ratio that
-    the material was made for, None for a material of constants per area. crack_length: the
-    characteristic length E G_f / tensile_strength^2 of a crack's tip [m]. element_size: edge of the
-    regular tetrahedron of the volume of each body [m], (body_count,). steps: largest stable ones.
+    Parameters
+    ----------
+    stiffness : MeshStiffness
+        Elastic constants of the block that the mesh is.
+    asked : tuple of (float, float) or None
+        Young's modulus [Pa] and Poisson's ratio for which the material was made; None for a
+        material of constants per area.
+    crack_length : float
+        Characteristic length E G_f / tensile_strength^2 of the tip of a crack [m].
+    element_size : ndarray
+        Edge of the regular tetrahedron of the volume of each body [m], shape (body_count,).
+    steps : StepReport
+        Largest stable steps.
     """
 
     stiffness: MeshStiffness
