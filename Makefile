@@ -28,7 +28,7 @@ ifeq ($(strip $(HOME)),)
 export HOME := $(CURDIR)/.venv/home
 endif
 
-.PHONY: help venv demo test test-slow test-bounds attack fuzz lint bench gallery lessons api mesh clean
+.PHONY: help venv demo test test-slow test-bounds attack fuzz lint bench gallery lessons docs mesh clean
 
 help: ## print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-11s %s\n", $$1, $$2}' Makefile
@@ -67,8 +67,8 @@ gallery: $(STAMP) ## run all experiments and show them on one page (GALLERY_OPTI
 lessons: $(LESSONS_STAMP) ## serve four interactive lessons to this machine's browser (installs marimo)
 	$(BIN)/python -m marimo run $(LESSONS) --host 127.0.0.1 $(LESSONS_OPTIONS)
 
-api: $(DOCS_STAMP) ## pages of all functions from their docstrings, in results/api (installs pdoc)
-	$(BIN)/python docs/make_api.py results/api
+docs: $(DOCS_STAMP) ## build these pages with API, gallery and search as a site, in results/docs
+	$(BIN)/python -m docs.site results/docs
 
 mesh: $(MESH_STAMP) ## make the meshes again (installs gmsh; the others do not need it)
 	$(BIN)/python experiments/make_meshes.py $(MESH_OPTIONS)
@@ -88,7 +88,7 @@ $(MESH_STAMP): $(STAMP)
 	@touch $@
 
 $(DOCS_STAMP): $(STAMP)
-	@echo "Installing pdoc (a few seconds)."
+	@echo "Installing what builds the pages (a few seconds)."
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[docs]"
 	@touch $@
 

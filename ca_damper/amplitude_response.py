@@ -18,7 +18,15 @@ if TYPE_CHECKING:
 class AmplitudeResponse:
     """A Response for each amplitude of the base, from one batch.
 
-    amplitudes: of the base [m]. responses: in their order; each has the report of all.
+    Returned by ``frequency_response`` for several amplitudes of the base. It has a length, items by
+    number, and can be iterated over.
+
+    Parameters
+    ----------
+    amplitudes : tuple of float
+        Amplitudes of the base [m].
+    responses : tuple of 'Response'
+        A Response for each amplitude; each has the report of the whole batch.
     """
 
     amplitudes: tuple[float, ...]
@@ -38,18 +46,44 @@ class AmplitudeResponse:
         return iter(self.responses)
 
     def measure(self, name: str) -> np.ndarray:
-        """A measure of a Response by name, (amplitudes, particles, ratios, seeds)."""
+        """Measure of all responses by name, stacked by amplitude.
+
+        Parameters
+        ----------
+        name : str
+            Name of a measure of a Response, such as ``"rms"``.
+
+        Returns
+        -------
+        ndarray
+            Values, shape (amplitudes, particles, ratios, seeds), in the unit of the measure.
+        """
         return np.stack([getattr(one, name) for one in self.responses])
 
     def peaks(self) -> tuple[np.ndarray, np.ndarray]:
-        """Where each curve peaks: (ratio, rms [m]), two arrays (amplitudes, particles, seeds)."""
+        """Locate the peak of each curve.
+
+        Returns
+        -------
+        tuple of (ndarray, ndarray)
+            Frequency ratio f/f0 [-] and RMS displacement [m] of the peaks, each of shape
+            (amplitudes, particles, seeds); NaN where a peak lies outside the ratios.
+        """
         ratio, rms = zip(*(one.peaks() for one in self.responses))
         return np.stack(ratio), np.stack(rms)
 
     def write_csv(self, path: FileName) -> None:
         """Write one row a scene, as ``Response.write_csv``, with its amplitude in front.
 
-        Raises InputError when the file cannot be written.
+        Parameters
+        ----------
+        path : path
+            CSV file; it is replaced as a whole.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written.
         """
         columns = [one.columns() for one in self.responses]
         sizes = [len(one["filling"]) for one in columns]

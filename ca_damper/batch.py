@@ -45,21 +45,58 @@ _MOST_STEPS = 2**31 - 1
 class Batch(LoadedScenes):
     """A filling, a table of scenes and the container's mount, ready to run.
 
-    table.dt holds the largest step of every scene; it is shortened so that a whole number of steps
-    makes a cycle of the base: ``steps_per_cycle``, (scenes,). The batch has a table of its own.
-    mount: "spring", or "base" for a container that moves like the base whatever the filling does,
-    or "floor" for one that lies on it by its weight, on stiffness and damping that never pull.
-    measured_cycles: most cycles that one run may measure. rtol, atol: of RK45, on the spring.
-    excitation: a Signal, as the base's motion, or an Excitation; the table's sine if None. Under a
-    Signal a cycle is a window: the runs count, and the sums are of, windows of 1 / frequency, and
-    the table's base_amplitude is not used. recorded_samples: most samples that a run may record.
-    structure: a ModalMount, for boxes at places of structures given by their modes, in groups of
-    scenes; see ``shake_structure``. None for a container of its own in each scene.
-    effects: "listed", those that the options of the filling ask for, or "auto": what is exactly
-    without effect or estimated to be negligible is left out, and what is needed or unclear is
-    computed; ``certificate`` says what and why. Fillings without a choice are as they are.
-    ``run_seconds`` and ``compile_seconds`` tell what was spent, ``report()`` all of it in short.
-    Raises InputError for a scene that the filling refuses or a step out of range.
+    The lower level below ``frequency_response``, ``shake`` and ``film``. A batch compiles nothing
+    where one of the same structure has run before.
+
+    Parameters
+    ----------
+    filling : Filling
+        Filling of the containers, such as ``Automaton()`` or ``Spheres()``.
+    table : SceneTable
+        Parameters of the scenes; the batch copies them. ``table.dt`` holds the largest step of each
+        scene [s], which is shortened so that a whole number of steps makes a cycle of the base.
+    mount : str, default "spring"
+        ``"spring"``: on spring and dashpot. ``"base"``: moves like the base whatever the filling
+        does. ``"floor"``: lies on the base by its weight, on a stiffness and damping that never
+        pull.
+    measured_cycles : int, default 1
+        Largest number of cycles that one run may measure.
+    rtol : float, default 1e-09
+        Relative tolerance of RK45, as a share of the state of the container.
+    atol : float, default 1e-12
+        Absolute tolerance of RK45 [m, m/s].
+    effects : str, default "listed"
+        ``"listed"``: effects that the options of the filling ask for. ``"auto"``: effects that an
+        estimate shows to be negligible are left out; see ``certificate``.
+    excitation : Signal, sequence of Signal or Excitation, optional
+        Base motion [m], one for all scenes or one for each, or an Excitation. None: the sine of the
+        table. Under a Signal, a cycle is a window of 1 / frequency and base_amplitude is not used.
+    recorded_samples : int, default 0
+        Largest number of samples that a run may record for ``time_series``.
+    structure : ModalMount, optional
+        Places of structures given by their modes, see ``shake_structure``; None for a container of
+        its own in each scene.
+
+    Attributes
+    ----------
+    run_seconds : float
+        Wall time spent on stepping [s].
+    compile_seconds : float
+        Wall time spent on compiling [s].
+    steps_per_cycle : ndarray
+        Steps in a cycle of the base, shape (scenes,).
+
+    Raises
+    ------
+    InputError
+        The filling refuses a scene, or a step is out of range.
+
+    Examples
+    --------
+    >>> table = SceneTable([10, 20], seed=1, dt=1e-4, base_amplitude=0.6e-3)
+    >>> batch = Batch(Automaton(), table, measured_cycles=20)  # doctest: +SKIP
+    >>> batch.start("rigid")  # doctest: +SKIP
+    >>> batch.run(150, 20).rms  # doctest: +SKIP
     """
 
     def __init__(
@@ -100,12 +137,23 @@ class Batch(LoadedScenes):
         return self.launches.scene_steps
 
     def start(self, start: str = "rest", *, displacement: Any = 0.0, velocity: Any = 0.0) -> None:
-        """Place the particles at their start and begin at time zero, the base passing zero upwards.
+        """Place the particles at their start, at time zero, where the base passes zero upwards.
 
-        start: the container begins at "rest", or in the steady state of the "empty" container, or
-        in that of a container with the particles as "rigid" mass; but for a single sine of the base
-        "rest" only. displacement [m], velocity [m/s] of the container beside it, one number or
-        (scenes,).
+        Parameters
+        ----------
+        start : str, default "rest"
+            ``"rest"``, the steady state of the ``"empty"`` container, or that of a container with
+            the particles as a ``"rigid"`` mass. Only ``"rest"`` for other excitations than a single
+            sine.
+        displacement : float or array_like, default 0.0
+            Displacement of the container beside that [m], one number or (scenes,).
+        velocity : float or array_like, default 0.0
+            Velocity of the container beside that [m/s], one number or (scenes,).
+
+        Raises
+        ------
+        InputError
+            ``start`` is unknown or does not fit the excitation, or a number is not finite.
         """
         coupling = self.engine.coupling
         choice("start", start, starts_of(self.excitation, self.mount))
@@ -120,10 +168,19 @@ class Batch(LoadedScenes):
         self._check_divergence()
 
     def change(self, **numbers: Any) -> None:
-        """Replace numbers of the scenes, as ``SceneTable.change``; ``start`` must follow.
+        """Replace parameters of the scenes; ``start`` must follow.
 
-        The bits are those of a batch made with these numbers, and nothing is compiled. Raises
-        InputError where that batch would be refused; this one then stays unchanged.
+        The bits are those of a batch made with these parameters, and nothing is compiled.
+
+        Parameters
+        ----------
+        **numbers : float or array_like
+            Parameters by name, as ``SceneTable.change``.
+
+        Raises
+        ------
+        InputError
+            A batch of these parameters would be refused; this one then stays unchanged.
         """
         engine = self.engine
         self.numbers = self._checked(self.numbers.changed(**numbers))
@@ -132,10 +189,19 @@ class Batch(LoadedScenes):
         self._load_pace()
 
     def drive(self, frequency: Any) -> None:
-        """Go on at another frequency [Hz], a scalar or (scenes,), at the end of a cycle.
+        """Go on at another frequency, at the end of a cycle.
 
-        The base keeps its place and changes its speed. Raises InputError within a cycle, and for
-        any excitation but a single sine of the base.
+        The base keeps its position and changes its speed.
+
+        Parameters
+        ----------
+        frequency : float or array_like
+            Frequency of the base [Hz], one number or (scenes,).
+
+        Raises
+        ------
+        InputError
+            A cycle is not complete, or the excitation is not a single sine of the base.
         """
         check_single_sine(self.excitation, "drive")
         self._check_cycle_is_full()
@@ -153,12 +219,30 @@ class Batch(LoadedScenes):
         *,
         record_every: int = 0,
     ) -> measures.Cycles:
-        """Run whole cycles and measure the last of them; returns ``measures.Cycles``.
+        """Run whole cycles and measure the last of them.
 
-        progress: called with a BatchProgress about six times a second. record_every: steps between
-        samples for ``time_series``, from the beginning of this run on; 0 for none.
-        Raises InputError for numbers of cycles that are none, or within a cycle, and beyond the end
-        of an excitation; SimulationDiverged.
+        Parameters
+        ----------
+        transient_cycles : int
+            Cycles before the measured ones.
+        measured_cycles : int
+            Cycles to measure, at most those of the batch.
+        progress : callable, optional
+            Function that is called with a BatchProgress about six times a second.
+        record_every : int, default 0
+            Steps between samples for ``time_series``, from the beginning of this run; 0 for none.
+
+        Returns
+        -------
+        Cycles
+            Record of the measured cycles, see ``measures.Cycles``.
+
+        Raises
+        ------
+        InputError
+            A number is out of range, a cycle is not complete, or the excitation ends earlier.
+        SimulationDiverged
+            A scene left the range in which its numbers mean anything.
         """
         transient = whole("transient_cycles", transient_cycles, 0, MOST_CYCLES)
         measured = whole("measured_cycles", measured_cycles, 0, self.measured_cycles)
@@ -178,11 +262,26 @@ class Batch(LoadedScenes):
     def measure_each(
         self, cycles: Any, progress: Optional[Listener] = None
     ) -> tuple[np.ndarray, ...]:
-        """Go on by cycles, a number for each scene or one for all, and measure all of them.
+        """Go on by a number of cycles for each scene, and measure all of them.
 
-        A scene of 0 cycles stays as it is. Returns the record of each, (cycles, COLUMNS).
-        Raises InputError for numbers of cycles that are none, or within a cycle;
-        SimulationDiverged.
+        Parameters
+        ----------
+        cycles : int or array_like
+            Number of cycles, one for all scenes or (scenes,); a scene with 0 stays as it is.
+        progress : callable, optional
+            As in ``run``.
+
+        Returns
+        -------
+        tuple of ndarray
+            Record of each scene, shape (cycles, len(measures.COLUMNS)).
+
+        Raises
+        ------
+        InputError
+            A number is out of range, or a cycle is not complete.
+        SimulationDiverged
+            A scene left the range in which its numbers mean anything.
         """
         counts = for_all("cycles", cycles, self.count, self.measured_cycles).astype(np.int64)
         self._check_cycle_is_full()
@@ -192,9 +291,21 @@ class Batch(LoadedScenes):
         return tuple(one[:count].copy() for one, count in zip(record, counts))
 
     def advance(self, steps: Any, progress: Optional[Listener] = None) -> None:
-        """Advance every scene by a number of steps, one for all or (scenes,), without measuring.
+        """Advance every scene by a number of steps without measuring.
 
-        Raises InputError unless they are whole numbers from zero, SimulationDiverged.
+        Parameters
+        ----------
+        steps : int or array_like
+            Number of steps, one for all scenes or (scenes,).
+        progress : callable, optional
+            As in ``run``.
+
+        Raises
+        ------
+        InputError
+            A number is negative or not whole.
+        SimulationDiverged
+            A scene left the range in which its numbers mean anything.
         """
         self._check_started()
         steps = for_all("steps", steps, self.count, _MOST_STEPS).astype(np.int64)
@@ -204,12 +315,28 @@ class Batch(LoadedScenes):
     def checkpointed(
         self, checkpoint: Any, resume: Any, identity: dict[str, str], owners: Any = ()
     ) -> Iterator[Any]:
-        """Save the runs in its block as a checkpoint asks; yields the writer.
+        """Save the runs inside a ``with`` block as a checkpoint asks.
 
-        checkpoint: a Checkpoint or None. resume: file to go on from, or None; the saved run must be
-        called again, and is continued. identity: words by name that a file must share; owners:
-        (name, object) of further data in it, as in ``restart.RunSnapshot``.
-        Raises InputError.
+        Parameters
+        ----------
+        checkpoint : Checkpoint, optional
+            Where and when to save; None for no checkpoint.
+        resume : path, optional
+            Checkpoint to go on from; the saved run must be called again and is continued.
+        identity : dict of str
+            Words by name that a file must share with this run.
+        owners : dict or sequence of (str, object), default ()
+            Further objects whose data belong in the file, as in ``restart.RunSnapshot``.
+
+        Yields
+        ------
+        CheckpointWriter
+            Writer of the checkpoint; ``save()`` saves now.
+
+        Raises
+        ------
+        InputError
+            The file cannot be read or written, or belongs to another run.
         """
         self._check_started()
         own = {"version": version_text(), "filling": identity_of(self.filling)}
@@ -251,7 +378,13 @@ class Batch(LoadedScenes):
         self.going_on = True
 
     def report(self) -> Report:
-        """Figures and cost of the run, a ``report.Report``."""
+        """Summarize figures and cost of the run.
+
+        Returns
+        -------
+        Report
+            Figures of all scenes since the last ``start``.
+        """
         particles, dt = self.table.column("particles"), self.table.column("dt")
         sprung = self.mount != "base"
         return Report(

@@ -20,8 +20,16 @@ _NEGLIGIBLE, _NEEDED = 1e-3, 1e-2
 class Estimate:
     """Size of an effect, estimated before a run.
 
-    share: at most this much of ``whole``, in words; 0 is exact. reason: where it comes from.
-    verdict: "negligible", "unclear" or "needed"; what is unclear is computed.
+    Parameters
+    ----------
+    effect : str
+        Name of the effect.
+    share : float
+        Upper bound of its size, as a share of ``whole``; 0 is exact.
+    whole : str
+        What the share is of, in words.
+    reason : str
+        Where the estimate comes from.
     """
 
     effect: str
@@ -31,13 +39,19 @@ class Estimate:
 
     @property
     def verdict(self) -> str:
-        """What the share means."""
+        """Verdict of the share: "negligible", "needed" or "unclear", which is computed."""
         if self.share < _NEGLIGIBLE:
             return NEGLIGIBLE
         return NEEDED if self.share >= _NEEDED else UNCLEAR
 
     def as_dict(self) -> dict[str, Any]:
-        """All figures, for a JSON file."""
+        """All figures, for a JSON file.
+
+        Returns
+        -------
+        dict
+            Figures by name.
+        """
         return {**asdict(self), "verdict": self.verdict}
 
     def __str__(self) -> str:
@@ -49,7 +63,17 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Onset:
-    """Scenes in which an effect acted, and the time when it first did [s]; None if it never did."""
+    """Scenes in which an effect acted, and the time when it first did.
+
+    Parameters
+    ----------
+    effect : str
+        Name of the effect.
+    scenes : int
+        Number of scenes.
+    since_s : float or None
+        Time [s]; None if it never acted.
+    """
 
     effect: str
     scenes: int
@@ -65,8 +89,16 @@ class Onset:
 class Periods:
     """Scenes in a periodic state, in which all measured cycles are alike.
 
-    cycles: measured. tolerance: largest difference of the motion of cycles, a share of it. scenes:
-    number for each period in cycles, (period, scenes); others: scenes without one.
+    Parameters
+    ----------
+    cycles : int
+        Number of measured cycles.
+    tolerance : float
+        Largest difference of the motion of cycles, as a share of it.
+    scenes : tuple of tuple of (int, int)
+        (period in cycles, number of scenes) for each period.
+    others : int
+        Number of scenes without a period.
     """
 
     cycles: int
@@ -85,10 +117,22 @@ class Periods:
 class Certificate:
     """What was computed, what was left out, and how that is known.
 
-    effects: "listed" or "auto". scenes: of the run. onsets: an Onset for each effect that was
-    computed, as far as a filling says when it acted. left_out: an Estimate for each effect that was
-    not computed. estimates: for those that "auto" decided on. audit: of contact tests that were
-    skipped; None where none are. periods: None where fewer than two cycles were measured.
+    Parameters
+    ----------
+    effects : str
+        ``"listed"`` or ``"auto"``, as asked for.
+    scenes : int
+        Number of scenes of the run.
+    onsets : tuple of Onset, default ()
+        For each effect that was computed, when it first acted, as far as the filling counts it.
+    left_out : tuple of Estimate, default ()
+        Estimated size of each effect that was not computed.
+    estimates : tuple of Estimate, default ()
+        Estimates of the effects that ``"auto"`` decided on.
+    audit : Audit, optional
+        Audit of contact tests that were skipped; None where none were.
+    periods : Periods, optional
+        Periodicity of the motion; None where fewer than two cycles were measured.
     """
 
     effects: str
@@ -100,7 +144,13 @@ class Certificate:
     periods: Optional[Periods] = None
 
     def rows(self) -> list[tuple[str, str]]:
-        """(name, text) of each line of a report."""
+        """Lines of a report.
+
+        Returns
+        -------
+        list of tuple
+            (name, text) of each line.
+        """
         found = [("acted", str(one)) for one in self.onsets]
         found += [("left out", f"{one.effect}, {one}") for one in self.left_out]
         found += [("estimated", f"{one.effect}, {one}") for one in self.estimates]
@@ -110,7 +160,13 @@ class Certificate:
         return found
 
     def as_dict(self) -> dict[str, Any]:
-        """All figures, for a JSON file."""
+        """All figures, for a JSON file.
+
+        Returns
+        -------
+        dict
+            Figures by name.
+        """
         figures = asdict(self)
         for name in ("left_out", "estimates"):
             figures[name] = [one.as_dict() for one in getattr(self, name)]

@@ -39,10 +39,18 @@ _HALVINGS = 60
 
 @dataclass(frozen=True, eq=False)
 class CollectAndCollide:
-    """Answer of the theory at amplitudes and gaps of one shape; NaN where A < gap / pi.
+    """Answer of the theory at amplitudes A and gaps of one shape; NaN where A < gap / pi.
 
-    energy: lost in a cycle by N m A^2 w^2. loss: apparent damping by N m w. mass: apparent mass by
-    N m. phase: of the wall when it meets the block [rad].
+    Parameters
+    ----------
+    energy : ndarray
+        Energy lost in a cycle over N m A^2 w^2 [-].
+    loss : ndarray
+        Apparent damping over N m w [-].
+    mass : ndarray
+        Apparent mass over N m [-].
+    phase : ndarray
+        Phase of the wall when it meets the block [rad].
     """
 
     energy: np.ndarray
@@ -57,8 +65,37 @@ class CollectAndCollide:
 def collect_and_collide(amplitude: ArrayLike, gap: ArrayLike) -> CollectAndCollide:
     """Loss and apparent mass of a block of grains in a container that moves as A sin(w t).
 
-    amplitude A [m]; gap: way of the block between floor and lid [m]; broadcast against each other.
-    Raises InputError unless they are positive numbers.
+    Parameters
+    ----------
+    amplitude : array_like
+        Amplitude A of the container [m].
+    gap : array_like
+        Distance that the block can move between floor and lid [m]; broadcast against the amplitude.
+
+    Returns
+    -------
+    CollectAndCollide
+        Dimensionless loss, apparent mass and energy, of the shape of the arguments.
+
+    Raises
+    ------
+    InputError
+        The arguments are not positive numbers.
+
+    Notes
+    -----
+    The motion exists for A >= gap / pi. The phase p of the impact follows from p - sin p = gap / A.
+
+    References
+    ----------
+    Bannerman et al., Phys. Rev. E 84 (2011) 011301; Sack et al., Phys. Rev. Lett. 111 (2013)
+    018001.
+
+    Examples
+    --------
+    >>> made = collect_and_collide(2.0, 2.0 * np.pi)
+    >>> round(float(made.energy), 12)
+    4.0
     """
     size, way = np.broadcast_arrays(_positive("amplitude", amplitude), _positive("gap", gap))
     ratio = way / size

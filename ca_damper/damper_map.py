@@ -37,11 +37,33 @@ _AXES = ("clearances", "particles", "amplitudes", "frequencies", "seeds")
 class DamperMap:
     """Measures of a container that is driven as A sin(2 pi f t), whatever its filling does.
 
-    label: of the filling. Axes: clearances [m], particles, amplitudes [m], frequencies [Hz], seeds;
-    clearance is the way of the settled grains to the lid. All measures have them in this order.
-    apparent_damping [N s/m], apparent_mass [kg]: of ``measures.Cycles``. particle_mass [kg].
-    gaps: the clearances, (clearances, particles) [m]: those asked for, or of the filling's own box.
-    theory: of a block of grains without gravity, (clearances, particles, amplitudes).
+    The axes of all measures are clearances, particles, amplitudes, frequencies, seeds, in this
+    order.
+
+    Parameters
+    ----------
+    label : str
+        Short word for the filling.
+    particle_mass : float
+        Mass of a particle [kg].
+    clearances : tuple of float
+        Distances from the settled grains to the lid [m]; (None,) for the box as it is.
+    particles : tuple of int
+        Numbers of particles.
+    amplitudes : tuple of float
+        Amplitudes A of the container [m].
+    frequencies : tuple of float
+        Frequencies f of the container [Hz].
+    seeds : tuple of int
+        Seeds.
+    gaps : ndarray
+        Clearance of each box [m], shape (clearances, particles).
+    apparent_damping : ndarray
+        Apparent damping of the filling [N s/m], of ``measures.Cycles``.
+    apparent_mass : ndarray
+        Apparent mass of the filling [kg], of ``measures.Cycles``.
+    reports : tuple of Report, default ()
+        Report of each batch.
     """
 
     label: str
@@ -63,7 +85,7 @@ class DamperMap:
 
     @property
     def omega(self) -> np.ndarray:
-        """Angular frequencies [rad/s], (frequencies, 1), to be divided by."""
+        """Angular frequencies [rad/s], (frequencies, 1), which broadcast against measures."""
         return 2.0 * np.pi * np.array(self.frequencies)[:, None]
 
     @property
@@ -87,7 +109,18 @@ class DamperMap:
         return np.pi * self.loss
 
     def loss_factor(self, container_mass: float) -> np.ndarray:
-        """Energy taken a radian per energy in motion, c / (w (M + m)), M [kg] of the container."""
+        """Energy lost in a radian over the energy in motion, c / (w (M + m)).
+
+        Parameters
+        ----------
+        container_mass : float
+            Mass M of the container [kg].
+
+        Returns
+        -------
+        ndarray
+            Loss factor [-], shape of all axes.
+        """
         moving = positive("container_mass", container_mass) + self.apparent_mass
         return self.apparent_damping / (self.omega * moving)
 
@@ -99,7 +132,15 @@ class DamperMap:
     def write_csv(self, path: FileName) -> None:
         """Write a row a scene: its place on the axes, measures, and the theory's loss and mass.
 
-        Raises InputError when the file cannot be written.
+        Parameters
+        ----------
+        path : path
+            CSV file; it is replaced as a whole.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written.
         """
         indices = np.indices(self.loss.shape).reshape(len(_AXES), -1)
         clearance, number, amplitude = indices[:3]
@@ -130,13 +171,49 @@ def damper_map(
     measured_cycles: int = 50,
     progress: Union[Listener, str, None] = AUTO,
 ) -> DamperMap:
-    """Loss and apparent mass of a driven damper over all its axes; returns a DamperMap.
+    """Loss and apparent mass of a driven damper over all its axes.
 
-    amplitudes [m], frequencies [Hz], particles: one or several of each. clearances: ways from the
-    settled grains, of N / columns layers, to the lid [m]; the box of the filling, Spheres or an
-    Automaton, is made as high as each of them needs with each number. None: the box as it is.
-    seeds: how many, counted from 1, or which. dt: largest step [s], chosen if None. progress: as in
-    ``frequency_response``. Raises InputError, SimulationDiverged.
+    Parameters
+    ----------
+    filling : Filling
+        Filling of the container.
+    amplitudes : float or sequence of float
+        Amplitudes of the container [m], one or several.
+    frequencies : float or sequence of float
+        Frequencies of the container [Hz], one or several.
+    particles : int or sequence of int
+        Numbers of particles, one or several.
+    clearances : float or sequence of float, optional
+        Distances from the settled grains to the lid [m]; the box is made as high as each needs.
+        None: the box of the filling as it is.
+    seeds : int or sequence of int, default 3
+        Number of seeds, counted from 1, or the seeds themselves.
+    dt : float, optional
+        Largest step [s]; chosen from the filling and the highest frequency if None.
+    transient_cycles : int, default 50
+        Cycles before the measured ones.
+    measured_cycles : int, default 50
+        Cycles to measure.
+    progress : callable or str or None, default "auto"
+        As in ``frequency_response``.
+
+    Returns
+    -------
+    DamperMap
+        Measures over all axes.
+
+    Raises
+    ------
+    InputError
+        An argument is out of its range, or the filling has no box to change.
+    SimulationDiverged
+        A scene left the range in which its numbers mean anything.
+
+    Examples
+    --------
+    >>> damper_map(
+    ...     Spheres(), amplitudes=[5e-3, 1e-2], frequencies=10.0, particles=30
+    ... )  # doctest: +SKIP
     """
     check_filling(filling)
     progress_option("progress", progress)

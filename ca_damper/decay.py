@@ -11,15 +11,37 @@ _LEAST_SAMPLES = 8
 
 
 def logarithmic_decrement(x: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-    """Amplitudes [m] of a decay, and the logarithmic decrement at each of them.
+    """Amplitudes of a decay, and the logarithmic decrement at each of them.
 
-    x: displacement at even times, (samples,), such as ``TimeHistory.x[:, 0, 0]``. An amplitude is
-    half the way between two neighbouring extremes, so that a constant sag has no part in it; the
-    decrement there is ln(a[k] / a[k + 2]), of the whole cycle around it. With a damping ratio z it
-    is 2 pi z / sqrt(1 - z^2) at every amplitude; grains make it depend on the amplitude.
-    Extremes are those of parabolas through three samples. A motion that has ended, or that grains
-    push to and fro within a few samples, ends the decay.
-    Raises InputError unless x is a series of finite numbers with four extremes at least.
+    Parameters
+    ----------
+    x : array_like
+        Displacement at even times [m], shape (samples,), such as ``TimeHistory.x[:, 0, 0]``.
+
+    Returns
+    -------
+    tuple of (ndarray, ndarray)
+        Amplitudes [m] and decrements [-], shape (extremes - 3,) each.
+
+    Raises
+    ------
+    InputError
+        ``x`` is not a series of finite numbers with at least four extremes.
+
+    Notes
+    -----
+    An amplitude is half the distance between two neighbouring extremes, so that a constant sag has
+    no part in it. The decrement there is ln(a[k] / a[k + 2]), of the whole cycle around it; a
+    damping ratio z gives 2 pi z / sqrt(1 - z^2) at every amplitude. Extremes are those of parabolas
+    through three samples. The decay ends where the motion ends or changes direction within a few
+    samples.
+
+    Examples
+    --------
+    >>> time = np.arange(4000) * 1e-3
+    >>> size, decrement = logarithmic_decrement(np.exp(-0.1 * time) * np.sin(2 * np.pi * 5 * time))
+    >>> round(float(decrement[0]), 4)
+    0.02
     """
     series = np.asarray(x, dtype=np.float64)
     if series.ndim != 1 or not np.isfinite(series).all():

@@ -9,9 +9,20 @@ from taichi_dem.kit.errors import SimulationDiverged as _SimulationDiverged
 class SimulationDiverged(_SimulationDiverged):
     """A scene left the range in which its numbers mean anything.
 
-    scene: dict of the numbers of the scene's row. step: number of the step after which it was
-    found. time_s: when that was [s]. dt: the step used [s]. dt_allowed: a step that would do [s],
-    also in ``advice``.
+    Parameters
+    ----------
+    sentence : str
+        The message.
+    scene : mapping
+        Numbers of the scene's row, by name.
+    step : int
+        Number of the step after which it was found.
+    time_s : float
+        Time of that [s].
+    dt : float
+        Step that was used [s].
+    dt_allowed : float
+        Step that would do [s], also in ``advice``.
     """
 
     def __init__(

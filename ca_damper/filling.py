@@ -58,9 +58,13 @@ _MOST_PLACES = 2**25
 class Structure:
     """Compiled structure of a filling; fillings of equal ``key`` share their compiled kernels.
 
-    key: the options that decide what is compiled. sizes: places that a scene needs, by name, for
-    ``SceneFields.field``, those for particles first; an engine has room for more, so that smaller
-    ones compile nothing.
+    Parameters
+    ----------
+    key : Hashable
+        Options that decide what is compiled.
+    sizes : dict, optional
+        Number of places that a scene needs, by name, for ``SceneFields.field``, those for particles
+        first. An engine has more, so that smaller ones compile nothing.
     """
 
     key: Hashable
@@ -71,14 +75,15 @@ class Structure:
 
 
 class Filling(Protocol):
-    """Options of a user, checked when they are made.
+    """Contract of a filling of the container.
 
-    A filling may also have a property ``structure``, a Structure. Its device then has a method
-    ``load(filling)`` that takes over all numbers of a filling of the same structure. Without it the
-    filling itself, which must be hashable, is the structure, and other options compile anew.
-    It may have ``order``, that of the error in the step, for the report, choose its effects by
-    itself, as ``activation.py`` says, and tell the ``clearance(particles)`` [m] above settled
-    particles, or make a box ``with_clearance(particles, clearance)``, for ``damper_map``.
+    Options of a user, checked when they are made. A filling may also have a property ``structure``,
+    a Structure. Its device then has a method ``load(filling)`` that takes over all numbers of a
+    filling of the same structure. Without it the filling itself, which must be hashable, is the
+    structure, and other options compile anew. It may have ``order``, that of the error in the step,
+    for the report; choose its effects by itself, as ``activation.py`` describes; and have
+    ``clearance(particles)`` [m] above settled particles, or ``with_clearance(particles,
+    clearance)``, for ``damper_map``.
     """
 
     @property
@@ -110,13 +115,52 @@ class Filling(Protocol):
         """Longest step that it allows or advises [s], and why; None where any will do."""
 
     def check(self, particles: int, dt: float) -> None:
-        """Raise InputError for a number of particles or a step [s] that it cannot do."""
+        """Refuse a number of particles or a step that the filling cannot do.
+
+        Parameters
+        ----------
+        particles : int
+            Number of particles.
+        dt : float
+            Step [s].
+
+        Raises
+        ------
+        InputError
+            They are out of range.
+        """
 
     def divergence(self, code: int, particles: int, dt: float) -> tuple[str, float]:
-        """Meaning of a code of divergence, in words that follow "it", and a step that avoids it."""
+        """Meaning of a code of divergence, and a step that avoids it.
+
+        Parameters
+        ----------
+        code : int
+            Code of ``DeviceFilling.divergence_code``, from 1.
+        particles : int
+            Number of particles of the scene.
+        dt : float
+            Step [s].
+
+        Returns
+        -------
+        tuple of (str, float)
+            Words that follow "it", and a step [s].
+        """
 
     def bind(self, table: SceneFields) -> "DeviceFilling":
-        """Declare its fields for all scenes of a table; no field may be used yet."""
+        """Declare the fields of the filling for all scenes of a table; no field may be used yet.
+
+        Parameters
+        ----------
+        table : SceneFields
+            Fields of the scenes.
+
+        Returns
+        -------
+        DeviceFilling
+            The filling on the device.
+        """
 
 
 class DeviceFilling(Protocol):

@@ -49,7 +49,17 @@ class Empty:
 class RigidMass:
     """Particles glued to the container: N m more mass and nothing else, exactly.
 
-    particle_mass [kg], gravity [m/s^2].
+    Parameters
+    ----------
+    particle_mass : float, default 0.0002
+        Mass of a particle [kg].
+    gravity : float, default 9.8
+        Gravity, downwards [m/s^2].
+
+    Raises
+    ------
+    InputError
+        A value is out of its range.
     """
 
     particle_mass: float = 0.2e-3

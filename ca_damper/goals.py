@@ -24,12 +24,33 @@ KINDS = ("value", "extreme", "curve")
 
 @dataclass(frozen=True)
 class Goal:
-    """An output: its name, its unit ("1" for none), one of KINDS, and how a Response gives it.
+    """Output of a damper that can be asked for with a tolerance.
 
-    function: of a Response of one particle number, with as many seeds as there are runs; returns
-    (seeds,) or (seeds, places). ratios: frequencies f/f0 that it needs; none for an "extreme",
-    whose Response has at least three around the highest RMS.
-    Raises InputError.
+    Parameters
+    ----------
+    name : str
+        Name of the output.
+    unit : str
+        Unit of the output, ``"1"`` for none.
+    kind : str
+        ``"value"``: at given frequencies. ``"extreme"``: of the curve, which is followed to its
+        peak. ``"curve"``: a value for each of the given frequencies.
+    function : callable, optional
+        Function of a Response of one particle number, with as many seeds as there are runs; returns
+        an array (seeds,) or (seeds, places).
+    ratios : tuple of float, default ()
+        Frequency ratios f/f0 [-] that the goal needs; none for an ``"extreme"``, whose Response has
+        at least three around the highest RMS.
+
+    Raises
+    ------
+    InputError
+        A member is of the wrong kind, or the ratios do not ascend.
+
+    Examples
+    --------
+    >>> Goal("swing", "m", "extreme", lambda found: found.amplitude[0].max(0)).kind
+    'extreme'
     """
 
     name: str
@@ -59,7 +80,23 @@ class Goal:
         object.__setattr__(self, "ratios", ratios)
 
     def values(self, response: Response) -> np.ndarray:
-        """Values of a Response, (seeds, places). Raises InputError for a function of no use."""
+        """Values of a Response.
+
+        Parameters
+        ----------
+        response : Response
+            Response of one particle number.
+
+        Returns
+        -------
+        ndarray
+            Values, shape (seeds, places).
+
+        Raises
+        ------
+        InputError
+            The function returns another shape.
+        """
         found = np.asarray(self.function(response), dtype=np.float64)
         if found.ndim not in (1, 2) or len(found) != len(response.seeds) or found.size == 0:
             raise InputError(
@@ -70,32 +107,93 @@ class Goal:
 
 
 def peak_ratio() -> Goal:
-    """Frequency ratio f/f0 at which the RMS displacement peaks."""
+    """Frequency ratio f/f0 at which the RMS displacement peaks.
+
+    Returns
+    -------
+    Goal
+        The ratio [-].
+    """
     return Goal("peak ratio", "1", "extreme", lambda found: found.peaks()[0][0])
 
 
 def peak_rms() -> Goal:
-    """Height of the peak of the RMS displacement [m]."""
+    """Height of the peak of the RMS displacement.
+
+    Returns
+    -------
+    Goal
+        The RMS displacement [m].
+    """
     return Goal("peak RMS", "m", "extreme", lambda found: found.peaks()[1][0])
 
 
 def rms_at(ratio: float) -> Goal:
-    """RMS displacement [m] at a frequency ratio f/f0."""
+    """RMS displacement at a frequency ratio.
+
+    Parameters
+    ----------
+    ratio : float
+        Frequency ratio f/f0.
+
+    Returns
+    -------
+    Goal
+        The RMS displacement [m].
+    """
     return _measure_at("RMS", "m", "rms", ratio)
 
 
 def loss_factor_at(ratio: float) -> Goal:
-    """Loss factor at a frequency ratio f/f0."""
+    """Loss factor at a frequency ratio.
+
+    Parameters
+    ----------
+    ratio : float
+        Frequency ratio f/f0.
+
+    Returns
+    -------
+    Goal
+        The loss factor [-].
+    """
     return _measure_at("loss factor", "1", "loss_factor", ratio)
 
 
 def apparent_mass_at(ratio: float) -> Goal:
-    """Apparent mass of the filling [kg] at a frequency ratio f/f0."""
+    """Apparent mass of the filling at a frequency ratio.
+
+    Parameters
+    ----------
+    ratio : float
+        Frequency ratio f/f0.
+
+    Returns
+    -------
+    Goal
+        The apparent mass [kg].
+    """
     return _measure_at("apparent mass", "kg", "apparent_mass", ratio)
 
 
 def response_curve(ratios: Union[Sequence[float], np.ndarray]) -> Goal:
-    """RMS displacement [m] at each of some ascending frequency ratios f/f0."""
+    """RMS displacement at each of some frequency ratios.
+
+    Parameters
+    ----------
+    ratios : sequence of float or ndarray
+        Ascending frequency ratios f/f0.
+
+    Returns
+    -------
+    Goal
+        The RMS displacements [m], one for each ratio.
+
+    Examples
+    --------
+    >>> response_curve([0.95, 0.97]).ratios
+    (0.95, 0.97)
+    """
     given = several("ratios", ratios, positive)
     return Goal("response curve", "m", "curve", lambda found: found.rms[0].T, given)
 

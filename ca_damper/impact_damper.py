@@ -35,11 +35,35 @@ _ROUNDING = 1e-12
 class ImpactDamper:
     """A grain between the floor and the ceiling of a container that is shaken by a sine.
 
-    oscillator: the container on its spring. particle_mass: of the grain [kg]. restitution: of its
-    blows, 0 to 1. clearance: its way between floor and ceiling [m]. frequency: of the base [Hz].
-    A speed u of the grain [m/s] that a method takes is one of ``speeds``.
-    Raises InputError unless mass, clearance and frequency are positive and the damping ratio of the
-    oscillator is below 1.
+    Methods take the speed u of the grain [m/s], one of ``speeds``.
+
+    Parameters
+    ----------
+    oscillator : Oscillator
+        Container on its spring.
+    particle_mass : float
+        Mass of the grain [kg].
+    restitution : float
+        Restitution coefficient of its impacts, from 0 to 1.
+    clearance : float
+        Distance that it can move between floor and ceiling [m].
+    frequency : float
+        Frequency of the base [Hz].
+
+    Raises
+    ------
+    InputError
+        A value is out of its range, or the oscillator is not underdamped.
+
+    References
+    ----------
+    Masri, J. Acoust. Soc. Am. 47 (1970) 229; Bapat and Sankar, J. Sound Vib. 99 (1985) 85.
+
+    Examples
+    --------
+    >>> damper = ImpactDamper(Oscillator(), 2e-3, 0.75, 0.02, frequency=6.0)
+    >>> round(float(damper.speeds[0]), 3)
+    0.65
     """
 
     oscillator: Oscillator
@@ -59,7 +83,7 @@ class ImpactDamper:
 
     @property
     def mass_ratio(self) -> float:
-        """Mass of the grain by that of the container."""
+        """Ratio of the mass of the grain to that of the container."""
         return self.particle_mass / self.oscillator.mass
 
     @property
@@ -69,7 +93,7 @@ class ImpactDamper:
 
     @property
     def omega(self) -> float:
-        """Of the base [rad/s]."""
+        """Angular frequency of the base [rad/s]."""
         return 2.0 * math.pi * self.frequency
 
     @cached_property
@@ -88,7 +112,7 @@ class ImpactDamper:
 
     @cached_property
     def approach(self) -> float:
-        """Velocity of the container before the blow on the ceiling, by the grain's speed."""
+        """Ratio of the container's velocity before the ceiling's impact to the grain's speed."""
         return (self.restitution - 1.0 - 2.0 * self.mass_ratio) / (1.0 + self.restitution)
 
     @cached_property
@@ -100,7 +124,18 @@ class ImpactDamper:
         return np.array([[a, -0.5 * self.clearance], [b, 0.0]])
 
     def free(self, t: float) -> np.ndarray:
-        """Matrix that takes (x, v) of the container a time t [s] on, without forces."""
+        """Matrix of the free motion over a time.
+
+        Parameters
+        ----------
+        t : float
+            Time [s].
+
+        Returns
+        -------
+        ndarray
+            Matrix (2, 2) that takes (x [m], v [m/s]) of the container on by that time.
+        """
         own = self.oscillator
         decay, square = 0.5 * own.damping / own.mass, own.stiffness / own.mass
         turn = math.sqrt(square - decay * decay)
@@ -108,19 +143,57 @@ class ImpactDamper:
         return math.exp(-decay * t) * np.array([[c + decay * s, s], [-square * s, c - decay * s]])
 
     def motion(self, u: float, t: float) -> np.ndarray:
-        """(x, v) of the container [m, m/s] at 0 to half a cycle after the blow on the ceiling."""
+        """Motion of the container at a time after the impact on the ceiling.
+
+        Parameters
+        ----------
+        u : float
+            Speed of the grain [m/s].
+        t : float
+            Time, from 0 to half a cycle [s].
+
+        Returns
+        -------
+        ndarray
+            Displacement [m] and velocity [m/s].
+        """
         sine, cosine = self._forced @ [u, 1.0]
         c, s = math.cos(self.omega * t), math.sin(self.omega * t)
         forced = np.array([sine * c + cosine * s, self.omega * (cosine * c - sine * s)])
         return forced + 2.0 * self.particle_mass * u * self.free(t) @ self._after
 
     def position(self, u: float, t: float) -> float:
-        """Position of the grain [m] then, from where the middle of the box is at x = 0."""
+        """Position of the grain at that time.
+
+        Parameters
+        ----------
+        u : float
+            Speed of the grain [m/s].
+        t : float
+            Time since the impact on the ceiling [s].
+
+        Returns
+        -------
+        float
+            Position [m], counted from where the middle of the box is at x = 0.
+        """
         return 0.5 * u * self.half_cycle - u * t
 
     def start(self, u: float) -> Any:
-        """(x, v) of the container and of the grain as the base passes zero upwards, (2, 2).
+        """State of container and grain as the base passes zero upwards.
 
+        Parameters
+        ----------
+        u : float
+            Speed of the grain [m/s].
+
+        Returns
+        -------
+        ndarray
+            (x [m], v [m/s]) of the container and of the grain, shape (2, 2).
+
+        Notes
+        -----
         The phase of the forced motion is then that of the transfer function.
         """
         sine, cosine = self._forced @ [u, 1.0]
@@ -131,13 +204,35 @@ class ImpactDamper:
         return sign * np.array([self.motion(u, t), [self.position(u, t), -u]])
 
     def is_possible(self, u: float) -> bool:
-        """Whether the grain flies from wall to wall without another blow."""
+        """Whether the grain flies from wall to wall without another impact.
+
+        Parameters
+        ----------
+        u : float
+            Speed of the grain [m/s].
+
+        Returns
+        -------
+        bool
+            True where it does.
+        """
         times = np.linspace(0.0, self.half_cycle, _POINTS)
         places = [self.position(u, t) - self.motion(u, t)[0] for t in times]
         return bool(np.abs(places).max() < 0.5 * self.clearance * (1.0 + 1e-6))
 
     def rms(self, u: float) -> float:
-        """RMS of x over a cycle [m], by Simpson's rule."""
+        """RMS displacement of the container over a cycle, by Simpson's rule.
+
+        Parameters
+        ----------
+        u : float
+            Speed of the grain [m/s].
+
+        Returns
+        -------
+        float
+            RMS of x [m].
+        """
         times = np.linspace(0.0, self.half_cycle, _POINTS)
         squares = np.array([self.motion(u, t)[0] ** 2 for t in times])
         inner = 4.0 * squares[1::2].sum() + 2.0 * squares[2:-1:2].sum()

@@ -30,9 +30,18 @@ _NOT_A_NUMBER = complex(np.nan, np.nan)
 
 @dataclass(frozen=True, eq=False)
 class Cycles:
-    """Sums over measured cycles, and the measures made of them; all arrays are (scenes,).
+    """Sums over measured cycles, and the measures made of them.
 
-    frequency [Hz]; steps: a cycle, n. record: (scenes, cycles, COLUMNS).
+    All arrays are of shape (scenes,) unless they say otherwise.
+
+    Parameters
+    ----------
+    frequency : ndarray
+        Frequency of each scene [Hz].
+    steps : ndarray
+        Number of steps in a cycle.
+    record : ndarray
+        Sums of each cycle, shape (scenes, cycles, len(COLUMNS)).
     """
 
     frequency: np.ndarray
@@ -43,15 +52,48 @@ class Cycles:
         return by_fields(self)
 
     def mean_of(self, name: str) -> np.ndarray:
-        """Mean of a column over cycles, (scenes,)."""
+        """Mean of a column over cycles.
+
+        Parameters
+        ----------
+        name : str
+            Name of a column, one of COLUMNS.
+
+        Returns
+        -------
+        ndarray
+            Means, shape (scenes,).
+        """
         return self.record[:, :, COLUMNS.index(name)].mean(axis=1)
 
     def per_step(self, name: str) -> np.ndarray:
-        """Mean of a summed quantity over steps and cycles, (scenes,)."""
+        """Mean of a summed quantity over steps and cycles.
+
+        Parameters
+        ----------
+        name : str
+            Name of a column, one of SUMS.
+
+        Returns
+        -------
+        ndarray
+            Means, shape (scenes,).
+        """
         return self.mean_of(name) / self.steps
 
     def harmonic(self, name: str) -> np.ndarray:
-        """Complex amplitude of x, v or f, (scenes,)."""
+        """Complex amplitude of the first harmonic.
+
+        Parameters
+        ----------
+        name : str
+            ``"x"`` [m], ``"v"`` [m/s] or ``"f"`` [N].
+
+        Returns
+        -------
+        ndarray
+            Amplitudes, shape (scenes,).
+        """
         amplitude = 2.0 * (self.per_step(f"{name}_cos") - 1j * self.per_step(f"{name}_sin"))
         if name != "f":
             return amplitude
@@ -59,7 +101,18 @@ class Cycles:
         return amplitude / (np.array([sine_and_cosine(a)[0] for a in half.tolist()]) / half)
 
     def harmonic_by_cycle(self, name: str) -> np.ndarray:
-        """Complex amplitude of x or v in every cycle, (scenes, cycles)."""
+        """Complex amplitude of the first harmonic in every cycle.
+
+        Parameters
+        ----------
+        name : str
+            ``"x"`` [m] or ``"v"`` [m/s].
+
+        Returns
+        -------
+        ndarray
+            Amplitudes, shape (scenes, cycles).
+        """
         cosine, sine = (
             self.record[:, :, COLUMNS.index(f"{name}_{part}")] for part in ("cos", "sin")
         )
@@ -142,11 +195,26 @@ class Cycles:
     def powers(
         self, base_amplitude: FloatOrArray, stiffness: FloatOrArray, damping: FloatOrArray
     ) -> dict[str, np.ndarray]:
-        """Mean power that "base" gives and that "dashpot" and "filling" take [W], first harmonics.
+        """Mean power of base, dashpot and filling, by first harmonics.
 
-        base_amplitude [m], stiffness [N/m] and damping [N s/m] of the primary structure. The base
-        moves as y = -i y0 and pulls the container with K (y - x) + C (y' - x'). In the steady state
-        the dashpot and the filling take together what the base gives.
+        Parameters
+        ----------
+        base_amplitude : float or ndarray
+            Amplitude of the base [m].
+        stiffness : float or ndarray
+            Stiffness of the primary structure [N/m].
+        damping : float or ndarray
+            Damping of the primary structure [N s/m].
+
+        Returns
+        -------
+        dict of ndarray
+            Power [W] that "base" gives and that "dashpot" and "filling" take.
+
+        Notes
+        -----
+        The base moves as y = -i y0 and pulls the container with K (y - x) + C (y' - x'). In the
+        steady state, dashpot and filling together take what the base gives.
         """
         base = -1j * base_amplitude * np.ones(len(self.omega))
         stretch, speed = base - self.harmonic("x"), 1j * self.omega * base
@@ -159,10 +227,21 @@ class Cycles:
         }
 
     def loss_factor(self, mass: FloatOrArray) -> np.ndarray:
-        """Energy that the filling takes a radian per energy in motion, c / (w (M + m)).
+        """Energy that the filling takes in a radian over the energy in motion, c / (w (M + m)).
 
-        mass M [kg] of the container, (scenes,) or one for all. The energy in motion is that of the
-        container and the apparent mass at the largest speed; 0 for a rigid mass.
+        Parameters
+        ----------
+        mass : float or ndarray
+            Mass M of the container [kg], (scenes,) or one for all.
+
+        Returns
+        -------
+        ndarray
+            Loss factor [-]; 0 for a rigid mass.
+
+        Notes
+        -----
+        The energy in motion is that of the container and the apparent mass m at the largest speed.
         """
         return self.apparent_damping / (self.omega * (mass + self.apparent_mass))
 
@@ -171,7 +250,19 @@ class Cycles:
     ) -> np.ndarray:
         """Effective share of critical damping, (C + c) / (2 sqrt(K (M + m))).
 
-        mass M [kg], stiffness K [N/m] and damping C [N s/m] of the primary structure.
+        Parameters
+        ----------
+        mass : float or ndarray
+            Mass M of the container [kg].
+        stiffness : float or ndarray
+            Stiffness K of the primary structure [N/m].
+        damping : float or ndarray
+            Damping C of the primary structure [N s/m].
+
+        Returns
+        -------
+        ndarray
+            Damping ratio [-].
         """
         critical = 2.0 * np.sqrt(stiffness * (mass + self.apparent_mass))
         return (damping + self.apparent_damping) / critical

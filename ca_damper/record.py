@@ -18,11 +18,24 @@ _MOST_MARKS = 1_000_000
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """One scene at one time.
+    """Snapshot of one scene.
 
-    time_s; x, y: displacement of container and base [m]; position, velocity: of the particles,
-    (particles, 2), horizontal and vertical, as the filling's ``snapshot`` gives them. diameter: of
-    each particle [m], (particles,), where they are of several sizes, else None.
+    Parameters
+    ----------
+    time_s : float
+        Time [s].
+    x : float
+        Displacement of the container [m].
+    y : float
+        Displacement of the base [m].
+    position : ndarray
+        Positions of the particles, horizontal and vertical, as the ``snapshot`` of the filling [m],
+        shape (particles, 2).
+    velocity : ndarray
+        Velocities of the particles [m/s], shape (particles, 2).
+    diameter : ndarray, optional
+        Diameter of each particle [m], shape (particles,), where they are of several sizes; else
+        None.
     """
 
     time_s: float
@@ -40,8 +53,12 @@ class Frame:
 class Film:
     """A recorded run.
 
-    history: arrays (samples, scenes) by name, see ``Batch.sample``. frames: a tuple of Frames for
-    each scene.
+    Parameters
+    ----------
+    history : dict
+        Arrays (samples, scenes) by name, see ``Batch.sample``.
+    frames : tuple of tuple of Frame
+        Frames of each scene.
     """
 
     history: dict[str, np.ndarray]
@@ -62,11 +79,36 @@ def film(
     frame_every: Optional[int] = None,
     progress: Union[Listener, str, None] = AUTO,
 ) -> Film:
-    """Run a batch of few scenes on by a number of steps and record it; returns a Film.
+    """Run a batch of few scenes on by a number of steps and record it.
 
-    The present state is recorded first, then every so many steps; frame_every: None for no frames.
-    progress: as in ``frequency_response``.
-    Raises InputError for numbers that are none, SimulationDiverged.
+    Parameters
+    ----------
+    batch : Batch
+        Batch that has been started.
+    steps : int
+        Number of steps.
+    sample_every : int, default 1
+        Steps between samples; the present state is the first sample.
+    frame_every : int, optional
+        Steps between frames; None for no frames.
+    progress : callable or str or None, default "auto"
+        As in ``frequency_response``.
+
+    Returns
+    -------
+    Film
+        Samples of all scenes, and frames with the positions of the particles.
+
+    Raises
+    ------
+    InputError
+        The batch was not started, or a number is out of range.
+    SimulationDiverged
+        A scene left the range in which its numbers mean anything.
+
+    Examples
+    --------
+    >>> shot = film(batch, steps=2000, frame_every=100)  # doctest: +SKIP
     """
     if not hasattr(batch, "sample") or isinstance(batch, type):
         raise InputError(f"batch must be a Batch that has been started, got {shown(batch)}")

@@ -18,18 +18,46 @@ RK45_STAGES = 6
 class Report:
     """Figures and cost of a batch since it was made.
 
-    method: label of the filling. mount: "spring", "base", "floor" or "structure". effects: what the
-    filling was asked to compute. effect_activity: an ``EffectUse`` for each of them that can be
-    counted, since the start. scenes: number; particles, dt_s: fewest and most. simulated_s: longest
-    time of a scene since its start. step_bound: longest step [s] that the filling allows or
-    advises, and why; None where any does. momentum_error: momentum of the particles out of nothing,
-    as a share of what they and the container exchanged, of the worst scene.
-    scene_steps, particle_steps: steps of all scenes, and times their particles.
-    container_evaluations: of the container's right-hand side since the start; 0 on the base.
-    compile_seconds, run_seconds: cost. order: of the error in the step, None where the filling
-    declares none. sampling: cycles of a response over which means were taken, and by how much of
-    itself that of the highest RMS may be off with a confidence of 95 %; None where it is not known.
-    certificate: when effects first acted, what was left out, what was audited.
+    Parameters
+    ----------
+    method : str
+        Label of the filling.
+    mount : str
+        ``"spring"``, ``"base"``, ``"floor"`` or ``"structure"``.
+    effects : tuple of str
+        Effects that the filling was asked to compute.
+    effect_activity : tuple of EffectUse
+        Activity of each effect that can be counted, since the start.
+    scenes : int
+        Number of scenes.
+    particles : tuple of (int, int)
+        Fewest and most particles of a scene.
+    dt_s : tuple of (float, float)
+        Shortest and longest step [s].
+    simulated_s : float
+        Longest time of a scene since its start [s].
+    step_bound : tuple of (float, str) or None
+        Longest step that the filling allows or advises [s], and why; None where any does.
+    momentum_error : float
+        Momentum of the particles that no impulse explains, as a share of what they and the
+        container exchanged, in the worst scene.
+    scene_steps : int
+        Number of steps of all scenes.
+    particle_steps : int
+        Number of steps of all scenes, each times its particles.
+    container_evaluations : int
+        Evaluations of the container's right-hand side since the start; 0 on the base.
+    compile_seconds : float
+        Time spent on compiling [s].
+    run_seconds : float
+        Time spent on stepping [s].
+    order : int, optional
+        Order of the error in the step; None where the filling declares none.
+    sampling : tuple of (int, float), optional
+        Number of cycles that means were taken over, and half-width of the mean of the highest RMS
+        as a share of it, with a confidence of 95 %; None where it is not known.
+    certificate : Certificate, optional
+        When effects first acted, what was left out, what was audited.
     """
 
     method: str
@@ -59,7 +87,7 @@ class Report:
 
     @property
     def particle_steps_per_second(self) -> float:
-        """Speed, without compiling; 0 before anything has run."""
+        """Speed without compiling [1/s]; 0 before anything has run."""
         return self.particle_steps / self.run_seconds if self.run_seconds > 0.0 else 0.0
 
     @property
@@ -75,7 +103,13 @@ class Report:
         return "; ".join(parts)
 
     def as_dict(self) -> dict[str, Any]:
-        """All figures, for a JSON file."""
+        """All figures, for a JSON file.
+
+        Returns
+        -------
+        dict
+            Figures by name.
+        """
         figures = asdict(self)
         figures["acted"] = figures.pop("effect_activity")
         if self.certificate is not None:
@@ -84,7 +118,18 @@ class Report:
         return {**figures, **{name: getattr(self, name) for name in derived}}
 
     def write(self, path: FileName) -> None:
-        """Write all figures as JSON. Raises InputError when the file cannot be written."""
+        """Write all figures as JSON.
+
+        Parameters
+        ----------
+        path : path
+            JSON file; it is replaced as a whole.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written.
+        """
         write_text(path, json.dumps(self.as_dict(), indent=1))
 
     def _bound_row(self):

@@ -57,19 +57,48 @@ _PEAK_COLUMNS = (
 class Response:
     """Response curves of a filling; every measure is an array (particles, ratios, seeds).
 
-    label: of the filling. particles, seeds: whole numbers. ratios: frequency by the natural one of
-    the empty container, ascending. steps_per_cycle, dt [s]: of each ratio, (ratios,): dt is the
-    step asked for, shortened so that whole steps make a cycle.
-
-    rms: root mean square of the displacement about its mean in each cycle [m]. rms_about_all: about
-    its mean in all cycles, which counts slower motions too [m]. amplitude: half the way from lowest
-    to highest [m]. mean: displacement [m]. mean_force: of the filling on the container [N].
-    apparent_mass [kg], apparent_damping [N s/m], loss_factor, damping_ratio: of
-    ``measures.Cycles``. energy: of the particles [J]. report: what was done and what it cost; None
-    for one way of a sweep.
-
-    As the last line of a notebook's cell it shows its curves and a table of the peaks; one at an
+    As the last line of a notebook's cell it shows its curves and a table of the peaks; a peak at an
     end of the ratios is said to be outside.
+
+    Parameters
+    ----------
+    label : str
+        Short word for the filling.
+    oscillator : Oscillator
+        Primary structure.
+    particles : tuple of int
+        Numbers of particles.
+    ratios : ndarray
+        Frequency over the natural one of the empty container [-], ascending, shape (ratios,).
+    seeds : tuple of int
+        Seeds.
+    steps_per_cycle : ndarray
+        Steps in a cycle at each ratio, shape (ratios,).
+    dt : ndarray
+        Step at each ratio [s], shape (ratios,): the one asked for, shortened so that whole steps
+        make a cycle.
+    rms : ndarray
+        RMS of the displacement about its mean in each cycle [m].
+    amplitude : ndarray
+        Half the distance from the lowest to the highest displacement [m].
+    mean : ndarray
+        Mean displacement [m].
+    mean_force : ndarray
+        Mean force of the filling on the container [N].
+    apparent_mass : ndarray
+        Apparent mass of the filling [kg], of ``measures.Cycles``.
+    apparent_damping : ndarray
+        Apparent damping of the filling [N s/m], of ``measures.Cycles``.
+    loss_factor : ndarray
+        Loss factor [-], of ``measures.Cycles``.
+    damping_ratio : ndarray
+        Damping ratio [-], of ``measures.Cycles``.
+    energy : ndarray
+        Energy of the particles [J].
+    rms_about_all : ndarray
+        RMS of the displacement about its mean in all cycles [m], which includes slower motions.
+    report : Report, optional
+        Figures and cost of the run; None for one direction of a sweep.
     """
 
     label: str
@@ -96,7 +125,13 @@ class Response:
         return in_brief(self, self.axes_in_words(), highest)
 
     def axes_in_words(self) -> str:
-        """Filling, particles, ratios and seeds in words."""
+        """Filling, particles, ratios and seeds in words.
+
+        Returns
+        -------
+        str
+            Words for titles.
+        """
         axes = f"particles {listed(self.particles)}, f/f0 {listed(self.ratios)}"
         return f"{self.label}, {axes}, {counted(len(self.seeds), 'seed')}"
 
@@ -128,9 +163,13 @@ class Response:
         return found
 
     def peaks(self) -> tuple[np.ndarray, np.ndarray]:
-        """Where each curve peaks: (ratio, rms [m]), two arrays (particles, seeds).
+        """Locate the peak of each curve.
 
-        NaN where a peak lies outside the ratios: its curve is highest at the first or last of them.
+        Returns
+        -------
+        tuple of (ndarray, ndarray)
+            Frequency ratio f/f0 [-] and RMS displacement [m], shape (particles, seeds) each. NaN
+            where a peak lies outside the ratios: its curve is highest at the first or last of them.
         """
         curves = np.moveaxis(self.rms, 2, 1).reshape(-1, len(self.ratios))
         found = np.array([peak(self.ratios, curve) for curve in curves])
@@ -140,12 +179,26 @@ class Response:
     def write_csv(self, path: FileName) -> None:
         """Write one row a scene: filling, particles, ratio, frequency, seed and all measures.
 
-        Raises InputError when the file cannot be written.
+        Parameters
+        ----------
+        path : path
+            CSV file; it is replaced as a whole.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written.
         """
         write_csv(path, self.columns())
 
     def columns(self) -> dict[str, Any]:
-        """Columns of equal length with a row a scene, as they are written, by name and unit."""
+        """Columns of equal length with a row a scene, as they are written.
+
+        Returns
+        -------
+        dict
+            Columns by name, which ends in the unit.
+        """
         grids = np.meshgrid(self.particles, self.ratios, self.seeds, indexing="ij")
         columns = dict(zip(("particles", "ratio", "seed"), (grid.ravel() for grid in grids)))
         columns["frequency_Hz"] = columns["ratio"] * self.oscillator.natural_frequency
@@ -171,20 +224,60 @@ def frequency_response(
     checkpoint: Optional[Checkpoint] = None,
     resume: Optional[FileName] = None,
 ) -> Any:
-    """Response curves of a filling, all scenes in one batch; returns a Response.
+    """Response curves of a filling, all scenes in one batch.
 
-    particles: one number or several. ratios: ascending frequency ratios f/f0, f0 of the empty
-    container. seeds: how many, counted from 1, or the seeds themselves. oscillator: the primary
-    structure, the paper's if None. dt: largest step [s], the filling's own if None. base_amplitude:
-    of the base [m], that of the oscillator if None; for several of them an AmplitudeResponse is
-    returned, with a Response for each. start: the container's motion at the beginning, see
-    ``Batch.start``. effects: "listed" or "auto", see ``Batch``; ``report.certificate`` says what
-    acted and what was left out.
-    progress: "auto" for a bar on a terminal and in Jupyter, None for silence, or a function that is
-    called with a Progress while kernels are compiled, and then six times a second. checkpoint: a
-    Checkpoint that says where and when the run saves itself, besides at its end and on Ctrl-C.
-    resume: such a file to go on from; the bits are those of a run that was never stopped.
-    Raises InputError for what cannot be used, SimulationDiverged.
+    Parameters
+    ----------
+    filling : Filling
+        Filling of the container, such as ``Automaton()`` or ``Spheres()``.
+    particles : int or sequence of int
+        Numbers of particles, one or several.
+    ratios : float or sequence of float or ndarray
+        Ascending frequency ratios f/f0 [-], f0 of the empty container.
+    seeds : int or sequence of int, default 5
+        Number of seeds, counted from 1, or the seeds themselves.
+    oscillator : Oscillator, optional
+        Primary structure; that of the paper if None.
+    dt : float, optional
+        Largest step [s]; that of the filling if None.
+    base_amplitude : float or sequence of float, optional
+        Amplitude of the base [m]; that of the oscillator if None.
+    transient_cycles : int, default 150
+        Cycles before the measured ones.
+    measured_cycles : int, default 20
+        Cycles to measure.
+    start : str, default "rest"
+        Motion of the container at the beginning: ``"rest"``, ``"empty"`` or ``"rigid"``, see
+        ``Batch.start``.
+    effects : str, default "listed"
+        ``"listed"`` or ``"auto"``, see ``Batch``; ``report.certificate`` tells what acted and what
+        was left out.
+    progress : callable or str or None, default "auto"
+        ``"auto"``: a bar on a terminal and in Jupyter. None: silence. A function is called with a
+        Progress while kernels are compiled, and then six times a second.
+    checkpoint : Checkpoint, optional
+        Where and when the run saves itself, besides at its end and on Ctrl-C.
+    resume : path, optional
+        Checkpoint to go on from; the bits are those of a run that was never stopped.
+
+    Returns
+    -------
+    Response or AmplitudeResponse
+        The latter where several base amplitudes are given.
+
+    Raises
+    ------
+    InputError
+        An argument is out of its range, or the filling refuses a scene.
+    SimulationDiverged
+        A scene left the range in which its numbers mean anything.
+
+    Examples
+    --------
+    >>> response = frequency_response(
+    ...     Automaton(), particles=[10, 30], ratios=[0.95, 0.97, 0.99], seeds=3
+    ... )  # doctest: +SKIP
+    >>> ratio, rms = response.peaks()  # doctest: +SKIP
     """
     grid = Grid(filling, particles, ratios, seeds, oscillator, dt, base_amplitude)
     check_run(transient_cycles, start, progress)

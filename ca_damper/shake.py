@@ -29,11 +29,35 @@ from taichi_dem.kit.validation import AUTO, FileName, instance, positive, severa
 class TimeHistory:
     """Motions of containers under one excitation.
 
-    label: of the filling. particles, seeds: whole numbers. time_s [s], base: displacement of the
-    base [m], both (samples,). x [m], v [m/s]: of the container; force [N]: of the filling on it,
-    mean since the sample before; all (samples, particles, seeds).
-    rms: root mean square of the displacement about its mean, and peak: its largest magnitude [m],
-    both of all steps, (particles, seeds). report: what was done and what it cost.
+    Parameters
+    ----------
+    label : str
+        Short word for the filling.
+    oscillator : Oscillator
+        Primary structure.
+    excitation : Excitation
+        Motion of the base and force on the container.
+    particles : tuple of int
+        Numbers of particles.
+    seeds : tuple of int
+        Seeds.
+    time_s : ndarray
+        Times [s], shape (samples,).
+    base : ndarray
+        Displacement of the base [m], shape (samples,).
+    x : ndarray
+        Displacement of the container [m], shape (samples, particles, seeds).
+    v : ndarray
+        Velocity of the container [m/s], shape (samples, particles, seeds).
+    force : ndarray
+        Force of the filling on the container [N], mean since the sample before, shape (samples,
+        particles, seeds).
+    rms : ndarray
+        RMS of the displacement about its mean [m], of all steps, shape (particles, seeds).
+    peak : ndarray
+        Largest magnitude of the displacement [m], of all steps, shape (particles, seeds).
+    report : Report, optional
+        Figures and cost of the run.
     """
 
     label: str
@@ -93,7 +117,15 @@ class TimeHistory:
     def write_csv(self, path: FileName) -> None:
         """Write a row a sample: time, base, and x and force of each particle number and seed.
 
-        Raises InputError when the file cannot be written.
+        Parameters
+        ----------
+        path : path
+            CSV file; it is replaced as a whole.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written.
         """
         columns = {"time_s": self.time_s, "base_m": self.base}
         for name, values in (("x_m", self.x), ("force_N", self.force)):
@@ -121,15 +153,58 @@ def shake(
     checkpoint: Optional[Checkpoint] = None,
     resume: Optional[FileName] = None,
 ) -> TimeHistory:
-    """Shake a structure and record its motion; returns a TimeHistory.
+    """Shake a structure and record its motion.
 
-    excitation: the base's motion as a Signal [m], or an Excitation; its base stands still where it
-    is None. particles: one number or several; seeds: how many, or which. oscillator: the structure,
-    the paper's if None; its base_amplitude is not used. dt: largest step [s], the filling's own if
-    None. duration [s]: that of the excitation if None. interval: between samples [s] at most; the
-    measures count all steps. displacement [m], velocity [m/s]: of the container at the beginning;
-    with an excitation that is zero the record is a free decay. The other arguments and errors are
-    those of ``frequency_response``.
+    Parameters
+    ----------
+    filling : Filling
+        Filling of the container.
+    excitation : Signal or Excitation
+        Motion of the base [m], or an Excitation; the base stands still where its member is None.
+    particles : int or sequence of int
+        Numbers of particles, one or several.
+    seeds : int or sequence of int, default 5
+        Number of seeds, counted from 1, or the seeds themselves.
+    oscillator : Oscillator, optional
+        Primary structure, without its base_amplitude; that of the paper if None.
+    dt : float, optional
+        Largest step [s]; that of the filling if None.
+    mount : str, default "spring"
+        ``"spring"``, ``"base"`` or ``"floor"``, see ``Batch``.
+    duration : float, optional
+        Duration [s]; that of the excitation if None.
+    interval : float, default 0.001
+        Longest time between samples [s]; the measures take all steps into account.
+    displacement : float, default 0.0
+        Displacement of the container at the beginning [m]. With an excitation that is zero, the
+        record is a free decay.
+    velocity : float, default 0.0
+        Velocity of the container at the beginning [m/s].
+    effects : str, default "listed"
+        As in ``frequency_response``.
+    progress : callable or str or None, default "auto"
+        As in ``frequency_response``.
+    checkpoint : Checkpoint, optional
+        As in ``frequency_response``.
+    resume : path, optional
+        As in ``frequency_response``.
+
+    Returns
+    -------
+    TimeHistory
+        Motion and force over time.
+
+    Raises
+    ------
+    InputError
+        An argument is out of its range.
+    SimulationDiverged
+        A scene left the range in which its numbers mean anything.
+
+    Examples
+    --------
+    >>> ground = excitation.random_vibration([2.0, 20.0], [0.1, 0.1], duration=10.0)
+    >>> shake(Spheres(), ground, particles=30).relative_rms  # doctest: +SKIP
     """
     check_run(0, STARTS[0], progress)
     plan = _Plan(filling, excitation, particles, seeds, oscillator, dt, duration, interval)

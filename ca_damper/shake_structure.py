@@ -35,12 +35,35 @@ _OUTSIDE_MODES = 1e-3
 class StructureHistory:
     """Motions of a structure with boxes under one excitation.
 
-    label: of the filling. boxes: tuple of Box. seeds: whole numbers. time_s [s], base: displacement
-    of the base [m], both (samples,). x [m], v [m/s]: of all places, (samples, places, seeds).
-    force [N]: of the filling on each box, mean since the sample before, (samples, boxes, seeds).
-    rms: root mean square of the displacement about its mean, and peak: its largest magnitude [m],
-    both of all steps, (places, seeds). report: what was done and what it cost; a place without a
-    box counts there as a scene without particles.
+    Parameters
+    ----------
+    label : str
+        Short word for the filling.
+    structure : ModalStructure
+        Places and modes.
+    boxes : tuple of Box
+        Boxes.
+    excitation : Excitation
+        Motion of the base and force on a place.
+    seeds : tuple of int
+        Seeds.
+    time_s : ndarray
+        Times [s], shape (samples,).
+    base : ndarray
+        Displacement of the base [m], shape (samples,).
+    x : ndarray
+        Displacement of all places [m], shape (samples, places, seeds).
+    v : ndarray
+        Velocity of all places [m/s], shape (samples, places, seeds).
+    force : ndarray
+        Force of the filling on each box [N], mean since the sample before, shape (samples, boxes,
+        seeds).
+    rms : ndarray
+        RMS of the displacement about its mean [m], of all steps, shape (places, seeds).
+    peak : ndarray
+        Largest magnitude of the displacement [m], of all steps, shape (places, seeds).
+    report : Report, optional
+        Figures and cost of the run; a place without a box counts as a scene without particles.
     """
 
     label: str
@@ -79,7 +102,15 @@ class StructureHistory:
     def write_csv(self, path: FileName) -> None:
         """Write a row a sample: time, base, x of each place and force of each box, for each seed.
 
-        Raises InputError when the file cannot be written.
+        Parameters
+        ----------
+        path : path
+            CSV file; it is replaced as a whole.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written.
         """
         columns = {"time_s": self.time_s, "base_m": self.base}
         for name, values in (("x_m_place", self.x), ("force_N_box", self.force)):
@@ -107,14 +138,54 @@ def shake_structure(
     checkpoint: Optional[Checkpoint] = None,
     resume: Optional[FileName] = None,
 ) -> StructureHistory:
-    """Shake a structure with boxes and record its motion; returns a StructureHistory.
+    """Shake a structure with boxes and record its motion.
 
-    boxes: a Box or several; several may share a place. excitation: the base's motion as a Signal
-    [m], or an Excitation, whose force acts at force_place. dt: largest step [s]; the filling's own
-    if None, or a fortieth of a cycle of the highest mode where that is shorter. displacement [m],
-    velocity [m/s]: of the places at the beginning, one number or (places,), and a sum of the modes.
-    The other arguments are those of ``shake``.
-    Raises InputError, also for a step that is too long for the highest mode; SimulationDiverged.
+    Parameters
+    ----------
+    filling : Filling
+        Filling of all boxes.
+    structure : ModalStructure
+        Places and modes.
+    boxes : Box or sequence of Box
+        Boxes, one or several; several may share a place.
+    excitation : Signal or Excitation
+        Motion of the base [m], or an Excitation, whose force acts at ``force_place``.
+    seeds : int or sequence of int, default 5
+        Number of seeds, counted from 1, or the seeds themselves.
+    dt : float, optional
+        Largest step [s]. None: that of the filling, or a fortieth of a cycle of the highest mode
+        where that is shorter.
+    duration : float, optional
+        Duration [s]; that of the excitation if None.
+    interval : float, default 0.001
+        Longest time between samples [s].
+    force_place : int, optional
+        Place where the force of the excitation acts.
+    displacement : float or array_like, default 0.0
+        Displacement of the places at the beginning [m], one number or (places,); a sum of the
+        modes.
+    velocity : float or array_like, default 0.0
+        Velocity of the places at the beginning [m/s], likewise.
+    effects : str, default "listed"
+        As in ``frequency_response``.
+    progress : callable or str or None, default "auto"
+        As in ``frequency_response``.
+    checkpoint : Checkpoint, optional
+        As in ``frequency_response``.
+    resume : path, optional
+        As in ``frequency_response``.
+
+    Returns
+    -------
+    StructureHistory
+        Motion of all places and force on all boxes over time.
+
+    Raises
+    ------
+    InputError
+        An argument is out of its range, or the step is too long for the highest mode.
+    SimulationDiverged
+        A scene left the range in which its numbers mean anything.
     """
     check_run(0, STARTS[0], progress)
     plan = _Plan(filling, structure, boxes, one_for_all(excitation), seeds, force_place)

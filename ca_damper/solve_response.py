@@ -55,21 +55,56 @@ def solve_response(
     plan: Optional[Plan] = None,
     progress: Union[Listener, str, None] = AUTO,
 ) -> Any:
-    """Value of a goal with an error bar: an Answer, or a tuple of them for several goals.
+    """Value of one or several goals, with an error bar.
 
-    goal: one of ``goals`` or several, which share their runs. tolerance: half-width of the bar as
-    a share of the value, or of a curve's largest. confidence: with which the bar holds the value
-    of endless runs at an endless small step. budget_s: CPU seconds without compiling, after which
-    the best answer is returned and says what is missing. ratios: range (lowest, highest) of f/f0
-    in which to look for a peak; one around the natural frequency if None, which is left where the
-    peak is outside. seeds: how many or which; as many as it takes if None. plan: that of an
-    earlier answer for this filling and as many particles, where to begin: at its step, seeds and
-    cycles. oscillator, progress: as in ``frequency_response``.
+    Parameters
+    ----------
+    filling : Filling
+        Filling of the container.
+    particles : int
+        Number of particles.
+    goal : Goal or sequence of Goal
+        One of ``goals``, or several, which share their runs.
+    tolerance : float, default 0.01
+        Half-width of the bar as a share of the value, or of a curve's largest.
+    confidence : float, default 0.95
+        Probability [-] with which the bar holds the value of endless runs at a vanishing step.
+    budget_s : float, optional
+        CPU time after which the best answer is returned and says what is missing [s]; None for no
+        limit.
+    oscillator : Oscillator, optional
+        Primary structure; that of the paper if None.
+    ratios : tuple of (float, float), optional
+        Range (lowest, highest) of f/f0 [-] in which to look for a peak. None: one around the
+        natural frequency, which is left where the peak is outside.
+    seeds : int or sequence of int, optional
+        Number of seeds or the seeds themselves; as many as it takes if None.
+    plan : Plan, optional
+        Plan of an earlier answer for this filling and as many particles: begin at its step, seeds
+        and cycles.
+    progress : callable or str or None, default "auto"
+        As in ``frequency_response``.
 
-    Runs begin at rest. A filling whose seeds come to several steady motions gives a
-    BranchedAnswer. The same question gets the same bits, unless a budget ends it.
-    Raises InputError for what cannot be asked, for a peak outside ratios and for a budget that
-    ends before there is anything to tell; SimulationDiverged.
+    Returns
+    -------
+    Answer or tuple of Answer
+        The tuple for several goals. A BranchedAnswer where seeds come to several steady motions.
+
+    Raises
+    ------
+    InputError
+        The question cannot be asked, the peak is outside ratios, or the budget ends before there is
+        anything to tell.
+    SimulationDiverged
+        No step that was tried is stable.
+
+    Notes
+    -----
+    Runs begin at rest. The same question gets the same bits, unless a budget ends it.
+
+    Examples
+    --------
+    >>> solve_response(Automaton(), particles=30, goal=goals.peak_rms())  # doctest: +SKIP
     """
     goals = _goals_of(goal)
     question = _question(filling, particles, oscillator, ratios, seeds)

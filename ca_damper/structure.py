@@ -37,11 +37,31 @@ _SYMMETRIC_TO = 1e-9
 class ModalStructure:
     """Places of a structure that move along one axis, and the modes in which they move.
 
-    masses: (places,) [kg], or their matrix (places, places). frequencies: natural ones of the modes
-    [Hz], and damping_ratios: shares of critical damping, both (modes,), the latter also one for
-    all. shapes: (places, modes) [kg^-1/2], with shapes^T masses shapes = 1.
-    Raises InputError for arrays that do not fit, masses that are not positive (definite),
-    frequencies that are not positive, negative damping, or shapes that are not orthonormal.
+    Parameters
+    ----------
+    masses : ndarray
+        Masses of the places [kg], shape (places,), or their matrix, shape (places, places).
+    frequencies : ndarray
+        Natural frequencies of the modes [Hz], shape (modes,).
+    damping_ratios : ndarray
+        Shares of critical damping of the modes, shape (modes,), or one number for all.
+    shapes : ndarray
+        Mode shapes [kg^-1/2], shape (places, modes), with shapes^T masses shapes = 1.
+
+    Raises
+    ------
+    InputError
+        Arrays do not fit, masses or frequencies are not positive, damping is negative, or shapes
+        are not orthonormal.
+
+    References
+    ----------
+    Craig and Kurdila, Fundamentals of Structural Dynamics, 2nd edition, chapters 10 and 11.
+
+    Examples
+    --------
+    >>> ModalStructure([2.0], [5.0], 0.01, [[2.0**-0.5]]).mode_count
+    1
     """
 
     masses: np.ndarray
@@ -80,10 +100,27 @@ class ModalStructure:
     ) -> "ModalStructure":
         """Structure of the lowest modes of K phi = w^2 M phi.
 
-        mass: as ``masses``. stiffness: (places, places) [N/m], with the base at rest.
-        damping_ratios: (modes,), or one for all. modes: how many, all if None. In each shape the
-        largest number is positive. Raises InputError also for a stiffness that is not symmetric
-        and positive definite, as that of a structure which does not hang on the base.
+        Parameters
+        ----------
+        mass : array_like
+            Masses of the places [kg], shape (places,) or (places, places).
+        stiffness : array_like
+            Stiffness matrix with the base at rest [N/m], shape (places, places).
+        damping_ratios : array_like
+            Shares of critical damping, shape (modes,), or one number for all.
+        modes : int, optional
+            Number of modes; all if None.
+
+        Returns
+        -------
+        ModalStructure
+            The structure; the largest number of each shape is positive.
+
+        Raises
+        ------
+        InputError
+            The matrices do not fit, or the stiffness is not symmetric and positive definite, as
+            that of a structure that does not hang on the base.
         """
         m = _mass_matrix("mass", mass)
         k = _array("stiffness", stiffness, 2)
@@ -128,18 +165,50 @@ class ModalStructure:
         return 1.0 - self.shapes @ self.participation
 
     def recoil(self, place: int) -> float:
-        """Speed that a unit impulse gives a place [1/kg]."""
+        """Speed that a unit impulse gives a place.
+
+        Parameters
+        ----------
+        place : int
+            Number of the place, from 0.
+
+        Returns
+        -------
+        float
+            Speed over impulse [1/kg].
+        """
         row = self.shapes[whole("place", place, 0, self.place_count - 1)]
         return float(row @ row)
 
     def modal(self, motion: ArrayLike) -> np.ndarray:
-        """Modal coordinates p of a motion (..., places) of the places, (..., modes)."""
+        """Modal coordinates p of a motion of the places.
+
+        Parameters
+        ----------
+        motion : array_like
+            Displacements [m], shape (..., places).
+
+        Returns
+        -------
+        ndarray
+            Modal coordinates [kg^1/2 m], shape (..., modes).
+        """
         return np.asarray(motion) @ self.masses @ self.shapes
 
     def transfer(self, frequency: ArrayLike, added_masses: Any = None) -> np.ndarray:
-        """Complex x / y of all places in the steady state at frequencies [Hz], (..., places).
+        """Complex ratio x / y of all places in the steady state.
 
-        added_masses: fixed to the places [kg], (places,); none if None.
+        Parameters
+        ----------
+        frequency : array_like
+            Frequencies of the base [Hz], any shape.
+        added_masses : array_like, optional
+            Masses fixed to the places [kg], shape (places,).
+
+        Returns
+        -------
+        ndarray
+            Ratio of the displacements [-], shape (..., places).
         """
         omega, added = self._asked(frequency, added_masses)
         held = (2.0 * np.pi * self.frequencies) ** 2 + 1j * omega * self._damping
@@ -149,7 +218,22 @@ class ModalStructure:
     def force_transfer(
         self, frequency: ArrayLike, place: int, added_masses: Any = None
     ) -> np.ndarray:
-        """Complex x [m] of all places per newton of a force at one of them, as ``transfer``."""
+        """Complex displacement of all places per force at one of them.
+
+        Parameters
+        ----------
+        frequency : array_like
+            Frequencies of the force [Hz], any shape.
+        place : int
+            Place of the force.
+        added_masses : array_like, optional
+            Masses fixed to the places [kg], shape (places,).
+
+        Returns
+        -------
+        ndarray
+            Displacement over force [m/N], shape (..., places).
+        """
         omega, added = self._asked(frequency, added_masses)
         row = self.shapes[whole("place", place, 0, self.place_count - 1)]
         return self._moved(omega, added, np.broadcast_to(row, (*omega.shape[:-1], len(row))))
@@ -184,9 +268,22 @@ class ModalStructure:
 class Box:
     """A container with particles, of the filling's own size, at a place of a structure.
 
-    place: from 0. particles: number. seed: None, or a whole number that together with the seed of
-    the run starts its particles; None takes the box's number in the list, so that boxes differ.
-    Its own mass is part of the structure's masses. Raises InputError.
+    The mass of the box itself is part of the masses of the structure.
+
+    Parameters
+    ----------
+    place : int
+        Number of the place, from 0.
+    particles : int
+        Number of particles.
+    seed : int, optional
+        Number that starts its particles, together with the seed of the run. None: the number of the
+        box in the list, so that boxes differ.
+
+    Raises
+    ------
+    InputError
+        A value is out of its range.
     """
 
     place: int

@@ -27,7 +27,14 @@ from taichi_dem.kit.validation import AUTO, FileName
 class Sweep:
     """Responses of the upward and the downward sweep, both with ascending ratios.
 
-    report: what was done on both and what it cost.
+    Parameters
+    ----------
+    up : Response
+        Response of the upward sweep.
+    down : Response
+        Response of the downward sweep.
+    report : Report, optional
+        Figures and cost of both.
     """
 
     up: Response
@@ -39,7 +46,7 @@ class Sweep:
 
     @property
     def hysteresis(self) -> np.ndarray:
-        """By how much the RMS differs, (down - up) / larger of both; (particles, ratios, seeds)."""
+        """Difference of the RMS, (down - up) / larger of both [-], (particles, ratios, seeds)."""
         return (self.down.rms - self.up.rms) / np.maximum(self.down.rms, self.up.rms)
 
 
@@ -58,10 +65,46 @@ def sweep_up_and_down(
     checkpoint: Optional[Checkpoint] = None,
     resume: Optional[FileName] = None,
 ) -> Sweep:
-    """Go up through the ratios and down again without a new start; returns a Sweep.
+    """Go up through the ratios and down again without a new start.
 
-    transient_cycles: at each frequency, before the measured ones. The other arguments and errors
-    are those of ``frequency_response``.
+    Parameters
+    ----------
+    filling : Filling
+        As in ``frequency_response``, likewise all that follow.
+    particles : int or sequence of int
+        Numbers of particles, one or several.
+    ratios : float or sequence of float or ndarray
+        Ascending frequency ratios f/f0 [-].
+    seeds : int or sequence of int, default 5
+        Number of seeds, counted from 1, or the seeds themselves.
+    oscillator : Oscillator, optional
+        Primary structure; that of the paper if None.
+    dt : float, optional
+        Largest step [s]; that of the filling if None.
+    transient_cycles : int, default 60
+        Cycles at each frequency before the measured ones.
+    measured_cycles : int, default 20
+        Cycles to measure at each frequency.
+    start : str, default "rest"
+        Motion of the container at the beginning.
+    progress : callable or str or None, default "auto"
+        ``"auto"``, None or a function.
+    checkpoint : Checkpoint, optional
+        Where and when the run saves itself.
+    resume : path, optional
+        Checkpoint to go on from.
+
+    Returns
+    -------
+    Sweep
+        Responses of both directions.
+
+    Raises
+    ------
+    InputError
+        An argument is out of its range.
+    SimulationDiverged
+        A scene left the range in which its numbers mean anything.
     """
     grid = Grid(filling, particles, ratios, seeds, oscillator, dt)
     check_run(transient_cycles, start, progress)

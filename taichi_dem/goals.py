@@ -30,11 +30,33 @@ KINDS = ("value", "extreme", "count")
 
 @dataclass(frozen=True)
 class Goal:
-    """An output: its name, its unit ("1" for none), how a Result gives it, and one of KINDS.
+    """Output of a run that can be asked for with a tolerance.
 
-    averaged: whether the mean over runs is asked for that differ by one rounding (``mean``).
-    check: a function of a Scene that raises InputError where the scene lacks what is asked for.
-    Raises InputError.
+    Parameters
+    ----------
+    name : str
+        Name of the output.
+    unit : str
+        Unit of the output, ``"1"`` for none.
+    function : callable, optional
+        Function of a Result with a frame at its end; returns a number.
+    kind : str, default "value"
+        ``"value"``: at the end. ``"extreme"``: over the run, of which its Results then have a time
+        series. ``"count"``: a value that changes in steps, as a whole number does.
+    averaged : bool, default False
+        Whether the mean over runs is asked for that differ by one rounding, see ``mean``.
+    check : callable or None, optional
+        Function of a Scene that raises InputError where the scene lacks what is asked for.
+
+    Raises
+    ------
+    InputError
+        A member is of the wrong kind.
+
+    Examples
+    --------
+    >>> Goal("fastest body", "m/s", lambda result: result.peak_speed.max()).kind
+    'value'
     """
 
     name: str
@@ -59,16 +81,49 @@ class Goal:
             )
 
     def mean(self) -> "Goal":
-        """The mean of the same output over runs that differ by one rounding."""
+        """Return the goal of the mean over runs that differ by one rounding.
+
+        Returns
+        -------
+        Goal
+            The mean of the same output.
+        """
         return replace(self, name=f"mean {self.name}", averaged=True)
 
     def check_scene(self, scene: Scene) -> None:
-        """Raise InputError, before any run, for a scene that lacks what is asked for."""
+        """Refuse, before any run, a scene that lacks what is asked for.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene.
+
+        Raises
+        ------
+        InputError
+            The scene lacks a group or a body.
+        """
         if self.check is not None:
             self.check(scene)
 
     def value(self, result: Result) -> float:
-        """Its value in a result. Raises InputError for a function that gives no number."""
+        """Value in a result.
+
+        Parameters
+        ----------
+        result : Result
+            Result with a frame at its end.
+
+        Returns
+        -------
+        float
+            Value, in the unit of the goal.
+
+        Raises
+        ------
+        InputError
+            The function gives no finite number.
+        """
         found: Any = self.function(result)
         single = isinstance(found, (np.ndarray, np.generic)) and found.size == 1
         value: Any = found.item() if single else found
@@ -81,7 +136,18 @@ class Goal:
 
 
 def hole_displacement(group: str = "hole") -> Goal:
-    """Mean displacement outward from the axis of a hole, of the bodies at its wall [mm]."""
+    """Mean displacement outward from the axis of a hole, of the bodies at its wall.
+
+    Parameters
+    ----------
+    group : str, default "hole"
+        Face group of the wall.
+
+    Returns
+    -------
+    Goal
+        The displacement [mm].
+    """
 
     def found(result):
         monitor = HoleMonitor(result.model, group)
@@ -91,7 +157,18 @@ def hole_displacement(group: str = "hole") -> Goal:
 
 
 def displacement(group: str) -> Goal:
-    """Mean distance by which the bodies with a face in a group have moved [mm]."""
+    """Mean distance by which the bodies with a face in a group have moved.
+
+    Parameters
+    ----------
+    group : str
+        Face group.
+
+    Returns
+    -------
+    Goal
+        The distance [mm].
+    """
 
     def found(result):
         bodies, _ = faces_of_group(result.model.mesh, result.model.topology, group)
@@ -101,31 +178,80 @@ def displacement(group: str) -> Goal:
 
 
 def body_displacement(body: int) -> Goal:
-    """Distance by which a body has moved [mm]."""
+    """Distance by which a body has moved.
+
+    Parameters
+    ----------
+    body : int
+        Number of the body, from 0.
+
+    Returns
+    -------
+    Goal
+        The distance [mm].
+    """
     name, check = f"displacement of body {body}", _has_body(body)
     return Goal(name, "mm", lambda result: _mean_way(result, [body]), check=check)
 
 
 def broken_faces() -> Goal:
-    """Number of released bonds."""
+    """Number of released bonds.
+
+    Returns
+    -------
+    Goal
+        The number [-].
+    """
     return Goal("broken faces", "1", lambda result: result.report.broken_faces, "count")
 
 
 def kinetic_energy() -> Goal:
-    """Kinetic energy of all bodies [J]."""
+    """Kinetic energy of all bodies.
+
+    Returns
+    -------
+    Goal
+        The energy [J].
+    """
     return Goal("kinetic energy", "J", lambda result: result.history["kinetic_J"][-1])
 
 
 def peak_speed(body: int) -> Goal:
-    """Largest speed of a body in the run [m/s]; shorter steps look at it at more times."""
+    """Largest speed of a body in the run; shorter steps look at it at more times.
+
+    Parameters
+    ----------
+    body : int
+        Number of the body, from 0.
+
+    Returns
+    -------
+    Goal
+        The speed [m/s].
+    """
     name, check = f"peak speed of body {body}", _has_body(body)
     return Goal(name, "m/s", lambda result: result.peak_speed[body], "extreme", check=check)
 
 
 def peak_particle_velocity(distance: float, group: str = "hole") -> Goal:
-    """Mean of the largest speeds of bodies at a distance [m] from the axis of a hole [m/s].
+    """Mean of the largest speeds of bodies at a distance from the axis of a hole.
 
-    They are the bodies that a cylinder of this radius cuts; shorter steps look at more times.
+    Parameters
+    ----------
+    distance : float
+        Radius of the cylinder around the axis that cuts the bodies [m].
+    group : str, default "hole"
+        Face group of the wall of the hole.
+
+    Returns
+    -------
+    Goal
+        The speed [m/s].
+
+    Raises
+    ------
+    InputError
+        The distance is not positive. (``check_scene`` refuses one that cuts no body.)
     """
     positive("distance", distance)
     bodies = partial(_cut_by_cylinder, distance, group)
@@ -141,7 +267,23 @@ def peak_particle_velocity(distance: float, group: str = "hole") -> Goal:
 
 
 def energy_share(term: str) -> Goal:
-    """Share of the work put in that a term of the energy balance has, such as "friction"."""
+    """Share of the work put in that a term of the energy balance has.
+
+    Parameters
+    ----------
+    term : str
+        Term of the energy balance, such as ``"friction"``.
+
+    Returns
+    -------
+    Goal
+        The share [-].
+
+    Raises
+    ------
+    InputError
+        The term is unknown.
+    """
     choice("term", term, TERMS)
 
     def found(result):
@@ -158,7 +300,13 @@ def energy_share(term: str) -> Goal:
 
 
 def largest_fragment() -> Goal:
-    """Mass of the largest part that bonds still join, as a share of the whole."""
+    """Mass of the largest part that bonds still join, as a share of the whole.
+
+    Returns
+    -------
+    Goal
+        The share [-].
+    """
 
     def found(result):
         model, held = result.model, np.isnan(result.broken_time)

@@ -41,14 +41,45 @@ _RULES: dict[str, type] = {
 class Material:
     """Constants of one homogeneous material (Konno et al., sections 2.1 and 2.2, Table 1).
 
-    density [kg/m3]; normal_stiffness, shear_stiffness [Pa/m] of a bond per area;
-    normal_damping, shear_damping [Pa s/m] of a bond per area; tensile_strength, cohesion [Pa];
-    friction [-]; fracture_energy [J/m2]; contact_stiffness [N/m] and contact_damping [N s/m] of
-    one sphere contact after fracture. Stiffnesses and dashpots are numbers, the same for all bonds,
-    or follow from moduli and the sizes of the bodies (``from_elastic``).
+    Stiffnesses and dashpots are numbers, the same for all bonds, or rules by which they follow from
+    moduli and the sizes of the bodies (``from_elastic``).
 
-    Raises InputError for a value that is no finite number, is negative, is zero where it must be
-    positive, or where the bond would fail before it reaches its strength.
+    Parameters
+    ----------
+    density : float
+        Density [kg/m^3].
+    normal_stiffness : float or rule
+        Normal stiffness of a bond per area [Pa/m].
+    shear_stiffness : float or rule
+        Shear stiffness of a bond per area [Pa/m].
+    normal_damping : float or rule
+        Normal dashpot of a bond per area [Pa s/m].
+    shear_damping : float or rule
+        Shear dashpot of a bond per area [Pa s/m].
+    tensile_strength : float
+        Tensile strength of a bond [Pa].
+    cohesion : float
+        Cohesion of a bond [Pa].
+    friction : float
+        Friction coefficient of bonds and of contact spheres.
+    fracture_energy : float
+        Fracture energy of mode I [J/m^2].
+    contact_stiffness : float or rule
+        Stiffness of one sphere contact [N/m].
+    contact_damping : float or rule
+        Dashpot of one sphere contact [N s/m].
+
+    Raises
+    ------
+    InputError
+        A value is not finite, negative, or zero where it must be positive; or a bond would fail
+        before it reaches its strength.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> replace(CONCRETE, friction=0.4).friction
+    0.4
     """
 
     density: float
@@ -98,17 +129,52 @@ class Material:
         cohesion: float,
         damping_ratio: float = 0.05,
     ) -> Material:
-        """A material from what is measured; its bonds are the stiffer, the nearer their bodies.
+        """Make a material from measured values; bonds are stiffer where bodies are closer.
 
-        young [Pa] and poisson of a block, which does not depend on the size of its elements: a
-        bond has the stiffness modulus / distance per area (``elasticity.moduli``). density [kg/m3];
-        tensile_strength [Pa], fracture_energy [J/m2] and cohesion [Pa] of a bond; friction_angle
-        [degrees]: of bonds, and of spheres that touch. damping_ratio: share of the critical damping
-        of a bond between its two bodies, and of contacts; 0 for none. Contact spheres are as stiff
-        as the bond they replace (``elasticity.bond_rules.FaceStiffness``).
+        Young's modulus and Poisson's ratio of a block then do not depend on the size of its
+        elements: a bond has the stiffness modulus / distance per area (``elasticity.moduli``).
+        Contact spheres are as stiff as the bond that they replace
+        (``elasticity.bond_rules.FaceStiffness``).
 
-        Raises InputError for a value out of its range. Whether the fracture energy suffices for the
-        largest elements is checked by the scene, which has the mesh.
+        Parameters
+        ----------
+        young : float
+            Young's modulus of a block [Pa].
+        poisson : float
+            Poisson's ratio of a block, from -0.2 to 0.45 [-].
+        density : float
+            Density [kg/m^3].
+        tensile_strength : float
+            Tensile strength of a bond [Pa].
+        fracture_energy : float
+            Fracture energy of mode I of a bond [J/m^2].
+        friction_angle : float
+            Friction angle of bonds and of spheres [degrees].
+        cohesion : float
+            Cohesion of a bond [Pa].
+        damping_ratio : float, default 0.05
+            Share of the critical damping of a bond between its two bodies, and of contacts; 0 for
+            none.
+
+        Returns
+        -------
+        Material
+            The material.
+
+        Raises
+        ------
+        InputError
+            A value is out of its range. Whether the fracture energy suffices for the largest
+            elements is checked by the scene, which has the mesh.
+
+        Examples
+        --------
+        >>> rock = Material.from_elastic(
+        ...     young=30e9, poisson=0.2, density=2400.0, tensile_strength=5e6,
+        ...     fracture_energy=100.0, friction_angle=35.0, cohesion=10e6,
+        ... )
+        >>> round(rock.friction, 3)
+        0.7
         """
         normal, shear = bond_moduli(young, poisson)
         ratio = positive("damping_ratio", damping_ratio, zero_allowed=True)

@@ -55,14 +55,31 @@ class Method(Protocol):
 
     @property
     def steps_ahead(self) -> float:
-        """Steps of a body by which its contacts are counted before they touch."""
+        """Number of steps of a body by which its contacts are counted before they touch."""
 
     def criterion(self) -> Any:
-        """Rule for the level of a body, as ``step_control.FixedStep`` or ``Displacement``."""
+        """Rule for the level of a body.
+
+        Returns
+        -------
+        FixedStep or Displacement
+            Rule of ``stability.step_control``.
+        """
 
 
 def check_method(method: object) -> None:
-    """Raise InputError, naming a missing member, unless a method keeps the contract ``Method``."""
+    """Refuse a method that does not keep the contract ``Method``.
+
+    Parameters
+    ----------
+    method : object
+        Object to check.
+
+    Raises
+    ------
+    InputError
+        It is no method, or lacks a member, which is named.
+    """
     wanted = members_of(Method)
     missing = [name for name in wanted if not hasattr(method, name)]
     if isinstance(method, type) or len(missing) > len(wanted) // 2:
@@ -91,10 +108,20 @@ def _steps_ahead(method):
 
 
 def structure_of(method: Any) -> Hashable:
-    """Parts of a method on which its kernels depend, hashable: all but its numbers.
+    """Parts of a method on which its kernels depend: all but its numbers.
 
     A user-defined method may have a member ``structure``; else any change of its numbers compiles
     anew, as kernels may have read them.
+
+    Parameters
+    ----------
+    method : Method
+        Method.
+
+    Returns
+    -------
+    hashable
+        Key of compiled kernels.
     """
     if type(method).__module__ != __name__:
         return getattr(method, "structure", (type(method), repr(method)))
@@ -105,11 +132,24 @@ def structure_of(method: Any) -> Hashable:
 
 
 def order_of(method: Any, damped: bool, varying: bool) -> Optional[int]:
-    """Order of the error in the step between events; None where a method declares none.
+    """Order of the error in the step between events.
 
-    damped: whether a dashpot acts. varying: whether bodies or times had steps of their own.
     A class that is derived from a method declares an order of its own, or none: its ``advance`` may
     have another one.
+
+    Parameters
+    ----------
+    method : Method
+        Method.
+    damped : bool
+        Whether a dashpot acts.
+    varying : bool
+        Whether bodies or times had steps of their own.
+
+    Returns
+    -------
+    int or None
+        None where the method declares none.
     """
     declared = vars(type(method)).get("order")
     return declared(method, damped, varying) if callable(declared) else None
@@ -132,11 +172,32 @@ def _suffix(method):
 class Uniform:
     """One step for all bodies, explicit.
 
-    dt0: largest step [s]. distance: l [m]; no body may move further in a step, so the step of all
-    falls to that of the fastest body. Without it the step is dt0 throughout. control: further
-    limits of the step, a ``StepControl``. dashpot: "full", or "limited": a dashpot keeps the share
-    of its coefficient that is stable at the steps of its bodies.
-    Source: Konno et al., 3.1 and 4.3 ("same time increment for all elements").
+    Parameters
+    ----------
+    dt0 : float, default 1e-08
+        Largest step [s].
+    distance : float, optional
+        Displacement limit l [m]: no body may move further in a step, so the step of all falls to
+        that of the fastest body. None: the step is dt0 throughout.
+    control : StepControl, optional
+        Further limits of the step.
+    dashpot : str, default "full"
+        ``"full"``, or ``"limited"``: a dashpot keeps the share of its coefficient that is stable at
+        the steps of its bodies.
+
+    Raises
+    ------
+    InputError
+        A value is out of its range, or two options exclude each other.
+
+    References
+    ----------
+    Konno et al., sections 3.1 and 4.3 ("same time increment for all elements").
+
+    Examples
+    --------
+    >>> Uniform(dt0=1e-8).name
+    'uniform'
     """
 
     dt0: float = 1e-8
@@ -166,7 +227,20 @@ class Uniform:
         return _steps_ahead(self)
 
     def order(self, damped: bool, varying: bool) -> Optional[int]:
-        """Order of the error in the step, see ``order_of``."""
+        """Order of the error in the step, see ``order_of``.
+
+        Parameters
+        ----------
+        damped : bool
+            Whether a dashpot acts.
+        varying : bool
+            Whether bodies or times had steps of their own.
+
+        Returns
+        -------
+        int or None
+            None where no order is known.
+        """
         return _explicit_order(self, damped, varying)
 
     def criterion(self) -> Union[FixedStep, Displacement]:
@@ -178,11 +252,35 @@ class Uniform:
 class Multirate:
     """Steps that differ by powers of two from body to body, explicit, with shared impulses.
 
-    dt0: largest step [s]. distance: l [m]; a body's step is the largest dt0 / 2^k in which it
-    moves by no more. neighbour: a body between its own times is "held" at its last position (the
-    paper) or "drifted" along to every time at which one of its bonds or contacts is evaluated,
-    and then takes the impulse at once. control, dashpot: as in ``Uniform``.
-    Source: Konno et al., 3.1, eq. 3.
+    Parameters
+    ----------
+    dt0 : float, default 1e-08
+        Largest step [s].
+    distance : float, default 1e-08
+        Displacement limit l [m]: the step of a body is the largest dt0 / 2^k in which it moves by
+        no more.
+    neighbour : str, default "held"
+        ``"held"``: a body between its own times stays at its last position (the paper).
+        ``"drifted"``: it is drifted along to every time at which one of its bonds or contacts is
+        evaluated, and then takes the impulse at once.
+    control : StepControl, optional
+        As in ``Uniform``.
+    dashpot : str, default "full"
+        As in ``Uniform``.
+
+    Raises
+    ------
+    InputError
+        A value is out of its range, or two options exclude each other.
+
+    References
+    ----------
+    Konno et al., section 3.1, eq. 3.
+
+    Examples
+    --------
+    >>> Multirate(dt0=8e-8, neighbour="drifted").name
+    'multirate_drifted'
     """
 
     dt0: float = 1e-8
@@ -212,7 +310,20 @@ class Multirate:
         return _steps_ahead(self)
 
     def order(self, damped: bool, varying: bool) -> Optional[int]:
-        """Order of the error in the step, see ``order_of``."""
+        """Order of the error in the step, see ``order_of``.
+
+        Parameters
+        ----------
+        damped : bool
+            Whether a dashpot acts.
+        varying : bool
+            Whether bodies or times had steps of their own.
+
+        Returns
+        -------
+        int or None
+            None where no order is known.
+        """
         return _explicit_order(self, damped, varying)
 
     def criterion(self) -> Displacement:
@@ -225,14 +336,36 @@ class ImplicitDashpots:
     """One step for all bodies, with the dashpots of bonds and contacts solved together in it.
 
     Springs and loads are explicit; their stability bounds the step, not that of the dashpots.
-    dt: step [s]. sweeps: fewest and most sweeps over all dashpots in a step. tolerance: sweeps end
-    once none changes a velocity by more than this share of the largest speed in the whole scene;
-    slow motion beside very fast bodies needs a smaller one. theta: time in the step at which bond
-    dashpots take their velocity, from 0.5 (mean of both ends, second order) to 1 (the end, first
-    order, for steps so long that the mean would ring). refresh: interval between updates of the
-    solved blocks of bonds [s].
-    Raises InputError for a value out of its range.
-    Source: specification, section 6; not in the paper.
+
+    Parameters
+    ----------
+    dt : float, default 4e-07
+        Step [s].
+    sweeps : tuple of (int, int), default (2, 20)
+        Fewest and most sweeps over all dashpots in a step.
+    tolerance : float, default 0.05
+        Sweeps end once none changes a velocity by more than this share of the largest speed in the
+        scene; slow motion beside very fast bodies needs a smaller one.
+    theta : float, default 0.5
+        Time in the step, as a share of it, at which bond dashpots take their velocity: from 0.5
+        (mean of both ends, second order) to 1 (the end, first order, for steps so long that the
+        mean would ring).
+    refresh : float, default 3e-05
+        Interval between updates of the solved blocks of bonds [s].
+
+    Raises
+    ------
+    InputError
+        A value is out of its range.
+
+    Notes
+    -----
+    The method is not in the paper.
+
+    Examples
+    --------
+    >>> ImplicitDashpots(dt=2e-7).dt0
+    2e-07
     """
 
     dt: float = 4e-7
@@ -265,7 +398,20 @@ class ImplicitDashpots:
         return self.dt
 
     def order(self, damped: bool, varying: bool) -> int:
-        """Order of the error in the step, see ``order_of``; that of sweeps that have agreed."""
+        """Order of the error in the step, see ``order_of``; that of sweeps that have converged.
+
+        Parameters
+        ----------
+        damped : bool
+            Whether a dashpot acts.
+        varying : bool
+            Whether bodies or times had steps of their own.
+
+        Returns
+        -------
+        int
+            1 or 2.
+        """
         return 1 if varying or (damped and self.theta != 0.5) else 2
 
     def criterion(self) -> FixedStep:

@@ -26,14 +26,34 @@ ROUNDING = 1e-9
 
 
 def needed_effects(result: object, tolerance: float = ROUNDING) -> Advice:
-    """Advice on the effects of a run; print it, or read its ``droppable`` and ``missing``.
+    """Advice on the effects of a run: those to keep, to drop, and to add.
 
-    result: the Result of ``simulate``, which is run again without the effects that seem to have had
-    no part, or its report, of which nothing can be shown droppable. tolerance: largest difference
-    of all that was recorded that counts as equal, as a share of its largest value, in [0, 1]; by
-    default what rounding explains. With a larger one, effects that took less than this share of the
-    energy are tried too. Loads and supports define the problem and are always kept.
-    Raises InputError for another kind of result, or a tolerance out of range.
+    A run of a Result is repeated without the effects that seem to have had no part; of a report
+    alone, no effect can be shown droppable. Loads and supports define the problem and are always
+    kept.
+
+    Parameters
+    ----------
+    result : Result or Report
+        Result of ``simulate``, or its report.
+    tolerance : float, default ROUNDING
+        Largest difference of all that was recorded that counts as equal, as a share of its largest
+        value, from 0 to 1; by default what rounding explains. With a larger one, effects that took
+        less than this share of the energy are tried too.
+
+    Returns
+    -------
+    Advice
+        Print it, or read its ``droppable`` and ``missing``.
+
+    Raises
+    ------
+    InputError
+        The result is of another kind, or the tolerance is out of range.
+
+    Examples
+    --------
+    >>> print(needed_effects(result))  # doctest: +SKIP
     """
     report = getattr(result, "report", result)
     if not isinstance(report, Report):
@@ -49,11 +69,25 @@ def needed_effects(result: object, tolerance: float = ROUNDING) -> Advice:
 
 
 def estimated_effects(scene: Scene, until: float) -> tuple[Estimate, ...]:
-    """Estimates of which effects a scene needs, before a run; print them.
+    """Estimates of which effects a scene needs, before a run.
 
-    until: end of the run [s]. Each compares an effect with what it acts beside by a dimensionless
-    group, and says negligible, needed or unclear; with effects="auto" a run finds out by itself.
-    Raises InputError for another kind of scene, or a time that is no positive number.
+    Parameters
+    ----------
+    scene : Scene
+        Scene.
+    until : float
+        End of the run [s].
+
+    Returns
+    -------
+    tuple of Estimate
+        For each effect a dimensionless group that compares it with what it acts beside, and the
+        verdict negligible, needed or unclear. Print them.
+
+    Raises
+    ------
+    InputError
+        The argument is no Scene, or the time is not positive.
     """
     instance("scene", scene, Scene)
     model = Model(scene.mesh, scene.material, scene.effects)

@@ -26,12 +26,31 @@ _MOST_STEPS, _MOST_CALLS = 2**42, 1_000_000
 
 @dataclass(frozen=True)
 class Every:
-    """Calls at even distances, besides at the start and at the end of the run.
+    """Calls of an observer at even distances, besides at the start and at the end of the run.
 
-    One of four is given. time_s: simulated time, each call at the nearest largest step [s].
-    steps: number of largest steps. samples: number of rows of the time series. wall_s: wall time
-    [s]; these calls come between two steps of any length, when bodies may stand at different
-    times. Raises InputError.
+    One of the four is given.
+
+    Parameters
+    ----------
+    time_s : float, optional
+        Simulated time between calls, each at the nearest largest step [s].
+    steps : int, optional
+        Number of largest steps between calls.
+    samples : int, optional
+        Number of rows of the time series between calls.
+    wall_s : float, optional
+        Wall time between calls [s]; these calls come between two steps of any length, when bodies
+        may stand at different times.
+
+    Raises
+    ------
+    InputError
+        None or several are given, or a value is out of its range.
+
+    Examples
+    --------
+    >>> sorted(Every(steps=2).marks(last=5, dt=1e-7))
+    [0, 2, 4, 5]
     """
 
     time_s: Optional[float] = None
@@ -54,9 +73,26 @@ class Every:
             positive(given[0], value)
 
     def marks(self, last: int, dt: float, samples: int = 1) -> set:
-        """Largest steps of dt [s] from 0 to last at which to call; InputError for too many.
+        """Largest steps at which to call.
 
-        samples: of the run after the one at the start.
+        Parameters
+        ----------
+        last : int
+            Last of the largest steps.
+        dt : float
+            Largest step [s].
+        samples : int, default 1
+            Number of rows of the time series after the one at the start.
+
+        Returns
+        -------
+        set of int
+            Steps from 0 to ``last``.
+
+        Raises
+        ------
+        InputError
+            They are too many.
         """
         if self.wall_s is not None:
             return {last}
@@ -76,7 +112,23 @@ class Every:
 
 @dataclass(frozen=True)
 class At:
-    """Calls at chosen times [s], each at the nearest largest step. Raises InputError."""
+    """Calls of an observer at chosen times, each at the nearest largest step.
+
+    Parameters
+    ----------
+    times_s : sequence of float
+        Times [s].
+
+    Raises
+    ------
+    InputError
+        A time is negative or no number.
+
+    Examples
+    --------
+    >>> sorted(At([0.0, 1e-6]).marks(last=20, dt=1e-7))
+    [0, 10]
+    """
 
     times_s: tuple
 
@@ -89,7 +141,27 @@ class At:
         object.__setattr__(self, "times_s", checked)
 
     def marks(self, last: int, dt: float, samples: int = 1) -> set:
-        """Largest steps of dt [s] at which to call; InputError for a time after the last."""
+        """Largest steps at which to call.
+
+        Parameters
+        ----------
+        last : int
+            Last of the largest steps.
+        dt : float
+            Largest step [s].
+        samples : int, default 1
+            Number of rows of the time series; not used here.
+
+        Returns
+        -------
+        set of int
+            Steps from 0 to ``last``.
+
+        Raises
+        ------
+        InputError
+            A time lies after the end of the run.
+        """
         for time in self.times_s:
             if round(time / dt) > last:
                 raise InputError(f"times_s must lie in [0, {last * dt:.6g}] s, got {time:g}")
@@ -97,22 +169,53 @@ class At:
 
 
 class Observer(Protocol):
-    """Measurement during a run: ``when`` it is called, and the method ``observe``."""
+    """Measurement during a run: the property ``when`` and the method ``observe``.
+
+    Examples
+    --------
+    >>> class Watch:
+    ...     when = Every(time_s=1e-5)
+    ...
+    ...     def observe(self, view):
+    ...         print(view.time_s, abs(view.motion()["velocity"]).max())
+    """
 
     @property
     def when(self) -> Union[Every, At]:
         """Times of the calls."""
 
     def observe(self, view: "RunView") -> None:
-        """Measure; an exception here ends the run, and no result is written."""
+        """Measure; an exception here ends the run, and no result is written.
+
+        Parameters
+        ----------
+        view : RunView
+            Read-only view of the run.
+        """
 
 
 class Collector:
-    """Observer that keeps what functions of the view give, in lists by name.
+    """Observer that keeps values of functions of the view, in lists by name.
 
-    when: of its calls. read: functions by name, such as ``cost=lambda view: view.cpu_seconds``.
-    rows: what they gave, by name; ``collector[name]`` is an array of it. view: of the last call,
-    for one more look at a run that diverged.
+    Parameters
+    ----------
+    when : Every or At
+        Times of its calls.
+    **read : callable
+        Functions of a RunView by name.
+
+    Attributes
+    ----------
+    rows : dict of list
+        Values by name; ``collector[name]`` is an array of them.
+    view : RunView or None
+        View of the last call, for one more look at a run that diverged.
+
+    Examples
+    --------
+    >>> cost = Collector(Every(samples=10), cpu=lambda view: view.cpu_seconds)
+    >>> list(cost.rows)
+    ['cpu']
     """
 
     def __init__(self, when: Union[Every, At], **read: Callable[["RunView"], Any]):
@@ -124,7 +227,13 @@ class Collector:
         return in_brief(self, ", ".join(self.rows))
 
     def observe(self, view: "RunView") -> None:
-        """Keep a value of every function."""
+        """Keep a value of every function.
+
+        Parameters
+        ----------
+        view : RunView
+            Read-only view of the run.
+        """
         self.view = view
         for name, read in self.read.items():
             self.rows[name].append(read(view))
@@ -138,7 +247,22 @@ class Collector:
 
 
 class RunView(Uncopied):
-    """Read-only view of a run at its present step; arrays are copies that refuse to be written."""
+    """Read-only view of a run at its present step.
+
+    An observer gets it. Arrays are copies that refuse to be written.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        Simulation that runs.
+    recorder : Recorder
+        Recorder of its samples and frames.
+
+    Raises
+    ------
+    InputError
+        Something writes to the view.
+    """
 
     _parts: tuple
 
@@ -163,7 +287,7 @@ class RunView(Uncopied):
 
     @property
     def model(self) -> Model:
-        """Constants of the bodies and bonds, of which kernels know."""
+        """Constants of the bodies and bonds, as arrays."""
         return self._parts[0].model
 
     @property
@@ -193,23 +317,54 @@ class RunView(Uncopied):
         return self._parts[0].running_seconds()
 
     def motion(self) -> dict:
-        """Arrays of the bodies' motion by name, as in ``State.motion``."""
+        """Motion of the bodies.
+
+        Returns
+        -------
+        dict of ndarray
+            Arrays by name, as in ``State.motion``: position [m], velocity [m/s], spin [rad/s] and
+            more.
+        """
         return {name: _locked(array) for name, array in self._parts[0].motion().items()}
 
     def energy_balance(self) -> dict:
-        """Terms of the energy balance by name [J]."""
+        """Terms of the energy balance.
+
+        Returns
+        -------
+        dict of float
+            Energies by name [J].
+        """
         return self._parts[0].energy_balance.account()
 
     def frame(self) -> Frame:
-        """Snapshot of the block, a ``Frame``."""
+        """Snapshot of the block.
+
+        Returns
+        -------
+        Frame
+            Positions, displacements, velocities and damage.
+        """
         return self._parts[1].frame()
 
     def report(self) -> Report:
-        """Report of the run so far."""
+        """Report of the run so far.
+
+        Returns
+        -------
+        Report
+            Figures and cost.
+        """
         return self._parts[0].report()
 
     def history(self) -> dict:
-        """Samples so far, arrays by column name; one at this step is among them."""
+        """Samples so far; one at this step is among them.
+
+        Returns
+        -------
+        dict of ndarray
+            Columns by name, which ends in the unit.
+        """
         return {name: _locked(array) for name, array in self._parts[1].history().items()}
 
 

@@ -22,14 +22,34 @@ from taichi_dem.scene import Scene
 class Result:
     """Result of a run.
 
-    history: arrays by column name, one row a sample. frames: snapshots. broken_time: when each bond
-    was released [s], NaN while it holds. peak_speed: largest speed of each body at the samples
-    [m/s]. report: figures of the run. diverged: the error sentence of a run that left its bounds,
-    whose data end before that, else "". start: motion that was set before the run, arguments of
-    ``State.set_motion``; None for a run that began with the scene at rest. acting_since: with
-    effects="auto", time [s] from which each effect acted on each body, NaN for never, by name.
-
     As the last line of a notebook's cell it shows a picture and a table.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene that ran.
+    method : Method
+        Method that stepped.
+    model : Model
+        Arrays of the scene.
+    history : dict
+        Columns by name, which ends in the unit, one row a sample.
+    frames : tuple of Frame
+        Snapshots.
+    broken_time : ndarray
+        Time at which each bond was released [s], shape (bond_count,); NaN while it holds.
+    peak_speed : ndarray
+        Largest speed of each body at the samples [m/s], shape (body_count,).
+    report : Report
+        Figures and cost of the run.
+    diverged : str, default ""
+        Error sentence of a run that left its bounds, whose data end before that; else ``""``.
+    start : dict, optional
+        Motion that was set before the run, arguments of ``State.set_motion``; None for a scene at
+        rest.
+    acting_since : dict, optional
+        With effects="auto": time from which each effect acted on each body [s], by name; NaN for
+        never.
     """
 
     scene: Scene
@@ -70,9 +90,17 @@ class Result:
         return self.report.certificate
 
     def mean_displacement(self, bodies: np.ndarray) -> np.ndarray:
-        """Mean displacement of some bodies [m], (frames, 3).
+        """Mean displacement of some bodies.
 
-        bodies: their numbers, or a mask of all.
+        Parameters
+        ----------
+        bodies : ndarray
+            Numbers of the bodies, or a mask of all.
+
+        Returns
+        -------
+        ndarray
+            Displacement [m], shape (frames, 3).
         """
         ways = (frame.displacement[bodies].T for frame in self.frames)
         return np.array([[along.mean() for along in way] for way in ways]).reshape(-1, 3)
@@ -104,7 +132,16 @@ class Result:
 
         The series, in paraview/ of that folder, has the folder's name. These files of an earlier
         run in the same folder are replaced, its series removed even where this run has no frames.
-        A leading "~" is the user's home. Raises InputError when the folder cannot be written to.
+
+        Parameters
+        ----------
+        folder : path
+            Folder; a leading "~" is the user's home.
+
+        Raises
+        ------
+        InputError
+            The folder cannot be written to.
         """
         folder = output_folder(folder)
         place, name = os.path.join(folder, "paraview"), series_name(folder)

@@ -25,21 +25,42 @@ REMEDY = "SphereContact(outer_faces=True)"
 class Scene:
     """A block of bonded bodies and the effects that act in it; checked once, here.
 
-    mesh: tetrahedra and face groups. material: its constants. effects: a list of the effects that
-    act, and what is not listed is not computed; or "auto": the laws of the material, each evaluated
-    only where and when it acts; or "all": the same laws, evaluated everywhere. loads: loads and
-    supports, and laws in place of the usual ones, beside a word. max_speed: bound [m/s] beyond
-    which a run counts as diverged. sleep: with "auto", largest momentum of a body, as a share of
-    the mean of all, at which its neighbours still count as not reached by any wave and are not
-    evaluated; 1e-6 by default, at most 0.01, 0 for none.
-    unbonded: names of groups of inner faces, which two bodies share, without bonds from the start,
-    as a notch or an open joint: both sides are free, and carry contact spheres as broken faces do.
-    weaker: name of such a group -> share, above 0 and at most 1, of the area of its faces that is
-    bonded. Stiffness, damping, strength, cohesion and fracture energy per area of the face are that
-    share of the material's; openings at the limits, and the friction angle, stay. The least share
-    counts where a face is in several groups.
-    Raises InputError for a wrong type, an effect listed twice in a role that takes one, friction
-    without contact, a group that the mesh does not have, or a bound that is no positive number.
+    Parameters
+    ----------
+    mesh : Mesh
+        Tetrahedra and face groups.
+    material : Material
+        Constants of bodies and bonds.
+    effects : sequence of Effect or str, default ()
+        A list: exactly these effects are computed. ``"auto"``: the laws of the material, each
+        evaluated only where and when it acts. ``"all"``: the same laws, evaluated everywhere.
+    max_speed : float, default 10000.0
+        Speed beyond which a run counts as diverged [m/s].
+    loads : iterable of Effect, default ()
+        Loads and supports, and laws instead of the usual ones, beside a word.
+    sleep : float, optional
+        With ``"auto"``: largest momentum of a body, as a share of the mean of all, at which its
+        neighbours still count as not reached by a wave. None: 1e-6; at most 0.01, 0 for no sleep.
+    unbonded : iterable of str, default ()
+        Names of groups of inner faces without bonds from the start, as a notch or an open joint.
+        Both sides are free, and carry contact spheres as broken faces do.
+    weaker : mapping, optional
+        Share of the area of its faces that is bonded, above 0 and at most 1, by the name of a group
+        of inner faces. Stiffness, damping, strength, cohesion and fracture energy per area of the
+        face are that share of the material's; openings at the limits and the friction angle do not
+        change.
+
+    Raises
+    ------
+    InputError
+        A type is wrong, an effect is listed twice in a role that takes one, friction has no
+        contact, the mesh lacks a group, or a number is out of its range.
+
+    Examples
+    --------
+    >>> gas = effects.GasPressure(group="hole", peak=575e6)
+    >>> Scene(read_mesh(PAPER_BLOCK), CONCRETE, effects="auto", loads=[gas]).on_demand
+    True
     """
 
     mesh: Mesh
@@ -79,17 +100,50 @@ class Scene:
         return self.effects.word == AUTO
 
     def effect(self, role: str) -> Any:
-        """The effect of a role that takes one, None where none is listed."""
+        """Effect of a role that takes one.
+
+        Parameters
+        ----------
+        role : str
+            Role, such as ``"contact"``.
+
+        Returns
+        -------
+        Effect or None
+            None where none is listed.
+        """
         return next((effect for effect in self.effects if effect.role == role), None)
 
     def damped(self, touching: bool = True) -> bool:
-        """Whether a dashpot acts: of bonds, or, where bodies are touching, of contacts."""
+        """Whether a dashpot acts.
+
+        Parameters
+        ----------
+        touching : bool, default True
+            Whether dashpots of contacts count.
+
+        Returns
+        -------
+        bool
+            True where one acts.
+        """
         material, roles = self.material, {effect.role for effect in self.effects if effect.name}
         bonds = "dashpot" in roles and material.has_bond_damping
         return bonds or (touching and "contact" in roles and material.has_contact_damping)
 
     def has(self, name: str) -> bool:
-        """Whether an effect of this name is listed."""
+        """Whether an effect is listed.
+
+        Parameters
+        ----------
+        name : str
+            Name of the effect.
+
+        Returns
+        -------
+        bool
+            True where it is listed.
+        """
         return any(effect.name == name for effect in self.effects)
 
 

@@ -45,21 +45,60 @@ def simulate(
 ) -> Result:
     """Run a scene to a time and return the result.
 
-    method: from ``taichi_dem.methods``. until: simulated time [s], rounded up to whole largest
-    steps. samples, frames: how many evenly spaced rows of the time series, and snapshots, after
-    the one at the start. progress: "auto" for a bar on a terminal and in Jupyter, None for silence,
-    or a function that is called with a Progress while kernels are compiled, and then with a
-    RunProgress about five times a second; ``progress=print`` prints percent and time left.
-    title: of the progress bar.
-    output: folder for the result, written at the end, or up to the last good sample when the
-    run diverges. checkpoint: a Checkpoint that says where and when the run saves itself, besides
-    at its end and on Ctrl-C, SIGTERM, SIGHUP, SIGXCPU and SIGUSR1. resume: a checkpoint file to go
-    on from, of the same scene and method; the bits are those of a run that was never stopped.
-    observers: called on the way with a ``RunView``, see ``Observer``; after a resume, at the times
-    that are left.
-    Raises InputError for bad arguments, SimulationDiverged when the run leaves its bounds,
-    Interrupted when one of these signals has saved the run. Warns, as a UserWarning before the
-    first step, of what its scene cannot do (``scene_warnings``).
+    Parameters
+    ----------
+    scene : Scene
+        Scene.
+    method : Method
+        Method, from ``taichi_dem.methods``.
+    until : float
+        Simulated time [s], rounded up to whole largest steps.
+    driver : str, default "auto"
+        ``"resident"``, ``"parallel"``, or ``"auto"``, see ``Simulation``.
+    samples : int, default 200
+        Number of evenly spaced rows of the time series after the one at the start.
+    frames : int, default 0
+        Number of evenly spaced snapshots after the one at the start.
+    progress : callable or str or None, default "auto"
+        ``"auto"``: a bar on a terminal and in Jupyter. None: silence. A function is called with a
+        Progress while kernels are compiled, and then with a RunProgress about five times a second;
+        ``print`` prints percent and time left.
+    title : str, default "simulating"
+        Title of the progress bar.
+    output : path, optional
+        Folder for the result, which is written at the end, or up to the last good sample when the
+        run diverges.
+    checkpoint : Checkpoint, optional
+        Where and when the run saves itself, besides at its end and on Ctrl-C, SIGTERM, SIGHUP,
+        SIGXCPU and SIGUSR1.
+    resume : path, optional
+        Checkpoint to go on from, of the same scene and method; the bits are those of a run that was
+        never stopped.
+    observers : sequence of Observer, default ()
+        Observers, called on the way with a ``RunView``; after a resume, at the times that are left.
+
+    Returns
+    -------
+    Result
+        Time series, snapshots and report.
+
+    Raises
+    ------
+    InputError
+        An argument is out of its range.
+    SimulationDiverged
+        The run left its bounds; ``result`` of the exception has the data up to there.
+    Interrupted
+        A signal ended the run, which has been saved.
+
+    Notes
+    -----
+    A UserWarning before the first step says what the scene cannot do (``scene_warnings``).
+
+    Examples
+    --------
+    >>> result = simulate(scene, method=ImplicitDashpots(4e-7), until=1e-4)  # doctest: +SKIP
+    >>> print(result.report)  # doctest: +SKIP
     """
     instance("scene", scene, Scene)
     check_method(method)

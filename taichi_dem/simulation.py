@@ -50,15 +50,40 @@ MOST_STEPS = 2**42
 class Simulation(Uncopied):
     """One scene, one method, one driver, on an engine of the session.
 
-    driver: "resident", "parallel", or "auto": parallel on a GPU and for large scenes; for those of
-    middle size on several threads, the faster one by measurement.
-    brute_force: contact search without cells, for tests.
-    model: the scene's arrays. tables, state, schedule, contacts, broad_phase, advance, step: parts
-    of the engine, with the data of this simulation (``engine.view``); contacts and broad_phase are
-    None without contact. cut_short: what an exception or Ctrl-C interrupted, in words, so that its
-    bits would not be those of an undisturbed run; "" otherwise.
-    Raises InputError for a wrong scene or method, an unknown driver, "resident" on a GPU, or a
-    scene that exceeds the machine's memory.
+    ``simulate`` makes one; it is the level below for those who step by themselves. ``tables``,
+    ``state``, ``schedule``, ``contacts``, ``broad_phase``, ``advance`` and ``step`` are parts of
+    the engine with the data of this simulation; contacts and broad_phase are None without contact.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene.
+    method : Method
+        Method, from ``taichi_dem.methods``.
+    driver : str, default "auto"
+        ``"resident"``, ``"parallel"``, or ``"auto"``: parallel on a GPU and for large scenes; for
+        those of middle size on several threads, the faster one by measurement.
+    brute_force : bool, default False
+        Contact search without cells, for tests.
+
+    Attributes
+    ----------
+    model : Model
+        Arrays of the scene.
+    cut_short : str
+        What an exception or Ctrl-C interrupted, in words, so that its bits would not be those of an
+        undisturbed run; ``""`` otherwise.
+
+    Raises
+    ------
+    InputError
+        Scene or method is of a wrong kind, the driver is unknown or does not fit the device, or the
+        scene exceeds the memory of the machine.
+
+    Examples
+    --------
+    >>> simulation = Simulation(scene, ImplicitDashpots())  # doctest: +SKIP
+    >>> simulation.advance_to(100)  # doctest: +SKIP
     """
 
     # Views of these parts, with the data of this simulation.
@@ -142,8 +167,17 @@ class Simulation(Uncopied):
     def reset(self, scene: Optional[Scene] = None, method: Optional[Method] = None) -> None:
         """Begin again at time zero and at rest, optionally with another scene or method.
 
-        They must be of the present structure: the same kinds of effects, the same kind of method;
-        then nothing is compiled. Raises InputError where they are not, or find no room.
+        Parameters
+        ----------
+        scene : Scene, optional
+            Scene of the same structure (kinds of effects); the present one if None.
+        method : Method, optional
+            Method of the same kind; the present one if None.
+
+        Raises
+        ------
+        InputError
+            The structure differs, or the scene finds no room.
         """
         scene = self.scene if scene is None else instance("scene", scene, Scene)
         method = self.method if method is None else method
@@ -179,6 +213,11 @@ class Simulation(Uncopied):
         """Choose the first steps, evaluate the bonds and open the account; done once.
 
         Compiles everything, so that the time of the run is that of stepping alone.
+
+        Raises
+        ------
+        InputError
+            The simulation was interrupted before.
         """
         self._check_whole()
         if self.energy_balance is not None:
@@ -223,7 +262,13 @@ class Simulation(Uncopied):
         self.step_resolution = StepResolution(*read, self.schedule, self.advance)
 
     def motion(self) -> dict[str, np.ndarray]:
-        """Arrays of ``State.motion``, with velocities and spins at the time of the positions."""
+        """Motion of the bodies, with velocities and spins at the time of the positions.
+
+        Returns
+        -------
+        dict of ndarray
+            Arrays by name, as in ``State.motion``.
+        """
         motion = self.state.motion()
         table = self.readings.motion()
         for place, name in enumerate(("velocity", "spin", "angular_momentum")):
@@ -238,10 +283,21 @@ class Simulation(Uncopied):
         self.bond_slips.sample(self.time_s)
 
     def advance_to(self, macro_step: int, on_call: Optional[Callable[[], object]] = None) -> None:
-        """Step until a number of largest steps; on_call() is called about five times a second.
+        """Step until a number of largest steps.
 
-        Raises SimulationDiverged with place and reason when the run leaves its bounds, InputError
-        for a number that is none.
+        Parameters
+        ----------
+        macro_step : int
+            Number of largest steps since the start.
+        on_call : callable, optional
+            Function without arguments that is called about five times a second.
+
+        Raises
+        ------
+        InputError
+            The number is out of range.
+        SimulationDiverged
+            The run left its bounds; the message names place and reason.
         """
         runtime.check_session(self.loan.session, "simulation")
         end = whole("macro_step", macro_step, 0, MOST_STEPS) * MACRO_TICKS
@@ -278,26 +334,56 @@ class Simulation(Uncopied):
         self.run_seconds, self.run_cpu_seconds = saved["cost"].tolist()
 
     def evaluations(self) -> int:
-        """Bonds and contact pairs evaluated so far."""
+        """Bonds and contact pairs evaluated so far.
+
+        Returns
+        -------
+        int
+            Their number.
+        """
         return int(self.schedule.evaluations[2] + self.schedule.evaluations[3])
 
     def sweeps(self) -> int:
-        """Sweeps over all dashpots so far, 0 for a method that solves none."""
+        """Sweeps over all dashpots so far.
+
+        Returns
+        -------
+        int
+            Their number, 0 for a method that solves none.
+        """
         solver = self.advance.solver
         return int(solver.total_sweeps[None]) if solver is not None else 0
 
     def running_seconds(self) -> float:
-        """Wall time spent stepping so far [s], compile time apart."""
+        """Wall time spent stepping so far, without compile time.
+
+        Returns
+        -------
+        float
+            Time [s].
+        """
         present = time.perf_counter() - self.started if self.started is not None else 0.0
         return self.run_seconds + present
 
     def cpu_seconds(self) -> float:
-        """CPU time spent stepping so far [s], compile time apart."""
+        """CPU time spent stepping so far, without compile time.
+
+        Returns
+        -------
+        float
+            Time [s].
+        """
         present = time.process_time() - self.started_cpu if self.started is not None else 0.0
         return self.run_cpu_seconds + present
 
     def evaluation_rate(self) -> float:
-        """Bonds and pairs to evaluate in a simulated second, if all levels stay as they are."""
+        """Bonds and pairs to evaluate in a simulated second, if all levels stay as they are.
+
+        Returns
+        -------
+        float
+            Rate [1/s].
+        """
         members = self.schedule.members()
         steps = 2.0 ** np.arange(len(members))
         if self.schedule.uniform:
@@ -307,14 +393,33 @@ class Simulation(Uncopied):
         return float(members @ steps) / self.method.dt0
 
     def gas_work(self) -> float:
-        """Work of the gas pressure [J], zero without it."""
+        """Work of the gas pressure.
+
+        Returns
+        -------
+        float
+            Work [J], zero without gas.
+        """
         places = [k for k, load in enumerate(self.model.loads) if isinstance(load, GasPressure)]
         return sum(self.energy_balance.load_work(place) for place in places)
 
     def report(self, brief: bool = False) -> Report:
         """Report of the run so far.
 
-        brief: whether to leave out a last comparison of all bodies, and the effects that it misses.
+        Parameters
+        ----------
+        brief : bool, default False
+            Whether to leave out a last comparison of all bodies, and the effects that it misses.
+
+        Returns
+        -------
+        Report
+            Figures and cost.
+
+        Raises
+        ------
+        InputError
+            The simulation was not started.
         """
         counts = [int(value) for value in self.schedule.evaluations.to_numpy()]
         if self.energy_balance is None:
@@ -373,7 +478,13 @@ class Simulation(Uncopied):
         )
 
     def acting_since(self) -> dict[str, np.ndarray]:
-        """Time [s] from which each effect acted on each body, by name; with effects="auto" only."""
+        """Time from which each effect acted on each body, with effects="auto".
+
+        Returns
+        -------
+        dict of ndarray
+            Times [s], shape (body_count,), by name; NaN for never.
+        """
         return acting_since(self.model, self.state, self.schedule)
 
 

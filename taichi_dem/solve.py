@@ -26,15 +26,46 @@ def solve(
     plan: Optional[Plan] = None,
     progress: Union[Listener, str, None] = AUTO,
 ) -> Answer:
-    """An output of a scene at a time, with an error bar that is as narrow as asked.
+    """Output of a scene at a time, with an error bar as narrow as asked.
 
-    until: simulated time [s]. goal: from ``taichi_dem.goals``. tolerance: largest half-width of
-    the bar, as a share of the value, in (0, 1]. confidence: of the bar, in (0, 1).
-    budget_s: CPU seconds after which no run is begun; None for no limit. plan: of the answer to a
-    question of a like scene, which then begins at the steps that were enough. progress: as of
-    ``simulate``.
-    The answer's ``shortfall`` says why a bar is wider than asked, and what would help.
-    Raises InputError for what cannot be used, SimulationDiverged where no step is stable.
+    Parameters
+    ----------
+    scene : Scene
+        Scene.
+    until : float
+        Simulated time [s].
+    goal : Goal
+        Output, from ``taichi_dem.goals``.
+    tolerance : float, default 0.01
+        Largest half-width of the bar, as a share of the value, above 0 and at most 1.
+    confidence : float, default 0.95
+        Probability [-] with which the bar holds the true value, above 0 and below 1.
+    budget_s : float, optional
+        CPU time after which no run is begun [s]; None for no limit.
+    plan : Plan, optional
+        Plan of the answer to a question of a similar scene: begin at the steps that were enough
+        there.
+    progress : callable or str or None, default "auto"
+        As in ``simulate``.
+
+    Returns
+    -------
+    Answer
+        Value, error bar and cost; ``shortfall`` says why a bar is wider than asked, and what would
+        help.
+
+    Raises
+    ------
+    InputError
+        An argument is out of its range, or the scene lacks what the goal asks for.
+    SimulationDiverged
+        No step is stable.
+
+    Examples
+    --------
+    >>> wanted = goals.hole_displacement()
+    >>> answer = solve(scene, until=1e-4, goal=wanted, tolerance=0.01)  # doctest: +SKIP
+    >>> print(answer)  # doctest: +SKIP
     """
     instance("scene", scene, Scene)
     instance("goal", goal, Goal).check_scene(scene)

@@ -33,27 +33,74 @@ _FRICTION = 0.5
 class Automaton:
     """Particles as a cellular automaton (Komatsuzaki et al., section 5).
 
-    accounting: which impulses act on the container: "landing" (of particles that meet a wall after
-    a change of cell), "landing+ejection" (also of those that a wall pushes along), "all", or
-    another word of ``accounting.ACCOUNTINGS``. static_contact: whether particles come to rest on
-    the floor and on the heap there, move with the container and weigh on it; None: as suits the
-    accounting, True with "all" and False with the others. restitution: between particles;
-    wall_restitution: between particle and wall. pair_rule: "both" of a pair change and momentum
-    stays in its line, or "one_sided" as printed: each that looks at another changes alone.
-    priority: of the events of a particle, at "random" or "pairs_first". accumulator: what a turn
-    does to the way travelled, one of accumulator.READINGS. static_threshold: relative speed below
-    which a particle rests on the heap, in units of g dt. width: of a cell, the diameter of a
-    particle [m]. columns, rows: cells inside the walls. particle_mass [kg], gravity [m/s^2]. v_max:
-    fastest particle to expect [m/s]; it bounds the step, dt < width / v_max. start: (column, row)
-    of every particle, counted from 0 at the lower left; cells are drawn from the seed if None.
-    traversal: "list" of particles or "scan" of all cells, same bits. ledger: write down where
-    uncounted momentum goes.
-    rules: "paper", those of the paper, or "place": particles fly any way, meet where their places
-    meet, and blows of one step leave the container with one velocity, whatever its mass. With
-    "place" accounting, pair_rule, priority, accumulator and ledger are as by default, and there is
-    Coulomb's friction: of two particles, and wall_friction of particle and wall; None: 0.5 with
-    "place", as that of the spheres, and none in the rules of the paper.
-    Raises InputError for what is not allowed.
+    One particle a cell of a triangular lattice; a particle changes its cell when it has travelled
+    the width of one. Instances are immutable and checked when they are made.
+
+    Parameters
+    ----------
+    accounting : str, default "all"
+        Impulses that act on the container: ``"landing"`` (of particles that meet a wall after a
+        change of cell), ``"landing+ejection"`` (also of those that a wall pushes along), ``"all"``,
+        or another key of ``accounting.ACCOUNTINGS``.
+    static_contact : bool, optional
+        Whether particles come to rest on the floor and on the heap there, move with the container
+        and weigh on it. None: True with accounting ``"all"``, False with the others.
+    restitution : float, default 0.75
+        Restitution coefficient between particles, from 0 to 1.
+    wall_restitution : float, default 0.75
+        Restitution coefficient between particle and wall, from 0 to 1.
+    pair_rule : str, default "both"
+        ``"both"``: both particles of a pair change and momentum along its line is conserved;
+        ``"one_sided"``: as printed in the paper, each particle that looks at another changes alone.
+    priority : str, default "random"
+        Order of the events of a particle: ``"random"`` or ``"pairs_first"``.
+    accumulator : str, default "signed"
+        Effect of a turn on the distance travelled, one of ``accumulator.READINGS``.
+    static_threshold : float, default 5.0
+        Relative speed, as a factor of g dt, below which a particle rests on the heap.
+    width : float, default 0.006
+        Width of a cell, the diameter of a particle [m].
+    columns : int, default 10
+        Number of columns of cells inside the walls.
+    rows : int, default 16
+        Number of rows of cells inside the walls.
+    particle_mass : float, default 0.0002
+        Mass of a particle [kg].
+    gravity : float, default 10.0
+        Gravity, downwards [m/s^2].
+    v_max : float, default 5.0
+        Largest particle speed to expect [m/s]. It bounds the step: dt < width / v_max.
+    start : tuple of (int, int), optional
+        (column, row) of every particle, counted from 0 at the lower left. None: cells are drawn
+        from the seed of the scene.
+    traversal : str, default "list"
+        ``"list"`` of particles or ``"scan"`` of all cells; both give the same bits.
+    ledger : bool, default False
+        Whether to record the momentum that the accounting leaves out.
+    rules : str, default "paper"
+        ``"paper"``: rules of the paper. ``"place"``: particles fly in any direction, collide where
+        their positions meet, and all impacts of a step are given to the container together.
+        ``"place"`` needs the defaults of accounting, pair_rule, priority, accumulator and ledger.
+    friction : float, optional
+        Friction coefficient between particles, for rules ``"place"`` only. None: 0.5 there, no
+        friction by the rules of the paper.
+    wall_friction : float, optional
+        Friction coefficient between particle and wall, likewise.
+
+    Raises
+    ------
+    InputError
+        A value is out of its range, or two options exclude each other.
+
+    References
+    ----------
+    Komatsuzaki, Sato, Iwata, Morishita, "Modeling of granular damper using cellular automata",
+    section 5.
+
+    Examples
+    --------
+    >>> Automaton(rules="place", columns=12).capacity
+    192
     """
 
     accounting: str = "all"
@@ -171,7 +218,7 @@ class Automaton:
 
     @property
     def frictions(self) -> tuple[float, float]:
-        """Coefficients between particles and between particle and wall; 0 by the paper's rules."""
+        """Friction coefficients between particles and at the wall; 0 by the paper's rules."""
         usual = _FRICTION if self.rules == "place" else 0.0
         asked = (self.friction, self.wall_friction)
         between, at_wall = (usual if value is None else value for value in asked)
@@ -219,11 +266,40 @@ class Automaton:
         return self.longest_dt, "a cell crossed at v_max"
 
     def clearance(self, particles: int) -> float:
-        """Way from so many settled particles to the lid [m]."""
+        """Distance from settled particles to the lid.
+
+        Parameters
+        ----------
+        particles : int
+            Number of particles.
+
+        Returns
+        -------
+        float
+            Clearance [m].
+        """
         return self.width * (self.rows - particles / self.columns)
 
     def with_clearance(self, particles: int, clearance: float) -> "Automaton":
-        """The same in a box with a clearance [m] above so many; InputError for parts of a cell."""
+        """Return a copy with a box as high as a clearance needs.
+
+        Parameters
+        ----------
+        particles : int
+            Number of settled particles.
+        clearance : float
+            Distance from the settled particles to the lid [m]; a whole number of cells.
+
+        Returns
+        -------
+        Automaton
+            The same options with another number of rows.
+
+        Raises
+        ------
+        InputError
+            The box would end within a cell.
+        """
         rows = clearance / self.width + particles / self.columns
         if abs(rows - round(rows)) > 1e-6:
             raise InputError(
@@ -233,7 +309,7 @@ class Automaton:
         return replace(self, rows=round(rows))
 
     def check(self, particles: int, dt: float) -> None:
-        """InputError unless so many particles fit and the step is shorter than width / v_max."""
+        """Refuse particles that do not fit, or a step that is not below width / v_max."""
         whole("particles", particles, 0, self.capacity)
         if self.start is not None and particles != len(self.start):
             raise InputError(

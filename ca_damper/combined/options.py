@@ -15,10 +15,20 @@ from taichi_dem.kit.validation import whole
 class Combined(Spheres):
     """Spheres that take short steps where contacts last, and long ones while all of them fly.
 
-    A step is as long as one of the automaton. Where nothing can touch anything in it, by bounds of
-    all speeds, the grains fly through it at once; else they take ``substeps`` steps of spheres.
-    What grains give the container in a step is one impulse, whichever way they went. The other
-    options are those of Spheres.
+    A step is as long as one of the automaton. Where no contact is possible in it, by bounds of all
+    speeds, the grains fly through it at once; else they take ``substeps`` steps of spheres. The
+    impulse of a step on the container is the sum of both. All other parameters are those of
+    ``Spheres``.
+
+    Parameters
+    ----------
+    substeps : int, default 5
+        Steps of spheres in a step with contacts, from 1 to 1000.
+
+    Raises
+    ------
+    InputError
+        A value is out of its range, or ``search`` is not ``"cells"``.
     """
 
     substeps: int = 5

@@ -125,11 +125,14 @@ class LoadedScenes(Uncopied):
         return self.time_origin + self._read_status()[0] * self.table.column("dt")
 
     def sample(self) -> dict[str, np.ndarray]:
-        """The present state: arrays (scenes,) by name.
+        """Read the present state of all scenes.
 
-        time_s; x [m], v [m/s], a [m/s^2] of the container, y [m] of the base; force [N]: mean of
-        the filling on the container in the last step; energy [J], momentum [kg m/s] of the
-        particles.
+        Returns
+        -------
+        dict
+            Arrays (scenes,) by name: time_s [s]; x [m], v [m/s], a [m/s^2] of the container; y [m]
+            of the base; force [N], mean of the filling on the container in the last step; energy
+            [J] and momentum [kg m/s] of the particles.
         """
         self._check_started()
         values = np.empty((len(measures.SAMPLE), self.count))
@@ -137,11 +140,18 @@ class LoadedScenes(Uncopied):
         return {"time_s": self.time_s, **dict(zip(measures.SAMPLE, values))}
 
     def time_series(self) -> dict[str, np.ndarray]:
-        """Samples that the last run recorded, and its end: arrays (samples, scenes) by name.
+        """Samples that the last run recorded, and its end.
 
-        time_s; x [m], v [m/s] of the container, y [m] of the base, force [N] of the filling on the
-        container: mean since the sample before, in the first one that of the last step. Raises
-        InputError where nothing was recorded.
+        Returns
+        -------
+        dict
+            Arrays (samples, scenes) by name: time_s [s]; x [m], v [m/s] of the container; y [m] of
+            the base; force [N] of the filling on the container, mean since the sample before.
+
+        Raises
+        ------
+        InputError
+            Nothing was recorded.
         """
         if self._recording is None:
             raise InputError("record_every of a run must be at least 1 before time_series, got 0")
@@ -176,12 +186,29 @@ class LoadedScenes(Uncopied):
         self.engine.recorder.aim(every)
 
     def snapshot(self, s: int) -> dict[str, np.ndarray]:
-        """Positions and velocities of the particles of scene s, from the filling."""
+        """Positions and velocities of the particles of a scene.
+
+        Parameters
+        ----------
+        s : int
+            Number of the scene, from 0.
+
+        Returns
+        -------
+        dict
+            As ``DeviceFilling.snapshot``: position [m] and velocity [m/s], each (particles, 2).
+        """
         self._check_started()
         return self.device.snapshot(whole("s", s, 0, self.count - 1))
 
     def attempts(self) -> np.ndarray:
-        """Steps that RK45 has tried since the start, (scenes,); one a step unless some failed."""
+        """Steps that RK45 has tried since the start; one a step unless some failed.
+
+        Returns
+        -------
+        ndarray
+            Counts, shape (scenes,).
+        """
         engine = self.engine
         return engine.table.in_use(engine.coupling.attempts)
 

@@ -30,12 +30,30 @@ def from_csv(
 ) -> Signal:
     """Signal from a CSV file, such as a measured motion of a base.
 
-    The first line that is not empty and does not begin with "#" names the columns: "time_s" or
-    "time_ms", and what was measured: displacement_m, _mm or _um, acceleration_m_s2, _mm_s2 or _g,
-    or force_N. column: which of these to take, if there are several. correct_baseline: of an
-    acceleration, as in ``from_samples``.
-    Raises InputError for a file that cannot be read, for text, empty cells, NaN, gaps, times that
-    run backwards, and for a step too coarse for the motion's spectrum.
+    The first line that is not empty and does not begin with "#" names the columns: time_s or
+    time_ms, and what was measured: displacement_m, _mm or _um, acceleration_m_s2, _mm_s2 or _g, or
+    force_N.
+
+    Parameters
+    ----------
+    path : path
+        CSV file.
+    column : str, optional
+        Column to take; needed where there are several of them.
+    correct_baseline : bool, default True
+        For an acceleration: subtract a straight line so that the motion ends at rest where it
+        began, as in ``from_samples``.
+
+    Returns
+    -------
+    Signal
+        Displacement [m] or force [N].
+
+    Raises
+    ------
+    InputError
+        The file cannot be read; it holds text, empty cells, NaN, gaps or times that run backwards;
+        or its step is too coarse for the spectrum of the motion.
     """
     name = path_name("path", path)
     flag("correct_baseline", correct_baseline)

@@ -23,8 +23,24 @@ class ExcitationKind(NamedTuple):
 class SineForce:
     """Force on the container, amplitude * sin(2 pi frequency t + phase), upwards.
 
-    amplitude [N], frequency [Hz], phase [rad]: each one number for all scenes or one for each.
-    Raises InputError unless they are finite, and for a frequency that is not positive.
+    Parameters
+    ----------
+    amplitude : float or sequence of float
+        Amplitude [N], one number for all scenes or one for each.
+    frequency : float or sequence of float
+        Frequency [Hz], likewise.
+    phase : float or sequence of float, default 0.0
+        Phase [rad], likewise.
+
+    Raises
+    ------
+    InputError
+        A number is not finite, or a frequency is not positive.
+
+    Examples
+    --------
+    >>> SineForce(amplitude=0.1, frequency=6.0)
+    SineForce(amplitude=0.1, frequency=6.0, phase=0.0)
     """
 
     amplitude: Any
@@ -38,7 +54,23 @@ class SineForce:
             raise InputError(f"frequency must be positive, got {shown(self.frequency)}")
 
     def rows(self, scenes: int) -> np.ndarray:
-        """Amplitude, frequency and phase of each scene, (3, scenes); InputError if they misfit."""
+        """Amplitude, frequency and phase of each scene.
+
+        Parameters
+        ----------
+        scenes : int
+            Number of scenes.
+
+        Returns
+        -------
+        ndarray
+            Amplitude [N], frequency [Hz] and phase [rad], shape (3, scenes).
+
+        Raises
+        ------
+        InputError
+            The numbers are neither one for all scenes nor one for each.
+        """
         values = (self.amplitude, self.frequency, self.phase)
         try:
             return np.stack([np.broadcast_to(one, scenes) for one in map(np.asarray, values)])
@@ -50,11 +82,20 @@ class SineForce:
 
 @dataclass(frozen=True)
 class Excitation:
-    """What shakes the scenes of a batch.
+    """Motion of the base and force on the container, for the scenes of a batch.
 
-    base: displacement of the base as a Signal [m], or one for each scene; None for the sine of the
-    scenes' table. force: on the container, upwards: a SineForce, a Signal [N] or one for each
-    scene, or None.
+    Parameters
+    ----------
+    base : Signal or sequence of Signal, optional
+        Displacement of the base [m], one for all scenes or one for each; None for the sine of the
+        scenes' table (in ``shake``: a base at rest).
+    force : SineForce or Signal or sequence of Signal, optional
+        Force on the container [N], upwards; None for no force.
+
+    Raises
+    ------
+    InputError
+        A member is no Signal, or the sequence is empty.
     """
 
     base: Union[Signal, Sequence[Signal], None] = None
@@ -71,16 +112,31 @@ class Excitation:
 
     @property
     def kind(self) -> ExcitationKind:
-        """What of it is compiled."""
+        """Kind of base motion and force, which is compiled."""
         base = "sine" if self.base is None else "signal"
         if isinstance(self.force, SineForce):
             return ExcitationKind(base, "sine")
         return ExcitationKind(base, "none" if self.force is None else "signal")
 
     def signals(self, role: str, scenes: int) -> tuple[Signal, ...]:
-        """Signal of each scene for "base" or "force"; empty where there is none.
+        """Signal of each scene for a role.
 
-        InputError for another number of signals than scenes.
+        Parameters
+        ----------
+        role : str
+            ``"base"`` or ``"force"``.
+        scenes : int
+            Number of scenes.
+
+        Returns
+        -------
+        tuple of Signal
+            One for each scene; empty where there is none.
+
+        Raises
+        ------
+        InputError
+            The number of signals differs from that of the scenes.
         """
         value = getattr(self, role)
         if value is None or isinstance(value, SineForce):
@@ -91,16 +147,44 @@ class Excitation:
         return given * scenes if len(given) == 1 else given
 
     def sizes(self, scenes: int) -> dict[str, int]:
-        """Nodes of all signals, by role."""
+        """Nodes of all signals, by role.
+
+        Parameters
+        ----------
+        scenes : int
+            Number of scenes.
+
+        Returns
+        -------
+        dict of int
+            Number of nodes by the name of a place in an engine.
+        """
         made = {role: self.signals(role, scenes) for role in ("base", "force")}
         return {f"{role}_nodes": len(packed(given)[0]) for role, given in made.items() if given}
 
     def identity(self) -> str:
-        """Words that are the same for equal excitations, whatever their labels."""
+        """Words that are the same for equal excitations, whatever their labels.
+
+        Returns
+        -------
+        str
+            Digest of base and force.
+        """
         return f"base {_identity(self.base)}, force {_identity(self.force)}"
 
     def duration(self, scenes: int) -> np.ndarray:
-        """Time up to which each scene is excited [s], infinite for sines, (scenes,)."""
+        """Time up to which each scene is excited.
+
+        Parameters
+        ----------
+        scenes : int
+            Number of scenes.
+
+        Returns
+        -------
+        ndarray
+            Time [s], shape (scenes,); infinite for sines.
+        """
         ends = np.full(scenes, np.inf)
         for role in ("base", "force"):
             given = self.signals(role, scenes)

@@ -31,10 +31,36 @@ def sines(
 ) -> Signal:
     """Sum of sines, amplitude * sin(2 pi frequency t + phase).
 
-    frequencies [Hz], amplitudes, phases [rad]: one or several, broadcast against each other.
-    duration [s]. of: amplitudes are those of the "value" or of its "acceleration" (its second
-    derivative; the value is then divided by -(2 pi frequency)^2). step: between nodes [s], a
-    fortieth of the shortest cycle if None.
+    Parameters
+    ----------
+    frequencies : float or sequence of float
+        Frequencies [Hz], one or several.
+    amplitudes : float or sequence of float
+        Amplitudes, in the unit of the value or of its acceleration, see ``of``.
+    duration : float
+        Duration [s].
+    phases : float or sequence of float, default 0.0
+        Phases [rad]. Frequencies, amplitudes and phases are broadcast against each other.
+    of : str, default "value"
+        ``"value"`` or ``"acceleration"``: what the amplitudes belong to. The value has the
+        amplitude of the acceleration over -(2 pi frequency)^2.
+    step : float, optional
+        Step between nodes [s]; a fortieth of the shortest cycle if None.
+
+    Returns
+    -------
+    Signal
+        Sum of the sines.
+
+    Raises
+    ------
+    InputError
+        Numbers do not broadcast, or a number or step is out of range.
+
+    Examples
+    --------
+    >>> sines([5.0, 8.0], [1e-3, 5e-4], duration=2.0).duration
+    2.0
     """
     choice("of", of, OF)
     lists = [several("frequencies", frequencies, positive)]
@@ -65,11 +91,36 @@ def sweep(
     of: str = "value",
     step: Optional[float] = None,
 ) -> Signal:
-    """Sine whose frequency goes from ``low`` to ``high`` [Hz], or down, within the duration [s].
+    """Sine whose frequency goes from ``low`` to ``high``, or down.
 
-    way: "linear", by the same number of Hz in any second, or "logarithmic", by the same number of
-    octaves. of: what keeps its amplitude, the "value", or its "acceleration" (but for the slow
-    change of the frequency). step: as in ``sines``.
+    Parameters
+    ----------
+    low : float
+        Frequency at the beginning [Hz].
+    high : float
+        Frequency at the end [Hz].
+    amplitude : float
+        Amplitude, in the unit of the value or of its acceleration, see ``of``.
+    duration : float
+        Duration [s].
+    way : str, default "linear"
+        ``"linear"``: as many Hz in every second; ``"logarithmic"``: as many octaves in every
+        second.
+    of : str, default "value"
+        ``"value"`` or ``"acceleration"``: what keeps its amplitude, the latter but for the slow
+        change of the frequency.
+    step : float, optional
+        Step between nodes [s], as in ``sines``.
+
+    Returns
+    -------
+    Signal
+        The sweep.
+
+    Raises
+    ------
+    InputError
+        A number is out of its range.
     """
     low, high, amplitude = (
         positive("low", low),
@@ -103,11 +154,37 @@ def random_vibration(
 ) -> Signal:
     """Stationary random vibration of a one-sided power spectral density.
 
-    frequencies [Hz]: ascending break points. density: there, [unit^2/Hz] with the unit of
-    the "acceleration", m/s^2, or of the "value", as ``of`` says; between them straight lines in a
-    doubly logarithmic diagram, beyond them nothing. Lines of the spectrum lie 1 / duration apart,
-    with amplitudes sqrt(2 density / duration) and phases at random from the seed: the mean square
-    over the duration is that of the density. step: as in ``sines``.
+    Parameters
+    ----------
+    frequencies : sequence of float
+        Break points of the density [Hz], ascending.
+    density : sequence of float
+        One-sided power spectral density at the break points [unit^2/Hz], with the unit of the
+        acceleration, m/s^2, or of the value; straight lines between them in a doubly logarithmic
+        diagram, zero outside.
+    duration : float
+        Duration [s].
+    seed : int, default 1
+        Seed of the phases.
+    of : str, default "acceleration"
+        ``"acceleration"`` or ``"value"``: what the density belongs to.
+    step : float, optional
+        Step between nodes [s], as in ``sines``.
+
+    Returns
+    -------
+    Signal
+        Displacement or value over time.
+
+    Raises
+    ------
+    InputError
+        Break points do not ascend, or the duration is too short for a line of the spectrum.
+
+    Notes
+    -----
+    Lines of the spectrum are 1 / duration apart and have amplitudes sqrt(2 density / duration) and
+    random phases: the mean square over the duration is that of the density.
     """
     choice("of", of, OF)
     points = np.array(several("frequencies", frequencies, positive))

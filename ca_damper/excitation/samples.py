@@ -27,12 +27,35 @@ def from_samples(
 ) -> Signal:
     """Signal through measured samples; its own time counts from the first of them.
 
-    time_s: evenly spaced times [s], (samples,). values: (samples,), of: the signal's "value", such
-    as a displacement [m] or a force [N], or its "acceleration" [m/s^2], which is integrated twice
-    from rest. correct_baseline: take from an acceleration the straight line that lets the motion
-    end at rest where it began; without it, small offsets integrate to large drifts.
-    Raises InputError for samples that are no finite numbers, for times with gaps or that run
-    backwards, and for a step that is too coarse for the samples' spectrum.
+    Parameters
+    ----------
+    time_s : array_like
+        Evenly spaced times [s], shape (samples,).
+    values : array_like
+        Samples, shape (samples,), of the kind that ``of`` names.
+    of : str, default "value"
+        ``"value"``: of the signal itself, such as a displacement [m] or a force [N].
+        ``"acceleration"``: of its second derivative [m/s^2], which is integrated twice from rest.
+    correct_baseline : bool, default True
+        Subtract from an acceleration the straight line that lets the motion end at rest where it
+        began; without it, small offsets integrate to large drifts.
+
+    Returns
+    -------
+    Signal
+        Cubic spline through the samples, or their exact double integral.
+
+    Raises
+    ------
+    InputError
+        Samples are not finite, times have gaps or run backwards, or the step is too coarse: 99 % of
+        the power must lie below a quarter of the sampling rate.
+
+    Examples
+    --------
+    >>> time = np.linspace(0.0, 1.0, 1001)
+    >>> from_samples(time, 1e-3 * np.sin(2 * np.pi * 5 * time)).duration
+    1.0
     """
     choice("of", of, OF)
     flag("correct_baseline", correct_baseline)

@@ -27,9 +27,28 @@ LEAST_NODES, MOST_NODES = 4, 2**24
 class Signal:
     """A smooth function of time from t = 0, such as a base displacement [m] or a force [N].
 
-    step: between nodes [s]. value: at the nodes, (nodes,). bend: second derivative there, (nodes,).
-    label: what it is, in words. Made by the functions of ``ca_damper.excitation``.
-    Raises InputError unless the arrays are finite and of one length.
+    A cubic spline with two continuous derivatives. It is made by the functions of
+    ``ca_damper.excitation``.
+
+    Parameters
+    ----------
+    step : float
+        Time between nodes [s].
+    value : ndarray
+        Values at the nodes, shape (nodes,).
+    bend : ndarray
+        Second derivative at the nodes, shape (nodes,).
+    label : str, default "signal"
+        Description in words.
+
+    Raises
+    ------
+    InputError
+        The arrays are not finite or differ in length.
+
+    References
+    ----------
+    de Boor, A Practical Guide to Splines, chapter IV ("not a knot").
     """
 
     step: float
@@ -56,7 +75,18 @@ class Signal:
         return self.step * (len(self.value) - 1)
 
     def at(self, time_s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Value, first and second derivative at times [s] within the duration, as the kernels."""
+        """Value, first and second derivative at given times, as kernels evaluate them.
+
+        Parameters
+        ----------
+        time_s : ndarray
+            Times within the duration [s], any shape.
+
+        Returns
+        -------
+        tuple of (ndarray, ndarray, ndarray)
+            Value, derivative [1/s] and second derivative [1/s^2], in the unit of the signal.
+        """
         place = np.asarray(time_s, dtype=np.float64) / self.step
         k = np.clip(np.floor(place).astype(np.int64), 0, len(self.value) - 2)
         u, h = place - k, self.step
@@ -67,7 +97,23 @@ class Signal:
         return value, slope, w * m0 + u * m1
 
     def scaled(self, factor: float) -> "Signal":
-        """The same, multiplied by a factor."""
+        """Return the signal multiplied by a factor.
+
+        Parameters
+        ----------
+        factor : float
+            Factor.
+
+        Returns
+        -------
+        Signal
+            The scaled signal.
+
+        Raises
+        ------
+        InputError
+            The factor is not finite.
+        """
         if not finite(factor):
             raise InputError(f"factor must be a finite number, got {shown(factor)}")
         label = f"{factor:g} times {self.label}"

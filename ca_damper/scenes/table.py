@@ -15,13 +15,44 @@ _MOST_SCENES, _MOST_SEED = 2**24, 2**31 - 1
 class SceneTable:
     """Parameters of each scene of a batch, one row a scene; plain NumPy.
 
-    particles [-], seed [-], dt [s], frequency [Hz] and base_amplitude [m] of the base motion, and
-    the primary structure: mass [kg], stiffness [N/m], damping [N s/m].
+    Plain NumPy. Parameters are given as scalars or sequences and are broadcast against each other.
+    They are checked to be numbers here, and whole ones where they count; a Batch checks their
+    ranges. What a scene does depends on its own row only, so that no bit depends on the rest of the
+    batch.
 
-    The numbers are given as scalars or sequences and are broadcast against each other. Here they
-    are checked to be numbers, whole ones where they count; a Batch checks their ranges. Whatever a
-    scene does depends on its own row only (on its seed, not on its index), so that no bit depends
-    on what else is in the batch. Raises InputError.
+    Parameters
+    ----------
+    particles : int or array_like
+        Number of particles.
+    seed : int or array_like
+        Seed.
+    dt : float or array_like
+        Step [s].
+    frequency : float or array_like, default 6.0
+        Frequency of the base [Hz].
+    base_amplitude : float or array_like, default 0.0
+        Amplitude of the base [m].
+    mass : float or array_like, default 0.086
+        Mass of the empty container [kg].
+    stiffness : float or array_like, default 123.4
+        Stiffness of its spring [N/m].
+    damping : float or array_like, default 0.08
+        Damping of its dashpot [N s/m].
+
+    Attributes
+    ----------
+    count : int
+        Number of scenes.
+
+    Raises
+    ------
+    InputError
+        A value is no number, or the numbers of rows differ.
+
+    Examples
+    --------
+    >>> SceneTable([10, 20, 30], seed=1, dt=1e-4).count
+    3
     """
 
     COLUMNS = (
@@ -46,7 +77,13 @@ class SceneTable:
         self._host = dict(zip(self.COLUMNS, map(_kept, self.COLUMNS, rows)))
 
     def copy(self) -> "SceneTable":
-        """A table of the same numbers, to be changed without this one."""
+        """Return a table of the same numbers.
+
+        Returns
+        -------
+        SceneTable
+            The copy.
+        """
         return SceneTable(**self._host)
 
     def __repr__(self) -> str:
@@ -58,10 +95,18 @@ class SceneTable:
         return in_brief(self, counted(self.count, "scene"), *words)
 
     def change(self, **numbers: Any) -> None:
-        """Replace numbers of all scenes by name, each a scalar or (scenes,).
+        """Replace numbers of all scenes by name.
 
-        Raises InputError for a name that is no column, and for what the constructor refuses; the
-        table is then as it was.
+        Parameters
+        ----------
+        **numbers : float or array_like
+            Numbers by the name of a column, each a scalar or (scenes,).
+
+        Raises
+        ------
+        InputError
+            A name is no column, or the constructor would refuse the number; the table stays as it
+            was.
         """
         for name in numbers:
             choice("number to change", name, self.COLUMNS)
@@ -73,16 +118,46 @@ class SceneTable:
         self._host = changed._host
 
     def drive(self, frequency: Any, dt: Any) -> None:
-        """Change frequency [Hz] and step [s] of all scenes, each a scalar or (scenes,)."""
+        """Change frequency and step of all scenes.
+
+        Parameters
+        ----------
+        frequency : float or array_like
+            Frequency of the base [Hz], a scalar or (scenes,).
+        dt : float or array_like
+            Step [s], a scalar or (scenes,).
+        """
         for name, values in (("frequency", frequency), ("dt", dt)):
             self._host[name] = _kept(name, np.broadcast_to(values, self.count))
 
     def column(self, name: str) -> np.ndarray:
-        """Column of the table by name, (scenes,); it refuses to be written, see ``change``."""
+        """Column of the table by name.
+
+        Parameters
+        ----------
+        name : str
+            Name of the column.
+
+        Returns
+        -------
+        ndarray
+            Values, shape (scenes,); read-only, see ``change``.
+        """
         return self._host[name]
 
     def row(self, s: int) -> dict[str, Any]:
-        """Numbers of scene s by name."""
+        """Numbers of a scene by name.
+
+        Parameters
+        ----------
+        s : int
+            Number of the scene, from 0.
+
+        Returns
+        -------
+        dict
+            Numbers by the name of the column.
+        """
         return {name: self._host[name][s].item() for name in self.COLUMNS}
 
 

@@ -50,26 +50,68 @@ _ROUNDING = 1e-9
 class Spheres:
     """Spheres of one size, or of several, in a box, by discrete elements (section 4 of the paper).
 
-    damping: "tsuji", a dashpot with d^(1/4), for one restitution at every speed, or "printed", with
-    d^(1/2) as in eq. (3), for the restitution at ``reference_speed`` [m/s] only: slower contacts
-    rebound more, faster ones less.
-    restitution, friction [-], young [Pa], poisson [-]: of two spheres; with ``wall_``: of sphere
-    and container, whose modulus and Poisson's ratio these are.
-    diameter [m], particle_mass [kg]: of a sphere; with ``sizes`` the largest diameter, and the mean
-    mass of all spheres, which are of one density. sizes: (number, diameter [m]) of each size; the
-    box holds as many as there would be of the largest.
-    width, height [m]: of the box inside. gravity [m/s^2]: downwards, or (to the right, downwards),
-    as for a box that lies on its side or is tilted.
-    friction_law: "viscous", which at small slip grows with it, so that heaps creep, or "history",
-    with a tangential spring for each contact, which holds. rotation: whether spheres turn; the
-    paper leaves it out.
-    search: "cells", or "all_pairs" as in the paper; the same bits, but slower above 10 spheres.
-    start: places of the spheres [m], shape (particles, 2), from the lower left inner corner, for
-    all scenes alike; by default random ones from each scene's seed. start_velocity: of the spheres
-    [m/s], shape (particles, 2), seen from the container; by default none, or a little at random
-    places.
+    Parameters
+    ----------
+    damping : str, default "tsuji"
+        ``"tsuji"``: a dashpot with d^(1/4), d the overlap, for one restitution at every speed.
+        ``"printed"``: with d^(1/2) as in eq. (3), for the restitution at ``reference_speed`` only.
+    restitution : float, default 0.75
+        Restitution coefficient between spheres, from 0.01 to 1. Not printed in the paper; 0.75 is
+        ours.
+    wall_restitution : float, default 0.75
+        Restitution coefficient between sphere and container, likewise.
+    friction : float, default 0.5
+        Friction coefficient between spheres.
+    wall_friction : float, default 0.5
+        Friction coefficient between sphere and container.
+    reference_speed : float, default 0.5
+        Speed at which ``"printed"`` has its restitution [m/s]. Not printed in the paper.
+    young : float, default 500000000.0
+        Young's modulus of the spheres [Pa].
+    wall_young : float, default 500000000.0
+        Young's modulus of the container [Pa].
+    poisson : float, default 0.3
+        Poisson's ratio of the spheres.
+    wall_poisson : float, default 0.3
+        Poisson's ratio of the container.
+    diameter : float, default 0.006
+        Diameter of a sphere [m]; with ``sizes`` it becomes the largest one.
+    particle_mass : float, default 0.0002
+        Mass of a sphere [kg]; with ``sizes`` the mean of all spheres, which are of one density.
+    width : float, default 0.06
+        Inner width of the box [m].
+    height : float, default 0.096
+        Inner height of the box [m].
+    gravity : float or tuple of (float, float), default 9.8
+        Gravity [m/s^2]: downwards, or (to the right, downwards), as for a box that is tilted.
+    rotation : bool, default False
+        Whether spheres turn; the paper leaves it out.
+    search : str, default "cells"
+        ``"cells"``, or ``"all_pairs"`` as in the paper: the same bits, but slower above 10 spheres.
+    start : array_like, optional
+        Positions of the spheres from the lower left inner corner [m], shape (particles, 2), for all
+        scenes. None: random ones from the seed of each scene.
+    friction_law : str, default "viscous"
+        ``"viscous"``: grows with small slip, so that heaps creep. ``"history"``: a tangential
+        spring for each contact, which holds.
+    sizes : sequence of (int, float), optional
+        (number, diameter [m]) of each size; the box holds as many as there would be of the largest.
+    start_velocity : array_like, optional
+        Velocities of the spheres relative to the container [m/s], shape (particles, 2).
 
-    Restitution and reference speed are not printed in the paper; 0.75 and 0.5 m/s are ours.
+    Raises
+    ------
+    InputError
+        A value is out of its range, or the box holds too few or too many spheres.
+
+    References
+    ----------
+    Komatsuzaki et al., section 4.
+
+    Examples
+    --------
+    >>> Spheres(width=0.03).capacity
+    80
     """
 
     damping: str = "tsuji"
@@ -139,8 +181,20 @@ class Spheres:
         return ("normal contact", *(name for name, there in asked.items() if there))
 
     def activated(self, particles: int) -> tuple["Spheres", tuple[Estimate, ...]]:
-        """These spheres with the effects that at most so many of them call for, and estimates.
+        """Return these spheres with the effects that a number of them calls for, and estimates.
 
+        Parameters
+        ----------
+        particles : int
+            Largest number of spheres.
+
+        Returns
+        -------
+        tuple of (Spheres, tuple)
+            The spheres, and an Estimate of each effect that was decided.
+
+        Notes
+        -----
         Friction is computed unless its coefficients are zero; rotation unless it is negligible.
         """
         estimate = rotation_estimate(self, particles)
@@ -148,7 +202,18 @@ class Spheres:
         return chosen, (estimate,)
 
     def left_out(self, particles: int) -> tuple[Estimate, ...]:
-        """Size of the effects that are not computed."""
+        """Size of the effects that are not computed.
+
+        Parameters
+        ----------
+        particles : int
+            Number of spheres.
+
+        Returns
+        -------
+        tuple of Estimate
+            An estimate of each.
+        """
         found = () if self.rotation else (rotation_estimate(self, particles),)
         return (*found, air_estimate(self))
 
@@ -190,16 +255,40 @@ class Spheres:
         return self.lattice[0] * self.lattice[1]
 
     def clearance(self, particles: int) -> float:
-        """Way from so many settled spheres to the lid [m]."""
+        """Distance from settled spheres to the lid.
+
+        Parameters
+        ----------
+        particles : int
+            Number of spheres.
+
+        Returns
+        -------
+        float
+            Clearance [m].
+        """
         return self.height - self.diameter * particles / self.lattice[0]
 
     def with_clearance(self, particles: int, clearance: float) -> "Spheres":
-        """The same in a box with a clearance [m] above so many settled spheres."""
+        """Return a copy with a box as high as a clearance needs.
+
+        Parameters
+        ----------
+        particles : int
+            Number of settled spheres.
+        clearance : float
+            Distance from the settled spheres to the lid [m].
+
+        Returns
+        -------
+        Spheres
+            The same options with another height.
+        """
         layers = particles / self.lattice[0]
         return replace(self, height=self.diameter * layers + clearance)
 
     def check(self, particles: int, dt: float) -> None:
-        """Raise InputError for an invalid number of spheres or step [s].
+        """Refuse an invalid number of spheres or step [s].
 
         A step too long for the contacts is not refused: how long it may be depends on how fast the
         spheres come to move. Such a run ends as diverged.
@@ -221,7 +310,13 @@ class Spheres:
         return DIVERGENCES[code], min(self.safe_step(), 0.5 * dt)
 
     def safe_step(self) -> float:
-        """Step [s] that resolves the contact of two spheres that fell through the box."""
+        """Step that resolves the contact of two spheres that fell through the box.
+
+        Returns
+        -------
+        float
+            Step [s].
+        """
         smallest = min(range(len(self.radii)), key=self.radii.__getitem__)
         numbers = pair_numbers(self, smallest, smallest)
         across, down = self.fall

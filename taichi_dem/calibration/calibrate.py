@@ -34,12 +34,31 @@ _SETS = {
 
 @dataclass(frozen=True)
 class Targets:
-    """What a mesh and its specimens are to show; None for what is not asked for.
+    """Elastic constants and strengths that a mesh and its specimens are to show.
 
-    young [Pa], poisson: of the mesh, the mean over all directions. tension: strength of a prism in
-    direct tension [Pa]. brazilian: 2 P / (pi D t) of a disc between two arcs of 20 degrees [Pa].
-    compression: strength of a prism between ends that hold it, twice as long as wide [Pa].
-    Raises InputError for a value out of its range.
+    Parameters
+    ----------
+    young : float, optional
+        Young's modulus of the mesh [Pa], the mean over all directions; None where it is not asked
+        for, likewise for all that follow.
+    poisson : float, optional
+        Poisson's ratio of the mesh.
+    tension : float, optional
+        Strength of a prism in direct tension [Pa].
+    brazilian : float, optional
+        Splitting strength 2 P / (pi D t) of a disc between two arcs of 20 degrees [Pa].
+    compression : float, optional
+        Strength of a prism between ends that hold it, twice as long as wide [Pa].
+
+    Raises
+    ------
+    InputError
+        A value is out of its range, or none is given.
+
+    Examples
+    --------
+    >>> Targets(young=30e9, tension=3e6).young
+    30000000000.0
     """
 
     young: Optional[float] = None
@@ -60,7 +79,19 @@ class Targets:
 
 @dataclass(frozen=True)
 class Match:
-    """A target and what was found. set: whether a constant of the bonds was free to meet it."""
+    """A target of a calibration and what was found.
+
+    Parameters
+    ----------
+    name : str
+        Name of the target.
+    target : float
+        Wanted value [Pa], of Poisson's ratio [-].
+    found : float
+        Value that was found, in the same unit [Pa or -].
+    set : bool
+        Whether a constant of the bonds was free to meet it.
+    """
 
     name: str
     target: float
@@ -69,12 +100,23 @@ class Match:
 
     @property
     def misfit(self) -> float:
-        """Deviation: of Poisson's ratio as it is, of all else as a share of the target."""
+        """Deviation as a share of the target; of Poisson's ratio, as it is."""
         apart = self.found - self.target
         return apart if self.name == "poisson" else apart / self.target
 
     def is_met(self, tolerance: float) -> bool:
-        """Whether the misfit is within a tolerance; False where nothing was found."""
+        """Whether the misfit is within a tolerance; False where nothing was found.
+
+        Parameters
+        ----------
+        tolerance : float
+            Largest misfit, a share of the target.
+
+        Returns
+        -------
+        bool
+            True where the target is met.
+        """
         return abs(self.misfit) <= tolerance
 
 
@@ -82,8 +124,18 @@ class Match:
 class Calibration:
     """A material, and how well it meets each target.
 
-    matches: a ``Match`` a target. tolerance: misfit up to which a target counts as met. runs: of
-    specimens. reach: sentences on targets that no constants meet.
+    Parameters
+    ----------
+    material : Material
+        The calibrated material.
+    matches : tuple of Match
+        Match of each target.
+    tolerance : float
+        Misfit up to which a target counts as met, as a share.
+    runs : int
+        Number of runs of specimens.
+    reach : tuple of str, default ()
+        Sentences on targets that no constants meet.
     """
 
     material: Material
@@ -138,20 +190,45 @@ def calibrate(
     slip_energy: Optional[float] = None,
     seed: int = 0,
 ) -> Calibration:
-    """Change a material such that a mesh, and specimens of its elements, show what is wanted.
+    """Change a material such that a mesh, and specimens of its elements, show given properties.
 
-    material: to begin with, from ``Material.from_elastic``; what no target asks for stays. young
-    and poisson are met by static solves of the mesh, which change the moduli of bonds; tension, or
-    else brazilian, by runs of a specimen of elements of the mesh's median size, which change the
-    tensile strength; compression likewise by the cohesion. Where tension and brazilian are both
-    asked for, tension is met and brazilian compared. tolerance: misfit that is allowed, as a share,
-    and of Poisson's ratio as it is. slip_energy: G_II of ``effects.SlipWeakening`` [J/m2] in all
-    tests, as the scene then must list it; None for ``ShearSlip``, by which bonds keep their
-    cohesion. seed: of the specimens.
+    Parameters
+    ----------
+    mesh : Mesh
+        Mesh of the scene.
+    material : Material
+        Material to begin with, from ``Material.from_elastic``; what no target asks for stays.
+    targets : Targets
+        Elastic constants and strengths.
+    tolerance : float, default 0.02
+        Misfit that is allowed, as a share of the target (of Poisson's ratio, as it is).
+    slip_energy : float, optional
+        Fracture energy G_II of ``effects.SlipWeakening`` in all tests [J/m^2]; the scene then must
+        list that effect. None: tests use ``ShearSlip``, by which bonds keep their cohesion.
+    seed : int, default 0
+        Seed of the specimens.
 
-    The misfit of each target is in the result, with a sentence where it is not met.
-    Raises InputError for invalid arguments, a material of constants per area, or a compression
-    without slip_energy: specimens then harden without a peak.
+    Returns
+    -------
+    Calibration
+        The material, the misfit of each target, and a sentence where a target is not met.
+
+    Raises
+    ------
+    InputError
+        An argument is invalid, the material has constants per area, or compression is asked for
+        without slip_energy: specimens then harden without a peak.
+
+    Notes
+    -----
+    Young's modulus and Poisson's ratio are met by static solves of the mesh, which change the
+    moduli of bonds. Strengths are met by runs of specimens of elements of the mesh's median size:
+    tension, or else brazilian, by the tensile strength of bonds, compression by their cohesion.
+    Where tension and brazilian are both asked for, tension is met and brazilian compared.
+
+    Examples
+    --------
+    >>> calibrate(mesh, material, Targets(young=30e9)).material  # doctest: +SKIP
     """
     instance("mesh", mesh, Mesh)
     instance("targets", targets, Targets)

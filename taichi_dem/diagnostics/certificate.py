@@ -26,9 +26,14 @@ _TIMES = {"tension": "softening", "shear": "slip", "contact": "contact", "fricti
 
 @dataclass(frozen=True)
 class Acting:
-    """One effect of a run. use: its activity. since_s: time at which it first acted, NaN if never.
+    """One effect of a run and the time from which it acted.
 
-    The time is that at which its limit was first reached; NaN also where it is not known.
+    Parameters
+    ----------
+    use : EffectUse
+        Activity of the effect.
+    since_s : float
+        Time at which its limit was first reached [s]; NaN where it never was, or is not known.
     """
 
     use: EffectUse
@@ -46,12 +51,26 @@ class Acting:
 class Certificate:
     """What acted in a run with effects="auto", and a bound of what was left out.
 
-    acting: an ``Acting`` for each effect. law_evaluations: of softening and slip, a unit each;
-    all_law_evaluations: those that effects="all" makes. sleep: bound that was asked for, see
-    ``Scene``. asleep: share of bodies times time. impulse, energy: bounds of the impulse and the
-    energy that sleeping bonds left out, as shares of all momentum and of the energy put in. audits:
-    an ``Audit`` for each kind of skipped evaluation. left_out: an ``Estimate`` for each effect that
-    no law of the scene serves.
+    Parameters
+    ----------
+    acting : tuple of Acting
+        Activity and onset of each effect.
+    law_evaluations : int
+        Evaluations of softening and slip, one for each unit.
+    all_law_evaluations : int
+        Evaluations that effects="all" makes.
+    sleep : float
+        Bound that was asked for, a share of the mean momentum, see ``Scene``.
+    asleep : float
+        Share of bodies times time that were asleep.
+    impulse : float
+        Bound of the impulse that sleeping bonds left out, as a share of all momentum.
+    energy : float
+        Bound of the energy that sleeping bonds left out, as a share of the energy put in.
+    audits : tuple of Audit
+        Audit of each kind of skipped evaluation.
+    left_out : tuple of Estimate
+        Estimate of each effect that no law of the scene serves.
     """
 
     acting: tuple[Acting, ...]
@@ -66,7 +85,7 @@ class Certificate:
 
     @property
     def law_ratio(self) -> float:
-        """How many times fewer evaluations of softening and slip than with effects="all"."""
+        """Factor by which evaluations of softening and slip are fewer than with effects="all"."""
         return self.all_law_evaluations / max(1, self.law_evaluations)
 
     @property
@@ -78,7 +97,13 @@ class Certificate:
         return in_brief(self, *map(str, self.acting), "" if self.holds else "does not hold")
 
     def as_dict(self) -> dict[str, Any]:
-        """All figures, for a JSON file."""
+        """All figures, for a JSON file.
+
+        Returns
+        -------
+        dict
+            Figures by name.
+        """
         since = {one.use.effect: one.since_s for one in self.acting}
         return {
             "acting_since_s": {k: None if np.isnan(v) else v for k, v in since.items()},

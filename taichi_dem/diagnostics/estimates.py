@@ -23,9 +23,18 @@ WEIGHT, AIR = 9.80665, 1.2
 
 @dataclass(frozen=True)
 class Estimate:
-    """An effect and the group by which it is judged.
+    """Dimensionless group by which an effect is judged before a run.
 
-    group: its value. words: the group in words. verdict: "negligible", "needed" or "unclear".
+    Parameters
+    ----------
+    effect : str
+        Name of the effect.
+    group : float
+        Value of the group [-]; NaN where it is not known.
+    words : str
+        The group in words.
+    verdict : str
+        ``"negligible"``, ``"needed"`` or ``"unclear"``.
     """
 
     effect: str
@@ -34,7 +43,13 @@ class Estimate:
     verdict: str
 
     def as_dict(self) -> dict[str, Any]:
-        """All figures, for a JSON file; a group that is not known is None."""
+        """All figures, for a JSON file; a group that is not known is None.
+
+        Returns
+        -------
+        dict
+            Figures by name; a group that is not known is None.
+        """
         return {**asdict(self), "group": None if math.isnan(self.group) else self.group}
 
     def __str__(self):

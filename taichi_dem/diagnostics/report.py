@@ -15,26 +15,75 @@ _JSON_KEYS = {"effect_activity": "acted", "missing_effects": "missed"}
 class Report:
     """Figures and cost of a run.
 
-    method, driver, effects: of the run. until_s: simulated time. substeps: ticks at which a body
-    was active. body_updates, bond_evaluations, pair_evaluations: work done. uniform_evaluations:
-    bonds and pairs that one step for all would have evaluated in the same substeps. sweeps: over
-    all dashpots where they are solved, else 0. ideal_gain: bodies times substeps over body updates,
-    the saving by different steps if a pair cost nothing; boundary_gain: uniform over actual
-    evaluations, the saving with every pair evaluated at the finer body's step. unconverged_steps:
-    those whose sweeps ended before impulses agreed; worst_residual: their largest residual, as a
-    share of the fastest body's speed. interpenetration: volume that bodies shared, where it was
-    looked for. searches: updates of the contact lists.
-    energy_balance: energy terms [J]; energy_residual_fraction: residual over the work put in.
-    linear_momentum_error, angular_momentum_error: unexplained momentum, as shares of that
-    exchanged. compile_seconds, run_seconds, run_cpu_seconds: cost. effect_activity: an
-    ``EffectUse`` for each effect. missing_effects: a ``missing_effects.MissingEffect`` for each
-    effect that was left out and needed. unresolved: sentences about bonds and contacts for which
-    the step was too long. bound_by: number of bodies at the end by the criterion that bounds their
-    step, see ``step_control.CRITERIA``. round_off_J: energies below this may be round-off
-    (``DivergenceCheck.round_off``). bond_slip: the ``bond_slip.BondSlip`` of the bond that slipped
-    farthest, empty where none slipped. measured_speedup: CPU time of one step for all over that of
-    the run, where it was measured. known_error: what is known of the error for nothing extra, in
-    words. certificate: what acted and what was left out, with effects="auto".
+    Parameters
+    ----------
+    method : str
+        Name of the method.
+    driver : str
+        Driver that ran, and those that were measured.
+    effects : tuple of str
+        Names of the effects.
+    until_s : float
+        Simulated time [s].
+    body_count : int
+        Number of bodies.
+    bond_count : int
+        Number of bonds.
+    broken_faces : int
+        Number of released bonds.
+    smallest_step_s : float
+        Shortest step of a body [s].
+    substeps : int
+        Ticks at which a body was active.
+    body_updates : int
+        Updates of bodies.
+    bond_evaluations : int
+        Evaluations of bonds.
+    pair_evaluations : int
+        Evaluations of contact pairs.
+    sweeps : int
+        Sweeps over all dashpots where they are solved, else 0.
+    uniform_evaluations : int
+        Bonds and pairs that one step for all would have evaluated in the same substeps.
+    searches : int
+        Updates of the contact lists.
+    energy_balance : dict
+        Energy terms [J] by name.
+    linear_momentum_error : float
+        Unexplained momentum, as a share of that exchanged.
+    angular_momentum_error : float
+        Unexplained angular momentum, as a share of that exchanged.
+    compile_seconds : float
+        Time spent on compiling [s].
+    run_seconds : float
+        Wall time spent stepping [s].
+    run_cpu_seconds : float
+        CPU time spent stepping [s].
+    effect_activity : tuple of EffectUse
+        Activity of each effect.
+    missing_effects : tuple of MissingEffect
+        Effects that were left out and needed.
+    unresolved : tuple of str
+        Sentences about bonds and contacts for which the step was too long.
+    bound_by : dict
+        Number of bodies at the end by the criterion that bounds their step, see
+        ``step_control.CRITERIA``.
+    round_off_J : float, default 0.0
+        Energies below this may be round-off [J].
+    unconverged_steps : int, default 0
+        Steps whose sweeps ended before impulses agreed.
+    worst_residual : float, default 0.0
+        Their largest residual, as a share of the speed of the fastest body.
+    interpenetration : Interpenetration, optional
+        Volume that bodies shared, where it was measured.
+    bond_slip : tuple of BondSlip, default ()
+        The bond that slipped farthest; empty where none slipped.
+    measured_speedup : float, optional
+        Ratio of the CPU time of one step for all to that of the run, where it was measured.
+    known_error : str, default ""
+        What is known of the error, in words.
+    certificate : Certificate, optional
+        What acted and what was left out, with effects="auto".
     """
 
     method: str
@@ -95,17 +144,17 @@ class Report:
 
     @property
     def ideal_gain(self) -> float:
-        """Bodies times substeps over body updates."""
+        """Ratio of bodies times substeps to body updates, the gain if pairs cost nothing."""
         return self.body_count * self.substeps / max(1, self.body_updates)
 
     @property
     def boundary_gain(self) -> float:
-        """Evaluations of one step for all over those made."""
+        """Ratio of the evaluations of one step for all to those that were made."""
         return self.uniform_evaluations / max(1, self.contact_evaluations)
 
     @property
     def energy_residual_fraction(self) -> float:
-        """Energy that the account cannot explain, over the work put in or the energy held."""
+        """Unexplained energy as a share of the work put in or of the energy held."""
         return abs(self.energy_balance["residual"]) / max(*self._given_and_held(), 1e-300)
 
     def _given_and_held(self):
@@ -123,7 +172,13 @@ class Report:
         return f"{100.0 * self.energy_residual_fraction:.3g} % of {whole}"
 
     def as_dict(self) -> dict[str, Any]:
-        """All figures, for a JSON file."""
+        """All figures, for a JSON file.
+
+        Returns
+        -------
+        dict
+            Figures by name.
+        """
         gains = "ideal_gain", "boundary_gain"
         derived = ("contact_evaluations", *gains, "energy_residual_fraction", "needs")
         plain = replace(self, certificate=None)

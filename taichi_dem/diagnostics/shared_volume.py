@@ -35,8 +35,16 @@ _HALVINGS = 2, 3
 class Interpenetration:
     """Pairs of bodies that share volume at a time.
 
-    share: the largest, of the smaller body's volume; bodies: its pair; time_s. deep: most pairs at
-    one time that share more than ``DEEP``.
+    Parameters
+    ----------
+    share : float, default 0.0
+        Largest share of the volume of the smaller body that a pair shares.
+    bodies : tuple, default (-1, -1)
+        The pair of bodies.
+    time_s : float, default 0.0
+        Time of that [s].
+    deep : int, default 0
+        Largest number of pairs at one time that share more than ``DEEP``.
     """
 
     share: float = 0.0

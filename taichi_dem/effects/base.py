@@ -79,10 +79,20 @@ class Effect(Sealed):
         return by_arguments(self)
 
     def silent(self) -> "Effect":
-        """A copy that is compiled like this effect and never acts.
+        """Return a copy that is compiled like this effect and never acts.
 
         All bits, reports and findings are those of a scene that does not list it, which would be
-        compiled anew. Raises InputError for an effect that cannot be silent.
+        compiled anew.
+
+        Returns
+        -------
+        Effect
+            The silent copy.
+
+        Raises
+        ------
+        InputError
+            The effect cannot be silent.
         """
         if type(self).harmless is Effect.harmless:
             raise InputError(f"effect {self.name} cannot be silent: leave it out of the scene")
@@ -91,53 +101,139 @@ class Effect(Sealed):
         return made
 
     def harmless(self, material: Material) -> Material:
-        """The material with which the effect never acts, as ``silent`` needs it."""
+        """Return the material with which the effect never acts, as ``silent`` needs it.
+
+        Parameters
+        ----------
+        material : Material
+            Material of the scene.
+
+        Returns
+        -------
+        Material
+            The changed material.
+        """
         return material
 
     def check_material(self, material: Material) -> None:
-        """Raise InputError for a material that the effect cannot act with; a scene asks."""
+        """Refuse a material that the effect cannot act with; a scene asks.
+
+        Parameters
+        ----------
+        material : Material
+            Material of the scene.
+
+        Raises
+        ------
+        InputError
+            The effect cannot act with it.
+        """
 
     def numbers(self, material: Material) -> tuple:
-        """Numbers that kernels read as ``self.law[0]`` and on: to change them compiles nothing."""
+        """Numbers that kernels read as ``self.law[0]`` and on; to change them compiles nothing.
+
+        Parameters
+        ----------
+        material : Material
+            Material of the scene.
+
+        Returns
+        -------
+        tuple of float
+            Numbers, in SI units [SI].
+        """
         return ()
 
     def declare(self, capacity: "Capacity") -> None:
-        """Declare further fields, with the capacity of an engine; no field may be used here."""
+        """Declare further fields, with the capacity of an engine; no field may be used here.
+
+        Parameters
+        ----------
+        capacity : Capacity
+            Numbers of bodies, bonds, units and faces that an engine has room for.
+        """
 
     def declare_columns(self, store: "PairStore") -> None:
-        """Declare its data for each pair of bodies, or of spheres, in a ``PairStore``.
+        """Declare data for each pair of bodies, or of spheres; called in scenes with contact.
 
-        ``store.column`` and ``store.sphere_column`` return fields. Called in scenes with contact.
+        Parameters
+        ----------
+        store : PairStore
+            Pair store, whose ``column`` and ``sphere_column`` return fields.
         """
 
     def load(self, model: "Model") -> None:
-        """Fill the declared fields for a scene; they are zero before. Raises InputError."""
+        """Fill the declared fields for a scene; they are zero before.
+
+        Parameters
+        ----------
+        model : Model
+            Arrays of the scene.
+
+        Raises
+        ------
+        InputError
+            The scene lacks what the effect needs.
+        """
 
     def state(self) -> dict[str, ti.Field]:
-        """Fields that change in a run, by name; a checkpoint holds them."""
+        """Fields that change in a run; a checkpoint holds them.
+
+        Returns
+        -------
+        dict
+            Fields by name.
+        """
         return {}
 
     def stress(self, material: Material, size: float) -> float:
-        """Stress that a load, support or ground may cause in a block of a size [m]; NaN: unknown.
+        """Stress that a load, support or ground may cause in a block, for estimates before a run.
 
-        Used by estimates before a run.
+        Parameters
+        ----------
+        material : Material
+            Material of the scene.
+        size : float
+            Largest extent of the block [m].
+
+        Returns
+        -------
+        float
+            Stress [Pa]; NaN where it is not known.
         """
         return np.nan
 
     def travel(self) -> Travel:
-        """Bounds of the displacement that it may cause along x, y and z [m]: lowest and highest.
+        """Bounds of the displacement that a load or support may cause along x, y and z.
 
-        Used of loads and supports, to decide whether parts of a mesh may meet. Infinite by default.
+        Used to decide whether parts of a mesh may meet. Infinite by default.
+
+        Returns
+        -------
+        tuple of (tuple, tuple)
+            Lowest and highest displacement [m], three components each.
         """
         return (-np.inf,) * 3, (np.inf,) * 3
 
     def stand_for(self, given: Optional["Effect"]) -> None:
-        """Take the attributes of this bound effect from a scene's effect; None changes nothing."""
+        """Take the attributes of this bound effect from an effect of a scene.
+
+        Parameters
+        ----------
+        given : 'Effect' or None
+            Effect of the scene; None changes nothing.
+        """
         if given is not None:
             self.__dict__["_given"] = vars(given)
 
     def load_scene(self, model: "Model") -> None:
-        """Load the numbers of the effect that this bound one stands for."""
+        """Load the numbers of the effect that this bound one stands for.
+
+        Parameters
+        ----------
+        model : Model
+            Arrays of the scene.
+        """
         if self._given.get("is_silent"):
             model = copy.copy(model)
             model.material = self.harmless(model.material)
@@ -146,10 +242,20 @@ class Effect(Sealed):
         self.load(model)
 
     def accepts(self, given: Optional["Effect"]) -> bool:
-        """Whether kernels compiled for this effect are valid for a scene's effect ``given``.
+        """Whether kernels compiled for this effect are valid for an effect of a scene.
 
         They are, unless they contain an attribute of it, read in a kernel, that has another value,
         or it has another count of numbers.
+
+        Parameters
+        ----------
+        given : 'Effect' or None
+            Effect of the scene.
+
+        Returns
+        -------
+        bool
+            True where they are valid.
         """
         if given is None:
             return True

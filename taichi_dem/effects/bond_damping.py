@@ -17,7 +17,12 @@ if TYPE_CHECKING:
 
 @ti.data_oriented
 class BondDamping(Effect):
-    """Normal and tangential dashpots, at full strength until the face is released."""
+    """Normal and tangential dashpots of bonds, at full strength until the face is released.
+
+    References
+    ----------
+    Konno et al., section 2.1 and Table 1.
+    """
 
     role = "dashpot"
     name = "bond_damping"

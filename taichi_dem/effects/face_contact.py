@@ -28,18 +28,41 @@ _FAR, _CLEARLY = 1e30, 1.0001
 class FaceContact(SphereContact):
     """Spheres behind the free faces of a body touch the free faces of others; both ways.
 
-    In place of ``SphereContact``, whose spheres meet on their flanks. A sphere touches every other
-    body at the one point of its free faces that is nearest to the centre. The overlap is the radius
-    less that distance; the force acts along this line and derives from the energy, which changes
-    continuously over edges, corners and cracks. Over the common edge of two bodies that make a flat
-    side a sphere touches both: it sinks in less there, by a part of the overlap.
-    A sphere whose centre is inside a body is pushed out through the free face that is nearest; the
-    run counts as diverged by then.
+    Takes the place of ``SphereContact``, whose spheres touch on their flanks. Outer faces always
+    touch.
 
-    Arguments: as of ``SphereContact``; outer faces always touch. Faces reach farther than the
-    spheres behind them, so the lists are longer; a body's radius, of which the skin is a share, is
-    that to its corners.
-    Source of the closest point: Ericson, Real-Time Collision Detection, 5.1.5; not in the paper.
+    Parameters
+    ----------
+    divisions : int, default 5
+        Equal parts of the edges of a face; 5 gives the paper's six spheres a face.
+    skin : float, default 0.0075
+        Gap up to which spheres enter the candidate list, as a share of the radius of a body to its
+        corners. It changes time, not results.
+    neighbours_per_body : int, default 192
+        Mean capacity of the list of neighbours.
+    pairs_per_body : int, default 48
+        Mean capacity of the list of body pairs.
+    spheres_per_body : int, default 320
+        Mean capacity of the list of sphere contacts.
+
+    Notes
+    -----
+    A sphere touches every other body at the one point of its free faces that is nearest to the
+    centre. The overlap is the radius less that distance; the force acts along this line and derives
+    from the energy, which changes continuously over edges, corners and cracks. Over the common edge
+    of two bodies that make a flat side a sphere touches both and has less overlap there. A sphere
+    whose centre is inside a body is pushed out through the free face that is nearest; the run
+    counts as diverged by then. Faces reach farther than the spheres behind them, so the lists are
+    longer. The effect is not in the paper.
+
+    References
+    ----------
+    Ericson, Real-Time Collision Detection, section 5.1.5 (closest point of a triangle).
+
+    Examples
+    --------
+    >>> FaceContact().face_spheres
+    6
     """
 
     name = "face_contact"

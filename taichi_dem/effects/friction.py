@@ -11,7 +11,12 @@ from taichi_dem.physics.sphere_pair import friction_force
 
 @ti.data_oriented
 class Friction(Effect):
-    """Friction of sphere contacts with the material's coefficient; no tangential spring."""
+    """Sliding friction of sphere contacts with the material's coefficient; no tangential spring.
+
+    References
+    ----------
+    Konno et al., section 2.2.
+    """
 
     role = "friction"
     name = "friction"

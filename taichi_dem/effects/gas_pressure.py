@@ -30,8 +30,36 @@ def pulse(peak, rise, decay_ratio, t):
 class GasPressure(FacePressure):
     """Pressure on the faces of a group along their current normal, also after they came loose.
 
-    group: name of the face group. peak [Pa]: 575 MPa. rise [s]: time to the peak. decay_ratio:
-    time from the peak to zero over the rise. The area stays the mesh's.
+    Parameters
+    ----------
+    group : str, default "hole"
+        Name of the face group.
+    peak : float, default 575000000.0
+        Peak pressure [Pa].
+    rise : float, default 0.000133
+        Time to the peak [s].
+    decay_ratio : float, default 2.75
+        Ratio of the time from the peak to zero to the rise.
+
+    Raises
+    ------
+    InputError
+        A value is out of its range.
+
+    Notes
+    -----
+    The pressure is a squared cosine up to the peak and a cosine down to zero. The area is that of
+    the mesh.
+
+    References
+    ----------
+    Konno et al., section 4.1, eq. 4, Fig. 11.
+
+    Examples
+    --------
+    >>> gas = GasPressure(rise=1e-4, decay_ratio=3.0)
+    >>> round(gas.duration, 6)
+    0.0004
     """
 
     name = "gas_pressure"
@@ -67,7 +95,18 @@ class GasPressure(FacePressure):
         return pulse(self.law[0], self.law[1], self.law[2], t)
 
     def pressure_at(self, times: ArrayLike) -> np.ndarray:
-        """Pressure [Pa] at an array of times [s], for pictures."""
+        """Pressure at given times, for pictures.
+
+        Parameters
+        ----------
+        times : array_like
+            Times [s].
+
+        Returns
+        -------
+        ndarray
+            Pressure [Pa].
+        """
         times = np.ascontiguousarray(times, dtype=np.float64)
         pressure = np.zeros_like(times)
         _sample(self.peak, self.rise, self.decay_ratio, times, pressure)

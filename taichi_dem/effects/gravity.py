@@ -13,7 +13,18 @@ from taichi_dem.physics.rotation import zero3
 
 @ti.data_oriented
 class Gravity(Effect):
-    """Uniform acceleration of all bodies [m/s^2]."""
+    """Uniform acceleration of all bodies.
+
+    Parameters
+    ----------
+    acceleration : sequence of float, default (0.0, -9.81, 0.0)
+        Acceleration along x, y and z [m/s^2].
+
+    Examples
+    --------
+    >>> Gravity((0.0, -1.62, 0.0)).name
+    'gravity'
+    """
 
     role = "load"
     name = "gravity"

@@ -32,7 +32,18 @@ class FacePressure(Effect):
 
     @abstractmethod
     def pressure(self, t: Any) -> Any:
-        """Pressure [Pa] at a time [s]; a ti.func."""
+        """Pressure at a time; a ti.func.
+
+        Parameters
+        ----------
+        t : float
+            Time [s].
+
+        Returns
+        -------
+        float
+            Pressure [Pa].
+        """
 
     def declare(self, capacity: "Capacity") -> None:
         """Loaded faces of every body: area vectors [m^2] and arms from the centre [m]."""
@@ -71,10 +82,26 @@ class FacePressure(Effect):
 class Pressure(FacePressure):
     """Pressure on the faces of a group along their current normal, also after they came loose.
 
-    group: name of a group of outer faces, or of inner ones without bonds, whose both sides it
-    pushes apart. values [Pa] at times [s]: linear between them, and constant before the first and
-    after the last; a single number is a constant pressure from time zero. Negative values pull.
-    Raises InputError for times that do not rise, or as many values as there are not times.
+    Parameters
+    ----------
+    group : str
+        Group of outer faces, or of inner faces without bonds, whose both sides the pressure pushes
+        apart.
+    values : float or sequence of float
+        Pressures [Pa] at the times: linear between them, constant before the first and after the
+        last. Negative values pull. A single number is a constant pressure from time zero.
+    times : sequence of float, default (0.0,)
+        Times [s], ascending.
+
+    Raises
+    ------
+    InputError
+        Times do not ascend, or values are not as many as times.
+
+    Examples
+    --------
+    >>> Pressure("top", [0.0, 1e6], times=[0.0, 1e-4]).values
+    (0.0, 1000000.0)
     """
 
     name = "pressure"
@@ -86,7 +113,29 @@ class Pressure(FacePressure):
 
     @classmethod
     def triangle(cls, group: str, peak: float, rise: float, fall: float) -> "Pressure":
-        """A triangular pulse: up to peak [Pa] in a time rise [s], which may be 0, down in fall."""
+        """Triangular pulse of pressure.
+
+        Parameters
+        ----------
+        group : str
+            Group of faces.
+        peak : float
+            Peak pressure [Pa]; negative ones pull.
+        rise : float
+            Time to the peak [s]; may be 0.
+        fall : float
+            Time from the peak to zero [s].
+
+        Returns
+        -------
+        Pressure
+            The load.
+
+        Raises
+        ------
+        InputError
+            A value is out of its range.
+        """
         rise, fall = positive("rise", rise, zero_allowed=True), positive("fall", fall)
         if not finite(peak) or peak == 0.0:
             raise InputError(f"peak must be a finite number other than 0, got {shown(peak)}")

@@ -30,12 +30,37 @@ if TYPE_CHECKING:
 class QuietBoundary(Effect):
     """Dashpots between the faces of a group and the ground, which reflect little of a wave.
 
-    Tractions of rho c_p v along a face's normal and rho c_s v across it, v the velocity of the
-    face, are those of a wave that goes on (Lysmer and Kuhlemeyer, eq. 1 and 2): of one that meets
-    the face at right angles nothing comes back, of an oblique one a part. group: outer faces.
-    p_speed, s_speed [m/s]: of both waves; None for those that bonds near the face give
-    (``wave_moduli``). Normals and arms stay those of the mesh: displacements are small there.
-    Raises InputError for bonds that give no speed, as of a body that has none.
+    Parameters
+    ----------
+    group : str
+        Group of outer faces.
+    p_speed : float, optional
+        Speed of compression waves [m/s]; None for that of the bonds near the face
+        (``wave_moduli``).
+    s_speed : float, optional
+        Speed of shear waves [m/s]; None likewise.
+
+    Raises
+    ------
+    InputError
+        A speed is not positive, or bonds near a face give none.
+
+    Notes
+    -----
+    Tractions of rho c_p v along the normal of a face and rho c_s v across it, v the velocity of the
+    face, are those of a wave that goes on: a wave that meets the face at right angles is absorbed,
+    an oblique one partly reflected. Normals and arms stay those of the mesh, as displacements are
+    small there.
+
+    References
+    ----------
+    J. Lysmer and R. L. Kuhlemeyer, Finite dynamic model for infinite media, J. Eng. Mech. Div. ASCE
+    95(EM4), 1969, 859-877, eq. 1 and 2.
+
+    Examples
+    --------
+    >>> QuietBoundary("left").group
+    'left'
     """
 
     role = "ground"

@@ -86,13 +86,30 @@ class ContactLaw(Protocol):
 
     @property
     def meets_faces(self) -> bool:
-        """Whether spheres meet faces, with ``corner`` of each in its body's frame [m]."""
+        """Whether spheres meet faces, with ``corner`` of each in the frame of its body."""
 
     def spheres(self, model: Any) -> Any:
-        """The ``ContactSpheres`` of a Model."""
+        """Contact spheres of a scene.
+
+        Parameters
+        ----------
+        model : Model
+            Arrays of the scene.
+
+        Returns
+        -------
+        ContactSpheres
+            Spheres of all faces.
+        """
 
     def watch_faces(self, exposed_faces: ti.Field) -> None:
-        """Take note of the field with a bit for each face of a body that is free."""
+        """Take note of the field with a bit for each face of a body that is free.
+
+        Parameters
+        ----------
+        exposed_faces : Field
+            Field of the bits of each body.
+        """
 
     def nearest(self, a: int, b: int, turn: ti.Matrix, offset: ti.Vector) -> Any:
         """Where two bodies are nearest by an entry of the pair store (``SphereContact``)."""

@@ -17,8 +17,14 @@ if TYPE_CHECKING:
 class ShearSlip(Effect):
     """Shear traction is bounded by cohesion + friction * pressure; beyond it the unit slips.
 
+    Notes
+    -----
     The pressure is the spring's part alone and lowers the limit in tension, never below zero.
     Cohesion does not degrade, and slip alone never releases a face.
+
+    References
+    ----------
+    Konno et al., section 2.1, eq. 1 and 2, Fig. 3.
     """
 
     role = "shear"

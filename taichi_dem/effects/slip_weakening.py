@@ -20,17 +20,35 @@ if TYPE_CHECKING:
 class SlipWeakening(Effect):
     """Coulomb slip of bonds whose cohesion falls linearly with the accumulated slip, to zero.
 
-    In place of ``ShearSlip``, by which cohesion does not degrade. The cohesion c of the material is
-    gone at the critical slip d_c = 2 G_II / c; the friction of the bond remains. A unit without
-    cohesion that is not pressed transmits nothing and releases the face, as one that failed in
-    tension does; pressed faces rub until they open. Slip to and fro accumulates; the strength in
-    tension does not fall with it.
+    Takes the place of ``ShearSlip``, by which cohesion does not degrade.
 
-    fracture_energy: G_II, of mode II [J/m^2], the area under the cohesion over the slip. A scene
-    refuses one of c^2 / (2 shear stiffness) or less, with which a unit would fail at once.
-    Raises InputError unless it is a positive number.
-    Source: Ida, J. Geophys. Res. 77 (1972) 3796; Andrews, J. Geophys. Res. 81 (1976) 3575; not in
-    the paper.
+    Parameters
+    ----------
+    fracture_energy : float
+        Fracture energy G_II of mode II [J/m^2], the area under the cohesion over the slip. A scene
+        refuses one of c^2 / (2 shear stiffness) or less, with which a unit would fail at once.
+
+    Raises
+    ------
+    InputError
+        The energy is not positive.
+
+    Notes
+    -----
+    The cohesion c of the material is gone at the critical slip d_c = 2 G_II / c; the friction of
+    the bond remains. A unit without cohesion that is not pressed transmits nothing and releases the
+    face, as one that failed in tension does; pressed faces slide with friction until they open.
+    Slip in both directions accumulates; the strength in tension does not fall with it. The effect
+    is not in the paper.
+
+    References
+    ----------
+    Ida, J. Geophys. Res. 77 (1972) 3796; Andrews, J. Geophys. Res. 81 (1976) 3575.
+
+    Examples
+    --------
+    >>> SlipWeakening(fracture_energy=500.0).fracture_energy
+    500.0
     """
 
     role = "shear"

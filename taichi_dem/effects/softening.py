@@ -21,9 +21,15 @@ if TYPE_CHECKING:
 class Softening(Effect):
     """Beyond the tensile strength a unit softens along a straight line and fails at zero traction.
 
+    Notes
+    -----
     Unloading goes to the origin and the elastic limit moves to where it began; compression keeps
     the full stiffness. One failed unit releases the whole face. Strength and fracture energy are
-    the material's.
+    those of the material.
+
+    References
+    ----------
+    Konno et al., section 2.1, Fig. 2.
     """
 
     role = "tension"

@@ -31,14 +31,38 @@ def _outer_faces(value: Any) -> Union[bool, str]:
 class SphereContact(Effect):
     """Spheres inscribed behind free faces repel each other, without attraction.
 
-    divisions: equal parts of a face's edges; 5 gives the paper's six spheres a face.
-    outer_faces: outer faces carry spheres from the start, beside those that break, or with
-    "once_broken" from the first break of any bond. Without, as in the paper, bodies pass through
-    each other there.
-    skin: gap up to which spheres enter the candidate list, at least, as a share of a body's radius;
-    more where bodies are fast. It changes time, not results.
-    neighbours_per_body, pairs_per_body, spheres_per_body: capacity of the lists, on average; that
-    of the spheres includes those of the next search, before those that they replace are freed.
+    Parameters
+    ----------
+    divisions : int, default 5
+        Equal parts of the edges of a face; 5 gives the paper's six spheres a face.
+    outer_faces : bool or str, default True
+        True: outer faces carry spheres from the start. ``"once_broken"``: from the first break of
+        any bond. False: only broken faces carry them, as in the paper, and bodies pass through each
+        other elsewhere.
+    skin : float, default 0.015
+        Gap up to which spheres enter the candidate list, at least, as a share of the radius of a
+        body; more where bodies are fast. It changes time, not results.
+    neighbours_per_body : int, default 64
+        Mean capacity of the list of neighbours.
+    pairs_per_body : int, default 24
+        Mean capacity of the list of body pairs.
+    spheres_per_body : int, default 160
+        Mean capacity of the list of sphere contacts, with those of the next search, before those
+        that they replace are freed.
+
+    Raises
+    ------
+    InputError
+        A value is out of its range.
+
+    References
+    ----------
+    Konno et al., section 2.2.
+
+    Examples
+    --------
+    >>> SphereContact(outer_faces=False).face_spheres
+    6
     """
 
     role = "contact"

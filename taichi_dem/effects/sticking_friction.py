@@ -19,11 +19,31 @@ class StickingFriction(Friction):
     """Friction with a tangential spring in each contact of two spheres, up to Coulomb's limit.
 
     A body at rest on a slope below the friction angle stays there; with ``Friction`` it creeps. The
-    spring's stretch turns with the first body and is lost when the spheres part.
-    stiffness_ratio: stiffness of the spring over the material's contact stiffness; spheres of a
-    Poisson's ratio nu have 2 (1 - nu) / (2 - nu) (Mindlin 1949).
-    Raises InputError unless it lies between 1e-6 and 1.
-    Source: Cundall and Strack, Geotechnique 29 (1979) 47; not in the paper.
+    stretch of a spring turns with the first body and is lost when the spheres part.
+
+    Parameters
+    ----------
+    stiffness_ratio : float, default 0.8
+        Ratio of the stiffness of the spring to the material's contact stiffness, from 1e-6 to 1;
+        spheres of a Poisson's ratio nu have 2 (1 - nu) / (2 - nu) (Mindlin 1949).
+
+    Raises
+    ------
+    InputError
+        The ratio is out of range.
+
+    Notes
+    -----
+    The effect is not in the paper.
+
+    References
+    ----------
+    Cundall and Strack, Geotechnique 29 (1979) 47.
+
+    Examples
+    --------
+    >>> StickingFriction(stiffness_ratio=0.85).stiffness_ratio
+    0.85
     """
 
     name = "sticking_friction"

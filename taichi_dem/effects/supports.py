@@ -63,7 +63,18 @@ class _Support(Effect):
 
 @ti.data_oriented
 class Fixed(_Support):
-    """Bodies with a face in the group neither move nor turn."""
+    """Bodies with a face in the group neither move nor turn.
+
+    Parameters
+    ----------
+    group : str
+        Face group.
+
+    Examples
+    --------
+    >>> Fixed("bottom").group
+    'bottom'
+    """
 
     name = "fixed"
 
@@ -78,7 +89,24 @@ class Roller(_Support):
     """Bodies with a face in the group slide on its plane and turn about its normal only.
 
     A body on several planes slides along what they have in common, and turns only where all are
-    parallel. normal: of the plane; its length does not matter.
+    parallel.
+
+    Parameters
+    ----------
+    group : str
+        Face group.
+    normal : sequence of float
+        Normal of the plane [-]; its length does not matter.
+
+    Raises
+    ------
+    InputError
+        The normal has no length.
+
+    Examples
+    --------
+    >>> Roller("left", normal=(1.0, 0.0, 0.0)).group
+    'left'
     """
 
     name = "roller"
@@ -150,10 +178,29 @@ def _right_angled(planes):
 class PrescribedMotion(_Support):
     """Bodies with a face in the group move with a given velocity and do not turn.
 
-    velocity [m/s]: v cos(2 pi frequency t); frequency [Hz], zero for a constant velocity. ramp:
-    time [s] in which the velocity rises from zero, in a straight line. history: in place of a ramp,
-    (times [s], shares): the velocity is multiplied by the shares, linear between the times and
-    constant before the first and after the last.
+    Parameters
+    ----------
+    group : str
+        Face group.
+    velocity : sequence of float
+        Velocity v along x, y and z [m/s]; the bodies move with v cos(2 pi frequency t).
+    frequency : float, default 0.0
+        Frequency [Hz]; zero for a constant velocity.
+    ramp : float, default 0.0
+        Time in which the velocity rises from zero, in a straight line [s].
+    history : tuple of (sequence, sequence), optional
+        (times [s], shares), in place of a ramp: the velocity is multiplied by the shares, linear
+        between the times and constant before the first and after the last.
+
+    Raises
+    ------
+    InputError
+        A value is out of its range, or ramp and history are both given.
+
+    Examples
+    --------
+    >>> PrescribedMotion("top", velocity=(0.0, -0.1, 0.0), ramp=1e-4).group
+    'top'
     """
 
     name = "prescribed_motion"

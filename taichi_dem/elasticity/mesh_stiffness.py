@@ -27,8 +27,13 @@ _NAMES = "xyz"
 class MeshStiffness:
     """Elastic constants of a block of a mesh.
 
-    compliance: strains per stress [1/Pa], (6, 6) in the order xx, yy, zz, yz, zx, xy, shear strains
-    as angles. density [kg/m3].
+    Parameters
+    ----------
+    compliance : ndarray
+        Strains per stress [1/Pa], shape (6, 6), in the order xx, yy, zz, yz, zx, xy; shear strains
+        as angles.
+    density : float
+        Density [kg/m^3].
     """
 
     compliance: np.ndarray
@@ -46,7 +51,7 @@ class MeshStiffness:
 
     @property
     def poisson_along(self) -> np.ndarray:
-        """Mean contraction across over the strain along x, y and z, (3,)."""
+        """Mean contraction across over the strain along x, y and z [-], (3,)."""
         across = self.compliance[:3, :3].sum(axis=0) - np.diag(self.compliance)[:3]
         return -0.5 * across * self.young_along
 
@@ -75,7 +80,7 @@ class MeshStiffness:
 
     @property
     def poisson(self) -> float:
-        """Poisson's ratio, the mean over all directions."""
+        """Poisson's ratio [-], the mean over all directions."""
         return 0.5 * self.young / self.shear - 1.0
 
     @property
@@ -112,11 +117,35 @@ class MeshStiffness:
 def mesh_stiffness(mesh: Mesh, material: Material) -> MeshStiffness:
     """Elastic constants of the block that a mesh is, with the bonds of a material.
 
-    The whole mesh under six uniform stresses, tractions on its outer faces, one linear static
-    solve each; the mean strain follows from the displacement of the outer faces, which give way
-    like half a bond, as if the solid went on behind them. Of all fields of stress in equilibrium
-    this is the softest answer: blocks of few elements show some per cent less than large ones.
-    Raises InputError where the springs cannot be solved.
+    The whole mesh is loaded by six uniform stresses, as tractions on its outer faces, with one
+    linear static solve each. The mean strain follows from the displacement of the outer faces,
+    which are as compliant as half a bond, as if the solid went on behind them.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Mesh.
+    material : Material
+        Material with the stiffness of the bonds.
+
+    Returns
+    -------
+    MeshStiffness
+        Compliance, moduli and wave speeds.
+
+    Raises
+    ------
+    InputError
+        The springs cannot be solved.
+
+    Notes
+    -----
+    Among all stress fields in equilibrium this is the most compliant answer: blocks of few elements
+    show some per cent less than large ones.
+
+    Examples
+    --------
+    >>> mesh_stiffness(read_mesh(PAPER_BLOCK), CONCRETE).young  # doctest: +SKIP
     """
     topology = topology_of(mesh)
     constants = material.normal_stiffness, material.shear_stiffness

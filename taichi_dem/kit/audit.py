@@ -42,9 +42,16 @@ def misses_bound(misses: int, audited: int) -> float:
 class Audit:
     """Outcome of an audit.
 
-    skipped: evaluations that were not needed, those made for the audit among them. audited: of
-    these, made and compared. misses: of these, that would have changed something. what: the
-    evaluations in words.
+    Parameters
+    ----------
+    skipped : int
+        Evaluations that were not needed, those made for the audit among them.
+    audited : int
+        Skipped evaluations that were made and compared.
+    misses : int
+        Audited evaluations that would have changed something.
+    what : str, default "evaluations"
+        The evaluations in words.
     """
 
     skipped: int
@@ -58,7 +65,13 @@ class Audit:
         return misses_bound(self.misses, self.audited)
 
     def as_dict(self) -> dict[str, Any]:
-        """All figures, for a JSON file."""
+        """All figures, for a JSON file.
+
+        Returns
+        -------
+        dict
+            Figures by name.
+        """
         return {**asdict(self), "misses_bound": self.misses_bound}
 
     def __str__(self) -> str:

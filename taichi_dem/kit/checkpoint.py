@@ -34,11 +34,30 @@ _MOST_MARKS = 1_000_000
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """Where a run saves itself, and when besides at its end and on Ctrl-C or another stop signal.
+    """Where a run saves itself, and when besides at its end.
 
-    path: file, replaced whole. every_steps: largest steps between two of them (steps of a scene
-    in a batch). every_s: simulated time [s]. every_wall_s: time on the wall [s].
-    Raises InputError for a value out of its range.
+    A run also saves itself at its end and on Ctrl-C or another stop signal.
+
+    Parameters
+    ----------
+    path : path
+        File; it is replaced as a whole.
+    every_steps : int, optional
+        Number of largest steps between two checkpoints (of steps of a scene in a batch).
+    every_s : float, optional
+        Simulated time between two checkpoints [s].
+    every_wall_s : float, optional
+        Wall time between two checkpoints [s].
+
+    Raises
+    ------
+    InputError
+        A value is out of its range.
+
+    Examples
+    --------
+    >>> Checkpoint("run.npz", every_wall_s=600).every_wall_s
+    600
     """
 
     path: FileName
@@ -56,9 +75,24 @@ class Checkpoint:
                 positive(name, getattr(self, name))
 
     def marks(self, last: int, dt: float) -> set[int]:
-        """Steps of dt [s] from 0 to last at which the run is to be saved, a set.
+        """Steps at which a run is to be saved.
 
-        Raises InputError where they are more than a million.
+        Parameters
+        ----------
+        last : int
+            Last step of the run.
+        dt : float
+            Step [s].
+
+        Returns
+        -------
+        set of int
+            Steps from 0 to ``last``.
+
+        Raises
+        ------
+        InputError
+            They are more than a million.
         """
         every = [self.every_steps] if self.every_steps else []
         if self.every_s is not None:

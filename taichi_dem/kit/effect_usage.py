@@ -12,12 +12,29 @@ from taichi_dem.kit.display import in_brief
 class EffectUse:
     """Activity of one effect.
 
-    effect: its name. what: the events in words. events: their number, of at most ``of`` (0 for no
-    limit). energy_J: taken or given, None where it is not booked. share: of ``whole``, in words;
-    None where there is nothing to compare with. steers: whether it directs the rest even where it
-    takes little, as a crack does: then only one that never acted can be left out. kept: reason to
-    keep it whatever was counted, in words, or "". rounding: whether the booked energy is no more
-    than rounding errors; then no event is counted.
+    Parameters
+    ----------
+    effect : str
+        Name of the effect.
+    what : str
+        Its events in words.
+    events : int
+        Number of events.
+    of : int, default 0
+        Largest possible number of events; 0 for no limit.
+    energy_J : float, optional
+        Energy taken or given [J]; None where it is not booked.
+    share : float, optional
+        Size as a share of ``whole``; None where there is nothing to compare with.
+    whole : str, default "the energy put in"
+        What the share is of, in words.
+    steers : bool, default False
+        Whether it directs the rest even where it takes little, as a crack does; such an effect can
+        be left out only if it never acted.
+    kept : str, default ""
+        Reason to keep it in any case, in words, or ``""``.
+    rounding : bool, default False
+        Whether the booked energy is within rounding errors; then no event is counted.
     """
 
     effect: str
@@ -42,7 +59,18 @@ class EffectUse:
         return not (self.is_active or self.kept or self.rounding)
 
     def negligible(self, tolerance: float) -> bool:
-        """Whether it acted, and booked less than a share of the energy, or round-off alone."""
+        """Whether it acted, and booked less than a share of the energy, or round-off alone.
+
+        Parameters
+        ----------
+        tolerance : float
+            Share of the energy.
+
+        Returns
+        -------
+        bool
+            True where it is negligible.
+        """
         if self.rounding:
             return not self.kept
         if self.share is None or self.steers or self.kept:
@@ -63,12 +91,20 @@ class EffectUse:
 
 @dataclass(frozen=True)
 class Advice:
-    """Which effects a run had need of.
+    """Effects that a run needed, and those that it did not need.
 
-    uses: an EffectUse for each effect. missing: findings about effects that were left out, with how
-    often and where. tolerance: share of the energy below which an effect counts as negligible.
-    shown: difference that a run without an effect made, by name, as a share of what was recorded;
-    then only effects of which it is within the tolerance are droppable. None where counts decide.
+    Parameters
+    ----------
+    uses : tuple of EffectUse
+        Activity of each effect.
+    missing : tuple
+        Findings about effects that were left out, with how often and where.
+    tolerance : float
+        Share of the energy below which an effect counts as negligible.
+    shown : mapping, optional
+        Difference that a run without an effect made, by name, as a share of what was recorded. Then
+        only effects whose difference is within the tolerance are droppable. None where counts
+        decide.
     """
 
     uses: tuple[EffectUse, ...]
@@ -106,9 +142,19 @@ class Advice:
         return f"; a run without it differs by {100.0 * self.shown[use.effect]:.2g} %"
 
     def verdict(self, name: str, kind: str) -> tuple[str, str]:
-        """What an effect did, and "keep it", "drop it", "list it" or "not missed", in words.
+        """What an effect did, and advice in words.
 
-        name: of the effect in reports; kind: its class, as findings about missing effects name it.
+        Parameters
+        ----------
+        name : str
+            Name of the effect in reports.
+        kind : str
+            Its class, by which findings about missing effects name it.
+
+        Returns
+        -------
+        tuple of (str, str)
+            What it did, and "keep it", "drop it", "list it" or "not missed".
         """
         for use in self.uses:
             if use.effect == name:

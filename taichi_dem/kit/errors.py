@@ -12,10 +12,14 @@ class InputError(ValueError):
 class SimulationDiverged(RuntimeError):
     """The run left the range in which its numbers mean anything.
 
-    result: of the run up to its last good sample, None where there is none. advice: what the
-    sentence says to try instead, numbers by name: step [s], the largest one of the method;
-    max_speed [m/s] of the scene; contact_stiffness [N/m] of the material; of the damper dt [s].
-    A run that follows it may have to be advised again.
+    Attributes
+    ----------
+    result : Result or None
+        Result of the run up to its last good sample; None where there is none.
+    advice : mapping of float
+        What the sentence advises, numbers by name: step [s], the largest one of the method;
+        max_speed [m/s] of the scene; contact_stiffness [N/m] of the material; of the damper dt [s].
+        A run that follows it may have to be advised again.
     """
 
     result: Any = None

@@ -94,7 +94,7 @@ def documentation(root: Path) -> list[Row]:
         return rows + [(str(page), "README, below the lines on the package") for page in about]
     pages = [*sorted(root.glob("*.md")), *sorted((root / "docs").glob("*.md"))]
     rows += [(page.relative_to(root).as_posix(), _heading(page)) for page in pages]
-    return [*rows, ("make api", "pages of all modules from their docstrings")]
+    return [*rows, ("make docs", "a site of all pages, the API and the gallery")]
 
 
 def _other_lists(package):

@@ -36,10 +36,22 @@ class Owner(Protocol):
     """Part of a run that holds changing values on the host."""
 
     def saved(self) -> dict[str, np.ndarray]:
-        """Arrays by name."""
+        """Data for a checkpoint beside the fields.
+
+        Returns
+        -------
+        dict of ndarray
+            Arrays by name.
+        """
 
     def resume(self, saved: Mapping[str, np.ndarray], /) -> None:
-        """Restore the arrays that ``saved`` returned."""
+        """Restore the data that ``saved`` returned.
+
+        Parameters
+        ----------
+        saved : mapping
+            Arrays by name.
+        """
 
 
 class RunSnapshot:

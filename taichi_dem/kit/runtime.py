@@ -35,7 +35,14 @@ ARCHITECTURES = ("cpu", "cuda")
 class Settings:
     """Settings with which Taichi was started.
 
-    arch: "cpu" or "cuda". threads: CPU threads of parallel loops. debug: bounds checks in kernels.
+    Parameters
+    ----------
+    arch : str
+        ``"cpu"`` or ``"cuda"``.
+    threads : int
+        CPU threads of parallel loops.
+    debug : bool
+        Whether kernels check array bounds.
     """
 
     arch: str
@@ -51,8 +58,16 @@ _on_clear: list[Callable[[], object]] = []
 class Session(Uncopied):
     """One start of Taichi; objects that own fields remember theirs.
 
-    program: Taichi's own object of it. thread, process: those that started it, the only ones that
-    may use it. cleared: whether its engines have been given back since.
+    Attributes
+    ----------
+    program : object
+        Taichi's own object of the session.
+    thread : int
+        Thread that started it, the only one that may use it.
+    process : int
+        Process that started it.
+    cleared : bool
+        Whether its engines have been given back since.
     """
 
     def __init__(self):
@@ -64,11 +79,30 @@ class Session(Uncopied):
 def start(arch: str = "cpu", threads: Optional[int] = None, debug: bool = False) -> Settings:
     """Start Taichi, or do nothing when it already runs with these settings.
 
-    arch: "cpu" or "cuda". threads: number of CPU threads, all cores by default. debug: check
-    array bounds inside kernels (about three times slower).
-    Returns the settings in force. Raises InputError for an unknown or absent architecture, a
-    thread count below one, a second start with other settings in the same process, or one in a
-    fork of the process that runs Taichi.
+    Parameters
+    ----------
+    arch : str, default "cpu"
+        ``"cpu"`` or ``"cuda"``.
+    threads : int, optional
+        Number of CPU threads; all cores if None.
+    debug : bool, default False
+        Check array bounds inside kernels (about three times slower).
+
+    Returns
+    -------
+    Settings
+        The settings in force.
+
+    Raises
+    ------
+    InputError
+        The architecture is unknown or absent, the number of threads is out of range, Taichi already
+        runs with other settings in this process, or this is a fork of the process that runs Taichi.
+
+    Examples
+    --------
+    >>> from taichi_dem import runtime
+    >>> runtime.start(threads=2)  # doctest: +SKIP
     """
     global _current, _session
     wanted = _checked(arch, threads, debug)
@@ -87,7 +121,10 @@ def start(arch: str = "cpu", threads: Optional[int] = None, debug: bool = False)
 def stop() -> None:
     """End the Taichi session; every simulation and batch made in it becomes invalid.
 
-    Raises InputError on another thread while the one that started Taichi is alive.
+    Raises
+    ------
+    InputError
+        Another thread started Taichi and is still alive.
     """
     global _current, _session
     _check_process()
@@ -114,14 +151,28 @@ def clear() -> None:
 
 
 def when_cleared(forget: Callable[[], object]) -> None:
-    """Have forget() called by ``clear``."""
+    """Have a function called by ``clear``.
+
+    Parameters
+    ----------
+    forget : callable
+        Function without arguments.
+    """
     _on_clear.append(forget)
 
 
 def session() -> Session:
-    """The running ``Session``; objects that own fields remember the one they were made in.
+    """The running session; objects that own fields remember the one they were made in.
 
-    Raises InputError when Taichi was not started.
+    Returns
+    -------
+    Session
+        The session.
+
+    Raises
+    ------
+    InputError
+        Taichi was not started.
     """
     if _session is None:
         raise InputError("Taichi is not started: call runtime.start() first")
@@ -139,9 +190,19 @@ def _check_process():
 
 
 def check_session(made_in: Session, what: str) -> None:
-    """Raise InputError unless a session is the present one, intact, and used by its own thread.
+    """Refuse a session that is not the present one, intact, and used by its own thread.
 
-    what: whose session it is, in words, such as "simulation".
+    Parameters
+    ----------
+    made_in : Session
+        Session to check.
+    what : str
+        Whose session it is, in words, such as "simulation".
+
+    Raises
+    ------
+    InputError
+        The session cannot be used.
     """
     if made_in.cleared:
         raise InputError(f"the memory of this {what} has been given back by runtime.clear()")
@@ -157,7 +218,18 @@ def check_session(made_in: Session, what: str) -> None:
 
 
 def check_thread(what: str) -> None:
-    """Raise InputError on another thread than the one that started Taichi."""
+    """Refuse another thread than the one that started Taichi.
+
+    Parameters
+    ----------
+    what : str
+        What is made, used or ended there, in words.
+
+    Raises
+    ------
+    InputError
+        This is another thread.
+    """
     if threading.get_ident() != session().thread:
         raise InputError(
             f"a {what} must be made, used and ended on the thread that called runtime.start(): "
@@ -166,7 +238,13 @@ def check_thread(what: str) -> None:
 
 
 def settings() -> Optional[Settings]:
-    """Settings of the running session, or None before the first start."""
+    """Settings of the running session.
+
+    Returns
+    -------
+    Settings or None
+        None before the first start.
+    """
     return _current
 
 
@@ -235,7 +313,13 @@ def _failures_in_words():
 
 
 def cuda_present() -> bool:
-    """Whether a CUDA device answers on this machine."""
+    """Whether a CUDA device answers on this machine.
+
+    Returns
+    -------
+    bool
+        True where one answers.
+    """
     # Taichi would say on stderr that it finds no libcuda; the caller says it in a sentence.
     ti.set_logging_level(ti.ERROR)
     return bool(ti._lib.core.with_cuda())

@@ -21,10 +21,17 @@ _CENTRINGS, _SMALL = 10, 1e-300
 class ContactSpheres:
     """Spheres of every face of every body, in body frames (world axes, origin at the centre).
 
-    centre: (body_count, 4, sphere_count, 3) [m]. radius: (body_count, 4, sphere_count) [m].
-    cluster: (body_count, 4, 4): centre and radius of a ball around the spheres of a face [m].
-    extent: (body_count,), radius of the ball around all spheres of a body [m]; little more than
-    half that of its corners, where a sphere has no room.
+    Parameters
+    ----------
+    centre : ndarray
+        Centres of the spheres [m], shape (body_count, 4, sphere_count, 3).
+    radius : ndarray
+        Radii [m], shape (body_count, 4, sphere_count).
+    cluster : ndarray
+        Centre and radius of a ball around the spheres of each face [m], shape (body_count, 4, 4).
+    extent : ndarray
+        Radius of the ball around all spheres of each body [m], shape (body_count,); little more
+        than half of that of its corners, which spheres do not reach.
     """
 
     centre: np.ndarray

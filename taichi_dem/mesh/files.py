@@ -52,20 +52,42 @@ def read_mesh(
 ) -> Mesh:
     """Read solid cells and named face groups from a file (Gmsh 2.2 or 4.1, VTK, VTU, ...).
 
-    scale: length of one unit of the file [m], e.g. 0.001 for a drawing in mm.
-    weld_tolerance: points not farther apart [m] become one; 0 welds nothing.
-    keep_coincident: accept distinct points at one place, and leave the faces on them unbonded, as
-    at a joint or a crack (see ``checked_mesh``).
-    Groups come from Gmsh's physical surfaces ("physical_TAG" where they have no name); in other
-    formats from integer data on triangles, as "data name_value".
-    Elements of higher order are read as linear ones; hexahedra, prisms and pyramids are cut into
-    tetrahedra after welding; groups of points, lines and volumes are not read: the mesh's notes
-    say so. A UserWarning tells of what may change results: parts of other materials, Abaqus sets
-    and surfaces that are not read, cells of types that meshio does not know, and cells that meet
-    but share no face.
+    Parameters
+    ----------
+    path : path
+        File that meshio reads.
+    scale : float, default 1.0
+        Length of one unit of the file [m], such as 0.001 for a drawing in mm.
+    weld_tolerance : float, default 0.0
+        Points not farther apart than this become one [m]; 0 welds nothing.
+    keep_coincident : bool, default False
+        Accept distinct points at one place, and leave the faces on them unbonded, as at a joint or
+        a crack (see ``checked_mesh``).
 
-    Raises InputError, in one sentence, for a file that is missing, cannot be read, holds no solid
-    cells or such as cannot be cut, or whose mesh ``checked_mesh`` refuses.
+    Returns
+    -------
+    Mesh
+        The checked mesh; ``notes`` tells what was mended or not read.
+
+    Raises
+    ------
+    InputError
+        The file is missing, cannot be read, or holds no solid cells or cells that cannot be cut; or
+        ``checked_mesh`` refuses its mesh.
+
+    Notes
+    -----
+    Groups come from Gmsh's physical surfaces ("physical_TAG" where they have no name); in other
+    formats from integer data on triangles, as "data name_value". Elements of higher order are read
+    as linear ones. Hexahedra, prisms and pyramids are cut into tetrahedra after welding. Groups of
+    points, lines and volumes are not read. A UserWarning tells of what may change results: parts of
+    other materials, Abaqus sets and surfaces that are not read, cells of types that meshio does not
+    know, and cells that meet but share no face.
+
+    Examples
+    --------
+    >>> read_mesh(PAPER_BLOCK).body_count
+    966
     """
     scale, path = positive("scale", scale), path_name("path", path)
     raw, printed = _read_raw(path)

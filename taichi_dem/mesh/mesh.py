@@ -31,23 +31,48 @@ _LEAST_EXTENT, _MOST_EXTENT = 1e-30, 1e30
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Tetrahedra and named groups of faces, as ``checked_mesh`` makes them: for good.
+    """Tetrahedra and named groups of faces, as ``checked_mesh`` makes them; immutable.
 
-    Made directly from arrays it is checked alike, but nothing is mended. The arrays and the groups
-    cannot be changed; ``dataclasses.replace`` gives another mesh.
+    Made directly from arrays, a mesh is checked alike but not repaired. ``dataclasses.replace``
+    gives another mesh.
 
-    points: (point_count, 3) float64 [m].
-    tetrahedra: (body_count, 4) int32 point indices, all of positive volume.
-    groups: name -> (n, 3) int32 point indices of outer faces, normals outward, or of inner faces
-    that two bodies share; inner_groups: names of the latter.
-    notes: sentences about what the checks mended or found remarkable.
-    source: name of the file, "" for a mesh built in memory.
-    unread: groups of the file that are not of faces, pairs of name and what they are of.
-    keep_coincident: points that coincide stay apart, and so do the faces on them: no bond joins
-    them, as at a joint or a crack (see ``checked_mesh``).
-    bonded_shares: pairs of an inner group and the share of its faces' area that is bonded, 0 for
-    none; a Scene sets them from its options.
-    Raises InputError for arrays that ``checked_mesh`` would refuse or mend.
+    Parameters
+    ----------
+    points : ndarray
+        Coordinates [m], shape (point_count, 3).
+    tetrahedra : ndarray
+        Point indices, shape (body_count, 4), all of positive volume.
+    groups : mapping
+        Point indices (n, 3) by name: of outer faces with normals outward, or of inner faces that
+        two bodies share.
+    notes : tuple of str, default ()
+        Sentences about what the checks repaired or found remarkable.
+    source : str, default ""
+        Name of the file; ``""`` for a mesh built in memory.
+    unread : tuple of tuple of (str, str), default ()
+        Groups of the file that are not of faces: pairs of name and what they are of.
+    keep_coincident : bool, default False
+        Whether points that coincide stay apart, and with them the faces on them, as at a joint or a
+        crack.
+
+    Attributes
+    ----------
+    bonded_shares : tuple of (str, float)
+        Inner groups and the share of the area of their faces that is bonded, 0 for none; a Scene
+        sets them.
+    inner_groups : tuple of str
+        Names of the groups of inner faces.
+
+    Raises
+    ------
+    InputError
+        The arrays are such as ``checked_mesh`` would refuse or repair.
+
+    Examples
+    --------
+    >>> mesh = read_mesh(PAPER_BLOCK)
+    >>> mesh.body_count, sorted(mesh.groups)[:2]
+    (966, ['back', 'bottom'])
     """
 
     points: np.ndarray
@@ -105,7 +130,23 @@ class Mesh:
         return len(self.points)
 
     def group_faces(self, name: str) -> np.ndarray:
-        """Faces of the group ``name``, shape (n, 3); InputError when there is none."""
+        """Faces of a group.
+
+        Parameters
+        ----------
+        name : str
+            Name of the group.
+
+        Returns
+        -------
+        ndarray
+            Point indices, shape (n, 3).
+
+        Raises
+        ------
+        InputError
+            There is no such group.
+        """
         if not isinstance(name, str) or name not in self.groups:
             known = ", ".join(sorted(self.groups)) or "none"
             kinds = [kind for other, kind in self.unread if other == name]
@@ -114,10 +155,23 @@ class Mesh:
         return self.groups[name]
 
     def bonded_by(self, shares: Mapping[str, float]) -> "Mesh":
-        """The same mesh with only a share of the area of some inner faces bonded.
+        """Return the mesh with only a share of the area of some inner faces bonded.
 
-        shares: name of an inner group -> share from 0, no bond, to 1; the least counts where a face
-        is in several. Raises InputError for a group that is not there, or is of outer faces.
+        Parameters
+        ----------
+        shares : mapping
+            Share by the name of an inner group, from 0 (no bond) to 1; the smallest counts where a
+            face is in several groups.
+
+        Returns
+        -------
+        Mesh
+            The mesh with its ``bonded_shares``.
+
+        Raises
+        ------
+        InputError
+            A group is not there, or is of outer faces.
         """
         if not shares and not self.bonded_shares:
             return self
@@ -159,15 +213,43 @@ def checked_mesh(
 ) -> Mesh:
     """Build a Mesh from arrays; repair and report small defects, refuse others.
 
-    points: (n, 3) [m].  tetrahedra: (m, 4) point indices, either orientation. groups: name -> (k,
-    3) point indices of outer faces, or of inner ones that two bodies share, either orientation.
-    weld_tolerance: points not farther apart [m] become one; 0 welds nothing. keep_coincident:
-    accept distinct points at one place; faces on them are free surfaces, as of two blocks that
-    touch, a joint or a crack, and meet by the contact of outer faces. Without it such points are
-    refused, as bodies that seem joined there would not be bonded.
+    Parameters
+    ----------
+    points : array_like
+        Coordinates [m], shape (n, 3).
+    tetrahedra : array_like
+        Point indices, shape (m, 4), in either orientation.
+    groups : mapping
+        Point indices (k, 3) by name, in either orientation: of outer faces, or of inner ones that
+        two bodies share.
+    source : path, default ""
+        Name of the file.
+    weld_tolerance : float, default 0.0
+        Points not farther apart than this become one [m]; 0 welds nothing.
+    keep_coincident : bool, default False
+        Accept distinct points at one place. Faces on them are free surfaces, as of two blocks that
+        touch, a joint or a crack, and meet by the contact of outer faces. Without it such points
+        are refused, as bodies that seem joined there would not be bonded.
 
-    Repaired: negative volumes, points without a tetrahedron, faces twice in a group.
-    Raises InputError, with the numbers (counted from 0) of the defects.
+    Returns
+    -------
+    Mesh
+        The checked mesh; its ``notes`` say what was repaired.
+
+    Raises
+    ------
+    InputError
+        A defect cannot be repaired; the sentence has the numbers, counted from 0.
+
+    Notes
+    -----
+    Repaired are negative volumes, points without a tetrahedron, and faces twice in a group.
+
+    Examples
+    --------
+    >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    >>> checked_mesh(corners, [[0, 1, 2, 3]], {"base": [[0, 1, 2]]}).body_count
+    1
     """
     notes: list[str] = []
     flag("keep_coincident", keep_coincident)

@@ -41,11 +41,27 @@ _LONGEST_NAME = 50
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """The block at one time.
+    """Snapshot of the block at one time.
 
-    time_s; position, displacement, velocity (n, 3) in m and m/s; rotation (n, 3, 3), body to
-    world; level (n,); damage (n,) in [0, 1], the mean over a body's bonds; bound (n,): what
-    asked for the level, a place in ``step_control.CRITERIA``.
+    Parameters
+    ----------
+    time_s : float
+        Time [s].
+    position : ndarray
+        Positions of the centres [m], shape (body_count, 3).
+    rotation : ndarray
+        Rotation matrices, from body to world axes [-], shape (body_count, 3, 3).
+    displacement : ndarray
+        Displacements from the start [m], shape (body_count, 3).
+    velocity : ndarray
+        Velocities of the centres [m/s], shape (body_count, 3).
+    level : ndarray
+        Levels of the step, dt0 / 2^level, shape (body_count,).
+    damage : ndarray
+        Share of the fracture energy that the bonds of a body have spent, from 0 to 1, shape
+        (body_count,).
+    bound : ndarray
+        Index in ``step_control.CRITERIA`` of what bounds the step, shape (body_count,).
     """
 
     time_s: float
@@ -237,12 +253,34 @@ def write_paraview(
 ) -> None:
     """Write frames as a ParaView series: folder/name.pvd and a VTU file a frame.
 
-    name: of the files, that of the folder if None (``series_name``).
-    Cells carry body_id, level, speed_m_s, displacement_m, damage and step_bound_by, the place
-    in ``step_control.CRITERIA`` of what bounds a body's step. acting_since: times [s] by name,
-    (body_count,), NaN for never; cells then carry NAME_acts, 1 where an effect has begun to act by
-    the time of the frame, and NAME_since_s. An earlier series of that name in the folder is removed
-    first.
+    Parameters
+    ----------
+    folder : path
+        Folder of the series; it is made where it does not exist.
+    model : Model
+        Arrays of the scene, ``result.model``.
+    frames : sequence of Frame
+        Snapshots, ``result.frames``.
+    name : str, optional
+        Name of the files; that of the folder if None.
+    acting_since : mapping, optional
+        Times from which effects acted on each body [s], (body_count,) by name, NaN for never. Cells
+        then carry NAME_acts, 1 from that time, and NAME_since_s.
+
+    Raises
+    ------
+    InputError
+        The folder cannot be written to.
+
+    Notes
+    -----
+    Cells carry body_id, level, speed_m_s, displacement_m, damage and step_bound_by, the place in
+    ``step_control.CRITERIA`` of what bounds a body's step. An earlier series of that name is
+    removed.
+
+    Examples
+    --------
+    >>> write_paraview("results/series", result.model, result.frames)  # doctest: +SKIP
     """
     folder = output_folder(folder)
     name = series_name(folder) if name is None else name

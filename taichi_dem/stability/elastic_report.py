@@ -25,10 +25,19 @@ ELEMENTS = 4.0
 class ElasticReport:
     """Elastic constants of a scene's mesh beside those asked for, and what follows from them.
 
-    stiffness: of the block that the mesh is. asked: Young's modulus [Pa] and Poisson's ratio that
-    the material was made for, None for a material of constants per area. crack_length: the
-    characteristic length E G_f / tensile_strength^2 of a crack's tip [m]. element_size: edge of the
-    regular tetrahedron of the volume of each body [m], (body_count,). steps: largest stable ones.
+    Parameters
+    ----------
+    stiffness : MeshStiffness
+        Elastic constants of the block that the mesh is.
+    asked : tuple of (float, float) or None
+        Young's modulus [Pa] and Poisson's ratio for which the material was made; None for a
+        material of constants per area.
+    crack_length : float
+        Characteristic length E G_f / tensile_strength^2 of the tip of a crack [m].
+    element_size : ndarray
+        Edge of the regular tetrahedron of the volume of each body [m], shape (body_count,).
+    steps : StepReport
+        Largest stable steps.
     """
 
     stiffness: MeshStiffness
@@ -91,8 +100,24 @@ class ElasticReport:
 def elastic_report(scene: Scene) -> ElasticReport:
     """Elastic constants that the mesh of a scene shows with its material; print it before a run.
 
+    Parameters
+    ----------
+    scene : Scene
+        Scene to judge.
+
+    Returns
+    -------
+    ElasticReport
+        Print it for the table.
+
+    Raises
+    ------
+    InputError
+        The argument is no Scene, or the springs cannot be solved.
+
+    Notes
+    -----
     Six linear static solves of the whole mesh: some seconds for ten thousand bodies.
-    Raises InputError for anything else than a Scene, or springs that cannot be solved.
     """
     instance("scene", scene, Scene)
     mesh, material = scene.mesh, scene.material

@@ -27,10 +27,27 @@ _WORST = 10
 class QualityReport:
     """Quality of each body, arrays (body_count,), and the explicit steps that follow.
 
-    volume_m3; mass_kg; aspect_ratio, longest edge / smallest altitude (1.22 when regular);
-    smallest_altitude_m; dashpot_step_s and spring_step_s, the largest explicit step at which a
-    pair of two such bodies is stable under its bond dashpots and bond springs.
-    point_count, bond_count, outer_count: of the mesh.
+    Parameters
+    ----------
+    volume_m3 : ndarray
+        Volumes [m^3], shape (body_count,), as all arrays.
+    mass_kg : ndarray
+        Masses [kg].
+    aspect_ratio : ndarray
+        Longest edge over smallest altitude [-]; 1.22 for a regular tetrahedron.
+    smallest_altitude_m : ndarray
+        Smallest altitudes [m].
+    dashpot_step_s : ndarray
+        Largest explicit step at which a pair of two such bodies is stable with its bond dashpots
+        [s].
+    spring_step_s : ndarray
+        The same with its bond springs [s].
+    point_count : int
+        Number of points of the mesh.
+    bond_count : int
+        Number of bonds.
+    outer_count : int
+        Number of outer faces.
     """
 
     volume_m3: np.ndarray
@@ -54,14 +71,33 @@ class QualityReport:
         return np.minimum(self.dashpot_step_s, self.spring_step_s)
 
     def worst(self, count: int = _WORST) -> np.ndarray:
-        """The bodies of the smallest critical step, the worst first, shape (count,)."""
+        """Bodies of the smallest critical step, the worst first.
+
+        Parameters
+        ----------
+        count : int, default _WORST
+            How many.
+
+        Returns
+        -------
+        ndarray
+            Numbers of the bodies, shape (count,).
+        """
         return np.argsort(self.critical_step_s, kind="stable")[:count]
 
     def price(self, count: int = _WORST) -> np.ndarray:
         """Gain in the step of the whole mesh without the k + 1 worst bodies, k < count.
 
-        Factors of at least 1, as many as there are bodies to leave out; infinite where nothing
-        is left that limits the step, 1 where nothing limited it before.
+        Parameters
+        ----------
+        count : int, default _WORST
+            How many.
+
+        Returns
+        -------
+        ndarray
+            Factors of at least 1, as many as there are bodies to leave out; infinite where nothing
+            else limits the step, 1 where nothing limited it before.
         """
         steps = np.append(np.sort(self.critical_step_s), np.inf)
         gained = steps[1 : count + 1]
@@ -113,9 +149,28 @@ class QualityReport:
 
 
 def quality_report(mesh: Mesh, material: Material) -> QualityReport:
-    """Shape and explicit step limits of every body of a mesh; infinite for one without bonds.
+    """Shape and explicit step limits of every body of a mesh.
 
-    Raises InputError for what is no mesh or material.
+    Parameters
+    ----------
+    mesh : Mesh
+        Mesh.
+    material : Material
+        Material of the bonds.
+
+    Returns
+    -------
+    QualityReport
+        Arrays (body_count,); limits are infinite for a body without bonds. Print it for a table.
+
+    Raises
+    ------
+    InputError
+        The arguments are no mesh and material.
+
+    Examples
+    --------
+    >>> print(quality_report(read_mesh(PAPER_BLOCK), CONCRETE))  # doctest: +SKIP
     """
     instance("mesh", mesh, Mesh)
     instance("material", material, Material)

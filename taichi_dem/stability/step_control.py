@@ -34,22 +34,44 @@ EVENTS = ("hit", "release", "neighbour")
 class StepControl:
     """Limits of a body's step beside its displacement in it.
 
-    safety: share of each stability limit that a step may take, in (0, 1]. angle: largest turn in a
-    step [rad]. criteria: names out of ``OPTIONAL`` that count. wake: events out of ``EVENTS`` at
-    which a body between its own times is brought to the present and takes its new step at once:
-    "hit" (a contact comes near), "release" (a bond near it breaks), "neighbour" (a body it touches
-    refined its step strongly). level_jump: levels by which a body may be coarser than one it
-    touches, None for any number. ahead: steps of the finer of two bodies by which their contacts
-    count before they could touch, at least 1, so that a coarse body is woken before a collision.
-    dashpot_floor: with dashpot "limited", the shortest step that dashpots require [s]; where they
-    need a shorter one they are limited instead. 0: they are never limited.
-    Raises InputError for a value out of its range or an unknown name.
+    Parameters
+    ----------
+    safety : float, default 0.25
+        Share of each stability limit that a step may take, above 0 and at most 1.
+    angle : float, default 0.02
+        Largest rotation in a step [rad].
+    criteria : tuple of str, default OPTIONAL
+        Criteria that count, out of ``step_control.OPTIONAL``.
+    wake : tuple of str, default EVENTS
+        Events at which a body between its own times is brought to the present and takes its new
+        step at once: ``"hit"`` (a contact comes near), ``"release"`` (a bond near it breaks),
+        ``"neighbour"`` (a body that it touches refined its step strongly).
+    level_jump : int or None, default 2
+        Levels by which a body may be coarser than one that it touches; None for any number.
+    ahead : float, default 2.0
+        Number of steps of the finer of two bodies by which their contacts count before they could
+        touch, at least 1, so that a coarse body is woken before a collision.
+    dashpot_floor : float, default 0.0
+        With dashpot ``"limited"``, the shortest step that dashpots require [s]; where they need a
+        shorter one they are limited instead. 0: they are never limited.
 
+    Raises
+    ------
+    InputError
+        A value is out of its range, or a name is unknown.
+
+    Notes
+    -----
     Stability allows 0.8 of the limits, accuracy less: a dashpot takes the velocity of half a step
-    ago, a held neighbour lies up to a step behind, both errors of first order. In the paper's block
-    (dt0 8e-8 s, largest error of a body at the hole at 7e-5 s) they are 0.9 % at 0.8 and 0.4 % at
-    0.4. One bond there opens to within 0.2 % of its failure and releases two bodies of the hole's
-    wall: at 0.5 it still held, and the mean displacement of the hole was 2.4 % short.
+    ago, and a held neighbour is up to a step behind, both errors of first order. In the paper's
+    block (dt0 8e-8 s, largest error of a body at the hole at 7e-5 s) they are 0.9 % at 0.8 and 0.4
+    % at 0.4. One bond there opens to within 0.2 % of its failure and releases two bodies of the
+    hole's wall: at 0.5 it still held, and the mean displacement of the hole was 2.4 % short.
+
+    Examples
+    --------
+    >>> StepControl(safety=0.5).safety
+    0.5
     """
 
     safety: float = 0.25

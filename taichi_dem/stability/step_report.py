@@ -43,10 +43,15 @@ METHODS = {
 class StepReport:
     """Largest stable steps of every body by criterion and by method, and which of them binds.
 
-    limits: arrays (body_count,) in s by criterion: bond_stiffness, bond_dashpot,
-    contact_stiffness and contact_dashpot (every sphere of the worst face in one contact),
-    contact_dashpot_single (one sphere in contact, which binds nothing by itself); a criterion
-    whose effect a scene leaves out is missing. warnings: sentences about the scene.
+    Parameters
+    ----------
+    limits : dict
+        Largest steps [s] by criterion, shape (body_count,) each: bond_stiffness, bond_dashpot,
+        contact_stiffness and contact_dashpot (every sphere of the worst face in one contact),
+        contact_dashpot_single (one sphere in contact, which binds nothing by itself). A criterion
+        whose effect a scene leaves out is missing.
+    warnings : tuple of str, default ()
+        Sentences about the scene.
     """
 
     limits: dict[str, np.ndarray]
@@ -71,12 +76,22 @@ class StepReport:
         return [name for name in self.limits if not name.endswith("single")]
 
     def borne(self, dashpots: str, link: str = "bond") -> np.ndarray:
-        """Largest stable step of each body under a method [s], (body_count,).
+        """Largest stable step of each body under a method.
 
-        dashpots: how the method takes them, a key of ``METHODS``: "full", "limited" or "solved".
-        link: "bond", or "contact" for every sphere of the worst face in one contact; a step is
-        stable that is below both. Solved dashpots leave the limit of the springs.
-        Infinite where nothing limits it.
+        A step is stable that is below both that of the bonds and that of the contacts.
+
+        Parameters
+        ----------
+        dashpots : str
+            How the method takes dashpots, a key of ``METHODS``: ``"full"``, ``"limited"`` or
+            ``"solved"``, which leaves the limit of the springs.
+        link : str, default "bond"
+            ``"bond"``, or ``"contact"`` for every sphere of the worst face in one contact.
+
+        Returns
+        -------
+        ndarray
+            Steps [s], shape (body_count,); infinite where nothing limits them.
         """
         springs = self.limits.get(f"{link}_stiffness")
         if springs is None:
@@ -91,19 +106,49 @@ class StepReport:
         return np.maximum(together, springs * np.sqrt(1.0 - 0.5 * LIMITED))
 
     def worst(self, count: int = _WORST) -> np.ndarray:
-        """Bodies of the smallest step, the worst first."""
+        """Bodies of the smallest step, the worst first.
+
+        Parameters
+        ----------
+        count : int, default _WORST
+            How many.
+
+        Returns
+        -------
+        ndarray
+            Numbers of the bodies, shape (count,).
+        """
         return np.argsort(self.step_s, kind="stable")[:count]
 
     def price(self, count: int = _WORST) -> float:
-        """Gain in the step of all without the count worst bodies, a factor of at least 1.
+        """Gain in the step of all without the count worst bodies.
 
-        Infinite where nothing limits the step of the others, or there are none.
+        Parameters
+        ----------
+        count : int, default _WORST
+            How many.
+
+        Returns
+        -------
+        float
+            Factor of at least 1; infinite where nothing limits the step of the others.
         """
         steps = np.append(np.sort(self.step_s), np.inf)
         return float(steps[min(count, len(steps) - 1)] / steps[0]) if steps[0] < np.inf else 1.0
 
     def work_share(self, count: int = _WORST) -> float:
-        """Share of the body updates, each at its own step, that the count worst bodies take."""
+        """Share of the body updates, each at its own step, that the worst bodies take.
+
+        Parameters
+        ----------
+        count : int, default _WORST
+            How many.
+
+        Returns
+        -------
+        float
+            Share, from 0 to 1.
+        """
         updates = 1.0 / self.step_s
         return float(updates[self.worst(count)].sum() / max(updates.sum(), 1e-300))
 
@@ -201,10 +246,31 @@ def stable_together(springs: ArrayLike, drags: ArrayLike) -> np.ndarray:
 def step_report(scene: Union[Scene, Mesh], material: Optional[Material] = None) -> StepReport:
     """Judge a scene, or a mesh and a material with all effects, before a run.
 
-    scene: a Scene, or a Mesh if material is given. Limits hold for a pair of equal bodies that
-    move against each other (``dashpot_step``, ``spring_step``): a mesh bears no
-    less, and at most twice as much.
-    Raises InputError for anything else.
+    Parameters
+    ----------
+    scene : Scene or Mesh
+        Scene, or a Mesh where a material is given.
+    material : Material, optional
+        Material of a mesh.
+
+    Returns
+    -------
+    StepReport
+        Largest stable step of each body by criterion and method. Print it for a table.
+
+    Raises
+    ------
+    InputError
+        The arguments are of another kind.
+
+    Notes
+    -----
+    Limits hold for a pair of equal bodies that move against each other: no mesh has a smaller
+    limit, and none more than twice the limit.
+
+    Examples
+    --------
+    >>> print(step_report(read_mesh(PAPER_BLOCK), CONCRETE))  # doctest: +SKIP
     """
     if isinstance(scene, Scene) and material is None:
         damped, friction, contact = map(scene.effect, ("dashpot", "friction", "contact"))

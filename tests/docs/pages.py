@@ -1,6 +1,7 @@
 """What tests read out of the pages: code blocks, links, and what a block leaves behind."""
 
 import pickle
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -50,6 +51,14 @@ def headings(page):
     for number, token in enumerate(everything):
         if token.type == "heading_open":
             yield number + 1, everything[number + 1].content
+
+
+def anchors(page):
+    """Names that a page's headings can be linked by."""
+    made = set()
+    for _, text in headings(page):
+        made.add(re.sub(r"[^\w\- ]", "", text).strip().lower().replace(" ", "-"))
+    return made
 
 
 class Program(NamedTuple):

@@ -26,7 +26,7 @@ WANTED = {
     " step=step, count=count, euler=euler, leapfrog=leapfrog)",
 }
 #: Pages whose blocks have tests of their own.
-APART = ("README.md", "docs/hard_cases.md")
+APART = ("README.md", "docs/long_runs.md", "docs/hard_cases.md")
 BLOCKS = [
     (page, number) for page in PAGES if page not in APART for number in range(len(blocks(page)))
 ]

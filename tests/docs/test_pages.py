@@ -10,7 +10,7 @@ from urllib.parse import unquote, urlsplit
 
 import pytest
 
-from tests.docs.pages import FOLDER, PAGES, headings, links, tokens, words
+from tests.docs.pages import FOLDER, PAGES, anchors, headings, links, tokens, words
 
 PACKAGES = ("taichi_dem.", "ca_damper.")
 PAPERS = {
@@ -36,14 +36,6 @@ def found(name):
             except ImportError:
                 raise LookupError(f"{name}: there is no {path}") from None
     return thing
-
-
-def anchors(page):
-    """Names that a page's headings can be linked by."""
-    made = set()
-    for _, text in headings(page):
-        made.add(re.sub(r"[^\w\- ]", "", text).strip().lower().replace(" ", "-"))
-    return made
 
 
 @pytest.mark.parametrize("page", PAGES)

@@ -25,8 +25,8 @@ def readme_table():
 
 
 def test_the_scenes_are_short_and_all_run_below():
-    """Two scenes and the long run."""
-    assert [len(text.splitlines()) <= MOST_LINES for text in blocks("README.md")] == [True] * 3
+    """One of each package."""
+    assert [len(text.splitlines()) <= MOST_LINES for text in blocks("README.md")] == [True] * 2
 
 
 def test_the_blast_runs_and_leaves_what_the_page_says(tmp_path):
@@ -60,7 +60,7 @@ def test_the_damper_runs_and_both_fillings_agree(tmp_path):
 def test_the_long_run_goes_on_from_its_checkpoint(tmp_path):
     """The start, the 200 samples of the first run, and those of the second half of 200."""
     wanted = "list(result.history['time_s']), result.report.needs"
-    ran = run_pasted(blocks("README.md")[2], tmp_path, wanted)
+    ran = run_pasted(blocks("docs/long_runs.md")[0], tmp_path, wanted)
     times, needs = ran.left
     # The observer is called in the second half only.
     assert re.findall(r"^(\S+) s: fastest body", ran.said, re.MULTILINE) == ["1.5e-03", "2.0e-03"]

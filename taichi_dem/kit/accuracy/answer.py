@@ -17,9 +17,18 @@ Values = Union[float, np.ndarray]
 class ErrorParts:
     """Half-widths of an error bar by source, in the unit of the value.
 
-    step: of the time step. solver: of sweeps that end early. chance: of runs that differ by one
-    rounding or by their seeds. sampling: of the time over which a mean was taken. Sources are
-    independent: their squares add.
+    Sources are independent: their squares add.
+
+    Parameters
+    ----------
+    step : float or ndarray, default 0.0
+        Error of the time step, in the unit of the value, as all.
+    solver : float or ndarray, default 0.0
+        Error of sweeps that end early, in the unit of the value.
+    chance : float or ndarray, default 0.0
+        Spread of runs that differ by one rounding or by their seeds, in the unit of the value.
+    sampling : float or ndarray, default 0.0
+        Error of the time over which a mean was taken, in the unit of the value.
     """
 
     step: Values = 0.0
@@ -29,7 +38,7 @@ class ErrorParts:
 
     @property
     def total(self) -> Values:
-        """Half-width of the whole bar."""
+        """Half-width of the whole bar, in the unit of the value."""
         return sum(getattr(self, part.name) ** 2 for part in fields(self)) ** 0.5
 
     def __repr__(self):
@@ -44,7 +53,17 @@ class ErrorParts:
 
 @dataclass(frozen=True)
 class Expense:
-    """What one tolerance costs. measured: whether it was paid, or is predicted from runs."""
+    """Cost of one tolerance.
+
+    Parameters
+    ----------
+    tolerance : float
+        Half-width of the bar as a share of the value.
+    seconds : float
+        CPU time [s].
+    measured : bool
+        Whether it was spent, or is predicted from runs.
+    """
 
     tolerance: float
     seconds: float
@@ -57,11 +76,23 @@ class Expense:
 
 @dataclass(frozen=True)
 class Plan:
-    """How an answer was found. method: in words, with its step. runs: number made of all kinds.
+    """How an answer was found, and what it cost.
 
-    pilot_s, final_s: CPU seconds of the runs that chose and of those that answered. begin: level
-    of the step at which a question of a like scene may begin. parting_s: simulated time from which
-    twins, runs that differ by one rounding, differ by more than was allowed [s]; infinite if never.
+    Parameters
+    ----------
+    method : str
+        Method in words, with its step.
+    runs : int
+        Number of runs of all kinds.
+    pilot_s : float
+        CPU time of the runs that chose the method and step [s].
+    final_s : float
+        CPU time of the runs that gave the answer [s].
+    begin : int, default 0
+        Level of the step at which a question of a similar scene may begin.
+    parting_s : float, default math.inf
+        Simulated time from which runs that differ by one rounding differ by more than was allowed
+        [s]; infinite if never.
     """
 
     method: str
@@ -73,7 +104,7 @@ class Plan:
 
     @property
     def seconds(self) -> float:
-        """CPU seconds of all runs."""
+        """CPU time of all runs [s]."""
         return self.pilot_s + self.final_s
 
     def __str__(self):
@@ -87,11 +118,33 @@ class Plan:
 class Answer:
     """Value of a goal with its error bar.
 
-    goal, unit: what was asked. value: a number, or one a place of a curve. error: half-width of the
-    bar that holds the true value with the given confidence. parts: of it, by source. tolerance:
-    the largest error that was allowed, as a share of the value. plan: how it was found.
-    result: of the finest run. cost_curve: what other tolerances would cost. shortfall: why the
-    error is larger than asked, and what would help; "" where it is not.
+    Parameters
+    ----------
+    goal : str
+        Name of the goal.
+    unit : str
+        Unit of the value, ``"1"`` for none.
+    value : float or ndarray
+        A number, or one for each place of a curve, in the unit of the goal.
+    parts : ErrorParts
+        Half-widths of the error bar by source.
+    tolerance : float
+        Largest error that was allowed, as a share of the value.
+    confidence : float
+        Probability [-] with which the bar holds the true value.
+    plan : Plan
+        How the answer was found, and what it cost.
+    result : object, optional
+        Result of the finest run.
+    cost_curve : sequence of Expense, optional
+        What other tolerances would cost.
+    shortfall : str, default ""
+        Why the error is larger than asked, and what would help; ``""`` where it is not.
+
+    Examples
+    --------
+    >>> answer = solve(scene, until=1e-4, goal=goals.hole_displacement())  # doctest: +SKIP
+    >>> answer.value, answer.error, answer.reached  # doctest: +SKIP
     """
 
     goal: str

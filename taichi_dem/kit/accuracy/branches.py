@@ -19,9 +19,20 @@ _MOST_BRANCHES = 4
 
 @dataclass(frozen=True)
 class Branch:
-    """One of several ends. value, error: mean over its runs and half-width of its bar.
+    """One of several ends of a question.
 
-    share: of all runs that came to it, share_error: half-width of its bar. seeds: of its runs.
+    Parameters
+    ----------
+    value : float
+        Mean over its runs, in the unit of the goal.
+    error : float
+        Half-width of the bar of the mean, in the unit of the goal.
+    share : float
+        Share of all runs that came to it.
+    share_error : float
+        Half-width of the bar of that share.
+    seeds : tuple of int
+        Seeds of its runs.
     """
 
     value: float
@@ -31,7 +42,20 @@ class Branch:
     seeds: tuple[int, ...]
 
     def in_words(self, unit: str, runs: str) -> str:
-        """Value, bar and share."""
+        """Value, bar and share in words.
+
+        Parameters
+        ----------
+        unit : str
+            Unit of the value.
+        runs : str
+            Word for the runs, in the plural.
+
+        Returns
+        -------
+        str
+            A part of a sentence.
+        """
         end = f" {unit}" if unit != "1" else ""
         share = f"{100.0 * self.share:.0f} +- {100.0 * self.share_error:.0f} %"
         return f"{self.value:.6g} +- {self.error:.2g}{end} for {share} of the {runs}"
@@ -41,7 +65,12 @@ class Branch:
 class BranchedAnswer(Answer):
     """Answer of a question with several ends: its value is that of the most frequent.
 
-    branches: all of them, the most frequent first.
+    All other parameters are those of ``Answer``.
+
+    Parameters
+    ----------
+    branches : tuple of Branch, default ()
+        All ends, the most frequent first.
     """
 
     branches: tuple[Branch, ...] = ()

@@ -15,7 +15,12 @@ LEAST_SHARE = 0.01
 class Progress:
     """How far a job is; every job of both packages and of the experiments reports one of these.
 
-    share: done, in [0, 1]. seconds: spent on it so far, without compiling [s].
+    Parameters
+    ----------
+    share : float
+        Share of the job that is done, from 0 to 1.
+    seconds : float
+        Time spent on it so far, without compiling [s].
     """
 
     phase: ClassVar[str] = "running"

@@ -22,11 +22,27 @@ _open_bars: list["ProgressBar"] = []
 
 
 class ProgressBar:
-    """A bar with percent, time left and speed, from entering to leaving its block.
+    """Bar with percent, time left and speed, from entering to leaving its block.
 
     It is drawn on stderr where that is a terminal, and in the cell of a Jupyter notebook; it leaves
     nothing behind. Call it with a Progress; while kernels are compiled in its block it says so by
-    itself. title: what is being done.
+    itself.
+
+    Parameters
+    ----------
+    title : str
+        What is being done.
+
+    Raises
+    ------
+    InputError
+        The bar is entered twice.
+
+    Examples
+    --------
+    >>> with ProgressBar("runs") as bar:
+    ...     for k in range(3):
+    ...         bar.count(k, total=3)
     """
 
     def __init__(self, title: str):
@@ -53,11 +69,25 @@ class ProgressBar:
         self._display.show(progress)
 
     def at(self, share: float) -> None:
-        """Show a share in [0, 1] of a job that knows no more of itself."""
+        """Show the progress of a job that knows no more than its share.
+
+        Parameters
+        ----------
+        share : float
+            Share that is done, from 0 to 1.
+        """
         self(Progress(share, time.perf_counter() - self._started))
 
     def count(self, done: int, total: int) -> None:
-        """Show how many runs are done of a job that consists of several."""
+        """Show how many runs are done of a job that consists of several.
+
+        Parameters
+        ----------
+        done : int
+            Number of runs that are done.
+        total : int
+            Number of all runs.
+        """
         self(Counted(done / max(1, total), time.perf_counter() - self._started, done, total))
 
     def __exit__(self, *error):
