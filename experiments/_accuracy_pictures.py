@@ -14,7 +14,7 @@ def draw_cost(path, panels):
     panels: by title, the answers as (share of the value that the bar is, share that the value is
     off, seconds), and the fixed runs by method as lists of (share off, seconds).
     """
-    with picture(path, 1, len(panels), size=(5.2 * len(panels), 4.4), squeeze=False) as (_, axes):
+    with picture(path, 1, len(panels), size=(4.5 * len(panels), 4.4), squeeze=False) as (_, axes):
         for one, (title, (answers, fixed)) in zip(axes[0], panels.items()):
             _draw_fixed(one, fixed)
             bars, off, seconds = np.array(answers).T
@@ -58,7 +58,7 @@ def draw_parting(path, time_ms, ways, apart, answer):
     time_ms (frames,). ways (runs, frames): mean way [mm]. apart (runs - 1, frames): difference of
     the usual body, as a share of its way. answer: to the question what the way is at the end.
     """
-    with picture(path, 1, 2, size=(10.0, 4.2)) as (_, (left, right)):
+    with picture(path, 1, 2, size=(9.0, 4.2)) as (_, (left, right)):
         left.plot(time_ms, ways.T, color=BLUE, linewidth=0.8)
         left.set(xlabel="time [ms]", ylabel="mean way of the bodies [mm]")
         left.set_title(f"{len(ways)} runs whose starts differ by one rounding")

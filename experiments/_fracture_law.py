@@ -97,7 +97,7 @@ def write(curves, points, at):
         columns[f"sliding_{1e-6 * pressure:g}_MPa_m"] = sliding
         columns[f"traction_{1e-6 * pressure:g}_MPa_Pa"] = shear
     write_csv(at("shear.csv"), columns)
-    with picture(at("law.png"), 1, 2, size=(9.6, 4.0)) as (_, panels):
+    with picture(at("law.png"), 1, 2, size=(9.2, 4.0)) as (_, panels):
         draw(panels, curves, size=3.4)
         panels[1].legend(loc="upper left")
         panels[0].set_title("pulled, unloaded, pressed, pulled until it breaks")

@@ -73,7 +73,7 @@ def picture_damping(path, made):
         ("largest displacement from the base [mm]", lambda one: 1e3 * one.relative_peak),
         ("damping ratio [%]", lambda one: 1e2 * one.damping_ratio),
     )
-    with picture(path, 1, 3, size=(10.4, 3.8)) as (figure, axes):
+    with picture(path, 1, 3, size=(9.2, 3.6)) as (figure, axes):
         for axis, (words, measure) in zip(axes, drawn):
             level = measure(empty)[0, 0]
             axis.axhline(level, color=GREY, ls=":", label=STYLES["empty"].label)

@@ -86,7 +86,7 @@ def picture_energy(path, runs):
     """Energy that the account cannot explain over time, a panel a limit; the sentences below."""
     limits = list(dict.fromkeys(made.limit for made in runs))
     said = [f"{m.limit}, {m.name}: “{m.sentence}”" for m in runs if m.sentence]
-    size = (4.6 * len(limits) + 0.6, 3.4 + 0.55 * len(said))
+    size = (4.3 * len(limits) + 0.6, 3.4 + 0.55 * len(said))
     with picture(path, 1, len(limits), size, squeeze=False) as (drawn, panels):
         for axes, limit in zip(panels[0], limits):
             for made, colour in zip((m for m in runs if m.limit == limit), COLOURS):
@@ -99,8 +99,8 @@ def picture_energy(path, runs):
             axes.set(title=f"limited by its {limit}", xlabel="time [µs]", **UNEXPLAINED)
             axes.legend(loc="upper right", title="step")
         panels[0, 0].set_ylabel("unexplained energy / energy put in [1]")
-        words = "\n".join(textwrap.fill(text, 62 * len(limits)) for text in said)
-        drawn.supxlabel(words, x=0.02, ha="left", fontsize=7.5, family="monospace")
+        words = "\n".join(textwrap.fill(text, 60 * len(limits)) for text in said)
+        drawn.supxlabel(words, x=0.02, ha="left", fontsize=8.5)
 
 
 def film(path, safe, bad, count=40, held=8):

@@ -126,7 +126,7 @@ def picture_spall(path, made, stress, rows):
     """Stress [MPa] over place and time in the first bars, and depths beside the formula's."""
     count, joint = min(2, len(rows)), made.place[:-1] + 0.5 * made.cell
     top = np.abs(stress[:, :count]).max()
-    with picture(path, 1, 1 + count, size=(4.2 * (1 + count), 3.8)) as (figure, (*panels, last)):
+    with picture(path, 1, 1 + count, size=(3.05 * (1 + count), 3.6)) as (figure, (*panels, last)):
         for k, (row, axes) in enumerate(zip(rows, panels)):
             drawn = draw_space_time(axes, joint, made.time, stress[:, k], top=top)
             draw_breaks(axes, joint, made.time, made.joints[:, k])

@@ -58,7 +58,7 @@ def picture_cycle(path: FileName, measures: Any, amplitude: float) -> None:
     [mm].
     """
     styles, time = styles_of(next(iter(measures.values()))), np.linspace(0.0, 1.0, 200)
-    shape = {"size": (4.2 * len(measures) + 0.6, 5.7), "sharex": True, "sharey": "row"}
+    shape = {"size": (2.85 * len(measures) + 0.6, 5.7), "sharex": True, "sharey": "row"}
     with picture(path, 2, len(measures), squeeze=False, **shape) as (figure, panels):
         for top, bottom, (title, fillings) in zip(*panels, measures.items()):
             motion = amplitude * np.sin(2.0 * np.pi * time)

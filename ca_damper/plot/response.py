@@ -22,7 +22,7 @@ def picture_responses(path: FileName, responses: Mapping[str, Any], particle_mas
     count = len(responses)
     columns = 2 if count < 4 else 3
     rows = (count + 2 + columns - 1) // columns
-    size = (4.2 * columns, 3.3 * rows)
+    size = (min(4.2, 9.2 / columns) * columns, 3.0 * rows)
     with picture(path, rows, columns, size, squeeze=False) as (figure, axes):
         panels = axes.ravel()
         for axis, (label, response) in zip(panels, responses.items()):
@@ -144,7 +144,7 @@ def picture_measures(path: FileName, responses: Mapping[str, Any], particle_mass
     Apparent mass as a share of the particles' own: 1 for a rigid mass.
     """
     count = len(responses)
-    size = (1.0 + 2.6 * count, 5.4)
+    size = (1.0 + 2.05 * count, 5.4)
     shape = {"squeeze": False, "sharex": True, "sharey": "row"}
     with picture(path, 2, count, size, **shape) as (figure, axes):
         for column, (label, response) in zip(axes.T, responses.items()):
@@ -170,7 +170,7 @@ def picture_hysteresis(path: FileName, sweeps: Mapping[str, Any]) -> None:
     """Sweeps up and down, the state carried on: a column a filling, a row a particle number."""
     particles = next(iter(sweeps.values())).up.particles
     count = len(sweeps)
-    size = (1.0 + 2.6 * count, 1.0 + 2.3 * len(particles))
+    size = (1.0 + 2.05 * count, 1.0 + 2.3 * len(particles))
     shape = {"squeeze": False, "sharex": True, "sharey": "row"}
     with picture(path, len(particles), count, size, **shape) as (figure, axes):
         for column, (label, sweep) in zip(axes.T, sweeps.items()):

@@ -20,12 +20,12 @@ from taichi_dem.simulate import result_of, simulate
 
 LENGTH = 0.3
 BAR = bar(LENGTH, 0.1, (3, 2, 2))
-STEP, UNTIL, LOOKS = 2e-8, 9e-4, 20
+STEP, UNTIL, LOOKS = 2e-8, 9e-4, 10
 #: The right end goes with v cos(2 pi f t), and sideways at half of it: v [m/s] to choose, f [Hz].
 SPEEDS = (0.05, 0.2, 0.5, 0.75, 1.0, 1.5, 2.0)
 SIDEWAYS, FREQUENCY = 0.5, 900.0
 #: Looks at which the bar is drawn: pulled open, and pressed together.
-SHOWN = {"pulled open": 6, "pressed together": LOOKS}
+SHOWN = {"pulled open": 3, "pressed together": LOOKS}
 #: Effects to choose from and their words; the first three act without contact.
 EFFECTS = {
     "bond_damping": (dem.effects.BondDamping, "dashpots of the bonds"),

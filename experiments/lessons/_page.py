@@ -56,6 +56,8 @@ def png_like_the_first(figure, name):
     """
 
     def laid_out():
+        # Room for longer numbers than those of the first.
+        figure.get_layout_engine().set(w_pad=0.15)
         figure.draw_without_rendering()
         return [axes.get_position(original=True) for axes in figure.axes]
 

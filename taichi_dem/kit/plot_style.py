@@ -4,7 +4,7 @@ import contextlib
 import io
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Union
 
 import matplotlib
 import numpy as np
@@ -51,26 +51,27 @@ class MethodStyle:
     label: str
     colour: str
     marker: str
-    line: str = "-"
+    line: Union[str, tuple[float, tuple[float, ...]]] = "-"
 
 
-#: Styles by name; those that share a picture have different colours.
+_LONG_DASHES, _DASH_DOT_DOT = (0.0, (8.0, 2.0)), (0.0, (5.0, 1.5, 1.0, 1.5, 1.0, 1.5))
+#: Styles by name; those that share a picture differ in colour, and without it in marker and line.
 STYLES = {
     "uniform": MethodStyle("paper's rule, one step for all", RED, "o"),
     "multirate_held": MethodStyle("paper's rule, multirate", BLUE, "s", "--"),
     "multirate_drifted": MethodStyle(
-        "paper's rule, multirate, neighbours drifted", GREEN, "D", ":"
+        "paper's rule, multirate, neighbours drifted", GREEN, "D", _DASH_DOT_DOT
     ),
     "controlled": MethodStyle("multirate, step control", ORANGE, "^", "-."),
-    "limited": MethodStyle("one fixed step, limited dashpots", PURPLE, "v"),
+    "limited": MethodStyle("one fixed step, limited dashpots", PURPLE, "v", _LONG_DASHES),
     "implicit": MethodStyle("one fixed step, solved dashpots", SKY, "P", "--"),
     "fixed": MethodStyle("one fixed step, full dashpots", BLACK, "X"),
-    "reference": MethodStyle("reference", GREY, "."),
+    "reference": MethodStyle("reference", GREY, ".", ":"),
     "ca_static": MethodStyle("automaton, static contact", BLUE, "o"),
-    "ca_place": MethodStyle("automaton, rules of place", WINE, "P"),
-    "ca_ejection": MethodStyle("automaton, landing + ejection", GREEN, "s"),
+    "ca_place": MethodStyle("automaton, rules of place", WINE, "P", ":"),
+    "ca_ejection": MethodStyle("automaton, landing + ejection", GREEN, "s", "-."),
     "ca_landing": MethodStyle("automaton, landing", ORANGE, "D"),
-    "dem": MethodStyle("spheres", RED, "^"),
+    "dem": MethodStyle("spheres", RED, "^", "--"),
     "dem_printed": MethodStyle("spheres, damping as printed", PURPLE, "v"),
     "dem_soft": MethodStyle("spheres, modulus / 100", SKY, "P"),
     "combined": MethodStyle("spheres and long flights", OLIVE, "v"),

@@ -53,7 +53,7 @@ def picture_wave(
     numbers of those to follow, name -> number. label: of the values. titles: of both panels.
     level: words and value of a dotted line.
     """
-    with picture(path, 1, 2, size=(10.0, 3.8)) as (_, (along, over)):
+    with picture(path, 1, 2, size=(9.0, 3.8)) as (_, (along, over)):
         draw_space_time(along, place, time_s, values, label)
         for (name, cell), colour in zip(cells.items(), (BLUE, GREEN, RED, ORANGE, PURPLE)):
             over.plot(1e3 * time_s, values[:, cell], color=colour, label=name)

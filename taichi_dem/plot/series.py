@@ -88,7 +88,7 @@ def plot_energy(path: FileName, history: Mapping[str, np.ndarray]) -> None:
     present = {key: look for key, look in _TERMS.items() if key in history}
     terms = {key: look for key, look in present.items() if np.abs(history[key]).max() > 0.0}
     with picture(
-        path, 2, 2, size=(10.8, 5.6), sharex=True, gridspec_kw={"height_ratios": [3.2, 1]}
+        path, 2, 2, size=(9.2, 5.6), sharex=True, gridspec_kw={"height_ratios": [3.2, 1]}
     ) as (figure, panels):
         _stack(panels[0, 0], time, history, terms)
         _lines(panels[0, 1], time, history, terms)
@@ -169,7 +169,7 @@ def plot_methods(
     series: method -> columns time_s, cpu_s, evaluations and the one compared, a displacement of the
     hole or of the body watched; the first is the one the others are compared with.
     """
-    with picture(path, 1, 3, size=(12.5, 4.0)) as (figure, (cost, work, moved)):
+    with picture(path, 2, 2, size=(9.0, 6.4)) as (_, ((cost, work), (moved, words))):
         first = next(iter(series.values()))
         styles = styles_of(series)
         for name, made in series.items():
@@ -202,5 +202,5 @@ def plot_methods(
         for axes in (cost, work, moved):
             axes.set(xlabel="time [ms]")
             _span(axes, time)
-        handles, labels = moved.get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=3)
+        words.set_axis_off()
+        words.legend(*moved.get_legend_handles_labels(), loc="center left", handlelength=4.0)
