@@ -24,13 +24,13 @@ def draw_cost(path, panels):
             one.set(xscale="log", yscale="log", title=title, xlabel="error / value [%]")
             one.set_ylabel("CPU time, all runs of an answer [s]")
             one.invert_xaxis()
-            one.legend(fontsize=7)
+            one.legend(loc="lower center", bbox_to_anchor=(0.5, 1.1), ncols=2)
 
 
 def _draw_fixed(axes, fixed):
-    for (name, runs), colour in zip(fixed.items(), (ORANGE, RED, GREY)):
+    for (name, runs), colour, mark in zip(fixed.items(), (ORANGE, RED, GREY), "sDv"):
         off, seconds = np.array(runs).T
-        axes.plot(100.0 * _seen(off), seconds, "s", color=colour, label=name, markersize=4)
+        axes.plot(100.0 * _seen(off), seconds, mark, color=colour, label=name, markersize=4)
 
 
 def _seen(off):
@@ -69,4 +69,4 @@ def draw_parting(path, time_ms, ways, apart, answer):
         right.set_title("how far they are apart")
         keys = [line_key(f"tolerance, {100 * answer.tolerance:g} %", color=ORANGE)]
         keys.append(line_key("from here on solve sees them part", color=RED, linestyle="--"))
-        right.legend(handles=keys, fontsize=8, loc="lower right")
+        right.legend(handles=keys, loc="lower right")

@@ -43,7 +43,8 @@ def counted(particles):
 
 def plot_motion(path, title, full, empty, style):
     """Displacement and energy over time, with particles and without; title: the particles."""
-    bare, own = {"color": GREY, "lw": 0.8, "label": STYLES["empty"].label}, {"color": style.colour}
+    bare = {"color": STYLES["empty"].colour, "lw": 0.8, "label": STYLES["empty"].label}
+    own = {"color": style.colour}
     time, own_title = full["time_s"], f"container with {title}"
     with picture(path, 2, 1, size=(8.6, 5.6), sharex=True) as (_, (motion, energy)):
         motion.plot(time, empty["x_mm"], **bare)

@@ -115,7 +115,8 @@ def draw(panels, curves, size):
         axes.plot(1e6 * way, 1e-6 * law, color=GREY, lw=1.0, label="law" if k < 2 else None)
         # Even distances along the curve, so that points do not run together.
         look = {"ls": "none", "ms": size, "color": COLOURS[k], "markevery": 0.02}
-        marks += axes.plot(1e6 * way, 1e-6 * traction, "o", label=f"measured{words}", **look)
+        look["marker"] = "osD^v"[k]
+        marks += axes.plot(1e6 * way, 1e-6 * traction, label=f"measured{words}", **look)
     panels[0].set(xlabel="opening [µm]", ylabel="traction [MPa]", ylim=(-3.0, 8.0))
     panels[1].set(xlabel="sliding [µm]", ylabel="shear traction [MPa]", ylim=(0.0, 18.0))
     panels[0].axhline(0.0, color=BLACK, lw=0.5)

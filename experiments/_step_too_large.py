@@ -21,7 +21,7 @@ TABLE = Table(
     sentence=("sentence",),
 )
 #: Colours of the runs of a limit; axes of the unexplained energy.
-COLOURS = (GREEN, ORANGE, RED)
+COLOURS, DASHES = (GREEN, ORANGE, RED), ("-", "--", "-.")
 UNEXPLAINED = {"yscale": "log", "ylim": (1e-5, 1e3)}
 
 
@@ -89,9 +89,10 @@ def picture_energy(path, runs):
     size = (4.3 * len(limits) + 0.6, 3.4 + 0.55 * len(said))
     with picture(path, 1, len(limits), size, squeeze=False) as (drawn, panels):
         for axes, limit in zip(panels[0], limits):
-            for made, colour in zip((m for m in runs if m.limit == limit), COLOURS):
+            own = [made for made in runs if made.limit == limit]
+            for made, colour, dashes in zip(own, COLOURS, DASHES):
                 time, label = 1e6 * made.time, f"{made.name} = {seconds(made.step)}"
-                axes.plot(time, positive(made.residual), color=colour, label=label)
+                axes.plot(time, positive(made.residual), color=colour, ls=dashes, label=label)
                 if made.sentence:
                     axes.plot(time[-1], made.residual[-1], "X", color=colour, ms=7, clip_on=False)
             axes.axhline(1.0, color=GREY, ls=":", lw=1.0, label="all that was put in")

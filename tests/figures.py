@@ -136,13 +136,18 @@ def reaches(collection, box):
 
 
 def lines_alike(axes):
-    """Lines of different colours that only their hue tells apart."""
-    looks = {look_of(line): line for line in data_lines(axes) if line.get_alpha() is None}
+    """Lines of different colours that only their hue tells apart; rows of marks stand apart."""
+    looks = {look_of(line): line for line in data_lines(axes) if not is_row(line)}
     for (one, first), (other, second) in itertools.combinations(looks.items(), 2):
         same_form = one[1:] == other[1:] and abs(first.get_lw() - second.get_lw()) < 1.0
         if same_form and one[0] != other[0] and abs(lightness(one[0]) - lightness(other[0])) < 12:
             both = f"{one[0]} and {other[0]}"
             yield f"lines in {both} differ in hue only, in {axes.get_title('left')!r}"
+
+
+def is_row(line):
+    """Whether a line is a row of marks."""
+    return line.get_linestyle() == "None" and np.ptp(line.get_ydata()) == 0.0
 
 
 def look_of(line):

@@ -82,12 +82,13 @@ def _draw_measures(top, bottom, one, style):
     # The cycle is closed: it ends as it begins.
     phase, ends = np.append(one.phase, 1.0), {"-": one.floor, "--": one.ceiling}
     height, spread = (_closed(over(one.height_mm, axis=0)) for over in (np.mean, np.std))
-    top.plot(phase, height, color=style.colour, label=style.label)
+    look = {"color": style.colour, "marker": style.marker, "ms": 4}
+    top.plot(phase, height, label=style.label, **look)
     band = {"color": style.colour, "alpha": 0.18, "linewidth": 0}
     top.fill_between(phase, height - spread, height + spread, **band)
     for line, share in ends.items():
         percent = 100.0 * _closed(share.mean(axis=0))
-        bottom.plot(phase, percent, color=style.colour, linestyle=line)
+        bottom.plot(phase, percent, linestyle=line, **look)
 
 
 def _closed(values):

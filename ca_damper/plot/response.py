@@ -83,7 +83,7 @@ def _draw_curves(axis, response, rows=None):
 def _draw_empty(axis, oscillator, ratios):
     """The empty container over the range of the ratios; labels of both axes."""
     fine = np.linspace(min(ratios), max(ratios), _FINE)
-    look = {"color": GREY, "ls": ":", "lw": 1.0, "label": STYLES["empty"].label}
+    look = {"color": STYLES["empty"].colour, "ls": ":", "label": STYLES["empty"].label}
     axis.plot(fine, 1e3 * oscillator.rms(fine * oscillator.natural_frequency), **look)
     axis.set(xlabel="frequency f / f$_0$ [1]", ylabel="RMS displacement [mm]")
 

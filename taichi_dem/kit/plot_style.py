@@ -41,7 +41,7 @@ STYLE = {
 BLUE, RED, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
 ORANGE, SKY, BLACK, GREY = "#E69F00", "#56B4E9", "#222222", "#8A8A8A"
 BROWN, VIOLET = "#8C6D31", "#6A51A3"
-WINE, OLIVE = "#882255", "#999933"
+WINE, OLIVE, LIGHT_GREY = "#882255", "#999933", "#ADADAD"
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ STYLES = {
     "dem_printed": MethodStyle("spheres, damping as printed", PURPLE, "v"),
     "dem_soft": MethodStyle("spheres, modulus / 100", SKY, "P"),
     "combined": MethodStyle("spheres and long flights", OLIVE, "v"),
-    "empty": MethodStyle("empty container", GREY, "X", ":"),
+    "empty": MethodStyle("empty container", LIGHT_GREY, "X", ":"),
     "rk45_tolerance": MethodStyle("RK45 in the kernel, tolerance swept", BROWN, "o"),
     "rk45_step": MethodStyle("RK45 in the kernel, longest step swept", VIOLET, "s"),
     "rk45_python": MethodStyle("RK45 in Python, tolerance swept", BLACK, "D"),

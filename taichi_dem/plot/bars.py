@@ -55,9 +55,11 @@ def picture_wave(
     """
     with picture(path, 1, 2, size=(9.0, 3.8)) as (_, (along, over)):
         draw_space_time(along, place, time_s, values, label)
-        for (name, cell), colour in zip(cells.items(), (BLUE, GREEN, RED, ORANGE, PURPLE)):
-            over.plot(1e3 * time_s, values[:, cell], color=colour, label=name)
-            along.axvline(place[cell], color=colour, lw=0.8, ls="--", label=name)
+        looks = zip((BLUE, GREEN, RED, ORANGE, PURPLE), ("-", "--", "-.", ":", (0, (8, 2))))
+        for (name, cell), (colour, dashes) in zip(cells.items(), looks):
+            look = {"color": colour, "ls": dashes, "label": name}
+            over.plot(1e3 * time_s, values[:, cell], **look)
+            along.axvline(place[cell], lw=1.2, **look)
         along.set_title(titles[0])
         along.legend(loc="upper left", title="seen on the right", frameon=True, framealpha=0.9)
         if level:

@@ -11,7 +11,7 @@ from taichi_dem.kit.study.cases import FAILED, PASSED, REFUSED, Trial
 
 #: Margins from which on more means nothing; where those stand that refuse, and those that fail.
 _MOST, _PLACES = 1e4, {REFUSED: 0.05, FAILED: 0.4}
-_TICKS = {0.05: "refused", 1.0: "1", 10.0: "10", 100.0: "100", _MOST: "10⁴ or exact"}
+_TICKS = {0.05: "refused", 1.0: "1", 10.0: "10", 100.0: "100", _MOST: "≥ 10⁴"}
 #: Style of a method in ``styles_of``, where it has another name there.
 Alias = Mapping[str, str]
 
@@ -91,7 +91,7 @@ def _draw_case(axis, own, looks):
     failed = any(trial.status == FAILED for trial in own)
     title = f"{case_title(own[0].case.name)}: {_verdict(own)}"
     look = {"fontsize": 9.0, "color": RED if failed else BLACK}
-    axis.set_title(textwrap.fill(title, 42), **look)
+    axis.set_title(textwrap.fill(title, 36), **look)
 
 
 def _verdict(own):
@@ -102,7 +102,7 @@ def _verdict(own):
     said = [f"{n} {'FAILED' if word == FAILED else word}" for word, n in counts.items() if n]
     least = min((trial.margin for trial in own if trial.worst), default=math.inf)
     if math.isfinite(least):
-        said.append(f"margin {power(least) if least >= 1e4 else format(least, '.2g')}")
+        said.append(f"margin {power(least) if least >= 100.0 else format(least, '.2g')}")
     return ", ".join(said)
 
 
@@ -141,7 +141,7 @@ def _draw_margins(axis, own, looks):
     axis.set_yticks(range(len(cases)), [case_title(case.name) for case in cases])
     axis.set_xticks(list(_TICKS), list(_TICKS.values()))
     axis.set_xticks([], minor=True)
-    axis.set_xlabel("margin: bound of physics / worst figure [1]")
+    axis.set_xlabel("margin: bound / worst figure [1]")
 
 
 def _place_of(trial):

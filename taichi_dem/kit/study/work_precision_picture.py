@@ -100,7 +100,7 @@ def picture_errors(
 
 def _write_below(figure, caption):
     """A caption and the machine, in lines as wide as the figure."""
-    lines = (textwrap.fill(" ".join(part.split()), 118) for part in (caption, machine_words()))
+    lines = (textwrap.fill(" ".join(part.split()), 140) for part in (caption, machine_words()))
     figure.supxlabel("\n".join(lines), fontsize=_SMALL, x=0.01, ha="left")
 
 
