@@ -2,7 +2,7 @@
 
 from ca_damper.plot import Box, Hanging, film_hanging
 from taichi_dem.kit.files import write_csv
-from taichi_dem.kit.plot_style import BLACK, GREY, STYLES, picture, styles_of
+from taichi_dem.kit.plot_style import BLACK, STYLES, picture, styles_of
 
 
 def figures_of(cycles, empty, o):
@@ -31,7 +31,8 @@ def write(at, full, empty, filling, options, omega):
     fastest = 1.2 * omega * max(float(one.cycles.amplitude[0]) for one in (full, empty))
     box = Box.of(filling)
     # The empty container moves as smoothly as the structure: its box is not staggered.
-    smooth = Hanging("empty", Box(box.width, box.height, box.diameter), empty.frames, GREY)
+    bare = Box(box.width, box.height, box.diameter)
+    smooth = Hanging("empty", bare, empty.frames, STYLES["empty"].colour)
     pair = [smooth, Hanging(title, box, full.frames, style.colour)]
     film_hanging(at("damper.gif"), pair, fastest)
 

@@ -1,5 +1,6 @@
 """Pictures of responses over frequency: curves with bands over seeds, measures, hysteresis."""
 
+import textwrap
 from collections.abc import Mapping
 from typing import Any
 
@@ -98,7 +99,7 @@ def _legend_of_bands(figure, axis):
     """Legend above all panels, made from one of them: what bands are is its last entry."""
     handles, _ = axis.get_legend_handles_labels()
     handles.append(area_key("lowest to highest seed", fc=GREY, alpha=0.3))
-    figure.legend(handles=handles, loc="outside upper center", ncols=len(handles))
+    figure.legend(handles=handles, loc="outside upper center", ncols=min(5, len(handles)))
 
 
 def _shade(response, k):
@@ -127,12 +128,11 @@ def _draw_peaks(place, height, responses, particle_mass):
     rigid = [first.oscillator.peak(n * particle_mass) for n in first.particles]
     words = "rigid mass of the same weight"
     place.plot(first.particles, [r for r, _ in rigid], color=GREY, ls=":", label=words)
-    place.set(title="where they peak; bars: range of the seeds", xlabel="particles N [1]")
+    place.set(title="place of the peak; bars: seeds", xlabel="particles N [1]")
     place.set_ylabel("f / f$_0$ of the peak [1]")
-    height.set(title="how high; bars: range of the seeds", xlabel="particles N [1]")
+    height.set(title="its height; bars: seeds", xlabel="particles N [1]")
     height.set(ylabel="peak RMS displacement [mm]", ylim=(0, None))
-    place.legend(handles=place.lines[-1:], loc="lower left")
-    keys, labels = height.get_legend_handles_labels()
+    keys, labels = place.get_legend_handles_labels()
     height.legend(keys, labels, loc="lower left")
     for axis in (place, height):
         axis.set_xticks(first.particles)
@@ -151,12 +151,17 @@ def picture_measures(path: FileName, responses: Mapping[str, Any], particle_mass
             for k, particles in enumerate(response.particles):
                 if particles > 0:
                     _draw_measures(column, response, k, particle_mass)
-            column[0].set_title(styles_of(responses)[label].label)
+            column[0].set_title(_narrow(styles_of(responses)[label].label))
             column[0].axhline(1.0, color=GREY, ls=":", lw=1.0, label="rigid mass")
             column[1].set_xlabel("frequency f / f$_0$ [1]")
         axes[0, 0].set_ylabel("apparent mass /\nmass of the particles [1]")
         axes[1, 0].set_ylabel("loss factor [1]")
         _legend_of_bands(figure, axes[0, 0])
+
+
+def _narrow(label):
+    """A label in lines that a column of four has room for."""
+    return textwrap.fill(label, 20)
 
 
 def _draw_measures(column, response, k, particle_mass):
@@ -174,14 +179,14 @@ def picture_hysteresis(path: FileName, sweeps: Mapping[str, Any]) -> None:
     shape = {"squeeze": False, "sharex": True, "sharey": "row"}
     with picture(path, len(particles), count, size, **shape) as (figure, axes):
         for column, (label, sweep) in zip(axes.T, sweeps.items()):
-            column[0].set_title(styles_of(sweeps)[label].label)
+            column[0].set_title(_narrow(styles_of(sweeps)[label].label))
             for k, axis in enumerate(column):
                 _draw_ways(axis, sweep, k)
             column[-1].set_xlabel("frequency f / f$_0$ [1]")
         for k, axis in enumerate(axes[:, 0]):
             axis.set_ylabel(f"{particles[k]} particles:\nRMS displacement [mm]")
         handles, _ = axes[0, 0].get_legend_handles_labels()
-        figure.legend(handles=handles, loc="outside upper center", ncols=len(handles))
+        figure.legend(handles=handles, loc="outside upper center", ncols=min(5, len(handles)))
 
 
 def _draw_ways(axis, sweep, k):

@@ -61,7 +61,7 @@ def picture_wave(
             over.plot(1e3 * time_s, values[:, cell], **look)
             along.axvline(place[cell], lw=1.2, **look)
         along.set_title(titles[0])
-        along.legend(loc="upper left", title="seen on the right", frameon=True, framealpha=0.9)
+        along.legend(loc="lower left", bbox_to_anchor=(0.0, 1.08), ncols=4, columnspacing=1.0)
         if level:
             over.axhline(level[1], color=GREY, ls=":", label=level[0])
         over.set(xlabel="time [ms]", ylabel=label, title=titles[1])

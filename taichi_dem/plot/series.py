@@ -51,7 +51,7 @@ def plot_pressure(
         if until_s is not None:
             look = {"color": "black", "linewidth": 0.8, "linestyle": ":", "label": "end of the run"}
             axes.axvline(1e3 * until_s, **look)
-            axes.legend(loc="lower center")
+            axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0))
         axes.set(xlabel="time [ms]", ylabel="pressure on the hole [MPa]")
         axes.set(xlim=(0.0, time_ms[-1]), ylim=(0.0, 1.12 * pressure[peak]))
 
