@@ -14,7 +14,7 @@ def draw_cost(path, panels):
     panels: by title, the answers as (share of the value that the bar is, share that the value is
     off, seconds), and the fixed runs by method as lists of (share off, seconds).
     """
-    with picture(path, 1, len(panels), size=(5.2 * len(panels), 4.4), squeeze=False) as (_, axes):
+    with picture(path, 1, len(panels), size=(4.5 * len(panels), 4.4), squeeze=False) as (_, axes):
         for one, (title, (answers, fixed)) in zip(axes[0], panels.items()):
             _draw_fixed(one, fixed)
             bars, off, seconds = np.array(answers).T
@@ -24,13 +24,13 @@ def draw_cost(path, panels):
             one.set(xscale="log", yscale="log", title=title, xlabel="error / value [%]")
             one.set_ylabel("CPU time, all runs of an answer [s]")
             one.invert_xaxis()
-            one.legend(fontsize=7)
+            one.legend(loc="lower center", bbox_to_anchor=(0.5, 1.1), ncols=2)
 
 
 def _draw_fixed(axes, fixed):
-    for (name, runs), colour in zip(fixed.items(), (ORANGE, RED, GREY)):
+    for (name, runs), colour, mark in zip(fixed.items(), (ORANGE, RED, GREY), "sDv"):
         off, seconds = np.array(runs).T
-        axes.plot(100.0 * _seen(off), seconds, "s", color=colour, label=name, markersize=4)
+        axes.plot(100.0 * _seen(off), seconds, mark, color=colour, label=name, markersize=4)
 
 
 def _seen(off):
@@ -58,7 +58,7 @@ def draw_parting(path, time_ms, ways, apart, answer):
     time_ms (frames,). ways (runs, frames): mean way [mm]. apart (runs - 1, frames): difference of
     the usual body, as a share of its way. answer: to the question what the way is at the end.
     """
-    with picture(path, 1, 2, size=(10.0, 4.2)) as (_, (left, right)):
+    with picture(path, 1, 2, size=(9.0, 4.2)) as (_, (left, right)):
         left.plot(time_ms, ways.T, color=BLUE, linewidth=0.8)
         left.set(xlabel="time [ms]", ylabel="mean way of the bodies [mm]")
         left.set_title(f"{len(ways)} runs whose starts differ by one rounding")
@@ -69,4 +69,4 @@ def draw_parting(path, time_ms, ways, apart, answer):
         right.set_title("how far they are apart")
         keys = [line_key(f"tolerance, {100 * answer.tolerance:g} %", color=ORANGE)]
         keys.append(line_key("from here on solve sees them part", color=RED, linestyle="--"))
-        right.legend(handles=keys, fontsize=8, loc="lower right")
+        right.legend(handles=keys, loc="lower right")

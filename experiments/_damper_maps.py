@@ -11,7 +11,7 @@ FINE = 400
 
 def picture_jump(path, maps):
     """Energy and apparent mass over amplitude without gravity, with the theory as a line."""
-    with picture(path, 1, 2, (9.6, 4.2)) as (figure, axes):
+    with picture(path, 1, 2, (9.2, 4.2)) as (figure, axes):
         first = next(iter(maps.values()))
         size, gap = np.array(first.amplitudes), float(first.gaps[0, 0])
         fine = np.linspace(gap / np.pi * (1.0 + 1e-9), max(size.max(), 0.4 * gap), FINE)
@@ -38,7 +38,7 @@ def picture_maps(path, maps, gravity):
         ("loss", "loss\nc / (N m ω) [1]", "viridis"),
         ("mass_share", "apparent mass\nby N m [1]", "cividis"),
     )
-    with picture(path, 2, len(maps), (9.6, 7.0), sharex=True, sharey=True) as (figure, axes):
+    with picture(path, 2, len(maps), (9.2, 7.0), sharex=True, sharey=True) as (figure, axes):
         for panels, (name, words, colours) in zip(axes, rows):
             shown = {k: getattr(one, name)[0, 0].mean(axis=-1) for k, one in maps.items()}
             low = min(0.0, *(float(one.min()) for one in shown.values()))

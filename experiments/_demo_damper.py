@@ -2,7 +2,7 @@
 
 from ca_damper.plot import Box, Hanging, film_hanging
 from taichi_dem.kit.files import write_csv
-from taichi_dem.kit.plot_style import BLACK, GREY, STYLES, picture, styles_of
+from taichi_dem.kit.plot_style import BLACK, STYLES, picture, styles_of
 
 
 def figures_of(cycles, empty, o):
@@ -31,7 +31,8 @@ def write(at, full, empty, filling, options, omega):
     fastest = 1.2 * omega * max(float(one.cycles.amplitude[0]) for one in (full, empty))
     box = Box.of(filling)
     # The empty container moves as smoothly as the structure: its box is not staggered.
-    smooth = Hanging("empty", Box(box.width, box.height, box.diameter), empty.frames, GREY)
+    bare = Box(box.width, box.height, box.diameter)
+    smooth = Hanging("empty", bare, empty.frames, STYLES["empty"].colour)
     pair = [smooth, Hanging(title, box, full.frames, style.colour)]
     film_hanging(at("damper.gif"), pair, fastest)
 
@@ -43,7 +44,8 @@ def counted(particles):
 
 def plot_motion(path, title, full, empty, style):
     """Displacement and energy over time, with particles and without; title: the particles."""
-    bare, own = {"color": GREY, "lw": 0.8, "label": STYLES["empty"].label}, {"color": style.colour}
+    bare = {"color": STYLES["empty"].colour, "lw": 0.8, "label": STYLES["empty"].label}
+    own = {"color": style.colour}
     time, own_title = full["time_s"], f"container with {title}"
     with picture(path, 2, 1, size=(8.6, 5.6), sharex=True) as (_, (motion, energy)):
         motion.plot(time, empty["x_mm"], **bare)

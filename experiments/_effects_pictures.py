@@ -11,7 +11,7 @@ def picture_effects(path, tables):
     titles = ("Blast of the paper's block", "Damper, spheres", "Damper, automaton")
     shown = [[one for one in effects_in(rows) if not one[1]["failed"]] for rows in tables.values()]
     heights = [max(1, len(effects)) for effects in shown]
-    size = (9.4, 1.6 + 0.42 * sum(heights) + 0.7 * len(heights))
+    size = (9.2, 1.6 + 0.42 * sum(heights) + 0.7 * len(heights))
     ratios = {"height_ratios": heights, "width_ratios": [1, 1.25]}
     with picture(path, len(heights), 2, size, squeeze=False, gridspec_kw=ratios) as (figure, axes):
         for (left, right), title, effects, rows in zip(axes, titles, shown, tables.values()):

@@ -97,7 +97,7 @@ def write(curves, points, at):
         columns[f"sliding_{1e-6 * pressure:g}_MPa_m"] = sliding
         columns[f"traction_{1e-6 * pressure:g}_MPa_Pa"] = shear
     write_csv(at("shear.csv"), columns)
-    with picture(at("law.png"), 1, 2, size=(9.6, 4.0)) as (_, panels):
+    with picture(at("law.png"), 1, 2, size=(9.2, 4.0)) as (_, panels):
         draw(panels, curves, size=3.4)
         panels[1].legend(loc="upper left")
         panels[0].set_title("pulled, unloaded, pressed, pulled until it breaks")
@@ -115,11 +115,12 @@ def draw(panels, curves, size):
         axes.plot(1e6 * way, 1e-6 * law, color=GREY, lw=1.0, label="law" if k < 2 else None)
         # Even distances along the curve, so that points do not run together.
         look = {"ls": "none", "ms": size, "color": COLOURS[k], "markevery": 0.02}
-        marks += axes.plot(1e6 * way, 1e-6 * traction, "o", label=f"measured{words}", **look)
+        look["marker"] = "osD^v"[k]
+        marks += axes.plot(1e6 * way, 1e-6 * traction, label=f"measured{words}", **look)
     panels[0].set(xlabel="opening [µm]", ylabel="traction [MPa]", ylim=(-3.0, 8.0))
     panels[1].set(xlabel="sliding [µm]", ylabel="shear traction [MPa]", ylim=(0.0, 18.0))
     panels[0].axhline(0.0, color=BLACK, lw=0.5)
-    panels[0].legend(loc="upper right")
+    panels[0].legend(loc="lower right")
     return marks
 
 
@@ -128,8 +129,9 @@ def film_law(path, curves, points, count=40):
     with moving_picture(path, (4.0, 3.6), 120) as (figure, shoot):
         above, below = figure.subplots(2, 2, height_ratios=(1.0, 1.9))
         marks = draw(below, curves, size=1.8)
-        look = {"marker": "o", "ms": 5.5, "mec": BLACK}
-        heads = [mark.axes.plot([], [], color=mark.get_color(), **look)[0] for mark in marks]
+        look = {"ms": 5.5, "mec": BLACK}
+        forms = [{"color": mark.get_color(), "marker": mark.get_marker(), **look} for mark in marks]
+        heads = [mark.axes.plot([], [], **form)[0] for mark, form in zip(marks, forms)]
         below[0].set_title("tension")
         below[1].set_title("shear under pressure")
         # Openings and slidings are drawn so much larger.

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from taichi_dem.kit.files import write_text
-from taichi_dem.kit.plot_style import BLACK, GREY, STYLES, picture, styles_of
+from taichi_dem.kit.plot_style import BLACK, STYLES, picture, styles_of
 
 RECORD = Path(__file__).resolve().parent / "base_motion.csv"
 #: Filter of the ground: frequency [Hz] and damping ratio (Kanai and Tajimi).
@@ -54,7 +54,7 @@ def picture_motion(path, made, shown):
         base, time = empty.excitation.base, empty.time_s
         axes[0].plot(time, base.at(np.minimum(time, base.duration))[2], color=BLACK, lw=0.8)
         axes[0].set(ylabel="acceleration\nof the base [m/s²]")
-        bare = {"color": GREY, "lw": 0.9, "label": STYLES["empty"].label}
+        bare = {"color": STYLES["empty"].colour, "lw": 0.9, "label": STYLES["empty"].label}
         for axis, (label, history) in zip(axes[1:], filled.items()):
             style, k = styles_of(filled)[label], history.particles.index(shown)
             axis.plot(time, 1e3 * empty.relative[:, 0, 0], **bare)
@@ -73,10 +73,10 @@ def picture_damping(path, made):
         ("largest displacement from the base [mm]", lambda one: 1e3 * one.relative_peak),
         ("damping ratio [%]", lambda one: 1e2 * one.damping_ratio),
     )
-    with picture(path, 1, 3, size=(10.4, 3.8)) as (figure, axes):
+    with picture(path, 1, 3, size=(9.2, 3.6)) as (figure, axes):
         for axis, (words, measure) in zip(axes, drawn):
             level = measure(empty)[0, 0]
-            axis.axhline(level, color=GREY, ls=":", label=STYLES["empty"].label)
+            axis.axhline(level, color=STYLES["empty"].colour, ls=":", label=STYLES["empty"].label)
             for label, history in filled.items():
                 style, values = styles_of(filled)[label], measure(history)
                 middle = values.mean(axis=1)

@@ -105,7 +105,8 @@ def write(impacts, dt0, at):
 def picture_blow(path, impacts, dt0):
     """Motion of the ends, evaluations, and share of bodies on each level of the second method."""
     time, other = 1e6 * impacts[0].time, impacts[1]
-    with picture(path, 1, 3, size=(12.0, 3.6), sharex=True) as (figure, (way, work, share)):
+    with picture(path, 2, 2, size=(9.0, 6.0), sharex=True) as (_, panels):
+        (way, work), (share, words) = panels
         for impact in impacts:
             look = {"color": impact.style.colour, "ls": impact.style.line}
             way.plot(time, 1e6 * impact.struck, **look)
@@ -114,10 +115,12 @@ def picture_blow(path, impacts, dt0):
         way.set(xlabel="time [µs]", ylabel="displacement [µm]", title="the answer")
         work.set(xlabel="time [µs]", ylabel="evaluations of bonds and pairs [10⁶]")
         work.set(title="the price", xlim=(0.0, time[-1]))
-        figure.legend(*work.get_legend_handles_labels(), loc="outside lower left", ncols=3)
+        words.set_axis_off()
         ends = {"struck end (thick)": 1.5, "far end (thin)": 0.8}
         way.legend(handles=[line_key(words, color=GREY, lw=width) for words, width in ends.items()])
-        draw_level_shares(figure, share, time, level_shares(other.levels), dt0)
+        key = words.legend(*work.get_legend_handles_labels(), loc="upper left", handlelength=4.0)
+        draw_level_shares(words, share, time, level_shares(other.levels), dt0, "lower left")
+        words.add_artist(key)
         share.set(xlabel="time [µs]", title=f"steps: {other.style.label}")
 
 

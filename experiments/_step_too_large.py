@@ -21,7 +21,7 @@ TABLE = Table(
     sentence=("sentence",),
 )
 #: Colours of the runs of a limit; axes of the unexplained energy.
-COLOURS = (GREEN, ORANGE, RED)
+COLOURS, DASHES = (GREEN, ORANGE, RED), ("-", "--", "-.")
 UNEXPLAINED = {"yscale": "log", "ylim": (1e-5, 1e3)}
 
 
@@ -86,12 +86,13 @@ def picture_energy(path, runs):
     """Energy that the account cannot explain over time, a panel a limit; the sentences below."""
     limits = list(dict.fromkeys(made.limit for made in runs))
     said = [f"{m.limit}, {m.name}: “{m.sentence}”" for m in runs if m.sentence]
-    size = (4.6 * len(limits) + 0.6, 3.4 + 0.55 * len(said))
+    size = (4.3 * len(limits) + 0.6, 3.4 + 0.55 * len(said))
     with picture(path, 1, len(limits), size, squeeze=False) as (drawn, panels):
         for axes, limit in zip(panels[0], limits):
-            for made, colour in zip((m for m in runs if m.limit == limit), COLOURS):
+            own = [made for made in runs if made.limit == limit]
+            for made, colour, dashes in zip(own, COLOURS, DASHES):
                 time, label = 1e6 * made.time, f"{made.name} = {seconds(made.step)}"
-                axes.plot(time, positive(made.residual), color=colour, label=label)
+                axes.plot(time, positive(made.residual), color=colour, ls=dashes, label=label)
                 if made.sentence:
                     axes.plot(time[-1], made.residual[-1], "X", color=colour, ms=7, clip_on=False)
             axes.axhline(1.0, color=GREY, ls=":", lw=1.0, label="all that was put in")
@@ -99,8 +100,8 @@ def picture_energy(path, runs):
             axes.set(title=f"limited by its {limit}", xlabel="time [µs]", **UNEXPLAINED)
             axes.legend(loc="upper right", title="step")
         panels[0, 0].set_ylabel("unexplained energy / energy put in [1]")
-        words = "\n".join(textwrap.fill(text, 62 * len(limits)) for text in said)
-        drawn.supxlabel(words, x=0.02, ha="left", fontsize=7.5, family="monospace")
+        words = "\n".join(textwrap.fill(text, 60 * len(limits)) for text in said)
+        drawn.supxlabel(words, x=0.02, ha="left", fontsize=8.5)
 
 
 def film(path, safe, bad, count=40, held=8):

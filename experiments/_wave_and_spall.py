@@ -126,15 +126,15 @@ def picture_spall(path, made, stress, rows):
     """Stress [MPa] over place and time in the first bars, and depths beside the formula's."""
     count, joint = min(2, len(rows)), made.place[:-1] + 0.5 * made.cell
     top = np.abs(stress[:, :count]).max()
-    with picture(path, 1, 1 + count, size=(4.2 * (1 + count), 3.8)) as (figure, (*panels, last)):
+    with picture(path, 1, 1 + count, size=(3.05 * (1 + count), 3.6)) as (figure, (*panels, last)):
         for k, (row, axes) in enumerate(zip(rows, panels)):
             drawn = draw_space_time(axes, joint, made.time, stress[:, k], top=top)
             draw_breaks(axes, joint, made.time, made.joints[:, k])
             look = {"color": BLACK, "ls": ":", "lw": 1.0, "label": "first break by the formula"}
             axes.axvline(LENGTH - row["formula_m"], **look)
             axes.set_title(f"pulse of {row['ratio']:g} × strength")
-            axes.legend(loc="lower left")
         figure.colorbar(drawn, ax=axes, label="stress, tension positive [MPa]")
+        figure.legend(*axes.get_legend_handles_labels(), loc="outside lower left", ncols=2)
         arrived, depth = ([row[key] for row in rows] for key in ("arrived_MPa", "depth_m"))
         line = np.linspace(0.8 * min(arrived), 1.1 * max(arrived), 100)
         formula = rows[0]["formula_m"] * rows[0]["arrived_MPa"] / line
@@ -143,4 +143,4 @@ def picture_spall(path, made, stress, rows):
         last.errorbar(arrived, depth, yerr=made.cell, **look)
         last.set(xlabel="pulse s$_0$ that arrived [MPa]", ylabel="depth of the first break [m]")
         last.set(ylim=(0.0, None), title="the stronger, the thinner")
-        last.legend(loc="upper right")
+        last.legend(loc="lower right", bbox_to_anchor=(1.0, 1.08))

@@ -112,7 +112,7 @@ def figures_of(chosen, prices, bar, block):
 def draw(path, shared, chosen, workload, measured):
     """Acceleration and shares, as the paper's Figs 9, 14 and 15; see ``run``."""
     names = [["whole", "contact"], ["shares", "cuts"]]
-    with picture(path, 0, size=(11.0, 9.0)) as (figure, _):
+    with picture(path, 0, size=(9.2, 8.4)) as (figure, _):
         axes = figure.subplot_mosaic(names)
         draw_acceleration(axes["whole"], shared, PAPER_WORKERS, PAPER_SERIAL)
         look = {"ls": "none", "marker": "o"}

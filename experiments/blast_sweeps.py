@@ -31,9 +31,9 @@ NAME = "blast_sweeps"
 SETTINGS = {"times": ((2e-5, 1e-4, 2e-4, 4e-4), (5e-6, 2e-5))}
 #: Way -> (words, colour); the first is that of the method with solved dashpots.
 WAYS = {
-    "gauss_seidel": ("Gauss-Seidel by colours", STYLES["implicit"].colour),
-    "jacobi": ("Jacobi, split masses", BROWN),
-    "momentum": ("Jacobi with momentum", VIOLET),
+    "gauss_seidel": ("Gauss-Seidel by colours", STYLES["implicit"].colour, "-"),
+    "jacobi": ("Jacobi, split masses", BROWN, "--"),
+    "momentum": ("Jacobi with momentum", VIOLET, "-."),
 }
 TOLERANCES = (0.05, 0.01, 1e-3)
 KICK, SWEEPS = 0.05, 30
@@ -77,9 +77,9 @@ def sweeps_to(errors, tolerance):
 def draw(path, found):
     """Error over sweeps of every way, a line a time."""
     with picture(path, size=(6.0, 4.0)) as (_, axes):
-        for name, (words, colour) in WAYS.items():
+        for name, (words, colour, dashes) in WAYS.items():
             lines = np.transpose([errors[name] for errors in found.values()])
-            axes.semilogy(lines, color=colour, alpha=0.7)[0].set_label(words)
+            axes.semilogy(lines, color=colour, ls=dashes, alpha=0.7)[0].set_label(words)
         for tolerance in TOLERANCES:
             axes.axhline(tolerance, color=GREY, linewidth=0.8, linestyle=":")
         axes.lines[-1].set_label("errors of 5, 1 and 0.1 %")

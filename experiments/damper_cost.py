@@ -140,7 +140,7 @@ def figures_of(costs, borne):
 
 def picture_cost(path, costs):
     """CPU time of a cycle over the number of particles, linear and logarithmic."""
-    with picture(path, 1, 2, (10.0, 5.0)) as (figure, axes):
+    with picture(path, 1, 2, (9.2, 5.2)) as (figure, axes):
         for label, rows in costs.items():
             filling, _, words, mark, line = VARIANTS[label]
             style, table = STYLES[filling.label], study.columns_of(rows)

@@ -129,7 +129,7 @@ def write_tables(folder, runs):
 def picture_rebound(path, runs, errors):
     """Height over time beside the closed form, and errors of the times of impact."""
     falls = {"ca_static": runs[DEFAULT], "dem": runs["dem"]}
-    with picture(path, 0, 0, size=(10.4, 4.6)) as (figure, _):
+    with picture(path, 0, 0, size=(9.2, 4.6)) as (figure, _):
         mosaic = [["ca_static", "errors"], ["dem", "errors"]]
         panels = figure.subplot_mosaic(mosaic, width_ratios=[1.7, 1.0])
         panels["ca_static"].sharex(panels["dem"])

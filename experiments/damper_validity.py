@@ -38,7 +38,7 @@ from _damper_validity import (
 from ca_damper import Automaton, Spheres
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_text
-from taichi_dem.kit.plot_style import picture, styles_of
+from taichi_dem.kit.plot_style import BLACK, picture, styles_of
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 
 NAME = "damper_validity"
@@ -249,7 +249,7 @@ def write_trust(path, options, apart):
 def picture_trust(path, options, apart):
     """A panel for each number of grains and rules: percent of difference, light is good."""
     labels = {name: styles_of([FILLINGS[name][0].label]) for name in ("paper", "place")}
-    shape = {"size": (2.9 * len(apart) + 0.8, 6.4), "squeeze": False, "sharex": True}
+    shape = {"size": (2.1 * len(apart) + 0.8, 6.4), "squeeze": False, "sharex": True}
     with picture(path, 2, len(apart), sharey=True, **shape) as (figure, panels):
         for row, name in zip(panels, labels):
             (style,) = labels[name].values()
@@ -273,7 +273,9 @@ def shade(axes, shares):
     level = np.digitize(shares, SHADES[1:])
     axes.imshow(level, cmap="YlOrRd", vmin=0, vmax=len(SHADES), origin="lower", aspect="auto")
     for (i, j), share in np.ndenumerate(shares):
-        axes.text(j, i, f"{100.0 * min(share, 9.99):.0f}", ha="center", va="center", fontsize=7)
+        look = {"ha": "center", "va": "center", "fontsize": 8.5}
+        look["color"] = "white" if level[i, j] > 0.6 * len(SHADES) else BLACK
+        axes.text(j, i, f"{100.0 * min(share, 9.99):.0f}", **look)
     axes.grid(False)
 
 

@@ -33,7 +33,7 @@ OF_QUICK = (
 )
 SETTINGS = {
     "only": (None, OF_QUICK, study.several(str), "cases by name, all by default"),
-    "columns": (5, 5, study.whole(1, 8), "of the sheet, 5"),
+    "columns": (3, 3, study.whole(1, 8), "of the sheet, 3"),
 }
 #: A uniform step of a hard case is fixed: the paper's rule does not shorten it.
 STYLES = {"uniform": "fixed"}

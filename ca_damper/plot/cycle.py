@@ -58,7 +58,7 @@ def picture_cycle(path: FileName, measures: Any, amplitude: float) -> None:
     [mm].
     """
     styles, time = styles_of(next(iter(measures.values()))), np.linspace(0.0, 1.0, 200)
-    shape = {"size": (4.2 * len(measures) + 0.6, 5.7), "sharex": True, "sharey": "row"}
+    shape = {"size": (2.85 * len(measures) + 0.6, 5.7), "sharex": True, "sharey": "row"}
     with picture(path, 2, len(measures), squeeze=False, **shape) as (figure, panels):
         for top, bottom, (title, fillings) in zip(*panels, measures.items()):
             motion = amplitude * np.sin(2.0 * np.pi * time)
@@ -82,12 +82,13 @@ def _draw_measures(top, bottom, one, style):
     # The cycle is closed: it ends as it begins.
     phase, ends = np.append(one.phase, 1.0), {"-": one.floor, "--": one.ceiling}
     height, spread = (_closed(over(one.height_mm, axis=0)) for over in (np.mean, np.std))
-    top.plot(phase, height, color=style.colour, label=style.label)
+    look = {"color": style.colour, "marker": style.marker, "ms": 4}
+    top.plot(phase, height, label=style.label, **look)
     band = {"color": style.colour, "alpha": 0.18, "linewidth": 0}
     top.fill_between(phase, height - spread, height + spread, **band)
     for line, share in ends.items():
         percent = 100.0 * _closed(share.mean(axis=0))
-        bottom.plot(phase, percent, color=style.colour, linestyle=line)
+        bottom.plot(phase, percent, linestyle=line, **look)
 
 
 def _closed(values):

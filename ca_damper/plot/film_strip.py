@@ -26,7 +26,7 @@ def picture_film_strips(
     velocity. amplitude [m], frequency [Hz]: of the container.
     """
     count = len(next(iter(films.values()))[1])
-    size = 1.14 * count + 0.9, 2.45 * len(films) + 0.3
+    size = 1.03 * count + 0.9, 2.3 * len(films) + 0.3
     fastest = 2.0 * np.pi * frequency * amplitude
     with picture(path, len(films), count, size=size, squeeze=False) as (figure, panels):
         for line, (name, (box, frames)) in zip(panels, films.items()):

@@ -1,5 +1,6 @@
 """Pictures of responses over frequency: curves with bands over seeds, measures, hysteresis."""
 
+import textwrap
 from collections.abc import Mapping
 from typing import Any
 
@@ -22,7 +23,7 @@ def picture_responses(path: FileName, responses: Mapping[str, Any], particle_mas
     count = len(responses)
     columns = 2 if count < 4 else 3
     rows = (count + 2 + columns - 1) // columns
-    size = (4.2 * columns, 3.3 * rows)
+    size = (min(4.2, 9.2 / columns) * columns, 3.0 * rows)
     with picture(path, rows, columns, size, squeeze=False) as (figure, axes):
         panels = axes.ravel()
         for axis, (label, response) in zip(panels, responses.items()):
@@ -83,7 +84,7 @@ def _draw_curves(axis, response, rows=None):
 def _draw_empty(axis, oscillator, ratios):
     """The empty container over the range of the ratios; labels of both axes."""
     fine = np.linspace(min(ratios), max(ratios), _FINE)
-    look = {"color": GREY, "ls": ":", "lw": 1.0, "label": STYLES["empty"].label}
+    look = {"color": STYLES["empty"].colour, "ls": ":", "label": STYLES["empty"].label}
     axis.plot(fine, 1e3 * oscillator.rms(fine * oscillator.natural_frequency), **look)
     axis.set(xlabel="frequency f / f$_0$ [1]", ylabel="RMS displacement [mm]")
 
@@ -98,7 +99,7 @@ def _legend_of_bands(figure, axis):
     """Legend above all panels, made from one of them: what bands are is its last entry."""
     handles, _ = axis.get_legend_handles_labels()
     handles.append(area_key("lowest to highest seed", fc=GREY, alpha=0.3))
-    figure.legend(handles=handles, loc="outside upper center", ncols=len(handles))
+    figure.legend(handles=handles, loc="outside upper center", ncols=min(5, len(handles)))
 
 
 def _shade(response, k):
@@ -127,12 +128,11 @@ def _draw_peaks(place, height, responses, particle_mass):
     rigid = [first.oscillator.peak(n * particle_mass) for n in first.particles]
     words = "rigid mass of the same weight"
     place.plot(first.particles, [r for r, _ in rigid], color=GREY, ls=":", label=words)
-    place.set(title="where they peak; bars: range of the seeds", xlabel="particles N [1]")
+    place.set(title="place of the peak; bars: seeds", xlabel="particles N [1]")
     place.set_ylabel("f / f$_0$ of the peak [1]")
-    height.set(title="how high; bars: range of the seeds", xlabel="particles N [1]")
+    height.set(title="its height; bars: seeds", xlabel="particles N [1]")
     height.set(ylabel="peak RMS displacement [mm]", ylim=(0, None))
-    place.legend(handles=place.lines[-1:], loc="lower left")
-    keys, labels = height.get_legend_handles_labels()
+    keys, labels = place.get_legend_handles_labels()
     height.legend(keys, labels, loc="lower left")
     for axis in (place, height):
         axis.set_xticks(first.particles)
@@ -144,19 +144,24 @@ def picture_measures(path: FileName, responses: Mapping[str, Any], particle_mass
     Apparent mass as a share of the particles' own: 1 for a rigid mass.
     """
     count = len(responses)
-    size = (1.0 + 2.6 * count, 5.4)
+    size = (1.0 + 2.05 * count, 5.4)
     shape = {"squeeze": False, "sharex": True, "sharey": "row"}
     with picture(path, 2, count, size, **shape) as (figure, axes):
         for column, (label, response) in zip(axes.T, responses.items()):
             for k, particles in enumerate(response.particles):
                 if particles > 0:
                     _draw_measures(column, response, k, particle_mass)
-            column[0].set_title(styles_of(responses)[label].label)
+            column[0].set_title(_narrow(styles_of(responses)[label].label))
             column[0].axhline(1.0, color=GREY, ls=":", lw=1.0, label="rigid mass")
             column[1].set_xlabel("frequency f / f$_0$ [1]")
         axes[0, 0].set_ylabel("apparent mass /\nmass of the particles [1]")
         axes[1, 0].set_ylabel("loss factor [1]")
         _legend_of_bands(figure, axes[0, 0])
+
+
+def _narrow(label):
+    """A label in lines that a column of four has room for."""
+    return textwrap.fill(label, 20)
 
 
 def _draw_measures(column, response, k, particle_mass):
@@ -170,18 +175,18 @@ def picture_hysteresis(path: FileName, sweeps: Mapping[str, Any]) -> None:
     """Sweeps up and down, the state carried on: a column a filling, a row a particle number."""
     particles = next(iter(sweeps.values())).up.particles
     count = len(sweeps)
-    size = (1.0 + 2.6 * count, 1.0 + 2.3 * len(particles))
+    size = (1.0 + 2.05 * count, 1.0 + 2.3 * len(particles))
     shape = {"squeeze": False, "sharex": True, "sharey": "row"}
     with picture(path, len(particles), count, size, **shape) as (figure, axes):
         for column, (label, sweep) in zip(axes.T, sweeps.items()):
-            column[0].set_title(styles_of(sweeps)[label].label)
+            column[0].set_title(_narrow(styles_of(sweeps)[label].label))
             for k, axis in enumerate(column):
                 _draw_ways(axis, sweep, k)
             column[-1].set_xlabel("frequency f / f$_0$ [1]")
         for k, axis in enumerate(axes[:, 0]):
             axis.set_ylabel(f"{particles[k]} particles:\nRMS displacement [mm]")
         handles, _ = axes[0, 0].get_legend_handles_labels()
-        figure.legend(handles=handles, loc="outside upper center", ncols=len(handles))
+        figure.legend(handles=handles, loc="outside upper center", ncols=min(5, len(handles)))
 
 
 def _draw_ways(axis, sweep, k):

@@ -125,10 +125,12 @@ def forked(place, when, edge):
 
 
 def draw(axes, cracks):
-    """Broken faces ahead of the notch, a colour for each mesh."""
+    """Broken faces ahead of the notch, a colour and a mark for each mesh."""
     axes.plot([0.0, 1e3 * NOTCH], [0.0, 0.0], color=BLACK, lw=1.5)
-    for one, colour in zip(cracks, itertools.cycle((RED, BLUE, GREEN, ORANGE, GREY))):
-        axes.plot(*1e3 * (one.place - [0.0, 0.5 * HEIGHT]).T, ".", ms=2.5, color=colour)
+    looks = zip((RED, BLUE, GREEN, ORANGE, GREY), "osD^v")
+    for one, (colour, mark) in zip(cracks, itertools.cycle(looks)):
+        look = {"color": colour, "marker": mark, "ms": 2.5, "ls": "none"}
+        axes.plot(*1e3 * (one.place - [0.0, 0.5 * HEIGHT]).T, **look)
     reach = 500.0 * HEIGHT
     axes.set(xlabel="x [mm]", ylabel="y [mm]", xlim=(40.0, 1e3 * LENGTH), ylim=(-reach, reach))
     axes.set_aspect("equal")

@@ -99,9 +99,9 @@ def turned(ratio, turn):
 
 def draw(axes, curves):
     """Ways over the angle."""
-    for (words, moved), colour in zip(curves.items(), (BLUE, RED)):
-        axes.plot(SHARES, 1e3 * moved.T, "o-", color=colour, ms=4, lw=0.8)
-        axes.plot([], [], "o-", color=colour, label=words)
+    for (words, moved), colour, form in zip(curves.items(), (BLUE, RED), ("o-", "s--")):
+        axes.plot(SHARES, 1e3 * moved.T, form, color=colour, ms=4, lw=0.8)
+        axes.plot([], [], form, color=colour, label=words)
     axes.axvline(1.0, color=BLACK, lw=0.8, ls=":")
     axes.set(xlabel="tangent of the slope by its limit", ylabel="way after 0.12 s [mm]")
     axes.legend(loc="lower right")

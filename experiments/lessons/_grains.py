@@ -5,10 +5,11 @@ The grains are those of the automaton with static contact. All runs on the threa
 
 import numpy as np
 
+from _page import png_like_the_first
 from ca_damper import Automaton, Batch, Oscillator, SceneTable
 from ca_damper.plot import Box, DrawnBox, frame_panel
 from ca_damper.record import frames_of
-from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, STYLES, png_of, styled
+from taichi_dem.kit.plot_style import BLACK, BLUE, GREEN, GREY, STYLES, styled
 from taichi_dem.kit.session_thread import session
 
 #: Frequencies by the natural one of the empty box, and the cycles before and while measuring.
@@ -88,12 +89,12 @@ def shaken(grains, o):
 def picture(answer):
     """Response, energy a cycle, and the box through one cycle; PNG bytes."""
     with styled(0, size=(10.0, 6.2)) as (figure, _):
-        above, below = figure.subfigures(2, 1, height_ratios=(1.0, 1.15))
-        response, energy = above.subplots(1, 2, width_ratios=(1.7, 1.0))
+        above, below = figure.add_gridspec(2, 1, height_ratios=(1.0, 1.15))
+        response, energy = above.subgridspec(1, 2, width_ratios=(1.7, 1.0)).subplots()
         _response(response, answer)
         _energy(energy, answer)
-        _boxes(below, answer)
-        return png_of(figure)
+        _boxes(figure, below.subgridspec(1, PICTURES).subplots(), answer)
+        return png_like_the_first(figure, "grains")
 
 
 def _response(axes, answer):
@@ -122,9 +123,9 @@ def _energy(axes, answer):
     axes.grid(False, axis="x")
 
 
-def _boxes(figure, answer):
+def _boxes(figure, panels, answer):
     """The box at even parts of a cycle."""
-    box, panels = Box.of(FILLING), figure.subplots(1, PICTURES)
+    box = Box.of(FILLING)
     swing = max(0.5 * box.diameter, *(abs(frame.x) for frame in answer.frames))
     for k, (axes, frame) in enumerate(zip(panels, answer.frames)):
         frame_panel(axes, box, swing)

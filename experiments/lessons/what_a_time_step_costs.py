@@ -1,4 +1,4 @@
-"""Lesson: what does a time step cost? Read the question, move a slider, see, unfold the answer.
+"""Lesson: what does a time step cost? Read, guess, move a slider, see.
 
 make lessons                                          # in the browser, with sliders
 python experiments/lessons/what_a_time_step_costs.py  # the first answer, without one
@@ -15,7 +15,7 @@ def _():
     import marimo as mo
 
     import _time_step as lesson
-    from _page import ask, percent, questions, sliders, tell
+    from _page import ask, guesses, percent, questions, replies, sliders, tell
     from taichi_dem.kit.plot_style import seconds
 
     _dashpots, _springs = map(seconds, lesson.limits())
@@ -30,7 +30,7 @@ def _():
     Two limits are known before any run: the dashpots of the stiffest body bear an explicit step of
     **{_dashpots}**, its springs one of **{_springs}**.
     """)
-    return ask, lesson, mo, percent, questions, seconds, sliders, tell
+    return ask, guesses, lesson, mo, percent, questions, replies, seconds, sliders, tell
 
 
 @app.cell
@@ -56,30 +56,37 @@ def _(ask, chosen, lesson, method, mo, percent, seconds, tell):
 
 
 @app.cell
-def _(mo, questions):
-    _text = """
-    Explicit: go from 80 to 160 ns. Does the error grow, or does something else happen? :: The run
-    diverges. At 80 ns it was wrong by 0.01 %: what bounds the step is **stability**, not accuracy.
-    You pay for small steps only because a larger one is impossible.
+def _(guesses, mo, questions):
+    asked = questions("""
+    Explicit: go from 80 to 160 ns. What does the error do? :: it doubles | it grows to four times |
+    *none is left to name: the run diverges :: At 80 ns it was wrong by 0.01 %: what bounds the step
+    is **stability**, not accuracy. You pay for small steps only because a larger one is impossible.
 
-    How does each curve fall when the step is halved? :: Explicit: the error halves, **first
-    order**. A dashpot takes the velocity of half a step ago. Solved together: the error falls to
-    about a quarter, **second order**. The dashpots act in the middle of the step.
+    Solved together: go from 160 to 80 ns. What is left of the error? :: as much as before | *about
+    a quarter | half :: The dashpots act in the middle of the step: **second order**. The explicit
+    error halves, **first order**: a dashpot takes the velocity of half a step ago.
 
-    Limited dashpots do not diverge up to 1280 ns. Why not take them? :: A dashpot that the step
-    does not bear is weakened until the step bears it. That is another material: wrong by 4 % at
-    80 ns, by about half at 320. **Stable is not right.** At 40 ns nothing is weakened, and both
-    explicit runs agree.
+    Limited dashpots do not diverge up to 1280 ns. How wrong are they at 320 ns? :: *by about half |
+    hardly, as they are stable | by 4 % :: A dashpot that the step does not bear is weakened until
+    the step bears it. That is another material: wrong by 4 % at 80 ns. **Stable is not right.** At
+    40 ns nothing is weakened, and both explicit runs agree.
 
-    You want 1 %. Which method, and which step? :: Dashpots solved together, with the longest step.
-    One of its steps costs several explicit ones, but it is 32 times as long as the longest explicit
-    one here. Beyond it the springs end the run: they are explicit in every method.
+    You want 1 %. What costs least? :: explicit, 80 ns | *solved together, 2560 ns | limited, 1280
+    ns :: One of its steps costs several explicit ones, but it is 32 times as long as the longest
+    explicit one here. Limited dashpots are wrong by 80 % there. Beyond 3 µs the springs end the
+    run: they are explicit in every method.
 
-    Make the blow gentler, from 10 to 50 µs. Which error falls? :: At 80 ns that of the solved
-    dashpots, to a twentieth: what changes slowly needs few steps. The explicit error hardly
-    changes. Its dashpots lag by half a step, whatever the blow.
-    """
-    questions(mo, _text)
+    Make the blow gentler, from 10 to 50 µs. Which error falls at 80 ns? :: both | the explicit one
+    | *that of the dashpots solved together :: To a twentieth or less: what changes slowly needs few
+    steps. The explicit error hardly changes. Its dashpots lag by half a step, whatever the blow.
+    """)
+    guessed = guesses(mo, asked)
+    return asked, guessed
+
+
+@app.cell
+def _(asked, guessed, mo, replies):
+    replies(mo, asked, guessed)
     return
 
 

@@ -16,7 +16,7 @@ from taichi_dem.mesh.contact_spheres import ContactSpheres
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.mesh.topology import body_properties, topology_of
-from taichi_dem.stability.mesh_limits import dashpots_of, springs_of
+from taichi_dem.stability.mesh_limits import dashpots_of, springs_of, subset_rates
 
 
 class Model:
@@ -68,6 +68,19 @@ class Model:
     def spheres(self) -> ContactSpheres:
         """``ContactSpheres`` of every face; with contact only."""
         return self.contact.spheres(self)
+
+    @cached_property
+    def dashpot_rates(self) -> np.ndarray:
+        """Rate of the dashpots of every body for each subset of its bonds [1/s], (n, 16)."""
+        return self._subset_rates(dashpots_of(self.material))
+
+    @cached_property
+    def spring_rates(self) -> np.ndarray:
+        """Squared angular frequency of the springs of every body likewise [1/s2], (n, 16)."""
+        return self._subset_rates(springs_of(self.material))
+
+    def _subset_rates(self, coefficients):
+        return subset_rates(self.mesh, self.topology, self.material.density, coefficients)
 
     @cached_property
     def bond_colours(self) -> np.ndarray:

@@ -4,7 +4,7 @@ import contextlib
 import io
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Union
 
 import matplotlib
 import numpy as np
@@ -41,7 +41,7 @@ STYLE = {
 BLUE, RED, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
 ORANGE, SKY, BLACK, GREY = "#E69F00", "#56B4E9", "#222222", "#8A8A8A"
 BROWN, VIOLET = "#8C6D31", "#6A51A3"
-WINE, OLIVE = "#882255", "#999933"
+WINE, OLIVE, LIGHT_GREY = "#882255", "#999933", "#ADADAD"
 
 
 @dataclass(frozen=True)
@@ -51,30 +51,31 @@ class MethodStyle:
     label: str
     colour: str
     marker: str
-    line: str = "-"
+    line: Union[str, tuple[float, tuple[float, ...]]] = "-"
 
 
-#: Styles by name; those that share a picture have different colours.
+_LONG_DASHES, _DASH_DOT_DOT = (0.0, (8.0, 2.0)), (0.0, (5.0, 1.5, 1.0, 1.5, 1.0, 1.5))
+#: Styles by name; those that share a picture differ in colour, and without it in marker and line.
 STYLES = {
     "uniform": MethodStyle("paper's rule, one step for all", RED, "o"),
     "multirate_held": MethodStyle("paper's rule, multirate", BLUE, "s", "--"),
     "multirate_drifted": MethodStyle(
-        "paper's rule, multirate, neighbours drifted", GREEN, "D", ":"
+        "paper's rule, multirate, neighbours drifted", GREEN, "D", _DASH_DOT_DOT
     ),
     "controlled": MethodStyle("multirate, step control", ORANGE, "^", "-."),
-    "limited": MethodStyle("one fixed step, limited dashpots", PURPLE, "v"),
+    "limited": MethodStyle("one fixed step, limited dashpots", PURPLE, "v", _LONG_DASHES),
     "implicit": MethodStyle("one fixed step, solved dashpots", SKY, "P", "--"),
     "fixed": MethodStyle("one fixed step, full dashpots", BLACK, "X"),
-    "reference": MethodStyle("reference", GREY, "."),
+    "reference": MethodStyle("reference", GREY, ".", ":"),
     "ca_static": MethodStyle("automaton, static contact", BLUE, "o"),
-    "ca_place": MethodStyle("automaton, rules of place", WINE, "P"),
-    "ca_ejection": MethodStyle("automaton, landing + ejection", GREEN, "s"),
+    "ca_place": MethodStyle("automaton, rules of place", WINE, "P", ":"),
+    "ca_ejection": MethodStyle("automaton, landing + ejection", GREEN, "s", "-."),
     "ca_landing": MethodStyle("automaton, landing", ORANGE, "D"),
-    "dem": MethodStyle("spheres", RED, "^"),
+    "dem": MethodStyle("spheres", RED, "^", "--"),
     "dem_printed": MethodStyle("spheres, damping as printed", PURPLE, "v"),
     "dem_soft": MethodStyle("spheres, modulus / 100", SKY, "P"),
     "combined": MethodStyle("spheres and long flights", OLIVE, "v"),
-    "empty": MethodStyle("empty container", GREY, "X", ":"),
+    "empty": MethodStyle("empty container", LIGHT_GREY, "X", ":"),
     "rk45_tolerance": MethodStyle("RK45 in the kernel, tolerance swept", BROWN, "o"),
     "rk45_step": MethodStyle("RK45 in the kernel, longest step swept", VIOLET, "s"),
     "rk45_python": MethodStyle("RK45 in Python, tolerance swept", BLACK, "D"),

@@ -41,13 +41,16 @@ def plot_acting(
     polygons, body, _ = surface(model.topology, view, rest, np.zeros(model.bond_count, dtype=bool))
     extent = np.ptp(view.project(model.mesh.points), axis=0)
     height = 2.6 * float(np.clip(extent[1] / extent[0], 0.15, 2.0))
-    rows, columns = (1, len(names)) if extent[1] > 0.3 * extent[0] else (len(names), 1)
+    columns = min(3, len(names)) if extent[1] > 0.3 * extent[0] else 1
+    rows = -(-len(names) // columns)
     size = 2.6 * columns + 1.4, (height + 0.5) * rows + 0.7
     shades = ListedColormap(matplotlib.colormaps["plasma"](np.linspace(0.0, 0.92, 256)))
     with picture(path, rows, columns, size, squeeze=False, sharex=True, sharey=True) as (
         figure,
         panels,
     ):
+        for axes in panels.flat[len(names) :]:
+            axes.set_axis_off()
         for axes, name in zip(panels.flat, names):
             times = acting_since[name]
             drawn = _coloured(axes, polygons, 1e3 * times[body], shades, 1e3 * until)

@@ -53,13 +53,15 @@ def picture_wave(
     numbers of those to follow, name -> number. label: of the values. titles: of both panels.
     level: words and value of a dotted line.
     """
-    with picture(path, 1, 2, size=(10.0, 3.8)) as (_, (along, over)):
+    with picture(path, 1, 2, size=(9.0, 3.8)) as (_, (along, over)):
         draw_space_time(along, place, time_s, values, label)
-        for (name, cell), colour in zip(cells.items(), (BLUE, GREEN, RED, ORANGE, PURPLE)):
-            over.plot(1e3 * time_s, values[:, cell], color=colour, label=name)
-            along.axvline(place[cell], color=colour, lw=0.8, ls="--", label=name)
+        looks = zip((BLUE, GREEN, RED, ORANGE, PURPLE), ("-", "--", "-.", ":", (0, (8, 2))))
+        for (name, cell), (colour, dashes) in zip(cells.items(), looks):
+            look = {"color": colour, "ls": dashes, "label": name}
+            over.plot(1e3 * time_s, values[:, cell], **look)
+            along.axvline(place[cell], lw=1.2, **look)
         along.set_title(titles[0])
-        along.legend(loc="upper left", title="seen on the right", frameon=True, framealpha=0.9)
+        along.legend(loc="lower left", bbox_to_anchor=(0.0, 1.08), ncols=4, columnspacing=1.0)
         if level:
             over.axhline(level[1], color=GREY, ls=":", label=level[0])
         over.set(xlabel="time [ms]", ylabel=label, title=titles[1])

@@ -56,7 +56,7 @@ def plot_cracks(
     """
     view = View(axis)
     broken_time = np.where(broken_time <= frame.time_s, broken_time, np.nan)
-    with picture(path, 1, 3, size=(13.2, 4.6)) as (figure, panels):
+    with picture(path, 1, 3, size=(9.2, 3.6)) as (figure, panels):
         drawn = draw_breaks(panels[0], view, model, broken_time)
         panels[0].set_title(f"{np.sum(~np.isnan(broken_time))} broken faces, block at rest")
         for axes, factor in ((panels[1], magnify), (panels[2], 1.0)):
@@ -146,8 +146,8 @@ def plot_steps(
     top = max(1, *(int(frame.level.max()) for frame in frames))
     look = level_look(top + 1)
     extent = np.ptp(view.project(model.mesh.points), axis=0)
-    height = 2.9 * np.clip(extent[1] / extent[0], 0.15, 2.0)
-    size = (2.9 * columns + 1.2, (height + 0.1) * rows + 0.6)
+    height = 2.6 * np.clip(extent[1] / extent[0], 0.15, 2.0)
+    size = (2.6 * columns + 1.2, (height + 0.1) * rows + 0.6)
     with picture(path, rows, columns, size=size, squeeze=False, sharex=True, sharey=True) as (
         figure,
         panels,

@@ -77,7 +77,7 @@ def film_runs(
         below.legend(loc="upper left")
         # The first picture keeps room for the longest footer.
         room = " \n" * max(text.count("\n") + 1 for text in footers or [""])
-        footer = figure.supxlabel(room, x=0.02, ha="left", fontsize=5.8, family="monospace")
+        footer = figure.supxlabel(room, x=0.02, ha="left", fontsize=6.5, family="monospace")
         for number, now in enumerate(times):
             for axes, run, drawn, line in zip(panels, runs, bodies, lines):
                 _show(axes, run, drawn, line, now, magnify, axis)

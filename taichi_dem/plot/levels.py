@@ -26,15 +26,20 @@ def level_names(dt0: float, count: int) -> Any:
 
 
 def draw_level_shares(
-    figure: Any, axes: Any, time: np.ndarray, shares: np.ndarray, dt0: float
+    owner: Any,
+    axes: Any,
+    time: np.ndarray,
+    shares: np.ndarray,
+    dt0: float,
+    loc: str = "outside right center",
 ) -> None:
     """Share of bodies on each level over time, the coarsest at the bottom, with its legend.
 
-    time: in the unit of the axis. shares: (sample_count, level_count), rows summing to 1. dt0: step
-    of level 0 [s].
+    owner: figure or axes that get the legend, at a place loc. time: in the unit of the axis.
+    shares: (sample_count, level_count), rows summing to 1. dt0: step of level 0 [s].
     """
     count = shares.shape[1]
     areas = axes.stackplot(time, 100.0 * shares.T, colors=level_shades(count))
     axes.set(ylabel="share of bodies [%]", ylim=(0.0, 100.0))
     names = level_names(dt0, count)
-    figure.legend(areas[::-1], names[::-1], title="step", loc="outside right center")
+    owner.legend(areas[::-1], names[::-1], title="step", loc=loc)

@@ -9,21 +9,22 @@ from taichi_dem.kit.plot_style import BLUE, GREEN, PURPLE, RED, picture, styles_
 from taichi_dem.kit.validation import FileName
 from taichi_dem.plot.levels import draw_level_shares
 
-#: Energy terms from the bottom of the stack up: blue is held, red lost in bonds, green in contacts.
+#: Energy terms from the bottom of the stack up, with colours and dashes: blue is held, orange lost
+#: in bonds, purple in contacts; within a group they differ in lightness.
 _TERMS = {
-    "kinetic_J": ("kinetic", "#08306B"),
-    "bond_strain_J": ("bond strain", "#3A87C2"),
-    "sphere_strain_J": ("sphere strain", "#A6CEE8"),
-    "bond_dashpot_J": ("bond dashpots", "#FDBE85"),
-    "slip_J": ("slip", "#E6700F"),
-    "softening_J": ("softening", "#A63603"),
-    "release_J": ("release", "#5C1A00"),
-    "sphere_dashpot_J": ("sphere dashpots", "#C7E5B4"),
-    "friction_J": ("friction", "#3E9B52"),
-    "ground_dashpot_J": ("ground dashpots", "#8C8C8C"),
+    "kinetic_J": ("kinetic", "#08306B", "-"),
+    "bond_strain_J": ("bond strain", "#3A87C2", "-"),
+    "sphere_strain_J": ("sphere strain", "#A6CEE8", "-"),
+    "bond_dashpot_J": ("bond dashpots", "#FDBE85", "--"),
+    "slip_J": ("slip", "#E6700F", "--"),
+    "softening_J": ("softening", "#A63603", "--"),
+    "release_J": ("release", "#5C1A00", "--"),
+    "sphere_dashpot_J": ("sphere dashpots", "#CDBDE3", "-."),
+    "friction_J": ("friction", "#6F4FA0", "-."),
+    "ground_dashpot_J": ("ground dashpots", "#8C8C8C", (0, (8, 2))),
 }
 _GIVEN = {
-    "gas_work_J": ("gas work", "black", "--"),
+    "gas_work_J": ("gas work", "black", (0, (5, 1.5, 1, 1.5, 1, 1.5))),
     "injected_J": ("injected at release", PURPLE, ":"),
 }
 
@@ -50,7 +51,7 @@ def plot_pressure(
         if until_s is not None:
             look = {"color": "black", "linewidth": 0.8, "linestyle": ":", "label": "end of the run"}
             axes.axvline(1e3 * until_s, **look)
-            axes.legend(loc="lower center")
+            axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0))
         axes.set(xlabel="time [ms]", ylabel="pressure on the hole [MPa]")
         axes.set(xlim=(0.0, time_ms[-1]), ylim=(0.0, 1.12 * pressure[peak]))
 
@@ -88,7 +89,7 @@ def plot_energy(path: FileName, history: Mapping[str, np.ndarray]) -> None:
     present = {key: look for key, look in _TERMS.items() if key in history}
     terms = {key: look for key, look in present.items() if np.abs(history[key]).max() > 0.0}
     with picture(
-        path, 2, 2, size=(10.8, 5.6), sharex=True, gridspec_kw={"height_ratios": [3.2, 1]}
+        path, 2, 2, size=(9.2, 5.6), sharex=True, gridspec_kw={"height_ratios": [3.2, 1]}
     ) as (figure, panels):
         _stack(panels[0, 0], time, history, terms)
         _lines(panels[0, 1], time, history, terms)
@@ -103,7 +104,7 @@ def plot_energy(path: FileName, history: Mapping[str, np.ndarray]) -> None:
 
 def _stack(axes, time, history, terms):
     values = [1e-3 * history[key] for key in terms]
-    colours = [colour for _, colour in terms.values()]
+    colours = [colour for _, colour, _ in terms.values()]
     axes.stackplot(time, values, colors=colours, edgecolor="white", linewidth=0.3)
     given = history["load_work_J"] + history["support_work_J"] + history["injected_J"]
     words = "work done + injected"
@@ -113,11 +114,9 @@ def _stack(axes, time, history, terms):
 
 
 def _lines(axes, time, history, terms):
-    for key, (label, colour) in terms.items():
-        axes.plot(time, positive(history[key]), color=colour, label=label, linewidth=2.0)
-    for key, (label, colour, line) in _GIVEN.items():
-        if np.abs(history[key]).max() > 0.0:
-            axes.plot(time, positive(history[key]), color=colour, label=label, linestyle=line)
+    given = {key: look for key, look in _GIVEN.items() if np.abs(history[key]).max() > 0.0}
+    for key, (label, colour, line) in (*terms.items(), *given.items()):
+        axes.plot(time, positive(history[key]), color=colour, label=label, linestyle=line)
     largest = max(1e-12, *(float(history[key].max()) for key in (*terms, *_GIVEN)))
     axes.set(yscale="log", ylim=(1e-6 * largest, 2.0 * largest))
     axes.set(ylabel="energy [J]", title="Every term of the account")
@@ -169,7 +168,7 @@ def plot_methods(
     series: method -> columns time_s, cpu_s, evaluations and the one compared, a displacement of the
     hole or of the body watched; the first is the one the others are compared with.
     """
-    with picture(path, 1, 3, size=(12.5, 4.0)) as (figure, (cost, work, moved)):
+    with picture(path, 2, 2, size=(9.0, 6.4)) as (_, ((cost, work), (moved, words))):
         first = next(iter(series.values()))
         styles = styles_of(series)
         for name, made in series.items():
@@ -202,5 +201,5 @@ def plot_methods(
         for axes in (cost, work, moved):
             axes.set(xlabel="time [ms]")
             _span(axes, time)
-        handles, labels = moved.get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=3)
+        words.set_axis_off()
+        words.legend(*moved.get_legend_handles_labels(), loc="center left", handlelength=4.0)

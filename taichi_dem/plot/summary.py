@@ -60,7 +60,7 @@ def picture_of_run(
     view = View(viewed_along(model.mesh.points))
     sides = np.ptp(view.project(model.mesh.points), axis=0)
     long = sides[0] > _LONG * sides[1]
-    with styled(0, size=(9.6, 5.2 if long else 4.2)) as (figure, _):
+    with styled(0, size=(9.2, 5.2 if long else 4.2)) as (figure, _):
         figure.get_layout_engine().set(w_pad=0.08)
         places = [["block", "block"], ["energy", "events"]]
         if not long:

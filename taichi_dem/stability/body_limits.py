@@ -12,7 +12,6 @@ import taichi as ti
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.types import real
 from taichi_dem.stability.contact_limits import ContactLimits
-from taichi_dem.stability.mesh_limits import dashpots_of, springs_of, subset_rates
 from taichi_dem.stability.stable_step import dashpot_limit, spring_limit
 from taichi_dem.stability.step_control import (
     BOND_C,
@@ -139,10 +138,9 @@ class StabilityLimits:
             self.turn.load(rule.angle, method.dt0)
         if self.has_contact:
             self.contact_limits.load(model, rule.ahead * method.dt0)
-        shape = model.mesh, model.topology, model.material.density
         if self.tables.dashpot.name:
-            assign(self.dashpot_table, subset_rates(*shape, dashpots_of(model.material)))
-        assign(self.spring_table, subset_rates(*shape, springs_of(model.material)))
+            assign(self.dashpot_table, model.dashpot_rates)
+        assign(self.spring_table, model.spring_rates)
 
     @ti.func
     def count(self, low):

@@ -9,7 +9,7 @@ from taichi_dem.kit.plot_style import BLUE, GREEN, GREY, PURPLE, RED
 from taichi_dem.workload.sharing import WAYS, SharedWork
 
 #: Colour and line by way of sharing.
-LOOK = dict(zip(WAYS, ((RED, "-"), (PURPLE, "--"), (BLUE, "-"), (GREEN, "-"))))
+LOOK = dict(zip(WAYS, ((RED, "-."), (PURPLE, "--"), (BLUE, "-"), (GREEN, (0, (8, 2))))))
 
 
 def draw_acceleration(
@@ -28,7 +28,7 @@ def draw_acceleration(
         counts = np.array([count for count in by_count if count <= most])
         gains = [by_count[count].acceleration(serial) for count in counts]
         colour, line = LOOK[way]
-        axes.plot(counts, gains, line, color=colour, label=WAYS[way])
+        axes.plot(counts, gains, ls=line, color=colour, label=WAYS[way])
     bound = counts / (1.0 + serial * (counts - 1.0))
     axes.plot(counts, bound, ":", color=GREY, label="bound: nobody ever waits")
     axes.set(xlabel="workers [1]", ylabel="acceleration [1]")
@@ -45,7 +45,7 @@ def draw_shares(axes: Any, chosen: Mapping[str, SharedWork]) -> None:
             (colour, line), most = LOOK[way], one.workers
             share, words = one.seconds / one.seconds.mean(), f"{WAYS[way]}: {one.imbalance:.3g}"
             look: Any = {"where": "mid", "color": colour, "label": words}
-            axes.step(np.arange(1, most + 1), share, line, **look)
+            axes.step(np.arange(1, most + 1), share, ls=line, **look)
     axes.set(xlabel="number of the worker [1]", ylabel="time of its work / mean [1]")
     axes.set(xlim=(0.5, most + 0.5), ylim=(0.0, 1.4 * axes.get_ylim()[1]))
     axes.legend(loc="upper right")

@@ -3,7 +3,17 @@
 import pytest
 
 from _hard_cases import registry
-from taichi_dem.kit.plot_style import RED, STYLES, power, styled, styles_of
+from taichi_dem.kit.plot_style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    RED,
+    STYLES,
+    line_key,
+    power,
+    styled,
+    styles_of,
+)
 from taichi_dem.kit.study.cases_picture import case_title, with_powers
 from tests.figures import bad_words_in, defects
 
@@ -12,7 +22,7 @@ def of(draw):
     """Defects of a figure with one pair of axes, labelled with units, that a function changes."""
     with styled() as (figure, axes):
         axes.set(xlabel="time [s]", ylabel="displacement [mm]")
-        axes.plot([0.0, 1.0], [0.0, 1.0])
+        axes.plot([0.0, 1.0], [0.0, 1.0], color=BLACK)
         draw(axes)
         figure.canvas.draw()
         return defects(figure)
@@ -24,6 +34,20 @@ def legend_of(label, **look):
         axes.legend()
 
     return draw
+
+
+def covered(axes, drawn):
+    """A legend in the middle of the axes, instead of the line that each figure has."""
+    axes.lines[0].remove()
+    axes.legend(handles=[line_key("some words")], loc="center")
+    return drawn
+
+
+def two_lines(axes, *colours, **look):
+    """Two lines instead of the one that each figure has."""
+    axes.lines[0].remove()
+    for level, colour in enumerate(colours):
+        axes.plot([0.0, 1.0], [level, level + 1.0], color=colour, **{"ls": "-", **look})
 
 
 FAULTS = {
@@ -39,6 +63,17 @@ FAULTS = {
     "dashed": lambda axes: axes.axvline(0.5, ls="--"),
     "band": lambda axes: axes.fill_between([0.0, 1.0], 0.0, 1.0, alpha=0.2),
     "stripe": lambda axes: axes.axhspan(0.0, 0.5, color="0.9"),
+    "small letters": lambda axes: axes.set_title("small", fontsize=6.4),
+    "small letters of a wide figure": lambda axes: axes.figure.set_size_inches(9.5, 4.0),
+    "words beyond the edge": lambda axes: axes.figure.text(
+        0.9, 0.5, "a long line of words, too long"
+    ),
+    "legend on a line": lambda axes: covered(axes, axes.plot([0.0, 1.0], [0.4, 0.6], color=BLUE)),
+    "legend on points": lambda axes: covered(axes, axes.plot(0.5, 0.5, "o", color=BLUE)),
+    "legend on a bar": lambda axes: covered(axes, axes.bar(0.5, 1.0, 0.1, color=BLUE)),
+    "legend on dots": lambda axes: covered(axes, axes.scatter(0.5, 0.5, color=BLUE)),
+    "hue of lines": lambda axes: two_lines(axes, RED, GREEN),
+    "hue of marks": lambda axes: two_lines(axes, RED, GREEN, ls="none", marker="o"),
 }
 
 
@@ -55,6 +90,15 @@ GOOD = {
     "dotted": legend_of("bound", ls=":"),
     "nothing shown": lambda axes: axes.set_axis_off(),
     "no ticks": lambda axes: axes.set(ylabel="", yticks=[]),
+    "ticks beyond the limits": lambda axes: (
+        axes.set_xticks([-9.0, 0.5, 9.0]) and axes.set_xlim(0, 1)
+    ),
+    "legend on a guide": lambda axes: covered(axes, axes.axhline(0.5, color=BLUE)),
+    "lightness": lambda axes: two_lines(axes, BLACK, RED),
+    "width": lambda axes: two_lines(axes, RED, GREEN) or axes.lines[0].set_lw(3.0),
+    "rows of marks": lambda axes: [
+        axes.plot(1, k, "x", color=c) for k, c in ((0, RED), (1, GREEN))
+    ],
 }
 
 
@@ -69,6 +113,18 @@ def test_names_of_a_method_share_its_style_and_others_take_free_colours():
     assert made["dem_tsuji"] is made["spheres"]
     assert made["mine"].label == "mine"
     assert len({style.colour for style in made.values()}) == 3
+
+
+def test_methods_of_the_blast_differ_without_colour_too():
+    """Their lines, which some pictures draw without marks."""
+    blast = list(STYLES.values())[: list(STYLES).index("ca_static")]
+
+    def draw(axes):
+        for style in blast:
+            axes.plot([0.0, 1.0], [1.0, 0.0], color=style.colour, ls=style.line, label=style.label)
+        axes.figure.legend(loc="outside upper left")
+
+    assert of(draw) == []
 
 
 def test_methods_of_a_package_differ_in_colour():

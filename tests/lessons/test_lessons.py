@@ -17,7 +17,6 @@ from PIL import Image
 import _answers
 import _grains
 import _needs
-import _page
 import _time_step
 from ca_damper import Batch, Empty, Oscillator, SceneTable
 from taichi_dem import ImplicitDashpots, InputError, Simulation, Uniform, effects, needed_effects
@@ -115,19 +114,6 @@ def test_grains_that_are_not_thrown_are_a_fixed_mass(engine):
     expected = o.base_amplitude * np.abs(glued) / math.sqrt(2.0)
     assert answer.cycles.rms == pytest.approx(expected, rel=0.03)
     assert abs(answer.energy["filling"]) < 0.01 * answer.energy["base"]
-
-
-def test_questions_and_answers_are_read_off_a_text():
-    shown = SimpleNamespace(md=lambda text: f"<{text}>", accordion=dict)
-    text = """
-    Why is
-    it so? :: It is **so**:
-    as it is.
-
-    And then? :: Nothing.
-    """
-    asked = {"Why is it so?": "<It is **so**: as it is.>", "And then?": "<Nothing.>"}
-    assert _page.questions(shown, text) == asked
 
 
 def test_sliders_of_the_grains_begin_at_one_of_their_steps():
@@ -270,9 +256,16 @@ def test_a_notebook_runs_without_a_browser(name, engine, capfd):
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     spec.loader.exec_module(module)
-    module.app.run()
+    shown, made = module.app.run()
     said, warned = capfd.readouterr()
     assert said.count("**") >= 4 and warned == ""
+    # The same with a guess at each question: each has its verdict now.
+    asked = made["asked"]
+    right = [question.right for question in asked]
+    guessed = SimpleNamespace(elements=made["guessed"].elements, value=right)
+    told, _ = module.app.run(defs={"asked": asked, "guessed": guessed})
+    verdicts = [str(outputs[-1].text).count("Right.") for outputs in (shown, told)]
+    assert verdicts == [0, len(asked)] and len(asked) >= 5
 
 
 @pytest.mark.parametrize("sentence", ["", "diverged"])

@@ -11,7 +11,7 @@ from taichi_dem.kit.study.cases import FAILED, PASSED, REFUSED, Trial
 
 #: Margins from which on more means nothing; where those stand that refuse, and those that fail.
 _MOST, _PLACES = 1e4, {REFUSED: 0.05, FAILED: 0.4}
-_TICKS = {0.05: "refused", 1.0: "1", 10.0: "10", 100.0: "100", _MOST: "10⁴ or exact"}
+_TICKS = {0.05: "refused", 1.0: "1", 10.0: "10", 100.0: "100", _MOST: "≥ 10⁴"}
 #: Style of a method in ``styles_of``, where it has another name there.
 Alias = Mapping[str, str]
 
@@ -33,41 +33,44 @@ def _distinct(trials, name):
 
 
 def _looks_of(trials, alias):
-    """Label and colour of every method."""
+    """Label, colour, mark and dashes of every method."""
     methods = _distinct(trials, "method")
     styles = styles_of((alias or {}).get(method, method) for method in methods)
-    return {m: {"label": s.label, "color": s.colour} for m, s in zip(methods, styles.values())}
+    return {
+        m: {"label": s.label, "color": s.colour, "marker": s.marker, "ls": s.line}
+        for m, s in zip(methods, styles.values())
+    }
 
 
 def picture_cases(
-    path: str, trials: Sequence[Trial], columns: int = 5, alias: Optional[Alias] = None
+    path: str, trials: Sequence[Trial], columns: int = 3, alias: Optional[Alias] = None
 ) -> None:
     """A panel a case with the curves of its methods; one case alone with its question."""
     cases, looks = _distinct(trials, "case"), _looks_of(trials, alias)
     # The first are thick, so that all are seen.
     for k, look in enumerate(looks.values()):
-        look["lw"] = max(0.8, 3.0 - 0.45 * k)
+        look.update(lw=max(0.8, 3.0 - 0.45 * k), marker=None)
     alone = len(cases) == 1
     columns = 1 if alone else columns
     rows = -(-len(cases) // columns)
-    size = (7.0, 4.6) if alone else (3.2 * columns, min(16.0, 0.4 + 2.4 * rows))
+    size = (7.0, 4.6) if alone else (3.06 * columns, 0.6 + 2.6 * rows)
     with picture(path, rows, columns, size, squeeze=False) as (figure, axes):
         for axis in axes.ravel()[len(cases) :]:
             axis.set_axis_off()
         for axis, case in zip(axes.ravel(), cases):
             own = [trial for trial in trials if trial.case is case]
-            _draw_case(axis, own, looks, 8.0 if alone else 6.0)
+            _draw_case(axis, own, looks)
         shown = dict.fromkeys(trial.method for trial in trials if trial.curve)
         keys = [line_key(**looks[method]) for method in shown]
         place = "lower center" if alone else "upper left"
-        figure.legend(handles=keys, loc=f"outside {place}", ncols=3 if size[0] > 9.0 else 2)
+        figure.legend(handles=keys, loc=f"outside {place}", ncols=2)
         if alone:
             question = textwrap.fill(with_powers(cases[0].question), 100)
             figure.suptitle(question, fontsize=9.0, x=0.02, ha="left")
 
 
-def _draw_case(axis, own, looks, size):
-    """Curves of the methods of a case, and how they fared in the title; size: of letters."""
+def _draw_case(axis, own, looks):
+    """Curves of the methods of a case, and how they fared in the title."""
     shown = [trial for trial in own if trial.curve]
     for trial in shown:
         curve, look = trial.curve, dict(looks[trial.method])
@@ -79,18 +82,16 @@ def _draw_case(axis, own, looks, size):
     if shown:
         axis.locator_params(axis="x", nbins=5)
     else:
-        said = textwrap.fill(f"“{own[0].words}”", 44)
+        said = textwrap.fill(f"“{own[0].words}”", 38)
         axis.set(xticks=[], yticks=[])
-        axis.text(0.03, 0.92, said, fontsize=size, va="top", transform=axis.transAxes)
+        axis.text(0.03, 0.92, said, fontsize=8.5, va="top", transform=axis.transAxes)
     lowest, highest = axis.get_ylim()
     if 0.0 < lowest < 0.95 * highest:
         axis.set_ylim(0.0, highest)
-    axis.tick_params(labelsize=size)
-    for label in (axis.xaxis.label, axis.yaxis.label):
-        label.set_size(size)
     failed = any(trial.status == FAILED for trial in own)
-    look = {"fontsize": size + 1.0, "color": RED if failed else BLACK}
-    axis.set_title(f"{case_title(own[0].case.name)}: {_verdict(own)}", **look)
+    title = f"{case_title(own[0].case.name)}: {_verdict(own)}"
+    look = {"fontsize": 9.0, "color": RED if failed else BLACK}
+    axis.set_title(textwrap.fill(title, 36), **look)
 
 
 def _verdict(own):
@@ -101,7 +102,7 @@ def _verdict(own):
     said = [f"{n} {'FAILED' if word == FAILED else word}" for word, n in counts.items() if n]
     least = min((trial.margin for trial in own if trial.worst), default=math.inf)
     if math.isfinite(least):
-        said.append(f"margin {power(least) if least >= 1e4 else format(least, '.2g')}")
+        said.append(f"margin {power(least) if least >= 100.0 else format(least, '.2g')}")
     return ", ".join(said)
 
 
@@ -110,37 +111,37 @@ def picture_margins(path: str, trials: Sequence[Trial], alias: Optional[Alias] =
     packages = dict.fromkeys(trial.case.package for trial in trials)
     panels = {name: [trial for trial in trials if trial.case.package == name] for name in packages}
     size = (
-        5.4 * len(panels),
-        1.4 + 0.17 * max(len(_distinct(own, "case")) for own in panels.values()),
+        4.6 * len(panels),
+        2.2 + 0.155 * max(len(_distinct(own, "case")) for own in panels.values()),
     )
     with picture(path, 1, len(panels), size, squeeze=False) as (_, axes):
         for axis, (package, own) in zip(axes[0], panels.items()):
             _draw_margins(axis, own, _looks_of(own, alias))
-            look = {"fontsize": 6.5, "title_fontsize": 9.5, "alignment": "left", "ncols": 2}
+            look = {"title_fontsize": 9.5, "alignment": "left"}
             look.update(loc="lower left", bbox_to_anchor=(-0.3, 1.0), borderpad=0.0)
             axis.legend(title=f"{package}: {len(own)} runs", **look)
 
 
 def _draw_margins(axis, own, looks):
-    """Marks of all methods, those that fail as crosses."""
+    """Marks of all methods, those that fail as stars."""
     cases = _distinct(own, "case")
     failed = [trial for trial in own if trial.status == FAILED]
     for k, (method, look) in enumerate(looks.items()):
         spread = 0.5 * (k / max(1, len(looks) - 1) - 0.5)
-        for mark, some in (({"marker": "o", "ms": 3.4}, own), ({"marker": "X", "ms": 8.0}, failed)):
+        look = {**look, "ls": "none", "mew": 0.0, "ms": 5.0}
+        for some, more in ((own, {}), (failed, {"marker": "*", "ms": 11.0, "label": None})):
             mine = [trial for trial in some if trial.method == method]
             where = [_place_of(trial) for trial in mine]
             level = [cases.index(trial.case) + spread for trial in mine]
-            axis.plot(where, level, ls="none", mew=0.0, **mark, **look)
-            look = {"color": look["color"]}
+            axis.plot(where, level, **{**look, **more})
     if failed:
-        axis.plot([], [], "X", ms=8.0, color=BLACK, label="failed")
+        axis.plot([], [], "*", ms=11.0, color=BLACK, label="failed")
     axis.axvline(1.0, color=GREY, lw=1.0, label="at the bound")
     axis.set(xscale="log", xlim=(0.02, 2.5 * _MOST), ylim=(len(cases) - 0.3, -0.7))
-    axis.set_yticks(range(len(cases)), [case_title(case.name) for case in cases], fontsize=6.5)
-    axis.set_xticks(list(_TICKS), list(_TICKS.values()), fontsize=7.0)
+    axis.set_yticks(range(len(cases)), [case_title(case.name) for case in cases])
+    axis.set_xticks(list(_TICKS), list(_TICKS.values()))
     axis.set_xticks([], minor=True)
-    axis.set_xlabel("margin: bound of physics / worst figure [1]", fontsize=9.0)
+    axis.set_xlabel("margin: bound / worst figure [1]")
 
 
 def _place_of(trial):

@@ -2,17 +2,18 @@
 
 import math
 import os
+import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from taichi_dem.kit import runtime
-from taichi_dem.kit.plot_style import GREY, picture, styles_of
+from taichi_dem.kit.plot_style import BLACK, GREY, picture, styles_of
 from taichi_dem.kit.study.summary import processor, versions
 from taichi_dem.kit.study.work_precision import Point
 
-_SMALL = 6.5
+_SMALL = 8.5
 #: Where a label's centre may stand: right and up in widths and heights of the label, and a gap.
 _PLACES = ((1, 1), (-1, -1), (1, -1), (-1, 1), (1, 0), (-1, 0), (0, 2), (0, -2), (1, 3), (-1, -3))
 WALL = "wall time [s], fastest of the repeats"
@@ -50,26 +51,24 @@ def picture_work_precision(
     its step [s]. Failures are crosses on the top edge, above what they would have cost, with their
     reason.
     """
-    panels = 3 if residual_names else 2
-    ratios = {"width_ratios": (1.0, 1.0, 0.62)[:panels]}
-    size = (6.0 * min(panels, 2.62), 6.2)
-    with picture(path, 1, panels, size, gridspec_kw=ratios) as (figure, axes):
-        looks, drawn = _looks(titles), []
-        for axis, cost, name in zip(axes, ("seconds", "evaluations"), (time_name, work_name)):
-            drawn.append(_Panel(axis, points, looks, cost))
-            drawn[-1].draw(floors, order)
-            axis.set(xlabel=name, ylabel=error_name)
+    below = ["evaluations", "residual"] if residual_names else ["evaluations"]
+    with picture(path, 0, size=(9.2, 9.6)) as (figure, _):
+        places = [["seconds"] * len(below), below]
+        axes = figure.subplot_mosaic(places, height_ratios=(1.4, 1.0))
+        looks, drawn = _looks(titles), {}
+        for cost, name in (("seconds", time_name), ("evaluations", work_name)):
+            drawn[cost] = _Panel(axes[cost], points, looks, cost)
+            drawn[cost].draw(floors, order)
+            axes[cost].set(xlabel=name, ylabel=error_name)
         if residual_names:
-            _draw_residuals(axes[2], points, looks, step_unit)
-            axes[2].set(xlabel=residual_names[0], ylabel=residual_names[1])
-        figure.legend(*_legend(axes[0], titles), loc="outside upper left", ncols=3)
+            _draw_residuals(axes["residual"], points, looks, step_unit)
+            axes["residual"].set(xlabel=residual_names[0], ylabel=residual_names[1])
+        figure.legend(*_legend(axes["seconds"], titles), loc="outside upper left", ncols=2)
         marks = "At the points: what is swept. Bars: to the slowest repeat."
-        words = f"{caption}\n{marks} {machine_words()}"
-        figure.supxlabel(words, fontsize=7.5, x=0.01, ha="left")
+        _write_below(figure, f"{caption} {marks}")
         # Where a label has room is known when everything else has its place.
         figure.draw_without_rendering()
-        for panel in drawn:
-            panel.label_steps()
+        drawn["seconds"].label_steps()
 
 
 def picture_errors(
@@ -85,7 +84,7 @@ def picture_errors(
     errors: by what they are of, then by method: pairs (cost, error), coarse to fine. An error of
     zero lies on the bottom edge.
     """
-    with picture(path, 1, len(errors), (4.6 * len(errors), 5.0)) as (figure, axes):
+    with picture(path, 1, len(errors), (9.2, 5.6)) as (figure, axes):
         looks = _looks(titles)
         for axis, (words, by_method) in zip(axes, errors.items()):
             seen = [error for pairs in by_method.values() for _, error in pairs if error > 0.0]
@@ -95,8 +94,14 @@ def picture_errors(
                 axis.plot([cost for cost, _ in pairs], height, label=method, **looks[method])
             axis.set(xscale="log", yscale="log", title=words, xlabel=time_name)
             axis.set_ylabel("error [1]")
-        figure.legend(*_legend(axes[0], titles), loc="outside upper left", ncols=4)
-        figure.supxlabel(f"{caption}\n{machine_words()}", fontsize=7.5, x=0.01, ha="left")
+        figure.legend(*_legend(axes[0], titles), loc="outside upper left", ncols=2)
+        _write_below(figure, caption)
+
+
+def _write_below(figure, caption):
+    """A caption and the machine, in lines as wide as the figure."""
+    lines = (textwrap.fill(" ".join(part.split()), 140) for part in (caption, machine_words()))
+    figure.supxlabel("\n".join(lines), fontsize=_SMALL, x=0.01, ha="left")
 
 
 def _looks(titles):
@@ -174,7 +179,7 @@ class _Panel:
         self.axis.set(xlim=(left, right), ylim=(bottom, top))
 
     def _draw_failures(self):
-        """Crosses along the top edge, a row a method; their height is no error."""
+        """Crosses in the marks of their methods along the top edge; their height is no error."""
         axis, failed = self.axis, {m: own for m, own in self.failed.items() if own}
         bottom, top = axis.get_ylim()
         step = (top / bottom) ** 0.055
@@ -187,8 +192,11 @@ class _Panel:
         for k, (method, own) in enumerate(failed.items()):
             level, colour = top * step ** (k + 0.65), self.looks[method]["color"]
             place = [at for at, _ in own]
-            axis.plot(place, [level] * len(own), "x", color=colour, ms=6, mew=1.6)
-            words = ", ".join(f"{p.label} {p.failure}" for _, p in own)
+            axis.plot(place, [level] * len(own), "x", color=BLACK, ms=4, mew=1.2)
+            around = {**self.looks[method], "ms": 9, "ls": "none", "mfc": "none"}
+            axis.plot(place, [level] * len(own), **around)
+            # The small panel shows the crosses alone.
+            words = ", ".join(f"{p.label} {p.failure}" for _, p in own) if self.timed else ""
             # On the side where there is room for it.
             late = place[-1] ** 2 > left * right
             end, shift, side = (place[0], -7, "right") if late else (place[-1], 7, "left")
