@@ -34,6 +34,7 @@ LAYERS = {
         ("simulation",),
         ("output", "measured_speedup", "measured_overhead", "paired_cost", "observers", "run_plan"),
         ("plot",),
+        ("viewer",),
         ("result",),
         ("simulate", "needed_effects", "outcome"),
         ("workload", "step_study", "goals"),
