@@ -52,7 +52,7 @@ void main() {
   shade *= light;
   vec3 away = corner / fwidth(corner);
   float nearest = min(away.x, min(away.y, away.z));
-  shade = mix(shade, vec3(0.35), mesh * 0.45 * (1.0 - smoothstep(0.3, 1.1, nearest)));
+  shade = mix(shade, vec3(0.35), mesh * 0.35 * (1.0 - smoothstep(0.3, 1.1, nearest)));
   for (int k = 0; k < 3; k++) {
     // Lines are thin on small faces: they would hide them.
     float wide = min(line, 0.12 / fwidth(corner[k]));

@@ -29,7 +29,7 @@ def show_block(result: Any, path: Optional[FileName], open_browser: Optional[boo
     body, face, breaks, edges = visible_faces(model, result.broken_time)
     bodies, faces = np.unique(body, return_inverse=True)
     size = _BODY_BYTES * len(bodies)
-    finite = [bool(_is_finite(frame)) for frame in result.frames]
+    finite = list(map(_is_finite, result.frames))
     frames, notes = select_frames(result.frames, finite, _FRAME_BYTES * len(bodies), size)
     time = time_unit(frames[-1].time_s)
     data = {
@@ -82,9 +82,9 @@ def visible_faces(model: Model, broken_time: np.ndarray) -> Any:
     return body, face, breaks, edges.reshape(-1, 3)
 
 
-def _is_finite(frame: Frame) -> Any:
-    values = frame.displacement, frame.rotation, frame.velocity, frame.damage
-    return all(np.isfinite(value).all() for value in values)
+def _is_finite(frame: Frame) -> bool:
+    values = frame.displacement, frame.rotation, frame.speed, frame.damage
+    return all(bool(np.isfinite(value).all()) for value in values)
 
 
 def _in_unit(times, unit):

@@ -59,6 +59,8 @@ LAYERS = {
         ("activation",),
         ("batch", "needed_effects"),
         ("plot",),
+        ("viewer",),
+        ("film",),
         ("amplitude_response", "response", "shake", "shake_structure", "damper_map"),
         ("sweep", "force_check", "goals"),
         ("accuracy",),

@@ -117,12 +117,18 @@ function fitCanvas(canvas) {
 
 /** Curves over time below the slider: each has name, colour, times and values. */
 class Trace {
-  constructor(curves, label, unit) {
-    Object.assign(this, { curves, label, unit, canvas: byId("trace"), left: 48, right: 8 });
+  constructor(curves, label) {
+    Object.assign(this, { curves, canvas: byId("trace"), left: 48, right: 8 });
     const values = curves.flatMap((curve) => curve.values), times = curves.flatMap((c) => c.times);
     this.range = [Math.min(...values), Math.max(...values)];
     if (this.range[0] === this.range[1]) this.range[1] += 1;
     this.span = [Math.min(...times), Math.max(...times)];
+    const names = curves.filter((curve) => curve.name).map(({ name, colour }) => {
+      const swatch = make("i");
+      swatch.style.background = colour;
+      return make("span", { class: "key" }, swatch, name);
+    });
+    byId("trace-names").append(make("span", {}, label), ...names);
   }
 
   across(time) {
@@ -132,7 +138,7 @@ class Trace {
 
   upwards(value) {
     const [low, high] = this.range, height = this.canvas.clientHeight;
-    return height - 8 - ((height - 30) * (value - low)) / (high - low);
+    return height - 8 - ((height - 16) * (value - low)) / (high - low);
   }
 
   draw(frame) {
@@ -158,15 +164,6 @@ class Trace {
       pen.fillStyle = style("--soft");
       pen.textAlign = "right";
       pen.fillText(inFigures(tick), this.left - 6, y);
-    }
-    pen.textAlign = "left";
-    pen.fillText(this.label, 0, 8);
-    let x = end;
-    pen.textAlign = "right";
-    for (const { name, colour } of this.curves.filter((curve) => curve.name).reverse()) {
-      pen.fillStyle = colour;
-      pen.fillText(name, x, 8);
-      x -= pen.measureText(name).width + 14;
     }
   }
 
@@ -197,7 +194,7 @@ class Player {
     const steps = times.slice(1).map((time, k) => time - times[k]).filter((step) => step > 0);
     const least = Math.min(...steps, 1);
     this.decimals = Math.min(4, Math.max(0, Math.ceil(-Math.log10(least) - 0.01) + 1));
-    this.interval = Math.min(150, Math.max(33, 8000 / times.length));
+    this.interval = Math.min(120, Math.max(33, 6000 / times.length));
     this.scrub = byId("scrub");
     this.scrub.max = times.length - 1;
     this.listen();
