@@ -12,11 +12,12 @@ from tests.viewer.made import block, damper
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 WIDTHS = (390, 1280)
-#: Run before all else of a page: errors are kept.
+#: Run before all else of a page: errors are kept, and told even where nothing else is.
 EARLY = """<script>
 const faults = [];
 addEventListener("error", (event) => faults.push(event.message));
 console.error = (...words) => faults.push(words.join(" "));
+setTimeout(() => parent.postMessage([NUMBER, { faults }], "*"), 500);
 </script>"""
 #: Run after all else: looks at the picture, moves the slider, and tells the page around it.
 LATE = """<script>
@@ -86,8 +87,8 @@ def told(tmp_path_factory):
 
 def framed(text, width, number):
     """A page with its probes in a frame of a width."""
-    probed = text.replace("<head>", "<head>" + EARLY, 1)
-    probed = probed.replace("</body>", LATE.replace("NUMBER", str(number)) + "</body>", 1)
+    early, late = (probe.replace("NUMBER", str(number)) for probe in (EARLY, LATE))
+    probed = text.replace("<head>", "<head>" + early, 1).replace("</body>", late + "</body>", 1)
     return f'<iframe width="{width}" height="844" srcdoc="{html.escape(probed)}"></iframe>'
 
 
