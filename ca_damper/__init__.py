@@ -13,12 +13,12 @@ from ca_damper.combined import Combined
 from ca_damper.damper_map import DamperMap, damper_map
 from ca_damper.decay import logarithmic_decrement
 from ca_damper.errors import InputError, SimulationDiverged
+from ca_damper.film import film
 from ca_damper.fixed_mass import Empty, RigidMass
 from ca_damper.goals import Goal
 from ca_damper.impact_damper import ImpactDamper
 from ca_damper.needed_effects import needed_effects
 from ca_damper.oscillator import Oscillator
-from ca_damper.record import film
 from ca_damper.report import Report
 from ca_damper.response import Response, frequency_response
 from ca_damper.scenes.table import SceneTable

@@ -1,6 +1,7 @@
 """Pictures and words of ``demo_damper.py``: a container with particles beside an empty one."""
 
 from ca_damper.plot import Box, Hanging, film_hanging
+from ca_damper.viewer import show_containers
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.plot_style import BLACK, STYLES, picture, styles_of
 
@@ -35,6 +36,7 @@ def write(at, full, empty, filling, options, omega):
     smooth = Hanging("empty", bare, empty.frames, STYLES["empty"].colour)
     pair = [smooth, Hanging(title, box, full.frames, style.colour)]
     film_hanging(at("damper.gif"), pair, fastest)
+    show_containers(pair, at("view.html"), open_browser=False)
 
 
 def counted(particles):

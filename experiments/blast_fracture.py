@@ -22,9 +22,9 @@ accuracies cost. The cracks are those of its finest run; nothing else is run or 
 
 Dashpots are solved together unless another method is asked for; blast_methods.py compares them.
 
-Writes pictures, an animation, history.csv, bonds.csv (when each bond broke), the mesh used, CSV of
-all that is plotted, summary.json and a ParaView series (paraview/blast_fracture.pvd) to
-results/blast_fracture/.
+Writes pictures, an animation, view.html (a page in which the block turns and plays), history.csv,
+bonds.csv (when each bond broke), the mesh used, CSV of all that is plotted, summary.json and a
+ParaView series (paraview/blast_fracture.pvd) to results/blast_fracture/.
 """
 
 import sys
@@ -141,7 +141,7 @@ def run(options):
         raise
     picture(result, options.out)
     print(f"\n{result.report}\n")
-    study.finish(options, NAME, figures_of(result), [result.report], see="cracks.png")
+    study.finish(options, NAME, figures_of(result), [result.report], see="cracks.png and view.html")
 
 
 def run_to_accuracy(scene, options):
@@ -229,6 +229,7 @@ def picture(result, folder):
         plot.plot_levels(at("levels.png"), time_s, shares, dt0)
         write_csv(at("levels.csv"), {"time_s": time_s, **level_columns(shares)})
     plot.save_animation(at("blast.gif"), model, frames, broken_time, magnify=3.0)
+    result.show(at("view.html"), open_browser=False)
 
 
 if __name__ == "__main__":

@@ -12,7 +12,8 @@ swings most) and amplitudes of the shaking base.
 With --effects auto, which is the default, the program computes the effects that the scene calls
 for (the spheres turn where friction makes them); "listed" takes the filling as it is.
 
-Writes damper.gif, motion.png, motion.csv, caption.txt and summary.json to results/demo_damper/.
+Writes damper.gif, view.html (the same to play), motion.png, motion.csv, caption.txt and
+summary.json to results/demo_damper/.
 """
 
 import sys
@@ -87,7 +88,7 @@ def run(options):
     report.write(at("report.json"))
     write_text(at("caption.txt"), " ".join(words) + "\n")
     print(*words, f"\n{report}", sep="\n")
-    study.finish(options, NAME, figures, batches.values(), show=False)
+    study.finish(options, NAME, figures, batches.values(), see="view.html", show=False)
     add_to_summary(options.out, certificate=report.certificate.as_dict())
 
 

@@ -104,6 +104,16 @@ def styles_of(names: Iterable[str]) -> dict[str, MethodStyle]:
     return {name: style or made[name] for name, style in found.items()}
 
 
+def colour_table(name: str, low: float = 0.0, high: float = 1.0) -> np.ndarray:
+    """256 colours of a part of a map of matplotlib, (256, 3) uint8; low, high: shares of it."""
+    return table_of(matplotlib.colormaps[name](np.linspace(low, high, 256)))
+
+
+def table_of(colours: np.ndarray) -> np.ndarray:
+    """Colours (n, 3 or 4) in [0, 1] as 256 of equal parts, (256, 3) uint8."""
+    return np.rint(255.0 * colours[np.arange(256) * len(colours) // 256, :3]).astype(np.uint8)
+
+
 def line_key(label: str, **look: Any) -> Line2D:
     """A line or marker for a legend alone; look: as of ``Axes.plot``."""
     return Line2D([], [], label=label, **look)

@@ -15,7 +15,7 @@ from taichi_dem.plot.view import View, surface
 
 _NEVER = "#E4E0D6"
 #: Titles by name, as ``Simulation.acting_since`` names them.
-_TITLES = {
+TITLES = {
     "softening": "softening of a bond",
     "slip": "slip of a bond",
     "contact": "contact",
@@ -36,7 +36,7 @@ def plot_acting(
     acting_since: times [s] by name, (body_count,), NaN where an effect never acts
     (``Result.acting_since``). until: end of the run [s]. axis: towards the viewer.
     """
-    view, names = View(axis), [name for name in _TITLES if name in acting_since]
+    view, names = View(axis), [name for name in TITLES if name in acting_since]
     rest = model.mesh.points[model.mesh.tetrahedra]
     polygons, body, _ = surface(model.topology, view, rest, np.zeros(model.bond_count, dtype=bool))
     extent = np.ptp(view.project(model.mesh.points), axis=0)
@@ -55,7 +55,7 @@ def plot_acting(
             times = acting_since[name]
             drawn = _coloured(axes, polygons, 1e3 * times[body], shades, 1e3 * until)
             count = int(np.isfinite(times).sum())
-            axes.set_title(f"{_TITLES[name]}\n{count:,} of {len(times):,} bodies", fontsize=9.5)
+            axes.set_title(f"{TITLES[name]}\n{count:,} of {len(times):,} bodies", fontsize=9.5)
             frame_block(axes, view, model, 0.03)
         for axes in panels[-1]:
             axes.set_xlabel(view.labels()[0])

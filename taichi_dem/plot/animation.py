@@ -68,12 +68,17 @@ def _drawn(figure, model, frames, broken_time, magnify, view):
 
 def _empty_collection(frames):
     """A collection coloured by half decades of speed up to the fastest body of all frames."""
-    fastest = max(max(float(frame.speed.max()) for frame in frames), 1e-12)
-    top = math.ceil(2.0 * math.log10(fastest))
-    edges = np.array([_nice(k) for k in range(top - _STEPS, top + 1)])
+    edges = speed_edges(frames)
     shades = matplotlib.colormaps["magma_r"](np.linspace(0.04, 0.9, len(edges)))
     norm = BoundaryNorm(edges, len(edges), extend="min")
     return PolyCollection([], cmap=ListedColormap(shades), norm=norm, linewidth=0)
+
+
+def speed_edges(frames: Sequence[Frame]) -> np.ndarray:
+    """Half decades of speed [m/s] up to the fastest body of all frames, ascending."""
+    fastest = max(max(float(frame.speed.max()) for frame in frames), 1e-12)
+    top = math.ceil(2.0 * math.log10(fastest))
+    return np.array([_nice(k) for k in range(top - _STEPS, top + 1)])
 
 
 def _nice(half_decades):

@@ -151,6 +151,7 @@ def test_film_records_samples_and_frames_at_whole_steps():
     shot = film(batch, 1667, sample_every=100, frame_every=208)
     dt = 1.0 / (6.0 * 1667)
     assert shot.history["x"].shape == (17, 2)
+    assert shot.filling is batch.filling and shot.mount == "spring"
     assert shot.history["time_s"][:, 0] == pytest.approx(100 * dt * np.arange(17))
     assert len(shot.frames) == 2
     assert [frame.time_s for frame in shot.frames[1]] == pytest.approx(208 * dt * np.arange(9))

@@ -118,7 +118,14 @@ FILES = {
         "hard_cases_blast.png",
         "full_box.png",
     ),
-    "demo_damper": ("damper.gif", "motion.png", "motion.csv", "report.json", "caption.txt"),
+    "demo_damper": (
+        "damper.gif",
+        "view.html",
+        "motion.png",
+        "motion.csv",
+        "report.json",
+        "caption.txt",
+    ),
 }
 
 quick = quick_runs([name for name in NAMES if "damper" in name or name == "hard_cases"])

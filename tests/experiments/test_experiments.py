@@ -112,7 +112,7 @@ FILES = {
     "blast_fracture": (
         *("history.csv", "mesh.msh", "report.json", "bonds.csv", "bodies.csv", "pressure.csv"),
         *("pressure.png", "cracks.png", "energy.png", "history.png", "acting.png"),
-        *("blast.gif", "paraview/{folder}.pvd", "paraview/{folder}_0000.vtu"),
+        *("blast.gif", "view.html", "paraview/{folder}.pvd", "paraview/{folder}_0000.vtu"),
     ),
     "blast_methods": ("methods.csv", "methods.png", "history_reference.csv"),
     "blast_multirate": (

@@ -1,0 +1,162 @@
+"""Films of a run: time series and frames of every scene, and a page that plays them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Optional, Union
+
+import numpy as np
+
+from ca_damper.progress import Stages
+from ca_damper.record import Frame, frames_of
+from taichi_dem.kit.display import counted, in_brief
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.progress.progress import Listener
+from taichi_dem.kit.progress.progress_bar import reporting
+from taichi_dem.kit.validation import AUTO, FileName, several, shown, whole
+from taichi_dem.kit.viewer import WebPage
+
+_MOST_STEPS = 2**31 - 1
+_MOST_MARKS = 1_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Film:
+    """A recorded run.
+
+    Parameters
+    ----------
+    history : dict
+        Arrays (samples, scenes) by name, see ``Batch.sample``.
+    frames : tuple of tuple of Frame
+        Frames of each scene.
+    filling : Filling, optional
+        Filling of the batch.
+    mount : str, default "spring"
+        Mount of the batch.
+    """
+
+    history: dict[str, np.ndarray]
+    frames: tuple[tuple[Frame, ...], ...]
+    filling: Any = None
+    mount: str = "spring"
+
+    def __repr__(self):
+        samples, scenes = np.shape(self.history.get("time_s", np.zeros((0, 0))))
+        most = max((len(frames) for frames in self.frames), default=0)
+        of_each = f"{counted(most, 'frame')} of each" if most else "no frames"
+        return in_brief(self, counted(samples, "sample"), counted(scenes, "scene"), of_each)
+
+    def show(
+        self,
+        path: Optional[FileName] = None,
+        *,
+        scenes: Optional[Sequence[int]] = None,
+        open_browser: Optional[bool] = None,
+    ) -> WebPage:
+        """Write one HTML page that plays containers and grains side by side, without a network.
+
+        Parameters
+        ----------
+        path : file name, optional
+            Of the page; by default ``view.html`` in a new folder for temporary files.
+        scenes : sequence of int, optional
+            Numbers of the scenes shown, at most six; by default the first six.
+        open_browser : bool, optional
+            By default it opens where a person sits at a terminal of a desktop: not in a pipe, a
+            test, a notebook or on a build server.
+
+        Returns
+        -------
+        WebPage
+            Path of the page. As the last line of a notebook's cell it shows the page there.
+
+        Raises
+        ------
+        InputError
+            Without frames, for a scene that is not there, and when the file cannot be written.
+
+        Examples
+        --------
+        >>> film(batch, 2000, frame_every=20).show("damper.html")  # doctest: +SKIP
+        """
+        # Imported here, so that matplotlib loads only where something is shown.
+        from ca_damper.viewer import MOST_SCENES, show_film
+
+        if not self.frames:
+            raise InputError("frames must be recorded to show a film: film(..., frame_every=20)")
+        count = len(self.frames)
+        given = range(min(MOST_SCENES, count)) if scenes is None else scenes
+        chosen = several("scenes", given, lambda name, x: whole(name, x, 0, count - 1))
+        if len(chosen) > MOST_SCENES:
+            raise InputError(f"scenes must be at most {MOST_SCENES}, got {len(chosen)}")
+        return show_film(self, chosen, path, open_browser)
+
+
+def film(
+    batch: Any,
+    steps: int,
+    *,
+    sample_every: int = 1,
+    frame_every: Optional[int] = None,
+    progress: Union[Listener, str, None] = AUTO,
+) -> Film:
+    """Run a batch of few scenes on by a number of steps and record it.
+
+    Parameters
+    ----------
+    batch : Batch
+        Batch that has been started.
+    steps : int
+        Number of steps.
+    sample_every : int, default 1
+        Steps between samples; the present state is the first sample.
+    frame_every : int, optional
+        Steps between frames; None for no frames.
+    progress : callable or str or None, default "auto"
+        As in ``frequency_response``.
+
+    Returns
+    -------
+    Film
+        Samples of all scenes, and frames with the positions of the particles.
+
+    Raises
+    ------
+    InputError
+        The batch was not started, or a number is out of range.
+    SimulationDiverged
+        A scene left the range in which its numbers mean anything.
+
+    Examples
+    --------
+    >>> shot = film(batch, steps=2000, frame_every=100)  # doctest: +SKIP
+    """
+    if not hasattr(batch, "sample") or isinstance(batch, type):
+        raise InputError(f"batch must be a Batch that has been started, got {shown(batch)}")
+    steps = whole("steps", steps, 1, _MOST_STEPS)
+    samples = _marks("sample_every", sample_every, steps)
+    frames = _marks("frame_every", frame_every, steps) if frame_every is not None else set()
+    marks = sorted(samples | frames | {steps})
+    rows, shots = [], []
+    with reporting(progress, "film") as report_progress:
+        tell = Stages(report_progress, [mark / steps for mark in marks[1:]])
+        for before, mark in zip([0, *marks], marks):
+            if mark > before:
+                batch.advance(mark - before, tell)
+            present = batch.sample()
+            if mark in samples:
+                rows.append(present)
+            if mark in frames:
+                shots.append(frames_of(batch, present))
+    history = {name: np.stack([row[name] for row in rows]) for name in rows[0]}
+    return Film(history, tuple(zip(*shots)), batch.filling, batch.mount)
+
+
+def _marks(name, every, steps):
+    """Steps at which to record, from 0 on; InputError where they are too many to be kept."""
+    if whole(name, every, 1, _MOST_STEPS) * _MOST_MARKS < steps:
+        raise InputError(
+            f"{name} must be at least {-(-steps // _MOST_MARKS)} in a film of {steps} steps, "
+            f"got {every}"
+        )
+    return set(range(0, steps + 1, every))

@@ -1,0 +1,159 @@
+"""Data of a page that shows a block in three dimensions, made from the frames of a run."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Optional
+
+import numpy as np
+
+from taichi_dem.engine.model import Model
+from taichi_dem.kit.display import counted
+from taichi_dem.kit.validation import FileName
+from taichi_dem.kit.viewer import WebPage, pack, quantise, select_frames, show_page, time_unit
+from taichi_dem.mesh.tetrahedra import LOCAL_FACES
+from taichi_dem.output.record import Frame
+from taichi_dem.plot.view import edge_keys, first_breaks, skin
+from taichi_dem.viewer.modes import colour_modes
+
+_HERE = Path(__file__).resolve().parent
+_SCRIPTS = (_HERE / "block.js", _HERE / "controls.js")
+#: Bytes of a body in a frame: displacement, turn, speed, damage, level; and at all times, at most.
+_FRAME_BYTES, _BODY_BYTES = 17, 300
+#: Time of a face that never breaks, and of one that was always free.
+_NEVER, _ALWAYS = 3e38, -1.0
+
+
+def show_block(result: Any, path: Optional[FileName], open_browser: Optional[bool]) -> WebPage:
+    """Write the page of a ``Result``; arguments and errors as of ``Result.show``."""
+    model, report = result.model, result.report
+    body, face, breaks, edges = visible_faces(model, result.broken_time)
+    bodies, faces = np.unique(body, return_inverse=True)
+    size = _BODY_BYTES * len(bodies)
+    finite = list(map(_is_finite, result.frames))
+    frames, notes = select_frames(result.frames, finite, _FRAME_BYTES * len(bodies), size)
+    time = time_unit(frames[-1].time_s)
+    data = {
+        **_motion(model, frames, bodies, time),
+        **_shape(model, bodies),
+        "faceBody": pack(faces, "uint32"),
+        "faceLocal": pack(face, "uint8"),
+        "faceBreaks": pack(_in_unit(breaks, time), "float32"),
+        "edgeBreaks": pack(_in_unit(edges, time), "float32"),
+        "magnify": _magnification(model, frames[-1]),
+        "modes": colour_modes(frames, bodies, result.method.dt0, result.acting_since, time),
+        **_broken_curve(result.broken_time, frames, time),
+    }
+    title = f"Block of {counted(model.body_count, 'body')}"
+    words = [report.outcome, f"{counted(len(frames), 'frame')}", result.diverged]
+    content = {"title": title, "subtitle": "; ".join(filter(None, words)), "notes": notes}
+    return show_page(path, open_browser, _SCRIPTS, data=data, **content)
+
+
+def visible_faces(model: Model, broken_time: np.ndarray) -> Any:
+    """Faces that show at some time.
+
+    Parameters
+    ----------
+    model : Model
+        Of the run.
+    broken_time : ndarray
+        When each bond was released [s], (bond_count,); NaN while it holds.
+
+    Returns
+    -------
+    body, face : ndarray
+        Body and local face of each, (n,).
+    breaks : ndarray
+        Time [s] from which it shows, (n,); -inf for outer faces.
+    edges : ndarray
+        Time [s] at which a crack first reaches the edge opposite each corner, (n, 3); NaN for
+        never.
+    """
+    broken, mesh = ~np.isnan(broken_time), model.mesh
+    body, face, _ = skin(model.topology, broken)
+    outer = np.full(model.topology.outer_count, -np.inf)
+    breaks = np.concatenate([outer, broken_time[broken], broken_time[broken]])
+    corners = mesh.tetrahedra[body[:, None], LOCAL_FACES[face]]
+    pairs = corners[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
+    keys, first = first_breaks(mesh, model.topology, broken_time)
+    wanted = edge_keys(pairs, mesh.point_count)
+    edges, hit = np.full(len(wanted), np.nan), np.isin(wanted, keys)
+    edges[hit] = first[np.searchsorted(keys, wanted[hit])]
+    return body, face, breaks, edges.reshape(-1, 3)
+
+
+def _is_finite(frame: Frame) -> bool:
+    values = frame.displacement, frame.rotation, frame.speed, frame.damage
+    return all(bool(np.isfinite(value).all()) for value in values)
+
+
+def _in_unit(times, unit):
+    """Times [s] in the unit of the page, as finite numbers."""
+    known = np.where(np.isfinite(times), unit[1] * times, _NEVER)
+    return np.where(np.isneginf(times), _ALWAYS, known)
+
+
+def _motion(model: Model, frames: Sequence[Frame], bodies: np.ndarray, time: Any) -> Any:
+    """Where the bodies are in each frame, and when it was."""
+    return {
+        "unit": time[0],
+        "times": [time[1] * frame.time_s for frame in frames],
+        "centres": pack(model.centre[bodies], "float32"),
+        "displacement": quantise([frame.displacement[bodies] for frame in frames]),
+        "turns": quantise([rotation_vectors(frame.rotation[bodies]) for frame in frames]),
+    }
+
+
+def _shape(model: Model, bodies: np.ndarray) -> Any:
+    """Corners of the bodies and extent of the block at rest."""
+    corners = model.mesh.tetrahedra[bodies]
+    used, places = np.unique(corners, return_inverse=True)
+    points = model.mesh.points[used]
+    low, high = points.min(axis=0), points.max(axis=0)
+    half = 0.5 * np.maximum(high - low, 1e-3 * (high - low).max())
+    arms = model.mesh.points[corners] - model.centre[bodies, None]
+    return {
+        "points": pack(points, "float32"),
+        "tetrahedra": pack(places, "uint32"),
+        "middle": (0.5 * (low + high)).tolist(),
+        "half": half.tolist(),
+        "radius": float(np.linalg.norm(half)),
+        "arm": float(np.linalg.norm(arms, axis=2).max()),
+    }
+
+
+def rotation_vectors(rotation: np.ndarray) -> np.ndarray:
+    """Axis times angle [rad] of rotation matrices (n, 3, 3), (n, 3), angles up to pi.
+
+    Source: Shepperd (1978), the quaternion from its largest component, which holds at all angles.
+    """
+    diagonal = np.einsum("nii->ni", rotation)
+    trace = diagonal.sum(axis=1, keepdims=True)
+    squares = 1.0 + np.concatenate([trace, 2.0 * diagonal - trace], axis=1)
+    pairs = rotation + rotation.transpose(0, 2, 1)
+    skew = (rotation - rotation.transpose(0, 2, 1))[:, [2, 0, 1], [1, 2, 0]]
+    products = np.zeros((len(rotation), 4, 4))
+    products[:, 0, 1:] = products[:, 1:, 0] = skew
+    products[:, 1:, 1:] = pairs
+    products[:, np.arange(4), np.arange(4)] = squares
+    best = squares.argmax(axis=1)
+    quaternion = products[np.arange(len(rotation)), best]
+    quaternion *= np.where(quaternion[:, :1] < 0.0, -1.0, 1.0)
+    sine = np.linalg.norm(quaternion[:, 1:], axis=1, keepdims=True)
+    angle = 2.0 * np.arctan2(sine, quaternion[:, :1])
+    return quaternion[:, 1:] * (angle / np.where(sine > 0.0, sine, 1.0))
+
+
+def _magnification(model: Model, frame: Frame) -> float:
+    """Magnification at which the displacement of the last frame is seen: 3 % of the block."""
+    size = np.ptp(model.mesh.points, axis=0).max()
+    moved = np.percentile(np.linalg.norm(frame.displacement, axis=1), 90)
+    return float(np.clip(0.03 * size / max(moved, 1e-30), 1.0, 1e4))
+
+
+def _broken_curve(broken_time: np.ndarray, frames: Sequence[Frame], time: Any) -> Any:
+    """Number of broken faces over time."""
+    counts = [int((broken_time <= frame.time_s).sum()) for frame in frames]
+    times = [time[1] * frame.time_s for frame in frames]
+    curve = {"name": "", "colour": "", "times": times, "values": counts}
+    return {"curves": [curve], "curveLabel": "broken faces"}
