@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ca_damper import Oscillator, Response
-from ca_damper.response import UNITS
+from ca_damper.measures import MEASURE_UNITS
 from tests.notebook import shown
 
 RATIOS = np.linspace(0.9, 1.1, 41)
@@ -20,7 +20,7 @@ def response(particles=(0, 10), ratios=RATIOS, seeds=(1, 2), rms=None, **others)
         gain = [np.abs(oscillator.transfer(frequency, 0.2e-3 * n)) for n in particles]
         rms = np.array(gain)[:, :, None] * oscillator.base_amplitude / np.sqrt(2.0)
         rms = rms * (1.0 + 0.01 * np.arange(len(seeds)))
-    measures = {**dict.fromkeys(UNITS, np.zeros_like(rms)), "rms": rms}
+    measures = {**dict.fromkeys(MEASURE_UNITS, np.zeros_like(rms)), "rms": rms}
     steps, dt = np.full(len(ratios), 100), np.full(len(ratios), 1e-4)
     given = Response("rigid", oscillator, particles, ratios, seeds, steps, dt, **measures)
     return dataclasses.replace(given, **others)
