@@ -64,9 +64,11 @@ def _explain_curves(axis, response):
     if len(response.ratios) == 1:
         for line in axis.lines:
             line.set_marker("o")
-    axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    handles, _ = axis.get_legend_handles_labels()
     if len(response.seeds) > 1:
-        axis.set_title(f"median of {len(response.seeds)} seeds, shaded: lowest to highest")
+        axis.set_title(f"median of {len(response.seeds)} seeds")
+        handles.append(_band_key())
+    axis.legend(handles=handles, loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
 def picture_measure(path: Optional[FileName], response: Any, name: str) -> Figure:
@@ -135,8 +137,12 @@ def _band(axis, x, values, colour, label):
 def _legend_of_bands(figure, axis):
     """Legend above all panels, made from one of them: what bands are is its last entry."""
     handles, _ = axis.get_legend_handles_labels()
-    handles.append(area_key("lowest to highest seed", fc=GREY, alpha=0.3))
+    handles.append(_band_key())
     figure.legend(handles=handles, loc="outside upper center", ncols=min(5, len(handles)))
+
+
+def _band_key():
+    return area_key("lowest to highest seed", fc=GREY, alpha=0.3)
 
 
 def _shade(response, k):
