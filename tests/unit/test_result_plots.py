@@ -83,6 +83,7 @@ def test_attenuation_is_fitted_to_what_there_is():
     assert law == pytest.approx((-1.5, 30.0), rel=1e-9)
     assert np.isnan(fall.attenuation().power_law(4.0)).all()
     figure = fall.plot.attenuation()
+    figure.canvas.draw()
     words = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
     assert "power -1.50 (fitted to all bodies)" in words
     assert defects(figure) == []
