@@ -2,12 +2,13 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.display import in_brief, listed
-from taichi_dem.kit.files import write_csv
+from taichi_dem.kit.optional import optional
 from taichi_dem.kit.validation import FileName
 
 if TYPE_CHECKING:
@@ -85,7 +86,22 @@ class AmplitudeResponse:
         InputError
             The file cannot be written.
         """
+        self.table().write_csv(path)
+
+    def table(self) -> Table:
+        """A row a scene, as of ``Response.table``, with its amplitude in front."""
         columns = [one.columns() for one in self.responses]
         sizes = [len(one["filling"]) for one in columns]
         joined = {name: np.concatenate([one[name] for one in columns]) for name in columns[0]}
-        write_csv(path, {"base_amplitude_m": np.repeat(self.amplitudes, sizes), **joined})
+        amplitude = np.repeat(self.amplitudes, sizes)
+        return Table({"base_amplitude_m": amplitude, **joined}, {"filling": "1"})
+
+    def to_pandas(self) -> Any:
+        """The table as a pandas DataFrame; InputError where pandas is not installed."""
+        return self.table().to_pandas()
+
+    def to_xarray(self) -> Any:
+        """As ``Response.to_xarray``, over base_amplitude [m] too."""
+        xarray = optional("xarray", "tables")
+        axis = xarray.Variable("base_amplitude", list(self.amplitudes), {"units": "m"})
+        return xarray.concat([one.to_xarray() for one in self.responses], axis)

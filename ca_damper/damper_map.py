@@ -15,9 +15,9 @@ from ca_damper.progress import Stages
 from ca_damper.report import Report
 from ca_damper.scenes.clock import automatic_dt
 from ca_damper.scenes.table import SceneTable
+from taichi_dem.kit.data_table import Table, dataset
 from taichi_dem.kit.display import in_brief, listed
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.progress.progress_bar import reporting
 from taichi_dem.kit.validation import (
@@ -31,6 +31,7 @@ from taichi_dem.kit.validation import (
 )
 
 _AXES = ("clearances", "particles", "amplitudes", "frequencies", "seeds")
+_UNITS = ("m", "1", "m", "Hz", "1")
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,6 +143,38 @@ class DamperMap:
         InputError
             The file cannot be written.
         """
+        self.table().write_csv(path)
+
+    def to_pandas(self) -> Any:
+        """The table as a pandas DataFrame; InputError where pandas is not installed."""
+        return self.table().to_pandas()
+
+    def to_xarray(self) -> Any:
+        """An xarray Dataset over clearance, particles, amplitude, frequency and seed.
+
+        Returns
+        -------
+        xarray.Dataset
+            ``apparent_damping``, ``apparent_mass``, ``loss``, ``mass_share``, ``energy``, and
+            ``gap``, the clearance of each box; units in attributes.
+
+        Raises
+        ------
+        InputError
+            Where xarray is not installed.
+        """
+        dims = "clearance", "particles", "amplitude", "frequency", "seed"
+        units = {"apparent_damping": "N s/m", "apparent_mass": "kg", "loss": "1"}
+        units.update(mass_share="1", energy="1")
+        found: dict[str, Any] = {n: (dims, getattr(self, n), u) for n, u in units.items()}
+        found["gap"] = dims[:2], self.gaps, "m"
+        axes = {one: (getattr(self, name), unit) for one, name, unit in zip(dims, _AXES, _UNITS)}
+        if self.clearances == (None,):
+            del axes["clearance"]
+        return dataset(found, axes, filling=self.label)
+
+    def table(self) -> Table:
+        """A row a scene: its place on the axes, measures, and the theory's loss and mass."""
         indices = np.indices(self.loss.shape).reshape(len(_AXES), -1)
         clearance, number, amplitude = indices[:3]
         columns: dict[str, Any] = {"filling": [self.label] * len(clearance)}
@@ -155,7 +188,8 @@ class DamperMap:
         made = self.theory
         for name in ("loss", "mass"):
             columns[f"{name}_theory"] = getattr(made, name)[clearance, number, amplitude]
-        write_csv(path, columns)
+        pure = "filling", "loss", "mass_share", "energy", "loss_theory", "mass_theory"
+        return Table(columns, dict.fromkeys(pure, "1"))
 
 
 def damper_map(

@@ -10,13 +10,16 @@ complex power F conj(V) / 2 holds both. A mass fixed to the container has c = 0 
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from taichi_dem.kit.data_table import dataset
 from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.elementary import sine_and_cosine
 from taichi_dem.kit.types import FloatOrArray
+from taichi_dem.kit.units import unit_of
 
 #: Summed over the steps of a cycle; _cos and _sin: times cos(w t) and sin(w t).
 SUMS = ("x", "x_squared", "x_cos", "x_sin", "v_cos", "v_sin", "f", "f_cos", "f_sin")
@@ -24,8 +27,32 @@ SUMS = ("x", "x_squared", "x_cos", "x_sin", "v_cos", "v_sin", "f", "f_cos", "f_s
 COLUMNS = (*SUMS, "x_max", "x_min", "energy")
 #: Columns of ``Batch.sample`` beside the time.
 SAMPLE = ("x", "v", "a", "y", "force", "energy", "momentum")
+#: Measures of a response and the unit that a CSV file says behind their names.
+MEASURE_UNITS = {
+    "rms": "m",
+    "amplitude": "m",
+    "mean": "m",
+    "mean_force": "N",
+    "apparent_mass": "kg",
+    "apparent_damping": "N_s_m",
+    "loss_factor": "",
+    "damping_ratio": "",
+    "energy": "J",
+    "rms_about_all": "m",
+}
+#: Units of what is sampled over time.
+SAMPLE_UNITS = {
+    **{"time_s": "s", "x": "m", "base": "m", "y": "m", "rms": "m", "peak": "m", "v": "m/s"},
+    **{"a": "m/s^2", "force": "N", "energy": "J", "momentum": "kg m/s"},
+}
 
 _NOT_A_NUMBER = complex(np.nan, np.nan)
+
+
+def column_of(measure: str) -> str:
+    """Name of a measure in tables and files, with its unit: "rms" -> "rms_m"."""
+    unit = MEASURE_UNITS[measure]
+    return f"{measure}_{unit}" if unit else measure
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +77,22 @@ class Cycles:
 
     def __repr__(self):
         return by_fields(self)
+
+    def to_xarray(self) -> Any:
+        """Measures that need no structure as an xarray Dataset over scene and cycle.
+
+        Raises
+        ------
+        InputError
+            Where xarray is not installed.
+        """
+        names = [n for n in MEASURE_UNITS if n not in ("loss_factor", "damping_ratio")]
+        found: dict[str, Any] = {
+            name: (("scene",), getattr(self, name), unit_of(column_of(name))) for name in names
+        }
+        found["rms_by_cycle"] = ("scene", "cycle"), self.rms_by_cycle, "m"
+        found["frequency"] = ("scene",), self.frequency, "Hz"
+        return dataset(found, {})
 
     def mean_of(self, name: str) -> np.ndarray:
         """Mean of a column over cycles.
@@ -266,6 +309,21 @@ class Cycles:
         """
         critical = 2.0 * np.sqrt(stiffness * (mass + self.apparent_mass))
         return (damping + self.apparent_damping) / critical
+
+
+def history_dataset(
+    history: Any, places: tuple[str, ...], others: dict[str, tuple[str, ...]], axes: dict[str, Any]
+) -> Any:
+    """An xarray Dataset of a history: base, x, v and force over time, rms and peak of the run.
+
+    places: dimensions of x, v, rms and peak beside time. others: those of the rest, by name. axes:
+    of ``data_table.dataset``, but for time.
+    """
+    over_time = {"base": (), "x": places, "v": places, **others}
+    dims = {name: ("time", *own) for name, own in over_time.items()}
+    dims.update(rms=places, peak=places)
+    found = {name: (own, getattr(history, name), SAMPLE_UNITS[name]) for name, own in dims.items()}
+    return dataset(found, {"time": (history.time_s, "s"), **axes}, filling=history.label)
 
 
 def first_harmonic(phase: ArrayLike, values: ArrayLike) -> tuple[float, float]:

@@ -6,6 +6,8 @@ from typing import Any, Optional
 import numpy as np
 
 from taichi_dem.kit.display import by_fields
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import shown
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,3 +55,13 @@ def frames_of(batch: Any, present: Optional[dict[str, np.ndarray]] = None) -> tu
         Frame(time_s[s], x[s], y[s], shot["position"], shot["velocity"], shot.get("diameter"))
         for s, shot in enumerate(shots)
     )
+
+
+def inner_size(filling: Any) -> tuple[float, float, float]:
+    """Width and height of the box of an Automaton or Spheres, and diameter of a particle [m]."""
+    if hasattr(filling, "columns"):
+        cell = filling.width
+        return filling.columns * cell, filling.rows * cell, cell
+    if not hasattr(filling, "diameter"):
+        raise InputError(f"filling must be an Automaton or Spheres for this, got {shown(filling)}")
+    return filling.width, filling.height, filling.diameter

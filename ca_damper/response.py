@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Optional, Union
+from typing import TYPE_CHECKING, Any, Optional, Union
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from ca_damper.amplitude_response import AmplitudeResponse
 from ca_damper.batch import Batch
 from ca_damper.checks import MOST_SCENES, MOST_SEED, check_run
 from ca_damper.filling import Filling, check_filling
-from ca_damper.measures import Cycles, peak
+from ca_damper.measures import MEASURE_UNITS, Cycles, column_of, peak
 from ca_damper.oscillator import Oscillator
 from ca_damper.report import Report
 from ca_damper.scenes.clock import automatic_dt, steps_per_cycle
@@ -19,26 +19,18 @@ from ca_damper.scenes.table import SceneTable
 from ca_damper.steady_state import mean_and_error
 from taichi_dem.kit.accuracy.student import t_quantile
 from taichi_dem.kit.checkpoint import Checkpoint
+from taichi_dem.kit.data_table import Table, dataset
 from taichi_dem.kit.display import counted, embedded, in_brief, listed, table, titled, unfolded
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.progress.progress_bar import reporting
+from taichi_dem.kit.units import unit_of
 from taichi_dem.kit.validation import AUTO, FileName, instance, positive, several, whole
 
-#: Measures of a response and the unit that a CSV file says behind their names.
-UNITS = {
-    "rms": "m",
-    "amplitude": "m",
-    "mean": "m",
-    "mean_force": "N",
-    "apparent_mass": "kg",
-    "apparent_damping": "N_s_m",
-    "loss_factor": "",
-    "damping_ratio": "",
-    "energy": "J",
-    "rms_about_all": "m",
-}
+if TYPE_CHECKING:
+    from ca_damper.plot.response_plots import ResponsePlots
+
 #: Particle numbers that a notebook shows, evenly over those there are.
 _MOST_SHOWN = 8
 #: In tables, of a peak at an end of the ratios, where its height cannot be known.
@@ -191,6 +183,55 @@ class Response:
         """
         write_csv(path, self.columns())
 
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of every measure, by name."""
+        return {name: unit_of(column_of(name)) for name in MEASURE_UNITS}
+
+    def table(self) -> Table:
+        """A row a scene: filling, particles, ratio, frequency, seed and all measures."""
+        return Table(self.columns(), {"filling": "1"})
+
+    def to_pandas(self) -> Any:
+        """The table as a pandas DataFrame, units in its ``attrs``.
+
+        Raises
+        ------
+        InputError
+            Where pandas is not installed.
+        """
+        return self.table().to_pandas()
+
+    def to_xarray(self) -> Any:
+        """All measures as an xarray Dataset over particles, frequency and seed.
+
+        Returns
+        -------
+        xarray.Dataset
+            Units in the attributes of each variable; ``ratio`` is a second coordinate along
+            frequency, the filling an attribute.
+
+        Raises
+        ------
+        InputError
+            Where xarray is not installed.
+        """
+        dims = "particles", "frequency", "seed"
+        found = {name: (dims, getattr(self, name), unit) for name, unit in self.units.items()}
+        frequency = self.ratios * self.oscillator.natural_frequency
+        axes: dict[str, Any] = {"particles": (self.particles, "1"), "frequency": (frequency, "Hz")}
+        axes["seed"] = self.seeds, "1"
+        made = dataset(found, axes, filling=self.label)
+        return made.assign_coords(ratio=("frequency", self.ratios, {"units": "1"}))
+
+    @property
+    def plot(self) -> "ResponsePlots":
+        """Pictures of the response, one function each: ``response.plot.curves("loss_factor")``."""
+        # Imported here, so that matplotlib loads only where a picture is drawn.
+        from ca_damper.plot.response_plots import ResponsePlots
+
+        return ResponsePlots(self)
+
     def columns(self) -> dict[str, Any]:
         """Columns of equal length with a row a scene, as they are written.
 
@@ -202,8 +243,8 @@ class Response:
         grids = np.meshgrid(self.particles, self.ratios, self.seeds, indexing="ij")
         columns = dict(zip(("particles", "ratio", "seed"), (grid.ravel() for grid in grids)))
         columns["frequency_Hz"] = columns["ratio"] * self.oscillator.natural_frequency
-        for name, unit in UNITS.items():
-            columns[f"{name}_{unit}" if unit else name] = getattr(self, name).ravel()
+        for name in MEASURE_UNITS:
+            columns[column_of(name)] = getattr(self, name).ravel()
         return {"filling": [self.label] * grids[0].size, **columns}
 
 
@@ -415,5 +456,5 @@ def measures_of(oscillator: Oscillator, cycles: Cycles) -> dict[str, np.ndarray]
         "loss_factor": cycles.loss_factor(o.mass),
         "damping_ratio": cycles.damping_ratio(o.mass, o.stiffness, o.damping),
     }
-    plain = {name: getattr(cycles, name) for name in UNITS if name not in of_structure}
+    plain = {name: getattr(cycles, name) for name in MEASURE_UNITS if name not in of_structure}
     return {**plain, **of_structure}

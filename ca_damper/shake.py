@@ -12,14 +12,15 @@ from ca_damper.checks import MOST_SCENES, STARTS, check_run
 from ca_damper.excitation.excitation import Excitation
 from ca_damper.excitation.signal import Signal
 from ca_damper.filling import Filling, check_filling
+from ca_damper.measures import history_dataset
 from ca_damper.oscillator import Oscillator
 from ca_damper.report import Report
 from ca_damper.scenes.table import SceneTable
 from ca_damper.window import one_for_all, run_duration, run_seeds, window
 from taichi_dem.kit.checkpoint import Checkpoint
+from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.display import counted, in_brief, listed
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.progress.progress_bar import reporting
 from taichi_dem.kit.validation import AUTO, FileName, instance, positive, several, whole
@@ -127,12 +128,37 @@ class TimeHistory:
         InputError
             The file cannot be written.
         """
-        columns = {"time_s": self.time_s, "base_m": self.base}
-        for name, values in (("x_m", self.x), ("force_N", self.force)):
+        self.table().write_csv(path)
+
+    def table(self) -> Table:
+        """A row a sample: time, base, and x and force of each particle number and seed."""
+        columns, units = {"time_s": self.time_s, "base_m": self.base}, {}
+        for name, values, unit in (("x_m", self.x, "m"), ("force_N", self.force, "N")):
             for k, number in enumerate(self.particles):
                 for j, seed in enumerate(self.seeds):
                     columns[f"{name}_N{number}_seed{seed}"] = values[:, k, j]
-        write_csv(path, columns)
+                    units[f"{name}_N{number}_seed{seed}"] = unit
+        return Table(columns, units, index="time_s")
+
+    def to_pandas(self) -> Any:
+        """The table as a pandas DataFrame; InputError where pandas is not installed."""
+        return self.table().to_pandas()
+
+    def to_xarray(self) -> Any:
+        """An xarray Dataset over time, particles and seed, units in attributes.
+
+        Returns
+        -------
+        xarray.Dataset
+            ``base``, ``x``, ``v``, ``force`` over time; ``rms`` and ``peak`` of the run.
+
+        Raises
+        ------
+        InputError
+            Where xarray is not installed.
+        """
+        axes = {"particles": (self.particles, "1"), "seed": (self.seeds, "1")}
+        return history_dataset(self, ("particles", "seed"), {"force": ("particles", "seed")}, axes)
 
 
 def shake(

@@ -12,15 +12,16 @@ from ca_damper.engine.modal_mount import ModalMount
 from ca_damper.excitation.excitation import Excitation
 from ca_damper.excitation.signal import Signal
 from ca_damper.filling import Filling, check_filling
+from ca_damper.measures import history_dataset
 from ca_damper.report import Report
 from ca_damper.scenes.clock import LEAST_STEPS_PER_CYCLE, automatic_dt
 from ca_damper.scenes.table import SceneTable
 from ca_damper.structure import Box, ModalStructure
 from ca_damper.window import one_for_all, run_duration, run_seeds, window
 from taichi_dem.kit.checkpoint import Checkpoint, identity_of
+from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.progress.progress_bar import reporting
 from taichi_dem.kit.validation import AUTO, FileName, instance, positive, shown, whole
@@ -112,12 +113,37 @@ class StructureHistory:
         InputError
             The file cannot be written.
         """
-        columns = {"time_s": self.time_s, "base_m": self.base}
-        for name, values in (("x_m_place", self.x), ("force_N_box", self.force)):
+        self.table().write_csv(path)
+
+    def table(self) -> Table:
+        """A row a sample: time, base, x of each place and force of each box, for each seed."""
+        columns, units = {"time_s": self.time_s, "base_m": self.base}, {}
+        for name, values, unit in (("x_m_place", self.x, "m"), ("force_N_box", self.force, "N")):
             for i in range(values.shape[1]):
                 for j, seed in enumerate(self.seeds):
                     columns[f"{name}{i}_seed{seed}"] = values[:, i, j]
-        write_csv(path, columns)
+                    units[f"{name}{i}_seed{seed}"] = unit
+        return Table(columns, units, index="time_s")
+
+    def to_pandas(self) -> Any:
+        """The table as a pandas DataFrame; InputError where pandas is not installed."""
+        return self.table().to_pandas()
+
+    def to_xarray(self) -> Any:
+        """An xarray Dataset over time, place, box and seed, units in attributes.
+
+        Returns
+        -------
+        xarray.Dataset
+            ``base``, ``x``, ``v``, ``force`` over time; ``rms`` and ``peak`` of the run.
+
+        Raises
+        ------
+        InputError
+            Where xarray is not installed.
+        """
+        axes = {"seed": (self.seeds, "1")}
+        return history_dataset(self, ("place", "seed"), {"force": ("box", "seed")}, axes)
 
 
 def shake_structure(

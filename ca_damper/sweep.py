@@ -6,21 +6,26 @@ takes up its new speed at once.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Optional, Union
+from typing import TYPE_CHECKING, Any, Optional, Union
 
 import numpy as np
 
 from ca_damper.checks import check_run
 from ca_damper.filling import Filling
+from ca_damper.measures import MEASURE_UNITS
 from ca_damper.oscillator import Oscillator
 from ca_damper.progress import Stages
 from ca_damper.report import Report
-from ca_damper.response import UNITS, Grid, Response
+from ca_damper.response import Grid, Response
 from taichi_dem.kit.checkpoint import Checkpoint
 from taichi_dem.kit.display import in_brief
+from taichi_dem.kit.optional import optional
 from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.progress.progress_bar import reporting
 from taichi_dem.kit.validation import AUTO, FileName
+
+if TYPE_CHECKING:
+    from ca_damper.plot.response_plots import SweepPlots
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +53,20 @@ class Sweep:
     def hysteresis(self) -> np.ndarray:
         """Difference of the RMS, (down - up) / larger of both [-], (particles, ratios, seeds)."""
         return (self.down.rms - self.up.rms) / np.maximum(self.down.rms, self.up.rms)
+
+    def to_xarray(self) -> Any:
+        """As ``Response.to_xarray``, over direction ("up", "down") too."""
+        xarray = optional("xarray", "tables")
+        axis = xarray.Variable("direction", ["up", "down"])
+        return xarray.concat([self.up.to_xarray(), self.down.to_xarray()], axis)
+
+    @property
+    def plot(self) -> "SweepPlots":
+        """Pictures of the sweep: ``sweep.plot.hysteresis(path="hysteresis.png")``."""
+        # Imported here, so that matplotlib loads only where a picture is drawn.
+        from ca_damper.plot.response_plots import SweepPlots
+
+        return SweepPlots(self)
 
 
 def sweep_up_and_down(
@@ -166,7 +185,7 @@ class _Collected:
     def __init__(self, grid):
         self.grid = grid
         self.steps = np.zeros(len(grid.ratios), dtype=np.int32)
-        self.values = {name: np.empty(grid.shape) for name in UNITS}
+        self.values = {name: np.empty(grid.shape) for name in MEASURE_UNITS}
 
     def record(self, k, batch, cycles):
         """Record the measures at ratio number k."""
@@ -182,7 +201,7 @@ class _Collected:
     def resume(self, saved):
         """Restore the data that ``saved`` returned."""
         self.steps = saved["steps"]
-        self.values = {name: saved[name] for name in UNITS}
+        self.values = {name: saved[name] for name in MEASURE_UNITS}
 
     def response(self):
         """All of them."""

@@ -24,6 +24,7 @@ from taichi_dem.goals import Goal
 from taichi_dem.kit.accuracy.answer import Answer
 from taichi_dem.kit.accuracy.branches import Branch, BranchedAnswer
 from taichi_dem.kit.checkpoint import Checkpoint
+from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.progress.progress import Progress
 from taichi_dem.kit.progress.progress_bar import ProgressBar
@@ -70,6 +71,7 @@ __all__ = [
     "Simulation",
     "SimulationDiverged",
     "StepControl",
+    "Table",
     "Targets",
     "Uniform",
     "__version__",

@@ -17,8 +17,8 @@ from taichi_dem.engine.model import Model
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import dot, length
 from taichi_dem.kit.validation import choice, finite, flag, positive, shown, whole, word
-from taichi_dem.mesh.tetrahedra import components
 from taichi_dem.mesh.topology import faces_of_group
+from taichi_dem.output.fragments import fragment_of_body
 from taichi_dem.output.hole_monitor import HoleMonitor
 from taichi_dem.result import Result
 from taichi_dem.scene import Scene
@@ -309,10 +309,9 @@ def largest_fragment() -> Goal:
     """
 
     def found(result):
-        model, held = result.model, np.isnan(result.broken_time)
-        bonds = np.stack([model.topology.master, model.topology.slave], axis=1)
-        part = components(model.body_count, bonds[held])
-        return np.bincount(part, model.body_mass).max() / model.body_mass.sum()
+        mass = result.model.body_mass
+        fragment = fragment_of_body(result.model, np.isfinite(result.broken_time))
+        return np.bincount(fragment, mass).max() / mass.sum()
 
     return Goal("largest fragment", "1", found, "count")
 

@@ -3,25 +3,30 @@
 import json
 import os
 from dataclasses import dataclass, field
-from typing import Any, Optional
+from typing import TYPE_CHECKING, Any, Optional
 
 import numpy as np
 
 from taichi_dem.diagnostics.certificate import Certificate
 from taichi_dem.diagnostics.report import Report
 from taichi_dem.engine.model import Model
+from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.display import counted, embedded, in_brief, table, titled, unfolded
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import output_folder, write_csv, write_text
 from taichi_dem.kit.validation import FileName
 from taichi_dem.kit.viewer import WebPage
 from taichi_dem.mesh.files import write_mesh
+from taichi_dem.output.export.run_exports import RunExports
 from taichi_dem.output.record import Frame, remove_series, series_name, write_bonds, write_paraview
 from taichi_dem.scene import Scene
 
+if TYPE_CHECKING:
+    from taichi_dem.plot.result.plots import ResultPlots
+
 
 @dataclass(frozen=True, eq=False)
-class Result:
+class Result(RunExports):
     """Result of a run.
 
     As the last line of a notebook's cell it shows a picture and a table.
@@ -34,8 +39,8 @@ class Result:
         Method that stepped.
     model : Model
         Arrays of the scene.
-    history : dict
-        Columns by name, which ends in the unit, one row a sample.
+    history : Table
+        Columns by name with their units, one row a sample.
     frames : tuple of Frame
         Snapshots.
     broken_time : ndarray
@@ -57,7 +62,7 @@ class Result:
     scene: Scene
     method: Any
     model: Model
-    history: dict[str, np.ndarray]
+    history: Table
     frames: tuple[Frame, ...]
     broken_time: np.ndarray
     peak_speed: np.ndarray
@@ -65,6 +70,11 @@ class Result:
     diverged: str = ""
     start: Optional[dict[str, np.ndarray]] = None
     acting_since: dict[str, np.ndarray] = field(default_factory=dict)
+
+    def __post_init__(self):
+        # Whatever mapping it was made from, also by dataclasses.replace.
+        if not isinstance(self.history, Table):
+            object.__setattr__(self, "history", Table(self.history, index="time_s"))
 
     def __repr__(self):
         samples = counted(len(self.history.get("time_s", ())), "sample")
@@ -106,6 +116,14 @@ class Result:
         """
         ways = (frame.displacement[bodies].T for frame in self.frames)
         return np.array([[along.mean() for along in way] for way in ways]).reshape(-1, 3)
+
+    @property
+    def plot(self) -> "ResultPlots":
+        """Pictures of the run, one function each: ``result.plot.energy(path="energy.png")``."""
+        # Imported here, so that matplotlib loads only where a picture is drawn.
+        from taichi_dem.plot.result.plots import ResultPlots
+
+        return ResultPlots(self)
 
     def _figures(self):
         """The main figures of the run, (name, text) each."""

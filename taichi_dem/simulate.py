@@ -7,7 +7,6 @@ from typing import Any, Optional, Union
 
 import numpy as np
 
-from taichi_dem.effects.gas_pressure import GasPressure
 from taichi_dem.kit.checkpoint import Checkpoint, digest, identity_of, version_text
 from taichi_dem.kit.engine_pool import LoanMemory
 from taichi_dem.kit.errors import InputError, SimulationDiverged
@@ -19,6 +18,7 @@ from taichi_dem.kit.validation import AUTO, FileName, instance
 from taichi_dem.measured_speedup import speedup_of_run
 from taichi_dem.methods import Method, check_method
 from taichi_dem.observers import Observer, RunView
+from taichi_dem.output.hole_monitor import watched_group
 from taichi_dem.output.record import Recorder
 from taichi_dem.result import Result
 from taichi_dem.run_plan import RunPlan
@@ -168,7 +168,7 @@ def result_of(run: Callable[..., Result], *arguments: Any, **options: Any) -> Re
 
 def _started(simulation):
     """A simulation ready to step and its recorder, with all kernels compiled."""
-    recorder = Recorder(simulation, _watched_group(simulation.scene))
+    recorder = Recorder(simulation, watched_group(simulation.scene))
     simulation.start()
     compiling("recording", 0.95)
     recorder.compile()
@@ -286,13 +286,6 @@ def _write(result, folder, writer):
         result.write(folder)
     except InputError as error:
         raise InputError(f"{error}{writer.last_good()}") from None
-
-
-def _watched_group(scene):
-    """The group under gas pressure; without gas, one called hole if the mesh has it."""
-    groups = [effect.group for effect in scene.effects if isinstance(effect, GasPressure)]
-    groups += [name for name in scene.mesh.groups if name == "hole"]
-    return groups[0] if groups else None
 
 
 def _result(simulation, recorder, error, brief=False):

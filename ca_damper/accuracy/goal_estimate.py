@@ -11,8 +11,9 @@ from ca_damper.accuracy.scene_runs import SceneKey, SceneRuns
 from ca_damper.accuracy.steady_runs import SteadyRuns
 from ca_damper.accuracy.step_part import StepPart, step_part
 from ca_damper.goals import Goal
+from ca_damper.measures import MEASURE_UNITS
 from ca_damper.oscillator import Oscillator
-from ca_damper.response import UNITS, Response
+from ca_damper.response import Response
 from ca_damper.steady_state import BATCHES, correlation_factor
 from taichi_dem.kit.accuracy.answer import ErrorParts, Values
 from taichi_dem.kit.accuracy.student import f_outside, t_quantile
@@ -194,7 +195,7 @@ def response_of(
         rows.append([runs.measures(key, begins[key], leave_out) for key in keys])
     values: dict[str, Any] = {
         name: np.stack([np.concatenate([one[name] for one in row]) for row in rows])[None]
-        for name in UNITS
+        for name in MEASURE_UNITS
     }
     named = tuple(seeds) if not leave_out else tuple(range(len(seeds) * leave_out))
     return _response(runs, ratios, named, dt, values)

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.collections import EllipseCollection
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 
-from ca_damper.record import Frame
+from ca_damper.record import Frame, inner_size
 from taichi_dem.kit.plot_style import BLACK, BLUE, RED
 
 #: Vertical speed of particles: falling, at rest, rising.
@@ -31,15 +31,12 @@ class Box:
     @classmethod
     def of_automaton(cls, automaton: Any) -> Any:
         """Of an Automaton."""
-        cell = automaton.width
-        return cls(
-            automaton.columns * cell, automaton.rows * cell, cell, True, automaton.rules == "paper"
-        )
+        return cls(*inner_size(automaton), True, automaton.rules == "paper")
 
     @classmethod
     def of_spheres(cls, spheres: Any) -> Any:
         """Of Spheres."""
-        return cls(spheres.width, spheres.height, spheres.diameter)
+        return cls(*inner_size(spheres))
 
     @classmethod
     def of(cls, filling: Any) -> Any:

@@ -2,10 +2,11 @@
 
 import textwrap
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Optional
 
 import numpy as np
 from matplotlib import colormaps
+from matplotlib.figure import Figure
 
 from ca_damper.oscillator import Oscillator
 from taichi_dem.kit.plot_style import GREY, STYLES, area_key, picture, png_of, styled, styles_of
@@ -39,17 +40,55 @@ def picture_responses(path: FileName, responses: Mapping[str, Any], particle_mas
 def picture_of_response(response: Any, rows: Any) -> Any:
     """PNG, in bytes: RMS over frequency; rows: which of the particle numbers are drawn."""
     with styled(size=(7.2, 4.0)) as (figure, axis):
-        # Without damping the empty container has no end at its natural frequency.
-        with np.errstate(divide="ignore", invalid="ignore"):
-            _draw_curves(axis, response, rows)
-        if len(response.ratios) == 1:
-            for line in axis.lines:
-                line.set_marker("o")
-        axis.set_ylim(0.0, None)
-        axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-        if len(response.seeds) > 1:
-            axis.set_title(f"median of {len(response.seeds)} seeds, shaded: lowest to highest")
+        _draw_rms(axis, response, rows)
         return png_of(figure)
+
+
+def picture_rms(path: Optional[FileName], response: Any) -> Figure:
+    """RMS over frequency for every particle number, and of the empty container."""
+    with picture(path, size=(7.2, 4.0)) as (figure, axis):
+        _draw_rms(axis, response)
+    return figure
+
+
+def _draw_rms(axis, response, rows=None):
+    # Without damping the empty container has no end at its natural frequency.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        _draw_curves(axis, response, rows)
+    axis.set_ylim(0.0, None)
+    _explain_curves(axis, response)
+
+
+def _explain_curves(axis, response):
+    """Marks where a curve is a point, legend, and what the bands are."""
+    if len(response.ratios) == 1:
+        for line in axis.lines:
+            line.set_marker("o")
+    handles, _ = axis.get_legend_handles_labels()
+    if len(response.seeds) > 1:
+        axis.set_title(f"median of {len(response.seeds)} seeds")
+        handles.append(_band_key())
+    axis.legend(handles=handles, loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+
+def picture_measure(path: Optional[FileName], response: Any, name: str) -> Figure:
+    """A measure of a response over frequency, for every particle number."""
+    with picture(path, size=(7.2, 4.0)) as (figure, axis):
+        for k, particles in enumerate(response.particles):
+            label = f"{particles} particles"
+            values = getattr(response, name)[k]
+            _band(axis, response.ratios, values, _shade(response, k), label)
+        words = f"{name.replace('_', ' ')} [{response.units[name]}]"
+        axis.set(xlabel="frequency f / f$_0$ [1]", ylabel=words)
+        _explain_curves(axis, response)
+    return figure
+
+
+def picture_peaks(path: Optional[FileName], response: Any) -> Figure:
+    """Place and height of the peaks of a response over the particle number."""
+    with picture(path, 1, 2, size=(8.4, 3.6)) as (figure, (place, height)):
+        _draw_peaks(place, height, {response.label: response})
+    return figure
 
 
 def picture_compared(path: FileName, curves: Any, oscillator: Oscillator) -> None:
@@ -98,8 +137,12 @@ def _band(axis, x, values, colour, label):
 def _legend_of_bands(figure, axis):
     """Legend above all panels, made from one of them: what bands are is its last entry."""
     handles, _ = axis.get_legend_handles_labels()
-    handles.append(area_key("lowest to highest seed", fc=GREY, alpha=0.3))
+    handles.append(_band_key())
     figure.legend(handles=handles, loc="outside upper center", ncols=min(5, len(handles)))
+
+
+def _band_key():
+    return area_key("lowest to highest seed", fc=GREY, alpha=0.3)
 
 
 def _shade(response, k):
@@ -113,8 +156,11 @@ def _share_height(panels):
         axis.set_ylim(0.0, 1.08 * highest)
 
 
-def _draw_peaks(place, height, responses, particle_mass):
-    """Place and height of the peaks over the particle number; bars from seed to seed."""
+def _draw_peaks(place, height, responses, particle_mass=None):
+    """Place and height of the peaks over the particle number; bars from seed to seed.
+
+    particle_mass [kg]: of the rigid mass drawn for scale, None for none.
+    """
     styles = styles_of(responses)
     for label, response in responses.items():
         style = styles[label]
@@ -125,9 +171,10 @@ def _draw_peaks(place, height, responses, particle_mass):
             look = {"marker": style.marker, "ms": 4.5, "color": style.colour, "lw": 1.2}
             axis.errorbar(response.particles, middle, yerr=bars, label=style.label, **look)
     first = next(iter(responses.values()))
-    rigid = [first.oscillator.peak(n * particle_mass) for n in first.particles]
-    words = "rigid mass of the same weight"
-    place.plot(first.particles, [r for r, _ in rigid], color=GREY, ls=":", label=words)
+    if particle_mass is not None:
+        rigid = [first.oscillator.peak(n * particle_mass) for n in first.particles]
+        words = "rigid mass of the same weight"
+        place.plot(first.particles, [r for r, _ in rigid], color=GREY, ls=":", label=words)
     place.set(title="place of the peak; bars: seeds", xlabel="particles N [1]")
     place.set_ylabel("f / f$_0$ of the peak [1]")
     height.set(title="its height; bars: seeds", xlabel="particles N [1]")
@@ -171,7 +218,7 @@ def _draw_measures(column, response, k, particle_mass):
     _band(column[1], response.ratios, response.loss_factor[k], colour, None)
 
 
-def picture_hysteresis(path: FileName, sweeps: Mapping[str, Any]) -> None:
+def picture_hysteresis(path: Optional[FileName], sweeps: Mapping[str, Any]) -> Figure:
     """Sweeps up and down, the state carried on: a column a filling, a row a particle number."""
     particles = next(iter(sweeps.values())).up.particles
     count = len(sweeps)
@@ -187,6 +234,7 @@ def picture_hysteresis(path: FileName, sweeps: Mapping[str, Any]) -> None:
             axis.set_ylabel(f"{particles[k]} particles:\nRMS displacement [mm]")
         handles, _ = axes[0, 0].get_legend_handles_labels()
         figure.legend(handles=handles, loc="outside upper center", ncols=min(5, len(handles)))
+    return figure
 
 
 def _draw_ways(axis, sweep, k):

@@ -36,21 +36,30 @@ def api_pages():
 def module_page(label, module):
     """Page of a module: its text, a table of all objects, and every object."""
     things = [Entry(f"{label}.{name}", thing) for name, thing in public_names(module)]
-    bases = list(dict.fromkeys(base for entry in things for base in bases_of(entry)))
-    known = {entry.thing for entry in things}
-    more = [Entry(f"{base.__module__}.{base.__qualname__}", base) for base in bases]
-    contracts = [entry for entry in more if entry.thing not in known]
+    contracts = _bases(things)
     intro = parsed(module.__doc__ or "")
     parts = [f"<h1>{label}</h1>", block(intro.summary), block(_blocks(intro.body))]
     parts += [_overview(things), *map(_object, things)]
-    if contracts:
-        parts.append('<h2 id="contracts">Base classes and contracts</h2>')
-        parts.append(
-            "<p>Members that several classes share, and what a class of one's own has.</p>"
-        )
-        parts += map(_object, contracts)
+    parts += _documented_bases(contracts)
     headings = [Heading(2, short(entry), anchor(entry)) for entry in [*things, *contracts]]
     return Page(label, "\n".join(parts), tuple(headings), ())
+
+
+def _bases(things):
+    """Entries of the base classes and contracts of classes that are not among these themselves."""
+    bases = list(dict.fromkeys(base for entry in things for base in bases_of(entry)))
+    known = {entry.thing for entry in things}
+    more = [Entry(f"{base.__module__}.{base.__qualname__}", base) for base in bases]
+    return [entry for entry in more if entry.thing not in known]
+
+
+def _documented_bases(contracts):
+    """HTML of base classes and contracts, with a heading of their own."""
+    if not contracts:
+        return []
+    words = "<p>Members that several classes share, and what a class of one's own has.</p>"
+    title = '<h2 id="contracts">Base classes and contracts</h2>'
+    return [title, words, *map(_object, contracts)]
 
 
 def results_page(package):
@@ -58,8 +67,10 @@ def results_page(package):
     things = [entry for entry in returned(package) if entry.owner is None]
     title = f"{package} results"
     words = f"Objects that functions of <code>{package}</code> return, and their parts."
+    contracts = _bases(things)
     parts = [f"<h1>{title}</h1><p>{words}</p>", _overview(things), *map(_object, things)]
-    headings = [Heading(2, short(entry), anchor(entry)) for entry in things]
+    parts += _documented_bases(contracts)
+    headings = [Heading(2, short(entry), anchor(entry)) for entry in [*things, *contracts]]
     return Page(title, "\n".join(parts), tuple(headings), ())
 
 

@@ -6,7 +6,6 @@ import numpy as np
 
 from _blast import BLOCK_STEP, FROM_RADII, HOLE_RADIUS, paper_effects
 from _trust.number import Number
-from _trust.pieces import pieces_of
 from taichi_dem import CONCRETE, PAPER_BLOCK, ImplicitDashpots, Scene, read_mesh, simulate
 from taichi_dem.kit.plot_style import BLACK, GREY, RED
 from taichi_dem.mesh.reorder import in_space_order
@@ -75,7 +74,7 @@ def sieving(result):
     The size of a fragment is the edge of a cube of its volume; the largest ends the sieves.
     """
     density = result.model.material.density
-    mass = np.array([piece.mass for piece in pieces_of(result, least=0.0)])
+    mass = result.fragments()["mass_kg"]
     size = np.cbrt(mass / density)
     limit = OF_THE_MESH * np.cbrt(result.model.body_mass.mean() / density)
     sieves = np.geomspace(0.1 * limit, size.max(), SIEVES)

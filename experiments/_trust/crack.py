@@ -8,10 +8,10 @@ from _trust.meshes import material_of, plate, springs_step
 from _trust.number import Number
 from taichi_dem import ImplicitDashpots, Scene, Simulation, effects
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.fixed_order import length
 from taichi_dem.kit.plot_style import BLACK, RED
 from taichi_dem.mesh.face_groups import with_cut
-from taichi_dem.mesh.tetrahedra import area_vectors, components
+from taichi_dem.mesh.tetrahedra import components
+from taichi_dem.output.cracks import crack_areas
 from taichi_dem.timeline import NEVER
 
 #: Plate and depth of its notch [m], edges of elements [m].
@@ -99,7 +99,7 @@ def measured(simulation, edge):
     model, broken = simulation.model, broken_bonds(simulation)
     bond = simulation.energy_balance.tables()[1]
     spent = bond[:, 3] + bond[:, 4]
-    area = length(area_vectors(model.mesh.points, model.topology.vertices))[broken].sum()
+    area = crack_areas(model)[broken].sum()
     left_open = simulation.energy_balance.account()["residual"] / spent.sum()
     beside = spent[~broken].sum() / spent.sum()
     faces = spent[broken].sum() / (ENERGY * area)

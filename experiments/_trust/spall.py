@@ -6,7 +6,6 @@ import numpy as np
 
 from _trust.meshes import material_of, plate, springs_step
 from _trust.number import Number
-from _trust.pieces import pieces_of
 from taichi_dem import ImplicitDashpots, Scene, effects, simulate
 from taichi_dem.kit.plot_style import BLACK, RED
 
@@ -18,6 +17,8 @@ LENGTH, SPEED, DENSITY, STRENGTH, PEAK, PULSE = 0.3, 3500.0, 2350.0, 5e6, 20e6, 
 WIDTH, ACROSS, ENERGY = 10e-3, (2, 3), 2.0
 #: The pulse's front [m], and the share of critical damping, without which elements ring behind it.
 FRONT, DAMPING = 25e-3, 0.1
+#: Least share of all mass that counts as a piece; below it is dust.
+LEAST = 0.005
 DEPTH = 0.5 * PULSE * STRENGTH / PEAK
 LEAVES = (2.0 * PEAK - STRENGTH) / (DENSITY * SPEED)
 PLANES = PEAK / STRENGTH
@@ -61,10 +62,13 @@ def spalled(edge, seed):
     fastest = max(frame.velocity[last, 0].mean() for frame in weak.frames)
     arrived = 0.5 * DENSITY * SPEED * fastest
     result = run(mesh, material, PEAK * PEAK / arrived, [effects.Softening()])
-    pieces = pieces_of(result)
-    first = max(pieces, key=lambda piece: piece.high[0])
-    ends = sorted(piece.high[0] for piece in pieces)
-    return first.mass / (DENSITY * WIDTH**2), first.velocity[0], len(pieces) - 1, ends
+    fragments = result.fragments()
+    mass, far = fragments["mass_kg"], np.full(fragments.row_count, -np.inf)
+    np.maximum.at(far, fragments.of_body, mesh.points[mesh.tetrahedra][..., 0].max(axis=1))
+    pieces = np.flatnonzero(mass > LEAST * mass.sum())
+    first = pieces[far[pieces].argmax()]
+    speed = fragments["velocity_x_m_s"][first]
+    return mass[first] / (DENSITY * WIDTH**2), speed, len(pieces) - 1, sorted(far[pieces].tolist())
 
 
 def run(mesh, material, peak, laws):

@@ -24,7 +24,10 @@ _HOST = re.sub(r"[^A-Za-z0-9]", "", platform.node())[:32] or "here"
 _TEMPORARY = re.compile(rf"\..*\.{_HOST}-(\d+)\.part(\.[^.]*)?")
 
 #: Endings of what experiments write.
-_WRITTEN = (".csv", ".gif", ".html", ".json", ".msh", ".npz", ".png", ".pvd", ".txt", ".vtu")
+_WRITTEN = (
+    *(".csv", ".gif", ".glb", ".html", ".json", ".msh", ".npz", ".png", ".pvd", ".txt", ".vtkhdf"),
+    *(".vtu", ".xyz"),
+)
 
 _claims: Optional[dict[str, int]] = None
 
@@ -183,6 +186,13 @@ def write_text(path: FileName, text: str) -> None:
     with renamed_when_done(path) as temporary:
         with open(temporary, "w", encoding="utf-8", newline="\n") as file:
             file.write(text)
+
+
+def write_bytes(path: FileName, content: bytes) -> None:
+    """Write bytes as a file. Raises InputError when it cannot be written."""
+    with renamed_when_done(path) as temporary:
+        with open(temporary, "wb") as file:
+            file.write(content)
 
 
 def write_csv(path: FileName, columns: Mapping[str, ArrayLike]) -> None:

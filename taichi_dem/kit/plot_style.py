@@ -4,7 +4,7 @@ import contextlib
 import io
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Union
+from typing import Any, Optional, Union
 
 import matplotlib
 import numpy as np
@@ -88,14 +88,15 @@ _SAME = {
     **{"automaton": "ca_static", "automaton_ejection": "ca_ejection", "spheres": "dem"},
     **{"automaton_landing": "ca_landing", "spheres_printed": "dem_printed", "dem_tsuji": "dem"},
 }
-_SPARE = (BLUE, RED, GREEN, PURPLE, ORANGE, SKY, BROWN, VIOLET)
+#: Colours of lines that have no style of their own.
+SPARE_COLOURS = (BLUE, RED, GREEN, PURPLE, ORANGE, SKY, BROWN, VIOLET)
 
 
 def styles_of(names: Iterable[str]) -> dict[str, MethodStyle]:
     """MethodStyle of each name: that of ``STYLES``, or else the name itself and a spare colour."""
     found = {name: STYLES.get(_SAME.get(name, name)) for name in names}
     taken = {style.colour for style in found.values() if style}
-    spare = [colour for colour in _SPARE if colour not in taken] or list(_SPARE)
+    spare = [colour for colour in SPARE_COLOURS if colour not in taken] or list(SPARE_COLOURS)
     others = [name for name, style in found.items() if style is None]
     made = {
         name: MethodStyle(name, spare[k % len(spare)], "osD^vPX"[k % 7], ("-", "--")[k % 2])
@@ -124,6 +125,13 @@ def area_key(label: str, **look: Any) -> Patch:
     return Patch(label=label, **look)
 
 
+class NotebookFigure(Figure):
+    """A figure that shows itself as the last line of a notebook's cell, also without pyplot."""
+
+    def _repr_png_(self) -> bytes:
+        return png_of(self)
+
+
 @contextlib.contextmanager
 def styled(
     rows: int = 1, columns: int = 1, size: tuple[float, float] = (6.4, 4.2), **options: Any
@@ -134,20 +142,22 @@ def styled(
     ``Figure.subplots``. The Agg canvas needs no display.
     """
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=size, layout="constrained")
+        figure = NotebookFigure(figsize=size, layout="constrained")
         FigureCanvasAgg(figure)
         yield figure, figure.subplots(rows, columns, **options) if rows else None
 
 
 @contextlib.contextmanager
-def picture(path: FileName, *shape: Any, **options: Any) -> Iterator[tuple[Figure, Any]]:
+def picture(path: Optional[FileName], *shape: Any, **options: Any) -> Iterator[tuple[Figure, Any]]:
     """A figure and its axes, as of ``styled``, written as PNG when the block ends well.
 
-    Raises InputError when the file cannot be written.
+    path: None for no file. Raises InputError when the file cannot be written.
     """
     with styled(*shape, **options) as (figure, axes):
         yield figure, axes
         _write_plain_numbers(figure)
+        if path is None:
+            return
         write_whole(path, lambda name: figure.savefig(name, format="png"))
 
 

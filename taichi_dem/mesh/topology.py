@@ -6,6 +6,7 @@ Local face f of a body is the face opposite its local vertex f.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -104,6 +105,17 @@ def _bonded_faces(mesh):
             start += len(group)
         share = of_face[number[: len(faces)]]
     return rows[share > 0.0], share[share > 0.0]
+
+
+def skin(topology: Topology, broken: Any) -> Any:
+    """Faces that show: outer ones and both sides of broken bonds.
+
+    broken: (bond_count,) bool. Returns body, local face (n,) and whether it is a crack face (n,).
+    """
+    bodies = (topology.outer_body, topology.master[broken], topology.slave[broken])
+    faces = (topology.outer_face, topology.master_face[broken], topology.slave_face[broken])
+    body = np.concatenate(bodies)
+    return body, np.concatenate(faces), np.arange(len(body)) >= topology.outer_count
 
 
 def face_vertices(mesh: Mesh, body: np.ndarray, face: np.ndarray) -> np.ndarray:

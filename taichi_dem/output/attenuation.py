@@ -1,13 +1,14 @@
 """How peak particle velocities fall with the distance from a blast hole."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
+from typing import Optional
 
 import numpy as np
 
 from taichi_dem.engine.model import Model
+from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.display import by_fields
+from taichi_dem.kit.validation import positive
 from taichi_dem.output.hole_monitor import HoleMonitor
 
 #: Bodies below which no power is fitted.
@@ -31,22 +32,41 @@ class Attenuation:
 
     @classmethod
     def of(
-        cls, model: Model, peak_speed: np.ndarray, radius: float, group: str = "hole"
-    ) -> Attenuation:
-        """Attenuation in a run; radius: of the hole [m], whose wall is a face group."""
+        cls,
+        model: Model,
+        peak_speed: np.ndarray,
+        radius: Optional[float] = None,
+        group: str = "hole",
+    ) -> "Attenuation":
+        """Attenuation in a run.
+
+        radius: of the hole [m], whose wall is a face group; that of its points if None.
+        """
         hole, points = HoleMonitor(model, group), model.mesh.points
+        radius = hole.radius if radius is None else positive("radius", radius)
         away = model.centre - hole.axis_point
         away = np.linalg.norm(away - np.outer(away @ hole.axis, hole.axis), axis=1)
         ends = model.centre - points.min(axis=0), points.max(axis=0) - model.centre
         return cls(away / radius, peak_speed, away < np.minimum(*ends).min(axis=1))
 
-    def power_law(self, nearest: float) -> tuple[float, float]:
-        """Exponent, and speed at one radius [m/s], for inner bodies by least squares.
+    @property
+    def table(self) -> Table:
+        """A row a body: its distance in radii, peak speed, and whether it is an inner one."""
+        columns = {
+            "body": np.arange(len(self.speed)),
+            "distance_by_radius": self.distance,
+            "peak_speed_m_s": self.speed,
+            "is_inner": self.inner,
+        }
+        return Table(columns, {"distance_by_radius": "1", "is_inner": "1"}, index="body")
 
-        nearest: bodies nearer to the axis are left out [radii]. NaN for both where fewer than ten
-        bodies are left.
+    def power_law(self, nearest: float, inner_only: bool = True) -> tuple[float, float]:
+        """Exponent, and speed at one radius [m/s], by least squares.
+
+        nearest: bodies nearer to the axis are left out [radii]. inner_only: fit the inner bodies
+        alone. NaN for both where fewer than ten bodies are left.
         """
-        taken = self.inner & (self.distance > nearest) & (self.speed > 0.0)
+        taken = (self.inner | (not inner_only)) & (self.distance > nearest) & (self.speed > 0.0)
         if taken.sum() < _FEWEST:
             return np.nan, np.nan
         slope, level = np.polyfit(np.log(self.distance[taken]), np.log(self.speed[taken]), 1)

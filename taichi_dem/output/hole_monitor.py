@@ -1,11 +1,22 @@
 """Monitoring of a block with a hole: the displacement of the bodies at its wall."""
 
+from typing import Optional
+
 import numpy as np
 
+from taichi_dem.effects.gas_pressure import GasPressure
 from taichi_dem.engine.model import Model
 from taichi_dem.kit.fixed_order import dot, length, weakest_direction
 from taichi_dem.mesh.tetrahedra import area_vectors
 from taichi_dem.mesh.topology import face_vertices, faces_of_group
+from taichi_dem.scene import Scene
+
+
+def watched_group(scene: Scene) -> Optional[str]:
+    """The group under gas pressure; without gas, one called hole if the mesh has it, or None."""
+    groups = [effect.group for effect in scene.effects if isinstance(effect, GasPressure)]
+    groups += [name for name in scene.mesh.groups if name == "hole"]
+    return groups[0] if groups else None
 
 
 class HoleMonitor:
@@ -28,7 +39,7 @@ class HoleMonitor:
         # No wall face has a normal along the axis: it is the weakest direction among the normals.
         self.axis = weakest_direction((area[:, :, None] * normal[:, None, :]).sum(axis=0))
         self.axis_point = (weight[:, None] * middle).sum(axis=0) / weight.sum()
-        self.bodies = np.unique(body)
+        self.bodies, self._wall = np.unique(body), mesh.points[np.unique(corners)]
         self.first = model.centre[self.bodies]
         away = self._in_plane(self.first - self.axis_point)
         # A body in the middle of what is loaded, where that is no hole, has no way outward.
@@ -56,6 +67,11 @@ class HoleMonitor:
         toward = normal[distance.argmin()]
         score = dot(self.first - self.axis_point, toward) - depth
         return int(self.bodies[score.argmax()])
+
+    @property
+    def radius(self) -> float:
+        """Mean distance of the points of the wall from the axis [m]."""
+        return float(length(self._in_plane(self._wall - self.axis_point)).mean())
 
     def radial_displacement(self, position: np.ndarray) -> float:
         """Mean displacement of the hole's bodies away from its axis [m]; position (n, 3)."""

@@ -5,6 +5,18 @@ import numpy as np
 from taichi_dem.observers import Every, RunView
 
 
+def body_spins(
+    inertia: np.ndarray, rotation: np.ndarray, angular_momentum: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Angular momenta [kg m^2/s] and spins [rad/s] of bodies in their own axes, (..., n, 3) each.
+
+    inertia: in body axes, (n, 3, 3). rotation: body to world, (..., n, 3, 3). angular_momentum: in
+    world axes, (..., n, 3).
+    """
+    local = np.einsum("...nji,...nj->...ni", rotation, angular_momentum)
+    return local, np.einsum("nij,...nj->...ni", np.linalg.inv(inertia), local)
+
+
 class MotionRecord:
     """Observer that keeps the motion of bodies at every sample.
 
@@ -44,8 +56,7 @@ class MotionRecord:
     @property
     def rotational_energy(self) -> np.ndarray:
         """Energy of the spins [J], (samples,)."""
-        local = np.einsum("snji,snj->sni", self["rotation"], self["angular_momentum"])
-        spin = np.einsum("nij,snj->sni", np.linalg.inv(self.inertia), local)
+        local, spin = body_spins(self.inertia, self["rotation"], self["angular_momentum"])
         return 0.5 * np.einsum("sni,sni->s", local, spin)
 
     @property

@@ -9,6 +9,7 @@ from typing import Any, Optional
 import numpy as np
 
 from taichi_dem.engine.model import Model
+from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.display import by_fields
 from taichi_dem.kit.files import output_folder, remove_files, write_csv
 from taichi_dem.kit.validation import FileName
@@ -62,6 +63,8 @@ class Frame:
         (body_count,).
     bound : ndarray
         Index in ``step_control.CRITERIA`` of what bounds the step, shape (body_count,).
+    angular_momentum : ndarray
+        About each body's own centre, in world axes [kg m^2/s], shape (body_count, 3).
     """
 
     time_s: float
@@ -72,6 +75,7 @@ class Frame:
     level: np.ndarray
     damage: np.ndarray
     bound: np.ndarray
+    angular_momentum: np.ndarray
 
     def __repr__(self):
         return by_fields(self)
@@ -145,6 +149,7 @@ class Recorder:
             level=motion["level"],
             damage=self._body_damage(damage),
             bound=self.state.bound.to_numpy(),
+            angular_momentum=motion["angular_momentum"],
         )
 
     def saved(self) -> dict[str, np.ndarray]:
@@ -174,10 +179,11 @@ class Recorder:
         own = np.where(bond >= 0, damage[np.maximum(bond, 0)], 0.0)
         return own.sum(axis=1) / np.maximum(1, (bond >= 0).sum(axis=1))
 
-    def history(self) -> dict[str, np.ndarray]:
-        """Time series as arrays by column name."""
+    def history(self) -> Table:
+        """Time series, a row a sample."""
         names = self.rows[0].keys() if self.rows else ()
-        return {name: np.array([row[name] for row in self.rows]) for name in names}
+        columns = {name: np.array([row[name] for row in self.rows]) for name in names}
+        return Table(columns, index="time_s")
 
     def broken_time(self) -> np.ndarray:
         """When each bond was released [s], (bond_count,); NaN while it holds."""
@@ -244,6 +250,27 @@ def remove_series(folder: FileName, name: str) -> None:
     remove_files(folder, re.escape(name) + r"(\.pvd|_\d{4,}\.vtu)")
 
 
+def corners_of_bodies(model: Model) -> np.ndarray:
+    """Numbers of the corners of every body where each brings its own, (n, 4) int32."""
+    return np.arange(4 * model.body_count, dtype=np.int32).reshape(-1, 4)
+
+
+def cell_data(frame: Frame, acting_since: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """What ParaView gets of every body in a frame, arrays by name: see ``write_paraview``."""
+    data = {
+        "body_id": np.arange(len(frame.level), dtype=np.int32),
+        "level": frame.level,
+        "speed_m_s": frame.speed,
+        "displacement_m": frame.displacement,
+        "damage": frame.damage,
+        "step_bound_by": frame.bound,
+    }
+    for effect, since in acting_since.items():
+        data[f"{effect}_acts"] = (since <= frame.time_s).astype(np.int32)
+        data[f"{effect}_since_s"] = since
+    return data
+
+
 def write_paraview(
     folder: FileName,
     model: Model,
@@ -285,21 +312,11 @@ def write_paraview(
     folder = output_folder(folder)
     name = series_name(folder) if name is None else name
     remove_series(folder, name)
-    cells = np.arange(4 * model.body_count, dtype=np.int32).reshape(-1, 4)
+    cells = corners_of_bodies(model)
     names = []
     for number, frame in enumerate(frames):
         names.append(f"{name}_{number:04d}.vtu")
-        data = {
-            "body_id": np.arange(model.body_count, dtype=np.int32),
-            "level": frame.level,
-            "speed_m_s": frame.speed,
-            "displacement_m": frame.displacement,
-            "damage": frame.damage,
-            "step_bound_by": frame.bound,
-        }
-        for effect, since in (acting_since or {}).items():
-            data[f"{effect}_acts"] = (since <= frame.time_s).astype(np.int32)
-            data[f"{effect}_since_s"] = since
         points = body_corners(model, frame).reshape(-1, 3)
+        data = cell_data(frame, acting_since or {})
         write_vtu(os.path.join(folder, names[-1]), points, cells, {}, data)
     write_pvd(os.path.join(folder, f"{name}.pvd"), [frame.time_s for frame in frames], names)

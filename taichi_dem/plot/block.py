@@ -7,6 +7,7 @@ import matplotlib
 import numpy as np
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
 
 from taichi_dem.engine.model import Model
 from taichi_dem.kit.plot_style import area_key, picture
@@ -41,13 +42,13 @@ def frame_block(axes: Any, view: View, model: Model, margin: float = 0.05) -> No
 
 
 def plot_cracks(
-    path: FileName,
+    path: Optional[FileName],
     model: Model,
     frame: Frame,
     broken_time: np.ndarray,
     magnify: float = 5.0,
     axis: Sequence[float] = (0.0, 0.0, 1.0),
-) -> None:
+) -> Figure:
     """Broken faces by time of breaking, in the block at rest and as it is (Konno et al., Fig 12).
 
     frame: the block at one time. broken_time: (bond_count,) [s], NaN while a bond holds. magnify:
@@ -74,6 +75,7 @@ def plot_cracks(
             axes.set(xlabel=view.labels()[0], ylabel=view.labels()[1])
         _close_up(panels[2], view, model, frame, broken_time)
         figure.colorbar(drawn, ax=panels, label="time of breaking [ms]", shrink=0.8, aspect=25)
+    return figure
 
 
 def draw_breaks(axes: Any, view: View, model: Model, broken_time: np.ndarray) -> Any:

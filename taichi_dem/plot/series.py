@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Optional
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from taichi_dem.kit.plot_style import BLUE, GREEN, PURPLE, RED, picture, styles_of
 from taichi_dem.kit.validation import FileName
@@ -11,7 +12,7 @@ from taichi_dem.plot.levels import draw_level_shares
 
 #: Energy terms from the bottom of the stack up, with colours and dashes: blue is held, orange lost
 #: in bonds, purple in contacts; within a group they differ in lightness.
-_TERMS = {
+ENERGY_TERMS = {
     "kinetic_J": ("kinetic", "#08306B", "-"),
     "bond_strain_J": ("bond strain", "#3A87C2", "-"),
     "sphere_strain_J": ("sphere strain", "#A6CEE8", "-"),
@@ -56,10 +57,10 @@ def plot_pressure(
         axes.set(xlim=(0.0, time_ms[-1]), ylim=(0.0, 1.12 * pressure[peak]))
 
 
-def plot_history(path: FileName, history: Mapping[str, np.ndarray]) -> None:
+def plot_history(path: Optional[FileName], history: Mapping[str, np.ndarray]) -> Figure:
     """Displacement at the hole, broken faces and the smallest step over time."""
     time = 1e3 * history["time_s"]
-    with picture(path, 3, 1, size=(6.2, 6.6), sharex=True) as (_, (top, middle, bottom)):
+    with picture(path, 3, 1, size=(6.2, 6.6), sharex=True) as (figure, (top, middle, bottom)):
         if "hole_radial_displacement_mm" in history:
             top.plot(
                 time,
@@ -81,12 +82,13 @@ def plot_history(path: FileName, history: Mapping[str, np.ndarray]) -> None:
         bottom.step(time, 1e9 * history["smallest_step_s"], where="post", color=GREEN)
         bottom.set(xlabel="time [ms]", ylabel="smallest step [ns]", yscale="log")
         _span(bottom, time)
+    return figure
 
 
-def plot_energy(path: FileName, history: Mapping[str, np.ndarray]) -> None:
+def plot_energy(path: Optional[FileName], history: Mapping[str, np.ndarray]) -> Figure:
     """Energy account: where the work went, every term by size, and what is unexplained."""
     time = 1e3 * history["time_s"]
-    present = {key: look for key, look in _TERMS.items() if key in history}
+    present = {key: look for key, look in ENERGY_TERMS.items() if key in history}
     terms = {key: look for key, look in present.items() if np.abs(history[key]).max() > 0.0}
     with picture(
         path, 2, 2, size=(9.2, 5.6), sharex=True, gridspec_kw={"height_ratios": [3.2, 1]}
@@ -100,6 +102,7 @@ def plot_energy(path: FileName, history: Mapping[str, np.ndarray]) -> None:
             _span(axes, time)
         handles, labels = panels[0, 1].get_legend_handles_labels()
         figure.legend(handles[::-1], labels[::-1], loc="outside right upper")
+    return figure
 
 
 def _stack(axes, time, history, terms):

@@ -10,7 +10,8 @@ import numpy as np
 
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.tetrahedra import LOCAL_FACES
-from taichi_dem.mesh.topology import Topology
+from taichi_dem.mesh.topology import Topology, skin
+from taichi_dem.output.cracks import picture_axes
 
 #: Faces that lean away from the viewer by less than this sine count as seen edge on.
 _EDGE_ON = 1e-6
@@ -27,9 +28,7 @@ class View:
         along = np.asarray(axis, dtype=float)
         main = int(np.abs(along).argmax())
         self.toward = along / np.linalg.norm(along) * np.sign(along[main])
-        right = np.cross(np.eye(3)[(main + 2) % 3], self.toward)
-        self.right = right / np.linalg.norm(right)
-        self.up = np.cross(self.toward, self.right)
+        self.right, self.up = picture_axes(self.toward)
 
     def project(self, points: np.ndarray) -> np.ndarray:
         """Picture coordinates [m] of points (..., 3), shape (..., 2)."""
@@ -50,17 +49,6 @@ class View:
         seen = np.flatnonzero(normal @ self.toward > _EDGE_ON * np.linalg.norm(normal, axis=1))
         depth = triangles[seen].mean(axis=1) @ self.toward
         return seen[np.argsort(depth, kind="stable")]
-
-
-def skin(topology: Topology, broken: Any) -> Any:
-    """Faces that show: outer ones and both sides of broken bonds.
-
-    broken: (bond_count,) bool. Returns body, local face (n,) and whether it is a crack face (n,).
-    """
-    bodies = (topology.outer_body, topology.master[broken], topology.slave[broken])
-    faces = (topology.outer_face, topology.master_face[broken], topology.slave_face[broken])
-    body = np.concatenate(bodies)
-    return body, np.concatenate(faces), np.arange(len(body)) >= topology.outer_count
 
 
 def surface(topology: Topology, view: View, corners: np.ndarray, broken: Any) -> Any:

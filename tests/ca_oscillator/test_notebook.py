@@ -1,29 +1,11 @@
 """A response in a notebook: curves and a table of peaks, whatever the numbers."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 
-from ca_damper import Oscillator, Response
-from ca_damper.response import UNITS
+from ca_damper import Oscillator
+from tests.made_response import response
 from tests.notebook import shown
-
-RATIOS = np.linspace(0.9, 1.1, 41)
-
-
-def response(particles=(0, 10), ratios=RATIOS, seeds=(1, 2), rms=None, **others):
-    """Of a rigid mass of 0.2 g a particle; the second seed swings by 1 % more."""
-    oscillator = Oscillator()
-    if rms is None:
-        frequency = np.asarray(ratios) * oscillator.natural_frequency
-        gain = [np.abs(oscillator.transfer(frequency, 0.2e-3 * n)) for n in particles]
-        rms = np.array(gain)[:, :, None] * oscillator.base_amplitude / np.sqrt(2.0)
-        rms = rms * (1.0 + 0.01 * np.arange(len(seeds)))
-    measures = {**dict.fromkeys(UNITS, np.zeros_like(rms)), "rms": rms}
-    steps, dt = np.full(len(ratios), 100), np.full(len(ratios), 1e-4)
-    given = Response("rigid", oscillator, particles, ratios, seeds, steps, dt, **measures)
-    return dataclasses.replace(given, **others)
 
 
 def test_a_notebook_shows_curves_and_peaks():

@@ -22,6 +22,7 @@ WANTED = {
     " stiffness=stiffness, deepest=deepest, rebound=rebound, account=account,"
     " unexplained=unexplained)",
     "docs/add_a_damper_accounting.md": "dict(force=force)",
+    "docs/results.md": "dict(units=result.history.units, out=out)",
     "docs/add_a_time_integrator.md": "dict(area=model.bonds['area'][0], mass=model.body_mass[0],"
     " step=step, count=count, euler=euler, leapfrog=leapfrog)",
 }
@@ -129,6 +130,17 @@ def test_the_integrator_gains_energy_by_its_factor(left_by):
     # Of energies of one time the leapfrog's differ by (w dt)^2 / 4, cos^2(p / 2) at phase p.
     swing = 0.25 * rate2 * step**2 * 1.01
     assert left["leapfrog"] / left["leapfrog"][0] == pytest.approx(1.0, rel=swing)
+
+
+def test_results_have_units_and_files(program):
+    """Of a block with a hole, which has all columns; every figure and file that the page names."""
+    made = program("docs/results.md")
+    units = made.left["units"]
+    assert all(units.values()) and units["hole_radial_displacement_mm"] == "mm"
+    there = {path.name for path in (made.folder / made.left["out"]).iterdir()}
+    figures = "history energy energy_shares cracks fragments rose attenuation damage"
+    wanted = {f"{name}.png" for name in figures.split()}
+    assert wanted | {"run.vtkhdf", "bodies.xyz", "fragments.xyz", "run.glb"} <= there
 
 
 def test_the_accounting_gives_the_container_the_weight_and_landings_do_not(left_by):

@@ -10,6 +10,7 @@ import numpy as np
 from taichi_dem import Checkpoint, Simulation, simulate
 from taichi_dem.diagnostics.energy_balance import unexplained_share
 from taichi_dem.kit.checkpoint import Interrupted
+from taichi_dem.kit.units import unit_of
 from taichi_dem.observers import Collector, Every
 from taichi_dem.simulate import run_simulation
 from tests.fuzz.ends import OutOfTime, Wrong
@@ -83,6 +84,9 @@ def judge(result):
     bad = [name for name, values in arrays.items() if not np.isfinite(values).all()]
     if bad:
         raise Wrong(f"no finite numbers without a word: {', '.join(bad)}")
+    unnamed = [name for name in result.history if not unit_of(name)]
+    if unnamed:
+        raise Wrong(f"columns without a unit: {', '.join(unnamed)}")
     report = result.report
     # Where supports hold all that is loaded, bodies exchange nothing but rounding.
     moved = result.history["kinetic_J"].max() > report.round_off_J

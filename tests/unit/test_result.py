@@ -365,6 +365,14 @@ def test_a_tilde_is_the_users_home(beam, tmp_path, monkeypatch):
     assert list((tmp_path / "here").iterdir()) == []
 
 
+def test_fragments_hold_the_kinetic_energy_of_the_account(beam):
+    """Frames and samples are of one time; the share that bodies turn with is in both."""
+    energy = beam.history["kinetic_J"]
+    assert beam.fragments()["kinetic_J"].sum() == pytest.approx(energy[-1], rel=1e-12)
+    assert beam.fragments(1)["kinetic_J"].sum() == pytest.approx(energy[2], rel=1e-12)
+    assert all(beam.history.units.values())
+
+
 def figures(result):
     return dict(result._figures())
 

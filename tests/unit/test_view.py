@@ -5,8 +5,8 @@ import pytest
 
 from taichi_dem.mesh import shapes as mesh_shapes
 from taichi_dem.mesh.tetrahedra import area_vectors
-from taichi_dem.mesh.topology import topology_of
-from taichi_dem.plot.view import View, skin, surface, traces
+from taichi_dem.mesh.topology import skin, topology_of
+from taichi_dem.plot.view import View, surface, traces
 
 AXES = [(0, 0, 1), (0, 1, 0), (1, 0, 0), (0.3, -0.2, 0.9), (-1, 2, 0.5)]
 

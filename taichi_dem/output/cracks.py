@@ -1,0 +1,172 @@
+"""Cracks: broken faces by time, area and orientation."""
+
+from typing import Any
+
+import numpy as np
+
+from taichi_dem.engine.model import Model
+from taichi_dem.kit.data_table import Table
+from taichi_dem.kit.fixed_order import length
+from taichi_dem.kit.validation import unit_vector, whole
+from taichi_dem.mesh.tetrahedra import area_vectors
+
+#: Sine of the angle between a face and a plane below which they count as parallel.
+_PARALLEL = 1e-6
+
+
+class Rose(Table):
+    """Directions of cracks in a plane: crack area by sector.
+
+    Attributes
+    ----------
+    width_deg : float
+        Width of a sector [degree].
+    parallel_m2 : float
+        Area of the cracks that lie in the plane, which have no direction there [m^2].
+    axis : ndarray, shape (3,)
+        Normal of the plane, towards the viewer.
+
+    Notes
+    -----
+    Sectors are centred at the multiples of their width, from 0 to below 180 degrees. With
+    ``parallel_m2`` their areas add up to the area of all cracks.
+    """
+
+    width_deg: float
+    parallel_m2: float
+    axis: np.ndarray
+
+
+def picture_axes(toward: np.ndarray) -> Any:
+    """Right and up, unit vectors (3,), of a picture seen from a unit vector.
+
+    Looking down a coordinate axis, the next two are right and up.
+    """
+    main = int(np.abs(toward).argmax())
+    right = np.cross(np.eye(3)[(main + 2) % 3], toward)
+    right = right / np.linalg.norm(right)
+    return right, np.cross(toward, right)
+
+
+def crack_areas(model: Model) -> np.ndarray:
+    """Area of the crack that each bond leaves when it breaks [m^2], (bond_count,).
+
+    Of a face that is bonded over a share of its area, that share.
+    """
+    top = model.topology
+    return length(area_vectors(model.mesh.points, top.vertices)) * top.bonded_share
+
+
+def cracks_of(model: Model, broken_time: np.ndarray) -> Table:
+    """Tabulate the broken faces in the order in which they broke.
+
+    Parameters
+    ----------
+    model : Model
+    broken_time : ndarray, shape (bond_count,)
+        When each bond broke [s], NaN while it holds.
+
+    Returns
+    -------
+    Table
+        ``time_s``, ``bond``, ``area_m2``, ``crack_area_m2`` of all cracks so far, place of the
+        face at rest, its unit normal out of the master, strike and dip.
+
+    Notes
+    -----
+    Strike and dip are those of geology with z up and y north: strike clockwise from north, the
+    face dipping to its right; dip from the horizontal. A horizontal face has the strike 0.
+    """
+    bond = np.flatnonzero(np.isfinite(broken_time))
+    bond = bond[np.argsort(broken_time[bond], kind="stable")]
+    points, corners = model.mesh.points, model.topology.vertices[bond]
+    place, normal = points[corners].mean(axis=1), _normals(model, bond)
+    area = crack_areas(model)[bond]
+    strike, dip = strike_and_dip(normal)
+    columns = {
+        "time_s": broken_time[bond],
+        "bond": bond,
+        "area_m2": area,
+        "crack_area_m2": np.cumsum(area),
+        **{f"centre_{axis}_m": place[:, k] for k, axis in enumerate("xyz")},
+        **{f"{axis}_normal": normal[:, k] for k, axis in enumerate("xyz")},
+        "strike_deg": strike,
+        "dip_deg": dip,
+    }
+    return Table(columns)
+
+
+def strike_and_dip(normal: np.ndarray) -> Any:
+    """Strike and dip of planes [degree], two arrays (n,); normal: unit normals (n, 3)."""
+    up = normal * np.where(normal[:, 2:] < 0.0, -1.0, 1.0)
+    dip = np.degrees(np.arctan2(np.hypot(up[:, 0], up[:, 1]), up[:, 2]))
+    # The upward normal leans the way in which the face dips, a quarter turn right of its strike.
+    toward = np.degrees(np.arctan2(up[:, 0], up[:, 1]))
+    flat = np.hypot(up[:, 0], up[:, 1]) < _PARALLEL
+    return np.where(flat, 0.0, (toward - 90.0) % 360.0), dip
+
+
+def crack_area_at(model: Model, broken_time: np.ndarray, times_s: np.ndarray) -> Table:
+    """Tabulate the area of all cracks over time.
+
+    Parameters
+    ----------
+    model : Model
+    broken_time : ndarray, shape (bond_count,)
+        When each bond broke [s], NaN while it holds.
+    times_s : ndarray, shape (n,)
+        Times of the rows [s].
+
+    Returns
+    -------
+    Table
+        ``time_s`` and ``crack_area_m2``; one side of a crack counts.
+    """
+    made = cracks_of(model, broken_time)
+    area = np.concatenate([[0.0], made["crack_area_m2"]])
+    upto = np.searchsorted(made["time_s"], times_s, side="right")
+    return Table({"time_s": times_s, "crack_area_m2": area[upto]}, index="time_s")
+
+
+def rose_of(
+    model: Model, broken: np.ndarray, axis: Any = (0.0, 0.0, 1.0), sectors: int = 36
+) -> Rose:
+    """Sum up the area of cracks by the direction of their traces in a plane.
+
+    Parameters
+    ----------
+    model : Model
+    broken : ndarray of bool, shape (bond_count,)
+    axis : sequence of 3 floats
+        Normal of the plane, towards the viewer.
+    sectors : int
+        Of a half turn, 2 to 360.
+
+    Returns
+    -------
+    Rose
+        ``angle_deg``, the middle of a sector, counter-clockwise from the right of a picture seen
+        along the axis (from x for the axis z); ``area_m2`` and number of ``faces`` in it.
+    """
+    axis, sectors = unit_vector("axis", axis), whole("sectors", sectors, 2, 360)
+    bond = np.flatnonzero(broken)
+    trace = np.cross(axis, _normals(model, bond))
+    area, width = crack_areas(model)[bond], 180.0 / sectors
+    seen = np.linalg.norm(trace, axis=1) > _PARALLEL
+    right, up = picture_axes(axis)
+    angle = np.degrees(np.arctan2(trace[seen] @ up, trace[seen] @ right))
+    sector = np.floor(angle / width + 0.5).astype(int) % sectors
+    columns = {
+        "angle_deg": width * np.arange(sectors),
+        "area_m2": np.bincount(sector, area[seen], sectors),
+        "faces": np.bincount(sector, minlength=sectors),
+    }
+    made = Rose(columns, index="angle_deg")
+    made.width_deg, made.parallel_m2, made.axis = width, float(area[~seen].sum()), axis
+    return made
+
+
+def _normals(model, bond):
+    """Unit normals of faces, out of their masters, (n, 3)."""
+    vectors = area_vectors(model.mesh.points, model.topology.vertices[bond])
+    return vectors / length(vectors)[:, None]

@@ -1,0 +1,161 @@
+"""Fragments: bodies that unbroken bonds still join, as one rigid piece each."""
+
+import numpy as np
+
+from taichi_dem.engine.model import Model
+from taichi_dem.kit.data_table import Table
+from taichi_dem.mesh.tetrahedra import components, signed_volumes
+from taichi_dem.output.motion_record import body_spins
+from taichi_dem.output.record import Frame
+
+_AXES = "xyz"
+
+
+class Fragments(Table):
+    """Table of the fragments at one time, the heaviest first.
+
+    Attributes
+    ----------
+    of_body : ndarray of int, shape (body_count,)
+        Fragment of each body, a row of the table.
+    time_s : float
+        Time [s].
+
+    Notes
+    -----
+    ``diameter_m`` is that of the sphere of the same volume. ``sieve_m`` estimates the opening of
+    the square sieve that a fragment just passes: the middle edge of the cuboid with the same
+    volume density and principal moments of inertia, in the shape at rest. A fragment's velocity is
+    its momentum by its mass, its spin its angular momentum by its inertia. ``kinetic_J`` is that of
+    its bodies; the share in ``translation_J`` and ``rotation_J`` is that of a rigid piece, the
+    rest is vibration.
+    """
+
+    of_body: np.ndarray
+    time_s: float
+
+    def vectors(self, name: str) -> np.ndarray:
+        """Collect the three columns of a vector.
+
+        Parameters
+        ----------
+        name : str
+            "centre" [m], "velocity" [m/s] or "spin" [rad/s].
+
+        Returns
+        -------
+        ndarray, shape (fragments, 3)
+        """
+        endings = {"centre": "m", "velocity": "m_s", "spin": "rad_s"}
+        return np.stack([self[f"{name}_{axis}_{endings[name]}"] for axis in _AXES], axis=1)
+
+
+def fragment_of_body(model: Model, broken: np.ndarray) -> np.ndarray:
+    """Number the fragments by falling mass, equal ones by their first body.
+
+    Parameters
+    ----------
+    model : Model
+    broken : ndarray of bool, shape (bond_count,)
+
+    Returns
+    -------
+    ndarray of int, shape (body_count,)
+        Fragment of each body.
+    """
+    links = np.stack([model.topology.master, model.topology.slave], axis=1)[~broken]
+    first = components(model.body_count, links)
+    heads, number = np.unique(first, return_inverse=True)
+    order = np.lexsort((heads, -np.bincount(number.reshape(-1), model.body_mass)))
+    rank = np.empty(len(order), dtype=np.int64)
+    rank[order] = np.arange(len(order))
+    return rank[number.reshape(-1)]
+
+
+def broken_by(broken_time: np.ndarray, time_s: float) -> np.ndarray:
+    """Whether each bond has broken by a time [s], (bond_count,) bool."""
+    # Bonds that hold have no time, and NaN compares as false.
+    return broken_time <= time_s
+
+
+def fragments_of(model: Model, frame: Frame, broken_time: np.ndarray) -> Fragments:
+    """Tabulate the fragments in a frame.
+
+    Parameters
+    ----------
+    model : Model
+    frame : Frame
+    broken_time : ndarray, shape (bond_count,)
+        When each bond broke [s], NaN while it holds.
+
+    Returns
+    -------
+    Fragments
+    """
+    of_body = fragment_of_body(model, broken_by(broken_time, frame.time_s))
+    mass = sums(of_body, model.body_mass)
+    volume = sums(of_body, signed_volumes(model.mesh.points, model.mesh.tetrahedra))
+    columns = {
+        "fragment": np.arange(len(mass)),
+        "bodies": np.bincount(of_body),
+        "mass_kg": mass,
+        "volume_m3": volume,
+        "diameter_m": np.cbrt(6.0 * volume / np.pi),
+        "sieve_m": _middle_edges(model, of_body, mass),
+        **_motion(model, frame, of_body, mass),
+    }
+    made = Fragments(columns, index="fragment")
+    made.of_body, made.time_s = of_body, frame.time_s
+    return made
+
+
+def sums(of_body: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Sums over the bodies of each fragment; values (body_count, ...)."""
+    flat = values.reshape(len(values), -1)
+    columns = [np.bincount(of_body, column) for column in flat.T]
+    return np.stack(columns, axis=1).reshape(-1, *values.shape[1:])
+
+
+def centres(of_body: np.ndarray, body_mass: np.ndarray, position: np.ndarray) -> np.ndarray:
+    """Centres of mass of fragments [m], (fragments, 3); position (body_count, 3) [m]."""
+    return sums(of_body, body_mass[:, None] * position) / sums(of_body, body_mass)[:, None]
+
+
+def _motion(model, frame, of_body, mass):
+    """Columns of place, velocity, spin and kinetic energy."""
+    body_mass = model.body_mass[:, None]
+    centre = centres(of_body, model.body_mass, frame.position)
+    velocity = centres(of_body, model.body_mass, frame.velocity)
+    arm = frame.position - centre[of_body]
+    own = np.cross(arm, body_mass * (frame.velocity - velocity[of_body]))
+    momentum = sums(of_body, own + frame.angular_momentum)
+    turned = frame.rotation @ model.body_inertia @ np.swapaxes(frame.rotation, 1, 2)
+    inertia = sums(of_body, turned + _steiner(model.body_mass, arm))
+    spin = np.linalg.solve(inertia, momentum[:, :, None])[:, :, 0]
+    local, local_spin = body_spins(model.body_inertia, frame.rotation, frame.angular_momentum)
+    body_energy = (model.body_mass * (frame.velocity**2).sum(axis=1)) + (local * local_spin).sum(1)
+    return {
+        **{f"centre_{axis}_m": centre[:, k] for k, axis in enumerate(_AXES)},
+        **{f"velocity_{axis}_m_s": velocity[:, k] for k, axis in enumerate(_AXES)},
+        "speed_m_s": np.linalg.norm(velocity, axis=1),
+        **{f"spin_{axis}_rad_s": spin[:, k] for k, axis in enumerate(_AXES)},
+        "spin_rad_s": np.linalg.norm(spin, axis=1),
+        "kinetic_J": 0.5 * sums(of_body, body_energy),
+        "translation_J": 0.5 * mass * (velocity**2).sum(axis=1),
+        "rotation_J": 0.5 * (spin * momentum).sum(axis=1),
+    }
+
+
+def _middle_edges(model, of_body, mass):
+    """Middle edges [m] of the cuboids with the fragments' inertia at rest."""
+    arm = model.centre - centres(of_body, model.body_mass, model.centre)[of_body]
+    inertia = sums(of_body, model.body_inertia + _steiner(model.body_mass, arm))
+    # Second moments of a cuboid are m a^2 / 12; the sum of two is a principal moment of inertia.
+    moments = np.linalg.eigvalsh(inertia)
+    return np.sqrt(12.0 * (0.5 * moments.sum(axis=1) - moments[:, 1]) / mass)
+
+
+def _steiner(mass, arm):
+    """Inertia of masses (n,) at the ends of arms (n, 3), (n, 3, 3) [kg m^2]."""
+    square = (arm**2).sum(axis=1)[:, None, None] * np.eye(3)
+    return mass[:, None, None] * (square - arm[:, :, None] * arm[:, None, :])

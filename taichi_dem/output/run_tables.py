@@ -1,0 +1,143 @@
+"""Tables of a finished run: fragments, cracks, energy, attenuation."""
+
+from typing import Any, Optional
+
+import numpy as np
+
+from taichi_dem.engine.model import Model
+from taichi_dem.kit.data_table import Table
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import whole
+from taichi_dem.output.attenuation import Attenuation
+from taichi_dem.output.body_values import Bodies
+from taichi_dem.output.cracks import Rose, crack_area_at, cracks_of, rose_of
+from taichi_dem.output.energy_shares import energy_shares
+from taichi_dem.output.fragments import Fragments, fragments_of
+from taichi_dem.output.hole_monitor import watched_group
+from taichi_dem.output.record import Frame
+from taichi_dem.scene import Scene
+
+
+class RunTables:
+    """What can be read out of a result; the base of ``Result``, which says what its members are."""
+
+    scene: Scene
+    model: Model
+    history: Table
+    frames: tuple[Frame, ...]
+    broken_time: np.ndarray
+    peak_speed: np.ndarray
+
+    def frame(self, number: int = -1) -> Frame:
+        """Choose a frame.
+
+        Parameters
+        ----------
+        number : int
+            From 0 on, or from -1, the last, backwards.
+
+        Returns
+        -------
+        Frame
+
+        Raises
+        ------
+        InputError
+            Where there is none of this number.
+        """
+        count = len(self.frames)
+        if not count:
+            raise InputError(
+                "a result must have frames for this: simulate(..., frames=1) keeps two"
+            )
+        return self.frames[whole("frame", number, -count, count - 1)]
+
+    def fragments(self, frame: int = -1) -> Fragments:
+        """Tabulate the bodies that unbroken bonds still join.
+
+        Parameters
+        ----------
+        frame : int
+            Number of the frame, the last by default.
+
+        Returns
+        -------
+        Fragments
+            Masses, sizes, places, velocities, spins and energies, a row a fragment.
+
+        Raises
+        ------
+        InputError
+            Where there is no such frame.
+
+        Examples
+        --------
+        ::
+
+            pieces = result.fragments()
+            print(pieces)
+            print(pieces["sieve_m"][pieces["mass_kg"] > 0.1])
+        """
+        return fragments_of(self.model, self.frame(frame), self.broken_time)
+
+    def cracks(self) -> Table:
+        """Tabulate broken faces in their order: time, area, place, normal, strike, dip."""
+        return cracks_of(self.model, self.broken_time)
+
+    def crack_area(self) -> Table:
+        """Tabulate the area of all cracks [m^2] at the times of the history."""
+        return crack_area_at(self.model, self.broken_time, self.history["time_s"])
+
+    def rose(self, axis: Any = (0.0, 0.0, 1.0), sectors: int = 36) -> Rose:
+        """Tabulate crack area by the direction of the cracks in a plane.
+
+        Parameters
+        ----------
+        axis : sequence of 3 floats
+            Normal of the plane, towards the viewer.
+        sectors : int
+            Of a half turn, 2 to 360.
+
+        Returns
+        -------
+        Rose
+            Area and number of faces by sector.
+        """
+        return rose_of(self.model, np.isfinite(self.broken_time), axis, sectors)
+
+    def energy_shares(self) -> Table:
+        """Tabulate every term of the energy balance as a share of the energy given, over time."""
+        return energy_shares(self.history)
+
+    def attenuation(
+        self, group: Optional[str] = None, radius: Optional[float] = None
+    ) -> Attenuation:
+        """Peak velocity of every body over its distance from a hole.
+
+        Parameters
+        ----------
+        group : str, optional
+            Face group of the hole's wall; that under gas pressure, or "hole", by default.
+        radius : float, optional
+            Of the hole [m]; that of the points of its wall by default.
+
+        Returns
+        -------
+        Attenuation
+            ``.table``, and ``.power_law(nearest)`` for the fit.
+
+        Raises
+        ------
+        InputError
+            Where the mesh has no such group.
+        """
+        group = watched_group(self.scene) if group is None else group
+        if group is None:
+            raise InputError(
+                "group must name the wall of a hole, as this scene has no gas pressure"
+            )
+        return Attenuation.of(self.model, self.peak_speed, radius, group)
+
+    def bodies(self, frame: int = -1) -> Bodies:
+        """What bodies are coloured by in a frame; InputError where there is no such frame."""
+        return Bodies(self.model, self.frame(frame), self.broken_time, self.peak_speed)
