@@ -2,13 +2,17 @@
 
 from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Optional
+from typing import Any, ClassVar, Optional
+
+import numpy as np
 
 from taichi_dem.effects.base import MANY, Effect
 from taichi_dem.effects.chosen import AUTO, LISTED, ChosenEffects, chosen_effects
 from taichi_dem.effects.roles import check_effect
+from taichi_dem.initial_motion import initial_motion
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.fixed_order import length
 from taichi_dem.kit.validation import between, finite, positive, shown
 from taichi_dem.materials import Material, softest_bond
 from taichi_dem.mesh.mesh import Mesh
@@ -71,6 +75,11 @@ class Scene:
     sleep: Optional[float] = None
     unbonded: Iterable[str] = ()
     weaker: Mapping[str, float] = field(default_factory=dict)
+    velocity: Any = None
+    spin: Any = None
+
+    #: Not among the options: arguments of ``State.set_motion``, none for a scene at rest.
+    initial_motion: ClassVar[Mapping[str, np.ndarray]] = {}
 
     def __post_init__(self):
         _check_body(self)
@@ -88,6 +97,15 @@ class Scene:
                 self.mesh.group_faces(effect.group)
                 check_free(self.mesh, effect.group)
         object.__setattr__(self, "max_speed", positive("max_speed", self.max_speed))
+        object.__setattr__(self, "initial_motion", _motion_of(self))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but functions, which no process can send to another: their rows instead."""
+        state = dict(vars(self))
+        if callable(self.velocity) or callable(self.spin):
+            rest = {"velocity": None, "spin": None}
+            state.update({**rest, **self.initial_motion})
+        return state
 
     def __repr__(self):
         effects = ", ".join(effect.name or type(effect).__name__ for effect in self.effects)
@@ -195,6 +213,26 @@ def _bonded(scene):
     return scene.mesh.bonded_by({**shares, **dict.fromkeys(names, 0.0)})
 
 
+def _motion_of(scene):
+    """Arrays of the motion at the start, which cannot be written to; keeps both options."""
+    for name in ("velocity", "spin"):
+        given = getattr(scene, name)
+        if isinstance(given, np.ndarray):
+            object.__setattr__(scene, name, _locked(given.copy()))
+    motion = initial_motion(scene.mesh, scene.velocity, scene.spin)
+    fastest = length(motion["velocity"]).max() if motion else 0.0
+    if fastest > scene.max_speed:
+        raise InputError(
+            f"velocity must be at most max_speed, {scene.max_speed:g} m/s, got {fastest:g} m/s"
+        )
+    return {name: _locked(rows) for name, rows in motion.items()}
+
+
+def _locked(array):
+    array.setflags(write=False)
+    return array
+
+
 def _sleep_of(scene):
     """Share of the mean momentum below which a body wakes no neighbour."""
     if scene.sleep is None:
@@ -237,7 +275,7 @@ def _check_roles(effects):
 def scene_warnings(scene: Any) -> tuple[str, ...]:
     """Sentences about what a scene lists or leaves out in vain; before a run.
 
-    scene: a Scene, or a Model, which has the same mesh, material and effects.
+    scene: a Scene.
     """
     return (*outer_faces_warnings(scene), *_friction_warnings(scene))
 
@@ -268,7 +306,6 @@ def outer_faces_warnings(scene: Any) -> tuple[str, ...]:
     or are too far from each other (``parts.may_meet``). Faces that lie on each other without a bond
     (``Mesh.keep_coincident``, ``Scene.unbonded``) meet in a solid of one piece too; unbonded ones
     have spheres with any contact.
-    scene: a Scene, or a Model, which has the same mesh and effects.
     """
     contact = next((effect for effect in scene.effects if effect.role == "contact"), None)
     if contact and contact.outer_faces:

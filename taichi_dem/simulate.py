@@ -241,6 +241,7 @@ def run_identity(scene: Scene, method: Method) -> dict[str, str]:
             f"{effect.name} {identity_of(vars(effect))}" for effect in scene.effects
         ),
         "max_speed": identity_of(scene.max_speed),
+        "initial motion": identity_of(scene.initial_motion) if scene.initial_motion else "nothing",
         "on demand": identity_of((scene.on_demand, scene.sleep)),
         "method": identity_of(method),
     }

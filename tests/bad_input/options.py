@@ -213,6 +213,7 @@ BLAST = [
     *taken(cut, "names", ("unbonded",)),
     *taken(cut, "shares", ("weaker",)),
     *taken(scene, "positive", ("max_speed",)),
+    *taken(scene, "three numbers", ("velocity", "spin"), (None, [[1, 2, 3]])),
     *taken(checkpoint, "path", ("path",)),
     *taken(checkpoint, "whole", ("every_steps",), (None,)),
     *taken(checkpoint, "positive", ("every_s", "every_wall_s"), (None,)),

@@ -23,7 +23,7 @@ LAYERS = {
         ("elasticity",),
         ("materials",),
         ("physics", "timeline", "closed_forms", "wave_moduli"),
-        ("effects",),
+        ("effects", "initial_motion"),
         ("scene",),
         ("stability",),
         ("methods",),
