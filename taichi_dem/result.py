@@ -18,7 +18,14 @@ from taichi_dem.kit.validation import FileName
 from taichi_dem.kit.viewer import WebPage
 from taichi_dem.mesh.files import write_mesh
 from taichi_dem.output.export.run_exports import RunExports
-from taichi_dem.output.record import Frame, remove_series, series_name, write_bonds, write_paraview
+from taichi_dem.output.record import (
+    Frame,
+    outward_columns,
+    remove_series,
+    series_name,
+    write_bonds,
+    write_paraview,
+)
 from taichi_dem.scene import Scene
 
 if TYPE_CHECKING:
@@ -142,9 +149,9 @@ class Result(RunExports):
             ("energy not explained", report.unexplained),
             ("time", f"{report.compile_seconds:.1f} s compiling, {report.run_seconds:.1f} s run"),
         ]
-        moved = history.get("hole_radial_displacement_mm", np.zeros(0))
-        if len(moved):
-            rows.insert(7, ("hole, mean outward displacement", f"{moved[-1]:.4g} mm"))
+        for hole, moved in outward_columns(history).items():
+            if len(moved):
+                rows.insert(7, (f"{hole}, mean outward displacement", f"{moved[-1]:.4g} mm"))
         return [*rows, *(("warning", need) for need in report.needs)]
 
     def write(self, folder: FileName) -> None:

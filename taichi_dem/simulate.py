@@ -18,7 +18,7 @@ from taichi_dem.kit.validation import AUTO, FileName, instance
 from taichi_dem.measured_speedup import speedup_of_run
 from taichi_dem.methods import Method, check_method
 from taichi_dem.observers import Observer, RunView
-from taichi_dem.output.hole_monitor import watched_group
+from taichi_dem.output.hole_monitor import watched_groups
 from taichi_dem.output.record import Recorder
 from taichi_dem.result import Result
 from taichi_dem.run_plan import RunPlan
@@ -168,7 +168,7 @@ def result_of(run: Callable[..., Result], *arguments: Any, **options: Any) -> Re
 
 def _started(simulation):
     """A simulation ready to step and its recorder, with all kernels compiled."""
-    recorder = Recorder(simulation, watched_group(simulation.scene))
+    recorder = Recorder(simulation, *watched_groups(simulation.scene))
     simulation.start()
     compiling("recording", 0.95)
     recorder.compile()

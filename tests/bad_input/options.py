@@ -191,6 +191,7 @@ BLAST = [
     *taken(StepControl, "whole", ("level_jump",), (None,)),
     *taken(StepControl, "words", ("criteria", "wake"), ([],)),
     *taken(effects.GasPressure, "positive", ("peak", "rise", "decay_ratio")),
+    *taken(effects.GasPressure, "zero or positive", ("start",)),
     *taken(effects.GasPressure, "group", ("group",)),
     *taken(effects.Fixed, "group", ("group",)),
     *taken(effects.SphereContact, "positive", ("skin",)),

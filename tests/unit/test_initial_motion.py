@@ -87,7 +87,7 @@ def test_twins_move_as_the_scene_does(by_hand):
 def test_one_spin_turns_all_bodies_as_one_rigid_body():
     spin = np.array([0.0, 3.0, -4.0])
     motion = scene(velocity=(1.0, 0.0, 0.0), spin=spin).initial_motion
-    expected = [1.0, 0.0, 0.0] + np.cross(spin, CENTRE - [0.1, 0.05, 0.05])
+    expected = np.array([1.0, 0.0, 0.0]) + np.cross(spin, CENTRE - [0.1, 0.05, 0.05])
     np.testing.assert_allclose(motion["velocity"], expected, atol=1e-15)
     assert (motion["spin"] == spin).all()
     rows = scene(spin=np.tile(spin, (COUNT, 1))).initial_motion
