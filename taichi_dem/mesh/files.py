@@ -17,6 +17,7 @@ from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import renamed_when_done, write_text
 from taichi_dem.kit.timeout import run_with_timeout
 from taichi_dem.kit.validation import FileName, path_name, positive
+from taichi_dem.mesh.cell_groups import body_groups_of, volumes_of
 from taichi_dem.mesh.content import (
     cells_counted,
     cells_dropped,
@@ -110,14 +111,21 @@ def read_mesh(
 
 
 def write_mesh(path: FileName, mesh: Mesh) -> None:
-    """Write a mesh with its named groups as a Gmsh 2.2 text file (exact: 17 digits)."""
-    names = list(mesh.groups)
-    lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$PhysicalNames", str(len(names) + 1)]
+    """Write a mesh with its named groups as a Gmsh 2.2 text file (exact: 17 digits).
+
+    Body groups become physical volumes. As a tetrahedron has one volume in this format, bodies in
+    several groups are in the volume "NAME|NAME", which ``read_mesh`` takes for both.
+    """
+    names, first = list(mesh.groups), 1 + len(mesh.groups)
+    volumes, tags = volumes_of(mesh, first)
+    lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$PhysicalNames"]
+    lines += [str(len(names) + len(volumes))]
     lines += [f'2 {tag} "{name}"' for tag, name in enumerate(names, start=1)]
-    lines += [f'3 {len(names) + 1} "bodies"', "$EndPhysicalNames", "$Nodes", str(len(mesh.points))]
+    lines += [f'3 {tag} "{name}"' for tag, name in enumerate(volumes, start=first)]
+    lines += ["$EndPhysicalNames", "$Nodes", str(len(mesh.points))]
     lines += [f"{k} {x:.17g} {y:.17g} {z:.17g}" for k, (x, y, z) in enumerate(mesh.points, 1)]
     elements = [(2, tag, face) for tag, name in enumerate(names, 1) for face in mesh.groups[name]]
-    elements += [(4, len(names) + 1, corners) for corners in mesh.tetrahedra]
+    elements += [(4, tag, corners) for tag, corners in zip(tags.tolist(), mesh.tetrahedra)]
     lines += ["$EndNodes", "$Elements", str(len(elements))]
     for number, (kind, tag, corners) in enumerate(elements, start=1):
         lines.append(f"{number} {kind} 2 {tag} {tag} " + " ".join(str(c + 1) for c in corners))
@@ -207,7 +215,10 @@ def _mesh(raw, scale, weld_tolerance, keep_coincident):
         tetrahedra = _tetrahedra(raw, notes)
     kept = {"keep_coincident": keep_coincident}
     mesh = checked_mesh(points, tetrahedra, _groups(raw), **kept)
-    return replace(mesh, notes=(*notes, *welding, *mesh.notes))
+    bodies = body_groups_of(raw)
+    if len(bodies) > 1:
+        notes.append(f"bodies are in the groups {', '.join(bodies)}, for materials of their own")
+    return replace(mesh, body_groups=bodies, notes=(*notes, *welding, *mesh.notes))
 
 
 def _renumber(raw, label):

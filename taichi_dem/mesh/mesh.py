@@ -4,9 +4,9 @@ x points to the right, y up, z towards the viewer.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Optional
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +15,7 @@ from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import FileName, flag, shown, word
 from taichi_dem.mesh import tetrahedra as geometry
+from taichi_dem.mesh.body_groups import checked_body_groups
 from taichi_dem.mesh.checked_groups import checked_groups
 from taichi_dem.mesh.parts_in_files import parts_of
 from taichi_dem.mesh.weld import COINCIDENT, weld_labels
@@ -82,12 +83,14 @@ class Mesh:
     source: str = ""
     unread: tuple[tuple[str, str], ...] = ()
     keep_coincident: bool = False
+    body_groups: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         notes: list[str] = []
         flag("keep_coincident", self.keep_coincident)
         given = self.points, self.tetrahedra, self.groups, 0.0
-        self._hold(*_checked(*given, self.keep_coincident, notes))
+        parts = _checked(*given, self.keep_coincident, notes)
+        self._hold(*parts, checked_body_groups(self.body_groups, len(parts[1])))
         mended = [note for note in notes if note.split()[0] in _MENDING]
         if mended:
             raise InputError(f"a Mesh takes what checked_mesh gives, which here {mended[0]}")
@@ -96,21 +99,24 @@ class Mesh:
     bonded_shares: ClassVar[tuple[tuple[str, float], ...]] = ()
     inner_groups: ClassVar[tuple[str, ...]] = ()
 
-    def _hold(self, points, tetrahedra, groups, inner_groups):
+    def _hold(self, points, tetrahedra, groups, inner_groups, body_groups):
         """Keep arrays that cannot be written to."""
         object.__setattr__(self, "inner_groups", inner_groups)
-        for array in (points, tetrahedra, *groups.values()):
+        for array in (points, tetrahedra, *groups.values(), *body_groups.values()):
             array.setflags(write=False)
         for name, value in zip(("points", "tetrahedra"), (points, tetrahedra)):
             object.__setattr__(self, name, value)
         object.__setattr__(self, "groups", MappingProxyType(dict(groups)))
+        object.__setattr__(self, "body_groups", MappingProxyType(dict(body_groups)))
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**vars(self), "groups": dict(self.groups)}
+        named = {"groups": dict(self.groups), "body_groups": dict(self.body_groups)}
+        return {**vars(self), **named}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
-        self._hold(self.points, self.tetrahedra, self.groups, self.inner_groups)
+        groups = self.groups, self.inner_groups, self.body_groups
+        self._hold(self.points, self.tetrahedra, *groups)
 
     def __repr__(self):
         groups = f"groups {', '.join(self.groups)}" if self.groups else "no groups"
@@ -149,10 +155,22 @@ class Mesh:
         """
         if not isinstance(name, str) or name not in self.groups:
             known = ", ".join(sorted(self.groups)) or "none"
-            kinds = [kind for other, kind in self.unread if other == name]
+            kinds = ["bodies"] * (isinstance(name, str) and name in self.body_groups)
+            kinds += [kind for other, kind in self.unread if other == name]
             why = f" ({name} is a group of {kinds[0]}: make one of faces)" if kinds else ""
             raise InputError(f"mesh has no face group {shown(name)}{why}; its groups are: {known}")
         return self.groups[name]
+
+    def group_bodies(self, name: str) -> np.ndarray:
+        """Numbers of the bodies in the body group ``name``, (n,); InputError when there is none."""
+        if not isinstance(name, str) or name not in self.body_groups:
+            known = ", ".join(sorted(self.body_groups)) or "none"
+            of_faces = isinstance(name, str) and name in self.groups
+            why = f" ({name} is a group of faces: make one of bodies)" if of_faces else ""
+            raise InputError(
+                f"mesh has no body group {shown(name)}{why}; its body groups are: {known}"
+            )
+        return self.body_groups[name]
 
     def bonded_by(self, shares: Mapping[str, float]) -> "Mesh":
         """Return the mesh with only a share of the area of some inner faces bonded.
@@ -210,6 +228,8 @@ def checked_mesh(
     source: FileName = "",
     weld_tolerance: float = 0.0,
     keep_coincident: bool = False,
+    *,
+    body_groups: Optional[Mapping[str, ArrayLike]] = None,
 ) -> Mesh:
     """Build a Mesh from arrays; repair and report small defects, refuse others.
 
@@ -258,7 +278,7 @@ def checked_mesh(
     made = object.__new__(Mesh)
     made.__dict__.update(notes=tuple(notes), source=str(source), unread=())
     made.__dict__.update(keep_coincident=keep_coincident)
-    made._hold(*parts)
+    made._hold(*parts, checked_body_groups(body_groups or {}, len(parts[1])))
     return made
 
 
