@@ -37,6 +37,7 @@ from taichi_dem.meshes import PAPER_BLOCK
 from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
 from taichi_dem.needed_effects import estimated_effects, needed_effects
 from taichi_dem.observers import At, Collector, Every, Observer, RunView
+from taichi_dem.output.receivers import Received, Receivers
 from taichi_dem.output.record import write_paraview
 from taichi_dem.scene import Scene
 from taichi_dem.simulate import simulate
@@ -66,6 +67,8 @@ __all__ = [
     "Observer",
     "Progress",
     "ProgressBar",
+    "Received",
+    "Receivers",
     "RunView",
     "Scene",
     "Simulation",

@@ -53,6 +53,19 @@ class Scene:
         of inner faces. Stiffness, damping, strength, cohesion and fracture energy per area of the
         face are that share of the material's; openings at the limits and the friction angle do not
         change.
+    velocity : array_like or mapping or function, optional
+        Velocities of the bodies at the start [m/s]: a vector for all, a vector by body group
+        (``Mesh.body_groups``; other bodies are at rest), a row for each body, (body_count, 3), or a
+        function of their centres [m] that returns such rows. None: at rest.
+    spin : array_like or mapping or function, optional
+        Spins likewise [rad/s]. Bodies that share a vector, all or a group, turn together as a rigid
+        body about the centre of their volume: the velocities of that turn are added to
+        ``velocity``. Rows are spins of the bodies about their own centres. None: no spin.
+
+    Attributes
+    ----------
+    initial_motion : mapping
+        Arrays "velocity" and "spin" that follow, (body_count, 3); empty for a scene at rest.
 
     Raises
     ------

@@ -11,7 +11,6 @@ from taichi_dem.mesh.content import is_solid, is_tetrahedron, tells_parts
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.split import owners_in
 
-
 #: Between the names of groups in that of a physical volume whose cells are in all of them.
 BOTH = "|"
 
@@ -50,7 +49,9 @@ def volumes_of(mesh: Mesh, first: int) -> tuple[list[str], np.ndarray]:
         return ["bodies"], np.full(mesh.body_count, first)
     for name in mesh.body_groups:
         if BOTH in name:
-            raise InputError(f"a body group must have a name without {BOTH!r} in a file, got {name!r}")
+            raise InputError(
+                f"a body group must have a name without {BOTH!r} in a file, got {name!r}"
+            )
     member = np.zeros((mesh.body_count, len(mesh.body_groups)), dtype=bool)
     for k, bodies in enumerate(mesh.body_groups.values()):
         member[bodies, k] = True

@@ -162,9 +162,7 @@ def parts_dropped(raw: Any, groups: Sequence[Unread]) -> list[str]:
 def others_dropped(raw: Any, groups: Sequence[Unread]) -> list[str]:
     """Sentences about groups that are not read and seldom matter; groups: ``unread_groups``."""
     others = [
-        f"{name} (of {kind})"
-        for name, kind in groups
-        if not _is_partial_set(raw, name, kind)
+        f"{name} (of {kind})" for name, kind in groups if not _is_partial_set(raw, name, kind)
     ]
     words = "only groups of faces and of solid cells are read, not"
     return [f"{words} {', '.join(others)}"] if others else []

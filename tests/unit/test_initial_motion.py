@@ -11,7 +11,7 @@ from taichi_dem.accuracy.job import Job
 from taichi_dem.accuracy.runs import Runs
 from taichi_dem.effects import SphereContact
 from taichi_dem.goals import body_displacement
-from taichi_dem.mesh.shapes import bar
+from taichi_dem.mesh.shapes import bar, placed_together
 from taichi_dem.outcome import outcome_of
 from taichi_dem.scene import outer_faces_warnings
 from taichi_dem.simulate import run_simulation
@@ -26,6 +26,11 @@ ROWS = np.random.default_rng(3).uniform(-1.0, 1.0, (2, COUNT, 3))
 
 def scene(**options):
     return Scene(BAR, CONCRETE, [], **options)
+
+
+def grouped(**options):
+    groups = {"a": [0, 1], "b": [1, 2]}
+    return Scene(replace(BAR, body_groups=groups), CONCRETE, [], **options)
 
 
 @pytest.fixture(scope="module")
@@ -94,6 +99,19 @@ def test_one_spin_turns_all_bodies_as_one_rigid_body():
     assert not rows["velocity"].any() and (rows["spin"] == spin).all()
 
 
+def test_body_groups_move_and_turn_each_for_itself():
+    two = placed_together({"a": (BAR, (0, 0, 0)), "b": (BAR, (1.0, 0, 0))})
+    spin = np.array([0.0, 0.0, 5.0])
+    made = Scene(two, CONCRETE, [], velocity={"a": (1, 0, 0)}, spin={"b": spin})
+    expected = [1.0, 0.0, 0.0], np.cross(spin, CENTRE - [0.1, 0.05, 0.05])
+    motion = made.initial_motion
+    assert (motion["velocity"][:COUNT] == expected[0]).all() and not motion["spin"][:COUNT].any()
+    np.testing.assert_allclose(motion["velocity"][COUNT:], expected[1], atol=1e-14)
+    rows = np.repeat([[1.0, 0, 0], [0, 0, 0]], COUNT, axis=0)
+    alike = Scene(two, CONCRETE, [], velocity=rows, spin={"b": spin}).initial_motion
+    assert alike["velocity"].tobytes() == motion["velocity"].tobytes()
+
+
 def test_a_scene_keeps_its_motion_for_another_mesh_and_at_rest_has_none():
     falls = scene(velocity=lambda x: np.stack([0 * x[:, 0], -x[:, 0], 0 * x[:, 0]], axis=1))
     longer = replace(falls, mesh=bar(0.4, 0.1, (4, 1, 1)))
@@ -110,6 +128,10 @@ REFUSED = {
     "flags": (lambda: scene(velocity=(True, False, True)), "velocity must be", "True"),
     "other rows": (lambda: scene(velocity=np.ones((5, 3))), f"each of {COUNT} bodies", "1."),
     "function": (lambda: scene(spin=lambda x: x[0]), "spin must be", f"{COUNT} bodies"),
+    "no group": (lambda: scene(velocity={"a": (1, 0, 0)}), "mesh has no body group 'a'"),
+    "group of faces": (lambda: scene(velocity={"left": (1, 0, 0)}), "'left' (left is a group of"),
+    "no vector": (lambda: grouped(spin={"a": 3.0}), "spin['a'] must be three finite", "3.0"),
+    "in two": (lambda: grouped(spin={"a": (1, 0, 0), "b": (1, 0, 0)}), "got body 1 in a and in b"),
     "fast": (lambda: scene(velocity=(2e4, 0, 0)), "velocity must be at most max_speed", "20000"),
 }
 
