@@ -10,10 +10,11 @@ from taichi_dem.effects.base import MANY, Effect
 from taichi_dem.effects.chosen import AUTO, LISTED, ChosenEffects, chosen_effects
 from taichi_dem.effects.roles import check_effect
 from taichi_dem.initial_motion import initial_motion
-from taichi_dem.kit.display import counted, in_brief
+from taichi_dem.kit.display import counted, embedded, in_brief, titled
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import length
-from taichi_dem.kit.validation import between, finite, positive, shown
+from taichi_dem.kit.pictures import png, write_picture
+from taichi_dem.kit.validation import FileName, between, finite, positive, shown
 from taichi_dem.materials import Material, softest_bond
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.parts import may_meet, parts_of
@@ -124,6 +125,16 @@ class Scene:
         effects = ", ".join(effect.name or type(effect).__name__ for effect in self.effects)
         words = f"effects {effects}" if effects else "no effects"
         return in_brief(self, counted(self.mesh.body_count, "body"), words)
+
+    def picture(self, path: FileName) -> None:
+        """Write a PNG picture of the outer faces, coloured by group, with what acts on each.
+
+        Raises InputError when it cannot be written.
+        """
+        write_picture(self, path)
+
+    def _repr_html_(self) -> str:
+        return titled(repr(self), embedded(png(self), "The mesh, coloured by group"))
 
     @property
     def on_demand(self) -> bool:

@@ -17,7 +17,9 @@ from taichi_dem.kit.validation import FileName, flag, shown, word
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.body_groups import checked_body_groups
 from taichi_dem.mesh.checked_groups import checked_groups
+from taichi_dem.mesh.mesh_methods import MeshMethods
 from taichi_dem.mesh.parts_in_files import parts_of
+from taichi_dem.mesh.sharing import refuse_bad_sharing
 from taichi_dem.mesh.weld import COINCIDENT, weld_labels
 
 #: Share of (longest edge)^3 below which a volume counts as zero, as it may be round-off.
@@ -31,7 +33,7 @@ _LEAST_EXTENT, _MOST_EXTENT = 1e-30, 1e30
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh:
+class Mesh(MeshMethods):
     """Tetrahedra and named groups of faces, as ``checked_mesh`` makes them; immutable.
 
     Made directly from arrays, a mesh is checked alike but not repaired. ``dataclasses.replace``
@@ -51,10 +53,12 @@ class Mesh:
     source : str, default ""
         Name of the file; ``""`` for a mesh built in memory.
     unread : tuple of tuple of (str, str), default ()
-        Groups of the file that are not of faces: pairs of name and what they are of.
+        Groups of the file that are not of faces or bodies: pairs of name and what they are of.
     keep_coincident : bool, default False
         Whether points that coincide stay apart, and with them the faces on them, as at a joint or a
         crack.
+    body_groups : mapping, optional
+        Numbers of bodies (n,) by name.
 
     Attributes
     ----------
@@ -294,7 +298,7 @@ def _checked(points, tetrahedra, groups, weld_tolerance, keep_coincident, notes)
     if not keep_coincident:
         _refuse_coincident(places)
     corners = _positive(places, corners, notes)
-    _refuse_bad_sharing(corners)
+    refuse_bad_sharing(corners)
     if keep_coincident:
         _check_coincident(places, corners, weld_tolerance, notes)
     return places, corners, *checked_groups(corners, faces, notes)
@@ -416,7 +420,7 @@ def _check_coincident(points, tetrahedra, weld_tolerance, notes):
         )
     pairs, _ = _coincident(points)
     if len(pairs):
-        _refuse_bad_sharing(geometry.components(len(points), pairs)[tetrahedra])
+        refuse_bad_sharing(geometry.components(len(points), pairs)[tetrahedra])
         count = len(np.unique(pairs))
         notes.append(f"kept {count} points apart that coincide with another: no bond joins them")
 
@@ -438,47 +442,8 @@ def _positive(points, tetrahedra, notes):
     return np.ascontiguousarray(tetrahedra, dtype=np.int32)
 
 
-def _refuse_bad_sharing(tetrahedra):
-    """Refuse repeated bodies, faces of three bodies and bodies that lie in each other."""
-    _, number, count = np.unique(
-        np.sort(tetrahedra, axis=1), axis=0, return_inverse=True, return_counts=True
-    )
-    repeated = np.flatnonzero(count[number.reshape(-1)] > 1)
-    if len(repeated):
-        twins = np.flatnonzero(number.reshape(-1) == number.reshape(-1)[repeated[0]])
-        raise InputError(f"tetrahedra {_listed(twins)} have the same four points")
-    face = geometry.face_numbers(geometry.all_faces(tetrahedra))
-    crowded = np.flatnonzero(np.bincount(face) > 2)
-    if len(crowded):
-        owners = np.flatnonzero(face == crowded[0]) // 4
-        raise InputError(
-            f"tetrahedra {_listed(owners)} share one face; at most two may "
-            f"({len(crowded)} such faces)"
-        )
-    _refuse_overlap(tetrahedra)
-
-
-def _refuse_overlap(tetrahedra):
-    """Refuse two bodies on the same side of their shared face."""
-    rows = geometry.shared_faces(tetrahedra)
-    first, second = (geometry.all_faces(tetrahedra)[rows[:, side]] for side in (0, 1))
-    start = np.argmax(second == first[:, :1], axis=1)
-    following = np.take_along_axis(second, ((start + 1) % 3)[:, None], axis=1)[:, 0]
-    bad = np.flatnonzero(following == first[:, 1])
-    if len(bad):
-        raise InputError(
-            f"tetrahedra {_listed(rows[bad[0]] // 4)} lie on the same side of the face they share"
-        )
-
-
 def _note_parts(tetrahedra, notes):
     """Say when the bodies are not all joined through shared faces."""
     parts = len(np.unique(parts_of(tetrahedra)))
     if parts > 1:
         notes.append(f"the mesh has {parts} parts that share no face with each other")
-
-
-def _listed(numbers):
-    """Numbers as "3, 5 and 9"."""
-    words = [str(int(k)) for k in numbers]
-    return " and ".join([", ".join(words[:-1]), words[-1]])

@@ -1,0 +1,241 @@
+"""Simple solids as meshes of tetrahedra of even size, without a mesh generator.
+
+All lengths in metres; x to the right, y up, z towards the viewer. ``element`` is the length of an
+edge; planes are met exactly, and round walls by polygons whose corners lie on them::
+
+    from taichi_dem import shapes
+
+    plate = shapes.plate(width=0.2, height=0.1, thickness=0.01, hole=0.03, element=0.01)
+    plate.picture("plate.png")
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Optional, Union
+
+import numpy as np
+
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import direction, finite, positive, shown
+from taichi_dem.mesh.drawn_out import drawn_out
+from taichi_dem.mesh.mesh import Mesh
+from taichi_dem.mesh.triangles import circle, divided
+
+#: Most elements of a mesh: ten million tetrahedra take some ten GiB to check.
+_MOST_BODIES = 10_000_000
+#: Tetrahedra in a cube of an element: 2.3 triangles in a square, three in a layer of 0.8.
+_PER_CUBE = 8.7
+#: Distance from a line within which a point lies on it, in elements.
+_ON = 1e-6
+
+
+def block(size: Union[float, Sequence[float]], *, element: float) -> Mesh:
+    """A box from the origin to (x, y, z) = ``size``.
+
+    Parameters
+    ----------
+    size : float or three floats [m]
+        Lengths along x, y and z; one number for a cube.
+    element : float [m]
+        Length of an edge, at most the smallest of them.
+
+    Returns
+    -------
+    Mesh
+        Groups left, right (x), bottom, top (y), back, front (z).
+
+    Raises
+    ------
+    InputError
+        For a length that is no positive number, or an element that does not fit.
+
+    Example
+    -------
+    ``shapes.block((0.4, 0.1, 0.1), element=0.025)``
+    """
+    lengths = (size,) * 3 if finite(size) else direction("size", size)
+    x, y, z = (positive("size", length) for length in lengths)
+    element = _element(element, min(x, y, z), x * y * z)
+    return drawn_out([divided(_corners(x, y), element)], z, element, _box_sides(x, y, element))
+
+
+def beam(*, length: float, width: float, height: float, element: float) -> Mesh:
+    """A beam along x from the origin: ``length`` along x, ``height`` along y, ``width`` along z.
+
+    Groups left, right (its ends), bottom, top, back, front. Else as ``block``.
+    """
+    given = {"length": length, "height": height, "width": width}
+    return block([positive(name, value) for name, value in given.items()], element=element)
+
+
+def cylinder(*, radius: float, height: float, element: float) -> Mesh:
+    """A cylinder that stands on the plane y = 0, with the y axis as its axis.
+
+    Parameters
+    ----------
+    radius, height : float [m]
+    element : float [m]
+        Length of an edge, at most the radius and the height.
+
+    Returns
+    -------
+    Mesh
+        Groups bottom, top (y), side. The side is a prism: its volume lacks a share of
+        2 (pi / n)^2 / 3, with n its chords.
+
+    Raises
+    ------
+    InputError
+        For a length that is no positive number, or an element that does not fit.
+    """
+    radius, height = positive("radius", radius), positive("height", height)
+    element = _element(element, min(radius, height), np.pi * radius**2 * height)
+    sides = {"side": _on_circle((0.0, 0.0), 2.0 * radius, element)}
+    made = drawn_out([circle((0.0, 0.0), 2.0 * radius, element)], height, element, sides)
+    made = made.moved(turned=(-90.0, 0.0, 0.0), about=(0.0, 0.0, 0.0))
+    names = {"back": "bottom", "front": "top"}
+    return replace(made, groups={names.get(k, k): faces for k, faces in made.groups.items()})
+
+
+def plate(
+    *,
+    width: float,
+    height: float,
+    thickness: float,
+    element: float,
+    hole: Union[float, Sequence[float], None] = None,
+    notch: Optional[Sequence[float]] = None,
+) -> Mesh:
+    """A plate from the origin, ``width`` along x, ``height`` along y, ``thickness`` along z.
+
+    Parameters
+    ----------
+    width, height, thickness : float [m]
+    element : float [m]
+        Length of an edge, at most the width, the height and the thickness.
+    hole : float or (x, y, diameter) [m], optional
+        A round hole through the thickness; one number is the diameter of one in the middle.
+    notch : (x, depth, opening) [m], optional
+        A slot from the bottom edge upward, its middle at x; at least half an element wide.
+
+    Returns
+    -------
+    Mesh
+        Groups left, right (x), bottom, top (y), back, front (z), hole and notch where they are.
+
+    Raises
+    ------
+    InputError
+        For a length that is no positive number, an element that does not fit, or a hole or notch
+        that does not leave an element of wall around it.
+
+    Example
+    -------
+    ``shapes.plate(width=0.2, height=0.1, thickness=0.01, hole=(0.15, 0.05, 0.02), element=0.01)``
+    """
+    given = {"width": width, "height": height, "thickness": thickness}
+    x, y, z = (positive(name, value) for name, value in given.items())
+    element = _element(element, min(x, y, z), x * y * z)
+    outline, sides = _corners(x, y), _box_sides(x, y, element)
+    loops = []
+    if hole is not None:
+        middle = _checked_hole(hole, x, y, element)
+        loops.append(circle(middle[:2], middle[2], element)[::-1])
+        sides["hole"] = _on_circle(middle[:2], middle[2], element)
+    if notch is not None:
+        slot = _checked_notch(notch, x, y, element)
+        _check_apart(slot, loops, element)
+        outline = [outline[0], *slot, *outline[1:]]
+        sides["notch"] = _on_slot(slot, element)
+    return drawn_out([divided(outline, element), *loops], z, element, sides)
+
+
+def _element(element, smallest, volume):
+    """Length of an edge [m], checked against the shape."""
+    element = positive("element", element)
+    if element > smallest * (1.0 + _ON):
+        raise InputError(
+            f"element must be at most the smallest length of the shape, {smallest:g} m, "
+            f"got {element:g}"
+        )
+    if _PER_CUBE * volume / element**3 > _MOST_BODIES:
+        least = (_PER_CUBE * volume / _MOST_BODIES) ** (1.0 / 3.0)
+        raise InputError(
+            f"element must be at least {least:.3g} m, for {_MOST_BODIES} tetrahedra at most, "
+            f"got {element:g}"
+        )
+    return element
+
+
+def _corners(x, y):
+    """Corners of a rectangle, anticlockwise from the origin."""
+    return [(0.0, 0.0), (x, 0.0), (x, y), (0.0, y)]
+
+
+def _box_sides(x, y, element):
+    """Sides of a rectangle by name, for ``drawn_out``."""
+    near = _ON * element
+    return {
+        "left": lambda p: p[..., 0] < near,
+        "right": lambda p: p[..., 0] > x - near,
+        "bottom": lambda p: p[..., 1] < near,
+        "top": lambda p: p[..., 1] > y - near,
+    }
+
+
+def _on_circle(middle, diameter, element):
+    def on(points):
+        away = np.sqrt(((points - np.asarray(middle)) ** 2).sum(axis=-1))
+        return np.abs(away - 0.5 * diameter) < _ON * element
+
+    return on
+
+
+def _on_slot(slot, element):
+    (left, _), (_, depth), (right, _) = slot[0], slot[1], slot[2]
+    near = _ON * element
+
+    def on(points):
+        x, y = points[..., 0], points[..., 1]
+        walls = (np.abs(x - left) < near) | (np.abs(x - right) < near)
+        end = np.abs(y - depth) < near
+        return (x > left - near) & (x < right + near) & (y < depth + near) & (walls | end)
+
+    return on
+
+
+def _checked_hole(hole, x, y, element):
+    """Middle and diameter of a hole [m], which leaves an element on all sides."""
+    given = (0.5 * x, 0.5 * y, hole) if finite(hole) else hole
+    across, up, diameter = direction("hole", given)
+    positive("diameter of the hole", diameter)
+    room = min(across, up, x - across, y - up) - 0.5 * diameter
+    if room < element * (1.0 - _ON) or diameter < element:
+        raise InputError(
+            f"hole must be (x, y, diameter) with a diameter of an element, {element:g} m, at least "
+            f"and as much between it and the edges, got {shown(hole)}"
+        )
+    return across, up, diameter
+
+
+def _checked_notch(notch, x, y, element):
+    """Corners of a slot from the bottom edge, clockwise about its empty inside."""
+    middle, depth, opening = direction("notch", notch)
+    left, right = middle - 0.5 * opening, middle + 0.5 * opening
+    room = min(left, x - right, y - depth, depth) - element
+    if not opening >= 0.5 * element or room < -_ON * element:
+        raise InputError(
+            f"notch must be (x, depth, opening) with a depth of an element, {element:g} m, at "
+            f"least, half of one as opening, and one between it and the edges, got {shown(notch)}"
+        )
+    return [(left, 0.0), (left, depth), (right, depth), (right, 0.0)]
+
+
+def _check_apart(slot, loops, element):
+    """Raise InputError for a notch that comes nearer than an element to a hole."""
+    (left, _), (_, depth), (right, _) = slot[0], slot[1], slot[2]
+    for loop in loops:
+        aside = np.maximum(np.maximum(left - loop[:, 0], loop[:, 0] - right), 0.0)
+        above = np.maximum(loop[:, 1] - depth, 0.0)
+        if (aside**2 + above**2).min() < element**2 * (1.0 - _ON):
+            raise InputError(f"notch must stay an element, {element:g} m, away from the hole")
