@@ -68,7 +68,8 @@ def _rows(name, given, mesh, centre) -> tuple[np.ndarray, list[_Shared]]:
 
 def _by_group(name, given, mesh):
     """The same from vectors by body group; bodies in none are at rest."""
-    rows, taken, shared = np.zeros((mesh.body_count, 3)), {}, []
+    rows, shared = np.zeros((mesh.body_count, 3)), []
+    taken: dict[int, str] = {}
     for group, value in given.items():
         bodies, vector = mesh.group_bodies(group), np.array(direction(f"{name}[{group!r}]", value))
         for body in bodies.tolist():

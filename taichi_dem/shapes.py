@@ -16,8 +16,9 @@ from typing import Optional, Union
 import numpy as np
 
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import direction, finite, positive, shown
+from taichi_dem.kit.validation import FileName, direction, finite, positive, shown
 from taichi_dem.mesh.drawn_out import drawn_out
+from taichi_dem.mesh.filled import filled_surface
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.triangles import circle, divided
 
@@ -148,6 +149,38 @@ def plate(
         outline = [outline[0], *slot, *outline[1:]]
         sides["notch"] = _on_slot(slot, element)
     return drawn_out([divided(outline, element), *loops], z, element, sides)
+
+
+def from_surface(path: FileName, *, element: float, scale: float = 1.0) -> Mesh:
+    """The solid inside a drawn surface, filled with tetrahedra by Gmsh.
+
+    Parameters
+    ----------
+    path : str
+        An STL file, or a STEP file (.step, .stp) of one solid or several.
+    element : float [m]
+        Length of an edge.
+    scale : float [m]
+        Length of one unit of an STL file, which has none, such as 0.001 for mm. Those of a STEP file
+        are converted to metres.
+
+    Returns
+    -------
+    Mesh
+        A group for each surface: of a name where the STEP file has one, else surface_1, surface_2,
+        ...; surfaces of an STL end at edges of more than 40 degrees.
+
+    Raises
+    ------
+    InputError
+        For a file that is missing, cannot be read, or is not closed, and where gmsh is not
+        installed: ``pip install "taichi-dem[mesh]"``.
+
+    Example
+    -------
+    ``shapes.from_surface("bracket.stl", element=0.005, scale=0.001)``
+    """
+    return filled_surface(path, element, scale)
 
 
 def _element(element, smallest, volume):
