@@ -25,12 +25,12 @@ def initial_motion(mesh: Mesh, velocity: Any, spin: Any) -> dict[str, np.ndarray
     mesh : Mesh
     velocity, spin : options of a ``Scene`` [m/s], [rad/s]
 
-    Returns:
+    Returns
     -------
     dict
         Arrays "velocity" [m/s] and "spin" [rad/s], (body_count, 3); empty for bodies at rest.
 
-    Raises:
+    Raises
     ------
     InputError
         For anything that gives no three finite numbers for each body, an unknown body group, and

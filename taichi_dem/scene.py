@@ -129,7 +129,15 @@ class Scene:
     def picture(self, path: FileName) -> None:
         """Write a PNG picture of the outer faces, coloured by group, with what acts on each.
 
-        Raises InputError when it cannot be written.
+        Parameters
+        ----------
+        path : path
+            File; its name ends in .png.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written.
         """
         write_picture(self, path)
 

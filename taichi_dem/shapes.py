@@ -31,14 +31,14 @@ _ON = 1e-6
 
 
 def block(size: Union[float, Sequence[float]], *, element: float) -> Mesh:
-    """A box from the origin to (x, y, z) = ``size``.
+    """Make a box from the origin to (x, y, z) = ``size``.
 
     Parameters
     ----------
-    size : float or three floats [m]
-        Lengths along x, y and z; one number for a cube.
-    element : float [m]
-        Length of an edge, at most the smallest of them.
+    size : float or sequence of float
+        Lengths along x, y and z [m]; one number for a cube.
+    element : float
+        Length of an edge [m], at most the smallest of them.
 
     Returns
     -------
@@ -48,11 +48,12 @@ def block(size: Union[float, Sequence[float]], *, element: float) -> Mesh:
     Raises
     ------
     InputError
-        For a length that is no positive number, or an element that does not fit.
+        A length is no positive number, or an element does not fit.
 
-    Example
-    -------
-    ``shapes.block((0.4, 0.1, 0.1), element=0.025)``
+    Examples
+    --------
+    >>> sorted(block((0.4, 0.1, 0.1), element=0.05).groups)
+    ['back', 'bottom', 'front', 'left', 'right', 'top']
     """
     lengths = (size,) * 3 if finite(size) else direction("size", size)
     x, y, z = (positive("size", length) for length in lengths)
@@ -61,33 +62,68 @@ def block(size: Union[float, Sequence[float]], *, element: float) -> Mesh:
 
 
 def beam(*, length: float, width: float, height: float, element: float) -> Mesh:
-    """A beam along x from the origin: ``length`` along x, ``height`` along y, ``width`` along z.
+    """Make a beam along x from the origin.
 
-    Groups left, right (its ends), bottom, top, back, front. Else as ``block``.
+    Parameters
+    ----------
+    length : float
+        Length along x [m].
+    width : float
+        Width along z [m].
+    height : float
+        Height along y [m].
+    element : float
+        Length of an edge [m], at most the smallest of them.
+
+    Returns
+    -------
+    Mesh
+        Groups left, right (its ends), bottom, top, back, front.
+
+    Raises
+    ------
+    InputError
+        A length is no positive number, or an element does not fit.
+
+    Examples
+    --------
+    >>> beam(length=1.0, width=0.1, height=0.1, element=0.1).body_count
+    60
     """
     given = {"length": length, "height": height, "width": width}
     return block([positive(name, value) for name, value in given.items()], element=element)
 
 
 def cylinder(*, radius: float, height: float, element: float) -> Mesh:
-    """A cylinder that stands on the plane y = 0, with the y axis as its axis.
+    """Make a cylinder that stands on the plane y = 0, with the y axis as its axis.
 
     Parameters
     ----------
-    radius, height : float [m]
-    element : float [m]
-        Length of an edge, at most the radius and the height.
+    radius : float
+        Radius [m].
+    height : float
+        Height [m].
+    element : float
+        Length of an edge [m], at most the radius and the height.
 
     Returns
     -------
     Mesh
-        Groups bottom, top (y), side. The side is a prism: its volume lacks a share of
-        2 (pi / n)^2 / 3, with n its chords.
+        Groups bottom, top (y), side.
 
     Raises
     ------
     InputError
-        For a length that is no positive number, or an element that does not fit.
+        A length is no positive number, or an element does not fit.
+
+    Notes
+    -----
+    The side is a prism of n chords: its volume lacks a share of 2 (pi / n)^2 / 3.
+
+    Examples
+    --------
+    >>> sorted(cylinder(radius=0.05, height=0.1, element=0.02).groups)
+    ['bottom', 'side', 'top']
     """
     radius, height = positive("radius", radius), positive("height", height)
     element = _element(element, min(radius, height), np.pi * radius**2 * height)
@@ -107,17 +143,24 @@ def plate(
     hole: Union[float, Sequence[float], None] = None,
     notch: Optional[Sequence[float]] = None,
 ) -> Mesh:
-    """A plate from the origin, ``width`` along x, ``height`` along y, ``thickness`` along z.
+    """Make a plate from the origin, with a hole or a notch where asked for.
 
     Parameters
     ----------
-    width, height, thickness : float [m]
-    element : float [m]
-        Length of an edge, at most the width, the height and the thickness.
-    hole : float or (x, y, diameter) [m], optional
-        A round hole through the thickness; one number is the diameter of one in the middle.
-    notch : (x, depth, opening) [m], optional
-        A slot from the bottom edge upward, its middle at x; at least half an element wide.
+    width : float
+        Width along x [m].
+    height : float
+        Height along y [m].
+    thickness : float
+        Thickness along z [m].
+    element : float
+        Length of an edge [m], at most the width, the height and the thickness.
+    hole : float or sequence of float, optional
+        Centre and diameter (x, y, diameter) of a round hole through the thickness [m]; one number
+        is the diameter of a hole in the middle.
+    notch : sequence of float, optional
+        Middle, depth and opening (x, depth, opening) of a slot from the bottom edge upward [m]; at
+        least half an element wide.
 
     Returns
     -------
@@ -127,12 +170,14 @@ def plate(
     Raises
     ------
     InputError
-        For a length that is no positive number, an element that does not fit, or a hole or notch
-        that does not leave an element of wall around it.
+        A length is no positive number, an element does not fit, or a hole or notch does not leave
+        an element of wall around it.
 
-    Example
-    -------
-    ``shapes.plate(width=0.2, height=0.1, thickness=0.01, hole=(0.15, 0.05, 0.02), element=0.01)``
+    Examples
+    --------
+    >>> drilled = plate(width=0.2, height=0.1, thickness=0.01, hole=0.03, element=0.01)
+    >>> "hole" in drilled.groups
+    True
     """
     given = {"width": width, "height": height, "thickness": thickness}
     x, y, z = (positive(name, value) for name, value in given.items())
@@ -152,33 +197,33 @@ def plate(
 
 
 def from_surface(path: FileName, *, element: float, scale: float = 1.0) -> Mesh:
-    """The solid inside a drawn surface, filled with tetrahedra by Gmsh.
+    """Fill a drawn surface with tetrahedra by Gmsh.
 
     Parameters
     ----------
-    path : str
+    path : path
         An STL file, or a STEP file (.step, .stp) of one solid or several.
-    element : float [m]
-        Length of an edge.
-    scale : float [m]
-        Length of one unit of an STL file, which has none, such as 0.001 for mm. Those of a STEP file
-        are converted to metres.
+    element : float
+        Length of an edge [m].
+    scale : float, default 1.0
+        Length of one unit of an STL file, which has none, such as 0.001 for mm [m]. Lengths of a
+        STEP file are converted to metres.
 
     Returns
     -------
     Mesh
-        A group for each surface: of a name where the STEP file has one, else surface_1, surface_2,
-        ...; surfaces of an STL end at edges of more than 40 degrees.
+        A group for each surface: of its name where the STEP file has one, else surface_1,
+        surface_2, ...; surfaces of an STL end at edges of more than 40 degrees.
 
     Raises
     ------
     InputError
-        For a file that is missing, cannot be read, or is not closed, and where gmsh is not
-        installed: ``pip install "taichi-dem[mesh]"``.
+        The file is missing, cannot be read, or is not closed, or gmsh is not installed:
+        ``pip install "taichi-dem[mesh]"``.
 
-    Example
-    -------
-    ``shapes.from_surface("bracket.stl", element=0.005, scale=0.001)``
+    Examples
+    --------
+    >>> bracket = from_surface("bracket.stl", element=0.005, scale=0.001)  # doctest: +SKIP
     """
     return filled_surface(path, element, scale)
 

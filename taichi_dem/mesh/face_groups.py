@@ -38,11 +38,11 @@ def with_body_group(mesh: Mesh, name: str, chosen: Choice) -> Mesh:
     chosen : function
         Of the centres of the bodies [m], (body_count, 3); returns body_count truth values.
 
-    Returns:
+    Returns
     -------
     Mesh
 
-    Raises:
+    Raises
     ------
     InputError
         For a name that is taken, a choice of no body, or other values.

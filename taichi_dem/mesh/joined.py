@@ -20,15 +20,15 @@ _WELD = 1e-6
 
 
 def join(*meshes: Mesh, names: Optional[Sequence[str]] = None, bonded: bool = False) -> Mesh:
-    """Several meshes as one.
+    """Make one mesh of several.
 
     Parameters
     ----------
     *meshes : Mesh
-        At the places where they are (``Mesh.moved``); bodies keep this order.
-    names : list of str, optional
-        Of the meshes: first, second, ... by default.
-    bonded : bool
+        Meshes at the places where they are (``Mesh.moved``); bodies keep this order.
+    names : sequence of str, optional
+        Names of the meshes: first, second, ... by default.
+    bonded : bool, default False
         Whether bonds join the meshes where faces of theirs match, corner by corner. Without it they
         are apart, also where they touch.
 
@@ -42,12 +42,15 @@ def join(*meshes: Mesh, names: Optional[Sequence[str]] = None, bonded: bool = Fa
     Raises
     ------
     InputError
-        For anything but meshes and as many different names, or, where they are to be bonded,
-        meshes that share no face.
+        There are fewer than two meshes, or other than as many different names, or meshes that are
+        to be bonded share no face.
 
-    Example
-    -------
-    ``join(beam, block.moved(by=(0.4, 0.2, 0)), names=["beam", "weight"])``
+    Examples
+    --------
+    >>> cube = shapes.block(0.1, element=0.1)
+    >>> two = join(cube, cube.moved(by=(0.2, 0.0, 0.0)), names=["left", "right"])
+    >>> sorted(two.body_groups)
+    ['left', 'right']
     """
     for place, mesh in enumerate(meshes):
         instance(f"mesh {place}", mesh, Mesh)

@@ -166,7 +166,23 @@ class Mesh(MeshMethods):
         return self.groups[name]
 
     def group_bodies(self, name: str) -> np.ndarray:
-        """Numbers of the bodies in the body group ``name``, (n,); InputError when there is none."""
+        """Return the numbers of the bodies of a body group.
+
+        Parameters
+        ----------
+        name : str
+            Name of the group.
+
+        Returns
+        -------
+        ndarray
+            Numbers in rising order, (n,).
+
+        Raises
+        ------
+        InputError
+            The mesh has no such group of bodies.
+        """
         if not isinstance(name, str) or name not in self.body_groups:
             known = ", ".join(sorted(self.body_groups)) or "none"
             of_faces = isinstance(name, str) and name in self.groups
@@ -254,6 +270,8 @@ def checked_mesh(
         Accept distinct points at one place. Faces on them are free surfaces, as of two blocks that
         touch, a joint or a crack, and meet by the contact of outer faces. Without it such points
         are refused, as bodies that seem joined there would not be bonded.
+    body_groups : mapping, optional
+        Numbers of tetrahedra (k,) by name.
 
     Returns
     -------

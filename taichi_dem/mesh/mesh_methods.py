@@ -20,23 +20,30 @@ class MeshMethods:
     """What ``Mesh`` inherits."""
 
     def group(self, name: str, chosen: Callable[[np.ndarray], Any]) -> "Mesh":
-        """The mesh with one more group: outer faces chosen by their centres.
+        """Return the mesh with one more group: outer faces chosen by their centres.
 
         Parameters
         ----------
         name : str
-            Of the new group.
-        chosen : function
-            Of the centres of all outer faces [m], (n, 3); returns n truth values.
+            Name of the new group.
+        chosen : callable
+            Function of the centres of all outer faces [m], (n, 3), that returns n truth values.
+
+        Returns
+        -------
+        Mesh
+            The mesh with the group.
 
         Raises
         ------
         InputError
-            For a name that is taken, a choice of no face, or other values.
+            The name is taken, no face is chosen, or other values are returned.
 
-        Example
-        -------
-        ``mesh.group("top", lambda x: x[:, 2] > 0.99)``
+        Examples
+        --------
+        >>> mesh = read_mesh(PAPER_BLOCK).group("high", lambda x: x[:, 1] > 1.9)
+        >>> "high" in mesh.groups
+        True
         """
         from taichi_dem.mesh.face_groups import with_outer_group
 
@@ -44,7 +51,25 @@ class MeshMethods:
         return with_outer_group(mesh, name, chosen)
 
     def body_group(self, name: str, chosen: Callable[[np.ndarray], Any]) -> "Mesh":
-        """The mesh with one more group of bodies, chosen by their centres; else as ``group``."""
+        """Return the mesh with one more group of bodies, chosen by their centres.
+
+        Parameters
+        ----------
+        name : str
+            Name of the new group.
+        chosen : callable
+            Function of the centres of all bodies [m], (n, 3), that returns n truth values.
+
+        Returns
+        -------
+        Mesh
+            The mesh with the group.
+
+        Raises
+        ------
+        InputError
+            The name is taken, no body is chosen, or other values are returned.
+        """
         from taichi_dem.mesh.face_groups import with_body_group
 
         mesh: Any = self
@@ -57,22 +82,27 @@ class MeshMethods:
         turned: Sequence[float] = (0.0, 0.0, 0.0),
         about: Optional[Sequence[float]] = None,
     ) -> "Mesh":
-        """The mesh at another place: turned, then shifted.
+        """Return the mesh at another place: turned, then shifted.
 
         Parameters
         ----------
-        by : three numbers [m]
-            The shift.
-        turned : three numbers [degrees]
-            Along the axis of the turn, right-handed, and as long as its angle: (0, 0, 90) turns x
-            into y.
-        about : three numbers [m], optional
-            A point on the axis; the middle of the mesh's box by default.
+        by : sequence of float, default (0.0, 0.0, 0.0)
+            Shift [m].
+        turned : sequence of float, default (0.0, 0.0, 0.0)
+            Vector along the axis of the turn, right-handed, and as long as its angle [degrees]:
+            (0, 0, 90) turns x into y.
+        about : sequence of float, optional
+            Point on the axis [m]; the middle of the mesh's box by default.
+
+        Returns
+        -------
+        Mesh
+            The moved mesh, with the same groups.
 
         Raises
         ------
         InputError
-            For anything but three finite numbers.
+            A value is not three finite numbers.
         """
         from dataclasses import replace
 
@@ -86,9 +116,17 @@ class MeshMethods:
         return replace(mesh, points=points + shift)
 
     def picture(self, path: FileName) -> None:
-        """Write a PNG picture of the outer faces, coloured by group; axes in m.
+        """Write a PNG picture of the outer faces, coloured by group, with axes in m.
 
-        Raises InputError when it cannot be written.
+        Parameters
+        ----------
+        path : path
+            File; its name ends in .png.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written.
         """
         pictures.write_picture(self, path)
 

@@ -19,8 +19,18 @@ from taichi_dem.scene import Scene
 class Received:
     """Motion of a point over time.
 
-    point : (3,) where it is at the start [m]. body : number of the body that holds it.
-    time_s : (k,) [s]. displacement : (k, 3) [m]. velocity : (k, 3) [m/s].
+    Parameters
+    ----------
+    point : tuple of float
+        Place at the start [m], (3,).
+    body : int
+        Number of the body that holds it.
+    time_s : ndarray
+        Times [s], (k,).
+    displacement : ndarray
+        Displacements [m], (k, 3).
+    velocity : ndarray
+        Velocities [m/s], (k, 3).
     """
 
     point: tuple[float, ...]
@@ -40,24 +50,25 @@ class Receivers:
 
     Parameters
     ----------
-    points : dict
-        Name of each receiver to its place (x, y, z) at the start [m].
-    when : Every or At
-        When they are read; with every row of the time series by default.
+    points : mapping
+        Place (x, y, z) of each receiver at the start [m], by its name.
+    when : Every or At, optional
+        Times of the readings; those of the time series by default.
 
-    Raises:
+    Raises
     ------
     InputError
-        For a name or place that is none; before a run, for a point in no body of its mesh.
+        A name or place is none.
 
-    Notes:
+    Notes
     -----
     ``result.receivers[name]`` holds what a run gave, a ``Received``, and ``result.write`` leaves
-    receivers.csv. After a resume, from there on.
+    receivers.csv. A resumed run gives what followed.
 
-    Example:
-    -------
-    ``simulate(..., observers=[Receivers({"far": (1.9, 1.0, 0.1)}, when=Every(time_s=1e-6))])``
+    Examples
+    --------
+    >>> Receivers({"far": (1.9, 1.0, 0.1)}, when=Every(time_s=1e-6)).points
+    {'far': (1.9, 1.0, 0.1)}
     """
 
     def __init__(
@@ -79,13 +90,30 @@ class Receivers:
         return in_brief(self, ", ".join(self.points), repr(self.when))
 
     def check_scene(self, scene: Scene) -> None:
-        """Find the bodies that hold the points, and forget an earlier run; InputError for none."""
+        """Find the bodies that hold the points, and forget an earlier run.
+
+        Parameters
+        ----------
+        scene : Scene
+            Scene of the run.
+
+        Raises
+        ------
+        InputError
+            A point is in no body of the mesh.
+        """
         places = self.points.items()
         found = [body_at(scene.mesh, f"receiver {name}", np.array(at)) for name, at in places]
         self._bodies, self._rows = np.array(found), []
 
     def observe(self, view: RunView) -> None:
-        """Keep displacements and velocities of the points."""
+        """Keep displacements and velocities of the points.
+
+        Parameters
+        ----------
+        view : RunView
+            View of the run.
+        """
         motion, bodies = view.motion(), self._bodies
         centre = view.model.centre[bodies]
         arm = np.array(list(self.points.values())) - centre
@@ -95,7 +123,13 @@ class Receivers:
         self._rows.append((view.time_s, moved, velocity))
 
     def received(self) -> dict[str, Received]:
-        """What was kept so far, by name."""
+        """Return what was kept so far.
+
+        Returns
+        -------
+        dict
+            A ``Received`` by the name of its receiver.
+        """
         shape = len(self._rows), len(self.points), 3
         times = np.array([time_s for time_s, _, _ in self._rows])
         moved = np.array([moved for _, moved, _ in self._rows]).reshape(shape)
