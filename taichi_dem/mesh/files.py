@@ -79,11 +79,12 @@ def read_mesh(
     Notes
     -----
     Groups come from Gmsh's physical surfaces ("physical_TAG" where they have no name); in other
-    formats from integer data on triangles, as "data name_value". Elements of higher order are read
-    as linear ones. Hexahedra, prisms and pyramids are cut into tetrahedra after welding. Groups of
-    points, lines and volumes are not read. A UserWarning tells of what may change results: parts of
-    other materials, Abaqus sets and surfaces that are not read, cells of types that meshio does not
-    know, and cells that meet but share no face.
+    formats from integer data on triangles, as "data name_value". Groups of bodies come from Gmsh's
+    physical volumes; in other formats from sets of solid cells and integer data on them. Elements
+    of higher order are read as linear ones. Hexahedra, prisms and pyramids are cut into tetrahedra
+    after welding. Groups of points and lines are not read. A UserWarning tells of what may change
+    results: Abaqus sets and surfaces that are not read, cells of types that meshio does not know,
+    and cells that meet but share no face.
 
     Examples
     --------

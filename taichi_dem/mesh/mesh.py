@@ -53,12 +53,12 @@ class Mesh(MeshMethods):
     source : str, default ""
         Name of the file; ``""`` for a mesh built in memory.
     unread : tuple of tuple of (str, str), default ()
-        Groups of the file that are not of faces or bodies: pairs of name and what they are of.
+        Groups of the file that are neither of faces nor of bodies: pairs of name and kind.
     keep_coincident : bool, default False
         Whether points that coincide stay apart, and with them the faces on them, as at a joint or a
         crack.
     body_groups : mapping, optional
-        Numbers of bodies (n,) by name.
+        Numbers of bodies (n,) by name, in rising order, as for ``Scene(materials=...)``.
 
     Attributes
     ----------
@@ -94,7 +94,7 @@ class Mesh(MeshMethods):
         flag("keep_coincident", self.keep_coincident)
         given = self.points, self.tetrahedra, self.groups, 0.0
         parts = _checked(*given, self.keep_coincident, notes)
-        self._hold(*parts, checked_body_groups(self.body_groups, len(parts[1])))
+        self._hold(parts, checked_body_groups(self.body_groups, len(parts[1])))
         mended = [note for note in notes if note.split()[0] in _MENDING]
         if mended:
             raise InputError(f"a Mesh takes what checked_mesh gives, which here {mended[0]}")
@@ -103,8 +103,9 @@ class Mesh(MeshMethods):
     bonded_shares: ClassVar[tuple[tuple[str, float], ...]] = ()
     inner_groups: ClassVar[tuple[str, ...]] = ()
 
-    def _hold(self, points, tetrahedra, groups, inner_groups, body_groups):
-        """Keep arrays that cannot be written to."""
+    def _hold(self, parts, body_groups):
+        """Keep arrays that cannot be written to; parts: what ``_checked`` gives."""
+        points, tetrahedra, groups, inner_groups = parts
         object.__setattr__(self, "inner_groups", inner_groups)
         for array in (points, tetrahedra, *groups.values(), *body_groups.values()):
             array.setflags(write=False)
@@ -119,8 +120,8 @@ class Mesh(MeshMethods):
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
-        groups = self.groups, self.inner_groups, self.body_groups
-        self._hold(self.points, self.tetrahedra, *groups)
+        parts = self.points, self.tetrahedra, self.groups, self.inner_groups
+        self._hold(parts, self.body_groups)
 
     def __repr__(self):
         groups = f"groups {', '.join(self.groups)}" if self.groups else "no groups"
@@ -166,22 +167,22 @@ class Mesh(MeshMethods):
         return self.groups[name]
 
     def group_bodies(self, name: str) -> np.ndarray:
-        """Return the numbers of the bodies of a body group.
+        """Bodies of a group.
 
         Parameters
         ----------
         name : str
-            Name of the group.
+            Name of the body group.
 
         Returns
         -------
         ndarray
-            Numbers in rising order, (n,).
+            Numbers of bodies, shape (n,).
 
         Raises
         ------
         InputError
-            The mesh has no such group of bodies.
+            There is no such group.
         """
         if not isinstance(name, str) or name not in self.body_groups:
             known = ", ".join(sorted(self.body_groups)) or "none"
@@ -300,7 +301,7 @@ def checked_mesh(
     made = object.__new__(Mesh)
     made.__dict__.update(notes=tuple(notes), source=str(source), unread=())
     made.__dict__.update(keep_coincident=keep_coincident)
-    made._hold(*parts, checked_body_groups(body_groups or {}, len(parts[1])))
+    made._hold(parts, checked_body_groups(body_groups or {}, len(parts[1])))
     return made
 
 

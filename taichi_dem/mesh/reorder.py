@@ -27,7 +27,7 @@ def in_space_order(mesh: Mesh) -> Mesh:
     Returns
     -------
     Mesh
-        The same bodies with other numbers; points and groups stay.
+        The same bodies with other numbers; points and groups of faces stay, body groups follow.
 
     Notes
     -----

@@ -99,8 +99,8 @@ def with_moved_nodes(mesh: Mesh, most: ArrayLike, seed: int) -> Mesh:
     moved = np.asarray(most) * np.random.default_rng(seed).uniform(-1.0, 1.0, mesh.points.shape)
     near = 1e-9 * extent
     moved[(mesh.points < low + near) | (mesh.points > low + extent - near)] = 0.0
-    named = {"body_groups": mesh.body_groups}
-    return checked_mesh(mesh.points + moved, mesh.tetrahedra, dict(mesh.groups), **named)
+    points, groups = mesh.points + moved, dict(mesh.groups)
+    return checked_mesh(points, mesh.tetrahedra, groups, body_groups=mesh.body_groups)
 
 
 def placed_together(parts: dict, keep_coincident: bool = False) -> Mesh:
@@ -127,7 +127,8 @@ def placed_together(parts: dict, keep_coincident: bool = False) -> Mesh:
 
 def _bodies_together(parts):
     """Body groups of ``placed_together``."""
-    groups, first = {}, 0
+    groups: dict[str, np.ndarray] = {}
+    first = 0
     for name, mesh in parts.items():
         for group, bodies in mesh.body_groups.items():
             for key in (group, f"{name}_{group}"):
@@ -145,8 +146,8 @@ def mirrored_copies(mesh: Mesh, copies: int) -> Mesh:
     """Copies of a block one behind the other along z, each the mirror image of the one before.
 
     mesh: fills 0 to its depth along z, with flat ends in the groups back (z = 0) and front; as
-    mirror images meet, the faces of both match and bond. Groups, of faces and bodies: as in the mesh;
-    back and front are those of the ends. Raises InputError as ``checked_mesh``.
+    mirror images meet, the faces of both match and bond. Groups, of faces and bodies: as in the
+    mesh; back and front are those of the ends. Raises InputError as ``checked_mesh``.
     """
     copies = whole("copies", copies, 1, _MOST_BOXES)
     depth = float(mesh.points[:, 2].max())

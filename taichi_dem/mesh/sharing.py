@@ -1,4 +1,4 @@
-"""Which tetrahedra may share a face (NumPy only)."""
+"""Tetrahedra that cannot be those of a solid, as they repeat or lie in each other (NumPy only)."""
 
 import numpy as np
 
@@ -7,9 +7,9 @@ from taichi_dem.mesh import tetrahedra as geometry
 
 
 def refuse_bad_sharing(tetrahedra: np.ndarray) -> None:
-    """Raise InputError for repeated bodies, faces of three, and bodies that lie in each other.
+    """Refuse repeated bodies, faces of three bodies and bodies that lie in each other.
 
-    tetrahedra: (m, 4) point numbers.
+    tetrahedra: (m, 4). Raises InputError.
     """
     _, number, count = np.unique(
         np.sort(tetrahedra, axis=1), axis=0, return_inverse=True, return_counts=True
