@@ -71,7 +71,8 @@ def _by_group(name, given, mesh):
     rows, shared = np.zeros((mesh.body_count, 3)), []
     taken: dict[int, str] = {}
     for group, value in given.items():
-        bodies, vector = mesh.group_bodies(group), np.array(direction(f"{name}[{group!r}]", value))
+        bodies = _bodies_of(name, given, group, mesh)
+        vector = np.array(direction(f"{name}[{group!r}]", value))
         for body in bodies.tolist():
             if body in taken:
                 raise InputError(
@@ -82,6 +83,16 @@ def _by_group(name, given, mesh):
         rows[bodies] = vector
         shared.append((bodies, vector))
     return rows, shared
+
+
+def _bodies_of(name, given, group, mesh):
+    """Bodies of a group; InputError that names the option where there is none."""
+    try:
+        return mesh.group_bodies(group)
+    except InputError as error:
+        raise InputError(
+            f"{name} must have names of body groups, got {shown(given)}: {error}"
+        ) from None
 
 
 def _numbers(found):
