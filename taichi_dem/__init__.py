@@ -17,7 +17,8 @@ A scene is a mesh, a material and the effects that act; ``simulate`` runs it::
 # First, out of order: it prepares the environment for ``import taichi``.
 from taichi_dem.kit import runtime  # isort: skip
 
-from taichi_dem import effects, goals, methods
+# The second is imported for what it tells ``kit.pictures``.
+from taichi_dem import effects, goals, methods, scene_pictures, shapes  # noqa: F401
 from taichi_dem.calibration.calibrate import Targets, calibrate
 from taichi_dem.elasticity.mesh_stiffness import mesh_stiffness
 from taichi_dem.goals import Goal
@@ -31,12 +32,14 @@ from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.kit.version import __version__
 from taichi_dem.materials import CONCRETE, Material
 from taichi_dem.mesh.files import read_mesh
+from taichi_dem.mesh.joined import join
 from taichi_dem.mesh.mesh import Mesh, checked_mesh
 from taichi_dem.mesh.reorder import in_space_order
 from taichi_dem.meshes import PAPER_BLOCK
 from taichi_dem.methods import ImplicitDashpots, Multirate, Uniform
 from taichi_dem.needed_effects import estimated_effects, needed_effects
 from taichi_dem.observers import At, Collector, Every, Observer, RunView
+from taichi_dem.output.receivers import Received, Receivers
 from taichi_dem.output.record import write_paraview
 from taichi_dem.scene import Scene
 from taichi_dem.simulate import simulate
@@ -66,6 +69,8 @@ __all__ = [
     "Observer",
     "Progress",
     "ProgressBar",
+    "Received",
+    "Receivers",
     "RunView",
     "Scene",
     "Simulation",
@@ -82,12 +87,14 @@ __all__ = [
     "estimated_effects",
     "goals",
     "in_space_order",
+    "join",
     "mesh_stiffness",
     "methods",
     "needed_effects",
     "quality_report",
     "read_mesh",
     "runtime",
+    "shapes",
     "simulate",
     "solve",
     "step_report",

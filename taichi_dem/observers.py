@@ -171,6 +171,9 @@ class At:
 class Observer(Protocol):
     """Measurement during a run: the property ``when`` and the method ``observe``.
 
+    It may also have a method ``check_scene(scene)``, which is called before anything is compiled,
+    and raises InputError where the scene lacks what is observed.
+
     Examples
     --------
     >>> class Watch:

@@ -87,8 +87,7 @@ def outcome_of(
     if disturbance:
         centre = simulation.model.centre
         noise = np.random.default_rng(seed).uniform(-disturbance, disturbance, centre.shape)
-        turn = np.tile([1.0, 0.0, 0.0, 0.0], (len(centre), 1))
-        simulation.state.set_motion(centre + noise, turn)
+        simulation.state.set_motion(centre + noise, **scene.initial_motion)
     looks: Any = {"samples": 1, "frames": 1, "progress": progress}
     return Outcome.of(result_of(run_simulation, simulation, until=until, **looks))
 

@@ -2,6 +2,7 @@
 
 import json
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Optional
 
@@ -13,12 +14,20 @@ from taichi_dem.engine.model import Model
 from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.display import counted, embedded, in_brief, table, titled, unfolded
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.files import output_folder, write_csv, write_text
+from taichi_dem.kit.files import output_folder, remove_files, write_csv, write_text
 from taichi_dem.kit.validation import FileName
 from taichi_dem.kit.viewer import WebPage
 from taichi_dem.mesh.files import write_mesh
 from taichi_dem.output.export.run_exports import RunExports
-from taichi_dem.output.record import Frame, remove_series, series_name, write_bonds, write_paraview
+from taichi_dem.output.receivers import Received, write_receivers
+from taichi_dem.output.record import (
+    Frame,
+    outward_columns,
+    remove_series,
+    series_name,
+    write_bonds,
+    write_paraview,
+)
 from taichi_dem.scene import Scene
 
 if TYPE_CHECKING:
@@ -52,11 +61,13 @@ class Result(RunExports):
     diverged : str, default ""
         Error sentence of a run that left its bounds, whose data end before that; else ``""``.
     start : dict, optional
-        Motion that was set before the run, arguments of ``State.set_motion``; None for a scene at
-        rest.
+        Motion that was set before the run, arguments of ``State.set_motion``; None for a run that
+        began as its scene says.
     acting_since : dict, optional
         With effects="auto": time from which each effect acted on each body [s], by name; NaN for
         never.
+    receivers : mapping, optional
+        Motion of the points of the ``Receivers`` among the observers, a ``Received`` each, by name.
     """
 
     scene: Scene
@@ -70,6 +81,7 @@ class Result(RunExports):
     diverged: str = ""
     start: Optional[dict[str, np.ndarray]] = None
     acting_since: dict[str, np.ndarray] = field(default_factory=dict)
+    receivers: Mapping[str, Received] = field(default_factory=dict)
 
     def __post_init__(self):
         # Whatever mapping it was made from, also by dataclasses.replace.
@@ -142,16 +154,17 @@ class Result(RunExports):
             ("energy not explained", report.unexplained),
             ("time", f"{report.compile_seconds:.1f} s compiling, {report.run_seconds:.1f} s run"),
         ]
-        moved = history.get("hole_radial_displacement_mm", np.zeros(0))
-        if len(moved):
-            rows.insert(7, ("hole, mean outward displacement", f"{moved[-1]:.4g} mm"))
+        for hole, moved in outward_columns(history).items():
+            if len(moved):
+                rows.insert(7, (f"{hole}, mean outward displacement", f"{moved[-1]:.4g} mm"))
         return [*rows, *(("warning", need) for need in report.needs)]
 
     def write(self, folder: FileName) -> None:
         """Write history.csv, bonds.csv, mesh.msh, report.json and a ParaView series to a folder.
 
-        The series, in paraview/ of that folder, has the folder's name. These files of an earlier
-        run in the same folder are replaced, its series removed even where this run has no frames.
+        With receivers, receivers.csv too. The series, in paraview/ of that folder, has the folder's
+        name. These files of an earlier run in the same folder are replaced, its series removed even
+        where this run has no frames.
 
         Parameters
         ----------
@@ -171,6 +184,9 @@ class Result(RunExports):
         write_mesh(os.path.join(folder, "mesh.msh"), self.scene.mesh)
         text = json.dumps({**self.report.as_dict(), "diverged": self.diverged}, indent=1)
         write_text(os.path.join(folder, "report.json"), text)
+        remove_files(folder, r"receivers\.csv")
+        if self.receivers:
+            write_receivers(os.path.join(folder, "receivers.csv"), self.receivers)
         if self.frames:
             write_paraview(place, self.model, self.frames, name, self.acting_since)
 

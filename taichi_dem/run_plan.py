@@ -11,6 +11,7 @@ from taichi_dem.kit.progress.progress import LEAST_SHARE, Listener, Progress
 from taichi_dem.kit.validation import progress_option, shown
 from taichi_dem.observers import Every, Observer, ObserverCalls, checked_observers
 from taichi_dem.output.record import Recorder
+from taichi_dem.scene import Scene
 from taichi_dem.simulation import Simulation
 
 #: Progress is reported this often [s].
@@ -79,6 +80,13 @@ class RunPlan:
         self.last, self.dt0, self.samples, self.frames = last, dt0, samples, frames
         self.observers = checked_observers(observers)
         ObserverCalls(self.observers, last, dt0, samples)
+
+    def check_scene(self, scene: Scene) -> None:
+        """Let the observers that want it look at the scene of the run; they raise InputError."""
+        for observer in self.observers:
+            check = getattr(observer, "check_scene", None)
+            if check is not None:
+                check(scene)
 
     def calls(
         self, simulation: Simulation, recorder: Recorder, report_progress: Optional[Listener]

@@ -2,14 +2,19 @@
 
 from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Optional
+from typing import Any, ClassVar, Optional
+
+import numpy as np
 
 from taichi_dem.effects.base import MANY, Effect
 from taichi_dem.effects.chosen import AUTO, LISTED, ChosenEffects, chosen_effects
 from taichi_dem.effects.roles import check_effect
-from taichi_dem.kit.display import counted, in_brief
+from taichi_dem.initial_motion import initial_motion
+from taichi_dem.kit.display import counted, embedded, in_brief, titled
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.validation import between, finite, positive, shown
+from taichi_dem.kit.fixed_order import length
+from taichi_dem.kit.pictures import png, write_picture
+from taichi_dem.kit.validation import FileName, between, finite, positive, shown
 from taichi_dem.materials import Material, softest_bond
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.parts import may_meet, parts_of
@@ -49,6 +54,19 @@ class Scene:
         of inner faces. Stiffness, damping, strength, cohesion and fracture energy per area of the
         face are that share of the material's; openings at the limits and the friction angle do not
         change.
+    velocity : array_like or mapping or function, optional
+        Velocities of the bodies at the start [m/s]: a vector for all, a vector by body group
+        (``Mesh.body_groups``; other bodies are at rest), a row for each body, (body_count, 3), or a
+        function of their centres [m] that returns such rows. None: at rest.
+    spin : array_like or mapping or function, optional
+        Spins likewise [rad/s]. Bodies that share a vector, all or a group, turn together as a rigid
+        body about the centre of their volume: the velocities of that turn are added to
+        ``velocity``. Rows are spins of the bodies about their own centres. None: no spin.
+
+    Attributes
+    ----------
+    initial_motion : mapping
+        Arrays "velocity" and "spin" that follow, (body_count, 3); empty for a scene at rest.
 
     Raises
     ------
@@ -71,6 +89,11 @@ class Scene:
     sleep: Optional[float] = None
     unbonded: Iterable[str] = ()
     weaker: Mapping[str, float] = field(default_factory=dict)
+    velocity: Any = None
+    spin: Any = None
+
+    #: Not among the options: arguments of ``State.set_motion``, none for a scene at rest.
+    initial_motion: ClassVar[Mapping[str, np.ndarray]] = {}
 
     def __post_init__(self):
         _check_body(self)
@@ -88,11 +111,38 @@ class Scene:
                 self.mesh.group_faces(effect.group)
                 check_free(self.mesh, effect.group)
         object.__setattr__(self, "max_speed", positive("max_speed", self.max_speed))
+        object.__setattr__(self, "initial_motion", _motion_of(self))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but functions, which no process can send to another: their rows instead."""
+        state = dict(vars(self))
+        if callable(self.velocity) or callable(self.spin):
+            rest = {"velocity": None, "spin": None}
+            state.update({**rest, **self.initial_motion})
+        return state
 
     def __repr__(self):
         effects = ", ".join(effect.name or type(effect).__name__ for effect in self.effects)
         words = f"effects {effects}" if effects else "no effects"
         return in_brief(self, counted(self.mesh.body_count, "body"), words)
+
+    def picture(self, path: FileName) -> None:
+        """Write a PNG picture of the outer faces, coloured by group, with what acts on each.
+
+        Parameters
+        ----------
+        path : path
+            File; its name ends in .png.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written.
+        """
+        write_picture(self, path)
+
+    def _repr_html_(self) -> str:
+        return titled(repr(self), embedded(png(self), "The mesh, coloured by group"))
 
     @property
     def on_demand(self) -> bool:
@@ -195,6 +245,26 @@ def _bonded(scene):
     return scene.mesh.bonded_by({**shares, **dict.fromkeys(names, 0.0)})
 
 
+def _motion_of(scene):
+    """Arrays of the motion at the start, which cannot be written to; keeps both options."""
+    for name in ("velocity", "spin"):
+        given = getattr(scene, name)
+        if isinstance(given, np.ndarray):
+            object.__setattr__(scene, name, _locked(given.copy()))
+    motion = initial_motion(scene.mesh, scene.velocity, scene.spin)
+    fastest = length(motion["velocity"]).max() if motion else 0.0
+    if fastest > scene.max_speed:
+        raise InputError(
+            f"velocity must be at most max_speed, {scene.max_speed:g} m/s, got {fastest:g} m/s"
+        )
+    return {name: _locked(rows) for name, rows in motion.items()}
+
+
+def _locked(array):
+    array.setflags(write=False)
+    return array
+
+
 def _sleep_of(scene):
     """Share of the mean momentum below which a body wakes no neighbour."""
     if scene.sleep is None:
@@ -237,7 +307,7 @@ def _check_roles(effects):
 def scene_warnings(scene: Any) -> tuple[str, ...]:
     """Sentences about what a scene lists or leaves out in vain; before a run.
 
-    scene: a Scene, or a Model, which has the same mesh, material and effects.
+    scene: a Scene.
     """
     return (*outer_faces_warnings(scene), *_friction_warnings(scene))
 
@@ -268,7 +338,6 @@ def outer_faces_warnings(scene: Any) -> tuple[str, ...]:
     or are too far from each other (``parts.may_meet``). Faces that lie on each other without a bond
     (``Mesh.keep_coincident``, ``Scene.unbonded``) meet in a solid of one piece too; unbonded ones
     have spheres with any contact.
-    scene: a Scene, or a Model, which has the same mesh and effects.
     """
     contact = next((effect for effect in scene.effects if effect.role == "contact"), None)
     if contact and contact.outer_faces:

@@ -18,7 +18,8 @@ from taichi_dem.kit.validation import AUTO, FileName, instance
 from taichi_dem.measured_speedup import speedup_of_run
 from taichi_dem.methods import Method, check_method
 from taichi_dem.observers import Observer, RunView
-from taichi_dem.output.hole_monitor import watched_group
+from taichi_dem.output.hole_monitor import watched_groups
+from taichi_dem.output.receivers import receivers_among
 from taichi_dem.output.record import Recorder
 from taichi_dem.result import Result
 from taichi_dem.run_plan import RunPlan
@@ -104,6 +105,7 @@ def simulate(
     check_method(method)
     last = macro_steps(until, method.dt0)
     plan = RunPlan(last, method.dt0, samples, frames, observers, progress)
+    receivers = _checked_receivers(plan, scene)
     arrays = _opened(scene, method, checkpoint, resume, last)
     if output is not None:
         output_folder(output)
@@ -113,7 +115,7 @@ def simulate(
         simulation, recorder = _started(Simulation(scene, method, driver))
         writer = _checkpoint_writer(simulation, recorder, checkpoint, resume, arrays)
         error = _run_saved(simulation, recorder, writer, plan, report_progress)
-        result = _result(simulation, recorder, error)
+        result = _result(simulation, recorder, error, receivers)
         if error is None:
             report = replace(result.report, measured_speedup=speedup_of_run(simulation))
             result = replace(result, report=report)
@@ -143,11 +145,12 @@ def run_simulation(
     instance("simulation", simulation, Simulation)
     last = macro_steps(until, simulation.method.dt0)
     plan = RunPlan(last, simulation.method.dt0, samples, frames, observers, progress)
+    receivers = _checked_receivers(plan, simulation.scene)
     with reporting(progress, title) as report_progress:
         simulation, recorder = _started(simulation)
         writer = NoCheckpointWriter()
         error = _run_saved(simulation, recorder, writer, plan, report_progress)
-    result = _result(simulation, recorder, error, brief)
+    result = _result(simulation, recorder, error, receivers, brief)
     result = replace(result, start=simulation.first_motion)
     if error is not None:
         error.result = result
@@ -168,7 +171,7 @@ def result_of(run: Callable[..., Result], *arguments: Any, **options: Any) -> Re
 
 def _started(simulation):
     """A simulation ready to step and its recorder, with all kernels compiled."""
-    recorder = Recorder(simulation, watched_group(simulation.scene))
+    recorder = Recorder(simulation, *watched_groups(simulation.scene))
     simulation.start()
     compiling("recording", 0.95)
     recorder.compile()
@@ -241,6 +244,7 @@ def run_identity(scene: Scene, method: Method) -> dict[str, str]:
             f"{effect.name} {identity_of(vars(effect))}" for effect in scene.effects
         ),
         "max_speed": identity_of(scene.max_speed),
+        "initial motion": identity_of(scene.initial_motion) if scene.initial_motion else "nothing",
         "on demand": identity_of((scene.on_demand, scene.sleep)),
         "method": identity_of(method),
     }
@@ -288,7 +292,14 @@ def _write(result, folder, writer):
         raise InputError(f"{error}{writer.last_good()}") from None
 
 
-def _result(simulation, recorder, error, brief=False):
+def _checked_receivers(plan, scene):
+    """Receivers among the observers, after all of these have seen the scene."""
+    plan.check_scene(scene)
+    return receivers_among(plan.observers)
+
+
+def _result(simulation, recorder, error, receivers, brief=False):
+    received = [one.received() for one in receivers]
     return Result(
         scene=simulation.scene,
         method=simulation.method,
@@ -300,4 +311,5 @@ def _result(simulation, recorder, error, brief=False):
         report=simulation.report(brief),
         diverged=str(error) if error else "",
         acting_since=simulation.acting_since(),
+        receivers={name: part for parts in received for name, part in parts.items()},
     )

@@ -132,11 +132,13 @@ class Simulation(Uncopied):
             setattr(self, name, PartView(self.loan, (name,)) if present else None)
 
     def _load(self):
-        """Put the scene into the engine, at rest and at time zero."""
+        """Put the scene into the engine, with its initial motion and at time zero."""
         with self._undivided("its scene was loaded"):
             self.loan.activate()
             engine: Any = self.loan.engine
             engine.load(self.model, self.method, self.scene.max_speed, self.scene.sleep)
+            if self.scene.initial_motion:
+                self.state.set_motion(self.model.centre, **self.scene.initial_motion)
             self.energy_balance = None
             self.run_seconds = self.run_cpu_seconds = 0.0
             self.started = None
@@ -165,7 +167,7 @@ class Simulation(Uncopied):
         return PartView(self.loan, ("drivers", name))
 
     def reset(self, scene: Optional[Scene] = None, method: Optional[Method] = None) -> None:
-        """Begin again at time zero and at rest, optionally with another scene or method.
+        """Begin again at time zero as the scene says, optionally with another scene or method.
 
         Parameters
         ----------

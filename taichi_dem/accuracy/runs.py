@@ -133,7 +133,7 @@ class Runs:
             self._simulation.reset(method=method)
         simulation = self._simulation
         if twin:
-            simulation.state.set_motion(**_displaced(simulation.model, twin))
+            simulation.state.set_motion(**_displaced(simulation, twin))
         looks: Any = {"samples": self.job.rows(level), "frames": frames, "progress": None}
         until = self.job.until
         return result_of(run_simulation, simulation, until=until, brief=brief, **looks)
@@ -154,8 +154,9 @@ def _share(apart, whole):
     return float(np.median(apart)) / max(float(np.median(whole)), 1e-300)
 
 
-def _displaced(model, seed):
+def _displaced(simulation, seed):
     """Motion at the start of a twin: arguments of ``State.set_motion``."""
+    model = simulation.model
     size = _ROUNDING * np.ptp(model.mesh.points, axis=0).max()
     noise = np.random.default_rng(seed).uniform(-size, size, model.centre.shape)
-    return {"position": model.centre + noise}
+    return {"position": model.centre + noise, **simulation.scene.initial_motion}

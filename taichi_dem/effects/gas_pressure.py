@@ -40,6 +40,9 @@ class GasPressure(FacePressure):
         Time to the peak [s].
     decay_ratio : float, default 2.75
         Ratio of the time from the peak to zero to the rise.
+    start : float, default 0.0
+        Time at which the pressure begins [s]: holes with a ``GasPressure`` each fire one after the
+        other.
 
     Raises
     ------
@@ -70,20 +73,22 @@ class GasPressure(FacePressure):
         peak: float = 575e6,
         rise: float = 1.33e-4,
         decay_ratio: float = 2.75,
+        start: float = 0.0,
     ):
         self.group = word("group", group)
         self.peak = positive("peak", peak)
         self.rise = positive("rise", rise)
         self.decay_ratio = positive("decay_ratio", decay_ratio)
+        self.start = positive("start", start, zero_allowed=True)
 
     @property
     def duration(self) -> float:
-        """Time from the beginning until there is no pressure any more [s]."""
+        """Time from its start until there is no pressure any more [s]."""
         return (self.decay_ratio + 1.0) * self.rise
 
     def numbers(self, material: Material) -> tuple[float, ...]:
-        """Peak [Pa], rise [s] and decay ratio."""
-        return self.peak, self.rise, self.decay_ratio
+        """Peak [Pa], rise [s], decay ratio and start [s]."""
+        return self.peak, self.rise, self.decay_ratio, self.start
 
     def stress(self, material: Material, size: float) -> float:
         """The peak pressure."""
@@ -92,7 +97,7 @@ class GasPressure(FacePressure):
     @ti.func
     def pressure(self, t):
         """Pressure [Pa] at a time [s]."""
-        return pulse(self.law[0], self.law[1], self.law[2], t)
+        return pulse(self.law[0], self.law[1], self.law[2], t - self.law[3])
 
     def pressure_at(self, times: ArrayLike) -> np.ndarray:
         """Pressure at given times, for pictures.
@@ -107,7 +112,7 @@ class GasPressure(FacePressure):
         ndarray
             Pressure [Pa].
         """
-        times = np.ascontiguousarray(times, dtype=np.float64)
+        times = np.ascontiguousarray(times, dtype=np.float64) - self.start
         pressure = np.zeros_like(times)
         _sample(self.peak, self.rise, self.decay_ratio, times, pressure)
         return pressure

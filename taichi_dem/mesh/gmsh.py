@@ -1,9 +1,14 @@
-"""Meshes made with Gmsh; the only importer of gmsh, which nothing else needs."""
+"""Meshes made with Gmsh; the only importer of gmsh, which nothing else needs.
+
+``mesh.filled`` fills drawn surfaces by the same session.
+"""
 
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import renamed_when_done
@@ -115,7 +120,7 @@ def block_with_hole(
         size_far,
         distance_far,
     )
-    with _session() as gmsh:
+    with session("block_with_hole") as gmsh:
         _add_geometry(gmsh.model, block)
         _add_sizes(gmsh.model.mesh.field, block)
         gmsh.model.mesh.generate(3)
@@ -124,7 +129,7 @@ def block_with_hole(
 
 
 @contextlib.contextmanager
-def _session():
+def session(name: str) -> Iterator[Any]:
     """A Gmsh model of our own, removed afterwards; a session of the caller stays open."""
     try:
         import gmsh
@@ -135,7 +140,7 @@ def _session():
     owned = not gmsh.isInitialized()
     if owned:
         gmsh.initialize(interruptible=False, readConfigFiles=False)
-    gmsh.model.add("block_with_hole")
+    gmsh.model.add(name)
     try:
         for name, value in _OPTIONS.items():
             gmsh.option.setNumber(name, value)

@@ -57,25 +57,44 @@ def may_meet(scene: Any, part: np.ndarray) -> bool:
     """Whether parts of a scene at rest may meet, as far as can be known before a run.
 
     They cannot where nothing moves them, or where uniform acceleration is all that does. Else every
-    part may move from its box by a share of its size (``NEARNESS``) and by the displacement that
-    its loads and supports may cause (``Effect.travel``); displacements common to all parts do not
-    count, unless they are unbounded in all directions, as with gas. part: from ``parts_of``.
+    part may move from its box by a share of its size (``NEARNESS``), by the displacement that
+    its loads and supports may cause (``Effect.travel``), and without end along the initial velocity
+    that it has beside the mean of all parts; displacements common to all parts do not count, unless
+    they are unbounded in all directions, as with gas. scene: a Scene. part: from ``parts_of``.
     """
     drives = [effect for effect in scene.effects if effect.role in ("load", "support")]
     travels = np.array([effect.travel() for effect in drives]).reshape(-1, 2, 3)
     anywhere = np.isinf(travels).all(axis=(1, 2))
+    flights = _flights(scene, part)
     weight_only = not any(hasattr(effect, "group") for effect in drives) and not anywhere.any()
-    if weight_only or not travels.any():
+    if (weight_only or not travels.any()) and not flights.any():
         return False
     low, high = part_boxes(scene.mesh.points[scene.mesh.tetrahedra], part)
     reach = NEARNESS * (high - low).max(axis=1, keepdims=True)
-    low, high = low - reach, high + reach
-    acts = np.array([_parts_under(scene.mesh, effect, part) for effect in drives])
+    low, high = low - reach + flights[0], high + reach + flights[1]
+    acts = np.array([_parts_under(scene.mesh, effect, part) for effect in drives], dtype=bool)
+    acts = acts.reshape(-1, part.max() + 1)
     alike = (acts == acts[:, :1]).all()
     for travel, on in zip(travels[anywhere] if alike else travels, acts[anywhere | ~alike]):
         low[on] += travel[0]
         high[on] += travel[1]
     return any_overlap(low, high)
+
+
+def _flights(scene, part):
+    """Lowest and highest displacement of parts by their initial velocities, (2, part_count, 3)."""
+    count = part.max() + 1
+    flights = np.zeros((2, count, 3))
+    if scene.initial_motion:
+        rows = scene.initial_motion["velocity"]
+        sums = np.array([np.bincount(part, along, count) for along in rows.T]).T
+        velocity = sums / np.bincount(part, minlength=count)[:, None]
+        beside = velocity - velocity.mean(axis=0)
+        # Rounding of the mean makes no part move against the others.
+        moving = np.abs(beside) > 1e-9 * np.abs(velocity).max()
+        flights[0][moving & (beside < 0.0)] = -np.inf
+        flights[1][moving & (beside > 0.0)] = np.inf
+    return flights
 
 
 def _parts_under(mesh, effect, part):

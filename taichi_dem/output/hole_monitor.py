@@ -12,11 +12,16 @@ from taichi_dem.mesh.topology import face_vertices, faces_of_group
 from taichi_dem.scene import Scene
 
 
-def watched_group(scene: Scene) -> Optional[str]:
-    """The group under gas pressure; without gas, one called hole if the mesh has it, or None."""
+def watched_groups(scene: Scene) -> tuple[str, ...]:
+    """The groups under gas pressure; without gas, one called hole if the mesh has it."""
     groups = [effect.group for effect in scene.effects if isinstance(effect, GasPressure)]
-    groups += [name for name in scene.mesh.groups if name == "hole"]
-    return groups[0] if groups else None
+    groups = groups or [name for name in scene.mesh.groups if name == "hole"]
+    return tuple(dict.fromkeys(groups))
+
+
+def watched_group(scene: Scene) -> Optional[str]:
+    """The first of ``watched_groups``, None without."""
+    return next(iter(watched_groups(scene)), None)
 
 
 class HoleMonitor:

@@ -36,6 +36,8 @@ ENERGY_COLUMNS = (
 )
 
 
+#: End of the name of a column with the mean displacement of a hole's bodies outward.
+_OUTWARD = "_radial_displacement_mm"
 #: Letters of a series' name.
 _LONGEST_NAME = 50
 
@@ -89,14 +91,15 @@ class Frame:
 class Recorder:
     """Collects samples and frames of a simulation.
 
-    group: face group of the hole whose displacement is followed, None for none. peak_speed: the
-    largest of each body at all samples so far [m/s], (body_count,).
+    groups: face groups of the holes whose displacement is followed; columns of the time series
+    have their names, unless there is only one. peak_speed: the largest of each body at all samples
+    so far [m/s], (body_count,).
     """
 
-    def __init__(self, simulation: Simulation, group: Optional[str]):
+    def __init__(self, simulation: Simulation, *groups: str):
         self.simulation = simulation
         self.model, self.state = simulation.model, simulation.state
-        self.hole = HoleMonitor(self.model, group) if group else None
+        self.holes = {group: HoleMonitor(self.model, group) for group in groups}
         self.rows: list[dict[str, float]] = []
         self.frames: list[Frame] = []
         self.peak_speed = np.zeros(self.model.body_count)
@@ -115,11 +118,11 @@ class Recorder:
         account = sim.energy_balance.account()
         account["gas_work"] = sim.gas_work()
         row = {"time_s": sim.time_s}
-        if self.hole is not None:
-            radial = self.hole.radial_displacement(motion["position"])
-            row["hole_radial_displacement_mm"] = 1e3 * radial
-            monitor = self.hole.monitored_displacement(motion["position"])
-            row["monitor_displacement_mm"] = 1e3 * monitor
+        for group, hole in self.holes.items():
+            moved = hole.radial_displacement(motion["position"])
+            monitored = hole.monitored_displacement(motion["position"])
+            for name, way in zip(hole_columns(group, len(self.holes)), (moved, monitored)):
+                row[name] = 1e3 * way
         row["broken_faces"] = int((self.state.broken_tick.to_numpy() != NEVER).sum())
         row.update({f"{name}_J": account[name] for name in ENERGY_COLUMNS})
         if self.model.ground:
@@ -190,6 +193,22 @@ class Recorder:
         tick = self.state.broken_tick.to_numpy()[: self.model.bond_count]
         seconds = tick * (self.simulation.method.dt0 / 2.0**MAX_LEVEL)
         return np.where(tick == NEVER, np.nan, seconds)
+
+
+def hole_columns(group: str, holes: int = 1) -> tuple[str, str]:
+    """Columns of the time series of a hole: mean displacement outward, and of the monitored body.
+
+    group: of its faces. holes: how many are followed.
+    """
+    if holes == 1:
+        return "hole_radial_displacement_mm", "monitor_displacement_mm"
+    return f"{group}{_OUTWARD}", f"{group}_monitor_displacement_mm"
+
+
+def outward_columns(history: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Mean displacements outward [mm] in a time series, by the name of the hole."""
+    found = (name for name in history if name.endswith(_OUTWARD))
+    return {name[: -len(_OUTWARD)]: history[name] for name in found}
 
 
 def body_corners(model: Model, frame: Frame) -> np.ndarray:

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from taichi_dem.kit.plot_style import BLUE, GREEN, PURPLE, RED, picture, styles_of
 from taichi_dem.kit.validation import FileName
+from taichi_dem.output.record import outward_columns
 from taichi_dem.plot.levels import draw_level_shares
 
 #: Energy terms from the bottom of the stack up, with colours and dashes: blue is held, orange lost
@@ -75,6 +76,10 @@ def plot_history(path: Optional[FileName], history: Mapping[str, np.ndarray]) ->
                 linestyle="--",
                 label="outward, mean over the hole's bodies",
             )
+            top.legend(loc="upper left")
+        elif outward_columns(history):
+            for hole, moved in outward_columns(history).items():
+                top.plot(time, moved, label=f"{hole}, outward")
             top.legend(loc="upper left")
         top.set(ylabel="displacement [mm]", ylim=(0.0, None))
         middle.step(time, history["broken_faces"], where="post", color=BLUE)

@@ -9,7 +9,7 @@ from matplotlib.ticker import MaxNLocator
 
 from taichi_dem.engine.model import Model
 from taichi_dem.kit.plot_style import BLACK, BLUE, png_of, styled
-from taichi_dem.output.record import Frame
+from taichi_dem.output.record import Frame, outward_columns
 from taichi_dem.plot.block import draw_breaks, frame_block
 from taichi_dem.plot.bodies import draw_bodies
 from taichi_dem.plot.view import View
@@ -176,10 +176,11 @@ def _events(history):
     nothing = np.full(len(history.get("time_s", ())), np.nan)
     if _largest(history.get("broken_faces", nothing)) > 0.0:
         return history["broken_faces"], _BROKEN
-    if "hole_radial_displacement_mm" in history:
-        values = 1e-3 * history["hole_radial_displacement_mm"]
+    outward = outward_columns(history)
+    if outward:
+        hole, values = next((hole, 1e-3 * moved) for hole, moved in outward.items())
         factor, unit = scale(_largest(values), "m")
-        return factor * values, f"hole, mean outward\ndisplacement [{unit}]"
+        return factor * values, f"{hole}, mean outward\ndisplacement [{unit}]"
     values = history.get("largest_speed_m_s", nothing)
     factor, unit = scale(_largest(values), "m/s")
     return factor * values, f"largest speed [{unit}]"

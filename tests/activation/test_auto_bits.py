@@ -105,7 +105,7 @@ class Saved:
     def __init__(self, name, method, **options):
         self.late = late_scene(name)
         self.simulation = simulation(self.late, scene_of(self.late, **options), method)
-        recorder = Recorder(self.simulation, None)
+        recorder = Recorder(self.simulation)
         self.simulation.start()
         self.saved = saved_run(self.simulation, recorder)
         self.last = round(self.late.until / method.dt0)

@@ -187,7 +187,7 @@ def test_an_effect_of_ones_own_is_sealed_when_it_is_complete(seed):
 
 def test_a_class_of_effects_shows_the_options_of_its_constructor():
     assert list(inspect.signature(effects.GasPressure).parameters) == [
-        *("group", "peak", "rise", "decay_ratio")
+        *("group", "peak", "rise", "decay_ratio", "start")
     ]
     assert not inspect.signature(effects.Softening).parameters
 

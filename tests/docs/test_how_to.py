@@ -33,9 +33,11 @@ BLOCKS = [
 ]
 #: Pages whose blocks take longer: of runs to an accuracy, of several kinds of structures.
 LONG = [
-    f"docs/{name}.md" for name in ("accuracy", "boundaries", "damper_engineering", "effects_auto")
+    f"docs/{name}.md"
+    for name in ("accuracy", "boundaries", "damper_engineering", "effects_auto", "tutorial")
 ]
-QUICK = [block for block in BLOCKS if block[0] not in LONG]
+COLLISION = "docs/tutorial.md", 1
+QUICK = [block for block in BLOCKS if block[0] not in LONG or block == COLLISION]
 
 
 @pytest.fixture(scope="module")
@@ -57,6 +59,21 @@ def program(tmp_path_factory):
 def left_by(program):
     """``left_by(name)``: what ``WANTED`` asks of the page docs/name.md."""
     return lambda name: program(f"docs/{name}.md").left
+
+
+def test_programs_of_the_tutorial_are_short():
+    assert [len(block.splitlines()) <= 25 for block in blocks("docs/tutorial.md")] == [True] * 3
+
+
+def test_the_blocks_of_the_tutorial_keep_their_momentum(program):
+    """v1 + v2 = 2 m/s, of which three digits are printed each; the text has the same digits."""
+    made = program(*COLLISION)
+    before, after = np.array(
+        [[float(word) for word in line.split() if "." in word] for line in made.said.splitlines()]
+    ).T
+    assert before.tolist() == [2.0, 0.0] and after.sum() == pytest.approx(2.0, abs=1.1e-3)
+    assert after == pytest.approx([0.208, 1.792], abs=2e-3)
+    assert (made.folder / "blocks.png").stat().st_size > 5000
 
 
 def test_each_how_to_has_a_block():

@@ -141,7 +141,8 @@ class BlastScene:
         if of is effects.Fixed:
             return of(group)
         if of is GAS:
-            return of(group, draws.near(1e7), draws.near(1e-5), draws.near(2.75))
+            pulse = draws.near(1e7), draws.near(1e-5), draws.near(2.75)
+            return of(group, *pulse, draws.near(1e-6) if draws.chance(0.3) else 0.0)
         vector = [draws.given(float(x)) for x in draws.vector(draws.power(-3.0, 2.0))]
         if of is effects.Roller:
             return of(group, vector)

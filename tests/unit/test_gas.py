@@ -3,7 +3,16 @@
 import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects, simulate
+from taichi_dem import (
+    CONCRETE,
+    Multirate,
+    Scene,
+    Simulation,
+    StepControl,
+    Uniform,
+    effects,
+    simulate,
+)
 from taichi_dem.mesh.mesh import checked_mesh
 from taichi_dem.mesh.shapes import bar, pair, single
 from taichi_dem.mesh.topology import face_vertices, topology_of
@@ -107,3 +116,56 @@ def test_any_group_of_outer_faces_may_be_loaded_and_is_monitored(make):
         result = simulate(scene, method=Uniform(1e-8), until=3e-8, samples=1)
         for column, values in result.history.items():
             assert np.isfinite(values).all(), (name, column)
+
+
+#: The second takes steps for the load, too.
+METHODS = (
+    Uniform(2.0**-23),
+    pytest.param(Multirate(2.0**-23, 1e-7, control=StepControl()), marks=pytest.mark.slow),
+)
+
+
+@pytest.mark.parametrize("method", METHODS, ids=("uniform", "multirate"))
+def test_a_delayed_pulse_is_the_same_run_later(method):
+    """Bit for bit: a body without bonds is at rest to the last bit, and times differ exactly."""
+    steps, delay, frames = 24, 8, []
+    for late in (0, delay):
+        gas = effects.GasPressure("base", 2e8, 2.0**-19, start=late * method.dt0)
+        scene = Scene(single(), CONCRETE, [gas])
+        until = (steps + late) * method.dt0
+        whole = {"samples": steps + late, "frames": steps + late, "progress": None}
+        frames.append(simulate(scene, method=method, until=until, **whole).frames)
+    assert not any(frame.velocity.any() for frame in frames[1][:delay])
+    # At its beginning the cosine squared is not zero but 4e-33.
+    for frame, later in zip(frames[0][1:], frames[1][delay + 1 :]):
+        for name in ("position", "velocity", "rotation"):
+            assert getattr(frame, name).tobytes() == getattr(later, name).tobytes(), name
+        assert (frame.level == later.level).all() and (frame.bound == later.bound).all()
+    assert frames[0][-1].velocity.any()
+
+
+def test_holes_fire_one_after_the_other_and_each_has_its_columns():
+    mesh, delay = bar(0.2, 0.1, (4, 1, 1)), 2.0**-20
+    first = effects.GasPressure("left", 1e7, 2.0**-21)
+    second = effects.GasPressure("right", 1e7, 2.0**-21, start=delay)
+    options = {"method": METHODS[0], "until": 2 * delay, "samples": 16, "progress": None}
+    both = simulate(Scene(mesh, CONCRETE, [first, second]), **options)
+    alone = simulate(Scene(mesh, CONCRETE, [first]), **options)
+    left, right = (both.history[f"{side}_radial_displacement_mm"] for side in ("left", "right"))
+    early = both.history["time_s"] <= delay
+    assert left[early].tobytes() == alone.history["hole_radial_displacement_mm"][early].tobytes()
+    assert left[early][-1] and not right[early].any() and right[-1]
+    assert "hole_radial_displacement_mm" not in both.history
+    assert "left_monitor_displacement_mm" in both.history
+    assert "right, mean outward displacement" in both._repr_html_()
+    assert "hole, mean outward displacement" in alone._repr_html_()
+    # Two pulses in one hole are one hole.
+    twice = Scene(mesh, CONCRETE, [first, effects.GasPressure("left", 1e7, start=delay)])
+    assert "hole_radial_displacement_mm" in simulate(twice, **options).history
+
+
+def test_the_law_of_a_delayed_pulse_is_shifted(body):
+    times = RISE * np.arange(-8.0, 48.0) / 8.0
+    early, late = (effects.GasPressure("hole", PEAK, RISE, start=t) for t in (0.0, 2.0 * RISE))
+    assert (late.pressure_at(times + 2.0 * RISE) == early.pressure_at(times)).all()
+    assert not late.pressure_at([1.9 * RISE]).any()

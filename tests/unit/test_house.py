@@ -19,11 +19,11 @@ ROOT = Path(__file__).resolve().parents[2]
 LAYERS = {
     "taichi_dem": (
         ("kit",),
-        ("meshes", "mesh"),
+        ("meshes", "mesh", "shapes"),
         ("elasticity",),
         ("materials",),
         ("physics", "timeline", "closed_forms", "wave_moduli"),
-        ("effects",),
+        ("effects", "initial_motion"),
         ("scene",),
         ("stability",),
         ("methods",),
@@ -35,7 +35,7 @@ LAYERS = {
         ("output", "measured_speedup", "measured_overhead", "paired_cost", "observers", "run_plan"),
         ("plot",),
         ("viewer",),
-        ("result",),
+        ("result", "scene_pictures"),
         ("simulate", "needed_effects", "outcome"),
         ("workload", "step_study", "goals"),
         ("accuracy", "calibration"),

@@ -1,0 +1,112 @@
+"""Velocities and spins of the bodies of a scene at its start, as a user gives them; NumPy only."""
+
+from collections.abc import Mapping
+from typing import Any, Callable, Union
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import LARGEST, direction, shown
+from taichi_dem.mesh.mesh import Mesh, volumes
+
+#: A vector for all bodies, one for each body group by name, a row for each body, or a function
+#: that returns the rows, of the centres of the bodies.
+Motion = Union[ArrayLike, Mapping[str, ArrayLike], Callable[[np.ndarray], ArrayLike]]
+#: Bodies, and the vector that is given for all of them.
+_Shared = tuple[np.ndarray, np.ndarray]
+
+
+def initial_motion(mesh: Mesh, velocity: Any, spin: Any) -> dict[str, np.ndarray]:
+    """Velocity and spin of every body at the start, as options of ``State.set_motion``.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    velocity, spin : options of a ``Scene`` [m/s], [rad/s]
+
+    Returns
+    -------
+    dict
+        Arrays "velocity" [m/s] and "spin" [rad/s], (body_count, 3); empty for bodies at rest.
+
+    Raises
+    ------
+    InputError
+        For anything that gives no three finite numbers for each body, an unknown body group, and
+        groups that share a body.
+    """
+    centre = mesh.points[mesh.tetrahedra].mean(axis=1)
+    moves, _ = _rows("velocity", velocity, mesh, centre)
+    turns, shared = _rows("spin", spin, mesh, centre)
+    for bodies, turn in shared:
+        arms = centre[bodies] - _middle(mesh, centre, bodies)
+        moves[bodies] = moves[bodies] + np.cross(turn, arms)
+    if not (moves.any() or turns.any()):
+        return {}
+    return {"velocity": moves, "spin": turns}
+
+
+def _rows(name, given, mesh, centre) -> tuple[np.ndarray, list[_Shared]]:
+    """A row for each body, and the vectors that were given for several of them."""
+    if given is None:
+        return np.zeros_like(centre), []
+    if isinstance(given, Mapping):
+        return _by_group(name, given, mesh)
+    found = given(centre.copy()) if callable(given) else given
+    array = _numbers(found)
+    one = array.shape == (3,) and not callable(given)
+    if not (one or array.shape == centre.shape):
+        raise InputError(
+            f"{name} must be three numbers, for all bodies or by body group, or three for each of "
+            f"{len(centre)} bodies, as an array or by a function of their centres, all finite and "
+            f"none above {LARGEST:g}, got {shown(found)}"
+        )
+    shared = [(np.arange(len(centre)), array)] if one else []
+    return np.array(np.broadcast_to(array, centre.shape)), shared
+
+
+def _by_group(name, given, mesh):
+    """The same from vectors by body group; bodies in none are at rest."""
+    rows, shared = np.zeros((mesh.body_count, 3)), []
+    taken: dict[int, str] = {}
+    for group, value in given.items():
+        bodies = _bodies_of(name, given, group, mesh)
+        vector = np.array(direction(f"{name}[{group!r}]", value))
+        for body in bodies.tolist():
+            if body in taken:
+                raise InputError(
+                    f"{name} must have each body in one group at most, got body {body} in "
+                    f"{taken[body]} and in {group}"
+                )
+            taken[body] = group
+        rows[bodies] = vector
+        shared.append((bodies, vector))
+    return rows, shared
+
+
+def _bodies_of(name, given, group, mesh):
+    """Bodies of a group; InputError that names the option where there is none."""
+    try:
+        return mesh.group_bodies(group)
+    except InputError as error:
+        raise InputError(
+            f"{name} must have names of body groups, got {shown(given)}: {error}"
+        ) from None
+
+
+def _numbers(found):
+    """Finite numbers as an array of floats; an empty one for anything else."""
+    try:
+        array = np.array(found)
+    except (TypeError, ValueError, OverflowError):
+        return np.zeros(0)
+    if array.dtype.kind not in "iuf" or not (np.abs(array) <= LARGEST).all():
+        return np.zeros(0)
+    return array.astype(np.float64)
+
+
+def _middle(mesh, centre, bodies):
+    """Centre of the volume of some bodies [m], (3,)."""
+    volume = volumes(mesh)[bodies]
+    return (volume[:, None] * centre[bodies]).sum(axis=0) / volume.sum()

@@ -1,0 +1,125 @@
+"""Solids of which only the surface is drawn, STL and STEP, filled with tetrahedra by Gmsh."""
+
+import os
+from typing import Any
+
+import numpy as np
+
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.fixed_order import dot, length
+from taichi_dem.kit.validation import FileName, path_name, positive
+from taichi_dem.mesh import tetrahedra as geometry
+from taichi_dem.mesh.gmsh import session
+from taichi_dem.mesh.mesh import Mesh, checked_mesh
+
+#: Angle between triangles of an STL from which on an edge parts two surfaces [degrees].
+_EDGE_DEG = 40.0
+#: Endings of files, by how they are read.
+_DRAWN, _TRIANGLES = (".step", ".stp"), (".stl",)
+
+
+def filled_surface(path: FileName, element: float, scale: float = 1.0) -> Mesh:
+    """The solid inside a drawn surface, see ``shapes.from_surface``."""
+    name = path_name("path", path)
+    element, scale = positive("element", element), positive("scale", scale)
+    if not name.lower().endswith((*_DRAWN, *_TRIANGLES)):
+        raise InputError(f"path must end in .stl, .step or .stp, got {name}")
+    if not os.path.isfile(name):
+        raise InputError(f"surface file {name} does not exist")
+    with session("filled") as gmsh:
+        drawn = name.lower().endswith(_DRAWN)
+        if drawn:
+            _draw_solid(gmsh, name)
+        else:
+            _draw_triangles(gmsh, name)
+        gmsh.option.setNumber("Mesh.MeshSizeMin", element / scale)
+        gmsh.option.setNumber("Mesh.MeshSizeMax", element / scale)
+        gmsh.model.mesh.generate(3)
+        return _mesh_of(gmsh, scale, name, drawn)
+
+
+def _draw_solid(gmsh: Any, name: str) -> None:
+    """Read a CAD file with its lengths in m."""
+    gmsh.option.setString("Geometry.OCCTargetUnit", "M")
+    gmsh.option.setNumber("Geometry.OCCImportLabels", 1)
+    gmsh.model.occ.importShapes(name)
+    gmsh.model.occ.synchronize()
+    if not gmsh.model.getEntities(3):
+        raise InputError(f"surface file {name} must hold a solid, a closed surface, got none")
+
+
+def _draw_triangles(gmsh: Any, name: str) -> None:
+    """Read triangles, part them at their edges, and make a volume of what they enclose."""
+    gmsh.merge(name)
+    gmsh.model.mesh.removeDuplicateNodes()
+    _refuse_open(gmsh, name)
+    angle = np.radians(_EDGE_DEG)
+    gmsh.model.mesh.classifySurfaces(angle, True, True, np.pi)
+    gmsh.model.mesh.createGeometry()
+    surfaces = [tag for _, tag in gmsh.model.getEntities(2)]
+    gmsh.model.geo.addVolume([gmsh.model.geo.addSurfaceLoop(surfaces)])
+    gmsh.model.geo.synchronize()
+
+
+def _refuse_open(gmsh, name):
+    """Raise InputError unless every edge of the triangles belongs to two of them."""
+    _, nodes = gmsh.model.mesh.getElementsByType(2)
+    if not len(nodes):
+        raise InputError(f"surface file {name} must hold triangles, got none")
+    corners = np.sort(nodes.reshape(-1, 3).astype(np.int64), axis=1)
+    edges = corners[:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2)
+    count = np.unique(edges, axis=0, return_counts=True)[1]
+    wrong = int((count != 2).sum())
+    if wrong:
+        raise InputError(
+            f"surface file {name} must be closed, each edge between two triangles, but {wrong} of "
+            f"its {len(count)} edges are not: close its holes, or join its points"
+        )
+
+
+def _mesh_of(gmsh, scale, name, drawn):
+    """The mesh that Gmsh has made; a group for each surface."""
+    tags, places, _ = gmsh.model.mesh.getNodes()
+    number = np.zeros(int(tags.max()) + 1, dtype=np.int64)
+    number[tags.astype(np.int64)] = np.arange(len(tags))
+    _, bodies = gmsh.model.mesh.getElementsByType(4)
+    if not len(bodies):
+        raise InputError(f"surface file {name} must enclose a solid, but Gmsh filled none")
+    points = scale * places.reshape(-1, 3)
+    tetrahedra = number[bodies.astype(np.int64)].reshape(-1, 4)
+    groups = _drawn_groups(gmsh, number) if drawn else _smooth_parts(points, tetrahedra)
+    return checked_mesh(points, tetrahedra, groups, source=name)
+
+
+def _drawn_groups(gmsh, number):
+    """Faces of each surface of a CAD file, by its name."""
+    groups: dict[str, np.ndarray] = {}
+    for _, tag in gmsh.model.getEntities(2):
+        _, corners = gmsh.model.mesh.getElementsByType(2, tag)
+        if len(corners):
+            faces = number[corners.astype(np.int64)].reshape(-1, 3)
+            key = _name_of(gmsh, tag)
+            groups[key] = np.vstack([groups[key], faces]) if key in groups else faces
+    return groups
+
+
+def _smooth_parts(points, tetrahedra):
+    """Outer faces in groups that end at sharp edges: Gmsh cuts smooth surfaces into patches."""
+    faces = geometry.all_faces(tetrahedra)
+    outer = faces[geometry.outer_rows(faces)]
+    normal = geometry.area_vectors(points, outer)
+    normal /= length(normal)[:, None]
+    edges = np.sort(outer[:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2), axis=1)
+    order = np.lexsort(edges.T)
+    same = (edges[order[1:]] == edges[order[:-1]]).all(axis=1)
+    pairs = np.stack([order[:-1][same], order[1:][same]], axis=1) // 3
+    smooth = dot(normal[pairs[:, 0]], normal[pairs[:, 1]]) > np.cos(np.radians(_EDGE_DEG))
+    label = geometry.components(len(outer), pairs[smooth])
+    parts = (outer[label == first] for first in np.unique(label))
+    return {f"surface_{k}": part for k, part in enumerate(parts, 1)}
+
+
+def _name_of(gmsh, tag):
+    """Last part of the name that a CAD program gave a surface, else its number."""
+    given = gmsh.model.getEntityName(2, tag).rsplit("/", 1)[-1].replace('"', "").strip()
+    return given if given.isprintable() and given else f"surface_{tag}"

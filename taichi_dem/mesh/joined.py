@@ -1,0 +1,98 @@
+"""Several meshes as one, side by side or bonded where their faces match (NumPy only)."""
+
+from collections.abc import Sequence
+from typing import Optional
+
+import numpy as np
+
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import flag, instance, shown, word
+from taichi_dem.mesh import tetrahedra as geometry
+from taichi_dem.mesh.mesh import Mesh, checked_mesh
+from taichi_dem.mesh.parts import parts_of
+from taichi_dem.mesh.shapes import placed_together
+from taichi_dem.mesh.weld import COINCIDENT, weld_labels
+
+#: Names of meshes that get none.
+_NAMES = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth")
+#: Points nearer than this share of the shortest edge become one where meshes are bonded.
+_WELD = 1e-6
+
+
+def join(*meshes: Mesh, names: Optional[Sequence[str]] = None, bonded: bool = False) -> Mesh:
+    """Make one mesh of several.
+
+    Parameters
+    ----------
+    *meshes : Mesh
+        Meshes at the places where they are (``Mesh.moved``); bodies keep this order.
+    names : sequence of str, optional
+        Names of the meshes: first, second, ... by default.
+    bonded : bool, default False
+        Whether bonds join the meshes where faces of theirs match, corner by corner. Without it they
+        are apart, also where they touch.
+
+    Returns
+    -------
+    Mesh
+        Each mesh is a body group of its name. Its groups are there as NAME_GROUP, and, under their
+        own name, together with those of that name of the others. Of groups of outer faces those
+        that have become inner ones are left out, unless all of a group have.
+
+    Raises
+    ------
+    InputError
+        There are fewer than two meshes, or other than as many different names, or meshes that are
+        to be bonded share no face.
+
+    Examples
+    --------
+    >>> cube = shapes.block(0.1, element=0.1)
+    >>> two = join(cube, cube.moved(by=(0.2, 0.0, 0.0)), names=["left", "right"])
+    >>> sorted(two.body_groups)
+    ['left', 'right']
+    """
+    for place, mesh in enumerate(meshes):
+        instance(f"mesh {place}", mesh, Mesh)
+    parts = dict(zip(_checked_names(names, len(meshes)), ((mesh, (0, 0, 0)) for mesh in meshes)))
+    flag("bonded", bonded)
+    points = np.vstack([mesh.points for mesh in meshes])
+    near = geometry.close_pairs(points, COINCIDENT * np.ptp(points, axis=0).max())
+    together = placed_together(parts, keep_coincident=len(near) > 0)
+    return _bonded(together) if bonded else together
+
+
+def _checked_names(names, count):
+    """A name for each mesh."""
+    if count < 2:
+        raise InputError(f"join must have at least two meshes, got {count}")
+    given = _NAMES[:count] if names is None else names
+    several = isinstance(given, (list, tuple)) and len(given) == count
+    if not several or len(set(map(str, given))) < count:
+        raise InputError(f"names must be {count} different names, got {shown(names)}")
+    return [word("names", name) for name in given]
+
+
+def _bonded(mesh):
+    """The mesh with points at one place made one, so that faces on them are shared."""
+    shortest = geometry.edge_lengths(mesh.points, mesh.tetrahedra).min()
+    label = weld_labels(mesh.points, mesh.tetrahedra, _WELD * shortest)
+    tetrahedra = label[mesh.tetrahedra]
+    groups = {name: label[faces] for name, faces in mesh.groups.items()}
+    faces = geometry.all_faces(tetrahedra)
+    number = geometry.face_numbers(np.vstack([faces, *groups.values()]))
+    shared = np.bincount(number[: len(faces)], minlength=number.max() + 1) == 2
+    start = len(faces)
+    for name, own in groups.items():
+        inner = shared[number[start : start + len(own)]]
+        start += len(own)
+        if not inner.all():
+            groups[name] = own[~inner]
+    made = checked_mesh(mesh.points, tetrahedra, groups, body_groups=mesh.body_groups)
+    before, after = (len(np.unique(parts_of(one))) for one in (mesh, made))
+    if after == before:
+        raise InputError(
+            "bonded must be False for meshes that share no face: their points must lie on each "
+            "other, corner by corner, got none that do"
+        )
+    return made

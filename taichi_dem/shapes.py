@@ -1,0 +1,319 @@
+"""Simple solids as meshes of tetrahedra of even size, without a mesh generator.
+
+All lengths in metres; x to the right, y up, z towards the viewer. ``element`` is the length of an
+edge; planes are met exactly, and round walls by polygons whose corners lie on them::
+
+    from taichi_dem import shapes
+
+    plate = shapes.plate(width=0.2, height=0.1, thickness=0.01, hole=0.03, element=0.01)
+    plate.picture("plate.png")
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Optional, Union
+
+import numpy as np
+
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import FileName, direction, finite, positive, shown
+from taichi_dem.mesh.drawn_out import drawn_out
+from taichi_dem.mesh.filled import filled_surface
+from taichi_dem.mesh.mesh import Mesh
+from taichi_dem.mesh.triangles import circle, divided
+
+#: Most elements of a mesh: ten million tetrahedra take some ten GiB to check.
+_MOST_BODIES = 10_000_000
+#: Tetrahedra in a cube of an element: 2.3 triangles in a square, three in a layer of 0.8.
+_PER_CUBE = 8.7
+#: Distance from a line within which a point lies on it, in elements.
+_ON = 1e-6
+
+
+def block(size: Union[float, Sequence[float]], *, element: float) -> Mesh:
+    """Make a box from the origin to (x, y, z) = ``size``.
+
+    Parameters
+    ----------
+    size : float or sequence of float
+        Lengths along x, y and z [m]; one number for a cube.
+    element : float
+        Length of an edge [m], at most the smallest of them.
+
+    Returns
+    -------
+    Mesh
+        Groups left, right (x), bottom, top (y), back, front (z).
+
+    Raises
+    ------
+    InputError
+        A length is no positive number, or an element does not fit.
+
+    Examples
+    --------
+    >>> sorted(block((0.4, 0.1, 0.1), element=0.05).groups)
+    ['back', 'bottom', 'front', 'left', 'right', 'top']
+    """
+    lengths = (size,) * 3 if finite(size) else direction("size", size)
+    x, y, z = (positive("size", length) for length in lengths)
+    element = _element(element, min(x, y, z), x * y * z)
+    return drawn_out([divided(_corners(x, y), element)], z, element, _box_sides(x, y, element))
+
+
+def beam(*, length: float, width: float, height: float, element: float) -> Mesh:
+    """Make a beam along x from the origin.
+
+    Parameters
+    ----------
+    length : float
+        Length along x [m].
+    width : float
+        Width along z [m].
+    height : float
+        Height along y [m].
+    element : float
+        Length of an edge [m], at most the smallest of them.
+
+    Returns
+    -------
+    Mesh
+        Groups left, right (its ends), bottom, top, back, front.
+
+    Raises
+    ------
+    InputError
+        A length is no positive number, or an element does not fit.
+
+    Examples
+    --------
+    >>> beam(length=1.0, width=0.1, height=0.1, element=0.1).body_count
+    60
+    """
+    given = {"length": length, "height": height, "width": width}
+    return block([positive(name, value) for name, value in given.items()], element=element)
+
+
+def cylinder(*, radius: float, height: float, element: float) -> Mesh:
+    """Make a cylinder that stands on the plane y = 0, with the y axis as its axis.
+
+    Parameters
+    ----------
+    radius : float
+        Radius [m].
+    height : float
+        Height [m].
+    element : float
+        Length of an edge [m], at most the radius and the height.
+
+    Returns
+    -------
+    Mesh
+        Groups bottom, top (y), side.
+
+    Raises
+    ------
+    InputError
+        A length is no positive number, or an element does not fit.
+
+    Notes
+    -----
+    The side is a prism of n chords: its volume lacks a share of 2 (pi / n)^2 / 3.
+
+    Examples
+    --------
+    >>> sorted(cylinder(radius=0.05, height=0.1, element=0.02).groups)
+    ['bottom', 'side', 'top']
+    """
+    radius, height = positive("radius", radius), positive("height", height)
+    element = _element(element, min(radius, height), np.pi * radius**2 * height)
+    sides = {"side": _on_circle((0.0, 0.0), 2.0 * radius, element)}
+    made = drawn_out([circle((0.0, 0.0), 2.0 * radius, element)], height, element, sides)
+    made = made.moved(turned=(-90.0, 0.0, 0.0), about=(0.0, 0.0, 0.0))
+    names = {"back": "bottom", "front": "top"}
+    return replace(made, groups={names.get(k, k): faces for k, faces in made.groups.items()})
+
+
+def plate(
+    *,
+    width: float,
+    height: float,
+    thickness: float,
+    element: float,
+    hole: Union[float, Sequence[float], None] = None,
+    notch: Optional[Sequence[float]] = None,
+) -> Mesh:
+    """Make a plate from the origin, with a hole or a notch where asked for.
+
+    Parameters
+    ----------
+    width : float
+        Width along x [m].
+    height : float
+        Height along y [m].
+    thickness : float
+        Thickness along z [m].
+    element : float
+        Length of an edge [m], at most the width, the height and the thickness.
+    hole : float or sequence of float, optional
+        Centre and diameter (x, y, diameter) of a round hole through the thickness [m]; one number
+        is the diameter of a hole in the middle.
+    notch : sequence of float, optional
+        Middle, depth and opening (x, depth, opening) of a slot from the bottom edge upward [m]; at
+        least half an element wide.
+
+    Returns
+    -------
+    Mesh
+        Groups left, right (x), bottom, top (y), back, front (z), hole and notch where they are.
+
+    Raises
+    ------
+    InputError
+        A length is no positive number, an element does not fit, or a hole or notch does not leave
+        an element of wall around it.
+
+    Examples
+    --------
+    >>> drilled = plate(width=0.2, height=0.1, thickness=0.01, hole=0.03, element=0.01)
+    >>> "hole" in drilled.groups
+    True
+    """
+    given = {"width": width, "height": height, "thickness": thickness}
+    x, y, z = (positive(name, value) for name, value in given.items())
+    element = _element(element, min(x, y, z), x * y * z)
+    outline, sides = _corners(x, y), _box_sides(x, y, element)
+    loops = []
+    if hole is not None:
+        middle = _checked_hole(hole, x, y, element)
+        loops.append(circle(middle[:2], middle[2], element)[::-1])
+        sides["hole"] = _on_circle(middle[:2], middle[2], element)
+    if notch is not None:
+        slot = _checked_notch(notch, x, y, element)
+        _check_apart(slot, loops, element)
+        outline = [outline[0], *slot, *outline[1:]]
+        sides["notch"] = _on_slot(slot, element)
+    return drawn_out([divided(outline, element), *loops], z, element, sides)
+
+
+def from_surface(path: FileName, *, element: float, scale: float = 1.0) -> Mesh:
+    """Fill a drawn surface with tetrahedra by Gmsh.
+
+    Parameters
+    ----------
+    path : path
+        An STL file, or a STEP file (.step, .stp) of one solid or several.
+    element : float
+        Length of an edge [m].
+    scale : float, default 1.0
+        Length of one unit of an STL file, which has none, such as 0.001 for mm [m]. Lengths of a
+        STEP file are converted to metres.
+
+    Returns
+    -------
+    Mesh
+        A group for each surface: of its name where the STEP file has one, else surface_1,
+        surface_2, ...; surfaces of an STL end at edges of more than 40 degrees.
+
+    Raises
+    ------
+    InputError
+        The file is missing, cannot be read, or is not closed, or gmsh is not installed:
+        ``pip install "taichi-dem[mesh]"``.
+
+    Examples
+    --------
+    >>> bracket = from_surface("bracket.stl", element=0.005, scale=0.001)  # doctest: +SKIP
+    """
+    return filled_surface(path, element, scale)
+
+
+def _element(element, smallest, volume):
+    """Length of an edge [m], checked against the shape."""
+    element = positive("element", element)
+    if element > smallest * (1.0 + _ON):
+        raise InputError(
+            f"element must be at most the smallest length of the shape, {smallest:g} m, "
+            f"got {element:g}"
+        )
+    if _PER_CUBE * volume / element**3 > _MOST_BODIES:
+        least = (_PER_CUBE * volume / _MOST_BODIES) ** (1.0 / 3.0)
+        raise InputError(
+            f"element must be at least {least:.3g} m, for {_MOST_BODIES} tetrahedra at most, "
+            f"got {element:g}"
+        )
+    return element
+
+
+def _corners(x, y):
+    """Corners of a rectangle, anticlockwise from the origin."""
+    return [(0.0, 0.0), (x, 0.0), (x, y), (0.0, y)]
+
+
+def _box_sides(x, y, element):
+    """Sides of a rectangle by name, for ``drawn_out``."""
+    near = _ON * element
+    return {
+        "left": lambda p: p[..., 0] < near,
+        "right": lambda p: p[..., 0] > x - near,
+        "bottom": lambda p: p[..., 1] < near,
+        "top": lambda p: p[..., 1] > y - near,
+    }
+
+
+def _on_circle(middle, diameter, element):
+    def on(points):
+        away = np.sqrt(((points - np.asarray(middle)) ** 2).sum(axis=-1))
+        return np.abs(away - 0.5 * diameter) < _ON * element
+
+    return on
+
+
+def _on_slot(slot, element):
+    (left, _), (_, depth), (right, _) = slot[0], slot[1], slot[2]
+    near = _ON * element
+
+    def on(points):
+        x, y = points[..., 0], points[..., 1]
+        walls = (np.abs(x - left) < near) | (np.abs(x - right) < near)
+        end = np.abs(y - depth) < near
+        return (x > left - near) & (x < right + near) & (y < depth + near) & (walls | end)
+
+    return on
+
+
+def _checked_hole(hole, x, y, element):
+    """Middle and diameter of a hole [m], which leaves an element on all sides."""
+    given = (0.5 * x, 0.5 * y, hole) if finite(hole) else hole
+    across, up, diameter = direction("hole", given)
+    positive("diameter of the hole", diameter)
+    room = min(across, up, x - across, y - up) - 0.5 * diameter
+    if room < element * (1.0 - _ON) or diameter < element:
+        raise InputError(
+            f"hole must be (x, y, diameter) with a diameter of an element, {element:g} m, at least "
+            f"and as much between it and the edges, got {shown(hole)}"
+        )
+    return across, up, diameter
+
+
+def _checked_notch(notch, x, y, element):
+    """Corners of a slot from the bottom edge, clockwise about its empty inside."""
+    middle, depth, opening = direction("notch", notch)
+    left, right = middle - 0.5 * opening, middle + 0.5 * opening
+    room = min(left, x - right, y - depth, depth) - element
+    if not opening >= 0.5 * element or room < -_ON * element:
+        raise InputError(
+            f"notch must be (x, depth, opening) with a depth of an element, {element:g} m, at "
+            f"least, half of one as opening, and one between it and the edges, got {shown(notch)}"
+        )
+    return [(left, 0.0), (left, depth), (right, depth), (right, 0.0)]
+
+
+def _check_apart(slot, loops, element):
+    """Raise InputError for a notch that comes nearer than an element to a hole."""
+    (left, _), (_, depth), (right, _) = slot[0], slot[1], slot[2]
+    for loop in loops:
+        aside = np.maximum(np.maximum(left - loop[:, 0], loop[:, 0] - right), 0.0)
+        above = np.maximum(loop[:, 1] - depth, 0.0)
+        if (aside**2 + above**2).min() < element**2 * (1.0 - _ON):
+            raise InputError(f"notch must stay an element, {element:g} m, away from the hole")
