@@ -49,6 +49,7 @@ def block_frame(centre, time_s, draw):
         rotation=np.array([matrix(turn) for turn in turns]),
         displacement=displacement,
         velocity=30.0 * share * draw.normal(size=(count, 3)),
+        angular_momentum=np.zeros((count, 3)),
         level=draw.integers(0, 4, count),
         damage=draw.random(count),
         bound=np.zeros(count, dtype=int),
