@@ -2,15 +2,16 @@
 
 from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Optional
+from typing import Any, ClassVar, Optional
 
-from taichi_dem.effects.base import MANY, Effect
+from taichi_dem.body_materials import BodyMaterials, body_materials
+from taichi_dem.effects.base import MANY, Effect, check_one_material
 from taichi_dem.effects.chosen import AUTO, LISTED, ChosenEffects, chosen_effects
 from taichi_dem.effects.roles import check_effect
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import between, finite, positive, shown
-from taichi_dem.materials import Material, softest_bond
+from taichi_dem.materials import Material
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.parts import may_meet, parts_of
 from taichi_dem.mesh.topology import check_free
@@ -49,12 +50,16 @@ class Scene:
         of inner faces. Stiffness, damping, strength, cohesion and fracture energy per area of the
         face are that share of the material's; openings at the limits and the friction angle do not
         change.
+    materials : mapping, optional
+        Material of the bodies of a group by the name of a body group; all other bodies have
+        ``material``. ``body_materials.joined`` says what a bond or contact between two of them has.
 
     Raises
     ------
     InputError
         A type is wrong, an effect is listed twice in a role that takes one, friction has no
-        contact, the mesh lacks a group, or a number is out of its range.
+        contact, the mesh lacks a group, a body is in groups of different materials, or a number is
+        out of its range.
 
     Examples
     --------
@@ -71,18 +76,27 @@ class Scene:
     sleep: Optional[float] = None
     unbonded: Iterable[str] = ()
     weaker: Mapping[str, float] = field(default_factory=dict)
+    materials: Mapping[str, Material] = field(default_factory=dict)
+
+    #: Not among the options: the material of each body.
+    body_materials: ClassVar[BodyMaterials]
 
     def __post_init__(self):
         _check_body(self)
         object.__setattr__(self, "mesh", _bonded(self))
+        laid = body_materials(self.mesh, self.material, self.materials)
+        object.__setattr__(self, "body_materials", laid)
+        object.__setattr__(self, "materials", dict(self.materials))
         object.__setattr__(self, "loads", _listed("loads", self.loads))
         object.__setattr__(self, "effects", _effects_of(self))
         _check_types(self)
         object.__setattr__(self, "sleep", _sleep_of(self))
         _check_roles(self.effects)
-        material = softest_bond(self.mesh, self.material)
+        for material in laid.checked_pairs():
+            for effect in self.effects:
+                effect.check_material(material)
         for effect in self.effects:
-            effect.check_material(material)
+            check_one_material(effect, laid)
         for effect in self.effects:
             if hasattr(effect, "group"):
                 self.mesh.group_faces(effect.group)
@@ -127,7 +141,8 @@ class Scene:
         bool
             True where one acts.
         """
-        material, roles = self.material, {effect.role for effect in self.effects if effect.name}
+        material = self.body_materials
+        roles = {effect.role for effect in self.effects if effect.name}
         bonds = "dashpot" in roles and material.has_bond_damping
         return bonds or (touching and "contact" in roles and material.has_contact_damping)
 
@@ -156,7 +171,7 @@ def _effects_of(scene):
     """Effects as a ``ChosenEffects``, from a list, a word, or those of another scene."""
     given = scene.loads
     if isinstance(scene.effects, str):
-        return chosen_effects(scene.effects, scene.mesh, scene.material, given)
+        return chosen_effects(scene.effects, scene.mesh, scene.body_materials, given)
     word = getattr(scene.effects, "word", None)
     effects = _listed("effects", scene.effects)
     if given and word in (None, LISTED):
@@ -237,7 +252,7 @@ def _check_roles(effects):
 def scene_warnings(scene: Any) -> tuple[str, ...]:
     """Sentences about what a scene lists or leaves out in vain; before a run.
 
-    scene: a Scene, or a Model, which has the same mesh, material and effects.
+    scene: a Scene, or a Model, which has the same mesh, materials and effects.
     """
     return (*outer_faces_warnings(scene), *_friction_warnings(scene))
 
@@ -245,11 +260,12 @@ def scene_warnings(scene: Any) -> tuple[str, ...]:
 def _friction_warnings(scene):
     """Friction without springs is a drag up to its limit, so without a dashpot it is none."""
     rubs = [effect for effect in scene.effects if effect.role == "friction"]
-    material = scene.material
-    if not rubs or rubs[0].remembers or material.has_contact_damping or not material.friction:
+    material = scene.body_materials
+    if not rubs or rubs[0].remembers or material.friction_has_dashpots:
         return ()
+    never = "never acts on bodies of a material" if material.has_contact_damping else "never acts"
     return (
-        f"{rubs[0].name} never acts: it is at most contact_damping times the sliding speed, and "
+        f"{rubs[0].name} {never}: it is at most contact_damping times the sliding speed, and "
         "contact_damping of the material is 0; StickingFriction acts by springs instead",
     )
 

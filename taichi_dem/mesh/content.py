@@ -15,16 +15,16 @@ from taichi_dem.mesh.split import shape_of
 Unread = tuple[str, str]
 
 #: Gmsh's groups by their dimension.
-_KINDS = {0: "points", 1: "lines", 3: "volumes"}
+_KINDS = {0: "points", 1: "lines"}
 _SPLIT = "split them into tetrahedra, for example by ParaView's filter Tetrahedralize"
 _UNKNOWN = "holds cells of a type that meshio does not know, such as voxels"
 #: What Gmsh's remedy below calls a file whose name a shell or Gmsh would take for more than a name.
 _PLAIN = "surface.stl"
 #: Kind of an Abaqus surface among the unread groups.
 _SURFACE = "element sides"
-_ONE_MATERIAL = (
-    "one material fills the whole mesh, and loads and supports need groups of faces (physical "
-    "surfaces in Gmsh)"
+_NEEDED = (
+    "loads and supports need groups of faces (physical surfaces in Gmsh), materials groups of "
+    "solid cells"
 )
 #: Of a script that does not end with a new line Gmsh leaves out the last: echo adds one.
 _FILL = (
@@ -137,7 +137,8 @@ def unread_groups(raw: Any) -> tuple[Unread, ...]:
             for tag in np.unique(tags[tags > 0]).tolist():
                 found.append((names.get((tag, block.dim), f"physical_{tag}"), _KINDS[block.dim]))
     known = {*raw.field_data, "gmsh:bounding_entities"}
-    found += [(name, "elements") for name in raw.cell_sets if name not in known]
+    sets = (name for name in raw.cell_sets if name not in known)
+    found += [(name, "elements") for name in sets if not _has_solid_members(raw, name)]
     found += [(name, "points") for name in raw.point_sets]
     return tuple(dict.fromkeys(found))
 
@@ -153,32 +154,18 @@ def surfaces_of_abaqus(path: str) -> tuple[Unread, ...]:
 
 
 def parts_dropped(raw: Any, groups: Sequence[Unread]) -> list[str]:
-    """Sentences about unread contents that may change a result; groups: from ``unread_groups``.
-
-    One group of volumes says nothing that the tetrahedra do not say.
-    """
-    sentences = []
-    names = [name for name, kind in groups if kind == "volumes"]
-    if len(names) > 1:
-        sentences.append(f"the groups of volumes {', '.join(names)} are not read: {_ONE_MATERIAL}")
+    """Sentences about unread contents that may change a result; groups: from ``unread_groups``."""
     sets = [f"{name} (of {kind})" for name, kind in groups if _is_partial_set(raw, name, kind)]
-    if sets:
-        sentences.append(f"the sets {', '.join(sets)} are not read: {_ONE_MATERIAL}")
-    numbers = [name for name in raw.cell_data if _differs(raw, name)]
-    if numbers:
-        listed = ", ".join(numbers)
-        sentences.append(f"numbers on tetrahedra are not read: {listed}; {_ONE_MATERIAL}")
-    return sentences
+    return [f"the sets {', '.join(sets)} are not read: {_NEEDED}"] if sets else []
 
 
 def others_dropped(raw: Any, groups: Sequence[Unread]) -> list[str]:
     """Sentences about groups that are not read and seldom matter; groups: ``unread_groups``."""
     others = [
-        f"{name} (of {kind})"
-        for name, kind in groups
-        if kind != "volumes" and not _is_partial_set(raw, name, kind)
+        f"{name} (of {kind})" for name, kind in groups if not _is_partial_set(raw, name, kind)
     ]
-    return [f"only groups of faces are read, not {', '.join(others)}"] if others else []
+    words = "only groups of faces and of solid cells are read, not"
+    return [f"{words} {', '.join(others)}"] if others else []
 
 
 def _is_partial_set(raw, name, kind):
@@ -187,25 +174,27 @@ def _is_partial_set(raw, name, kind):
         return kind == _SURFACE
     if name in raw.point_sets and kind == "points":
         return len(raw.point_sets[name]) < len(raw.points)
-    solid = [is_solid(block.type) for block in raw.cells]
-    members = (0 if held is None else len(held) for held in raw.cell_sets.get(name, ()))
-    count = sum(number for number, wanted in zip(members, solid) if wanted)
-    return count < sum(len(block.data) for block, wanted in zip(raw.cells, solid) if wanted)
+    return False
 
 
-def _differs(raw, name):
-    """Whether tetrahedra carry different whole numbers of a name, as they do for materials.
+def _has_solid_members(raw, name):
+    """Whether a set of cells holds solid ones, which become a group of bodies."""
+    members = zip(raw.cells, raw.cell_sets[name])
+    return any(held is not None and len(held) and is_solid(block.type) for block, held in members)
 
-    Numbers of which each tetrahedron has its own are numbers of the cells, not of materials.
+
+def tells_parts(raw: Any, name: str) -> bool:
+    """Whether solid cells carry different whole numbers of a name, as they do for materials.
+
+    Numbers of which each cell has its own are numbers of the cells, not of materials.
     """
     values = [
-        np.asarray(data).ravel()
-        for block, data in zip(raw.cells, raw.cell_data[name])
-        if is_solid(block.type) and np.asarray(data).dtype.kind in "iu"
+        data
+        for block, data in zip(raw.cells, map(np.asarray, raw.cell_data[name]))
+        if is_solid(block.type) and data.dtype.kind in "iu" and data.ndim == 1
     ]
     all_values = np.concatenate([[], *values])
-    count = len(np.unique(all_values))
-    return not name.startswith("gmsh:") and 1 < count < max(len(all_values), 3)
+    return 1 < len(np.unique(all_values)) < max(len(all_values), 3)
 
 
 def _held(raw, wanted=lambda block: True):

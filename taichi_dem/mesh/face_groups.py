@@ -1,4 +1,4 @@
-"""Groups of faces chosen by where they are: for loads, supports, notches, joints (NumPy only)."""
+"""Groups chosen by where they are: faces for loads, supports, notches; bodies (NumPy only)."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -12,7 +12,7 @@ from taichi_dem.kit.validation import direction, shown, unit_vector, word
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.mesh import Mesh
 
-#: Given the centres of faces [m], (n, 3), whether each is chosen, (n,).
+#: Given the centres of faces or bodies [m], (n, 3), whether each is chosen, (n,).
 Choice = Callable[[np.ndarray], Any]
 
 
@@ -25,6 +25,38 @@ def with_outer_group(mesh: Mesh, name: str, chosen: Choice) -> Mesh:
     faces = geometry.all_faces(mesh.tetrahedra)
     outer = faces[geometry.outer_rows(faces)]
     return _with_group(mesh, name, outer[_choose(mesh, outer, chosen)])
+
+
+def with_body_group(mesh: Mesh, name: str, chosen: Choice) -> Mesh:
+    """The mesh with one more group of bodies, chosen by their centres.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    name : str
+        Of the new group, as for ``Scene(materials={name: ...})``.
+    chosen : function
+        Of the centres of the bodies [m], (body_count, 3); returns body_count truth values.
+
+    Returns
+    -------
+    Mesh
+
+    Raises
+    ------
+    InputError
+        For a name that is taken, a choice of no body, or other values.
+
+    Example
+    -------
+    ``with_body_group(mesh, "ore", lambda x: x[:, 1] > 0.5)``
+    """
+    if word("name", name) in mesh.body_groups:
+        raise InputError(f"name must be that of a new group, got {shown(name)}, which is there")
+    bodies = np.flatnonzero(_choose(mesh, mesh.tetrahedra, chosen, "bodies"))
+    if not len(bodies):
+        raise InputError(f"group {name} must have at least one body, but none was chosen")
+    return replace(mesh, body_groups={**mesh.body_groups, name: bodies})
 
 
 def with_inner_group(mesh: Mesh, name: str, chosen: Choice) -> Mesh:
@@ -67,16 +99,16 @@ def _inner_faces(mesh):
     return geometry.all_faces(mesh.tetrahedra)[rows[:, 0]], rows // 4
 
 
-def _choose(mesh, faces, chosen):
-    """Which faces a choice takes, (n,)."""
-    centres = mesh.points[faces].mean(axis=1)
+def _choose(mesh, corners, chosen, what="faces"):
+    """Which faces or bodies, given by their corners, a choice takes, (n,)."""
+    centres = mesh.points[corners].mean(axis=1)
     if not callable(chosen):
-        raise InputError(f"chosen must be a function of centres of faces, got {shown(chosen)}")
+        raise InputError(f"chosen must be a function of centres of {what}, got {shown(chosen)}")
     found = np.asarray(chosen(centres))
-    if found.shape != (len(faces),) or found.dtype != bool:
+    if found.shape != (len(corners),) or found.dtype != bool:
         raise InputError(
-            f"chosen must return one truth value for each of {len(faces)} faces, got an array of "
-            f"{found.dtype} of shape {found.shape}"
+            f"chosen must return one truth value for each of {len(corners)} {what}, got an "
+            f"array of {found.dtype} of shape {found.shape}"
         )
     return found
 

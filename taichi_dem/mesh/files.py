@@ -17,6 +17,7 @@ from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import renamed_when_done, write_text
 from taichi_dem.kit.timeout import run_with_timeout
 from taichi_dem.kit.validation import FileName, path_name, positive
+from taichi_dem.mesh.cell_groups import body_groups_of, volumes_of
 from taichi_dem.mesh.content import (
     cells_counted,
     cells_dropped,
@@ -78,11 +79,12 @@ def read_mesh(
     Notes
     -----
     Groups come from Gmsh's physical surfaces ("physical_TAG" where they have no name); in other
-    formats from integer data on triangles, as "data name_value". Elements of higher order are read
-    as linear ones. Hexahedra, prisms and pyramids are cut into tetrahedra after welding. Groups of
-    points, lines and volumes are not read. A UserWarning tells of what may change results: parts of
-    other materials, Abaqus sets and surfaces that are not read, cells of types that meshio does not
-    know, and cells that meet but share no face.
+    formats from integer data on triangles, as "data name_value". Groups of bodies come from Gmsh's
+    physical volumes; in other formats from sets of solid cells and integer data on them. Elements
+    of higher order are read as linear ones. Hexahedra, prisms and pyramids are cut into tetrahedra
+    after welding. Groups of points and lines are not read. A UserWarning tells of what may change
+    results: Abaqus sets and surfaces that are not read, cells of types that meshio does not know,
+    and cells that meet but share no face.
 
     Examples
     --------
@@ -110,14 +112,21 @@ def read_mesh(
 
 
 def write_mesh(path: FileName, mesh: Mesh) -> None:
-    """Write a mesh with its named groups as a Gmsh 2.2 text file (exact: 17 digits)."""
-    names = list(mesh.groups)
-    lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$PhysicalNames", str(len(names) + 1)]
+    """Write a mesh with its named groups as a Gmsh 2.2 text file (exact: 17 digits).
+
+    Body groups become physical volumes. As a tetrahedron has one volume in this format, bodies in
+    several groups are in the volume "NAME|NAME", which ``read_mesh`` takes for both.
+    """
+    names, first = list(mesh.groups), 1 + len(mesh.groups)
+    volumes, tags = volumes_of(mesh, first)
+    lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$PhysicalNames"]
+    lines += [str(len(names) + len(volumes))]
     lines += [f'2 {tag} "{name}"' for tag, name in enumerate(names, start=1)]
-    lines += [f'3 {len(names) + 1} "bodies"', "$EndPhysicalNames", "$Nodes", str(len(mesh.points))]
+    lines += [f'3 {tag} "{name}"' for tag, name in enumerate(volumes, start=first)]
+    lines += ["$EndPhysicalNames", "$Nodes", str(len(mesh.points))]
     lines += [f"{k} {x:.17g} {y:.17g} {z:.17g}" for k, (x, y, z) in enumerate(mesh.points, 1)]
     elements = [(2, tag, face) for tag, name in enumerate(names, 1) for face in mesh.groups[name]]
-    elements += [(4, len(names) + 1, corners) for corners in mesh.tetrahedra]
+    elements += [(4, tag, corners) for tag, corners in zip(tags.tolist(), mesh.tetrahedra)]
     lines += ["$EndNodes", "$Elements", str(len(elements))]
     for number, (kind, tag, corners) in enumerate(elements, start=1):
         lines.append(f"{number} {kind} 2 {tag} {tag} " + " ".join(str(c + 1) for c in corners))
@@ -207,7 +216,10 @@ def _mesh(raw, scale, weld_tolerance, keep_coincident):
         tetrahedra = _tetrahedra(raw, notes)
     kept = {"keep_coincident": keep_coincident}
     mesh = checked_mesh(points, tetrahedra, _groups(raw), **kept)
-    return replace(mesh, notes=(*notes, *welding, *mesh.notes))
+    bodies = body_groups_of(raw)
+    if len(bodies) > 1:
+        notes.append(f"bodies are in the groups {', '.join(bodies)}, for materials of their own")
+    return replace(mesh, body_groups=bodies, notes=(*notes, *welding, *mesh.notes))
 
 
 def _renumber(raw, label):

@@ -4,9 +4,9 @@ x points to the right, y up, z towards the viewer.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Optional
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,8 +15,10 @@ from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import FileName, flag, shown, word
 from taichi_dem.mesh import tetrahedra as geometry
+from taichi_dem.mesh.body_groups import checked_body_groups
 from taichi_dem.mesh.checked_groups import checked_groups
 from taichi_dem.mesh.parts_in_files import parts_of
+from taichi_dem.mesh.sharing import refuse_bad_sharing
 from taichi_dem.mesh.weld import COINCIDENT, weld_labels
 
 #: Share of (longest edge)^3 below which a volume counts as zero, as it may be round-off.
@@ -50,10 +52,12 @@ class Mesh:
     source : str, default ""
         Name of the file; ``""`` for a mesh built in memory.
     unread : tuple of tuple of (str, str), default ()
-        Groups of the file that are not of faces: pairs of name and what they are of.
+        Groups of the file that are neither of faces nor of bodies: pairs of name and kind.
     keep_coincident : bool, default False
         Whether points that coincide stay apart, and with them the faces on them, as at a joint or a
         crack.
+    body_groups : mapping, optional
+        Numbers of bodies (n,) by name, in rising order, as for ``Scene(materials=...)``.
 
     Attributes
     ----------
@@ -82,12 +86,14 @@ class Mesh:
     source: str = ""
     unread: tuple[tuple[str, str], ...] = ()
     keep_coincident: bool = False
+    body_groups: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         notes: list[str] = []
         flag("keep_coincident", self.keep_coincident)
         given = self.points, self.tetrahedra, self.groups, 0.0
-        self._hold(*_checked(*given, self.keep_coincident, notes))
+        parts = _checked(*given, self.keep_coincident, notes)
+        self._hold(parts, checked_body_groups(self.body_groups, len(parts[1])))
         mended = [note for note in notes if note.split()[0] in _MENDING]
         if mended:
             raise InputError(f"a Mesh takes what checked_mesh gives, which here {mended[0]}")
@@ -96,21 +102,25 @@ class Mesh:
     bonded_shares: ClassVar[tuple[tuple[str, float], ...]] = ()
     inner_groups: ClassVar[tuple[str, ...]] = ()
 
-    def _hold(self, points, tetrahedra, groups, inner_groups):
-        """Keep arrays that cannot be written to."""
+    def _hold(self, parts, body_groups):
+        """Keep arrays that cannot be written to; parts: what ``_checked`` gives."""
+        points, tetrahedra, groups, inner_groups = parts
         object.__setattr__(self, "inner_groups", inner_groups)
-        for array in (points, tetrahedra, *groups.values()):
+        for array in (points, tetrahedra, *groups.values(), *body_groups.values()):
             array.setflags(write=False)
         for name, value in zip(("points", "tetrahedra"), (points, tetrahedra)):
             object.__setattr__(self, name, value)
         object.__setattr__(self, "groups", MappingProxyType(dict(groups)))
+        object.__setattr__(self, "body_groups", MappingProxyType(dict(body_groups)))
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**vars(self), "groups": dict(self.groups)}
+        named = {"groups": dict(self.groups), "body_groups": dict(self.body_groups)}
+        return {**vars(self), **named}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
-        self._hold(self.points, self.tetrahedra, self.groups, self.inner_groups)
+        parts = self.points, self.tetrahedra, self.groups, self.inner_groups
+        self._hold(parts, self.body_groups)
 
     def __repr__(self):
         groups = f"groups {', '.join(self.groups)}" if self.groups else "no groups"
@@ -149,10 +159,38 @@ class Mesh:
         """
         if not isinstance(name, str) or name not in self.groups:
             known = ", ".join(sorted(self.groups)) or "none"
-            kinds = [kind for other, kind in self.unread if other == name]
+            kinds = ["bodies"] * (isinstance(name, str) and name in self.body_groups)
+            kinds += [kind for other, kind in self.unread if other == name]
             why = f" ({name} is a group of {kinds[0]}: make one of faces)" if kinds else ""
             raise InputError(f"mesh has no face group {shown(name)}{why}; its groups are: {known}")
         return self.groups[name]
+
+    def group_bodies(self, name: str) -> np.ndarray:
+        """Bodies of a group.
+
+        Parameters
+        ----------
+        name : str
+            Name of the body group.
+
+        Returns
+        -------
+        ndarray
+            Numbers of bodies, shape (n,).
+
+        Raises
+        ------
+        InputError
+            There is no such group.
+        """
+        if not isinstance(name, str) or name not in self.body_groups:
+            known = ", ".join(sorted(self.body_groups)) or "none"
+            of_faces = isinstance(name, str) and name in self.groups
+            why = f" ({name} is a group of faces: make one of bodies)" if of_faces else ""
+            raise InputError(
+                f"mesh has no body group {shown(name)}{why}; its body groups are: {known}"
+            )
+        return self.body_groups[name]
 
     def bonded_by(self, shares: Mapping[str, float]) -> "Mesh":
         """Return the mesh with only a share of the area of some inner faces bonded.
@@ -210,6 +248,8 @@ def checked_mesh(
     source: FileName = "",
     weld_tolerance: float = 0.0,
     keep_coincident: bool = False,
+    *,
+    body_groups: Optional[Mapping[str, ArrayLike]] = None,
 ) -> Mesh:
     """Build a Mesh from arrays; repair and report small defects, refuse others.
 
@@ -230,6 +270,8 @@ def checked_mesh(
         Accept distinct points at one place. Faces on them are free surfaces, as of two blocks that
         touch, a joint or a crack, and meet by the contact of outer faces. Without it such points
         are refused, as bodies that seem joined there would not be bonded.
+    body_groups : mapping, optional
+        Numbers of tetrahedra (k,) by name.
 
     Returns
     -------
@@ -258,7 +300,7 @@ def checked_mesh(
     made = object.__new__(Mesh)
     made.__dict__.update(notes=tuple(notes), source=str(source), unread=())
     made.__dict__.update(keep_coincident=keep_coincident)
-    made._hold(*parts)
+    made._hold(parts, checked_body_groups(body_groups or {}, len(parts[1])))
     return made
 
 
@@ -274,7 +316,7 @@ def _checked(points, tetrahedra, groups, weld_tolerance, keep_coincident, notes)
     if not keep_coincident:
         _refuse_coincident(places)
     corners = _positive(places, corners, notes)
-    _refuse_bad_sharing(corners)
+    refuse_bad_sharing(corners)
     if keep_coincident:
         _check_coincident(places, corners, weld_tolerance, notes)
     return places, corners, *checked_groups(corners, faces, notes)
@@ -396,7 +438,7 @@ def _check_coincident(points, tetrahedra, weld_tolerance, notes):
         )
     pairs, _ = _coincident(points)
     if len(pairs):
-        _refuse_bad_sharing(geometry.components(len(points), pairs)[tetrahedra])
+        refuse_bad_sharing(geometry.components(len(points), pairs)[tetrahedra])
         count = len(np.unique(pairs))
         notes.append(f"kept {count} points apart that coincide with another: no bond joins them")
 
@@ -418,47 +460,8 @@ def _positive(points, tetrahedra, notes):
     return np.ascontiguousarray(tetrahedra, dtype=np.int32)
 
 
-def _refuse_bad_sharing(tetrahedra):
-    """Refuse repeated bodies, faces of three bodies and bodies that lie in each other."""
-    _, number, count = np.unique(
-        np.sort(tetrahedra, axis=1), axis=0, return_inverse=True, return_counts=True
-    )
-    repeated = np.flatnonzero(count[number.reshape(-1)] > 1)
-    if len(repeated):
-        twins = np.flatnonzero(number.reshape(-1) == number.reshape(-1)[repeated[0]])
-        raise InputError(f"tetrahedra {_listed(twins)} have the same four points")
-    face = geometry.face_numbers(geometry.all_faces(tetrahedra))
-    crowded = np.flatnonzero(np.bincount(face) > 2)
-    if len(crowded):
-        owners = np.flatnonzero(face == crowded[0]) // 4
-        raise InputError(
-            f"tetrahedra {_listed(owners)} share one face; at most two may "
-            f"({len(crowded)} such faces)"
-        )
-    _refuse_overlap(tetrahedra)
-
-
-def _refuse_overlap(tetrahedra):
-    """Refuse two bodies on the same side of their shared face."""
-    rows = geometry.shared_faces(tetrahedra)
-    first, second = (geometry.all_faces(tetrahedra)[rows[:, side]] for side in (0, 1))
-    start = np.argmax(second == first[:, :1], axis=1)
-    following = np.take_along_axis(second, ((start + 1) % 3)[:, None], axis=1)[:, 0]
-    bad = np.flatnonzero(following == first[:, 1])
-    if len(bad):
-        raise InputError(
-            f"tetrahedra {_listed(rows[bad[0]] // 4)} lie on the same side of the face they share"
-        )
-
-
 def _note_parts(tetrahedra, notes):
     """Say when the bodies are not all joined through shared faces."""
     parts = len(np.unique(parts_of(tetrahedra)))
     if parts > 1:
         notes.append(f"the mesh has {parts} parts that share no face with each other")
-
-
-def _listed(numbers):
-    """Numbers as "3, 5 and 9"."""
-    words = [str(int(k)) for k in numbers]
-    return " and ".join([", ".join(words[:-1]), words[-1]])

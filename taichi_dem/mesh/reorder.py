@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from taichi_dem.mesh.body_groups import renumbered
 from taichi_dem.mesh.mesh import Mesh
 
 #: Cells of the curve along the longest side of a mesh, as a power of two.
@@ -26,7 +27,7 @@ def in_space_order(mesh: Mesh) -> Mesh:
     Returns
     -------
     Mesh
-        The same bodies with other numbers; points and groups stay.
+        The same bodies with other numbers; points and groups of faces stay, body groups follow.
 
     Notes
     -----
@@ -43,7 +44,8 @@ def in_space_order(mesh: Mesh) -> Mesh:
     966
     """
     order = np.argsort(_morton(mesh.points[mesh.tetrahedra].mean(axis=1)), kind="stable")
-    return replace(mesh, tetrahedra=mesh.tetrahedra[order])
+    groups = renumbered(mesh.body_groups, order)
+    return replace(mesh, tetrahedra=mesh.tetrahedra[order], body_groups=groups)
 
 
 def _morton(places):

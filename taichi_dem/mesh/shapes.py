@@ -99,15 +99,17 @@ def with_moved_nodes(mesh: Mesh, most: ArrayLike, seed: int) -> Mesh:
     moved = np.asarray(most) * np.random.default_rng(seed).uniform(-1.0, 1.0, mesh.points.shape)
     near = 1e-9 * extent
     moved[(mesh.points < low + near) | (mesh.points > low + extent - near)] = 0.0
-    return checked_mesh(mesh.points + moved, mesh.tetrahedra, dict(mesh.groups))
+    points, groups = mesh.points + moved, dict(mesh.groups)
+    return checked_mesh(points, mesh.tetrahedra, groups, body_groups=mesh.body_groups)
 
 
 def placed_together(parts: dict, keep_coincident: bool = False) -> Mesh:
     """Several solids as one mesh, not bonded to each other; bodies in the order of the parts.
 
     parts: name -> (mesh, shift (3,) [m]). Groups: those of every part as NAME_GROUP, and, under
-    its own name, a group of all parts together. keep_coincident: solids may touch point by point
-    (see ``checked_mesh``). Raises InputError as ``checked_mesh``.
+    its own name, a group of all parts together. Body groups: likewise, and NAME for all bodies of a
+    part. keep_coincident: solids may touch point by point (see ``checked_mesh``). Raises InputError
+    as ``checked_mesh``.
     """
     points, tetrahedra, groups, first = [], [], {}, 0
     for name, (mesh, shift) in parts.items():
@@ -119,15 +121,33 @@ def placed_together(parts: dict, keep_coincident: bool = False) -> Mesh:
         first += mesh.point_count
     joined = {key: np.vstack(faces) for key, faces in groups.items()}
     arrays = np.vstack(points), np.vstack(tetrahedra), joined
-    return checked_mesh(*arrays, keep_coincident=keep_coincident)
+    bodies = _bodies_together({name: mesh for name, (mesh, _) in parts.items()})
+    return checked_mesh(*arrays, keep_coincident=keep_coincident, body_groups=bodies)
+
+
+def _bodies_together(parts):
+    """Body groups of ``placed_together``."""
+    groups: dict[str, np.ndarray] = {}
+    first = 0
+    for name, mesh in parts.items():
+        for group, bodies in mesh.body_groups.items():
+            for key in (group, f"{name}_{group}"):
+                groups[key] = np.append(groups.get(key, bodies[:0]), bodies + first)
+        first += mesh.body_count
+    # The name of a part stands for all of it, whatever groups are called.
+    first = 0
+    for name, mesh in parts.items():
+        groups[name] = np.arange(first, first + mesh.body_count)
+        first += mesh.body_count
+    return groups
 
 
 def mirrored_copies(mesh: Mesh, copies: int) -> Mesh:
     """Copies of a block one behind the other along z, each the mirror image of the one before.
 
     mesh: fills 0 to its depth along z, with flat ends in the groups back (z = 0) and front; as
-    mirror images meet, the faces of both match and bond. Groups: as in the mesh; back and front are
-    those of the ends. Raises InputError as ``checked_mesh``.
+    mirror images meet, the faces of both match and bond. Groups, of faces and bodies: as in the
+    mesh; back and front are those of the ends. Raises InputError as ``checked_mesh``.
     """
     copies = whole("copies", copies, 1, _MOST_BOXES)
     depth = float(mesh.points[:, 2].max())
@@ -142,7 +162,10 @@ def mirrored_copies(mesh: Mesh, copies: int) -> Mesh:
     groups = {name: place[:, faces].reshape(-1, 3) for name, faces in mesh.groups.items()}
     groups["back"] = place[0][mesh.groups["back"]]
     groups["front"] = place[-1][mesh.groups["front" if copies % 2 else "back"]]
-    return checked_mesh(points, place[:, mesh.tetrahedra].reshape(-1, 4), groups)
+    shifts = mesh.body_count * np.arange(copies)[:, None]
+    bodies = {name: (shifts + group).ravel() for name, group in mesh.body_groups.items()}
+    tetrahedra = place[:, mesh.tetrahedra].reshape(-1, 4)
+    return checked_mesh(points, tetrahedra, groups, body_groups=bodies)
 
 
 def _base(edge, height):

@@ -56,6 +56,11 @@ def tetrahedra_in(points: ArrayLike, kind: str, cells: np.ndarray) -> np.ndarray
     return _positive(np.asarray(points, dtype=np.float64), tetrahedra)
 
 
+def owners_in(kind: str, cells: np.ndarray) -> np.ndarray:
+    """Cell of each of the tetrahedra that ``tetrahedra_in`` gives, (m,)."""
+    return _cones(kind, cells)[1]
+
+
 def folded_or_flat(points: np.ndarray, kind: str, cells: np.ndarray) -> str:
     """A sentence on the first cell that folds over itself or is partly flat once cut, or "".
 

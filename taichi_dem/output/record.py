@@ -275,7 +275,8 @@ def write_paraview(
     Notes
     -----
     Cells carry body_id, level, speed_m_s, displacement_m, damage and step_bound_by, the place in
-    ``step_control.CRITERIA`` of what bounds a body's step. An earlier series of that name is
+    ``step_control.CRITERIA`` of what bounds a body's step; with several materials also material,
+    the number of each body's. An earlier series of that name is
     removed.
 
     Examples
@@ -297,6 +298,8 @@ def write_paraview(
             "damage": frame.damage,
             "step_bound_by": frame.bound,
         }
+        if not model.materials.is_one:
+            data["material"] = model.materials.of_body
         for effect, since in (acting_since or {}).items():
             data[f"{effect}_acts"] = (since <= frame.time_s).astype(np.int32)
             data[f"{effect}_since_s"] = since

@@ -212,6 +212,7 @@ BLAST = [
     *taken(quiet, "group", ("group",)),
     *taken(cut, "names", ("unbonded",)),
     *taken(cut, "shares", ("weaker",)),
+    *taken(cut, "materials", ("materials",)),
     *taken(scene, "positive", ("max_speed",)),
     *taken(checkpoint, "path", ("path",)),
     *taken(checkpoint, "whole", ("every_steps",), (None,)),

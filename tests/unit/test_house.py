@@ -21,7 +21,7 @@ LAYERS = {
         ("kit",),
         ("meshes", "mesh"),
         ("elasticity",),
-        ("materials",),
+        ("materials", "body_materials"),
         ("physics", "timeline", "closed_forms", "wave_moduli"),
         ("effects",),
         ("scene",),
