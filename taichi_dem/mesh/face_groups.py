@@ -28,28 +28,33 @@ def with_outer_group(mesh: Mesh, name: str, chosen: Choice) -> Mesh:
 
 
 def with_body_group(mesh: Mesh, name: str, chosen: Choice) -> Mesh:
-    """The mesh with one more group of bodies, chosen by their centres.
+    """Return the mesh with one more group of bodies, chosen by their centres.
 
     Parameters
     ----------
     mesh : Mesh
+        Mesh.
     name : str
-        Of the new group, as for ``Scene(materials={name: ...})``.
-    chosen : function
-        Of the centres of the bodies [m], (body_count, 3); returns body_count truth values.
+        Name of the new group, as for ``Scene(materials={name: ...})``.
+    chosen : callable
+        Function of the centres of the bodies [m], shape (body_count, 3), that returns body_count
+        truth values.
 
     Returns
     -------
     Mesh
+        The mesh with this group in its ``body_groups``.
 
     Raises
     ------
     InputError
-        For a name that is taken, a choice of no body, or other values.
+        The name is taken, no body is chosen, or the function returns other values.
 
-    Example
-    -------
-    ``with_body_group(mesh, "ore", lambda x: x[:, 1] > 0.5)``
+    Examples
+    --------
+    >>> mesh = with_body_group(read_mesh(PAPER_BLOCK), "upper", lambda x: x[:, 1] > 1.0)
+    >>> mesh.group_bodies("upper").size > 0
+    True
     """
     if word("name", name) in mesh.body_groups:
         raise InputError(f"name must be that of a new group, got {shown(name)}, which is there")
