@@ -26,7 +26,7 @@ from taichi_dem.elasticity.bond_rules import (
 )
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import instance, shown
-from taichi_dem.materials import Material, unchecked
+from taichi_dem.materials import Material, check_energy, unchecked
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.topology import topology_of
 
@@ -228,7 +228,7 @@ class BodyMaterials:
         where = f" at bond {bond}, whose bodies are {distance:.4g} m apart"
         if mixed:
             where += " and of two materials, of which it has the lesser strength and energy"
-        made.check_energy(where)
+        check_energy(made, where)
         return made
 
 

@@ -97,20 +97,7 @@ class Material:
             if not isinstance(value, _RULES.get(field.name, ())):
                 _check_number(field.name, value)
         if not isinstance(self.normal_stiffness, BondRule):
-            self.check_energy()
-
-    def check_energy(self, where: str = "") -> None:
-        """Raise InputError where a bond would fail before it reaches its strength.
-
-        where: which bond, in words, for a stiffness that is not the same for all.
-        """
-        if self.failure_opening <= self.onset_opening:
-            least = self.tensile_strength**2 / (2.0 * float(self.normal_stiffness))
-            raise InputError(
-                f"fracture_energy must be larger than tensile_strength^2 / (2 normal_stiffness) = "
-                f"{least:.6g} J/m2{where}, or the bond would fail before it reaches its strength, "
-                f"got {self.fracture_energy}"
-            )
+            check_energy(self)
 
     @classmethod
     def from_elastic(
@@ -214,6 +201,20 @@ class Material:
     def softening_slope(self) -> float:
         """Fall of the traction with the opening beyond the onset, a positive number [Pa/m]."""
         return self.tensile_strength / (self.failure_opening - self.onset_opening)
+
+
+def check_energy(material: Material, where: str = "") -> None:
+    """Raise InputError where a bond would fail before it reaches its strength.
+
+    where: which bond, in words, for a stiffness that is not the same for all.
+    """
+    if material.failure_opening <= material.onset_opening:
+        least = material.tensile_strength**2 / (2.0 * float(material.normal_stiffness))
+        raise InputError(
+            f"fracture_energy must be larger than tensile_strength^2 / (2 normal_stiffness) = "
+            f"{least:.6g} J/m2{where}, or the bond would fail before it reaches its strength, "
+            f"got {material.fracture_energy}"
+        )
 
 
 def unchecked(material: Material, **values: Any) -> Material:

@@ -59,10 +59,15 @@ def thrown(method, steps, materials=None, mesh=None, word=None, twin=False):
         of_body[mesh.body_groups["ore"]] = 1
         laid = BodyMaterials(mesh, (CONCRETE, replace(CONCRETE)), of_body)
         object.__setattr__(scene, "body_materials", laid)
+    return moved(scene, method, steps)
+
+
+def moved(scene, method, steps, share=1.0):
+    """A run that begins with a share of these velocities."""
     simulation = Simulation(scene, method)
     away = simulation.model.centre - np.array([0.05, 0.025, 0.025])
     velocity = away * np.array([800.0, -200.0, 400.0]) + away[:, [1, 2, 0]] * 300.0
-    simulation.state.set_motion(simulation.model.centre, velocity=velocity)
+    simulation.state.set_motion(simulation.model.centre, velocity=share * velocity)
     simulation.advance_to(steps)
     return simulation
 
@@ -102,20 +107,25 @@ def test_the_account_closes_where_two_materials_break(method, steps):
 def test_numbers_of_bodies_change_results_by_rounding_alone():
     """Bodies in another order: where master and slave change sides, so do their materials.
 
-    Sweeps visit bonds in another order too, so they go on until velocities agree to 1e-12.
+    Sweeps visit bonds in another order too, so they go on until velocities agree to 1e-12. A bond
+    is seen from its master, which turns: a second-order effect, of (3e-6)^2 at 40 mm/s here. Units
+    open by 1e-7 m, to rounding of places of 0.1 m: 1e-10 of it.
     """
     method = ImplicitDashpots(4e-7, tolerance=1e-12, sweeps=(2, 500))
-    mesh = bar(0.1, 0.05, (3, 2, 2))
+    mesh = with_body_group(bar(0.1, 0.05, (3, 2, 2)), "ore", lambda x: x[:, 0] + x[:, 1] > 0.08)
     other = in_space_order(mesh)
     order = [
         int(np.flatnonzero((other.tetrahedra == corners).all(axis=1))[0])
         for corners in mesh.tetrahedra
     ]
     assert order != sorted(order)
+    given, laws = {"ore": rock(young=3 * E, density=5000.0)}, paper_effects(outer_faces=True)[:-1]
     found = [
-        thrown(method, 12, {"ore": ORE}, each).state.motion()["velocity"] for each in (mesh, other)
+        moved(Scene(each, rock(), laws, materials=given), method, 12, 1e-3)
+        for each in (mesh, other)
     ]
-    assert found[1][order] == pytest.approx(found[0], abs=1e-9 * np.abs(found[0]).max())
+    first, second = (simulation.state.motion()["velocity"] for simulation in found)
+    assert second[order] == pytest.approx(first, abs=1e-8 * np.abs(first).max())
 
 
 def stretched(mesh, material, materials, speed=2.0, steps=120):
