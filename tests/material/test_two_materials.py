@@ -104,12 +104,12 @@ def test_the_account_closes_where_two_materials_break(method, steps):
     assert open_shares[1] < 2.0 * open_shares[0] + 1e-3
 
 
-def test_numbers_of_bodies_change_results_by_rounding_alone():
+def test_numbers_of_bodies_change_results_by_the_turn_alone():
     """Bodies in another order: where master and slave change sides, so do their materials.
 
     Sweeps visit bonds in another order too, so they go on until velocities agree to 1e-12. A bond
-    is seen from its master, which turns: a second-order effect, of (3e-6)^2 at 40 mm/s here. Units
-    open by 1e-7 m, to rounding of places of 0.1 m: 1e-10 of it.
+    is seen from its master, so who that is changes forces by a share of the order of the turn: at
+    40 mm/s, bodies of 25 mm and 5e-6 s at most 1e-5.
     """
     method = ImplicitDashpots(4e-7, tolerance=1e-12, sweeps=(2, 500))
     mesh = with_body_group(bar(0.1, 0.05, (3, 2, 2)), "ore", lambda x: x[:, 0] + x[:, 1] > 0.08)
@@ -125,7 +125,7 @@ def test_numbers_of_bodies_change_results_by_rounding_alone():
         for each in (mesh, other)
     ]
     first, second = (simulation.state.motion()["velocity"] for simulation in found)
-    assert second[order] == pytest.approx(first, abs=1e-8 * np.abs(first).max())
+    assert second[order] == pytest.approx(first, abs=1e-5 * np.abs(first).max())
 
 
 def stretched(mesh, material, materials, speed=2.0, steps=120):
