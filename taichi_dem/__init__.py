@@ -31,6 +31,7 @@ from taichi_dem.kit.progress.progress import Progress
 from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.kit.version import __version__
 from taichi_dem.materials import CONCRETE, Material
+from taichi_dem.mesh.face_groups import with_body_group
 from taichi_dem.mesh.files import read_mesh
 from taichi_dem.mesh.joined import join
 from taichi_dem.mesh.mesh import Mesh, checked_mesh
@@ -98,5 +99,6 @@ __all__ = [
     "simulate",
     "solve",
     "step_report",
+    "with_body_group",
     "write_paraview",
 ]

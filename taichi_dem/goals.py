@@ -261,7 +261,7 @@ def peak_particle_velocity(distance: float, group: str = "hole") -> Goal:
 
     def check(scene):
         _has_group(group)(scene)
-        bodies(Model(scene.mesh, scene.material, scene.effects))
+        bodies(Model(scene.mesh, scene.body_materials, scene.effects))
 
     return Goal(f"peak velocity at {distance:g} m", "m/s", found, "extreme", check=check)
 

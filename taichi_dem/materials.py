@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from taichi_dem.elasticity.bond_rules import (
@@ -16,14 +16,10 @@ from taichi_dem.elasticity.bond_rules import (
     ModulusOverDistance,
     Rule,
     ShareOfCritical,
-    bond_geometry,
-    per_bond,
 )
 from taichi_dem.elasticity.moduli import bond_moduli
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import LARGEST, SMALLEST, finite, plain_fields, positive, shown
-from taichi_dem.mesh.mesh import Mesh
-from taichi_dem.mesh.topology import topology_of
 
 _MAY_BE_ZERO = frozenset(
     {"normal_damping", "shear_damping", "cohesion", "friction", "contact_damping"}
@@ -101,20 +97,7 @@ class Material:
             if not isinstance(value, _RULES.get(field.name, ())):
                 _check_number(field.name, value)
         if not isinstance(self.normal_stiffness, BondRule):
-            self._check_energy()
-
-    def _check_energy(self, where: str = "") -> None:
-        """Raise InputError where a bond would fail before it reaches its strength.
-
-        where: which bond, in words, for a stiffness that is not the same for all.
-        """
-        if self.failure_opening <= self.onset_opening:
-            least = self.tensile_strength**2 / (2.0 * float(self.normal_stiffness))
-            raise InputError(
-                f"fracture_energy must be larger than tensile_strength^2 / (2 normal_stiffness) = "
-                f"{least:.6g} J/m2{where}, or the bond would fail before it reaches its strength, "
-                f"got {self.fracture_energy}"
-            )
+            check_energy(self)
 
     @classmethod
     def from_elastic(
@@ -220,39 +203,21 @@ class Material:
         return self.tensile_strength / (self.failure_opening - self.onset_opening)
 
 
-def material_on(mesh: Mesh, material: Material) -> Material:
-    """The material with the numbers that contacts have in a mesh; bonds keep their rules."""
-    given = {name: getattr(material, name) for name in ("contact_stiffness", "contact_damping")}
-    numbers = {
-        name: rule.of_mesh(mesh, material.density)
-        for name, rule in given.items()
-        if isinstance(rule, ContactRule)
-    }
-    return replace(material, **numbers) if numbers else material
+def check_energy(material: Material, where: str = "") -> None:
+    """Raise InputError where a bond would fail before it reaches its strength.
 
-
-def softest_bond(mesh: Mesh, material: Material) -> Material:
-    """The material with the numbers of the bond of least stiffness in a mesh.
-
-    Raises InputError where the fracture energy is too small for it: the larger the elements, the
-    softer their bonds, and the more energy they have stored when they reach their strength.
+    where: which bond, in words, for a stiffness that is not the same for all.
     """
-    springs = material.normal_stiffness, material.shear_stiffness
-    if not any(isinstance(constant, BondRule) for constant in springs):
-        return material
-    topology = topology_of(mesh)
-    if not topology.bond_count:
-        return material
-    stiffness = per_bond(mesh, topology, material.density, springs)
-    bond = int(stiffness[:, 0].argmin())
-    normal, shear = stiffness[bond, 0], stiffness[:, 1].min()
-    distance = bond_geometry(mesh, topology, material.density).distance[bond]
-    made = _unchecked(material, normal_stiffness=float(normal), shear_stiffness=float(shear))
-    made._check_energy(f" at bond {bond}, whose bodies are {distance:.4g} m apart")
-    return made
+    if material.failure_opening <= material.onset_opening:
+        least = material.tensile_strength**2 / (2.0 * float(material.normal_stiffness))
+        raise InputError(
+            f"fracture_energy must be larger than tensile_strength^2 / (2 normal_stiffness) = "
+            f"{least:.6g} J/m2{where}, or the bond would fail before it reaches its strength, "
+            f"got {material.fracture_energy}"
+        )
 
 
-def _unchecked(material, **values):
+def unchecked(material: Material, **values: Any) -> Material:
     """A copy of a material with other values, without a check."""
     made = object.__new__(Material)
     made.__dict__.update(vars(material), **values)

@@ -68,6 +68,7 @@ class ByHand(Advance):
             slots = self.tables.bond_slots[b]
             motion = self._motion(b, slots)
             k, force, torque = self.tables.bond_stiffness[b], zero3(), zero3()
+            m = self.tables.bond_pair[b]
             for q in range(3):
                 u = 3 * b + q
                 arm = unit_arm(motion, self.tables.vertex_slave[u])
@@ -75,7 +76,7 @@ class ByHand(Advance):
                 traction = vec3(k[0] * opening[0], k[1] * opening[1], k[1] * opening[2])
                 # What would have acted is watched in every scene.
                 shear = vec2(traction[1], traction[2])
-                self.state.note_passed(b, traction[0], shear.norm_sqr())
+                self.state.note_passed(m, b, traction[0], shear.norm_sqr())
                 force += traction
                 torque += arm.cross(traction)
             dt = self.schedule.pair_step(slots[0] >> 2, slots[1] >> 2)

@@ -90,7 +90,7 @@ def estimated_effects(scene: Scene, until: float) -> tuple[Estimate, ...]:
         The argument is no Scene, or the time is not positive.
     """
     instance("scene", scene, Scene)
-    model = Model(scene.mesh, scene.material, scene.effects)
+    model = Model(scene.mesh, scene.body_materials, scene.effects)
     return estimates_before(model, positive("until", until))
 
 

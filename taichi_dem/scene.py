@@ -6,7 +6,8 @@ from typing import Any, ClassVar, Optional
 
 import numpy as np
 
-from taichi_dem.effects.base import MANY, Effect
+from taichi_dem.body_materials import BodyMaterials, body_materials
+from taichi_dem.effects.base import MANY, Effect, check_one_material
 from taichi_dem.effects.chosen import AUTO, LISTED, ChosenEffects, chosen_effects
 from taichi_dem.effects.roles import check_effect
 from taichi_dem.initial_motion import initial_motion
@@ -15,7 +16,7 @@ from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import length
 from taichi_dem.kit.pictures import png, write_picture
 from taichi_dem.kit.validation import FileName, between, finite, positive, shown
-from taichi_dem.materials import Material, softest_bond
+from taichi_dem.materials import Material
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.parts import may_meet, parts_of
 from taichi_dem.mesh.topology import check_free
@@ -54,6 +55,9 @@ class Scene:
         of inner faces. Stiffness, damping, strength, cohesion and fracture energy per area of the
         face are that share of the material's; openings at the limits and the friction angle do not
         change.
+    materials : mapping, optional
+        Material of the bodies of a group by the name of a body group; all other bodies have
+        ``material``. ``body_materials.joined`` says what a bond or contact between two of them has.
     velocity : array_like or mapping or function, optional
         Velocities of the bodies at the start [m/s]: a vector for all, a vector by body group
         (``Mesh.body_groups``; other bodies are at rest), a row for each body, (body_count, 3), or a
@@ -72,7 +76,8 @@ class Scene:
     ------
     InputError
         A type is wrong, an effect is listed twice in a role that takes one, friction has no
-        contact, the mesh lacks a group, or a number is out of its range.
+        contact, the mesh lacks a group, a body is in groups of different materials, or a number is
+        out of its range.
 
     Examples
     --------
@@ -89,23 +94,31 @@ class Scene:
     sleep: Optional[float] = None
     unbonded: Iterable[str] = ()
     weaker: Mapping[str, float] = field(default_factory=dict)
+    materials: Mapping[str, Material] = field(default_factory=dict)
     velocity: Any = None
     spin: Any = None
 
     #: Not among the options: arguments of ``State.set_motion``, none for a scene at rest.
     initial_motion: ClassVar[Mapping[str, np.ndarray]] = {}
+    #: Not among the options: the material of each body.
+    body_materials: ClassVar[BodyMaterials]
 
     def __post_init__(self):
         _check_body(self)
         object.__setattr__(self, "mesh", _bonded(self))
+        laid = body_materials(self.mesh, self.material, self.materials)
+        object.__setattr__(self, "body_materials", laid)
+        object.__setattr__(self, "materials", dict(self.materials))
         object.__setattr__(self, "loads", _listed("loads", self.loads))
         object.__setattr__(self, "effects", _effects_of(self))
         _check_types(self)
         object.__setattr__(self, "sleep", _sleep_of(self))
         _check_roles(self.effects)
-        material = softest_bond(self.mesh, self.material)
+        for material in laid.checked_pairs():
+            for effect in self.effects:
+                effect.check_material(material)
         for effect in self.effects:
-            effect.check_material(material)
+            check_one_material(effect, laid)
         for effect in self.effects:
             if hasattr(effect, "group"):
                 self.mesh.group_faces(effect.group)
@@ -177,7 +190,8 @@ class Scene:
         bool
             True where one acts.
         """
-        material, roles = self.material, {effect.role for effect in self.effects if effect.name}
+        material = self.body_materials
+        roles = {effect.role for effect in self.effects if effect.name}
         bonds = "dashpot" in roles and material.has_bond_damping
         return bonds or (touching and "contact" in roles and material.has_contact_damping)
 
@@ -206,7 +220,7 @@ def _effects_of(scene):
     """Effects as a ``ChosenEffects``, from a list, a word, or those of another scene."""
     given = scene.loads
     if isinstance(scene.effects, str):
-        return chosen_effects(scene.effects, scene.mesh, scene.material, given)
+        return chosen_effects(scene.effects, scene.mesh, scene.body_materials, given)
     word = getattr(scene.effects, "word", None)
     effects = _listed("effects", scene.effects)
     if given and word in (None, LISTED):
@@ -315,11 +329,12 @@ def scene_warnings(scene: Any) -> tuple[str, ...]:
 def _friction_warnings(scene):
     """Friction without springs is a drag up to its limit, so without a dashpot it is none."""
     rubs = [effect for effect in scene.effects if effect.role == "friction"]
-    material = scene.material
-    if not rubs or rubs[0].remembers or material.has_contact_damping or not material.friction:
+    material = scene.body_materials
+    if not rubs or rubs[0].remembers or material.friction_has_dashpots:
         return ()
+    never = "never acts on bodies of a material" if material.has_contact_damping else "never acts"
     return (
-        f"{rubs[0].name} never acts: it is at most contact_damping times the sliding speed, and "
+        f"{rubs[0].name} {never}: it is at most contact_damping times the sliding speed, and "
         "contact_damping of the material is 0; StickingFriction acts by springs instead",
     )
 

@@ -239,7 +239,7 @@ def run_identity(scene: Scene, method: Method) -> dict[str, str]:
         "version": version_text(),
         "mesh": f"{mesh.body_count} tetrahedra ({content})",
         "bonded shares": identity_of(mesh.bonded_shares),
-        "material": identity_of(scene.material),
+        "material": _material_identity(scene),
         "effects": ", ".join(
             f"{effect.name} {identity_of(vars(effect))}" for effect in scene.effects
         ),
@@ -248,6 +248,18 @@ def run_identity(scene: Scene, method: Method) -> dict[str, str]:
         "on demand": identity_of((scene.on_demand, scene.sleep)),
         "method": identity_of(method),
     }
+
+
+def _material_identity(scene):
+    """Materials of a scene in words, and which body has which."""
+    laid = scene.body_materials
+    if laid.is_one:
+        return identity_of(laid.materials[0])
+    names = [identity_of(material) for material in laid.materials]
+    # In an order of their own, not that of the groups.
+    order = sorted(range(len(names)), key=names.__getitem__)
+    place = np.argsort(order)[laid.of_body]
+    return f"{'; '.join(names[k] for k in order)} ({digest(place)})"
 
 
 def _run_saved(simulation, recorder, writer, plan, report_progress):

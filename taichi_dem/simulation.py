@@ -109,7 +109,7 @@ class Simulation(Uncopied):
         started = time.perf_counter()
         compiling("set-up", 0.0)
         self.scene, self.method, self.solves = scene, method, method.solves
-        self.model = Model(scene.mesh, scene.material, scene.effects)
+        self.model = Model(scene.mesh, scene.body_materials, scene.effects)
         name = driver_name(driver, self.model.bond_count)
         structure = Structure(scene.effects, method, brute_force, scene.on_demand)
         self.loan = ENGINES.borrow(structure, capacity_of(self.model), self.model, "simulation")
@@ -186,7 +186,7 @@ class Simulation(Uncopied):
         check_method(method)
         model = self.model
         if scene is not self.scene:
-            model = Model(scene.mesh, scene.material, scene.effects)
+            model = Model(scene.mesh, scene.body_materials, scene.effects)
         self._check_reset(scene, method, model)
         self.scene, self.method, self.model = scene, method, model
         self.loan.scene = model

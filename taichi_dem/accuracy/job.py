@@ -32,7 +32,7 @@ class Job:
 
     def methods(self) -> "Methods":
         """The method for this scene, at any step."""
-        scene, material = self.scene, self.scene.material
+        scene, material = self.scene, self.scene.body_materials
         present = {effect.role for effect in scene.effects if effect.name}
         damped = "dashpot" in present and material.has_bond_damping
         damped |= "contact" in present and material.has_contact_damping
@@ -44,7 +44,7 @@ class Job:
 
         Without bonds that of contacts, which is not needed where few of their spheres ever touch.
         """
-        mesh, material = self.scene.mesh, self.scene.material
+        mesh, material = self.scene.mesh, self.scene.body_materials
         rates = bond_rates(mesh, topology_of(mesh), material.density, springs_of(material))
         step = float(spring_step(rates).min())
         if math.isinf(step):

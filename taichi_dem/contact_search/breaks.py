@@ -84,7 +84,7 @@ class Breaks:
             born = ti.max(self.state.exposed_tick[face_i], self.state.exposed_tick[face_j])
             if fresh and (freed or born == tick):
                 overlap = ti.max(0.0, -self.contacts.gap(i, j, a, b))
-                energy += self.contacts.law.stored(overlap)
+                energy += self.contacts.law.stored(self.tables.pair(i, j), overlap)
         return energy
 
     @ti.func

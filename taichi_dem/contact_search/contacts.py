@@ -99,12 +99,13 @@ class Contacts:
         """Elastic energy of a pair's overlaps now, and of springs between its spheres [J]."""
         energy = 0.0
         pair = self.store.body[p]
+        m = self.tables.pair(pair[0], pair[1])
         for k in range(self.store.first[p], self.store.last[p]):
             spheres = self.store.sphere[k]
             overlap = -self.gap(pair[0], pair[1], spheres[0], spheres[1])
-            energy += self.law.stored(ti.max(0.0, overlap))
+            energy += self.law.stored(m, ti.max(0.0, overlap))
             if ti.static(self.remembers):
-                energy += self.friction.stored(k)
+                energy += self.friction.stored(m, k)
         return energy
 
     @ti.func

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from taichi_dem.mesh.topology import mean_density
+
 if TYPE_CHECKING:
     from taichi_dem.engine.model import Model
 
@@ -62,28 +64,31 @@ def estimates_before(model: "Model", until: float) -> tuple[Estimate, ...]:
 
     model: the scene's arrays. until: end of the run [s]. The stress is that of the loads and
     supports (``Effect.stress``), the speed that of a wave of this stress, stress / (density wave
-    speed).
+    speed). Of several materials the least strengths, the largest friction and the mean density
+    count.
     """
-    material, size = model.material, float(np.ptp(model.mesh.points, axis=0).max())
-    given = [effect.stress(material, size) for effect in (*model.loads, *model.supports)]
+    materials, size = model.materials, float(np.ptp(model.mesh.points, axis=0).max())
+    density = mean_density(model.mesh, materials.density)
+    given = [
+        max(effect.stress(material, size) for material in materials.materials)
+        for effect in (*model.loads, *model.supports)
+    ]
     # An unknown load is NaN, and with it all that follows.
     stress = float(sum(given))
     spacing = float(2.0 * model.body_radius.mean())
-    wave = math.sqrt(_normal_stiffness(model) * spacing / material.density)
-    speed = stress / (material.density * wave)
-    softening = stress / material.tensile_strength
-    shear = stress / max(material.cohesion, 1e-300)
+    wave = math.sqrt(_normal_stiffness(model) * spacing / density)
+    speed = stress / (density * wave)
+    softening = stress / materials.least("tensile_strength")
+    shear = stress / max(materials.least("cohesion"), 1e-300)
     breaks = max(softening, shear)
     return (
         _judged("softening", softening, "stress over tensile strength"),
         _judged("slip", shear, "stress over cohesion"),
         _judged("contact", breaks, "stress over strength, as contact needs free faces"),
-        _judged("friction", material.friction * breaks, "friction times stress over strength"),
+        _judged("friction", materials.friction * breaks, "friction times stress over strength"),
         _judged("bond damping", _damping(model), "share of a bond's vibration lost in a cycle"),
         _judged("gravity", WEIGHT * until / max(speed, 1e-300), "speed of a fall over that given"),
-        _judged(
-            "air drag", _drag(material, speed, until, spacing), "share of momentum lost to air"
-        ),
+        _judged("air drag", _drag(density, speed, until, spacing), "share of momentum lost to air"),
     )
 
 
@@ -103,8 +108,8 @@ def _normal_stiffness(model):
     return float(np.median(model.bond_stiffness[:, 0]))
 
 
-def _drag(material, speed, until, spacing):
-    return AIR * speed * until / (material.density * spacing)
+def _drag(density, speed, until, spacing):
+    return AIR * speed * until / (density * spacing)
 
 
 def _judged(effect, group, words):

@@ -94,7 +94,7 @@ _NEEDS = {
 def unserved(model: "Model") -> dict[str, MissingEffect]:
     """An empty ``MissingEffect`` for every need that no effect of a model serves."""
     roles = {effect.role for effect in model.effects if effect.name}
-    material = model.material
+    material = model.materials
     listed = {
         "tension": "tension" not in roles,
         "shear": "shear" not in roles,
@@ -111,7 +111,7 @@ def unserved(model: "Model") -> dict[str, MissingEffect]:
     }
     if "bare" in found:
         found["bare"].effect = remedy(model.contact)
-    if "friction" in found and not material.has_contact_damping:
+    if "friction" in found and not material.friction_has_dashpots:
         # Friction is a dashpot's force up to a limit: without a dashpot springs alone hold.
         found["friction"].effect = "StickingFriction"
     return found

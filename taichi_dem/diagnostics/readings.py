@@ -232,6 +232,6 @@ class Readings:
                 if ti.static(self.advance.limited):
                     ti.atomic_min(share[i], self.advance.contact_share(i, j))
                 else:
-                    rate = count * self.contacts.law.damping()
+                    rate = count * self.contacts.law.damping(self.tables.pair(i, j))
                     rate *= 1.0 / self.tables.mass[i] + 1.0 / self.tables.mass[j]
                     ti.atomic_max(taken[i], rate * self.advance.schedule.pair_step(i, j))

@@ -70,7 +70,8 @@ class Remedies:
             return Remedy("and the scene begins like this: move the bodies apart", {})
         remedy = self._of_step(body, beside)
         if remedy is None:
-            firm = RAISED * float(self.model.material.contact_stiffness)
+            stiffness = self.model.materials.of_contacts("contact_stiffness")
+            firm = RAISED * float(np.broadcast_to(stiffness, self.model.body_count)[body])
             words = f"its contacts are too soft: try a contact_stiffness of {firm:.2g} N/m"
             return Remedy(words, {"contact_stiffness": float(f"{firm:.2g}")})
         return remedy
@@ -110,16 +111,18 @@ class Remedies:
 
         Dashpots that are solved or limited set none.
         """
-        steps = quality_report(self.model.mesh, self.model.material)
+        steps = quality_report(self.model.mesh, self.model.materials)
         limits = {"bond springs": steps.spring_step_s}
         tame = self.solves or self.limited
         if self.model.by_role["dashpot"] and not tame:
             limits["bond dashpots"] = steps.dashpot_step_s
         if self.contacts is not None:
-            material = self.model.material
+            stiffness, damping = map(
+                self.model.materials.of_contacts, ("contact_stiffness", "contact_damping")
+            )
             pairs, counts, _ = self.contacts.store.near_table()
             rates = contact_rates(pairs, counts, self.model.body_mass)
-            limits["contact springs"] = spring_step(material.contact_stiffness * rates)
+            limits["contact springs"] = spring_step(stiffness * rates)
             if not tame:
-                limits["sphere dashpots"] = dashpot_step(material.contact_damping * rates)
+                limits["sphere dashpots"] = dashpot_step(damping * rates)
         return limits

@@ -166,8 +166,8 @@ class StepResolution:
         ``stability/body_limits.py``. Contacts that took energy have acted; it is booked to the
         first body of a pair.
         """
-        damping = float(self.model.material.contact_damping)
-        if self.contacts is None or not self.limited or not damping:
+        damping = self.model.materials.of_contacts("contact_damping")
+        if self.contacts is None or not self.limited or not np.any(damping):
             return self.pair_share
         acted = self.state.contact_heat.to_numpy()[:, :2].sum(axis=1) > 0.0
         x = 2.0 * damping * self.step / self.lightest
@@ -181,4 +181,5 @@ class StepResolution:
             return np.zeros(bonds)
         widest = units.to_numpy()[: 3 * bonds, 0].reshape(bonds, 3).max(axis=1)
         failed = self.state.broken_tick.to_numpy()[:bonds] != NEVER
-        return np.where(failed, widest / self.model.material.failure_opening, 0.0)
+        opening = self.model.of_bonds(lambda material: material.failure_opening)
+        return np.where(failed, widest / opening, 0.0)

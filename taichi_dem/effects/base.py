@@ -17,6 +17,7 @@ import numpy as np
 import taichi as ti
 from taichi.lang import impl
 
+from taichi_dem.body_materials import MOST, BodyMaterials
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.display import by_arguments
 from taichi_dem.kit.errors import InputError
@@ -49,7 +50,8 @@ class Effect(Sealed):
     role: its place in the step. name: the word used in reports and on the command line, by default
     that of the class. Kernels of a bound effect read its numbers in the field ``self.law``,
     constants of the scene in ``self.tables`` (engine.tables.Tables), and the fields that
-    ``declare`` has declared.
+    ``declare`` has declared. Laws of bonds and contacts have a row of numbers for each pair of
+    materials: they read ``self.law[m, k]``, m the pair, in a bond ``self.tables.bond_pair[b]``.
     """
 
     role = ""
@@ -130,12 +132,15 @@ class Effect(Sealed):
         """
 
     def numbers(self, material: Material) -> tuple:
-        """Numbers that kernels read as ``self.law[0]`` and on; to change them compiles nothing.
+        """Numbers that kernels read; to change them compiles nothing.
+
+        Loads, supports and ground read them as ``self.law[0]`` and on, laws of bonds and contacts
+        as ``self.law[m, 0]`` and on, m a pair of materials.
 
         Parameters
         ----------
         material : Material
-            Material of the scene.
+            Material of the scene; for a law what joins the two bodies (``body_materials.joined``).
 
         Returns
         -------
@@ -235,10 +240,9 @@ class Effect(Sealed):
             Arrays of the scene.
         """
         if self._given.get("is_silent"):
-            model = copy.copy(model)
-            model.material = self.harmless(model.material)
+            model = model.harmless(self)
         if self._count:
-            assign(self.law, _checked_numbers(self, model.material))
+            assign(self.law, _numbers_of(self, model.materials))
         self.load(model)
 
     def accepts(self, given: Optional["Effect"]) -> bool:
@@ -278,7 +282,8 @@ def bound(effect: Effect, tables: "Tables") -> Any:
     made.__dict__.update(_given=vars(effect), _frozen={}, tables=tables)
     made._count = _count_of(effect)
     if made._count:
-        made.law = ti.field(real, shape=made._count)
+        one_row = effect.role in MANY
+        made.law = ti.field(real, shape=made._count if one_row else (MOST**2, made._count))
     made.declare(tables.capacity)
     return made
 
@@ -287,6 +292,28 @@ def _count_of(effect):
     """How many numbers an effect has."""
     material: Any = _AnyMaterial()
     return len(effect.numbers(material))
+
+
+def _numbers_of(effect, materials):
+    """Numbers of an effect; of laws a row for each pair of materials, ``Tables.pair``."""
+    table = [[_checked_numbers(effect, pair) for pair in row] for row in materials.pairs]
+    if effect.role in MANY:
+        return table[0][0]
+    rows = np.zeros((MOST * len(table), effect._count))
+    for a, row in enumerate(table):
+        rows[MOST * a : MOST * a + len(row)] = row
+    return rows
+
+
+def check_one_material(effect: Effect, materials: BodyMaterials) -> None:
+    """Raise InputError where a load, support or ground takes numbers that materials differ in."""
+    if effect.role in MANY and not materials.is_one:
+        own = [tuple(effect.numbers(row[k])) for k, row in enumerate(materials.pairs)]
+        if any(numbers != own[0] for numbers in own):
+            raise InputError(
+                f"effect {effect.name} takes one row of numbers for all bodies, and must get the "
+                f"same of every material of a scene, got {shown(own[0])} and others"
+            )
 
 
 def _checked_numbers(effect, material):
@@ -332,12 +359,12 @@ class ElasticTension(Effect):
     is_null = True
 
     @ti.func
-    def traction(self, stiffness, u, opening):
+    def traction(self, m, stiffness, u, opening):
         """Linear traction [Pa] at a normal opening [m]."""
         return stiffness * opening
 
     @ti.func
-    def failed(self, u):
+    def failed(self, m, u):
         """An elastic unit never fails."""
         return 0
 
@@ -365,7 +392,7 @@ class ElasticShear(Effect):
     is_null = True
 
     @ti.func
-    def traction(self, stiffness, u, sliding, pressure):
+    def traction(self, m, stiffness, u, sliding, pressure):
         """Linear shear traction [Pa] (eq. 1) and no energy slipped away."""
         return stiffness * sliding, 0.0
 
@@ -396,12 +423,12 @@ class NoFriction(Effect):
     is_null = True
 
     @ti.func
-    def limit(self, force_normal):
+    def limit(self, m, force_normal):
         """No friction at any normal force."""
         return 0.0
 
     @ti.func
-    def force(self, damping, force_normal, slide):
+    def force(self, m, damping, force_normal, slide):
         """No force at any sliding velocity."""
         return vec3(0.0, 0.0, 0.0)
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from typing import Any
 
+from taichi_dem.body_materials import BodyMaterials
 from taichi_dem.effects.base import SINGLE, Effect
 from taichi_dem.effects.bond_damping import BondDamping
 from taichi_dem.effects.friction import Friction
@@ -13,7 +14,6 @@ from taichi_dem.effects.sphere_contact import ONCE_BROKEN, SphereContact
 from taichi_dem.effects.sticking_friction import StickingFriction
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import shown
-from taichi_dem.materials import Material
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.parts import parts_of
 
@@ -38,9 +38,9 @@ class ChosenEffects(tuple):
 
 
 def chosen_effects(
-    word: Any, mesh: Mesh, material: Material, given: Iterable[Effect]
+    word: Any, mesh: Mesh, material: BodyMaterials, given: Iterable[Effect]
 ) -> ChosenEffects:
-    """Effects for a word, "auto" or "all": laws of the material, and those given.
+    """Effects for a word, "auto" or "all": laws that any of the materials needs, and those given.
 
     given: loads, supports, and laws in place of the usual ones. Bodies may touch at outer faces
     from the start where the mesh has several parts, else once something has broken. Raises
@@ -66,7 +66,7 @@ def chosen_effects(
 
 
 def _laws(mesh, material, taken):
-    """The laws that a material has numbers for; a coefficient of zero needs none."""
+    """The laws that a material has numbers for; coefficients of zero need none."""
     laws = [Softening(), ShearSlip()]
     if material.has_bond_damping:
         laws.append(BondDamping())
@@ -75,7 +75,7 @@ def _laws(mesh, material, taken):
         laws.append(SphereContact(outer_faces=True if _may_meet(mesh) else ONCE_BROKEN))
     if material.friction > 0.0:
         # Friction without springs is a dashpot's force up to its limit: none without a dashpot.
-        laws.append(Friction() if material.has_contact_damping else StickingFriction())
+        laws.append(Friction() if material.friction_has_dashpots else StickingFriction())
     return laws
 
 

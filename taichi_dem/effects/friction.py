@@ -31,11 +31,11 @@ class Friction(Effect):
         return replace(material, friction=0.0)
 
     @ti.func
-    def limit(self, force_normal):
+    def limit(self, m, force_normal):
         """Largest friction [N] at a normal force [N]; of impulses likewise."""
-        return self.law[0] * force_normal
+        return self.law[m, 0] * force_normal
 
     @ti.func
-    def force(self, damping, force_normal, slide):
+    def force(self, m, damping, force_normal, slide):
         """Force [N] on the second sphere against its sliding velocity [m/s]."""
-        return friction_force(self.law[0], damping, force_normal, slide)
+        return friction_force(self.law[m, 0], damping, force_normal, slide)

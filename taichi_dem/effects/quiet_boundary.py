@@ -91,10 +91,11 @@ class QuietBoundary(Effect):
         vector = area_vectors(model.mesh.points, corners)
         area = length(vector)
         normal = vector / area[:, None]
+        density = np.broadcast_to(model.materials.density, model.body_count)[body]
         out = normal[:, :, None] * normal[:, None, :]
         along, across = (
-            (area / 3.0 * model.material.density * speed)[:, None, None]
-            for speed in self._speeds(model, corners)
+            (area / 3.0 * density * speed)[:, None, None]
+            for speed in self._speeds(model, corners, density)
         )
         laws = along * out + across * (np.eye(3) - out)
         arms = model.mesh.points[corners] - model.centre[body][:, None]
@@ -120,11 +121,11 @@ class QuietBoundary(Effect):
                 self.b[i] = self.b[i] + block.b
                 self.c[i] = self.c[i] + block.c
 
-    def _speeds(self, model, corners):
+    def _speeds(self, model, corners, density):
         """Speeds of both waves at each face [m/s]."""
         found = []
         for name, modulus in zip(("p_speed", "s_speed"), wave_moduli(model, corners)):
-            speed = np.sqrt(modulus / model.material.density)
+            speed = np.sqrt(modulus / density)
             given = getattr(self, name)
             if given is None and not np.isfinite(speed).all():
                 raise InputError(

@@ -1,9 +1,11 @@
 """Roles of effects as typed contracts: the members that each must have.
 
 All members are ``ti.func`` methods of the bound effect. b is a bond, u one of its three contact
-units (3 b, 3 b + 1, 3 b + 2), i a body, k a sphere pair.
+units (3 b, 3 b + 1, 3 b + 2), i a body, k a sphere pair, m a pair of materials, whose numbers a law
+reads as ``self.law[m, 0]`` and on.
 """
 
+import inspect
 from typing import Any, Protocol
 
 import taichi as ti
@@ -16,10 +18,10 @@ from taichi_dem.physics.wrench import Block
 class TensionLaw(Protocol):
     """Normal law of a bond's contact units; role "tension"."""
 
-    def traction(self, stiffness: float, u: int, opening: float) -> float:
+    def traction(self, m: int, stiffness: float, u: int, opening: float) -> float:
         """Traction [Pa] at a normal opening [m]."""
 
-    def failed(self, u: int) -> int:
+    def failed(self, m: int, u: int) -> int:
         """1 once the unit transmits nothing any more, else 0."""
 
     def stored(self, b: int, u: int, opening: float) -> float:
@@ -40,7 +42,7 @@ class ShearLaw(Protocol):
     """
 
     def traction(
-        self, stiffness: float, u: int, sliding: ti.Vector, pressure: float
+        self, m: int, stiffness: float, u: int, sliding: ti.Vector, pressure: float
     ) -> tuple[ti.Vector, float]:
         """Traction [Pa], two components, and energy per area slipped away now [J/m^2]."""
 
@@ -58,7 +60,7 @@ class SlipMemory(Protocol):
 class ShearFailure(Protocol):
     """Failure of a bond's contact units in shear."""
 
-    def failed(self, u: int, pressure: float) -> int:
+    def failed(self, m: int, u: int, pressure: float) -> int:
         """1 once the unit transmits nothing any more at a pressure [Pa], else 0."""
 
 
@@ -72,16 +74,16 @@ class DashpotLaw(Protocol):
 class ContactLaw(Protocol):
     """Normal law of contact spheres; role "contact"."""
 
-    def normal(self, overlap: float, opening_rate: float) -> float:
+    def normal(self, m: int, overlap: float, opening_rate: float) -> float:
         """Repulsion [N] at an overlap [m] of spheres that part at a rate [m/s]."""
 
-    def elastic(self, overlap: float) -> float:
+    def elastic(self, m: int, overlap: float) -> float:
         """Part of it that is stored [N]."""
 
-    def damping(self) -> float:
+    def damping(self, m: int) -> float:
         """Coefficient of the dashpot [N s/m], which friction shares."""
 
-    def stored(self, overlap: float) -> float:
+    def stored(self, m: int, overlap: float) -> float:
         """Energy [J]."""
 
     @property
@@ -124,10 +126,10 @@ class FrictionLaw(Protocol):
     One with ``remembers = True`` also keeps the contract ``FrictionMemory``.
     """
 
-    def limit(self, force_normal: float) -> float:
+    def limit(self, m: int, force_normal: float) -> float:
         """Largest friction [N] at a normal force [N]; of impulses likewise."""
 
-    def force(self, damping: float, force_normal: float, slide: ti.Vector) -> ti.Vector:
+    def force(self, m: int, damping: float, force_normal: float, slide: ti.Vector) -> ti.Vector:
         """Force [N] on the second sphere against its sliding velocity [m/s]."""
 
 
@@ -140,16 +142,16 @@ class FrictionMemory(Protocol):
     def follow(self, k: int, normal: ti.Vector, way: ti.Vector) -> None:
         """Turn the spring of pair k into the plane of contact and stretch it by ``way`` [m]."""
 
-    def slip(self, k: int, limit: float, way: ti.Vector) -> float:
+    def slip(self, m: int, k: int, limit: float, way: ti.Vector) -> float:
         """Shorten the spring to a limit [N]; return the energy dissipated [J]."""
 
-    def spring(self, k: int) -> ti.Vector:
+    def spring(self, m: int, k: int) -> ti.Vector:
         """Force [N] on the second sphere."""
 
-    def stored(self, k: int) -> float:
+    def stored(self, m: int, k: int) -> float:
         """Energy [J]."""
 
-    def part(self, k: int) -> float:
+    def part(self, m: int, k: int) -> float:
         """Forget the spring as the spheres part; energy [J] that it had."""
 
 
@@ -203,7 +205,7 @@ class Activation(Protocol):
     laws of contact, friction and damping have too.
     """
 
-    def begins(self, stiffness: float, *state: Any) -> int:
+    def begins(self, m: int, stiffness: float, *state: Any) -> int:
         """Nonzero where a unit that the law never changed comes near its limit.
 
         Below, the traction must be stiffness times opening, and nothing else may happen. state: of
@@ -270,6 +272,27 @@ def members_of(contract: type) -> tuple:
     return tuple(name for name in vars(contract) if not name.startswith("_"))
 
 
+def _check_parameters(kind, contract, name):
+    """Raise InputError where a member of an effect takes other arguments than its contract says."""
+    wanted, given = (_parameters(getattr(owner, name, None)) for owner in (contract, kind))
+    if wanted is None or given is None or len(wanted) == len(given):
+        return
+    raise InputError(
+        f"effect {kind.__name__} must have a member {name}({', '.join(wanted)}), "
+        f"got {name}({', '.join(given)})"
+    )
+
+
+def _parameters(member):
+    """Names of the arguments of a function beside self; None where any number is taken."""
+    if not callable(member):
+        return None
+    found = list(inspect.signature(member).parameters.values())[1:]
+    if any(each.kind in (each.VAR_POSITIONAL, each.VAR_KEYWORD) for each in found):
+        return None
+    return [each.name for each in found if each.default is each.empty]
+
+
 def check_effect(effect: Any) -> None:
     """Raise InputError unless an effect has a known role and every member of its contract."""
     kind = type(effect).__name__
@@ -287,3 +310,7 @@ def check_effect(effect: Any) -> None:
             f"effect {kind} must have a member {missing[0]}, as its role {effect.role} asks for "
             f"{', '.join(wanted)}"
         )
+    further = [contract for name, contract in FURTHER.items() if getattr(effect, name, False)]
+    for contract in (CONTRACTS[effect.role], *further):
+        for name in members_of(contract):
+            _check_parameters(type(effect), contract, name)

@@ -49,15 +49,15 @@ class ShearSlip(Effect):
         return {"shear_slip": self.slip}
 
     @ti.func
-    def begins(self, stiffness, sliding, pressure):
+    def begins(self, m, stiffness, sliding, pressure):
         """1 where a unit that never slipped comes near its limit at a pressure [Pa], else 0."""
-        limit = NEAR * coulomb_limit(self.law[0], self.law[1], pressure)
+        limit = NEAR * coulomb_limit(self.law[m, 0], self.law[m, 1], pressure)
         return ti.cast(stiffness * stiffness * sliding.norm_sqr() > limit * limit, ti.i32)
 
     @ti.func
-    def traction(self, stiffness, u, sliding, pressure):
+    def traction(self, m, stiffness, u, sliding, pressure):
         """Shear traction [Pa] and the energy per area slipped away now [J/m^2]."""
-        limit = coulomb_limit(self.law[0], self.law[1], pressure)
+        limit = coulomb_limit(self.law[m, 0], self.law[m, 1], pressure)
         elastic = sliding - self.slip[u]
         spent = 0.0
         # Squares first: almost every unit stays elastic and needs no root.

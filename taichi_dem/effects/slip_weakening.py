@@ -93,23 +93,23 @@ class SlipWeakening(Effect):
         return {"slip_weakening": self.unit}
 
     @ti.func
-    def begins(self, stiffness, sliding, pressure):
+    def begins(self, m, stiffness, sliding, pressure):
         """1 where a unit that never slipped comes near its limit at a pressure [Pa], else 0."""
-        limit = NEAR * coulomb_limit(self.law[0], self.law[1], pressure)
+        limit = NEAR * coulomb_limit(self.law[m, 0], self.law[m, 1], pressure)
         return ti.cast(stiffness * stiffness * sliding.norm_sqr() > limit * limit, ti.i32)
 
     @ti.func
-    def traction(self, stiffness, u, sliding, pressure):
+    def traction(self, m, stiffness, u, sliding, pressure):
         """Shear traction [Pa] and the energy per area slipped away now [J/m^2]."""
         unit = self.unit[u]
-        cohesion = self.law[0] - self.law[3] * unit[2]
-        limit = coulomb_limit(ti.max(0.0, cohesion), self.law[1], pressure)
+        cohesion = self.law[m, 0] - self.law[m, 3] * unit[2]
+        limit = coulomb_limit(ti.max(0.0, cohesion), self.law[m, 1], pressure)
         elastic = sliding - vec2(unit[0], unit[1])
         spent = 0.0
         if stiffness * stiffness * elastic.dot(elastic) > limit * limit:
             reach = elastic.norm()
-            rubbing = self.law[1] * pressure
-            length = weakening_slip(stiffness, self.law[3], cohesion, rubbing, reach)
+            rubbing = self.law[m, 1] * pressure
+            length = weakening_slip(stiffness, self.law[m, 3], cohesion, rubbing, reach)
             # Mean of the tractions before and after, so that stored plus spent is exact.
             spent = stiffness * (reach - 0.5 * length) * length
             slip = elastic * (length / reach)
@@ -119,9 +119,9 @@ class SlipWeakening(Effect):
         return stiffness * elastic, spent
 
     @ti.func
-    def failed(self, u, pressure):
+    def failed(self, m, u, pressure):
         """1 once the unit has neither cohesion nor pressure [Pa], else 0."""
-        return ti.cast(self.unit[u][2] >= self.law[2] and pressure <= 0.0, ti.i32)
+        return ti.cast(self.unit[u][2] >= self.law[m, 2] and pressure <= 0.0, ti.i32)
 
     @ti.func
     def is_active(self, b, u):

@@ -55,7 +55,8 @@ class Softening(Effect):
     def load(self, model: "Model") -> None:
         """Set every unit intact."""
         stiffness = np.repeat(model.bond_stiffness[:, 0], 3)
-        onset = model.material.tensile_strength / stiffness
+        strength = model.of_bonds(lambda material: material.tensile_strength)
+        onset = np.repeat(np.broadcast_to(strength, model.bond_count), 3) / stiffness
         assign(self.unit, np.stack([onset, stiffness], axis=1))
 
     def state(self) -> dict[str, ti.Field]:
@@ -64,31 +65,31 @@ class Softening(Effect):
 
     @ti.func
     def _onset(self, b):
-        return self.law[0] / self.tables.bond_stiffness[b][0]
+        return self.law[self.tables.bond_pair[b], 0] / self.tables.bond_stiffness[b][0]
 
     @ti.func
-    def begins(self, stiffness, opening):
+    def begins(self, m, stiffness, opening):
         """1 where an intact unit comes near its strength at an opening [m], else 0."""
-        return ti.cast(stiffness * opening > NEAR * self.law[0], ti.i32)
+        return ti.cast(stiffness * opening > NEAR * self.law[m, 0], ti.i32)
 
     @ti.func
-    def traction(self, stiffness, u, opening):
+    def traction(self, m, stiffness, u, opening):
         """Traction [Pa] at a normal opening [m]; raises the elastic limit beyond it."""
         traction = stiffness * opening
         if opening > 0.0:
             unit = self.unit[u]
             if opening > unit[0]:
-                onset = self.law[0] / stiffness
-                softened = envelope_traction(self.law[0], onset, self.law[1], opening)
+                onset = self.law[m, 0] / stiffness
+                softened = envelope_traction(self.law[m, 0], onset, self.law[m, 1], opening)
                 unit = vec2(opening, softened / opening)
                 self.unit[u] = unit
             traction = unit[1] * opening
         return traction
 
     @ti.func
-    def failed(self, u):
+    def failed(self, m, u):
         """1 once the unit has been opened to the failure opening, else 0."""
-        return ti.cast(self.unit[u][0] >= self.law[1], ti.i32)
+        return ti.cast(self.unit[u][0] >= self.law[m, 1], ti.i32)
 
     @ti.func
     def is_active(self, b, u):
@@ -106,9 +107,11 @@ class Softening(Effect):
     @ti.func
     def spent(self, b, u):
         """Energy per area [J/m^2] that softening has spent in this unit."""
-        return softening_energy(self.law[0], self._onset(b), self.law[1], self.unit[u][0])
+        m = self.tables.bond_pair[b]
+        return softening_energy(self.law[m, 0], self._onset(b), self.law[m, 1], self.unit[u][0])
 
     @ti.func
     def damage(self, b, u):
         """Share of the fracture energy that is spent, 0 intact to 1 failed."""
-        return self.spent(b, u) / (0.5 * self.law[0] * self.law[1])
+        m = self.tables.bond_pair[b]
+        return self.spent(b, u) / (0.5 * self.law[m, 0] * self.law[m, 1])

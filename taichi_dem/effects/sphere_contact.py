@@ -125,21 +125,21 @@ class SphereContact(Effect):
         return a // self.tables.face_spheres[None]
 
     @ti.func
-    def normal(self, overlap, opening_rate):
+    def normal(self, m, overlap, opening_rate):
         """Repulsion [N] at an overlap [m] of spheres that part at opening_rate [m/s]."""
-        return normal_force(self.law[0], self.law[1], overlap, opening_rate)
+        return normal_force(self.law[m, 0], self.law[m, 1], overlap, opening_rate)
 
     @ti.func
-    def elastic(self, overlap):
+    def elastic(self, m, overlap):
         """Spring's part of the repulsion [N]."""
-        return self.law[0] * overlap
+        return self.law[m, 0] * overlap
 
     @ti.func
-    def damping(self):
+    def damping(self, m):
         """Damping coefficient of a contact [N s/m]; friction shares it (spec, section 2)."""
-        return self.law[1]
+        return self.law[m, 1]
 
     @ti.func
-    def stored(self, overlap):
+    def stored(self, m, overlap):
         """Elastic energy of a contact [J]."""
-        return 0.5 * self.law[0] * overlap * overlap
+        return 0.5 * self.law[m, 0] * overlap * overlap

@@ -76,34 +76,34 @@ class StickingFriction(Friction):
         self.stretch[k] = flat * (stretch.norm() / ti.max(flat.norm(), 1e-300)) + way
 
     @ti.func
-    def slip(self, k, limit, way):
+    def slip(self, m, k, limit, way):
         """Shorten the spring of sphere pair k to a limit [N]; return the energy dissipated [J].
 
         way: its stretch in this step [m]. The work of the stretch, at the mean of the forces before
         and after, is the energy stored plus that dissipated by slipping.
         """
         trial = self.stretch[k]
-        longest = limit / self.law[1]
+        longest = limit / self.law[m, 1]
         size = trial.norm()
         present = trial
         if size > longest:
             present = trial * (longest / size)
         self.stretch[k] = present
-        return 0.5 * self.law[1] * (trial - way + present).dot(trial - present)
+        return 0.5 * self.law[m, 1] * (trial - way + present).dot(trial - present)
 
     @ti.func
-    def spring(self, k):
+    def spring(self, m, k):
         """Force of the spring of sphere pair k on the second sphere [N]."""
-        return -self.law[1] * self.stretch[k]
+        return -self.law[m, 1] * self.stretch[k]
 
     @ti.func
-    def stored(self, k):
+    def stored(self, m, k):
         """Elastic energy in the spring of sphere pair k [J]."""
-        return 0.5 * self.law[1] * self.stretch[k].norm_sqr()
+        return 0.5 * self.law[m, 1] * self.stretch[k].norm_sqr()
 
     @ti.func
-    def part(self, k):
+    def part(self, m, k):
         """Reset the spring of sphere pair k, whose spheres have parted; return its energy [J]."""
-        energy = self.stored(k)
+        energy = self.stored(m, k)
         self.stretch[k] = vec3(0.0)
         return energy

@@ -18,10 +18,13 @@ from taichi_dem.kit.fixed_order import dot, length
 from taichi_dem.kit.validation import plain_fields, positive
 from taichi_dem.mesh.mesh import Mesh, volumes
 from taichi_dem.mesh.tetrahedra import all_faces, area_vectors
-from taichi_dem.mesh.topology import Topology, body_properties
+from taichi_dem.mesh.topology import Density, Topology, body_properties
 
 #: Contact spheres that share the stiffness of a face: those of five divisions.
 FACE_SPHERES = 6
+#: Numbers of bodies, or all of them.
+Bodies = Union[np.ndarray, slice]
+ALL = slice(None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,26 +32,31 @@ class BondGeometry:
     """Sizes of bonds, arrays (bond_count,).
 
     distance: of the centres of the two bodies along the normal of their face [m]. area: of the face
-    [m^2]. pair_mass: m1 m2 / (m1 + m2) of the two bodies [kg].
+    [m^2]. pair_mass: m1 m2 / (m1 + m2) of the two bodies [kg]. master_share: share of the distance
+    that lies in the master. bodies: master and slave of each, (bond_count, 2).
     """
 
     distance: np.ndarray
     area: np.ndarray
     pair_mass: np.ndarray
+    master_share: np.ndarray
+    bodies: np.ndarray
 
     def __repr__(self):
         return by_fields(self)
 
 
-def bond_geometry(mesh: Mesh, topology: Topology, density: float) -> BondGeometry:
-    """Sizes of all bonds of a mesh; density [kg/m3]."""
+def bond_geometry(mesh: Mesh, topology: Topology, density: Density) -> BondGeometry:
+    """Sizes of all bonds of a mesh; density [kg/m3]: of all bodies, or of each, (body_count,)."""
     mass, centre, _ = body_properties(mesh, density)
     vector = area_vectors(mesh.points, topology.vertices)
     area = length(vector)
     master, slave = topology.master, topology.slave
     distance = dot(centre[slave] - centre[master], vector) / area
     pair_mass = mass[master] * mass[slave] / (mass[master] + mass[slave])
-    return BondGeometry(distance, area, pair_mass)
+    behind = dot(mesh.points[topology.vertices[:, 0]] - centre[master], vector) / area
+    bodies = np.stack([master, slave], axis=1)
+    return BondGeometry(distance, area, pair_mass, behind / distance, bodies)
 
 
 class Rule:
@@ -80,10 +88,10 @@ class BondRule(Rule):
 
 
 class ContactRule(Rule):
-    """Base of rules for a constant of sphere contacts, one number a mesh."""
+    """Base of rules for a constant of sphere contacts, one number for all bodies of a material."""
 
-    def of_mesh(self, mesh: Mesh, density: float) -> float:
-        """The constant for the bodies of a mesh; density [kg/m3]."""
+    def of_mesh(self, mesh: Mesh, density: float, bodies: Bodies = ALL) -> float:
+        """The constant for bodies of a mesh, all by default; density [kg/m3]."""
         raise NotImplementedError
 
 
@@ -123,19 +131,21 @@ class ShareOfCritical(BondRule):
 class FaceStiffness(ContactRule):
     """Stiffness of one sphere contact [N/m]: as stiff as a bond where a face's six spheres touch.
 
-    The median over all faces of modulus area / (6 distance), where the distance is twice that of
-    the face from its body's centre: one number a mesh, as a contact has. A step that the bonds of a
-    body bear is then borne by a contact of all spheres of a face, in a mesh of even size.
+    The median over all faces of the bodies of modulus area / (6 distance), where the distance is
+    twice that of the face from its body's centre: one number for all bodies of a material. A step
+    that the bonds of a body bear is then borne by a contact of all spheres of a face, in a mesh of
+    even size.
     Raises InputError unless the modulus is a positive number.
     """
 
     modulus: float
 
-    def of_mesh(self, mesh: Mesh, density: float) -> float:
-        """Stiffness of a contact of two bodies of a mesh [N/m]."""
-        area = length(area_vectors(mesh.points, all_faces(mesh.tetrahedra))).reshape(-1, 4)
+    def of_mesh(self, mesh: Mesh, density: float, bodies: Bodies = ALL) -> float:
+        """Stiffness of a contact of two bodies [N/m]."""
+        faces = all_faces(mesh.tetrahedra[bodies])
+        area = length(area_vectors(mesh.points, faces)).reshape(-1, 4)
         # The centre is a quarter of the altitude 3 V / A away from a face.
-        distance = 2.0 * 0.75 * volumes(mesh)[:, None] / area
+        distance = 2.0 * 0.75 * volumes(mesh)[bodies, None] / area
         return float(np.median(self.modulus * area / distance)) / FACE_SPHERES
 
 
@@ -150,10 +160,10 @@ class ContactShareOfCritical(ContactRule):
     ratio: float
     modulus: float
 
-    def of_mesh(self, mesh: Mesh, density: float) -> float:
-        """Dashpot of a contact of two bodies of a mesh [N s/m]."""
-        stiffness = FaceStiffness(self.modulus).of_mesh(mesh, density)
-        mass = 0.5 * density * float(np.median(volumes(mesh)))
+    def of_mesh(self, mesh: Mesh, density: float, bodies: Bodies = ALL) -> float:
+        """Dashpot of a contact of two bodies [N s/m]."""
+        stiffness = FaceStiffness(self.modulus).of_mesh(mesh, density, bodies)
+        mass = 0.5 * density * float(np.median(volumes(mesh)[bodies]))
         return 2.0 * self.ratio * math.sqrt(stiffness * mass)
 
 
@@ -161,8 +171,65 @@ class ContactShareOfCritical(ContactRule):
 Constant = Union[float, Rule]
 
 
+@dataclass(frozen=True, repr=False)
+class InSeries(BondRule):
+    """Constant of a bond between two materials per area: both parts of its distance in series.
+
+    A constant traction opens both parts: by (d / h) / k(h) that of a rule, d of the distance h of
+    the bodies in that body, which is d / E for a modulus E; by 1 / (2 k) that of a constant per
+    area, half a bond wherever the face lies. first: of the master's material, second of the
+    slave's.
+    """
+
+    first: Constant
+    second: Constant
+
+    def __post_init__(self):
+        """Both constants are those of a checked material."""
+
+    def per_bond(self, bonds: BondGeometry) -> np.ndarray:
+        """The constant of every bond per area, (bond_count,)."""
+        first, second = (_of_bonds(each, bonds) for each in (self.first, self.second))
+        one = bonds.master_share if isinstance(self.first, BondRule) else 0.5
+        other = 1.0 - bonds.master_share if isinstance(self.second, BondRule) else 0.5
+        return first * second / (one * second + other * first)
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class ByMaterials(BondRule):
+    """Constant of a bond per area by the materials of its two bodies.
+
+    constants: of the pair (a, b) of materials in entry a, b. of_body: material of each body.
+    """
+
+    constants: tuple[tuple[Constant, ...], ...]
+    of_body: np.ndarray
+
+    def __post_init__(self):
+        """All constants are those of a checked material."""
+
+    def per_bond(self, bonds: BondGeometry) -> np.ndarray:
+        """The constant of every bond per area, (bond_count,)."""
+        kinds, found = self.of_body[bonds.bodies], np.zeros(len(bonds.area))
+        for a, row in enumerate(self.constants):
+            for b, constant in enumerate(row):
+                chosen = (kinds == (a, b)).all(axis=1)
+                if chosen.any():
+                    found[chosen] = _of_bonds(constant, bonds)[chosen]
+        return found
+
+
+def joined_constants(first: Constant, second: Constant) -> Constant:
+    """Constant of a bond or contact between two materials: one that both share stays to the bit."""
+    if first == second:
+        return first
+    if isinstance(first, Rule) or isinstance(second, Rule):
+        return InSeries(first, second)
+    return 2.0 * first * second / (first + second)
+
+
 def per_bond(
-    mesh: Mesh, topology: Topology, density: float, constants: tuple[Constant, Constant]
+    mesh: Mesh, topology: Topology, density: Density, constants: tuple[Constant, Constant]
 ) -> np.ndarray:
     """Normal and tangential constant of every bond per area, (bond_count, 2).
 
@@ -176,10 +243,11 @@ def per_bond(
 
 def evaluated(constants: tuple[Constant, Constant], bonds: BondGeometry) -> np.ndarray:
     """Two constants, numbers or rules, for bonds of given sizes, (n, 2)."""
-    columns = [
-        constant.per_bond(bonds)
-        if isinstance(constant, BondRule)
-        else np.full(len(bonds.area), float(constant))
-        for constant in constants
-    ]
-    return np.stack(columns, axis=1)
+    return np.stack([_of_bonds(constant, bonds) for constant in constants], axis=1)
+
+
+def _of_bonds(constant, bonds):
+    """A constant, a number or a rule, of every bond, (n,)."""
+    if isinstance(constant, BondRule):
+        return constant.per_bond(bonds)
+    return np.full(len(bonds.area), float(constant))

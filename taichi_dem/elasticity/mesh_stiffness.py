@@ -13,10 +13,15 @@ from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.fixed_order import dot, length
 from taichi_dem.mesh.mesh import Mesh, volumes
 from taichi_dem.mesh.tetrahedra import area_vectors
-from taichi_dem.mesh.topology import body_properties, face_vertices, topology_of
+from taichi_dem.mesh.topology import (
+    body_properties,
+    face_vertices,
+    mean_density,
+    topology_of,
+)
 
 if TYPE_CHECKING:
-    from taichi_dem.materials import Material
+    from taichi_dem.body_materials import AnyMaterial
 
 #: Components of stress and strain, in Voigt's order; strains yz, zx and xy are twice the tensor's.
 VOIGT = ((0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1))
@@ -114,8 +119,8 @@ class MeshStiffness:
         return "\n".join([*lines, f"long waves: {speeds}"])
 
 
-def mesh_stiffness(mesh: Mesh, material: Material) -> MeshStiffness:
-    """Elastic constants of the block that a mesh is, with the bonds of a material.
+def mesh_stiffness(mesh: Mesh, material: AnyMaterial) -> MeshStiffness:
+    """Elastic constants of the block that a mesh is, with the bonds of a material, or of several.
 
     The whole mesh is loaded by six uniform stresses, as tractions on its outer faces, with one
     linear static solve each. The mean strain follows from the displacement of the outer faces,
@@ -159,7 +164,7 @@ def mesh_stiffness(mesh: Mesh, material: Material) -> MeshStiffness:
         outer.strain(motions[:, :, k], stress) / total for k, stress in enumerate(_unit_stresses())
     ]
     compliance = np.array(strains).T
-    return MeshStiffness(0.5 * (compliance + compliance.T), material.density)
+    return MeshStiffness(0.5 * (compliance + compliance.T), mean_density(mesh, material.density))
 
 
 def _unit_stresses():
@@ -183,7 +188,8 @@ class _OuterFaces:
         self.arm = mesh.points[vertices].mean(axis=1) - centre[self.body]
         # A bond to its mirror image: half of it is twice as stiff.
         distance = 2.0 * dot(self.arm, self.vector) / self.area
-        mirrored = BondGeometry(distance, self.area, 0.5 * mass[self.body])
+        halves, both = np.full(len(self.body), 0.5), np.stack([self.body, self.body], axis=1)
+        mirrored = BondGeometry(distance, self.area, 0.5 * mass[self.body], halves, both)
         constants = material.normal_stiffness, material.shear_stiffness
         self.springs = 2.0 * evaluated(constants, mirrored)
 

@@ -1,16 +1,18 @@
 """Constants of a scene as arrays: bodies, bonds and contact spheres."""
 
+import copy
 from collections.abc import Iterable
 from functools import cached_property
-from typing import Any
+from typing import Any, Callable
 
 import numpy as np
 
+from taichi_dem.body_materials import AnyMaterial, BodyMaterials, laid_out
 from taichi_dem.effects.base import ROLES, Effect
 from taichi_dem.elasticity.bond_rules import per_bond
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.fixed_order import length, product, transposed
-from taichi_dem.materials import Material, material_on
+from taichi_dem.materials import Material
 from taichi_dem.mesh.colouring import edge_colours
 from taichi_dem.mesh.contact_spheres import ContactSpheres
 from taichi_dem.mesh.mesh import Mesh
@@ -22,18 +24,22 @@ from taichi_dem.stability.mesh_limits import dashpots_of, springs_of, subset_rat
 class Model:
     """Constant arrays of a scene and its effects by role; NumPy only.
 
-    mesh: of the scene. material: of the scene, with the numbers that its contacts have in the mesh.
+    mesh: of the scene. materials: of its bodies, a ``BodyMaterials``. material: the first of them,
+    with the numbers that its contacts have in the mesh.
     topology: its faces and bonds. body_mass [kg], centre [m] and body_inertia [kg m^2], body_radius
     [m] (of the ball around a body): an entry a body. by_role: lists of effects. contact: the effect
     of this role, None without.
     Source: Konno et al., section 2.
     """
 
-    def __init__(self, mesh: Mesh, material: Material, effects: Iterable[Effect]):
-        self.mesh, self.material = mesh, material_on(mesh, material)
+    def __init__(self, mesh: Mesh, material: AnyMaterial, effects: Iterable[Effect]):
+        self.mesh, self.materials = mesh, laid_out(mesh, material)
+        self.material = self.materials.pairs[0][0]
         self.topology = topology_of(mesh)
         self.body_count, self.bond_count = mesh.body_count, self.topology.bond_count
-        self.body_mass, self.centre, self.body_inertia = body_properties(mesh, material.density)
+        self.body_mass, self.centre, self.body_inertia = body_properties(
+            mesh, self.materials.density
+        )
         corners = mesh.points[mesh.tetrahedra] - self.centre[:, None]
         self.body_radius = length(corners).max(axis=1)
         self.by_role = {role: [e for e in effects if e.role == role] for role in ROLES}
@@ -43,6 +49,23 @@ class Model:
     def __repr__(self):
         bodies, bonds = counted(self.body_count, "body"), counted(self.bond_count, "bond")
         return in_brief(self, bodies, bonds, *(effect.name for effect in self.effects))
+
+    @property
+    def body_materials(self) -> BodyMaterials:
+        """The same as ``materials``, under the name that a scene has for them."""
+        return self.materials
+
+    def harmless(self, effect: Effect) -> "Model":
+        """A copy with the materials with which an effect never acts."""
+        made = copy.copy(self)
+        made.materials = self.materials.changed(effect.harmless)
+        made.material = made.materials.pairs[0][0]
+        return made
+
+    def of_bonds(self, value: Callable[[Material], float]) -> Any:
+        """A number of what joins the bodies of each bond, an array (n,), or one for all."""
+        links = np.stack([self.topology.master, self.topology.slave], axis=1)
+        return self.materials.of_links(links, value)
 
     @property
     def effects(self) -> tuple:
@@ -72,15 +95,15 @@ class Model:
     @cached_property
     def dashpot_rates(self) -> np.ndarray:
         """Rate of the dashpots of every body for each subset of its bonds [1/s], (n, 16)."""
-        return self._subset_rates(dashpots_of(self.material))
+        return self._subset_rates(dashpots_of(self.materials))
 
     @cached_property
     def spring_rates(self) -> np.ndarray:
         """Squared angular frequency of the springs of every body likewise [1/s2], (n, 16)."""
-        return self._subset_rates(springs_of(self.material))
+        return self._subset_rates(springs_of(self.materials))
 
     def _subset_rates(self, coefficients):
-        return subset_rates(self.mesh, self.topology, self.material.density, coefficients)
+        return subset_rates(self.mesh, self.topology, self.materials.density, coefficients)
 
     @cached_property
     def bond_colours(self) -> np.ndarray:
@@ -118,12 +141,12 @@ class Model:
     @property
     def bond_stiffness(self) -> np.ndarray:
         """Normal and shear stiffness of every bond per area [Pa/m], (bond_count, 2)."""
-        return self._per_bond(springs_of(self.material))
+        return self._per_bond(springs_of(self.materials))
 
     @property
     def bond_damping(self) -> np.ndarray:
         """Normal and shear dashpot of every bond per area [Pa s/m], (bond_count, 2)."""
-        return self._per_bond(dashpots_of(self.material))
+        return self._per_bond(dashpots_of(self.materials))
 
     def _per_bond(self, constants):
-        return per_bond(self.mesh, self.topology, self.material.density, constants)
+        return per_bond(self.mesh, self.topology, self.materials.density, constants)

@@ -6,6 +6,7 @@ import numpy as np
 import taichi as ti
 from numpy.typing import ArrayLike
 
+from taichi_dem.body_materials import MOST
 from taichi_dem.effects.body_motion import BodyMotion
 from taichi_dem.engine.model import Model
 from taichi_dem.engine.tables import Tables
@@ -19,13 +20,20 @@ from taichi_dem.step.sleeping import Sleeping
 from taichi_dem.timeline import NEVER
 
 
-def unserved_limits(model: Model) -> tuple[float, float, float]:
-    """Tensile strength, cohesion [Pa] and friction that no effect of a model serves, else inf."""
+def unserved_limits(model: Model) -> np.ndarray:
+    """Tensile strength, cohesion [Pa] and friction that no effect of a model serves, else inf.
+
+    A row for each pair of materials, ``Tables.pair``.
+    """
     served = {effect.role for effect in model.effects if effect.name}
-    material = model.material
-    strength = np.inf if "tension" in served else material.tensile_strength
-    cohesion = np.inf if "shear" in served else material.cohesion
-    return strength, cohesion, 0.0 if "shear" in served else material.friction
+    rows = np.zeros((MOST**2, 3))
+    for a, row in enumerate(model.materials.pairs):
+        for b, pair in enumerate(row):
+            strength = np.inf if "tension" in served else pair.tensile_strength
+            cohesion = np.inf if "shear" in served else pair.cohesion
+            friction = 0.0 if "shear" in served else pair.friction
+            rows[MOST * a + b] = strength, cohesion, friction
+    return rows
 
 
 @ti.data_oriented
@@ -51,7 +59,8 @@ class State:
     bad_body: lowest body out of bounds, body_count if none.
     active_effects: bits of each body: of the loads, then the supports, then the ground that changed
     its motion, CONTACT and RUBBED. limits: tensile strength, cohesion [Pa] and friction coefficient
-    whose excess in a bond is noted, without bound where an effect serves them; passed: ticks at
+    of each pair of materials, whose excess in a bond is noted, without bound where an effect serves
+    them; passed: ticks at
     which a bond first exceeded its tensile and its shear limit, NEVER before. activity: the
     ``Activity`` of bonds whose laws act on demand, sleeping: the ``Sleeping`` of bodies; else None.
     """
@@ -79,7 +88,7 @@ class State:
             self.contact_heat = ti.Vector.field(3, real, shape=n)
             self.injected_tick = ti.field(ti.i64, shape=())
         self.active_effects = ti.field(ti.i64, shape=n)
-        self.limits = ti.Vector.field(3, real, shape=())
+        self.limits = ti.Vector.field(3, real, shape=MOST**2)
         self.passed = ti.Vector.field(2, ti.i64, shape=bonds)
         accounts = len(tables.loads) + 1 + len(tables.ground)
         self.load_work = ti.Vector.field(accounts, real, shape=n)
@@ -98,7 +107,7 @@ class State:
         assign(self.broken_tick, np.full(model.bond_count, NEVER))
         assign(self.bad_body, n)
         assign(self.passed, np.full((model.bond_count, 2), NEVER))
-        assign(self.limits, np.array(unserved_limits(model)))
+        assign(self.limits, unserved_limits(model))
         if self.activity is not None:
             self.activity.load(model)
             self.sleeping.load(model, sleep)
@@ -133,12 +142,13 @@ class State:
                 self.activity.note_touch(i, bits, self.tick[None])
 
     @ti.func
-    def note_passed(self, b, pull, shear2):
+    def note_passed(self, m, b, pull, shear2):
         """Note that a bond exceeds a limit that no listed effect serves.
 
-        pull: traction of one of its units [Pa]; shear2: square of that across [Pa^2].
+        m: pair of its materials. pull: traction of one of its units [Pa]; shear2: square of that
+        across [Pa^2].
         """
-        limits = self.limits[None]
+        limits = self.limits[m]
         if pull > limits[0]:
             self._note_first(b, 0)
         bound = coulomb_limit(limits[1], limits[2], -pull)

@@ -6,6 +6,7 @@ from typing import Any, Optional
 import numpy as np
 import taichi as ti
 
+from taichi_dem.body_materials import MOST
 from taichi_dem.effects.base import ABSENT, ROLES, SINGLE, Effect, bound
 from taichi_dem.engine.capacity import Capacity
 from taichi_dem.engine.model import Model
@@ -27,6 +28,8 @@ class Tables:
     unit_area [m^2] one a bond. neighbour is the body behind local face f, entry 4 * body + f, -1
     where it is outer; face_bond the bond there. face_spheres: contact spheres on a face; those of
     face k begin at entry k * face_spheres.
+    material: number of the material of a body. bond_pair: of the pair of materials of a bond, the
+    row of its numbers in the table of a law, as ``pair`` gives it for two bodies.
     on_demand: whether laws are evaluated only where they act.
     Body frames coincide with the world axes at the start. Source: Konno et al., section 2.
     """
@@ -35,7 +38,7 @@ class Tables:
         *("body_count", "bond_count", "mass", "mass_inverse", "radius", "extent", "inertia"),
         *("inertia_inverse", "bond_slots", "bond_frame", "bond_stiffness", "unit_area"),
         *("vertex_master", "vertex_slave", "neighbour", "face_bond", "sphere", "cluster"),
-        "face_spheres",
+        *("face_spheres", "material", "bond_pair"),
     )
 
     # Bound effects by role; null objects where the scene lists none, contact is None then.
@@ -85,6 +88,7 @@ class Tables:
         self.mass = ti.field(real, shape=n)
         self.mass_inverse = ti.field(real, shape=n)
         self.radius = ti.field(real, shape=n)
+        self.material = ti.field(ti.i32, shape=n)
         self.inertia = ti.Matrix.field(3, 3, real, shape=n)
         self.inertia_inverse = ti.Matrix.field(3, 3, real, shape=n)
 
@@ -94,6 +98,7 @@ class Tables:
         self.bond_frame = ti.Matrix.field(3, 3, real, shape=bonds)
         self.bond_stiffness = ti.Vector.field(2, real, shape=bonds)
         self.unit_area = ti.field(real, shape=bonds)
+        self.bond_pair = ti.field(ti.i32, shape=bonds)
         self.vertex_master = ti.Vector.field(3, real, shape=units)
         self.vertex_slave = ti.Vector.field(3, real, shape=units)
         self.neighbour = ti.field(ti.i32, shape=capacity.faces)
@@ -115,10 +120,18 @@ class Tables:
         assign(self.inertia, model.body_inertia)
         assign(self.inertia_inverse, inverse(model.body_inertia))
         self._load_bonds(model)
+        of_body, top = model.materials.of_body, model.topology
+        assign(self.material, of_body)
+        assign(self.bond_pair, MOST * of_body[top.master] + of_body[top.slave])
         if self.has_contact:
             self._load_spheres(model.spheres)
         for effect in self.effects:
             effect.load_scene(model)
+
+    @ti.func
+    def pair(self, i, j):
+        """Pair of materials of two bodies: the row of its numbers in the table of a law."""
+        return MOST * self.material[i] + self.material[j]
 
     def matched(self, model: Model) -> list[tuple[Any, Optional[Effect]]]:
         """Pairs of an effect bound here and the corresponding one of a model.

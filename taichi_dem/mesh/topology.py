@@ -6,7 +6,7 @@ Local face f of a body is the face opposite its local vertex f.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Union
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import product, transposed
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.mesh import Mesh
+
+#: Density of all bodies [kg/m3], or of each, (body_count,).
+Density = Union[float, np.ndarray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,12 +167,21 @@ def _sides_of(mesh, topology, wanted):
     return topology.outer_body[found], topology.outer_face[found]
 
 
-def body_properties(mesh: Mesh, density: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def mean_density(mesh: Mesh, density: Density) -> float:
+    """Mass over volume of a mesh [kg/m3]; density: as for ``body_properties``."""
+    if not isinstance(density, np.ndarray):
+        return density
+    volume = geometry.signed_volumes(mesh.points, mesh.tetrahedra)
+    return float((density * volume).sum() / volume.sum())
+
+
+def body_properties(mesh: Mesh, density: Density) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mass [kg] (n,), centre of mass [m] (n, 3), inertia about it [kg m2] (n, 3, 3).
 
-    density [kg/m3].  With the vertices x_k taken from the centroid, the second moment of a
-    homogeneous tetrahedron is S = m/20 sum_k x_k x_k^T and its inertia is tr(S) 1 - S
-    (F. Tonon, J. Math. Stat. 1(1), 2005, 8-11, writes out the same integral by components).
+    density [kg/m3]: of all bodies, or of each, (body_count,).  With the vertices x_k taken from the
+    centroid, the second moment of a homogeneous tetrahedron is S = m/20 sum_k x_k x_k^T and its
+    inertia is tr(S) 1 - S (F. Tonon, J. Math. Stat. 1(1), 2005, 8-11, writes out the same integral
+    by components).
     """
     corners = mesh.points[mesh.tetrahedra]
     centre = corners.mean(axis=1)

@@ -274,7 +274,9 @@ def corners_of_bodies(model: Model) -> np.ndarray:
     return np.arange(4 * model.body_count, dtype=np.int32).reshape(-1, 4)
 
 
-def cell_data(frame: Frame, acting_since: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+def cell_data(
+    model: Model, frame: Frame, acting_since: Mapping[str, np.ndarray]
+) -> dict[str, np.ndarray]:
     """What ParaView gets of every body in a frame, arrays by name: see ``write_paraview``."""
     data = {
         "body_id": np.arange(len(frame.level), dtype=np.int32),
@@ -284,6 +286,8 @@ def cell_data(frame: Frame, acting_since: Mapping[str, np.ndarray]) -> dict[str,
         "damage": frame.damage,
         "step_bound_by": frame.bound,
     }
+    if not model.materials.is_one:
+        data["material"] = model.materials.of_body
     for effect, since in acting_since.items():
         data[f"{effect}_acts"] = (since <= frame.time_s).astype(np.int32)
         data[f"{effect}_since_s"] = since
@@ -321,7 +325,8 @@ def write_paraview(
     Notes
     -----
     Cells carry body_id, level, speed_m_s, displacement_m, damage and step_bound_by, the place in
-    ``step_control.CRITERIA`` of what bounds a body's step. An earlier series of that name is
+    ``step_control.CRITERIA`` of what bounds a body's step; with several materials also material,
+    the number of each body's. An earlier series of that name is
     removed.
 
     Examples
@@ -336,6 +341,6 @@ def write_paraview(
     for number, frame in enumerate(frames):
         names.append(f"{name}_{number:04d}.vtu")
         points = body_corners(model, frame).reshape(-1, 3)
-        data = cell_data(frame, acting_since or {})
+        data = cell_data(model, frame, acting_since or {})
         write_vtu(os.path.join(folder, names[-1]), points, cells, {}, data)
     write_pvd(os.path.join(folder, f"{name}.pvd"), [frame.time_s for frame in frames], names)

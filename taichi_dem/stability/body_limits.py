@@ -198,8 +198,8 @@ class StabilityLimits:
         contact_c, contact_k = 0.0, 0.0
         if ti.static(self.has_contact):
             share = self.contact_limits.eigenvalue(i)
-            contact_c = self.contacts.law.damping() * share
-            contact_k = self.contacts.law.elastic(1.0) * share
+            largest = self.contact_limits.largest_constants(i)
+            contact_c, contact_k = largest[0] * share, largest[1] * share
         self.bond_damping[i], self.contact_damping[i] = dashpot, contact_c
         if ti.static(self.controlled):
             self._limit(i, dashpot, contact_c, spring, contact_k)

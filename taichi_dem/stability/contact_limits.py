@@ -113,6 +113,27 @@ class ContactLimits:
         return largest_eigenvalue(a, b, c)
 
     @ti.func
+    def largest_constants(self, i):
+        """Largest dashpot [N s/m] and stiffness [N/m] of the near contacts of body i.
+
+        Times ``eigenvalue`` they bound the rates of contacts with bodies of several materials.
+        """
+        dashpot, stiffness = 0.0, 0.0
+        for k in range(self.store.first_of[i], self.store.first_of[i + 1]):
+            p = self.store.near_slot[k]
+            if self.count[p] != 0:
+                m = self.tables.pair(i, self.store.body[p][1])
+                dashpot = ti.max(dashpot, self.contacts.law.damping(m))
+                stiffness = ti.max(stiffness, self.contacts.law.elastic(m, 1.0))
+        for k in range(self.store.second_start[i], self.store.second_start[i + 1]):
+            p = self.store.second_slot[k]
+            if self.count[p] != 0:
+                m = self.tables.pair(self.store.body[p][0], i)
+                dashpot = ti.max(dashpot, self.contacts.law.damping(m))
+                stiffness = ti.max(stiffness, self.contacts.law.elastic(m, 1.0))
+        return ti.Vector([dashpot, stiffness])
+
+    @ti.func
     def _add_pair(self, p, side, a, b, c):
         """Add the near contacts of a pair to the block of its first (0) or second (1) body."""
         i, j = self.store.body[p][0], self.store.body[p][1]

@@ -2,7 +2,7 @@
 
 import contextlib
 from dataclasses import dataclass
-from typing import Optional
+from typing import Optional, Union
 
 import numpy as np
 
@@ -31,9 +31,10 @@ class ElasticReport:
         Elastic constants of the block that the mesh is.
     asked : tuple of (float, float) or None
         Young's modulus [Pa] and Poisson's ratio for which the material was made; None for a
-        material of constants per area.
-    crack_length : float
-        Characteristic length E G_f / tensile_strength^2 of the tip of a crack [m].
+        material of constants per area, and for several materials.
+    crack_length : float or ndarray
+        Characteristic length E G_f / tensile_strength^2 of the tip of a crack [m]; with several
+        materials that of each body's, (body_count,), by the E of a mesh of this material alone.
     element_size : ndarray
         Edge of the regular tetrahedron of the volume of each body [m], shape (body_count,).
     steps : StepReport
@@ -42,7 +43,7 @@ class ElasticReport:
 
     stiffness: MeshStiffness
     asked: Optional[tuple[float, float]]
-    crack_length: float
+    crack_length: Union[float, np.ndarray]
     element_size: np.ndarray
     steps: StepReport
 
@@ -59,11 +60,16 @@ class ElasticReport:
             return self.steps.warnings
         largest = float(self.element_size.max())
         words = (
-            f"the characteristic length E G_f / tensile_strength^2 = {self.crack_length:.3g} m is "
+            f"the characteristic length E G_f / tensile_strength^2 = {self._crack_words()} m is "
             f"less than {ELEMENTS:g} elements at {coarse} of {len(self.element_size)} bodies, with "
             f"edges of up to {largest:.3g} m: strength and paths of cracks there are the mesh's"
         )
         return (words, *self.steps.warnings)
+
+    def _crack_words(self):
+        """The characteristic length, or the range of several, as a number for a sentence."""
+        ends = np.unique([np.min(self.crack_length), np.max(self.crack_length)])
+        return " to ".join(f"{length:.3g}" for length in ends)
 
     def __repr__(self):
         stiffness = f"E {self.stiffness.young:.4g} Pa, nu {self.stiffness.poisson:.3g}"
@@ -77,7 +83,7 @@ class ElasticReport:
             lines.insert(0, f"{head}{0.5e-9 * self.asked[0] / (1.0 + self.asked[1]):10.4g}")
         fewest, median = self.elements.min(), float(np.median(self.elements))
         lines.append(
-            f"characteristic length of cracks {self.crack_length:.3g} m: {fewest:.2g} of the "
+            f"characteristic length of cracks {self._crack_words()} m: {fewest:.2g} of the "
             f"largest element, {median:.2g} of the median one"
         )
         lines += [f"warning: {warning}" for warning in self.warnings]
@@ -117,14 +123,24 @@ def elastic_report(scene: Scene) -> ElasticReport:
 
     Notes
     -----
-    Six linear static solves of the whole mesh: some seconds for ten thousand bodies.
+    Six linear static solves of the whole mesh: some seconds for ten thousand bodies. With several
+    materials those of the block that they make together, and six solves more for each.
     """
     instance("scene", scene, Scene)
-    mesh, material = scene.mesh, scene.material
-    stiffness = mesh_stiffness(mesh, material)
-    crack = stiffness.young * material.fracture_energy / material.tensile_strength**2
-    steps = step_report(scene)
-    return ElasticReport(stiffness, _asked(material), crack, element_sizes(mesh), steps)
+    mesh, laid = scene.mesh, scene.body_materials
+    stiffness = mesh_stiffness(mesh, laid)
+    steps, sizes = step_report(scene), element_sizes(mesh)
+    if laid.is_one:
+        material = laid.materials[0]
+        crack = _crack_length(stiffness, material)
+        return ElasticReport(stiffness, _asked(material), crack, sizes, steps)
+    lengths = [_crack_length(mesh_stiffness(mesh, each), each) for each in laid.materials]
+    return ElasticReport(stiffness, None, np.array(lengths)[laid.of_body], sizes, steps)
+
+
+def _crack_length(stiffness, material):
+    """Characteristic length of a crack's tip [m]."""
+    return stiffness.young * material.fracture_energy / material.tensile_strength**2
 
 
 def element_sizes(mesh: Mesh) -> np.ndarray:

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from taichi_dem.elasticity.bond_rules import Constant, per_bond
+from taichi_dem.body_materials import AnyMaterial
+from taichi_dem.elasticity.bond_rules import Constant, Density, per_bond
 from taichi_dem.kit.fixed_order import (
     inverse_factor,
     largest_eigenvalues,
@@ -14,24 +15,23 @@ from taichi_dem.kit.fixed_order import (
     product,
     transposed,
 )
-from taichi_dem.materials import Material
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.topology import Topology, body_properties, face_vertices
 
 
-def dashpots_of(material: Material) -> tuple[Constant, Constant]:
+def dashpots_of(material: AnyMaterial) -> tuple[Constant, Constant]:
     """Normal and tangential dashpot per area of bonds [Pa s/m], numbers or rules."""
     return material.normal_damping, material.shear_damping
 
 
-def springs_of(material: Material) -> tuple[Constant, Constant]:
+def springs_of(material: AnyMaterial) -> tuple[Constant, Constant]:
     """Normal and tangential stiffness per area of bonds [Pa/m], numbers or rules."""
     return material.normal_stiffness, material.shear_stiffness
 
 
 def bond_rates(
-    mesh: Mesh, topology: Topology, density: float, coefficients: tuple[Constant, Constant]
+    mesh: Mesh, topology: Topology, density: Density, coefficients: tuple[Constant, Constant]
 ) -> np.ndarray:
     """Largest eigenvalue of M^-1/2 G M^-1/2 of every body, shape (body_count,).
 
@@ -48,7 +48,7 @@ def bond_rates(
 def subset_rates(
     mesh: Mesh,
     topology: Topology,
-    density: float,
+    density: Density,
     coefficients: tuple[Constant, Constant],
     subsets: Sequence[int] = range(16),
 ) -> np.ndarray:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from taichi_dem.body_materials import AnyMaterial, BodyMaterials
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.validation import instance
 from taichi_dem.materials import Material
@@ -148,15 +149,15 @@ class QualityReport:
         return lines
 
 
-def quality_report(mesh: Mesh, material: Material) -> QualityReport:
+def quality_report(mesh: Mesh, material: AnyMaterial) -> QualityReport:
     """Shape and explicit step limits of every body of a mesh.
 
     Parameters
     ----------
     mesh : Mesh
         Mesh.
-    material : Material
-        Material of the bonds.
+    material : Material or BodyMaterials
+        Material of the bonds, or those of a scene, ``Scene.body_materials``.
 
     Returns
     -------
@@ -173,7 +174,7 @@ def quality_report(mesh: Mesh, material: Material) -> QualityReport:
     >>> print(quality_report(read_mesh(PAPER_BLOCK), CONCRETE))  # doctest: +SKIP
     """
     instance("mesh", mesh, Mesh)
-    instance("material", material, Material)
+    instance("material", material, (Material, BodyMaterials))
     topology = topology_of(mesh)
     mass, _, _ = body_properties(mesh, material.density)
     altitude = smallest_altitudes(mesh)

@@ -6,14 +6,15 @@ from typing import Optional, Union
 import numpy as np
 from numpy.typing import ArrayLike
 
+from taichi_dem.body_materials import laid_out
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.fixed_order import length
-from taichi_dem.materials import Material, material_on
+from taichi_dem.materials import Material
 from taichi_dem.mesh.contact_spheres import spheres_of_faces
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.tetrahedra import all_faces, area_vectors
-from taichi_dem.mesh.topology import body_properties, topology_of
+from taichi_dem.mesh.topology import Density, body_properties, topology_of
 from taichi_dem.scene import Scene, scene_warnings
 from taichi_dem.stability.body_limits import LIMITED
 from taichi_dem.stability.mesh_limits import (
@@ -266,7 +267,8 @@ def step_report(scene: Union[Scene, Mesh], material: Optional[Material] = None) 
     Notes
     -----
     Limits hold for a pair of equal bodies that move against each other: no mesh has a smaller
-    limit, and none more than twice the limit.
+    limit, and none more than twice the limit. Of contacts with bodies of several materials the
+    stiffest counts.
 
     Examples
     --------
@@ -276,7 +278,7 @@ def step_report(scene: Union[Scene, Mesh], material: Optional[Material] = None) 
         damped, friction, contact = map(scene.effect, ("dashpot", "friction", "contact"))
         divisions = contact.divisions if contact is not None else None
         warnings = scene_warnings(scene)
-        return _report(scene.mesh, scene.material, damped, friction, divisions, warnings)
+        return _report(scene.mesh, scene.body_materials, damped, friction, divisions, warnings)
     if isinstance(scene, Mesh) and isinstance(material, Material):
         return _report(scene, material, True, True, 5)
     raise InputError(
@@ -286,22 +288,23 @@ def step_report(scene: Union[Scene, Mesh], material: Optional[Material] = None) 
 
 
 def _report(mesh, material, damped, friction, divisions, warnings=()):
-    topology, material = topology_of(mesh), material_on(mesh, material)
+    topology, material = topology_of(mesh), laid_out(mesh, material)
     rates = bond_rates(mesh, topology, material.density, springs_of(material))
     limits = {"bond_stiffness": spring_step(rates)}
     if damped:
         rates = bond_rates(mesh, topology, material.density, dashpots_of(material))
         limits["bond_dashpot"] = dashpot_step(rates)
     if divisions is not None:
+        stiffness, damping = map(material.of_contacts, ("contact_stiffness", "contact_damping"))
         one, whole = contact_eigenvalues(mesh, material.density, divisions, friction)
-        limits["contact_stiffness"] = spring_step(material.contact_stiffness * whole)
-        limits["contact_dashpot"] = dashpot_step(material.contact_damping * whole)
-        limits["contact_dashpot_single"] = dashpot_step(material.contact_damping * one)
+        limits["contact_stiffness"] = spring_step(stiffness * whole)
+        limits["contact_dashpot"] = dashpot_step(damping * whole)
+        limits["contact_dashpot_single"] = dashpot_step(damping * one)
     return StepReport(limits, warnings)
 
 
 def contact_eigenvalues(
-    mesh: Mesh, density: float, divisions: int, friction: bool
+    mesh: Mesh, density: Density, divisions: int, friction: bool
 ) -> tuple[np.ndarray, np.ndarray]:
     """Largest eigenvalues of M^-1/2 (J^T D J) M^-1/2 of each body [1/kg], two arrays (n,).
 

@@ -76,18 +76,18 @@ class Advance(BondLaws, ContactForce):
             motion = self._motion(b, slots)
             if ti.static(self.solves_bonds):
                 motion = self.solver.bonds.mean(b, motion)
-            stiffness = self.tables.bond_stiffness[b]
+            stiffness, m = self.tables.bond_stiffness[b], self.tables.bond_pair[b]
             force, torque, failed = zero3(), zero3(), 0
             dragged, slipped = 0.0, 0.0
             for q in range(3):
                 u = 3 * b + q
                 arm = unit_arm(motion, self.tables.vertex_slave[u])
                 opening = unit_opening(motion, arm, self.tables.vertex_master[u])
-                pull = self.pull(b, u, stiffness[0], opening[0])
+                pull = self.pull(m, b, u, stiffness[0], opening[0])
                 sliding = vec2(opening[1], opening[2])
-                shear, spent = self.shear(b, u, stiffness[1], sliding, -pull)
+                shear, spent = self.shear(m, b, u, stiffness[1], sliding, -pull)
                 if ti.static(self.notes_limits):
-                    self.state.note_passed(b, pull, shear.norm_sqr())
+                    self.state.note_passed(m, b, pull, shear.norm_sqr())
                 traction = vec3(pull, shear[0], shear[1])
                 if ti.static(self.has_dashpot):
                     velocity = unit_velocity(motion, arm)
@@ -99,7 +99,7 @@ class Advance(BondLaws, ContactForce):
                 force += traction
                 torque += arm.cross(traction)
                 slipped += spent
-                failed |= self.has_failed(b, u, pull)
+                failed |= self.has_failed(m, b, u, pull)
             dt = self._bond_step(b, slots[0] >> 2, slots[1] >> 2)
             area = self.tables.unit_area[b]
             if failed == 0:

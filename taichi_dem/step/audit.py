@@ -87,6 +87,7 @@ class Audit:
     def _laws(self, a, b):
         """Compare the laws of a bond that are not active with the linear ones."""
         stiffness, motion = self.tables.bond_stiffness[b], self.advance.motion_of(b)
+        m = self.tables.bond_pair[b]
         for q in range(3):
             u = 3 * b + q
             arm = unit_arm(motion, self.tables.vertex_slave[u])
@@ -95,14 +96,14 @@ class Audit:
             self._remember(3 * a + q, u, True)
             if ti.static(self.activity.laws[SOFTENING]):
                 if not self.activity.has_begun(b, SOFTENING):
-                    law = self.tables.tension.traction(stiffness[0], u, opening[0])
-                    other = law != pull or self.tables.tension.failed(u) != 0
+                    law = self.tables.tension.traction(m, stiffness[0], u, opening[0])
+                    other = law != pull or self.tables.tension.failed(m, u) != 0
                     self._book(SOFTENING, other)
             if ti.static(self.activity.laws[SLIP]):
                 if self.activity.has_begun(b, SOFTENING):
-                    pull = self.tables.tension.traction(stiffness[0], u, opening[0])
+                    pull = self.tables.tension.traction(m, stiffness[0], u, opening[0])
                 if not self.activity.has_begun(b, SLIP):
-                    law, spent = self.tables.shear.traction(stiffness[1], u, sliding, -pull)
+                    law, spent = self.tables.shear.traction(m, stiffness[1], u, sliding, -pull)
                     straight = stiffness[1] * sliding
                     other = law[0] != straight[0] or law[1] != straight[1] or spent != 0.0
                     self._book(SLIP, other)

@@ -12,32 +12,32 @@ from taichi_dem.step.activity import SLIP, SOFTENING
 class BondLaws:
     """Base of ``Advance``, which owns all that is used here.
 
-    on_demand: whether the normal and the shear law are evaluated only on bonds that came near
-    their limits (``Activity``); else on all.
+    m: pair of materials of a bond. on_demand: whether the normal and the shear law are evaluated
+    only on bonds that came near their limits (``Activity``); else on all.
     """
 
     @ti.func
-    def pull(self, b, u, stiffness, opening):
+    def pull(self, m, b, u, stiffness, opening):
         """Normal traction of a unit [Pa] at an opening [m], by its law where that acts."""
         traction = stiffness * opening
         if ti.static(self.on_demand[SOFTENING]):
-            begins = self.tables.tension.begins(stiffness, opening)
+            begins = self.tables.tension.begins(m, stiffness, opening)
             if self.activity.is_active(b, SOFTENING, begins, self.state.tick[None]):
-                traction = self.tables.tension.traction(stiffness, u, opening)
+                traction = self.tables.tension.traction(m, stiffness, u, opening)
         else:
-            traction = self.tables.tension.traction(stiffness, u, opening)
+            traction = self.tables.tension.traction(m, stiffness, u, opening)
         return traction
 
     @ti.func
-    def shear(self, b, u, stiffness, sliding, pressure):
+    def shear(self, m, b, u, stiffness, sliding, pressure):
         """Shear traction of a unit [Pa] and energy per area slipped away now [J/m^2]."""
         traction, spent = stiffness * sliding, 0.0
         if ti.static(self.on_demand[SLIP]):
-            begins = self.tables.shear.begins(stiffness, sliding, pressure)
+            begins = self.tables.shear.begins(m, stiffness, sliding, pressure)
             if self.activity.is_active(b, SLIP, begins, self.state.tick[None]):
-                traction, spent = self.tables.shear.traction(stiffness, u, sliding, pressure)
+                traction, spent = self.tables.shear.traction(m, stiffness, u, sliding, pressure)
         else:
-            traction, spent = self.tables.shear.traction(stiffness, u, sliding, pressure)
+            traction, spent = self.tables.shear.traction(m, stiffness, u, sliding, pressure)
         return traction, spent
 
     @ti.func
@@ -87,18 +87,18 @@ class BondLaws:
         return self.tables.unit_area[b] * vec2(elapsed * force.norm(), ti.abs(energy))
 
     @ti.func
-    def has_failed(self, b, u, pull):
+    def has_failed(self, m, b, u, pull):
         """1 once a unit transmits nothing any more, else 0; pull: its normal traction [Pa]."""
         failed = 0
         if ti.static(self.on_demand[SOFTENING]):
             if self.activity.has_begun(b, SOFTENING):
-                failed = self.tables.tension.failed(u)
+                failed = self.tables.tension.failed(m, u)
         else:
-            failed = self.tables.tension.failed(u)
+            failed = self.tables.tension.failed(m, u)
         if ti.static(self.shear_releases):
             if ti.static(self.on_demand[SLIP]):
                 if self.activity.has_begun(b, SLIP):
-                    failed |= self.tables.shear.failed(u, -pull)
+                    failed |= self.tables.shear.failed(m, u, -pull)
             else:
-                failed |= self.tables.shear.failed(u, -pull)
+                failed |= self.tables.shear.failed(m, u, -pull)
         return failed

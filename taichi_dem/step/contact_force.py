@@ -79,7 +79,7 @@ class ContactForce:
         turn, offset = back @ self.state.rotation[j], back @ branch
         force, moment_i, moment_j = zero3(), zero3(), zero3()
         dragged, rubbed, slipped, deepest = 0.0, 0.0, 0.0, 0.0
-        scale, near_count, active = 1.0, 0, ti.i64(0)
+        scale, near_count, active, m = 1.0, 0, ti.i64(0), self.tables.pair(i, j)
         if ti.static(self.limited):
             scale = self.contact_share(i, j)
         for k in range(self.contacts.store.first[p], self.contacts.store.last[p]):
@@ -93,20 +93,20 @@ class ContactForce:
                 velocity = self._velocity_at(j, arm - branch) - self._velocity_at(i, arm)
                 rate = velocity.dot(normal)
                 slide = velocity - rate * normal
-                push = self.contacts.law.normal(overlap, self._limited(rate, scale))
-                drag = self._limited(self.contacts.law.damping(), scale)
-                rub, stuck, spent = self._rub(k, i, normal, push, drag, slide, elapsed, stepping)
+                push = self.contacts.law.normal(m, overlap, self._limited(rate, scale))
+                drag = self._limited(self.contacts.law.damping(m), scale)
+                rub, stuck, spent = self._rub(m, k, i, normal, push, drag, slide, elapsed, stepping)
                 pushed = push * normal + rub
                 active |= active_bits(push, rub)
                 force += pushed
                 moment_i -= arm.cross(pushed)
                 moment_j += (arm - branch).cross(pushed)
-                dragged += (self.contacts.law.elastic(overlap) - push) * rate
+                dragged += (self.contacts.law.elastic(m, overlap) - push) * rate
                 rubbed -= (rub - stuck).dot(slide)
                 slipped += spent
                 deepest = ti.max(deepest, overlap / near.size)
             elif ti.static(stepping):
-                slipped += self.springs.part(k)
+                slipped += self.springs.part(m, k)
         return PairForces(
             force=force,
             moment_i=moment_i,
@@ -120,18 +120,18 @@ class ContactForce:
         )
 
     @ti.func
-    def _rub(self, k, i, normal, push, drag, slide, elapsed, stepping: ti.template()):
+    def _rub(self, m, k, i, normal, push, drag, slide, elapsed, stepping: ti.template()):
         """Friction on the second sphere and the spring's part of it [N]; energy of slipping [J]."""
         rub, stuck, spent = zero3(), zero3(), 0.0
         if ti.static(self.springs.present):
-            rotation, bound = self.state.rotation[i], self.tables.friction.limit(push)
+            rotation, bound = self.state.rotation[i], self.tables.friction.limit(m, push)
             if ti.static(stepping):
                 self.springs.follow(k, rotation, normal, elapsed * slide)
-                spent = self.springs.slip(k, rotation, bound, elapsed * slide)
-            stuck = self.springs.force(k, rotation)
+                spent = self.springs.slip(m, k, rotation, bound, elapsed * slide)
+            stuck = self.springs.force(m, k, rotation)
             rub = add_within(stuck, -drag * slide, bound)
         else:
-            rub = self.tables.friction.force(drag, push, slide)
+            rub = self.tables.friction.force(m, drag, push, slide)
         return rub, stuck, spent
 
     @ti.func

@@ -44,19 +44,19 @@ class TangentialSprings:
         self.friction.follow(k, back @ normal, back @ way)
 
     @ti.func
-    def slip(self, k, rotation, bound, way):
+    def slip(self, m, k, rotation, bound, way):
         """Shorten the spring of sphere pair k to a bound [N] after ``way`` [m]; energy [J]."""
-        return self.friction.slip(k, bound, rotation.transpose() @ way)
+        return self.friction.slip(m, k, bound, rotation.transpose() @ way)
 
     @ti.func
-    def force(self, k, rotation):
+    def force(self, m, k, rotation):
         """Force of the spring of sphere pair k on the second sphere [N]."""
-        return rotation @ self.friction.spring(k)
+        return rotation @ self.friction.spring(m, k)
 
     @ti.func
-    def part(self, k):
+    def part(self, m, k):
         """Energy [J] that is lost as the spheres of a pair no longer touch; 0 without springs."""
         energy = 0.0
         if ti.static(self.present):
-            energy = self.friction.part(k)
+            energy = self.friction.part(m, k)
         return energy

@@ -98,7 +98,7 @@ class PeakTension(ElasticTension):
         self.peak = ti.field(ti.f64, shape=capacity.units)
 
     @ti.func
-    def traction(self, stiffness, u, opening):
+    def traction(self, m, stiffness, u, opening):
         """Linear traction [Pa]."""
         self.peak[u] = ti.max(self.peak[u], stiffness * opening)
         return stiffness * opening
@@ -120,8 +120,8 @@ class PeakShear(ElasticShear):
         self.peak = ti.field(ti.f64, shape=capacity.units)
 
     @ti.func
-    def traction(self, stiffness, u, sliding, pressure):
+    def traction(self, m, stiffness, u, sliding, pressure):
         """Linear traction [Pa]; nothing slips."""
-        needed = stiffness * sliding.norm() - self.law[0] * pressure
+        needed = stiffness * sliding.norm() - self.law[m, 0] * pressure
         self.peak[u] = ti.max(self.peak[u], needed)
         return stiffness * sliding, 0.0

@@ -95,9 +95,9 @@ class LooseSoftening(Softening):
     activation = "a unit is opened to half as much again as its strength"
 
     @ti.func
-    def begins(self, stiffness, opening):
+    def begins(self, m, stiffness, opening):
         """1 beyond 1.5 times the strength."""
-        return ti.cast(stiffness * opening > 1.5 * self.law[0], ti.i32)
+        return ti.cast(stiffness * opening > 1.5 * self.law[m, 0], ti.i32)
 
 
 @ti.data_oriented
@@ -107,9 +107,9 @@ class LooseSlip(ShearSlip):
     activation = "a unit is sheared to half as much again as its limit"
 
     @ti.func
-    def begins(self, stiffness, sliding, pressure):
+    def begins(self, m, stiffness, sliding, pressure):
         """1 beyond 1.5 times the limit."""
-        limit = 1.5 * (self.law[0] + self.law[1] * pressure)
+        limit = 1.5 * (self.law[m, 0] + self.law[m, 1] * pressure)
         return ti.cast(stiffness * sliding.norm() > limit, ti.i32)
 
 
@@ -192,10 +192,10 @@ class CountedSoftening(Softening):
         return {**super().state(), "calls": self.calls}
 
     @ti.func
-    def traction(self, stiffness, u, opening):
+    def traction(self, m, stiffness, u, opening):
         """Traction that falls with every call beyond the strength [Pa]."""
         traction = stiffness * opening
-        if traction > self.law[0]:
+        if traction > self.law[m, 0]:
             self.calls[u // 3] = self.calls[u // 3] + 1.0
         return traction / (1.0 + 1e-3 * self.calls[u // 3])
 

@@ -213,6 +213,7 @@ BLAST = [
     *taken(quiet, "group", ("group",)),
     *taken(cut, "names", ("unbonded",)),
     *taken(cut, "shares", ("weaker",)),
+    *taken(cut, "materials", ("materials",)),
     *taken(scene, "positive", ("max_speed",)),
     *taken(scene, "three numbers", ("velocity", "spin"), (None, [[1, 2, 3]])),
     *taken(checkpoint, "path", ("path",)),

@@ -84,6 +84,7 @@ WRONG = {
     "history": [3, "ab", [1], [[0], [1], [2]], [[0, 1], [1]], [[1, 0], [1, 1]], [[0], ["1"]]],
     "names": [None, 3, "notch", [3], [None], {"notch"}],
     "shares": [None, 3, "notch", [("notch", 0.5)], *({"notch": x} for x in (0, -1, 2, "1", None))],
+    "materials": [None, 3, "ore", [("ore", 0.5)], *({"ore": x} for x in (0, "concrete", None))],
     "path": ["", None, 3, [], "a\0b", b"run.npz", True],
     "object": [None, 3, "x", [], object],
 }

@@ -20,7 +20,7 @@ def scene(*listed, **options):
 class Unsaid(effects.SphereContact):
     """A contact law that does not say when it begins to act."""
 
-    def normal(self, overlap, opening_rate):
+    def normal(self, m, overlap, opening_rate):
         """No force [N]."""
         return 0.0
 
@@ -28,7 +28,7 @@ class Unsaid(effects.SphereContact):
 class UnsaidFriction(effects.Friction):
     """A law of friction likewise."""
 
-    def limit(self, force_normal):
+    def limit(self, m, force_normal):
         """No friction [N]."""
         return 0.0
 
@@ -36,7 +36,7 @@ class UnsaidFriction(effects.Friction):
 class UnsaidTension(effects.Softening):
     """A normal law likewise."""
 
-    def traction(self, stiffness, u, opening):
+    def traction(self, m, stiffness, u, opening):
         """No traction [Pa]."""
         return 0.0
 
@@ -44,7 +44,7 @@ class UnsaidTension(effects.Softening):
 class UnsaidShear(effects.SlipWeakening):
     """A shear law likewise."""
 
-    def failed(self, u, pressure):
+    def failed(self, m, u, pressure):
         """It never fails."""
         return 0
 
@@ -62,7 +62,7 @@ class WordsAlone(effects.Softening):
 
     activation = "never"
 
-    def traction(self, stiffness, u, opening):
+    def traction(self, m, stiffness, u, opening):
         """No traction [Pa]."""
         return 0.0
 

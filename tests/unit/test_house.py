@@ -21,7 +21,7 @@ LAYERS = {
         ("kit",),
         ("meshes", "mesh", "shapes"),
         ("elasticity",),
-        ("materials",),
+        ("materials", "body_materials"),
         ("physics", "timeline", "closed_forms", "wave_moduli"),
         ("effects", "initial_motion"),
         ("scene",),

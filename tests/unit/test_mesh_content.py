@@ -254,15 +254,17 @@ def test_several_groups_of_volumes_are_told_and_named_when_asked_for(tmp_path, n
     rock, ore, edge = ("rock", "ore", "edge") if named else (*["physical_5", "physical_6"], None)
     blocks = [("tetra", BAR.tetrahedra, halves), LEFT, *[line] * named]
     path = gmsh_file(tmp_path / "mesh.msh", groups, blocks)
-    with pytest.warns(UserWarning, match=f"volumes {rock}, {ore} are not read: one material"):
-        mesh = read_mesh(path)
-    assert any(f"volumes {rock}, {ore} are not read" in note for note in mesh.notes)
+    mesh = read_mesh(path)
+    assert f"bodies are in the groups {rock}, {ore}, for materials of their own" in mesh.notes
+    for name, first in ((rock, 0), (ore, BAR.body_count // 2)):
+        assert np.array_equal(mesh.group_bodies(name), first + np.arange(BAR.body_count // 2))
     assert list(mesh.groups) == ["left" if named else "physical_5"]
     assert np.array_equal(in_space_order(mesh).unread, mesh.unread)
-    with pytest.raises(InputError, match=rf"{ore} is a group of volumes: make one of faces"):
+    with pytest.raises(InputError, match=rf"{ore} is a group of bodies: make one of faces"):
         mesh.group_faces(ore)
     if named:
-        assert f"only groups of faces are read, not {edge} (of lines)" in mesh.notes
+        words = "only groups of faces and of solid cells are read, not"
+        assert f"{words} {edge} (of lines)" in mesh.notes
         with pytest.raises(InputError, match="edge is a group of lines"):
             mesh.group_faces("edge")
 
@@ -278,14 +280,16 @@ def test_sets_and_numbers_of_other_formats_are_told(tmp_path):
     content.point_sets = {"held": np.arange(3)}
     meshio.write(tmp_path / "mesh.inp", content)
     with pytest.warns(UserWarning, match="need groups of faces") as warned:
-        (note,) = read_mesh(tmp_path / "mesh.inp").notes
-    assert note.startswith("the sets part (of elements), held (of points) are not read: one mat")
+        mesh = read_mesh(tmp_path / "mesh.inp")
+    (note,) = mesh.notes
+    assert note.startswith("the sets held (of points) are not read: loads and supports need groups")
+    assert mesh.group_bodies("part").tolist() == list(range(5))
     assert len(warned) == 1 and note in str(warned[0].message)
     content = meshio.Mesh(BAR.points, cells, cell_data={"rock": [np.arange(BAR.body_count) % 2]})
     meshio.write(tmp_path / "mesh.vtu", content)
-    with pytest.warns(UserWarning, match="numbers on tetrahedra are not read: rock; one material"):
-        mesh = read_mesh(tmp_path / "mesh.vtu")
+    mesh = read_mesh(tmp_path / "mesh.vtu")
     assert len(mesh.notes) == 1 and "1 note" in repr(mesh)
+    assert mesh.group_bodies("rock_1").tolist() == list(range(1, BAR.body_count, 2))
 
 
 @pytest.mark.parametrize("number", [np.ones, np.arange, np.zeros])
@@ -308,7 +312,7 @@ def test_abaqus_sets_of_everything_are_noted_without_a_warning(tmp_path):
         tmp_path / "mesh.inp", "", point_sets={"n": np.arange(BAR.point_count)}, **sets
     )
     assert read_mesh(path).notes == (
-        "only groups of faces are read, not all (of elements), n (of points)",
+        "only groups of faces and of solid cells are read, not n (of points)",
     )
 
 

@@ -70,7 +70,7 @@ def test_parameters_of_a_scene_stay_its_own(scene, states):
     frozen = FrozenScene(Scene(scene.mesh, slippery, scene.effects), METHOD, states, substeps=1)
     frozen.seconds(1)
     tables = frozen.simulation.tables
-    assert tables.friction.law[0] == 0.0 and tables.contact.law.to_numpy()[1] == 1.0
+    assert tables.friction.law[0, 0] == 0.0 and tables.contact.law.to_numpy()[0, 1] == 1.0
 
 
 def test_the_watch_for_missing_effects_is_that_of_the_scene(scene, less, states):

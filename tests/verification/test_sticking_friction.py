@@ -159,11 +159,11 @@ class Spring:
     ):
         for _ in range(1):
             self.law.follow(0, normal, way)
-            found[4] = self.law.slip(0, bound, way)
-            force = self.law.spring(0)
+            found[4] = self.law.slip(0, 0, bound, way)
+            force = self.law.spring(0, 0)
             for c in ti.static(range(3)):
                 found[c] = force[c]
-            found[3] = self.law.stored(0)
+            found[3] = self.law.stored(0, 0)
 
 
 @pytest.fixture(scope="module")

@@ -56,7 +56,7 @@ def write_vtkhdf(
         _write_cells(root, model)
         points = [body_corners(model, frame).reshape(-1, 3) for frame in frames]
         _column(root, "Points", points)
-        columns = [cell_data(frame, acting_since or {}) for frame in frames]
+        columns = [cell_data(model, frame, acting_since or {}) for frame in frames]
         for name in columns[0]:
             _column(root, f"CellData/{name}", [column[name] for column in columns])
         _write_steps(root, [frame.time_s for frame in frames], model.body_count, list(columns[0]))

@@ -124,7 +124,7 @@ class PairDashpots:
         branch = self.state.position[j] - self.state.position[i]
         back = self.state.rotation[i].transpose()
         turn, offset = back @ self.state.rotation[j], back @ branch
-        ahead = dt * self.contacts.approach(i, j)
+        ahead, m = dt * self.contacts.approach(i, j), self.tables.pair(i, j)
         force, moment, deepest, parted = zero3(), zero3(), 0.0, 0.0
         elapsed = 0.0
         if ti.static(self.springs.present):
@@ -140,8 +140,8 @@ class PairDashpots:
                 overlap, normal, arm = met.overlap, met.normal, met.arm - branch
                 self.entry[end], self.normal[end], self.arm[end] = k, normal, arm
                 # Spheres still apart may approach until they touch, at the end of the step.
-                push = dt * self.contacts.law.elastic(ti.max(overlap, 0.0))
-                self.push[end] = push + self.contacts.law.damping() * ti.min(overlap, 0.0)
+                push = dt * self.contacts.law.elastic(m, ti.max(overlap, 0.0))
+                self.push[end] = push + self.contacts.law.damping(m) * ti.min(overlap, 0.0)
                 self.share[end] = self._share(i, j, branch, arm, normal)
                 force += self.impulse[k]
                 moment += arm.cross(self.impulse[k])
@@ -151,12 +151,12 @@ class PairDashpots:
                     if overlap > 0.0:
                         way = self._way(i, j, branch, arm, normal, elapsed)
                         self.springs.follow(k, self.state.rotation[i], normal, way)
-                        self.pull[end] = dt * self.springs.force(k, self.state.rotation[i])
+                        self.pull[end] = dt * self.springs.force(m, k, self.state.rotation[i])
                 end += 1
             else:
                 self.impulse[k] = zero3()
             if not is_within(near, 0.0):
-                parted += self.springs.part(k)
+                parted += self.springs.part(m, k)
         self.store.deepest[p], self.touching[p], self.branch[p] = deepest, end - start, branch
         if end > start:
             self._deposit(p, branch, force, moment)
@@ -202,25 +202,26 @@ class PairDashpots:
         """Solve a pair's contacts, one after the other; largest squared velocity it changed."""
         change2 = 0.0
         pair = self.store.body[p]
-        damping = self.schedule.step_seconds[0] * self.contacts.law.damping()
+        m = self.tables.pair(pair[0], pair[1])
+        damping = self.schedule.step_seconds[0] * self.contacts.law.damping(m)
         start = self.store.first[p]
         for c in range(start, start + self.touching[p]):
-            found = self._visit(c, pair[0], pair[1], self.branch[p], damping)
+            found = self._visit(m, c, pair[0], pair[1], self.branch[p], damping)
             change2 = ti.max(change2, found)
         return change2
 
     @ti.func
-    def _visit(self, c, i, j, branch, damping):
+    def _visit(self, m, c, i, j, branch, damping):
         k, arm, share = self.entry[c], self.arm[c], self.share[c]
         linear, angular = self.velocities.apart(i, j, branch)
-        found = self._answer(c, linear + angular.cross(arm), damping)
+        found = self._answer(m, c, linear + angular.cross(arm), damping)
         step = self.impulse[k] - found
         self.impulse[k] = found
         self.velocities.pull(i, j, branch, step, arm.cross(step))
         return share[0] * share[0] * step.norm_sqr()
 
     @ti.func
-    def _answer(self, c, velocity, damping):
+    def _answer(self, m, c, velocity, damping):
         """Impulse of a contact by its laws [N s], with those of all others as they are.
 
         velocity: of the second sphere against the first, with the present impulse [m/s].
@@ -232,7 +233,7 @@ class PairDashpots:
         found = ti.max(0.0, (self.push[c] - damping * free) / (1.0 + damping * share[0])) * normal
         if ti.static(self.has_friction):
             slide = velocity - rate * normal - share[1] * (held - pressed * normal)
-            bound = self.tables.friction.limit(found.dot(normal))
+            bound = self.tables.friction.limit(m, found.dot(normal))
             stick = -damping / (1.0 + damping * share[1])
             if ti.static(self.springs.present):
                 pull = cut_to(self.pull[c], bound)
@@ -252,7 +253,8 @@ class PairDashpots:
             pair = self.store.body[p]
             i, j, branch = pair[0], pair[1], self.branch[p]
             after, turned = self.velocities.apart(i, j, branch)
-            damping = self.schedule.step_seconds[0] * self.contacts.law.damping()
+            m = self.tables.pair(i, j)
+            damping = self.schedule.step_seconds[0] * self.contacts.law.damping(m)
             spin = self.state.spin[i]
             before = self.state.velocity[j] - self.state.velocity[i] - spin.cross(branch)
             linear = 0.5 * (after + before)
@@ -261,13 +263,13 @@ class PairDashpots:
             dragged, rubbed, active = 0.0, 0.0, ti.i64(0)
             for c in range(start, start + self.touching[p]):
                 velocity, normal = linear + angular.cross(self.arm[c]), self.normal[c]
-                impulse = self._answer(c, after + turned.cross(self.arm[c]), damping)
+                impulse = self._answer(m, c, after + turned.cross(self.arm[c]), damping)
                 pressed, rate = impulse.dot(normal), velocity.dot(normal)
                 dragged += (ti.max(self.push[c], 0.0) - pressed) * rate
                 rub = impulse - pressed * normal
                 active |= active_bits(pressed, rub)
                 if ti.static(self.springs.present):
-                    stuck, spent = self._slip(p, c, i, j, pressed)
+                    stuck, spent = self._slip(m, p, c, i, j, pressed)
                     rub -= stuck
                     rubbed += spent
                 rubbed -= rub.dot(velocity)
@@ -284,6 +286,7 @@ class PairDashpots:
         back = self.state.rotation[i].transpose()
         branch = self.state.position[j] - self.state.position[i]
         turn, offset = back @ self.state.rotation[j], back @ branch
+        m = self.tables.pair(i, j)
         force, moment_i, moment_j, dragged, rubbed = zero3(), zero3(), zero3(), 0.0, 0.0
         for k in range(self.store.first[p], self.store.last[p]):
             pushed = self.impulse[k] / dt
@@ -299,11 +302,11 @@ class PairDashpots:
             rate, pressed = velocity.dot(met.normal), pushed.dot(met.normal)
             spring = 0.0
             if near.can_meet == 1:
-                spring = self.contacts.law.elastic(ti.max(met.overlap, 0.0))
+                spring = self.contacts.law.elastic(m, ti.max(met.overlap, 0.0))
             dragged += (spring - pressed) * rate
             rub = pushed - pressed * met.normal
             if ti.static(self.springs.present):
-                rub -= self.springs.force(k, self.state.rotation[i])
+                rub -= self.springs.force(m, k, self.state.rotation[i])
             rubbed -= rub.dot(velocity)
         return PairForces(
             force=force,
@@ -318,11 +321,11 @@ class PairDashpots:
         )
 
     @ti.func
-    def _slip(self, p, c, i, j, pressed):
+    def _slip(self, m, p, c, i, j, pressed):
         """Limit a spring in a step; return its impulse [N s] and the energy of slipping [J]."""
         k, normal, rotation = self.entry[c], self.normal[c], self.state.rotation[i]
         dt = self.schedule.step_seconds[0]
-        bound = self.tables.friction.limit(pressed) / dt
+        bound = self.tables.friction.limit(m, pressed) / dt
         way = self._way(i, j, self.branch[p], self.arm[c], normal, self.elapsed[p])
-        spent = self.springs.slip(k, rotation, bound, way)
-        return dt * self.springs.force(k, rotation), spent
+        spent = self.springs.slip(m, k, rotation, bound, way)
+        return dt * self.springs.force(m, k, rotation), spent
