@@ -16,10 +16,6 @@ def check_client(client: Any) -> None:
         raise InputError(f"client must be a dask.distributed.Client, got {shown(client)}")
     if client.asynchronous:
         raise InputError("client must not be asynchronous, got one that is")
-    if client.status != "running":
-        raise InputError(
-            f"client must be connected to a scheduler, got one that is {client.status}"
-        )
     if _worker_count(client) == 0:
         raise InputError("client must have at least one worker, got none")
 
@@ -79,6 +75,8 @@ def _record_of(future):
 
 def _worker_count(client):
     """Number of workers; InputError where one has several threads, or the client is lost."""
+    if client.status != "running":
+        raise _client_lost(f"it is {client.status}")
     try:
         threads = client.nthreads().values()
     except (OSError, RuntimeError) as error:

@@ -136,9 +136,7 @@ def _processes(workers, client):
     if client is None:
         return runtime.usable_cores() if workers is None else whole("workers", workers, 1, 1024)
     if workers is not None:
-        raise InputError(
-            f"workers must be left out with a client, which has its own, got {workers}"
-        )
+        raise InputError(f"workers must be left out with a client, got {workers}")
     check_client(client)
     return 0
 
