@@ -40,6 +40,11 @@ LINES = [
     ("blast_fracture", ("--checkpoint-every", "-5s"), ("--checkpoint-every",)),
     ("blast_fracture", ("--checkpoint-every", "1" * 400 + "steps"), ("--checkpoint-every",)),
     ("blast_fracture", ("extra",), ("extra",)),
+    ("blast_fracture", ("--sweep", "none.csv"), ("table none.csv cannot be read",)),
+    ("blast_fracture", ("--sweep", "{folder}"), ("cannot be read",)),
+    ("blast_fracture", ("--sweep", "{file}", "--workers", "0"), ("--workers", "1 to 1024")),
+    ("blast_fracture", ("--workers", "2"), ("left out without --sweep",)),
+    ("damper_response", ("--sweep", "{file}"), ("at least one row",)),
     ("blast_fracture", ("--accuracy", "0"), ("--accuracy", "up to 100%")),
     ("blast_fracture", ("--accuracy", "1 percent"), ("--accuracy", "up to 100%")),
     (

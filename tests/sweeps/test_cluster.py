@@ -51,7 +51,7 @@ def test_a_client_that_is_gone_is_a_sentence_and_keeps_what_is_finished(tmp_path
         with pytest.raises(InputError, match=r"^the client has lost .*; 3 finished jobs are kept"):
             sweep(jobs.squared, rows, client=client, out=tmp_path, progress=leave)
         assert len(list((tmp_path / "jobs").iterdir())) == 3
-        with pytest.raises(InputError, match="^the client has lost its scheduler: it is closed$"):
+        with pytest.raises(InputError, match=r"^the client has lost its scheduler: it is closed$"):
             sweep(jobs.squared, rows, client=client, out=tmp_path, **QUIET)
 
 

@@ -3,7 +3,7 @@
 import contextlib
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Optional, Union
 
 from taichi_dem.kit import runtime
@@ -82,27 +82,42 @@ def sweep(
     >>> table = sweep(blast, parameter_grid(peak=[4e8, 5e8, 6e8]), out="results/peaks")
     ... # doctest: +SKIP
     """
-    leave_unless_main()
-    name, rows = checked_work(function), checked_rows(table)
+    rows = checked_rows(table)
     jobs = jobs_of(function, rows, whole("seed", seed, 0, 2**63))
     count = _processes(workers, client)
     journal = Journal(out, identity_of(function))
-    records = journal.read(jobs)
-    missing = [*{job.digest: job for job in jobs if job.digest not in records}.values()]
-    with reporting(progress, "sweeping") as listen, contextlib.ExitStack() as opened:
-        if missing:
-            arch = _architecture()
-            ended = (
-                run_locally(name, missing, count, arch)
-                if client is None
-                else run_on_cluster(function, missing, client, arch)
-            )
-            opened.callback(ended.close)
-            _collect(ended, records, journal, _counter(listen, len(missing)))
-    made = SweepTable(jobs, [records[job.digest] for job in jobs], SEED in rows[0])
+    records = run_missing(function, jobs, journal, count=count, client=client, progress=progress)
+    made = SweepTable(jobs, records, SEED in rows[0])
     if journal.folder:
         made.write_csv(os.path.join(journal.folder, RESULTS))
     return made
+
+
+def run_missing(
+    function: Work,
+    jobs: Sequence[Job],
+    journal: Journal,
+    *,
+    count: int,
+    client: Any = None,
+    progress: Union[Listener, str, None] = AUTO,
+) -> list[Record]:
+    """Records of jobs, of which those that the journal lacks are run; count: of processes."""
+    leave_unless_main()
+    name, records = checked_work(function), journal.read(jobs)
+    missing = [*{job.digest: job for job in jobs if job.digest not in records}.values()]
+    if missing:
+        arch = _architecture()
+        with (
+            reporting(progress, "sweeping") as listen,
+            contextlib.closing(
+                run_locally(name, missing, count, arch)
+                if client is None
+                else run_on_cluster(function, missing, client, arch)
+            ) as ended,
+        ):
+            _collect(ended, records, journal, _counter(listen, len(missing)))
+    return [records[job.digest] for job in jobs]
 
 
 def _collect(ended: Iterator[tuple[Job, Record]], records, journal, count):
