@@ -1,0 +1,75 @@
+"""How probable each face of a block is to break, from many runs."""
+
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import ListedColormap, Normalize
+
+from taichi_dem.engine.model import Model
+from taichi_dem.kit.plot_style import picture
+from taichi_dem.kit.validation import FileName
+from taichi_dem.plot.block import JOINT, STONE, frame_block
+from taichi_dem.plot.deep import crossings
+from taichi_dem.plot.view import View, surface, traces
+
+
+def plot_crack_probability(path: FileName, model: Model, probability: np.ndarray) -> None:
+    """Faces of the block at rest by their probability to break: on its front, and half-way through.
+
+    Parameters
+    ----------
+    path
+        Name of the PNG file.
+    model
+        Of a scene with the mesh of all runs.
+    probability
+        Of each bond to be broken, shape (bond_count,) [1]; faces at 0 are not drawn.
+    """
+    view = View()
+    with picture(path, 1, 2, size=(9.4, 4.3), sharey=True) as (figure, panels):
+        drawn = _on_front(panels[0], view, model, probability)
+        panels[0].set_title("On the front face")
+        _half_way(panels[1], view, model, probability)
+        for axes in panels:
+            frame_block(axes, view, model)
+            axes.set_xlabel(view.labels()[0])
+        panels[0].set_ylabel(view.labels()[1])
+        label = "probability of a face to break [1]"
+        figure.colorbar(drawn, ax=panels, label=label, shrink=0.85, aspect=25)
+
+
+def _on_front(axes, view, model, probability):
+    """Edges of the front face by the most probable face that ends there."""
+    corners = model.mesh.points[model.mesh.tetrahedra]
+    polygons, _, _ = surface(model.topology, view, corners, np.zeros(model.bond_count, dtype=bool))
+    axes.add_collection(PolyCollection(polygons, facecolor=STONE, edgecolor=JOINT, linewidth=0.4))
+    # Traces are of the least value that ends at an edge.
+    falling = np.where(probability > 0.0, -probability, np.nan)
+    body, ends, least = traces(model.mesh, model.topology, view, falling)
+    return _lines(axes, view.project(corners[body[:, None], ends]), -least)
+
+
+def _half_way(axes, view, model, probability):
+    """Where faces cross the plane half-way through the block."""
+    middle = 0.5 * float(model.mesh.points[:, 2].min() + model.mesh.points[:, 2].max())
+    broken = np.flatnonzero(probability > 0.0)
+    triangles = model.mesh.points[model.topology.vertices[broken]]
+    segments, which = crossings(triangles, 2, middle)
+    axes.set_facecolor(STONE)
+    axes.set_title(f"In the section at z = {middle:.3g} m")
+    return _lines(axes, view.project(segments), probability[broken][which])
+
+
+def _lines(axes, segments, probability) -> Any:
+    """Lines by probability, dark where it is high and on top; light yellow would not be seen."""
+    order = np.argsort(probability, kind="stable")
+    shades = matplotlib.colormaps["viridis_r"](np.linspace(0.1, 1.0, 256))
+    lines = LineCollection(
+        segments[order], linewidth=1.6, cmap=ListedColormap(shades), norm=Normalize(0.0, 1.0)
+    )
+    lines.set_array(probability[order])
+    lines.set_capstyle("round")
+    axes.add_collection(lines)
+    return lines
