@@ -13,6 +13,7 @@ from typing import Any, Callable, NamedTuple
 
 from taichi_dem.kit import runtime
 from taichi_dem.kit.errors import InputError, SimulationDiverged
+from taichi_dem.kit.progress.progress_bar import hide_bars
 from taichi_dem.kit.provenance import commit, machine
 from taichi_dem.kit.sweeps.rows import ADDED, SEED, Row, Value, plain_value
 from taichi_dem.kit.validation import shown
@@ -105,6 +106,7 @@ def run_in_worker(work: Work, row: Row, arch: str) -> Record:
     """Run one job with Taichi started on one CPU thread, by the thread of the worker."""
     runtime.start(arch, threads=1)
     runtime.check_thread("job of a sweep")
+    hide_bars()
     return run_job(work, row)
 
 
