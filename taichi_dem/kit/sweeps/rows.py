@@ -37,17 +37,17 @@ def parameter_grid(**columns: Iterable) -> list[Row]:
     **columns
         Values of each column; the last column varies fastest.
 
-    Returns:
+    Returns
     -------
     list of dict
         One row a combination.
 
-    Raises:
+    Raises
     ------
     InputError
         For no column at all, or a column that is not a list of values.
 
-    Examples:
+    Examples
     --------
     >>> parameter_grid(peak=[1.0, 2.0], rise=[3.0])
     [{'peak': 1.0, 'rise': 3.0}, {'peak': 2.0, 'rise': 3.0}]

@@ -60,24 +60,24 @@ def sweep(
     progress
         "auto" for a bar on a terminal and in Jupyter, None, or a function of a ``Progress``.
 
-    Returns:
+    Returns
     -------
     SweepTable
         A row for each row of the table, in its order, with provenance.
 
-    Raises:
+    Raises
     ------
     InputError
         For a bad argument, a folder of another sweep or without space, or a client that is lost:
         finished rows are kept in ``out``.
 
-    Notes:
+    Notes
     -----
     A row that fails has the sentence in the column ``error`` and does not stop the others. A row
     whose process dies is run again, three times in all; on a cluster as often as Dask's setting
     ``allowed-failures`` says. Ctrl-C keeps the rows that are finished.
 
-    Examples:
+    Examples
     --------
     >>> table = sweep(blast, parameter_grid(peak=[4e8, 5e8, 6e8]), out="results/peaks")
     ... # doctest: +SKIP

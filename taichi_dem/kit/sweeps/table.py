@@ -23,13 +23,13 @@ class SweepTable(Mapping[str, np.ndarray]):
     Columns are those of the input, the results, NaN or "" where a row has none, and ``error``: the
     sentence of a row that failed, else "". They are the same bits wherever a job ran.
 
-    Attributes:
+    Attributes
     ----------
     provenance : dict of str to ndarray
         Seed of each row, version of the package, commit of its sources or "unknown", machine, and
         seconds on the wall [s].
 
-    Examples:
+    Examples
     --------
     >>> table = sweep(run, rows)                           # doctest: +SKIP
     >>> table["displacement_mm"].mean(), table.provenance["seconds"].sum()  # doctest: +SKIP
@@ -83,7 +83,7 @@ class SweepTable(Mapping[str, np.ndarray]):
         provenance
             Whether its columns stand behind the others.
 
-        Raises:
+        Raises
         ------
         InputError
             Where pandas is not installed.
@@ -100,7 +100,7 @@ class SweepTable(Mapping[str, np.ndarray]):
         provenance
             Whether its columns stand behind the others.
 
-        Raises:
+        Raises
         ------
         InputError
             When the file cannot be written.
