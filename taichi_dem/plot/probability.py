@@ -6,6 +6,7 @@ import matplotlib
 import numpy as np
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.patches import Rectangle
 
 from taichi_dem.engine.model import Model
 from taichi_dem.kit.plot_style import picture
@@ -53,13 +54,14 @@ def _on_front(axes, view, model, probability):
 
 def _half_way(axes, view, model, probability):
     """Where faces cross the plane half-way through the block."""
-    middle = 0.5 * float(model.mesh.points[:, 2].min() + model.mesh.points[:, 2].max())
-    broken = np.flatnonzero(probability > 0.0)
-    triangles = model.mesh.points[model.topology.vertices[broken]]
-    segments, which = crossings(triangles, 2, middle)
-    axes.set_facecolor(STONE)
+    low, high = model.mesh.points.min(axis=0), model.mesh.points.max(axis=0)
+    middle = 0.5 * float(low[2] + high[2])
+    segments, which = crossings(model.mesh.points[model.topology.vertices], 2, middle)
+    segments, found = view.project(segments), probability[which]
+    axes.add_patch(Rectangle(low[:2], *(high - low)[:2], facecolor=STONE, edgecolor=JOINT))
+    axes.add_collection(LineCollection(segments, colors=JOINT, linewidth=0.4))
     axes.set_title(f"In the section at z = {middle:.3g} m")
-    return _lines(axes, view.project(segments), probability[broken][which])
+    return _lines(axes, segments[found > 0.0], found[found > 0.0])
 
 
 def _lines(axes, segments, probability) -> Any:
