@@ -249,7 +249,13 @@ def settings() -> Optional[Settings]:
 
 
 def usable_cores() -> int:
-    """Number of cores that this process may use."""
+    """Number of cores that this process may use.
+
+    Returns
+    -------
+    int
+        At least 1 [1].
+    """
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

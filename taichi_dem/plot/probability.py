@@ -21,12 +21,12 @@ def plot_crack_probability(path: FileName, model: Model, probability: np.ndarray
 
     Parameters
     ----------
-    path
+    path : path
         Name of the PNG file.
-    model
+    model : Model
         Of a scene with the mesh of all runs.
-    probability
-        Of each bond to be broken, shape (bond_count,) [1]; faces at 0 are not drawn.
+    probability : ndarray, shape (bond_count,)
+        Of each bond to be broken [1]; faces at 0 are not drawn.
     """
     view = View()
     with picture(path, 1, 2, size=(9.4, 4.3), sharey=True) as (figure, panels):

@@ -34,13 +34,13 @@ def parameter_grid(**columns: Iterable) -> list[Row]:
 
     Parameters
     ----------
-    **columns
+    **columns : iterable
         Values of each column; the last column varies fastest.
 
     Returns
     -------
     list of dict
-        One row a combination.
+        One row for each combination, each value in the unit of its column.
 
     Raises
     ------

@@ -41,23 +41,23 @@ def sweep(
 
     Parameters
     ----------
-    function
+    function : callable
         Called with a row, a dict of column name to number or text; returns a dict of numbers and
         text. It must stand at the top of a file. ``row["seed"]`` is the seed of the row, a whole
         number below 2^31, unless the table has such a column.
-    table
+    table : list of dict, dict, DataFrame or path
         A list of dicts with the same keys, a dict or DataFrame of columns, the name of a CSV file
         with a header, or what ``parameter_grid`` makes.
-    workers
+    workers : int, optional
         Number of processes on this machine, from 1 to 1024; by default one a core.
-    client
+    client : distributed.Client, optional
         A ``dask.distributed.Client`` whose workers run the rows instead; each has one thread.
-    out
+    out : path, optional
         Folder that keeps each finished row. The same call later runs only rows that are missing
         or changed, or whose function or package changed.
-    seed
+    seed : int
         Seed from which those of the rows follow, a whole number from 0 to 2^63.
-    progress
+    progress : "auto", function or None
         "auto" for a bar on a terminal and in Jupyter, None, or a function of a ``Progress``.
 
     Returns

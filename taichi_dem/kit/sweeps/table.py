@@ -23,6 +23,15 @@ class SweepTable(Mapping[str, np.ndarray]):
     Columns are those of the input, the results, NaN or "" where a row has none, and ``error``: the
     sentence of a row that failed, else "". They are the same bits wherever a job ran.
 
+    Parameters
+    ----------
+    jobs : sequence of Job
+        One a row, in the order of the input.
+    records : sequence of Record
+        What running them left.
+    seeded : bool
+        Whether the input has a column of seeds.
+
     Attributes
     ----------
     provenance : dict of str to ndarray
@@ -80,8 +89,12 @@ class SweepTable(Mapping[str, np.ndarray]):
 
         Parameters
         ----------
-        provenance
+        provenance : bool
             Whether its columns stand behind the others.
+
+        Returns
+        -------
+        pandas.DataFrame
 
         Raises
         ------
@@ -95,9 +108,9 @@ class SweepTable(Mapping[str, np.ndarray]):
 
         Parameters
         ----------
-        path
+        path : path
             Name of the file.
-        provenance
+        provenance : bool
             Whether its columns stand behind the others.
 
         Raises
