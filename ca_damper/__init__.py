@@ -15,6 +15,7 @@ from ca_damper.decay import logarithmic_decrement
 from ca_damper.errors import InputError, SimulationDiverged
 from ca_damper.film import film
 from ca_damper.fixed_mass import Empty, RigidMass
+from ca_damper.frequency_sweep import Sweep, sweep_up_and_down
 from ca_damper.goals import Goal
 from ca_damper.impact_damper import ImpactDamper
 from ca_damper.needed_effects import needed_effects
@@ -27,11 +28,13 @@ from ca_damper.shake_structure import StructureHistory, shake_structure
 from ca_damper.solve_response import solve_response
 from ca_damper.spheres import Spheres
 from ca_damper.structure import Box, ModalStructure
-from ca_damper.sweep import Sweep, sweep_up_and_down
 from taichi_dem.kit.accuracy.answer import Answer
 from taichi_dem.kit.accuracy.branches import Branch, BranchedAnswer
 from taichi_dem.kit.progress.progress import Progress
 from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.sweeps.rows import parameter_grid
+from taichi_dem.kit.sweeps.sweep import sweep
+from taichi_dem.kit.sweeps.table import SweepTable
 from taichi_dem.kit.version import __version__
 
 __all__ = [
@@ -62,6 +65,7 @@ __all__ = [
     "Spheres",
     "StructureHistory",
     "Sweep",
+    "SweepTable",
     "TimeHistory",
     "__version__",
     "collect_and_collide",
@@ -72,9 +76,11 @@ __all__ = [
     "goals",
     "logarithmic_decrement",
     "needed_effects",
+    "parameter_grid",
     "runtime",
     "shake",
     "shake_structure",
     "solve_response",
+    "sweep",
     "sweep_up_and_down",
 ]

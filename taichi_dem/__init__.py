@@ -29,6 +29,9 @@ from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.progress.progress import Progress
 from taichi_dem.kit.progress.progress_bar import ProgressBar
+from taichi_dem.kit.sweeps.rows import parameter_grid
+from taichi_dem.kit.sweeps.sweep import sweep
+from taichi_dem.kit.sweeps.table import SweepTable
 from taichi_dem.kit.version import __version__
 from taichi_dem.materials import CONCRETE, Material
 from taichi_dem.mesh.face_groups import with_body_group
@@ -77,6 +80,7 @@ __all__ = [
     "Simulation",
     "SimulationDiverged",
     "StepControl",
+    "SweepTable",
     "Table",
     "Targets",
     "Uniform",
@@ -92,6 +96,7 @@ __all__ = [
     "mesh_stiffness",
     "methods",
     "needed_effects",
+    "parameter_grid",
     "quality_report",
     "read_mesh",
     "runtime",
@@ -99,6 +104,7 @@ __all__ = [
     "simulate",
     "solve",
     "step_report",
+    "sweep",
     "with_body_group",
     "write_paraview",
 ]

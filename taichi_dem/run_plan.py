@@ -110,8 +110,9 @@ class _Sampler:
 
     def observe(self, view):
         """Sample."""
-        self.simulation.sample()
-        self.recorder.sample()
+        with self.simulation.readings.held():
+            self.simulation.sample()
+            self.recorder.sample()
 
 
 class _EvenlySpaced:

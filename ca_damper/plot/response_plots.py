@@ -13,8 +13,8 @@ from ca_damper.plot.response import (
 from taichi_dem.kit.validation import FileName, choice
 
 if TYPE_CHECKING:
+    from ca_damper.frequency_sweep import Sweep
     from ca_damper.response import Response
-    from ca_damper.sweep import Sweep
 
 
 class ResponsePlots:

@@ -132,7 +132,8 @@ class EnergyBalance:
         """
         bond = np.zeros((self.model.bond_count, 5))
         self.readings.bonds(bond)
-        return self.readings.bodies(), bond, self.readings.pairs()
+        with self.readings.held():
+            return self.readings.bodies(), bond, self.readings.pairs()
 
     def _residual(self, terms):
         given = terms["load_work"] + terms["support_work"] + terms["injected"] + self.start_energy

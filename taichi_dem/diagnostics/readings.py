@@ -1,6 +1,8 @@
 """Readings of a run: tables of energy, momentum and shares that kernels fill for the host."""
 
-from typing import TYPE_CHECKING
+import contextlib
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, Optional
 
 import numpy as np
 import taichi as ti
@@ -25,6 +27,25 @@ class Readings:
     def __init__(self, tables: "Tables", state: "State", advance: Advance):
         self.tables, self.state, self.advance = tables, state, advance
         self.contacts, self.half_step = advance.contacts, HalfStep(advance)
+        self._held: Optional[dict[str, Any]] = None
+
+    @contextlib.contextmanager
+    def held(self) -> Iterator[None]:
+        """Read each table once in the block, in which the run stands still; blocks may nest."""
+        outer = self._held
+        self._held = {} if outer is None else outer
+        try:
+            yield
+        finally:
+            self._held = outer
+
+    def _once(self, name, read):
+        """Result of read(), which inside of ``held`` is called once under a name."""
+        if self._held is None:
+            return read()
+        if name not in self._held:
+            self._held[name] = read()
+        return self._held[name]
 
     def pushes(self) -> tuple[np.ndarray, np.ndarray]:
         """Impulses [N s] and moments [N m s] of contacts in half a step, (body_count, 6).
@@ -32,6 +53,9 @@ class Readings:
         Summed in the order of the pairs, so that no thread changes a bit. Also the heat of each
         pair's dashpots and friction by which the booked one is behind [J], (pairs, 2).
         """
+        return self._once("pushes", self._pushes)
+
+    def _pushes(self):
         pushed = np.zeros((int(values(self.tables.body_count)), 6))
         count = int(values(self.contacts.store.near_count)) if self.contacts is not None else 0
         table = np.zeros((count, 14))
@@ -55,20 +79,23 @@ class Readings:
 
     def bodies(self) -> np.ndarray:
         """Kinetic energy, work of loads, supports, contact heats, ground's heat [J], (n, 7)."""
-        table, ground = self._table(), len(self.tables.loads) + 16
+        table, ground = self._present(), len(self.tables.loads) + 16
         return np.column_stack([table[:, :6], 0.0 - table[:, ground:].sum(axis=1)])
 
     def motion(self) -> np.ndarray:
         """Velocity, spin and angular momentum of every body at the time of its position, (n, 9)."""
-        return self._table()[:, 6:15]
+        return self._present()[:, 6:15]
 
     def works(self) -> np.ndarray:
         """Work of each load, of all supports, of each ground, on every body [J], (n, accounts)."""
-        return self._table()[:, 15:]
+        return self._present()[:, 15:]
 
     def step_back(self) -> None:
         """Set the velocities, which are given at time zero, half a step back."""
         self._table(back=1)
+
+    def _present(self):
+        return self._once("table", self._table)
 
     def _table(self, back=0):
         pushed, _ = self.pushes()

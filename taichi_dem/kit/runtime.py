@@ -248,6 +248,19 @@ def settings() -> Optional[Settings]:
     return _current
 
 
+def usable_cores() -> int:
+    """Number of cores that this process may use.
+
+    Returns
+    -------
+    int
+        At least 1 [1].
+    """
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
 @atexit.register
 def _end_session():
     """End the session while all modules are there, so that Taichi writes its kernel cache.
@@ -262,10 +275,7 @@ def _end_session():
 
 def _checked(arch, threads, debug):
     choice("arch", arch, ARCHITECTURES)
-    cores = os.cpu_count() or 1
-    if hasattr(os, "sched_getaffinity"):
-        cores = len(os.sched_getaffinity(0))
-    count = cores if threads is None else whole("threads", threads, 1, 1024)
+    count = usable_cores() if threads is None else whole("threads", threads, 1, 1024)
     return Settings(arch, count, flag("debug", debug))
 
 

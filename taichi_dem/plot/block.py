@@ -16,7 +16,7 @@ from taichi_dem.output.record import Frame, body_corners
 from taichi_dem.plot.levels import level_look, level_names
 from taichi_dem.plot.view import View, surface, traces
 
-_STONE, _JOINT, _INSIDE = "#E4E0D6", "#C9C3B5", "#B5AD9C"
+STONE, JOINT, _INSIDE = "#E4E0D6", "#C9C3B5", "#B5AD9C"
 
 
 def displaced(model: Model, frame: Frame, magnify: float) -> np.ndarray:
@@ -65,7 +65,7 @@ def plot_cracks(
             for collection in (drawn, lines):
                 collection.set_clim(0.0, 1e3 * frame.time_s or 1.0)
         scale = "true scale" if magnify == 1.0 else f"displacement × {magnify:g}"
-        marks = [area_key("outer faces", fc=_STONE, ec=_JOINT)]
+        marks = [area_key("outer faces", fc=STONE, ec=JOINT)]
         marks.append(area_key("crack faces, seen where cracks open", fc=_INSIDE))
         figure.legend(handles=marks, loc="outside lower left", ncols=2)
         panels[1].set_title(f"t = {1e3 * frame.time_s:.3g} ms, {scale}")
@@ -82,7 +82,7 @@ def draw_breaks(axes: Any, view: View, model: Model, broken_time: np.ndarray) ->
     """Every broken face of the block at rest, also inside it; the earliest on top."""
     rest = model.mesh.points[model.mesh.tetrahedra]
     polygons, _, _ = surface(model.topology, view, rest, np.zeros(model.bond_count, dtype=bool))
-    axes.add_collection(PolyCollection(polygons, facecolor=_STONE, edgecolor=_JOINT, linewidth=0.4))
+    axes.add_collection(PolyCollection(polygons, facecolor=STONE, edgecolor=JOINT, linewidth=0.4))
     broken = np.flatnonzero(~np.isnan(broken_time))
     broken = broken[np.argsort(-broken_time[broken], kind="stable")]
     triangles = view.project(model.mesh.points[model.topology.vertices[broken]])
@@ -93,10 +93,8 @@ def draw_breaks(axes: Any, view: View, model: Model, broken_time: np.ndarray) ->
 def _deformed(axes, view, model, corners, broken_time):
     """The block as it is, its inside dark where it opens, and crack lips by time of breaking."""
     polygons, _, crack = surface(model.topology, view, corners, ~np.isnan(broken_time))
-    colours = np.where(crack, _INSIDE, _STONE)
-    axes.add_collection(
-        PolyCollection(polygons, facecolor=colours, edgecolor=_JOINT, linewidth=0.3)
-    )
+    colours = np.where(crack, _INSIDE, STONE)
+    axes.add_collection(PolyCollection(polygons, facecolor=colours, edgecolor=JOINT, linewidth=0.3))
     body, ends, time_s = traces(model.mesh, model.topology, view, broken_time)
     order = np.argsort(-time_s, kind="stable")
     segments = view.project(corners[body[:, None], ends])[order]

@@ -94,7 +94,7 @@ def _section(axes, triangles, time_ms, normal, place, bounds, look):
     return lines
 
 
-def crossings(triangles: np.ndarray, normal: np.ndarray, place: np.ndarray) -> Any:
+def crossings(triangles: np.ndarray, normal: int, place: float) -> Any:
     """Where triangles (n, 3, 3) [m] cross the plane at a place on an axis.
 
     Returns the ends of the lines (m, 2, 3) [m] and which triangle each belongs to (m,). One with a

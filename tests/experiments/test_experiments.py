@@ -73,6 +73,10 @@ FIGURES = {
         *("tetrahedra", "broken_faces", "ppv_exponent", "ms_a_step", "seconds_per_simulated_ms"),
         *("memory_MB", "fields_MB", "ledger_residual_fraction", "linear_momentum_error"),
     },
+    "blast_ensemble": {
+        *("members", "failed_members", "faces_in_all", "faces_in_some", "broken_faces_mean"),
+        *("broken_faces_sd", "hole_displacement_mean_mm", "hole_displacement_sd_mm"),
+    },
     "blast_scaling": {
         *("imbalance_24_static", "imbalance_24_rebalanced", "imbalance_24_polyline"),
         *("speedup_24_simulated", "speedup_24_static", "speedup_24_due", "speedup_2_threads"),
@@ -123,6 +127,10 @@ FILES = {
     "blast_block": (
         *("cracks.png", "peaks.png", "energy.png", "peaks.csv", "history.csv", "mesh.msh"),
         *("paraview/{folder}.pvd", "checkpoint.npz"),
+    ),
+    "blast_ensemble": (
+        *("probability.png", "displacement.png", "probability.csv", "displacement.csv"),
+        *("members.csv", "caption.txt"),
     ),
     "blast_scaling": ("scaling.png", "scaling.csv", "shares.csv"),
     "cost_of_effects": ("effects.png", "blast.csv", "damper.csv", "lists.csv"),

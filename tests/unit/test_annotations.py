@@ -71,7 +71,9 @@ def test_public_functions_are_annotated(path):
 def test_modules_of_every_folder_count():
     found = list(annotated_paths())
     assert {"taichi_dem/simulate.py", "taichi_dem/step/implicit/bonds.py"} < set(found)
-    assert {"ca_damper/sweep.py", "ca_damper/automaton/accounting/protocol.py"} < set(found)
+    assert {"ca_damper/frequency_sweep.py", "ca_damper/automaton/accounting/protocol.py"} < set(
+        found
+    )
 
 
 def test_no_module_is_left_unchecked_and_bodies_without_types_are_checked_too():

@@ -62,7 +62,7 @@ LAYERS = {
         ("viewer",),
         ("film",),
         ("amplitude_response", "response", "shake", "shake_structure", "damper_map"),
-        ("sweep", "force_check", "goals"),
+        ("frequency_sweep", "force_check", "goals"),
         ("accuracy",),
         ("solve_response",),
         ("step_study",),

@@ -292,3 +292,12 @@ def test_a_bar_without_standard_error_is_silent(monkeypatch):
         bar(Compiling(0.5, 1.0, "time step"))
         bar.at(0.5)
         bar.count(1, 2)
+
+
+def test_a_process_that_works_for_another_shows_no_bar(monkeypatch):
+    monkeypatch.setattr(progress_bar, "_open_bars", [])
+    monkeypatch.setattr(progress_bar, "_display_for", pytest.fail)
+    progress_bar.hide_bars()
+    progress_bar.hide_bars()
+    with ProgressBar("running") as bar:
+        bar.at(0.5)

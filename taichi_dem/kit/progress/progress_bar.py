@@ -113,6 +113,12 @@ def reporting(progress: Union[Listener, str, None], title: str) -> Iterator[Opti
             yield bar
 
 
+def hide_bars() -> None:
+    """Show no further bar in this process, which works for another one and shares its terminal."""
+    if not _open_bars:
+        _open_bars.append(ProgressBar("hidden"))
+
+
 class _Nothing:
     """Silent bar, where there is neither a terminal nor Jupyter."""
 

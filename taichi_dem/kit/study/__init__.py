@@ -1,5 +1,6 @@
 """Tools of a study: options, tables, figures of a summary, timings, kept results, workers."""
 
+from taichi_dem.kit.provenance import processor
 from taichi_dem.kit.study.accuracy_option import (
     add_accuracy,
     check_accuracy,
@@ -30,7 +31,6 @@ from taichi_dem.kit.study.summary import (
     figure,
     finish,
     print_figures,
-    processor,
     value_in_words,
     versions,
     write_summary,

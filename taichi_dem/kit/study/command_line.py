@@ -18,6 +18,7 @@ from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.files import claiming, older_files, output_folder
 from taichi_dem.kit.progress.lasting_output import lasting_output
 from taichi_dem.kit.study.settings import Settings, add_settings, take_settings
+from taichi_dem.kit.study.sweep_option import add_sweep, run_sweep
 from taichi_dem.kit.validation import shown
 
 #: Files of an earlier run that are named.
@@ -131,6 +132,7 @@ def parser(
     if drivers:
         made.add_argument("--driver", default=drivers[0], choices=drivers)
     made.add_argument("--threads", type=whole(1, 1024), default=None, help="CPU threads")
+    add_sweep(made, whole(1, 1024))
     made.settings = settings
     add_settings(made, settings, **defaults)
     return made
@@ -180,11 +182,16 @@ def main(
     """Parse, start Taichi, run; returns the exit code of ``exit_code``.
 
     The settings of its parser have their values of the full or of the quick job in options.
-    options.started: when, on ``time.perf_counter``.
+    options.started: when, on ``time.perf_counter``. With --sweep each row of a table is run
+    instead, in a process of its own.
     """
 
     def work():
         options = made.parse_args(arguments)
+        if getattr(options, "sweep", None) is not None:
+            return run_sweep(run, made, options, sys.argv[1:] if arguments is None else arguments)
+        if getattr(options, "workers", None) is not None:
+            raise InputError(f"workers must be left out without --sweep, got {options.workers}")
         take_settings(options, getattr(made, "settings", {}))
         options.started, began = time.perf_counter(), time.time()
         runtime.start(options.arch, options.threads)

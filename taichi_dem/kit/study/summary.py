@@ -5,7 +5,6 @@ import math
 import os
 import platform
 import shlex
-import subprocess
 import sys
 import textwrap
 import time
@@ -17,12 +16,12 @@ import numpy as np
 
 from taichi_dem.kit import runtime
 from taichi_dem.kit.files import write_text
+from taichi_dem.kit.provenance import commit, processor
 from taichi_dem.kit.study.tables import print_table
 from taichi_dem.kit.version import __version__, taichi_version
 
 #: A figure by its name, as of ``figure``; ``finish`` takes the arguments of that as well.
 Figures = Mapping[str, dict]
-_HERE = os.path.dirname(os.path.abspath(__file__))
 
 
 def figure(value: Any, unit: str, paper: Any = None) -> dict:
@@ -108,25 +107,11 @@ def write_summary(
     write_text(os.path.join(folder, "summary.json"), json.dumps(content, indent=1))
 
 
-def processor() -> str:
-    """Name of the processor, as the system gives it."""
-    try:
-        with open("/proc/cpuinfo") as lines:
-            names = [line.split(":", 1)[1].strip() for line in lines if "model name" in line]
-    except OSError:
-        names = []
-    return names[0] if names else platform.processor() or platform.machine()
-
-
 def versions() -> dict[str, str]:
-    """Versions of what computes, and the commit where there is one."""
+    """Versions of what computes, and the commit, "unknown" where there is none."""
     found = {"taichi": taichi_version(), "numpy": np.__version__, "taichi-dem": __version__}
     found["python"] = platform.python_version()
-    git = ["git", "-C", _HERE, "rev-parse", "--short", "HEAD"]
-    try:
-        found["commit"] = subprocess.run(git, capture_output=True, text=True).stdout.strip()
-    except OSError:
-        found["commit"] = ""
+    found["commit"] = commit()
     return found
 
 

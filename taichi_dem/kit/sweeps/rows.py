@@ -1,0 +1,190 @@
+"""The table of a sweep: rows from lists, columns, CSV files and products, checked before any run.
+
+A row is a dict of column name to number or text.
+"""
+
+import csv
+import itertools
+import numbers
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Union
+
+import numpy as np
+
+from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.validation import FileName, path_name, shown
+
+#: A value of a table.
+Value = Union[bool, int, float, str]
+#: A row by column name.
+Row = dict[str, Value]
+#: What a sweep takes for a table.
+TableLike = Union[Sequence[Mapping[str, Any]], Mapping[str, Sequence], FileName]
+#: Column of the seeds of rows.
+SEED = "seed"
+#: Names of columns that a sweep adds to its result.
+ADDED = ("error", "version", "commit", "machine", "seconds")
+#: Whole numbers of a column lie within these, as NumPy has them.
+_MOST_WHOLE = 2**63
+
+
+def parameter_grid(**columns: Iterable) -> list[Row]:
+    """Rows of all combinations of some values, for ``sweep``.
+
+    Parameters
+    ----------
+    **columns : iterable
+        Values of each column; the last column varies fastest.
+
+    Returns
+    -------
+    list of dict
+        One row for each combination, each value in the unit of its column.
+
+    Raises
+    ------
+    InputError
+        For no column at all, or a column that is not a list of values.
+
+    Examples
+    --------
+    >>> parameter_grid(peak=[1.0, 2.0], rise=[3.0])
+    [{'peak': 1.0, 'rise': 3.0}, {'peak': 2.0, 'rise': 3.0}]
+    """
+    if not columns:
+        raise InputError("a parameter grid must have at least one column, got none")
+    lists = [_values(name, values) for name, values in columns.items()]
+    return [dict(zip(columns, combination)) for combination in itertools.product(*lists)]
+
+
+def checked_rows(table: TableLike) -> list[Row]:
+    """Rows of a table, each with the same columns and no empty cell, values as Python has them.
+
+    Raises InputError in one sentence for anything else.
+    """
+    if isinstance(table, (str, os.PathLike)):
+        rows = read_rows(table)
+    elif hasattr(table, "to_dict"):
+        rows = _of_columns(table.to_dict("list"))
+    elif isinstance(table, Mapping):
+        rows = _of_columns(table)
+    else:
+        rows = _of_dicts(table)
+    if not rows:
+        raise InputError("a table must have at least one row, got none")
+    for number, row in enumerate(rows):
+        _check_columns(rows[0], row, number)
+    return [
+        {name: plain_value(f"{name} of row {k}", value) for name, value in row.items()}
+        for k, row in enumerate(rows)
+    ]
+
+
+def read_rows(path: FileName, typed: bool = True) -> list[Row]:
+    """Rows of a CSV file with a header; cells that read as numbers become numbers.
+
+    typed: whether they do. Raises InputError for a file that cannot be read or is no such table.
+    """
+    name = path_name("table", path)
+    try:
+        with open(name, encoding="utf-8-sig", newline="") as file:
+            cells = [line for line in csv.reader(file, strict=True) if line]
+    except (OSError, UnicodeError, csv.Error) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"table {name} cannot be read: {reason}") from None
+    if len(cells) < 2:
+        raise InputError(
+            f"table {name} must have a header and at least one row, got {len(cells)} lines"
+        )
+    header = [cell.strip() for cell in cells[0]]
+    _check_header(name, header)
+    for number, line in enumerate(cells[1:]):
+        if len(line) != len(header):
+            raise InputError(
+                f"row {number} of table {name} must have {len(header)} cells, got {len(line)}"
+            )
+        for column, cell in zip(header, line):
+            if not cell.strip():
+                raise InputError(f"row {number} of table {name} has an empty cell under {column!r}")
+    return [
+        {
+            column: _number_or_text(cell.strip()) if typed else cell.strip()
+            for column, cell in zip(header, line)
+        }
+        for line in cells[1:]
+    ]
+
+
+def plain_value(name: str, value: Any) -> Value:
+    """A number or text as Python has it; InputError, which calls it by name, for anything else."""
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, bool):
+        return value
+    for kind in (float, str):
+        if isinstance(value, kind):
+            return kind(value)
+    if isinstance(value, numbers.Integral) and -_MOST_WHOLE <= int(value) < _MOST_WHOLE:
+        return int(value)
+    raise InputError(f"{name} must be a number or text, got {shown(value)}")
+
+
+def _values(name, values):
+    if isinstance(values, (str, bytes, Mapping)) or not hasattr(values, "__iter__"):
+        raise InputError(f"column {name} must be a list of values, got {shown(values)}")
+    return list(values)
+
+
+def _of_columns(columns):
+    lists = {name: _values(name, values) for name, values in columns.items()}
+    lengths = {name: len(values) for name, values in lists.items()}
+    if len(set(lengths.values())) > 1:
+        raise InputError(f"columns of a table must be equally long, got {shown(lengths)}")
+    return [dict(zip(lists, values)) for values in zip(*lists.values())]
+
+
+def _of_dicts(table):
+    listed = hasattr(table, "__iter__") and not isinstance(table, (bytes, set, frozenset))
+    rows = list(table) if listed else [table]
+    for row in rows:
+        if not isinstance(row, Mapping):
+            raise InputError(
+                f"a table must be rows, columns or the name of a CSV file, got {shown(table)}"
+            )
+    return [dict(row) for row in rows]
+
+
+def _check_header(name, header):
+    if "" in header:
+        raise InputError(f"table {name} must name each column, got an empty name")
+    double = [column for k, column in enumerate(header) if column in header[:k]]
+    if double:
+        raise InputError(f"table {name} must name each column once, got {double[0]!r} twice")
+
+
+def _check_columns(first, row, number):
+    """Refuse what a row lacks, or has beside the columns of the first row."""
+    if not first:
+        raise InputError("a table must have at least one column, got none")
+    for name in row:
+        if not isinstance(name, str) or not name or name in ADDED:
+            raise InputError(
+                f"a column of a table must have a name other than {', '.join(ADDED)}, "
+                f"got {shown(name)}"
+            )
+        if name not in first:
+            raise InputError(f"row {number} has the unknown column {name!r}, which row 0 lacks")
+    for name in first:
+        value = row.get(name)
+        if value is None or value == "" or value != value:
+            raise InputError(f"row {number} has an empty cell under {name!r}")
+
+
+def _number_or_text(cell):
+    for kind in (int, float):
+        try:
+            return kind(cell)
+        except ValueError:
+            continue
+    return cell

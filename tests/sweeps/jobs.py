@@ -1,0 +1,71 @@
+"""Functions that the sweeps of tests run, and their tables; other processes import them."""
+
+import os
+import signal
+from pathlib import Path
+
+from ca_damper import RigidMass, frequency_response
+from taichi_dem import InputError, SimulationDiverged, parameter_grid, runtime
+
+
+def squared(row):
+    """Cheap: a number and text."""
+    return {"square": row["x"] ** 2, "word": f"x is {row['x']}"}
+
+
+def where(row):
+    """What a worker knows of itself."""
+    return {"pid": os.getpid(), "threads": runtime.settings().threads}
+
+
+def counted(row):
+    """Leave a mark in a folder for each run."""
+    Path(row["folder"], f"{row['x']}_{len(os.listdir(row['folder']))}").touch()
+    return squared(row)
+
+
+def marks(folder):
+    """Runs of ``counted`` by x."""
+    return sorted(int(path.name.split("_")[0]) for path in Path(folder).iterdir())
+
+
+def damper(row):
+    """A frequency response: what a kernel computes."""
+    _dies_once(row)
+    response = frequency_response(
+        RigidMass(), particles=[row["particles"]], ratios=[row["ratio"]], seeds=[row["seed"]],
+        start="rigid", transient_cycles=5, measured_cycles=3, progress=None,
+    )  # fmt: skip
+    return {"rms_m": response.rms.mean(), "amplitude_m": response.amplitude.mean()}
+
+
+def _dies_once(row):
+    """The process of one row is killed, unless the file of the row says that it was."""
+    if row["particles"] == 2 and not os.path.exists(row["killed"]):
+        Path(row["killed"]).touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+def damper_rows(folder, killed=False):
+    """Eight rows of ``damper``; killed: whether the process of the third is killed."""
+    mark = Path(folder, "killed")
+    mark.unlink(missing_ok=True) if killed else mark.touch()
+    return parameter_grid(particles=[0, 2, 5, 9], ratio=[0.9, 0.97], killed=[str(mark)])
+
+
+def bad(row):
+    """Fail in the way that the row says."""
+    if row["how"] == "input":
+        raise InputError("sand must be dry,\n got wet")
+    if row["how"] == "diverged":
+        raise SimulationDiverged("the run diverged at 1 s")
+    if row["how"] == "bug":
+        return {"x": row["not there"]}
+    if row["how"] == "killed":
+        os.kill(os.getpid(), signal.SIGKILL)
+    return {"x": 1.0} if row["how"] == "well" else row["how"]
+
+
+def odd(row):
+    """Return what no table can hold, by the row."""
+    return {"list": {"x": [1.0]}, "name": {"how": 1.0}, "key": {1: 1.0}, "none": None}[row["how"]]
