@@ -13,9 +13,14 @@ FUZZ_OPTIONS ?=
 MESH_OPTIONS ?=
 GALLERY_OPTIONS ?=
 LESSONS_OPTIONS ?=
+# Pythons in which the wheel is installed and run; by default that of .venv.
+PYTHONS ?=
 
 BIN := $(if $(filter Windows_NT,$(OS)),.venv/Scripts,.venv/bin)
 STAMP := .venv/stamp
+# Quadrants has no version for Python 3.9.
+QUADRANTS := $(subst .venv,.venv-quadrants,$(BIN))
+QUADRANTS_STAMP := .venv-quadrants/stamp
 MESH_STAMP := .venv/stamp-mesh
 DOCS_STAMP := .venv/stamp-docs
 LESSONS_STAMP := .venv/stamp-lessons
@@ -28,10 +33,11 @@ ifeq ($(strip $(HOME)),)
 export HOME := $(CURDIR)/.venv/home
 endif
 
-.PHONY: help venv demo test test-slow test-bounds attack fuzz lint bench gallery lessons docs mesh clean
+.PHONY: help venv demo test test-slow test-bounds test-quadrants attack fuzz lint bench gallery lessons docs mesh wheel \
+  release-check clean
 
 help: ## print this list
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-11s %s\n", $$1, $$2}' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-14s %s\n", $$1, $$2}' Makefile
 
 venv: $(STAMP) ## set up .venv (about a minute; done by itself where needed)
 
@@ -52,6 +58,19 @@ attack: $(STAMP) ## attack it at random, minutes (ATTACK_OPTIONS="--attacks 100 
 
 fuzz: $(STAMP) ## run 10,000 random scenes, each briefly (FUZZ_OPTIONS="--number 500 --seed 7": some)
 	$(BIN)/python -m tests.fuzz --number 10000 $(FUZZ_OPTIONS)
+
+test-quadrants: $(QUADRANTS_STAMP) ## run the tests on Quadrants, Taichi's successor; list what differs
+	@rm -f results/quadrants.txt
+	$(QUADRANTS)/python $(TEST) -p tests.quadrants.report -m "not slow" $(TEST_OPTIONS) || test -s results/quadrants.txt
+
+wheel: $(STAMP) ## build the wheel into dist/ and run it in an empty environment (PYTHONS="python3.9 ...": in several)
+	@rm -rf build dist
+	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation --wheel-dir dist .
+	$(BIN)/python .ci/check_wheel.py dist/*.whl $(PYTHONS)
+
+release-check: $(STAMP) ## check that this checkout can be released (RELEASE.md), then the wheel
+	$(BIN)/python .ci/check_release.py
+	$(MAKE) wheel
 
 lint: $(STAMP) ## check style, format and types
 	$(BIN)/python -m ruff check .
@@ -74,7 +93,7 @@ mesh: $(MESH_STAMP) ## make the meshes again (installs gmsh; the others do not n
 	$(BIN)/python experiments/make_meshes.py $(MESH_OPTIONS)
 
 clean: ## remove .venv, caches and build leftovers; results/ stays
-	rm -rf .venv build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis
+	rm -rf .venv .venv-quadrants build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(STAMP): requirements.txt pyproject.toml
@@ -97,4 +116,16 @@ $(LESSONS_STAMP): $(STAMP)
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[lessons]"
 	@$(BIN)/python -c "import marimo" || { echo "The lessons need Python 3.10 or newer: type" \
 	  "make venv PYTHON=/path/to/python3.12"; exit 1; }
+	@touch $@
+
+$(QUADRANTS_STAMP): $(STAMP) tests/quadrants/alias/taichi.py
+	@echo "Setting up .venv-quadrants: about 100 MB to download."
+	@$(BIN)/python -m venv --clear .venv-quadrants
+	@grep -v -e '^taichi==' -e '^-e ' requirements.txt >.venv-quadrants/requirements.txt
+	@$(QUADRANTS)/python -m pip install --quiet --disable-pip-version-check -r .venv-quadrants/requirements.txt \
+	  "quadrants>=1.3.3,<2" || { echo "Quadrants needs Python 3.10 or newer: type" \
+	  "make venv PYTHON=/path/to/python3.12"; exit 1; }
+	@$(QUADRANTS)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@$(QUADRANTS)/python -c "import pathlib, site; \
+	  pathlib.Path(site.getsitepackages()[0], 'taichi-alias.pth').write_text('$(CURDIR)/tests/quadrants/alias')"
 	@touch $@

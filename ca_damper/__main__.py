@@ -1,4 +1,8 @@
-"""``python -m ca_damper``: list fillings, runs and results, and experiments."""
+"""``python -m ca_damper``: list fillings and runs; with ``demo``, shake a box of grains."""
+
+import sys
+from collections.abc import Sequence
+from typing import Optional
 
 import ca_damper
 from taichi_dem.kit import listing
@@ -15,5 +19,10 @@ def sections() -> list[tuple[str, list]]:
     ]
 
 
+def main(arguments: Optional[Sequence[str]] = None) -> int:
+    """Run the program; returns its exit code."""
+    return listing.run(ca_damper, sections(), arguments)
+
+
 if __name__ == "__main__":
-    listing.run(ca_damper, sections())
+    sys.exit(main())

@@ -37,6 +37,11 @@ SMALL, LARGE, LARGEST = (20, 10, 10), (40, 20, 20), (112, 39, 39)
 STEPS, REPEATS = 4, 3
 
 
+def options_parser():
+    """Options of this script."""
+    return study.parser(NAME, __doc__, out="results", threads=1, summary="bench.json")
+
+
 def run(options):
     """Measure, print, write; the keys NAME_seconds of bench.json are medians."""
     folder = output_folder(options.out)
@@ -199,4 +204,4 @@ PARTS = (damper, _bench_start.measure, blast, block)
 
 
 if __name__ == "__main__":
-    sys.exit(study.main(run, study.parser(NAME, __doc__, out="results", threads=1)))
+    sys.exit(study.main(run, options_parser()))

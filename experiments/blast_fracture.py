@@ -22,6 +22,9 @@ accuracies cost. The cracks are those of its finest run; nothing else is run or 
 
 Dashpots are solved together unless another method is asked for; blast_methods.py compares them.
 
+``python -m taichi_dem demo`` is the same job without these choices, where only the package is
+installed.
+
 Writes pictures, an animation, view.html (a page in which the block turns and plays), history.csv,
 bonds.csv (when each bond broke), the mesh used, CSV of all that is plotted, summary.json and a
 ParaView series (paraview/blast_fracture.pvd) to results/blast_fracture/.
@@ -30,8 +33,6 @@ ParaView series (paraview/blast_fracture.pvd) to results/blast_fracture/.
 import sys
 from functools import partial
 
-import numpy as np
-
 from _blast import EFFECTS, OPTIONAL, blast_parser, print_quality, run_options
 from _blast import METHODS as BLAST_METHODS
 from taichi_dem import (
@@ -39,7 +40,6 @@ from taichi_dem import (
     InputError,
     Scene,
     SimulationDiverged,
-    effects,
     estimated_effects,
     goals,
     plot,
@@ -47,12 +47,11 @@ from taichi_dem import (
     simulate,
     solve,
 )
+from taichi_dem.demo import SETTINGS as DEMO_SETTINGS
+from taichi_dem.demo import figures_of, picture
 from taichi_dem.effects.chosen import WORDS
 from taichi_dem.kit import study
-from taichi_dem.kit.files import write_csv
 from taichi_dem.methods import Multirate, Uniform
-from taichi_dem.output.record import write_bodies
-from taichi_dem.output.run_costs import level_columns, level_shares
 
 NAME = "blast_fracture"
 #: Methods of the paper, made of the largest step dt0 [s] and the displacement limit l [m].
@@ -73,9 +72,7 @@ SETTINGS = {
     "dt0": (None, None, study.number(0, 1), "largest step [s], by method"),
     "l": (None, None, study.number(0, 1), "the paper's way of a body in a step [m], 1e-7"),
     "without": ("", "", str, "effects to leave out, by comma"),
-    "until": (5e-4, 8e-5, study.number(0, 1), "simulated time [s], 5e-4"),
-    "frames": (40, 6, study.whole(1, 10000), "snapshots, 40"),
-    "samples": (200, 20, study.whole(1, 1000000), "rows of the time series, 200"),
+    **DEMO_SETTINGS,
 }
 
 
@@ -141,7 +138,7 @@ def run(options):
         raise
     picture(result, options.out)
     print(f"\n{result.report}\n")
-    study.finish(options, NAME, figures_of(result), [result.report], see="cracks.png and view.html")
+    study.finish(options, NAME, figures_of(result), [result.report], see="cracks.png")
 
 
 def run_to_accuracy(scene, options):
@@ -169,67 +166,6 @@ def figures_of_answer(answer):
         "cpu_seconds": (answer.plan.seconds, "s"),
         "pilot_cpu_seconds": (answer.plan.pilot_s, "s"),
     }
-
-
-def figures_of(result):
-    """Figures for summary.json, beside the paper's where it names one."""
-    history, report = result.history, result.report
-    paper_mm = 1.93 if abs(report.until_s - 5e-4) < 1e-9 else None
-    per_ms = report.run_cpu_seconds / (1e3 * report.until_s)
-    # A scene without a hole has no displacement of it.
-    moved = {
-        f"{place}_displacement_mm": (float(history[f"{place}_displacement_mm"][-1]), "mm", paper)
-        for place, paper in (("hole_radial", None), ("monitor", paper_mm))
-        if f"{place}_displacement_mm" in history
-    }
-    return {
-        **moved,
-        "broken_faces": (report.broken_faces, "1"),
-        "ledger_residual_fraction": (report.energy_residual_fraction, "1"),
-        "linear_momentum_error": (report.linear_momentum_error, "1"),
-        "angular_momentum_error": (report.angular_momentum_error, "1"),
-        "smallest_step_s": (float(history["smallest_step_s"].min()), "s", 4e-11),
-        "contact_evaluations": (report.contact_evaluations, "1"),
-        "seconds_per_simulated_ms": (per_ms, "s", 2702 * 60 / 0.5),
-        **figures_of_certificate(report.certificate),
-    }
-
-
-def figures_of_certificate(certificate):
-    """What acted only where needed: evaluations spared, time asleep, misses of the audit."""
-    if certificate is None:
-        return {}
-    return {
-        "fracture_evaluations_ratio": (certificate.law_ratio, "1"),
-        "asleep_percent": (100.0 * certificate.asleep, "%"),
-        "audited": (sum(audit.audited for audit in certificate.audits), "1"),
-        "audit_misses": (sum(audit.misses for audit in certificate.audits), "1"),
-    }
-
-
-def picture(result, folder):
-    """Draw and write everything that is plotted."""
-    at = study.output_paths(folder)
-    frames, model, history = result.frames, result.model, result.history
-    dt0, broken_time = result.method.dt0, result.broken_time
-    write_bodies(at("bodies.csv"), frames)
-    for gas in (load for load in model.loads if isinstance(load, effects.GasPressure)):
-        time_s = np.linspace(0.0, 1.1 * gas.duration, 400)
-        pressure = gas.pressure_at(time_s)
-        plot.plot_pressure(at("pressure.png"), time_s, pressure, history["time_s"][-1])
-        write_csv(at("pressure.csv"), {"time_s": time_s, "pressure_pa": pressure})
-    plot.plot_history(at("history.png"), history)
-    plot.plot_energy(at("energy.png"), history)
-    plot.plot_cracks(at("cracks.png"), model, frames[-1], broken_time, magnify=3.0)
-    if result.acting_since:
-        plot.plot_acting(at("acting.png"), model, result.acting_since, frames[-1].time_s)
-    shares, time_s = level_shares([f.level for f in frames]), [frame.time_s for frame in frames]
-    if shares.shape[1] > 1:
-        plot.plot_steps(at("steps.png"), model, frames[1:] or frames, dt0, broken_time)
-        plot.plot_levels(at("levels.png"), time_s, shares, dt0)
-        write_csv(at("levels.csv"), {"time_s": time_s, **level_columns(shares)})
-    plot.save_animation(at("blast.gif"), model, frames, broken_time, magnify=3.0)
-    result.show(at("view.html"), open_browser=False)
 
 
 if __name__ == "__main__":

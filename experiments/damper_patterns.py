@@ -84,7 +84,7 @@ def run(options):
     rows, figures = compared(runs)
     print("Mean height of the particles over one cycle")
     TABLE.show(rows)
-    study.finish(options, NAME, figures, batches.values(), show=False)
+    study.finish(options, NAME, figures, batches.values())
 
 
 def shake(batch, options, progress):

@@ -73,9 +73,7 @@ def run(options):
     picture_rebound(folder / "rebound.png", runs, errors)
     write_tables(folder, runs)
     print_errors(errors)
-    study.finish(
-        options, NAME, figures_of(errors), [batch for batch, _ in jobs.values()], show=False
-    )
+    study.finish(options, NAME, figures_of(errors), [batch for batch, _ in jobs.values()])
 
 
 def fillings(options):

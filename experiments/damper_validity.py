@@ -100,7 +100,7 @@ def run(options):
     write_text(folder / "validity.md", page_of(rows))
     write_trust(folder / "trust.csv", options, apart)
     picture_trust(folder / "trust.png", options, apart)
-    study.finish(options, NAME, figures_of(rows, apart), 0.0, show=False)
+    study.finish(options, NAME, figures_of(rows, apart), 0.0)
 
 
 def swing_rows(options, effort):

@@ -17,17 +17,13 @@ from pathlib import Path
 
 from taichi_dem import InputError
 from taichi_dem.kit.files import output_folder, write_text
-from taichi_dem.kit.study import bare_parser, exit_code, several
-from taichi_dem.kit.study.results_page import (
-    markdown_table,
-    read_entries,
-    shrink_picture,
-    write_page,
-)
+from taichi_dem.kit.study import bare_parser, main_of_tool, several
+from taichi_dem.kit.study.entries import ENTRIES, read_entries
+from taichi_dem.kit.study.results_page import markdown_table, shrink_picture, write_page
 from taichi_dem.kit.study.results_run import run_entries
 
 HERE = Path(__file__).resolve().parent
-PAGES = read_entries(HERE / "_gallery_pages.txt")
+PAGES = read_entries(HERE / ENTRIES)
 #: Scripts that are no experiment of their own, and why.
 TOOLS = {
     "bench": "measures speed, `make bench`",
@@ -52,7 +48,7 @@ def main(arguments=None):
     made.add_argument("--only", type=several(str), default=None, help="names, by comma")
     for name, words in FLAGS.items():
         made.add_argument(f"--{name}", action="store_true", help=words)
-    return exit_code(lambda: _work(made.parse_args(arguments)))
+    return main_of_tool(_work, made, arguments)
 
 
 def _work(options):

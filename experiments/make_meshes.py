@@ -15,7 +15,7 @@ import sys
 
 from taichi_dem import CONCRETE, PAPER_BLOCK, quality_report, read_mesh
 from taichi_dem.kit.files import output_folder
-from taichi_dem.kit.study import bare_parser, exit_code
+from taichi_dem.kit.study import bare_parser, main_of_tool
 from taichi_dem.mesh.gmsh import block_with_hole
 
 
@@ -23,7 +23,7 @@ def main(arguments=None):
     """Write the meshes and print their quality; returns the exit code."""
     made = bare_parser("make_meshes", __doc__.splitlines()[0])
     made.add_argument("--out", default=os.path.dirname(PAPER_BLOCK), help="folder to write to")
-    return exit_code(lambda: write(made.parse_args(arguments).out))
+    return main_of_tool(lambda options: write(options.out), made, arguments)
 
 
 def write(folder):

@@ -46,7 +46,7 @@ def run(options):
     study.print_table([row.cells() for row in rows], HEADER)
     study.write_rows(folder / "trust.csv", [row.as_dict() for row in rows])
     write_text(folder / "trust.md", page_of(rows))
-    study.finish(options, NAME, figures_of(rows), 0.0, show=False)
+    study.finish(options, NAME, figures_of(rows), 0.0)
 
 
 def figures_of(rows):

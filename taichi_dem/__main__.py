@@ -1,6 +1,9 @@
-"""``python -m taichi_dem``: list effects, methods, materials, meshes and experiments."""
+"""``python -m taichi_dem``: list effects, methods, meshes; with ``demo``, blast a block."""
 
 import inspect
+import sys
+from collections.abc import Sequence
+from typing import Optional
 
 import taichi_dem
 from taichi_dem import effects, materials, mesh, meshes, methods
@@ -43,5 +46,10 @@ def _rows(members):
     return rows
 
 
+def main(arguments: Optional[Sequence[str]] = None) -> int:
+    """Run the program; returns its exit code."""
+    return listing.run(taichi_dem, sections(), arguments)
+
+
 if __name__ == "__main__":
-    listing.run(taichi_dem, sections())
+    sys.exit(main())

@@ -23,7 +23,12 @@ class Seen(NamedTuple):
 
     @property
     def text(self):
-        return _ORDERS.sub("", self.raw).replace("\r\n", "\n").replace("\r", "\n")
+        return without_orders(self.raw).replace("\r\n", "\n").replace("\r", "\n")
+
+
+def without_orders(text):
+    """A text without colours and moves of the cursor."""
+    return _ORDERS.sub("", text)
 
 
 def run_in_terminal(command, columns=100, term="xterm-256color", **options):

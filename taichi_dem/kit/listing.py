@@ -8,6 +8,7 @@ import argparse
 import ast
 import inspect
 import pkgutil
+import sys
 from collections.abc import Callable, Iterable, Sequence
 from importlib import import_module
 from pathlib import Path
@@ -15,6 +16,7 @@ from types import ModuleType
 from typing import Optional
 
 from taichi_dem.kit.progress.lasting_output import lasting_output
+from taichi_dem.kit.terminal import show_heading, show_names
 from taichi_dem.kit.version import __version__
 
 #: Name and line; title and rows.
@@ -27,21 +29,34 @@ _PACKAGES = ("taichi_dem", "ca_damper")
 
 def run(
     package: ModuleType, sections: Iterable[Section], arguments: Optional[Sequence[str]] = None
-) -> None:
-    """Print the sections of a package, its experiments and where its documentation is."""
+) -> int:
+    """Print the sections of a package, its experiments and where its documentation is.
+
+    With "demo" as first argument, run the module of that name with the others instead. Returns the
+    exit code.
+    """
+    given = sys.argv[1:] if arguments is None else [*arguments]
+    if given[:1] == ["demo"]:
+        return import_module(f"{package.__name__}.demo").main(given[1:])
+    demo = first_line(_docstring(Path(str(package.__file__)).with_name("demo.py")))
     parser = argparse.ArgumentParser(
         prog=f"python -m {package.__name__}",
-        description=f"List what {package.__name__} offers, with the first line of each docstring.",
+        description=f"List what {package.__name__} offers, with the first line of each docstring. "
+        f"With the word demo: {demo} It has options of its own (demo --help).",
     )
     parser.add_argument("--version", action="version", version=f"taichi-dem {__version__}")
-    parser.parse_args(arguments)
-    head = [f"{package.__name__} {__version__}: {first_line(package.__doc__)}"]
+    parser.parse_args(given)
     where = f", in {_ROOT}" if _is_checkout(_ROOT) else ""
     tail = [
+        ("Demonstration", [(f"python -m {package.__name__} demo", demo)]),
         (f"Experiments{where}", experiments(_ROOT)),
         (f"Documentation{where}", [*_other_lists(package), *documentation(_ROOT)]),
     ]
-    _show("\n".join([*head, *map(_section, [*sections, *tail])]))
+    with lasting_output():
+        show_heading(f"{package.__name__} {__version__}: {first_line(package.__doc__)}")
+        for title, rows in [*sections, *tail]:
+            show_names(title, rows)
+    return 0
 
 
 def first_line(docstring: Optional[str]) -> str:
@@ -127,17 +142,3 @@ def _docstring(path):
 def _heading(page):
     lines = page.read_text(encoding="utf-8", errors="replace").splitlines()
     return next((line[2:] for line in lines if line.startswith("# ")), "")
-
-
-def _section(section):
-    """A section as text, "" where it has no rows."""
-    title, rows = section
-    width = max((len(name) for name, _ in rows), default=0)
-    lines = [f"  {name:{width}}  {line}".rstrip() for name, line in rows]
-    return "\n".join(["", title, *lines]) if rows else ""
-
-
-def _show(text):
-    """Print, and end silently when the reader has left, as in ``| head``."""
-    with lasting_output():
-        print(text)

@@ -13,7 +13,7 @@ from tests.processes import users_environment
 from tests.scenes import ROOT
 
 FOLDER = Path(ROOT)
-PAGES = ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md")
+PAGES = ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md", "RELEASE.md")
 PAGES += tuple(sorted(f"docs/{path.name}" for path in (FOLDER / "docs").glob("*.md")))
 
 

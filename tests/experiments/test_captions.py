@@ -8,9 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from _demo_damper import taken
 from _multirate import short_steps
 from _step_too_large import ended
+from ca_damper.demo_pictures import taken
 from taichi_dem.kit import study
 
 

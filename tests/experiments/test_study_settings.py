@@ -57,4 +57,4 @@ def test_all_that_is_not_compiling_since_the_start_counts_as_running(tmp_path, m
     monkeypatch.setattr(study.summary, "write_summary", lambda *_, **found: written.update(found))
     monkeypatch.setattr(study.summary.time, "perf_counter", lambda: 107.5)
     study.finish(SimpleNamespace(out=str(tmp_path), started=100.0), "some", {}, 2.0)
-    assert written == {"compile_seconds": 2.0, "run_seconds": 5.5}
+    assert (written["compile_seconds"], written["run_seconds"]) == (2.0, 5.5)

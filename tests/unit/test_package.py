@@ -1,7 +1,11 @@
 """The wheel: what it carries, and that it runs where it is only unpacked; one version for all."""
 
+import configparser
 import email
 import importlib.metadata
+import json
+import pkgutil
+import re
 import shutil
 import subprocess
 import sys
@@ -14,6 +18,7 @@ import taichi_dem
 from taichi_dem import PAPER_BLOCK
 from taichi_dem.kit import study
 from taichi_dem.kit.checkpoint import version_text
+from tests import arch
 from tests.docs.pages import FOLDER
 from tests.processes import users_environment
 
@@ -59,7 +64,7 @@ def said(folder, tmp_path, *arguments):
         env=users_environment(PYTHONPATH=str(folder)),
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=600,
     )
     assert done.returncode == 0 and done.stderr == "", done.stderr
     return done.stdout
@@ -87,6 +92,76 @@ def test_the_wheel_says_what_it_is(wheel):
     assert fields.get_payload().strip() == (FOLDER / "README.md").read_text("utf-8").strip()
     (licence,) = [name for name in wheel.namelist() if name.endswith("/LICENSE")]
     assert wheel.read(licence) == (FOLDER / "LICENSE").read_bytes()
+
+
+def test_the_wheel_has_a_program_for_each_package_and_needs_no_tests(wheel):
+    (name,) = [name for name in wheel.namelist() if name.endswith("/entry_points.txt")]
+    entries = configparser.ConfigParser()
+    entries.read_string(wheel.read(name).decode())
+    programs = dict(entries["console_scripts"])
+    assert set(programs) == {"taichi-dem", "ca-damper"}
+    for place in programs.values():
+        assert callable(pkgutil.resolve_name(place))
+    needs = about(wheel).get_all("Requires-Dist")
+    always = {named(need) for need in needs if "extra ==" not in need}
+    assert always == {"taichi", "numpy", "meshio", "matplotlib", "pillow", "rich", "jinja2"}
+
+
+def named(requirement):
+    """Name of a distribution in a requirement."""
+    return re.match(r"[A-Za-z0-9-]+", requirement)[0]
+
+
+def test_requirements_pin_what_users_and_tests_need_and_no_more(wheel):
+    """The only two lists: of the wheel, with its extra for tests, and of ``make venv``."""
+    needs = about(wheel).get_all("Requires-Dist")
+    needed = {
+        named(n) for n in needs if "extra ==" not in n or "extra == 'test'" in n.replace('"', "'")
+    }
+    lines = (FOLDER / "requirements.txt").read_text("utf-8").splitlines()
+    pinned = {named(line) for line in lines if "==" in line}
+    assert needed - {"taichi-dem"} <= pinned <= {named(need) for need in needs}
+    assert "--only-binary :all:" in lines
+
+
+def test_the_citation_has_the_version_the_authors_and_both_papers(wheel):
+    text = (FOLDER / "CITATION.cff").read_text("utf-8")
+    assert f"\nversion: {taichi_dem.__version__}\n" in text
+    assert f'name: "{about(wheel)["Author"]}"' in text
+    page = (FOLDER / "README.md").read_text("utf-8")
+    for title in re.findall(r'^    title: "(.+)"$', text, re.MULTILINE):
+        assert " ".join(title.split()) in " ".join(page.split())
+    assert text.count("  - type: article") == 2
+
+
+@pytest.mark.parametrize(
+    ("package", "files"),
+    [
+        ("ca_damper", ("damper.gif", "motion.png", "motion.csv")),
+        pytest.param(
+            "taichi_dem",
+            ("cracks.png", "blast.gif", "history.csv", "mesh.msh", "paraview/out.pvd"),
+            marks=pytest.mark.slow,
+        ),
+    ],
+)
+def test_the_demonstration_runs_where_only_the_wheel_is(unpacked, tmp_path, package, files):
+    options = ("--quick", "--json", "--threads", "2", "--arch", arch.chosen(), "--out", "out")
+    summary = json.loads(said(unpacked, tmp_path, "-m", package, "demo", *options))
+    assert summary["command"].startswith(f"-m {package} demo --quick")
+    assert summary["quick"] is True and summary["figures"]
+    for name in files:
+        assert (tmp_path / "out" / name).is_file(), name
+
+
+@pytest.mark.parametrize("package", ["taichi_dem", "ca_damper"])
+def test_what_a_demonstration_does_not_know_is_one_sentence(unpacked, tmp_path, package):
+    line = [sys.executable, "-m", package, "demo", "--colour", "red"]
+    options = {"capture_output": True, "text": True, "cwd": tmp_path}
+    done = subprocess.run(line, env=users_environment(PYTHONPATH=str(unpacked)), **options)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == "unrecognized arguments: --colour red\n"
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_what_is_unpacked_runs_and_reads_its_own_mesh(unpacked, tmp_path):

@@ -19,6 +19,8 @@ _NOTEBOOK_SECONDS = 0.2
 _NARROW = 70
 #: Bars that are shown now; a second one below the first would garble both.
 _open_bars: list["ProgressBar"] = []
+#: Blocks of ``no_bars`` that are open now.
+_silent_blocks: list[object] = []
 
 
 class ProgressBar:
@@ -95,6 +97,16 @@ class ProgressBar:
         _open_bars.remove(self)
         self._display.close()
         self._display = _Nothing()
+
+
+@contextlib.contextmanager
+def no_bars() -> Iterator[None]:
+    """Show no bar in the block, whoever watches."""
+    _silent_blocks.append(None)
+    try:
+        yield
+    finally:
+        _silent_blocks.pop()
 
 
 @contextlib.contextmanager
@@ -210,6 +222,8 @@ class _Notebook:
 
 
 def _display_for(title):
+    if _silent_blocks:
+        return _Nothing()
     shell = _notebook_shell()
     if shell is not None:
         return _Notebook(title, sys.modules["IPython"].display.display)

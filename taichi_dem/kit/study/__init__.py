@@ -17,6 +17,7 @@ from taichi_dem.kit.study.command_line import (
     exit_code,
     interval,
     main,
+    main_of_tool,
     number,
     one_of,
     output_paths,
@@ -25,19 +26,19 @@ from taichi_dem.kit.study.command_line import (
     tolerance,
     whole,
 )
+from taichi_dem.kit.study.look import print_figures, value_in_words
 from taichi_dem.kit.study.new_process import call_in_process, call_rounds
 from taichi_dem.kit.study.settings import add_settings, begin, take_settings
 from taichi_dem.kit.study.summary import (
     figure,
     finish,
-    print_figures,
-    value_in_words,
     versions,
     write_summary,
 )
 from taichi_dem.kit.study.table import Table
-from taichi_dem.kit.study.tables import columns_of, print_table, show_rows, write_rows
+from taichi_dem.kit.study.tables import columns_of, show_rows, write_rows
 from taichi_dem.kit.study.timing import Timing, clock, on_device, seconds_of
+from taichi_dem.kit.terminal import print_table
 
 __all__ = [
     "Parser",
@@ -64,6 +65,7 @@ __all__ = [
     "give_answers",
     "interval",
     "main",
+    "main_of_tool",
     "number",
     "on_device",
     "one_of",

@@ -4,7 +4,6 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 
 from taichi_dem.kit.study.summary import figure
-from taichi_dem.kit.study.tables import print_table
 from taichi_dem.kit.study.work_precision import (
     ANSWER_HEADER,
     Point,
@@ -14,6 +13,7 @@ from taichi_dem.kit.study.work_precision import (
     write_answers,
     write_points,
 )
+from taichi_dem.kit.terminal import print_table
 
 
 def give_answers(

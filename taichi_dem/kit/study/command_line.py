@@ -7,6 +7,7 @@ import os
 import re
 import sys
 import time
+import warnings
 from argparse import ArgumentParser, Namespace
 from collections.abc import Collection, Sequence
 from types import MappingProxyType
@@ -17,6 +18,9 @@ from taichi_dem.kit.checkpoint import Checkpoint, Interrupted
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.files import claiming, older_files, output_folder
 from taichi_dem.kit.progress.lasting_output import lasting_output
+from taichi_dem.kit.progress.progress_bar import no_bars
+from taichi_dem.kit.study.entries import Entry, entry_of
+from taichi_dem.kit.study.look import show_opening
 from taichi_dem.kit.study.settings import Settings, add_settings, take_settings
 from taichi_dem.kit.study.sweep_option import add_sweep, run_sweep
 from taichi_dem.kit.validation import shown
@@ -29,10 +33,11 @@ _INTERVALS = {None: "every_wall_s", "s": "every_wall_s", "steps": "every_steps",
 class Parser(argparse.ArgumentParser):
     """An argument parser whose complaints are one sentence.
 
-    settings: of the study, for ``main``.
+    settings: of the study, for ``main``. entry: its texts, where no script has an entry for them.
     """
 
     settings: Settings = MappingProxyType({})
+    entry: Optional[Entry] = None
 
     def error(self, message: str) -> NoReturn:
         """Turn a wrong command line into an InputError."""
@@ -126,6 +131,7 @@ def parser(
     """
     made = bare_parser(name, description)
     made.add_argument("--quick", action="store_true", help="a smaller job of under a minute")
+    made.add_argument("--json", action="store_true", help="print summary.json and nothing else")
     place: Any = {"type": os.path.expanduser, "default": os.path.join("results", name)}
     made.add_argument("--out", help="folder for the output", **place)
     made.add_argument("--arch", default="cpu", choices=runtime.ARCHITECTURES)
@@ -139,9 +145,11 @@ def parser(
 
 
 def bare_parser(name: str, description: Optional[str]) -> Parser:
-    """Parser of a script without options."""
+    """Parser of a script with the one option that every script has."""
     plain: Any = {"formatter_class": argparse.RawDescriptionHelpFormatter, "allow_abbrev": False}
-    return Parser(prog=f"python experiments/{name}.py", description=description, **plain)
+    made = Parser(prog=f"python experiments/{name}.py", description=description, **plain)
+    made.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    return made
 
 
 def output_paths(folder: str) -> Callable[[str], str]:
@@ -176,35 +184,90 @@ def checkpoint_of(
 
 def main(
     run: Callable[[Namespace], None],
-    made: ArgumentParser,
+    made: Parser,
     arguments: Optional[Sequence[str]] = None,
 ) -> int:
-    """Parse, start Taichi, run; returns the exit code of ``exit_code``.
+    """Parse, say what is done, start Taichi, run; returns the exit code of ``exit_code``.
 
-    The settings of its parser have their values of the full or of the quick job in options.
-    options.started: when, on ``time.perf_counter``. With --sweep each row of a table is run
+    The settings of its parser have their values of the full or of the quick job in options, which
+    also hold started and began, when, on ``time.perf_counter`` and ``time.time``; entry, the texts
+    on the study; and command, its words after "python". With --sweep each row of a table is run
     instead, in a process of its own.
     """
+    given = sys.argv[1:] if arguments is None else arguments
 
-    def work():
-        options = made.parse_args(arguments)
-        if getattr(options, "sweep", None) is not None:
-            return run_sweep(run, made, options, sys.argv[1:] if arguments is None else arguments)
-        if getattr(options, "workers", None) is not None:
+    def work(options):
+        if options.sweep is not None:
+            return _sweep(run, made, options, given)
+        if options.workers is not None:
             raise InputError(f"workers must be left out without --sweep, got {options.workers}")
-        take_settings(options, getattr(made, "settings", {}))
-        options.started, began = time.perf_counter(), time.time()
+        take_settings(options, made.settings)
+        options.started = time.perf_counter()
+        options.entry = made.entry or entry_of(run)
+        options.command = [*made.prog.split()[1:], *given]
+        show_opening(made.description, options.entry, options.quick)
         runtime.start(options.arch, options.threads)
         with claiming():
             run(options)
-        _name_older_files(getattr(options, "out", ""), began)
+        _name_older_files(options.out, options.began)
+        return 0
 
-    return exit_code(work)
+    return main_of_tool(work, made, arguments)
+
+
+def _sweep(run, made, options, given):
+    """Run the job for each row of a table; returns the exit code."""
+    if options.json:
+        raise InputError("json must be left out with --sweep, which writes sweep.csv")
+    return run_sweep(run, made, options, given)
+
+
+def main_of_tool(
+    work: Callable[[Namespace], Optional[int]],
+    made: Parser,
+    arguments: Optional[Sequence[str]] = None,
+) -> int:
+    """Parse and do work(options), as loud as --quiet and --json say; as ``exit_code``."""
+
+    def heard():
+        options = made.parse_args(arguments)
+        options.began = time.time()
+        with _loudness(options):
+            code = work(options)
+        if getattr(options, "json", False):
+            print(_summary(options))
+        return code
+
+    return exit_code(heard)
+
+
+@contextlib.contextmanager
+def _loudness(options):
+    """Discard prints in the block for --json and --quiet, for --quiet also bars and warnings."""
+    with contextlib.ExitStack() as stack:
+        if options.quiet or getattr(options, "json", False):
+            nowhere = stack.enter_context(open(os.devnull, "w", encoding="utf-8"))
+            stack.enter_context(contextlib.redirect_stdout(nowhere))
+        if options.quiet:
+            stack.enter_context(no_bars())
+            stack.enter_context(warnings.catch_warnings())
+            warnings.simplefilter("ignore")
+        yield
+
+
+def _summary(options):
+    """Text of the JSON file that sums up a run, without the newline at its end."""
+    name = getattr(options, "summary", "summary.json")
+    path = os.path.join(options.out, name)
+    if not os.path.isfile(path) or name in older_files(options.out, options.began):
+        raise InputError(f"json needs a run that writes {name}, and this one wrote none")
+    with open(path, encoding="utf-8") as file:
+        return file.read().rstrip()
 
 
 def _name_older_files(folder, began):
     """Say which files in the folder of the output this run has not written."""
-    older = older_files(folder, began) if folder else []
+    older = older_files(folder, began)
     if older:
         listed = ", ".join(older[:_MOST_NAMED])
         more = f" and {len(older) - _MOST_NAMED} more" if len(older) > _MOST_NAMED else ""

@@ -7,8 +7,6 @@ import json
 import os
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from fnmatch import fnmatchcase
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Optional, Union
@@ -19,7 +17,8 @@ from PIL import Image
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import output_folder, write_text, write_whole
-from taichi_dem.kit.study.summary import value_in_words
+from taichi_dem.kit.study.entries import Entry, is_key_figure
+from taichi_dem.kit.study.look import value_in_words
 
 _HERE = Path(__file__).resolve().parent
 #: Notes of the program that ran a study, beside its output: seconds, and what it printed.
@@ -32,47 +31,6 @@ CAPTION = "caption.txt"
 _MOST_KEY_FIGURES = 12
 #: Text of a table: name, value, paper's value.
 Row = tuple[str, str, str]
-
-
-@dataclass(frozen=True)
-class Entry:
-    """Description of one study.
-
-    name: of the script. part: heading under which it stands. question: that it answers. look:
-    what to read off its pictures. time: of the full run on two cores, in words. pictures: names
-    of its pictures and films, the most telling first; what else it writes is linked. figures:
-    patterns of the key figures in summary.json; figures with a paper's value are always shown.
-    paper: what the paper says of it, empty where it does not ask this. options: of the command.
-    """
-
-    name: str
-    part: str
-    question: str
-    look: str
-    time: str
-    pictures: tuple
-    figures: tuple = ()
-    paper: str = ""
-    options: str = ""
-
-    @property
-    def command(self) -> str:
-        """Command line of a user."""
-        return " ".join(filter(None, [f"python experiments/{self.name}.py", self.options]))
-
-
-def read_entries(path: Union[str, Path]) -> tuple[Entry, ...]:
-    """Entries of a text file: "# part", "## name", and lines "field: text", indented to go on."""
-    part, found = "", []
-    for block in Path(path).read_text(encoding="utf-8").split("\n\n"):
-        head, *lines = re.sub(r"\n  +", " ", block).strip().split("\n")
-        if head.startswith("# "):
-            part = head[2:]
-        elif head.startswith("## "):
-            fields: Any = dict(line.split(": ", 1) for line in lines)
-            words = {name: tuple(fields.get(name, "").split()) for name in ("pictures", "figures")}
-            found.append(Entry(name=head[3:], part=part, **{**fields, **words}))
-    return tuple(found)
 
 
 def markdown_table(entries: Sequence[Entry], root: Union[str, Path], pictures: str) -> str:
@@ -211,8 +169,7 @@ def figure_rows(
         value, paper = (with_unit(item[k], item["unit"]) for k in ("value", "paper"))
         known = item["paper"] is not None
         row = (in_words(name, item["unit"]), value, paper if known else "")
-        wanted = known or any(fnmatchcase(name, pattern) for pattern in patterns)
-        (key if wanted else rest).append(row)
+        (key if is_key_figure(name, item, patterns) else rest).append(row)
     # Those with a paper's value first, so that the cut never takes them.
     key.sort(key=lambda row: not row[2])
     return tuple(key[:_MOST_KEY_FIGURES]), tuple(key[_MOST_KEY_FIGURES:] + rest)

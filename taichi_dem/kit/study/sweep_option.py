@@ -12,12 +12,12 @@ from typing import Any
 from taichi_dem.kit import runtime
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.files import claiming, write_csv, write_text
-from taichi_dem.kit.study.tables import print_table
 from taichi_dem.kit.sweeps.job import Job, jobs_of
 from taichi_dem.kit.sweeps.journal import Journal
 from taichi_dem.kit.sweeps.rows import ADDED, Row, read_rows
 from taichi_dem.kit.sweeps.sweep import run_missing
 from taichi_dem.kit.sweeps.table import SweepTable
+from taichi_dem.kit.terminal import print_table
 from taichi_dem.kit.validation import shown
 
 #: Options that are of the sweep, not of a row.

@@ -4,9 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Optional, Union
 
 from taichi_dem.kit.files import write_csv
-
-#: Cells of a table that say nothing.
-BLANK = ("", "None", "nan")
+from taichi_dem.kit.terminal import print_table
 
 
 def columns_of(rows: Sequence[Mapping[str, Any]]) -> dict[str, list]:
@@ -27,14 +25,6 @@ def write_rows(
     names = names.split() if isinstance(names, str) else names
     columns: list[Any] = list(zip(*rows)) or [()] * len(names)
     write_csv(path, dict(zip(names, columns)))
-
-
-def print_table(rows: Sequence[Sequence], header: Sequence[str]) -> None:
-    """Print rows of cells under a header, columns as wide as they need to be; blanks as a dash."""
-    cells = [header, *[["-" if str(cell) in BLANK else str(cell) for cell in row] for row in rows]]
-    widths = [max(len(row[k]) for row in cells) for k in range(len(header))]
-    for row in cells:
-        print("  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip())
 
 
 def show_rows(rows: Sequence[Mapping[str, Any]], formats: Mapping[str, tuple[str, str]]) -> None:

@@ -1,12 +1,23 @@
-"""Pictures and words of ``demo_damper.py``: a container with particles beside an empty one."""
+"""Pictures and words of the demonstration: a container with particles beside an empty one."""
 
+from argparse import Namespace
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from ca_damper.measures import Cycles
+from ca_damper.oscillator import Oscillator
 from ca_damper.plot import Box, Hanging, film_hanging
 from ca_damper.viewer import show_containers
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.plot_style import BLACK, STYLES, picture, styles_of
 
+#: Arrays by name.
+Columns = Mapping[str, np.ndarray]
 
-def figures_of(cycles, empty, o):
+
+def figures_of(cycles: Cycles, empty: Cycles, o: Oscillator) -> dict[str, tuple[float, str]]:
     """Amplitude of the container with particles and without; their power and apparent mass."""
     figures = {
         "amplitude_mm": (1e3 * cycles.amplitude, "mm"),
@@ -23,8 +34,18 @@ def figures_of(cycles, empty, o):
     return {name: (float(value[0]), unit) for name, (value, unit) in figures.items()}
 
 
-def write(at, full, empty, filling, options, omega):
-    """Write the curves, their table and the animation; omega: of the base [rad/s]."""
+def write(
+    at: Callable[[str], str],
+    full: Any,
+    empty: Any,
+    filling: Any,
+    options: Namespace,
+    omega: float,
+) -> None:
+    """Write the curves, their table and the animation.
+
+    full, empty: a ``Swing`` each. omega: of the base [rad/s].
+    """
     bare = {"x_empty_mm": empty.columns["x_mm"], "energy_empty_mJ": empty.columns["energy_mJ"]}
     write_csv(at("motion.csv"), {**full.columns, **bare})
     title, style = counted(options.particles), styles_of([filling.label])[filling.label]
@@ -32,19 +53,19 @@ def write(at, full, empty, filling, options, omega):
     fastest = 1.2 * omega * max(float(one.cycles.amplitude[0]) for one in (full, empty))
     box = Box.of(filling)
     # The empty container moves as smoothly as the structure: its box is not staggered.
-    bare = Box(box.width, box.height, box.diameter)
-    smooth = Hanging("empty", bare, empty.frames, STYLES["empty"].colour)
+    plain = Box(box.width, box.height, box.diameter)
+    smooth = Hanging("empty", plain, empty.frames, STYLES["empty"].colour)
     pair = [smooth, Hanging(title, box, full.frames, style.colour)]
     film_hanging(at("damper.gif"), pair, fastest)
     show_containers(pair, at("view.html"), open_browser=False)
 
 
-def counted(particles):
+def counted(particles: int) -> str:
     """Number of particles in words."""
     return f"{particles} particle{'' if particles == 1 else 's'}"
 
 
-def plot_motion(path, title, full, empty, style):
+def plot_motion(path: str, title: str, full: Columns, empty: Columns, style: Any) -> None:
     """Displacement and energy over time, with particles and without; title: the particles."""
     bare = {"color": STYLES["empty"].colour, "lw": 0.8, "label": STYLES["empty"].label}
     own = {"color": style.colour}
@@ -61,7 +82,12 @@ def plot_motion(path, title, full, empty, style):
             axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
 
 
-def sentences(figures, filling, oscillator, options):
+def sentences(
+    figures: Mapping[str, tuple[float, str]],
+    filling: Any,
+    oscillator: Oscillator,
+    options: Namespace,
+) -> tuple[str, ...]:
     """The comparison in words."""
     value = {name: one for name, (one, _) in figures.items()}
     own, mass = oscillator.natural_frequency, 1e3 * oscillator.mass
@@ -78,7 +104,7 @@ def sentences(figures, filling, oscillator, options):
     )
 
 
-def taken(value):
+def taken(value: Mapping[str, float]) -> tuple[str, ...]:
     """Power and apparent mass of the particles in words; value: of the figures, by name."""
     takes = value["power_mW"] > 0.0
     power, damping = abs(value["power_mW"]), value["apparent_damping_N_s_m"]

@@ -1,0 +1,155 @@
+"""Blast the paper's block of concrete from its hole, and draw how it breaks.
+
+The scene of Konno et al., section 4. Expect a crushed zone at the hole, cracks that run out from
+it, and a wedge pushed out of the free face on the right.
+
+    python -m taichi_dem demo                # about half a minute, most of it pictures
+    python -m taichi_dem demo --out mine     # pictures and tables into ./mine
+
+Writes pictures, an animation, view.html (a page in which the block turns and plays), history.csv,
+bonds.csv (when each bond broke), the mesh used, CSV of all that is plotted, summary.json and a
+ParaView series to results/blast_demo/.
+"""
+
+from argparse import Namespace
+from collections.abc import Sequence
+from typing import Any, Optional
+
+import numpy as np
+
+from taichi_dem import plot
+from taichi_dem.diagnostics.certificate import Certificate
+from taichi_dem.effects import GasPressure, ShearSlip, SphereContact
+from taichi_dem.kit import study
+from taichi_dem.kit.files import write_csv
+from taichi_dem.kit.study.entries import Entry
+from taichi_dem.materials import CONCRETE
+from taichi_dem.mesh.files import read_mesh
+from taichi_dem.meshes import PAPER_BLOCK
+from taichi_dem.methods import ImplicitDashpots
+from taichi_dem.output.record import write_bodies
+from taichi_dem.output.run_costs import level_columns, level_shares
+from taichi_dem.result import Result
+from taichi_dem.scene import Scene
+from taichi_dem.simulate import simulate
+
+NAME = "blast_demo"
+SETTINGS = {
+    "until": (5e-4, 8e-5, study.number(0, 1), "simulated time [s], 5e-4"),
+    "frames": (40, 6, study.whole(1, 10000), "snapshots, 40"),
+    "samples": (200, 20, study.whole(1, 1000000), "rows of the time series, 200"),
+}
+_ENTRY = Entry(
+    name=NAME,
+    part="",
+    question="How does a block of concrete break when a hole in it is blasted?",
+    look="",
+    time="20 s",
+    pictures=("cracks.png", "view.html", "blast.gif"),
+    figures=("hole_radial*", "monitor*", "broken_faces", "ledger*"),
+)
+
+
+def main(arguments: Optional[Sequence[str]] = None) -> int:
+    """Run the program on a command line, that of the process by default; returns its exit code."""
+    made = study.parser(NAME, __doc__, ("auto", "resident", "parallel"), SETTINGS)
+    made.prog, made.entry = "python -m taichi_dem demo", _ENTRY
+    return study.main(run, made, arguments)
+
+
+def run(options: Namespace) -> None:
+    """Blast the block, draw it, print the report and the figures."""
+    loads = [ShearSlip(), SphereContact(outer_faces=False), GasPressure()]
+    scene = Scene(read_mesh(PAPER_BLOCK), CONCRETE, "auto", loads=loads)
+    names = ("until", "driver", "samples", "frames")
+    given: dict[str, Any] = {name: getattr(options, name) for name in names}
+    method = ImplicitDashpots(4e-7)
+    result = simulate(scene, method=method, title="blasting", output=options.out, **given)
+    picture(result, options.out)
+    print(f"{result.report}\n")
+    study.finish(options, NAME, figures_of(result), [result.report])
+
+
+def figures_of(result: Result) -> dict[str, tuple]:
+    """Figures of a blast for summary.json, beside the paper's where it names one.
+
+    Parameters
+    ----------
+    result
+        Of a run; a scene without a hole has no displacement of it.
+
+    Returns
+    -------
+    dict
+        Arguments of ``study.figure`` by name: value, unit, and the paper's value or nothing.
+    """
+    history, report = result.history, result.report
+    paper_mm = 1.93 if abs(report.until_s - 5e-4) < 1e-9 else None
+    per_ms = report.run_cpu_seconds / (1e3 * report.until_s)
+    moved = {
+        f"{place}_displacement_mm": (float(history[f"{place}_displacement_mm"][-1]), "mm", paper)
+        for place, paper in (("hole_radial", None), ("monitor", paper_mm))
+        if f"{place}_displacement_mm" in history
+    }
+    return {
+        **moved,
+        "broken_faces": (report.broken_faces, "1"),
+        "ledger_residual_fraction": (report.energy_residual_fraction, "1"),
+        "linear_momentum_error": (report.linear_momentum_error, "1"),
+        "angular_momentum_error": (report.angular_momentum_error, "1"),
+        "smallest_step_s": (float(history["smallest_step_s"].min()), "s", 4e-11),
+        "contact_evaluations": (report.contact_evaluations, "1"),
+        "seconds_per_simulated_ms": (per_ms, "s", 2702 * 60 / 0.5),
+        **figures_of_certificate(report.certificate),
+    }
+
+
+def figures_of_certificate(certificate: Optional[Certificate]) -> dict[str, tuple]:
+    """What acted only where needed: evaluations spared, time asleep, misses of the audit."""
+    if certificate is None:
+        return {}
+    return {
+        "fracture_evaluations_ratio": (certificate.law_ratio, "1"),
+        "asleep_percent": (100.0 * certificate.asleep, "%"),
+        "audited": (sum(audit.audited for audit in certificate.audits), "1"),
+        "audit_misses": (sum(audit.misses for audit in certificate.audits), "1"),
+    }
+
+
+def picture(result: Result, folder: str) -> None:
+    """Draw a blast and write all that is plotted.
+
+    Parameters
+    ----------
+    result
+        Of a run with frames.
+    folder
+        For the pictures and tables; it is made where there is none.
+
+    Raises
+    ------
+    InputError
+        When the folder cannot be made or written to.
+    """
+    at = study.output_paths(folder)
+    frames, model, history = result.frames, result.model, result.history
+    dt0, broken_time = result.method.dt0, result.broken_time
+    write_bodies(at("bodies.csv"), frames)
+    for gas in (load for load in model.loads if isinstance(load, GasPressure)):
+        time_s = np.linspace(0.0, 1.1 * gas.duration, 400)
+        pressure = gas.pressure_at(time_s)
+        plot.plot_pressure(at("pressure.png"), time_s, pressure, history["time_s"][-1])
+        write_csv(at("pressure.csv"), {"time_s": time_s, "pressure_pa": pressure})
+    plot.plot_history(at("history.png"), history)
+    plot.plot_energy(at("energy.png"), history)
+    plot.plot_cracks(at("cracks.png"), model, frames[-1], broken_time, magnify=3.0)
+    if result.acting_since:
+        plot.plot_acting(at("acting.png"), model, result.acting_since, frames[-1].time_s)
+    shares = level_shares([frame.level for frame in frames])
+    times = np.array([frame.time_s for frame in frames])
+    if shares.shape[1] > 1:
+        plot.plot_steps(at("steps.png"), model, frames[1:] or frames, dt0, broken_time)
+        plot.plot_levels(at("levels.png"), times, shares, dt0)
+        write_csv(at("levels.csv"), {"time_s": times, **level_columns(shares)})
+    plot.save_animation(at("blast.gif"), model, frames, broken_time, magnify=3.0)
+    result.show(at("view.html"), open_browser=False)

@@ -1,0 +1,75 @@
+"""Texts on a study for its page and its program, read from a file beside the scripts."""
+
+import inspect
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any, Optional, Union
+
+#: File of the entries in the folder of the scripts.
+ENTRIES = "_gallery_pages.txt"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Description of one study.
+
+    name: of the script. part: heading under which it stands. question: that it answers. look:
+    what to read off its pictures. time: of the full run on two cores, in words. pictures: names
+    of its pictures and films, the most telling first; what else it writes is linked. figures:
+    patterns of the key figures in summary.json; figures with a paper's value are always shown.
+    paper: what the paper says of it, empty where it does not ask this. options: of the command.
+    """
+
+    name: str
+    part: str
+    question: str
+    look: str
+    time: str
+    pictures: tuple
+    figures: tuple = ()
+    paper: str = ""
+    options: str = ""
+
+    @property
+    def command(self) -> str:
+        """Command line of a user."""
+        return " ".join(filter(None, [f"python experiments/{self.name}.py", self.options]))
+
+    @property
+    def expected_time(self) -> str:
+        """Time of the full run in words, such as "20 s on two cores" or "5 min on one core"."""
+        words = self.time.removeprefix("about ")
+        return f"{words} core" if words.endswith(" on one") else f"{words} on two cores"
+
+
+def read_entries(path: Union[str, Path]) -> tuple[Entry, ...]:
+    """Entries of a text file: "# part", "## name", and lines "field: text", indented to go on."""
+    part, found = "", []
+    for block in Path(path).read_text(encoding="utf-8").split("\n\n"):
+        head, *lines = re.sub(r"\n  +", " ", block).strip().split("\n")
+        if head.startswith("# "):
+            part = head[2:]
+        elif head.startswith("## "):
+            fields: Any = dict(line.split(": ", 1) for line in lines)
+            words = {name: tuple(fields.get(name, "").split()) for name in ("pictures", "figures")}
+            found.append(Entry(name=head[3:], part=part, **{**fields, **words}))
+    return tuple(found)
+
+
+def entry_of(run: Callable) -> Optional[Entry]:
+    """Entry of the script in which a function is defined; None where it has none."""
+    try:
+        script = Path(inspect.getfile(inspect.unwrap(run)))
+    except TypeError:
+        return None
+    path = script.parent / ENTRIES
+    known = read_entries(path) if path.is_file() else ()
+    return next((entry for entry in known if entry.name == script.stem), None)
+
+
+def is_key_figure(name: str, item: Mapping[str, Any], patterns: Sequence[str]) -> bool:
+    """Whether a figure of summary.json has a paper's value or a name that fits a pattern."""
+    return item["paper"] is not None or any(fnmatchcase(name, pattern) for pattern in patterns)

@@ -1,0 +1,90 @@
+"""The look of all programs: with style on a terminal, plain text in a pipe or a file."""
+
+import os
+import sys
+import textwrap
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+#: Most columns of a paragraph.
+_WIDE = 100
+#: Cells of a table that say nothing.
+BLANK = ("", "None", "nan")
+
+
+def show_heading(text: str) -> None:
+    """Print a line that heads what follows."""
+    console = _console()
+    if console is None:
+        print(text)
+    else:
+        console.print(text, style="bold", markup=False)
+
+
+def show_paragraph(text: str) -> None:
+    """Print a text in lines of at most 100 characters, or as many as the terminal has columns."""
+    console = _console()
+    print(textwrap.fill(text, _WIDE if console is None else min(_WIDE, console.width)))
+
+
+def print_table(rows: Sequence[Sequence[Any]], header: Sequence[str]) -> None:
+    """Print rows of cells under a header, columns as wide as they need to be; blanks as a dash.
+
+    Parameters
+    ----------
+    rows, header
+        Cells and names of the columns, as many in each row. On a terminal that is too narrow, long
+        cells go on in further lines of their column.
+    """
+    cells = [["-" if str(cell) in BLANK else str(cell) for cell in row] for row in rows]
+    console = _console()
+    if console is None:
+        _show_aligned([[*header], *cells])
+        return
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 2, 0, 0))
+    for name in header:
+        table.add_column(Text(name), overflow="fold")
+    for row in cells:
+        table.add_row(*map(Text, row))
+    console.print(table)
+
+
+def _show_aligned(cells):
+    widths = [max(len(row[k]) for row in cells) for k in range(len(cells[0]))]
+    for row in cells:
+        print("  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip())
+
+
+def show_names(title: str, rows: Iterable[tuple[str, str]]) -> None:
+    """Print a title and, below it, names with a line on each; nothing where there are none.
+
+    Lines stand beside their names, or below them where the terminal is too narrow for that.
+    """
+    rows = list(rows)
+    if not rows:
+        return
+    show_heading(f"\n{title}")
+    console, width = _console(), max(len(name) for name, _ in rows)
+    lines = [f"  {name:{width}}  {line}".rstrip() for name, line in rows]
+    if console is None or max(map(len, lines)) <= console.width:
+        print(*lines, sep="\n")
+        return
+    from rich.padding import Padding
+    from rich.text import Text
+
+    for name, line in rows:
+        print(f"  {name}")
+        if line:
+            console.print(Padding(Text(line, style="dim"), (0, 0, 0, 6)))
+
+
+def _console():
+    """Rich's console on standard output, None where that is no terminal or one without style."""
+    if sys.stdout is None or not sys.stdout.isatty() or os.environ.get("TERM") == "dumb":
+        return None
+    from rich.console import Console
+
+    return Console(file=sys.stdout, highlight=False)
