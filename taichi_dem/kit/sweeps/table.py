@@ -1,14 +1,14 @@
 """The table that a sweep returns: results apart from what tells where they come from."""
 
 import hashlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from taichi_dem.kit.data_table import Table
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.files import write_csv
-from taichi_dem.kit.optional import optional
 from taichi_dem.kit.sweeps.job import Job, Record
 from taichi_dem.kit.sweeps.rows import SEED
 from taichi_dem.kit.validation import FileName
@@ -17,7 +17,7 @@ from taichi_dem.kit.validation import FileName
 _OF_RECORDS = ("version", "commit", "machine", "seconds")
 
 
-class SweepTable(Mapping[str, np.ndarray]):
+class SweepTable(Table):
     """Result of ``sweep``: column name -> array, a row for each row of the input, in its order.
 
     Columns are those of the input, the results, NaN or "" where a row has none, and ``error``: the
@@ -47,32 +47,19 @@ class SweepTable(Mapping[str, np.ndarray]):
     def __init__(self, jobs: Sequence[Job], records: Sequence[Record], seeded: bool):
         given = [name for name in jobs[0].row if name != SEED or seeded]
         results = dict.fromkeys(name for record in records for name in record.values)
-        self._columns = {name: _column([job.row[name] for job in jobs]) for name in given}
+        columns = {name: _column([job.row[name] for job in jobs]) for name in given}
         for name in results:
-            self._columns[name] = _column([record.values.get(name) for record in records])
-        self._columns["error"] = np.array([record.error for record in records], dtype=str)
+            columns[name] = _column([record.values.get(name) for record in records])
+        columns["error"] = np.array([record.error for record in records], dtype=str)
+        super().__init__(columns)
         self.provenance = {SEED: _column([job.row[SEED] for job in jobs])}
         for name in _OF_RECORDS:
             self.provenance[name] = _column([getattr(record, name) for record in records])
-
-    def __getitem__(self, name: str) -> np.ndarray:
-        return self._columns[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._columns)
-
-    def __len__(self) -> int:
-        return len(self._columns)
 
     def __repr__(self):
         failures = int((self["error"] != "").sum())
         rows = counted(self.row_count, "row"), counted(len(self), "column")
         return in_brief(self, *rows, f"{failures} failed" if failures else "", ", ".join(self))
-
-    @property
-    def row_count(self) -> int:
-        """Number of rows."""
-        return len(self["error"])
 
     @property
     def digest(self) -> str:
@@ -101,7 +88,7 @@ class SweepTable(Mapping[str, np.ndarray]):
         InputError
             Where pandas is not installed.
         """
-        return optional("pandas", "tables").DataFrame(self._with(provenance))
+        return Table(self._with(provenance)).to_pandas()
 
     def write_csv(self, path: FileName, provenance: bool = True) -> None:
         """Write the table as a CSV file.
@@ -121,7 +108,7 @@ class SweepTable(Mapping[str, np.ndarray]):
         write_csv(path, self._with(provenance))
 
     def _with(self, provenance):
-        return {**self, **self.provenance} if provenance else dict(self)
+        return {**self, **self.provenance} if provenance else {**self}
 
 
 def _column(values):
