@@ -89,7 +89,13 @@ class AmplitudeResponse:
         self.table().write_csv(path)
 
     def table(self) -> Table:
-        """A row a scene, as of ``Response.table``, with its amplitude in front."""
+        """A row a scene, as of ``Response.table``, with its amplitude in front.
+
+        Returns
+        -------
+        Table
+            Columns by name, units in ``units``.
+        """
         columns = [one.columns() for one in self.responses]
         sizes = [len(one["filling"]) for one in columns]
         joined = {name: np.concatenate([one[name] for one in columns]) for name in columns[0]}
@@ -97,11 +103,33 @@ class AmplitudeResponse:
         return Table({"base_amplitude_m": amplitude, **joined}, {"filling": "1"})
 
     def to_pandas(self) -> Any:
-        """The table as a pandas DataFrame; InputError where pandas is not installed."""
+        """The table as a pandas DataFrame.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Units by column in its ``attrs``.
+
+        Raises
+        ------
+        InputError
+            Where pandas is not installed.
+        """
         return self.table().to_pandas()
 
     def to_xarray(self) -> Any:
-        """As ``Response.to_xarray``, over base_amplitude [m] too."""
+        """As ``Response.to_xarray``, over base_amplitude [m] too.
+
+        Returns
+        -------
+        xarray.Dataset
+            Units in the attributes of each variable.
+
+        Raises
+        ------
+        InputError
+            Where xarray is not installed.
+        """
         xarray = optional("xarray", "tables")
         axis = xarray.Variable("base_amplitude", list(self.amplitudes), {"units": "m"})
         return xarray.concat([one.to_xarray() for one in self.responses], axis)

@@ -146,7 +146,18 @@ class DamperMap:
         self.table().write_csv(path)
 
     def to_pandas(self) -> Any:
-        """The table as a pandas DataFrame; InputError where pandas is not installed."""
+        """The table as a pandas DataFrame.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Units by column in its ``attrs``.
+
+        Raises
+        ------
+        InputError
+            Where pandas is not installed.
+        """
         return self.table().to_pandas()
 
     def to_xarray(self) -> Any:
@@ -174,7 +185,13 @@ class DamperMap:
         return dataset(found, axes, filling=self.label)
 
     def table(self) -> Table:
-        """A row a scene: its place on the axes, measures, and the theory's loss and mass."""
+        """A row a scene: its place on the axes, measures, and the theory's loss and mass.
+
+        Returns
+        -------
+        Table
+            Columns by name, units in ``units``.
+        """
         indices = np.indices(self.loss.shape).reshape(len(_AXES), -1)
         clearance, number, amplitude = indices[:3]
         columns: dict[str, Any] = {"filling": [self.label] * len(clearance)}

@@ -97,6 +97,11 @@ class Film:
     def to_xarray(self) -> Any:
         """The history as an xarray Dataset over sample and scene, units in attributes.
 
+        Returns
+        -------
+        xarray.Dataset
+            Units in the attributes of each variable.
+
         Raises
         ------
         InputError

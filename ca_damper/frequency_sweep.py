@@ -55,7 +55,18 @@ class Sweep:
         return (self.down.rms - self.up.rms) / np.maximum(self.down.rms, self.up.rms)
 
     def to_xarray(self) -> Any:
-        """As ``Response.to_xarray``, over direction ("up", "down") too."""
+        """As ``Response.to_xarray``, over direction ("up", "down") too.
+
+        Returns
+        -------
+        xarray.Dataset
+            Units in the attributes of each variable.
+
+        Raises
+        ------
+        InputError
+            Where xarray is not installed.
+        """
         xarray = optional("xarray", "tables")
         axis = xarray.Variable("direction", ["up", "down"])
         return xarray.concat([self.up.to_xarray(), self.down.to_xarray()], axis)

@@ -81,6 +81,11 @@ class Cycles:
     def to_xarray(self) -> Any:
         """Measures that need no structure as an xarray Dataset over scene and cycle.
 
+        Returns
+        -------
+        xarray.Dataset
+            Units in the attributes of each variable.
+
         Raises
         ------
         InputError

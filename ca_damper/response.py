@@ -189,11 +189,22 @@ class Response:
         return {name: unit_of(column_of(name)) for name in MEASURE_UNITS}
 
     def table(self) -> Table:
-        """A row a scene: filling, particles, ratio, frequency, seed and all measures."""
+        """A row a scene: filling, particles, ratio, frequency, seed and all measures.
+
+        Returns
+        -------
+        Table
+            Columns by name, units in ``units``.
+        """
         return Table(self.columns(), {"filling": "1"})
 
     def to_pandas(self) -> Any:
         """The table as a pandas DataFrame, units in its ``attrs``.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Units by column in its ``attrs``.
 
         Raises
         ------

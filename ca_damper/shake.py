@@ -131,7 +131,13 @@ class TimeHistory:
         self.table().write_csv(path)
 
     def table(self) -> Table:
-        """A row a sample: time, base, and x and force of each particle number and seed."""
+        """A row a sample: time, base, and x and force of each particle number and seed.
+
+        Returns
+        -------
+        Table
+            Columns by name, units in ``units``.
+        """
         columns, units = {"time_s": self.time_s, "base_m": self.base}, {}
         for name, values, unit in (("x_m", self.x, "m"), ("force_N", self.force, "N")):
             for k, number in enumerate(self.particles):
@@ -141,7 +147,18 @@ class TimeHistory:
         return Table(columns, units, index="time_s")
 
     def to_pandas(self) -> Any:
-        """The table as a pandas DataFrame; InputError where pandas is not installed."""
+        """The table as a pandas DataFrame.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Units by column in its ``attrs``.
+
+        Raises
+        ------
+        InputError
+            Where pandas is not installed.
+        """
         return self.table().to_pandas()
 
     def to_xarray(self) -> Any:

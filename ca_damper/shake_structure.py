@@ -116,7 +116,13 @@ class StructureHistory:
         self.table().write_csv(path)
 
     def table(self) -> Table:
-        """A row a sample: time, base, x of each place and force of each box, for each seed."""
+        """A row a sample: time, base, x of each place and force of each box, for each seed.
+
+        Returns
+        -------
+        Table
+            Columns by name, units in ``units``.
+        """
         columns, units = {"time_s": self.time_s, "base_m": self.base}, {}
         for name, values, unit in (("x_m_place", self.x, "m"), ("force_N_box", self.force, "N")):
             for i in range(values.shape[1]):
@@ -126,7 +132,18 @@ class StructureHistory:
         return Table(columns, units, index="time_s")
 
     def to_pandas(self) -> Any:
-        """The table as a pandas DataFrame; InputError where pandas is not installed."""
+        """The table as a pandas DataFrame.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Units by column in its ``attrs``.
+
+        Raises
+        ------
+        InputError
+            Where pandas is not installed.
+        """
         return self.table().to_pandas()
 
     def to_xarray(self) -> Any:

@@ -65,11 +65,21 @@ class Table(dict[str, np.ndarray]):
         return len(next(iter(self.values()), ()))
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """Copies of all columns, plain arrays by name, that may be written to."""
+        """Copies of all columns, plain arrays by name, that may be written to.
+
+        Returns
+        -------
+        dict of str to ndarray
+            Copies, in the order of the columns.
+        """
         return {name: values.copy() for name, values in self.items()}
 
     def to_pandas(self) -> Any:
         """A pandas DataFrame of all columns; its ``attrs["units"]`` holds their units.
+
+        Returns
+        -------
+        pandas.DataFrame
 
         Raises
         ------
@@ -85,6 +95,10 @@ class Table(dict[str, np.ndarray]):
 
         The dimension has the name of the column that numbers the rows, without its unit: "time".
 
+        Returns
+        -------
+        xarray.Dataset
+
         Raises
         ------
         InputError
@@ -97,7 +111,18 @@ class Table(dict[str, np.ndarray]):
         return dataset({n: ((rows,), v, self.units[n]) for n, v in columns.items()}, axes)
 
     def write_csv(self, path: FileName) -> None:
-        """Write the table as CSV. Raises InputError when the file cannot be written."""
+        """Write the table as CSV.
+
+        Parameters
+        ----------
+        path : path
+            Name of the file.
+
+        Raises
+        ------
+        InputError
+            When the file cannot be written.
+        """
         write_csv(path, self)
 
     def __repr__(self) -> str:
@@ -128,6 +153,24 @@ class Table(dict[str, np.ndarray]):
         return _restored, (type(self), dict(self), vars(self))
 
     def _refuse(self, *given: Any, **options: Any) -> Any:
+        """Refuse the change.
+
+        Parameters
+        ----------
+        *given : Any
+            Arguments of the method of a dict.
+        **options : Any
+            Options of the method of a dict.
+
+        Returns
+        -------
+        nothing
+
+        Raises
+        ------
+        InputError
+            In any case: tables are read-only.
+        """
         raise InputError(
             f"a {type(self).__name__} must not be changed: take arrays(), or make a new one"
         )

@@ -17,10 +17,17 @@ _FEWEST = 10
 
 @dataclass(frozen=True, eq=False)
 class Attenuation:
-    """Peak velocities of bodies over their scaled distance from a hole; arrays (body_count,).
+    """Peak velocities of bodies over their scaled distance from a hole.
 
-    distance: from the hole's axis, in radii of the hole. speed: the largest [m/s]. inner: whether
-    the body is nearer to the axis than to any side of the block; elsewhere the wave comes back.
+    Parameters
+    ----------
+    distance : ndarray
+        From the hole's axis, in radii of the hole, shape (body_count,).
+    speed : ndarray
+        Largest speed of each body [m/s], shape (body_count,).
+    inner : ndarray
+        Whether a body is nearer to the axis than to any side of the block, shape (body_count,);
+        elsewhere the wave comes back.
     """
 
     distance: np.ndarray
@@ -38,9 +45,22 @@ class Attenuation:
         radius: Optional[float] = None,
         group: str = "hole",
     ) -> "Attenuation":
-        """Attenuation in a run.
+        """Measure the attenuation in a run.
 
-        radius: of the hole [m], whose wall is a face group; that of its points if None.
+        Parameters
+        ----------
+        model : Model
+            Arrays of the scene, ``result.model``.
+        peak_speed : ndarray
+            Largest speed of each body [m/s], shape (body_count,).
+        radius : float, optional
+            Radius of the hole [m]; that of the points of its wall by default.
+        group : str
+            Face group of the hole's wall.
+
+        Returns
+        -------
+        Attenuation
         """
         hole, points = HoleMonitor(model, group), model.mesh.points
         radius = hole.radius if radius is None else positive("radius", radius)
@@ -61,10 +81,21 @@ class Attenuation:
         return Table(columns, {"distance_by_radius": "1", "is_inner": "1"}, index="body")
 
     def power_law(self, nearest: float, inner_only: bool = True) -> tuple[float, float]:
-        """Exponent, and speed at one radius [m/s], by least squares.
+        """Fit a power of the distance by least squares.
 
-        nearest: bodies nearer to the axis are left out [radii]. inner_only: fit the inner bodies
-        alone. NaN for both where fewer than ten bodies are left.
+        Parameters
+        ----------
+        nearest : float
+            Number of radii below which bodies are left out.
+        inner_only : bool
+            Whether the inner bodies alone are fitted.
+
+        Returns
+        -------
+        exponent : float
+            Power of the distance, a pure number; NaN where fewer than ten bodies are left.
+        speed : float
+            Speed of the fit at one radius [m/s]; NaN likewise.
         """
         taken = (self.inner | (not inner_only)) & (self.distance > nearest) & (self.speed > 0.0)
         if taken.sum() < _FEWEST:

@@ -81,11 +81,21 @@ class RunTables:
         return fragments_of(self.model, self.frame(frame), self.broken_time)
 
     def cracks(self) -> Table:
-        """Tabulate broken faces in their order: time, area, place, normal, strike, dip."""
+        """Tabulate broken faces in their order: time, area, place, normal, strike, dip.
+
+        Returns
+        -------
+        Table
+        """
         return cracks_of(self.model, self.broken_time)
 
     def crack_area(self) -> Table:
-        """Tabulate the area of all cracks [m^2] at the times of the history."""
+        """Tabulate the area of all cracks [m^2] at the times of the history.
+
+        Returns
+        -------
+        Table
+        """
         return crack_area_at(self.model, self.broken_time, self.history["time_s"])
 
     def rose(self, axis: Any = (0.0, 0.0, 1.0), sectors: int = 36) -> Rose:
@@ -106,7 +116,12 @@ class RunTables:
         return rose_of(self.model, np.isfinite(self.broken_time), axis, sectors)
 
     def energy_shares(self) -> Table:
-        """Tabulate every term of the energy balance as a share of the energy given, over time."""
+        """Tabulate every term of the energy balance as a share of the energy given, over time.
+
+        Returns
+        -------
+        Table
+        """
         return energy_shares(self.history)
 
     def attenuation(
@@ -139,5 +154,20 @@ class RunTables:
         return Attenuation.of(self.model, self.peak_speed, radius, group)
 
     def bodies(self, frame: int = -1) -> Bodies:
-        """What bodies are coloured by in a frame; InputError where there is no such frame."""
+        """Collect what bodies are coloured by in a frame.
+
+        Parameters
+        ----------
+        frame : int
+            Number of the frame, the last by default.
+
+        Returns
+        -------
+        Bodies
+
+        Raises
+        ------
+        InputError
+            Where there is no such frame.
+        """
         return Bodies(self.model, self.frame(frame), self.broken_time, self.peak_speed)
