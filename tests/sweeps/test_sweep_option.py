@@ -58,7 +58,7 @@ def test_each_row_runs_once_in_a_folder_of_its_own(beam, tmp_path):
     assert [row["mass_figure"] for row in rows] == ["1.0", "nan", "1.0"]
     assert [row["error"] for row in rows] == ["", "mass is too small for this beam", ""]
     assert float(rows[0]["seconds"]) > 0.0 and rows[0]["machine"] and rows[0]["version"]
-    assert (folder / "row_0" / "output.txt").read_text().startswith("loud")
+    assert (folder / "row_0" / "output.txt").read_text().startswith("\nloud")
     command = json.loads((folder / "row_2" / "summary.json").read_text())["command"]
     assert "--mass=2 " in command and "--loud" not in command
     # Again: what is missing, has failed or is changed.
@@ -94,3 +94,19 @@ def test_a_bad_table_is_one_sentence_before_any_run(tmp_path, monkeypatch, capsy
     said = capsys.readouterr().err
     assert words in said and said.count("\n") == 1
     assert sorted(path.name for path in tmp_path.iterdir()) == ["table.csv"]
+
+
+def test_json_and_workers_without_a_sweep_are_refused(tmp_path, monkeypatch, capsys):
+    from taichi_dem.kit import study
+
+    monkeypatch.chdir(tmp_path)
+    namespace = {"__name__": "beam"}
+    exec(STUDY, namespace)
+    parser = namespace["options_parser"]()
+    for given, words in (
+        (["--sweep", "table.csv", "--json"], "json must be left out with --sweep"),
+        (["--workers", "2"], "workers must be left out without --sweep, got 2"),
+    ):
+        assert study.main(namespace["run"], parser, given) == 2
+        said = capsys.readouterr().err
+        assert words in said and said.count("\n") == 1

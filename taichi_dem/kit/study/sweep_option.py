@@ -21,7 +21,9 @@ from taichi_dem.kit.terminal import print_table
 from taichi_dem.kit.validation import shown
 
 #: Options that are of the sweep, not of a row.
-_OWN = ("sweep", "workers", "out", "help")
+_OWN = ("sweep", "workers", "out")
+#: Those without a value.
+_LOUDNESS = ("quiet", "json", "help")
 #: Cells of a column that is an option without a value.
 _SWITCH = {"yes": True, "true": True, "1": True, "no": False, "false": False, "0": False}
 #: Columns of the row of a job.
@@ -92,8 +94,10 @@ def _summary_of(job: Job) -> str:
 def _lines(made, table, options, arguments, count):
     """Arguments of each row, all of which the parser takes. Raises InputError otherwise."""
     own = ArgumentParser(allow_abbrev=False, add_help=False)
-    for name in _OWN[:-1]:
+    for name in _OWN:
         own.add_argument(f"--{name}")
+    for name in _LOUDNESS:
+        own.add_argument(f"--{name}", action="store_true")
     common = own.parse_known_args(arguments)[1]
     known = _options_of(made)
     for column in table[0]:
@@ -123,7 +127,7 @@ def _options_of(made: ArgumentParser) -> dict[str, Action]:
         for text in action.option_strings
         if text.startswith("--")
     }
-    return {name: action for name, action in found.items() if name not in _OWN}
+    return {name: action for name, action in found.items() if name not in (*_OWN, *_LOUDNESS)}
 
 
 def _argument(action, name, cell):
