@@ -6,17 +6,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taichi_dem.kit.data_table import Table
+from taichi_dem.kit.data_table import Table, Tabulated
 from taichi_dem.kit.display import in_brief, listed
 from taichi_dem.kit.optional import optional
-from taichi_dem.kit.validation import FileName
 
 if TYPE_CHECKING:
     from ca_damper.response import Response
 
 
 @dataclass(frozen=True, eq=False)
-class AmplitudeResponse:
+class AmplitudeResponse(Tabulated):
     """A Response for each amplitude of the base, from one batch.
 
     Returned by ``frequency_response`` for several amplitudes of the base. It has a length, items by
@@ -73,21 +72,6 @@ class AmplitudeResponse:
         ratio, rms = zip(*(one.peaks() for one in self.responses))
         return np.stack(ratio), np.stack(rms)
 
-    def write_csv(self, path: FileName) -> None:
-        """Write one row a scene, as ``Response.write_csv``, with its amplitude in front.
-
-        Parameters
-        ----------
-        path : path
-            CSV file; it is replaced as a whole.
-
-        Raises
-        ------
-        InputError
-            The file cannot be written.
-        """
-        self.table().write_csv(path)
-
     def table(self) -> Table:
         """A row a scene, as of ``Response.table``, with its amplitude in front.
 
@@ -101,21 +85,6 @@ class AmplitudeResponse:
         joined = {name: np.concatenate([one[name] for one in columns]) for name in columns[0]}
         amplitude = np.repeat(self.amplitudes, sizes)
         return Table({"base_amplitude_m": amplitude, **joined}, {"filling": "1"})
-
-    def to_pandas(self) -> Any:
-        """The table as a pandas DataFrame.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Units by column in its ``attrs``.
-
-        Raises
-        ------
-        InputError
-            Where pandas is not installed.
-        """
-        return self.table().to_pandas()
 
     def to_xarray(self) -> Any:
         """As ``Response.to_xarray``, over base_amplitude [m] too.

@@ -15,14 +15,13 @@ from ca_damper.progress import Stages
 from ca_damper.report import Report
 from ca_damper.scenes.clock import automatic_dt
 from ca_damper.scenes.table import SceneTable
-from taichi_dem.kit.data_table import Table, dataset
+from taichi_dem.kit.data_table import Table, Tabulated, dataset
 from taichi_dem.kit.display import in_brief, listed
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.progress.progress_bar import reporting
 from taichi_dem.kit.validation import (
     AUTO,
-    FileName,
     positive,
     progress_option,
     several,
@@ -35,7 +34,7 @@ _UNITS = ("m", "1", "m", "Hz", "1")
 
 
 @dataclass(frozen=True, eq=False)
-class DamperMap:
+class DamperMap(Tabulated):
     """Measures of a container that is driven as A sin(2 pi f t), whatever its filling does.
 
     The axes of all measures are clearances, particles, amplitudes, frequencies, seeds, in this
@@ -129,36 +128,6 @@ class DamperMap:
     def theory(self) -> CollectAndCollide:
         """Collect and collide without gravity, at every clearance, number and amplitude."""
         return collect_and_collide(np.array(self.amplitudes), self.gaps[:, :, None])
-
-    def write_csv(self, path: FileName) -> None:
-        """Write a row a scene: its place on the axes, measures, and the theory's loss and mass.
-
-        Parameters
-        ----------
-        path : path
-            CSV file; it is replaced as a whole.
-
-        Raises
-        ------
-        InputError
-            The file cannot be written.
-        """
-        self.table().write_csv(path)
-
-    def to_pandas(self) -> Any:
-        """The table as a pandas DataFrame.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Units by column in its ``attrs``.
-
-        Raises
-        ------
-        InputError
-            Where pandas is not installed.
-        """
-        return self.table().to_pandas()
 
     def to_xarray(self) -> Any:
         """An xarray Dataset over clearance, particles, amplitude, frequency and seed.

@@ -19,10 +19,9 @@ from ca_damper.scenes.table import SceneTable
 from ca_damper.steady_state import mean_and_error
 from taichi_dem.kit.accuracy.student import t_quantile
 from taichi_dem.kit.checkpoint import Checkpoint
-from taichi_dem.kit.data_table import Table, dataset
+from taichi_dem.kit.data_table import Table, Tabulated, dataset
 from taichi_dem.kit.display import counted, embedded, in_brief, listed, table, titled, unfolded
 from taichi_dem.kit.errors import InputError
-from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.progress.progress import Listener
 from taichi_dem.kit.progress.progress_bar import reporting
 from taichi_dem.kit.units import unit_of
@@ -46,7 +45,7 @@ _PEAK_COLUMNS = (
 
 
 @dataclass(frozen=True, eq=False)
-class Response:
+class Response(Tabulated):
     """Response curves of a filling; every measure is an array (particles, ratios, seeds).
 
     As the last line of a notebook's cell it shows its curves and a table of the peaks; a peak at an
@@ -168,21 +167,6 @@ class Response:
         shape = (len(self.particles), len(self.seeds))
         return found[:, 0].reshape(shape), found[:, 1].reshape(shape)
 
-    def write_csv(self, path: FileName) -> None:
-        """Write one row a scene: filling, particles, ratio, frequency, seed and all measures.
-
-        Parameters
-        ----------
-        path : path
-            CSV file; it is replaced as a whole.
-
-        Raises
-        ------
-        InputError
-            The file cannot be written.
-        """
-        write_csv(path, self.columns())
-
     @property
     def units(self) -> dict[str, str]:
         """Unit of every measure, by name."""
@@ -197,21 +181,6 @@ class Response:
             Columns by name, units in ``units``.
         """
         return Table(self.columns(), {"filling": "1"})
-
-    def to_pandas(self) -> Any:
-        """The table as a pandas DataFrame, units in its ``attrs``.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Units by column in its ``attrs``.
-
-        Raises
-        ------
-        InputError
-            Where pandas is not installed.
-        """
-        return self.table().to_pandas()
 
     def to_xarray(self) -> Any:
         """All measures as an xarray Dataset over particles, frequency and seed.

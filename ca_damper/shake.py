@@ -18,7 +18,7 @@ from ca_damper.report import Report
 from ca_damper.scenes.table import SceneTable
 from ca_damper.window import one_for_all, run_duration, run_seeds, window
 from taichi_dem.kit.checkpoint import Checkpoint
-from taichi_dem.kit.data_table import Table
+from taichi_dem.kit.data_table import Table, Tabulated
 from taichi_dem.kit.display import counted, in_brief, listed
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import Listener
@@ -27,7 +27,7 @@ from taichi_dem.kit.validation import AUTO, FileName, instance, positive, severa
 
 
 @dataclass(frozen=True, eq=False)
-class TimeHistory:
+class TimeHistory(Tabulated):
     """Motions of containers under one excitation.
 
     Parameters
@@ -115,21 +115,6 @@ class TimeHistory:
         critical = 2.0 * math.sqrt(o.stiffness * o.mass)
         return (o.damping + self.added_damping) / critical
 
-    def write_csv(self, path: FileName) -> None:
-        """Write a row a sample: time, base, and x and force of each particle number and seed.
-
-        Parameters
-        ----------
-        path : path
-            CSV file; it is replaced as a whole.
-
-        Raises
-        ------
-        InputError
-            The file cannot be written.
-        """
-        self.table().write_csv(path)
-
     def table(self) -> Table:
         """A row a sample: time, base, and x and force of each particle number and seed.
 
@@ -145,21 +130,6 @@ class TimeHistory:
                     columns[f"{name}_N{number}_seed{seed}"] = values[:, k, j]
                     units[f"{name}_N{number}_seed{seed}"] = unit
         return Table(columns, units, index="time_s")
-
-    def to_pandas(self) -> Any:
-        """The table as a pandas DataFrame.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Units by column in its ``attrs``.
-
-        Raises
-        ------
-        InputError
-            Where pandas is not installed.
-        """
-        return self.table().to_pandas()
 
     def to_xarray(self) -> Any:
         """An xarray Dataset over time, particles and seed, units in attributes.

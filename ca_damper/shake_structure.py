@@ -19,7 +19,7 @@ from ca_damper.scenes.table import SceneTable
 from ca_damper.structure import Box, ModalStructure
 from ca_damper.window import one_for_all, run_duration, run_seeds, window
 from taichi_dem.kit.checkpoint import Checkpoint, identity_of
-from taichi_dem.kit.data_table import Table
+from taichi_dem.kit.data_table import Table, Tabulated
 from taichi_dem.kit.display import counted, in_brief
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.progress.progress import Listener
@@ -33,7 +33,7 @@ _OUTSIDE_MODES = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class StructureHistory:
+class StructureHistory(Tabulated):
     """Motions of a structure with boxes under one excitation.
 
     Parameters
@@ -100,21 +100,6 @@ class StructureHistory:
         """
         return np.moveaxis(self.structure.modal(np.moveaxis(self.relative, 1, -1)), -1, 1)
 
-    def write_csv(self, path: FileName) -> None:
-        """Write a row a sample: time, base, x of each place and force of each box, for each seed.
-
-        Parameters
-        ----------
-        path : path
-            CSV file; it is replaced as a whole.
-
-        Raises
-        ------
-        InputError
-            The file cannot be written.
-        """
-        self.table().write_csv(path)
-
     def table(self) -> Table:
         """A row a sample: time, base, x of each place and force of each box, for each seed.
 
@@ -130,21 +115,6 @@ class StructureHistory:
                     columns[f"{name}{i}_seed{seed}"] = values[:, i, j]
                     units[f"{name}{i}_seed{seed}"] = unit
         return Table(columns, units, index="time_s")
-
-    def to_pandas(self) -> Any:
-        """The table as a pandas DataFrame.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Units by column in its ``attrs``.
-
-        Raises
-        ------
-        InputError
-            Where pandas is not installed.
-        """
-        return self.table().to_pandas()
 
     def to_xarray(self) -> Any:
         """An xarray Dataset over time, place, box and seed, units in attributes.

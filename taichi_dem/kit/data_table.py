@@ -1,5 +1,6 @@
 """Read-only tables of columns with units, for pandas, xarray and plain NumPy."""
 
+from abc import abstractmethod
 from collections.abc import Mapping
 from typing import Any, Optional
 
@@ -177,6 +178,50 @@ class Table(dict[str, np.ndarray]):
 
     __setitem__ = __delitem__ = __ior__ = _refuse
     update = pop = popitem = clear = setdefault = _refuse
+
+
+class Tabulated:
+    """Base of results that ``table`` gives as rows: as a CSV file, and for pandas."""
+
+    @abstractmethod
+    def table(self) -> Table:
+        """Give all rows as a table.
+
+        Returns
+        -------
+        Table
+            Columns by name, units in ``units``.
+        """
+
+    def to_pandas(self) -> Any:
+        """Give the table as a pandas DataFrame.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Units by column in its ``attrs``.
+
+        Raises
+        ------
+        InputError
+            Where pandas is not installed.
+        """
+        return self.table().to_pandas()
+
+    def write_csv(self, path: FileName) -> None:
+        """Write the table as CSV.
+
+        Parameters
+        ----------
+        path : path
+            CSV file; it is replaced as a whole.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written.
+        """
+        self.table().write_csv(path)
 
 
 def _restored(kind, columns, attributes):
