@@ -57,11 +57,11 @@ def frames_of(batch: Any, present: Optional[dict[str, np.ndarray]] = None) -> tu
     )
 
 
-def inner_size(filling: Any) -> tuple[float, float, float]:
+def inner_size(box: Any) -> tuple[float, float, float]:
     """Width and height of the box of an Automaton or Spheres, and diameter of a particle [m]."""
-    if hasattr(filling, "columns"):
-        cell = filling.width
-        return filling.columns * cell, filling.rows * cell, cell
-    if not hasattr(filling, "diameter"):
-        raise InputError(f"filling must be an Automaton or Spheres for this, got {shown(filling)}")
-    return filling.width, filling.height, filling.diameter
+    if hasattr(box, "columns"):
+        cell = box.width
+        return box.columns * cell, box.rows * cell, cell
+    if not hasattr(box, "diameter"):
+        raise InputError(f"filling must be an Automaton or Spheres for this, got {shown(box)}")
+    return box.width, box.height, box.diameter

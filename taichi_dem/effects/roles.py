@@ -287,10 +287,10 @@ def _parameters(member):
     """Names of the arguments of a function beside self; None where any number is taken."""
     if not callable(member):
         return None
-    found = list(inspect.signature(member).parameters.values())[1:]
+    found = list(inspect.signature(member).parameters.values())
     if any(each.kind in (each.VAR_POSITIONAL, each.VAR_KEYWORD) for each in found):
         return None
-    return [each.name for each in found if each.default is each.empty]
+    return [each.name for each in found[1:] if each.default is each.empty]
 
 
 def check_effect(effect: Any) -> None:

@@ -17,7 +17,7 @@ from ca_damper import (
     frequency_response,
     sweep_up_and_down,
 )
-from ca_damper.response import UNITS
+from ca_damper.measures import MEASURE_UNITS
 
 PAPER = Oscillator()
 RATIOS = np.linspace(0.9, 1.1, 5)
@@ -57,7 +57,7 @@ def test_several_amplitudes_are_an_axis_of_the_same_bits(tmp_path):
     for amplitude, one in zip(amplitudes, made):
         alone = rigid_response(base_amplitude=amplitude)
         assert one.oscillator == alone.oscillator == Oscillator(base_amplitude=amplitude)
-        for name in UNITS:
+        for name in MEASURE_UNITS:
             assert np.array_equal(getattr(one, name), getattr(alone, name)), name
     assert made.measure("rms")[1] == pytest.approx(4.0 * made.measure("rms")[0], rel=1e-8)
     assert made.peaks()[1].shape == (2, 2, 2) and made[1] is made.responses[1]

@@ -13,6 +13,7 @@ import taichi as ti
 from taichi_dem import Checkpoint, InputError
 from taichi_dem.kit.allocation import FieldTree
 from taichi_dem.kit.checkpoint import (
+    FORMAT,
     STOP_SIGNALS,
     SaveTimer,
     StopRequests,
@@ -55,7 +56,7 @@ def test_another_format_is_refused(path):
         arrays = dict(file)
     arrays["about"] = np.array(json.dumps({"format": 99, "identity": IDENTITY}))
     write_sealed(path, arrays)
-    with pytest.raises(InputError, match="must have format 4, got 99"):
+    with pytest.raises(InputError, match=f"must have format {FORMAT}, got 99"):
         read_checkpoint(path, IDENTITY)
 
 

@@ -17,6 +17,7 @@ from taichi_dem.diagnostics.missing_effects import MissingEffect
 from taichi_dem.effects.base import Effect
 from taichi_dem.kit.accuracy.answer import Answer, ErrorParts, Expense, Plan
 from taichi_dem.kit.display import counted, in_brief, listed
+from taichi_dem.kit.sweeps.job import Job, Record
 from taichi_dem.mesh.contact_spheres import spheres_of_faces
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.stability.step_control import Displacement, FixedStep
@@ -51,6 +52,12 @@ EFFECTS = (
 )
 
 
+def swept():
+    """Table of a sweep of one row."""
+    record = Record({"speed_m_s": 1.5}, "", True, 0.1, "1.0", "unknown", "machine")
+    return taichi_dem.SweepTable([Job({"mass": 2.0, "seed": 7}, "digest")], [record], seeded=False)
+
+
 def of_the_blast():
     """All that a user holds after a run of the blast, and before."""
     mesh = bar(0.4, 0.1, (4, 1, 1))
@@ -58,7 +65,10 @@ def of_the_blast():
     others = ("contact", "friction")
     few = [e for e in EFFECTS if e.role not in others and e.name != "slip_weakening"]
     scene, method = taichi_dem.Scene(mesh, CONCRETE, few), taichi_dem.Uniform(1e-8)
-    result = taichi_dem.simulate(scene, method=method, until=4e-8, frames=3, samples=4)
+    seen = taichi_dem.Receivers({"middle": (0.2, 0.05, 0.05)})
+    run = {"until": 4e-8, "frames": 3, "samples": 4, "observers": [seen]}
+    result = taichi_dem.simulate(scene, method=method, **run)
+    yield from (seen, result.receivers["middle"], result.history, swept())
     yield from (mesh, scene, result, result.model, result.report, result.frames[0])
     yield from (result.model.topology, spheres_of_faces(mesh, result.model.centre, 5))
     simulation = taichi_dem.Simulation(scene, method)

@@ -8,6 +8,7 @@ import sys
 import pytest
 
 from taichi_dem import CONCRETE, Scene, Simulation, Uniform, effects
+from taichi_dem.body_materials import MOST
 from taichi_dem.engine.capacity import LEAST
 from taichi_dem.measured_overhead import elastic_step_seconds
 from taichi_dem.mesh.shapes import bar, pair
@@ -63,11 +64,13 @@ def counts(cls, *listed):
 # Tables, state and schedule with room for n elastic, free bodies and b bonds, in the order of their
 # making, after the anchor of the tree.
 n, b, whole, wide = 1024, 2048, ti.i32, ti.i64
+# Of laws, a row of numbers for each ordered pair of sixteen materials.
+pairs = 16**2
 model = [(1, 1, wide), (1, 1, whole), (1, 1, whole), (n, 1), (n, 1), (n, 1), (n, 9), (n, 9)]
 model += [(b, 2, whole), (b, 9), (b, 2), (b, 1), (3 * b, 3), (3 * b, 3)]
-model += [(4 * n, 1, whole), (4 * n, 1, whole)]
+model += [(4 * n, 1, whole), (4 * n, 1, whole), (n, 1, whole), (b, 1, whole)]
 state = [(n, 3), (n, 4), (n, 9), (n, 3), (n, 3), (n, 3), (n, 1, whole), (n, 1, whole)]
-state += [(n, 1, wide), (4 * n, 6), (b, 1, wide), (n, 1, wide), (1, 3), (b, 2, wide)]
+state += [(n, 1, wide), (4 * n, 6), (b, 1, wide), (n, 1, wide), (pairs, 3), (b, 2, wide)]
 state += [(n, 1), (n, 6), (n, 2)]
 state += [(1, 1, wide), (1, 1, whole), (1, 1)]
 # Of three active lists that of contacts has but one place.
@@ -132,10 +135,12 @@ def test_a_scene_without_effects_allocates_what_is_listed_by_hand(count):
     ("effect", "own"), [("bond_damping", (0, 2)), ("softening", (2, 6)), ("shear_slip", (2, 6))]
 )
 def test_an_effect_adds_its_own_fields_and_the_account_of_heat(count, effect, own):
-    """own: numbers of the law, and of each bond beside three of heat; 8 bytes, for all room."""
+    """own: numbers of the law by pair of materials, and of each bond beside three of heat."""
     law, bond = own
     room = 2 * LEAST.bodies
-    assert count[effect]["bytes"] - count["composed"]["bytes"] == 8 * (law + (bond + 3) * room)
+    assert count[effect]["bytes"] - count["composed"]["bytes"] == 8 * (
+        MOST**2 * law + (bond + 3) * room
+    )
 
 
 OWNED = {"softening_unit": effects.Softening, "shear_slip": effects.ShearSlip}

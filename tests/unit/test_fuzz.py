@@ -238,8 +238,8 @@ def test_ends_that_were_mended_stay_so(seed):
 def test_limited_dashpots_of_no_damping_keep_their_share():
     """Before its first recording a step counts as infinite; a warning would be an error here."""
     made = object.__new__(StepResolution)
-    material = SimpleNamespace(contact_damping=0.0)
-    made.model, made.contacts, made.limited = SimpleNamespace(material=material), object(), True
+    materials = SimpleNamespace(of_contacts=lambda name: 0.0)
+    made.model, made.contacts, made.limited = SimpleNamespace(materials=materials), object(), True
     made.pair_share, made.step, made.lightest = np.ones(2), np.full(2, np.inf), np.ones(2)
     made.state = SimpleNamespace(contact_heat=SimpleNamespace(to_numpy=lambda: np.zeros((2, 5))))
     assert (made._contact_shares() == 1.0).all()

@@ -205,8 +205,8 @@ def main(
         options.started = time.perf_counter()
         options.entry = made.entry or entry_of(run)
         options.command = [*made.prog.split()[1:], *given]
-        show_opening(made.description, options.entry, options.quick)
         runtime.start(options.arch, options.threads)
+        show_opening(made.description, options.entry, options.quick)
         with claiming():
             run(options)
         _name_older_files(options.out, options.began)
