@@ -22,7 +22,7 @@ TABLE = Table(
 )
 #: Colours of the runs of a limit; axes of the unexplained energy.
 COLOURS, DASHES = (GREEN, ORANGE, RED), ("-", "--", "-.")
-UNEXPLAINED = {"yscale": "log", "ylim": (1e-5, 1e3)}
+UNEXPLAINED = {"yscale": "log", "ylim": (1e-5, 1e4)}
 
 
 class Struck:
