@@ -67,16 +67,20 @@ class Bench:
 
 def caption(rows, steps):
     """Words on what to see."""
-    pressures = ", ".join(f"{1e-6 * pressure:g}" for pressure in PRESSURES)
     off = max(abs(row["error"]) for row in rows)
     return (
         f"{1 + len(PRESSURES)} bonds, {steps} samples of each. Left: pulled beyond its strength a "
         "bond softens; unloaded and reloaded it runs on the line to the origin, pressed it is as "
         f"stiff as ever; at {rows[1]['measured']:.2f} um it lets go. Right: under pressures of "
-        f"{pressures} MPa it slides at cohesion + friction x pressure, and elastically back and "
-        "forth below that. Points are measured with a load cell, lines are the law; the figures "
-        f"differ by at most {100 * off:.2g} %."
+        f"{pressures_in_words()} MPa it slides at cohesion + friction x pressure, and elastically "
+        "back and forth below that. Points are measured with a load cell, lines are the law; the "
+        f"figures differ by at most {100 * off:.2g} %."
     )
+
+
+def pressures_in_words():
+    """Pressures of the specimens in shear, in MPa."""
+    return ", ".join(f"{1e-6 * pressure:g}" for pressure in PRESSURES)
 
 
 def figures_of(rows):
@@ -133,7 +137,7 @@ def film_law(path, curves, points, count=40):
         forms = [{"color": mark.get_color(), "marker": mark.get_marker(), **look} for mark in marks]
         heads = [mark.axes.plot([], [], **form)[0] for mark, form in zip(marks, forms)]
         below[0].set_title("tension")
-        below[1].set_title("shear under pressure")
+        below[1].set_title(f"shear at {pressures_in_words()} MPa")
         # Openings and slidings are drawn so much larger.
         first = "opening × 600", specimen(above[0], points, COLOURS[0]), curves[0], (0.6, 0.0)
         last = "sliding × 60", specimen(above[1], points, COLOURS[-1]), curves[-1], (0.0, 0.06)

@@ -116,6 +116,9 @@ def picture_blow(path, impacts, dt0):
         work.set(xlabel="time [µs]", ylabel="evaluations of bonds and pairs [10⁶]")
         work.set(title="the price", xlim=(0.0, time[-1]))
         words.set_axis_off()
+        # There are no numbers below the right one, as words has no axes.
+        for axes in (way, work):
+            axes.tick_params(labelbottom=True)
         ends = {"struck end (thick)": 1.5, "far end (thin)": 0.8}
         way.legend(handles=[line_key(words, color=GREY, lw=width) for words, width in ends.items()])
         key = words.legend(*work.get_legend_handles_labels(), loc="upper left", handlelength=4.0)

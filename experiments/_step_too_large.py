@@ -22,7 +22,7 @@ TABLE = Table(
 )
 #: Colours of the runs of a limit; axes of the unexplained energy.
 COLOURS, DASHES = (GREEN, ORANGE, RED), ("-", "--", "-.")
-UNEXPLAINED = {"yscale": "log", "ylim": (1e-5, 1e3)}
+UNEXPLAINED = {"yscale": "log", "ylim": (1e-5, 1e4)}
 
 
 class Struck:
@@ -87,7 +87,8 @@ def picture_energy(path, runs):
     limits = list(dict.fromkeys(made.limit for made in runs))
     said = [f"{m.limit}, {m.name}: “{m.sentence}”" for m in runs if m.sentence]
     size = (4.3 * len(limits) + 0.6, 3.4 + 0.55 * len(said))
-    with picture(path, 1, len(limits), size, squeeze=False) as (drawn, panels):
+    shape = 1, len(limits), size
+    with picture(path, *shape, squeeze=False, sharey=True) as (drawn, panels):
         for axes, limit in zip(panels[0], limits):
             own = [made for made in runs if made.limit == limit]
             for made, colour, dashes in zip(own, COLOURS, DASHES):

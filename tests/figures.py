@@ -126,7 +126,7 @@ def crosses(line, box):
 def reaches(collection, box):
     """Whether paths of a collection lie in a box of the display; images of cells are data all."""
     if isinstance(collection, QuadMesh):
-        return True
+        return collection.axes.get_window_extent().overlaps(box)
     if isinstance(collection, PathCollection):
         places = collection.get_offset_transform().transform(collection.get_offsets())
         return any(box.contains(*place) for place in places)

@@ -10,7 +10,7 @@ from matplotlib.colors import ListedColormap
 from taichi_dem.engine.model import Model
 from taichi_dem.kit.plot_style import area_key, picture
 from taichi_dem.kit.validation import FileName
-from taichi_dem.plot.block import frame_block
+from taichi_dem.plot.block import frame_block, name_outer_axes
 from taichi_dem.plot.view import View, surface
 
 _NEVER = "#E4E0D6"
@@ -49,18 +49,13 @@ def plot_acting(
         figure,
         panels,
     ):
-        for axes in panels.flat[len(names) :]:
-            axes.set_axis_off()
         for axes, name in zip(panels.flat, names):
             times = acting_since[name]
             drawn = _coloured(axes, polygons, 1e3 * times[body], shades, 1e3 * until)
             count = int(np.isfinite(times).sum())
             axes.set_title(f"{TITLES[name]}\n{count:,} of {len(times):,} bodies", fontsize=9.5)
             frame_block(axes, view, model, 0.03)
-        for axes in panels[-1]:
-            axes.set_xlabel(view.labels()[0])
-        for axes in panels[:, 0]:
-            axes.set_ylabel(view.labels()[1])
+        name_outer_axes(panels, len(names), view)
         figure.colorbar(drawn, ax=panels, label="acts from [ms]", pad=0.02, aspect=30)
         figure.legend(
             handles=[area_key("never", fc=_NEVER, ec="#00000030")], loc="outside lower left"

@@ -41,6 +41,18 @@ def frame_block(axes: Any, view: View, model: Model, margin: float = 0.05) -> No
     axes.grid(False)
 
 
+def name_outer_axes(panels: np.ndarray, count: int, view: View) -> None:
+    """Labels and numbers of x below each column and of y on the left; hide all but count panels."""
+    columns = panels.shape[1]
+    for axes in panels.flat[count:]:
+        axes.set_axis_off()
+    for axes in panels.flat[max(0, count - columns) : count]:
+        axes.set_xlabel(view.labels()[0])
+        axes.tick_params(labelbottom=True)
+    for axes in panels[:, 0]:
+        axes.set_ylabel(view.labels()[1])
+
+
 def plot_cracks(
     path: Optional[FileName],
     model: Model,
@@ -155,12 +167,7 @@ def plot_steps(
         figure.get_layout_engine().set(h_pad=0.08)
         for axes, frame in zip(panels.flat, frames):
             drawn = _levels(axes, view, model, frame, broken_time, look)
-        for axes in panels.flat[len(frames) :]:
-            axes.set_axis_off()
-        for axes in panels[-1]:
-            axes.set_xlabel(view.labels()[0])
-        for axes in panels[:, 0]:
-            axes.set_ylabel(view.labels()[1])
+        name_outer_axes(panels, len(frames), view)
         bar = figure.colorbar(drawn, ax=panels, ticks=range(top + 1), pad=0.02, aspect=30)
         bar.ax.set_yticklabels(level_names(dt0, top + 1))
         bar.ax.tick_params(length=0)
