@@ -16,6 +16,7 @@ from taichi_dem.engine.model import Model
 from taichi_dem.kit.effect_usage import Advice
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 from taichi_dem.kit.validation import fraction, instance, positive
+from taichi_dem.mesh.parts import may_meet, parts_of
 from taichi_dem.result import Result
 from taichi_dem.scene import Scene
 from taichi_dem.simulate import run_simulation
@@ -91,7 +92,9 @@ def estimated_effects(scene: Scene, until: float) -> tuple[Estimate, ...]:
     """
     instance("scene", scene, Scene)
     model = Model(scene.mesh, scene.body_materials, scene.effects)
-    return estimates_before(model, positive("until", until))
+    until, part = positive("until", until), parts_of(scene.mesh)
+    meeting = int(part.max() + 1) if may_meet(scene, part) else 0
+    return estimates_before(model, until, scene.initial_motion.get("velocity"), meeting)
 
 
 def differences(result: Result, names: Iterable[str], tolerance: float) -> dict[str, float]:

@@ -18,12 +18,10 @@ import numpy as np
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import FileName, direction, finite, positive, shown
 from taichi_dem.mesh.drawn_out import drawn_out
-from taichi_dem.mesh.filled import filled_surface
+from taichi_dem.mesh.filled import MOST_BODIES, filled_surface
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.triangles import circle, divided
 
-#: Most elements of a mesh: ten million tetrahedra take some ten GiB to check.
-_MOST_BODIES = 10_000_000
 #: Tetrahedra in a cube of an element: 2.3 triangles in a square, three in a layer of 0.8.
 _PER_CUBE = 8.7
 #: Distance from a line within which a point lies on it, in elements.
@@ -236,10 +234,10 @@ def _element(element, smallest, volume):
             f"element must be at most the smallest length of the shape, {smallest:g} m, "
             f"got {element:g}"
         )
-    if _PER_CUBE * volume / element**3 > _MOST_BODIES:
-        least = (_PER_CUBE * volume / _MOST_BODIES) ** (1.0 / 3.0)
+    if _PER_CUBE * volume / element**3 > MOST_BODIES:
+        least = (_PER_CUBE * volume / MOST_BODIES) ** (1.0 / 3.0)
         raise InputError(
-            f"element must be at least {least:.3g} m, for {_MOST_BODIES} tetrahedra at most, "
+            f"element must be at least {least:.3g} m, for {MOST_BODIES} tetrahedra at most, "
             f"got {element:g}"
         )
     return element

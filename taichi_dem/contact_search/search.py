@@ -89,7 +89,10 @@ class BroadPhase:
         option = _CAPACITIES[int(values(self.full))]
         if option:
             law = type(self.contacts.law).__name__
-            raise InputError(f"contact lists are full: give {law} a larger {option}")
+            raise InputError(
+                f"contact lists are full: give {law} a larger {option}, or move solids apart that "
+                "lie in each other"
+            )
 
     @property
     def phases(self) -> tuple[tuple[Callable[..., Any], Callable[..., Any]], ...]:

@@ -7,7 +7,7 @@ factor of a few, which no such estimate knows.
 
 import math
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Optional
 
 import numpy as np
 
@@ -59,13 +59,17 @@ class Estimate:
         return f"{self.effect}: {self.verdict} ({self.words} {value})"
 
 
-def estimates_before(model: "Model", until: float) -> tuple[Estimate, ...]:
+def estimates_before(
+    model: "Model", until: float, velocity: Optional[np.ndarray] = None, meeting: int = 0
+) -> tuple[Estimate, ...]:
     """Estimates of all effects of a scene before a run, by dimensionless groups.
 
-    model: the scene's arrays. until: end of the run [s]. The stress is that of the loads and
-    supports (``Effect.stress``), the speed that of a wave of this stress, stress / (density wave
-    speed). Of several materials the least strengths, the largest friction and the mean density
-    count.
+    model: the scene's arrays. until: end of the run [s]. velocity: of the bodies at the start
+    [m/s], (body_count, 3), None at rest. meeting: number of parts that no bond joins, where they
+    may meet, else 0. The stress is that of the loads and supports (``Effect.stress``) and of the
+    motion at the start, the speed that of a wave of this stress, stress / (density wave speed), or
+    the largest at the start. Of several materials the least strengths, the largest friction and
+    the mean density count.
     """
     materials, size = model.materials, float(np.ptp(model.mesh.points, axis=0).max())
     density = mean_density(model.mesh, materials.density)
@@ -74,22 +78,49 @@ def estimates_before(model: "Model", until: float) -> tuple[Estimate, ...]:
         for effect in (*model.loads, *model.supports)
     ]
     # An unknown load is NaN, and with it all that follows.
-    stress = float(sum(given))
     spacing = float(2.0 * model.body_radius.mean())
     wave = math.sqrt(_normal_stiffness(model) * spacing / density)
-    speed = stress / (density * wave)
+    beside, rim, fastest = _speeds(model, velocity)
+    stress = float(sum(given)) + density * (wave * beside + rim**2)
+    speed = np.maximum(stress / (density * wave), fastest)
     softening = stress / materials.least("tensile_strength")
     shear = stress / max(materials.least("cohesion"), 1e-300)
     breaks = max(softening, shear)
     return (
         _judged("softening", softening, "stress over tensile strength"),
         _judged("slip", shear, "stress over cohesion"),
-        _judged("contact", breaks, "stress over strength, as contact needs free faces"),
+        _contact(breaks, meeting),
         _judged("friction", materials.friction * breaks, "friction times stress over strength"),
         _judged("bond damping", _damping(model), "share of a bond's vibration lost in a cycle"),
         _judged("gravity", WEIGHT * until / max(speed, 1e-300), "speed of a fall over that given"),
         _judged("air drag", _drag(density, speed, until, spacing), "share of momentum lost to air"),
     )
+
+
+def _contact(breaks, meeting):
+    """Estimate of contact: parts that meet touch from the start, others where they break."""
+    if meeting and not breaks >= meeting:
+        return _judged("contact", float(meeting), "number of parts that may meet")
+    return _judged("contact", breaks, "stress over strength, as contact needs free faces")
+
+
+def _speeds(model, velocity):
+    """Speeds at the start: largest beside a rigid motion of all, of its rim, and largest of all.
+
+    A front that stops a speed v has the stress density wave v, a rim of speed v density v^2.
+    """
+    if velocity is None:
+        return 0.0, 0.0, 0.0
+    mass = model.body_mass[:, None]
+    arm = model.centre - (mass * model.centre).sum(axis=0) / mass.sum()
+    mean = (mass * velocity).sum(axis=0) / mass.sum()
+    momentum = (mass * np.cross(arm, velocity)).sum(axis=0)
+    inertia = np.eye(3) * (mass * arm**2).sum() - (mass * arm).T @ arm
+    rim = np.cross(np.linalg.pinv(inertia) @ momentum, arm)
+    speeds = (velocity - mean - rim, rim, velocity)
+    beside, turning, fastest = (float(np.linalg.norm(one, axis=1).max()) for one in speeds)
+    # Rounding of a rigid motion strains nothing.
+    return beside if beside > 1e-9 * fastest else 0.0, turning, fastest
 
 
 def _damping(model):

@@ -14,6 +14,10 @@ from taichi_dem.mesh.mesh import Mesh, checked_mesh
 
 #: Angle between triangles of an STL from which on an edge parts two surfaces [degrees].
 _EDGE_DEG = 40.0
+#: Most elements of a mesh: ten million tetrahedra take some ten GiB to check.
+MOST_BODIES = 10_000_000
+#: Tetrahedra that Gmsh makes in a cube of an element.
+_PER_CUBE = 8.5
 #: Endings of files, by how they are read.
 _DRAWN, _TRIANGLES = (".step", ".stp"), (".stl",)
 
@@ -32,6 +36,7 @@ def filled_surface(path: FileName, element: float, scale: float = 1.0) -> Mesh:
             _draw_solid(gmsh, name)
         else:
             _draw_triangles(gmsh, name)
+        _refuse_too_many(name, element, scale, _drawn_volume(gmsh, drawn))
         gmsh.option.setNumber("Mesh.MeshSizeMin", element / scale)
         gmsh.option.setNumber("Mesh.MeshSizeMax", element / scale)
         gmsh.model.mesh.generate(3)
@@ -46,6 +51,28 @@ def _draw_solid(gmsh: Any, name: str) -> None:
     gmsh.model.occ.synchronize()
     if not gmsh.model.getEntities(3):
         raise InputError(f"surface file {name} must hold a solid, a closed surface, got none")
+
+
+def _drawn_volume(gmsh, drawn):
+    """Volume inside the surface, in units of the file."""
+    if drawn:
+        return sum(gmsh.model.occ.getMass(3, tag) for _, tag in gmsh.model.getEntities(3))
+    tags, places, _ = gmsh.model.mesh.getNodes()
+    place = dict(zip(tags.tolist(), places.reshape(-1, 3)))
+    _, nodes = gmsh.model.mesh.getElementsByType(2)
+    corners = np.array([place[node] for node in nodes.tolist()]).reshape(-1, 3, 3)
+    return abs(float(np.linalg.det(corners - corners[:1, :1]).sum())) / 6.0
+
+
+def _refuse_too_many(name, element, scale, volume):
+    """Raise InputError for more tetrahedra than there is memory for, before Gmsh makes them."""
+    volume = volume * scale**3
+    least = (_PER_CUBE * volume / MOST_BODIES) ** (1.0 / 3.0)
+    if element < least:
+        raise InputError(
+            f"element must be at least {least:.3g} m, for {MOST_BODIES} tetrahedra at most in the "
+            f"{volume:.3g} m^3 of {name}, got {element:g}"
+        )
 
 
 def _draw_triangles(gmsh: Any, name: str) -> None:

@@ -42,8 +42,8 @@ def join(*meshes: Mesh, names: Optional[Sequence[str]] = None, bonded: bool = Fa
     Raises
     ------
     InputError
-        There are fewer than two meshes, or other than as many different names, or meshes that are
-        to be bonded share no face.
+        There are fewer than two meshes, or other than as many different names, or two groups would
+        have one name, or meshes that are to be bonded share no face.
 
     Examples
     --------
@@ -55,6 +55,7 @@ def join(*meshes: Mesh, names: Optional[Sequence[str]] = None, bonded: bool = Fa
     for place, mesh in enumerate(meshes):
         instance(f"mesh {place}", mesh, Mesh)
     parts = dict(zip(_checked_names(names, len(meshes)), ((mesh, (0, 0, 0)) for mesh in meshes)))
+    _refuse_clashes({name: mesh for name, (mesh, _) in parts.items()})
     flag("bonded", bonded)
     points = np.vstack([mesh.points for mesh in meshes])
     near = geometry.close_pairs(points, COINCIDENT * np.ptp(points, axis=0).max())
@@ -71,6 +72,21 @@ def _checked_names(names, count):
     if not several or len(set(map(str, given))) < count:
         raise InputError(f"names must be {count} different names, got {shown(names)}")
     return [word("names", name) for name in given]
+
+
+def _refuse_clashes(parts):
+    """Raise InputError where NAME_GROUP is the name of a group that is there already."""
+    for kind in ("groups", "body_groups"):
+        own = {group for mesh in parts.values() for group in getattr(mesh, kind)}
+        taken = own | set(parts) if kind == "body_groups" else set(own)
+        for name, mesh in parts.items():
+            for group in getattr(mesh, kind):
+                if f"{name}_{group}" in taken:
+                    raise InputError(
+                        f"names must give each group a name of its own, but {name}_{group} would "
+                        f"be that of {group} of {name} and of another: give other names"
+                    )
+                taken.add(f"{name}_{group}")
 
 
 def _bonded(mesh):

@@ -76,6 +76,19 @@ def test_what_is_not_closed_or_no_surface_is_refused(tmp_path):
         assert_refused(lambda name=name: shapes.from_surface(tmp_path / name, element=0.03), "")
 
 
+@needs_gmsh
+def test_more_elements_than_memory_holds_are_refused_before_gmsh_makes_them(tmp_path):
+    """10^7 tetrahedra of 8.5 in a cube of an element: an edge of (8.5 V / 10^7)^(1/3)."""
+    path = write_stl(tmp_path / "box.stl", box())
+    least = (8.5 * SIZE.prod() / 1e7) ** (1.0 / 3.0)
+    assert_refused(
+        lambda: shapes.from_surface(path, element=1e-5, scale=1e-3),
+        f"element must be at least {least:.3g} m",
+        "0.002 m^3",
+        "got 1e-05",
+    )
+
+
 def test_a_missing_gmsh_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "gmsh", None)
     path = write_stl(tmp_path / "box.stl", box())

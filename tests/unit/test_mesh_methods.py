@@ -16,6 +16,7 @@ from tests.turns import matrix, quaternion
 
 BAR = bar(0.2, 0.1, (2, 1, 1))
 AFTER = BAR.moved(by=(0.2, 0.0, 0.0))
+JOINED = join(BAR, AFTER.moved(by=(1.0, 0.0, 0.0)), names=["left", "right"])
 
 
 def test_a_moved_mesh_turns_about_its_middle_and_keeps_its_groups():
@@ -85,6 +86,11 @@ def test_the_picture_of_a_scene_shows_every_group(tmp_path):
 
 REFUSED = {
     "one": (lambda: join(BAR), "join must have at least two meshes", "got 1"),
+    "clash": (
+        lambda: join(JOINED, JOINED.moved(by=(9.0, 0.0, 0.0)), names=["left", "left_left"]),
+        "names must give each group a name of its own",
+        "left_",
+    ),
     "no mesh": (lambda: join(BAR, 3), "mesh 1 must be a Mesh", "3"),
     "names": (lambda: join(BAR, AFTER, names=["a"]), "names must be 2 different names", "['a']"),
     "alike": (lambda: join(BAR, AFTER, names=["a", "a"]), "names must be 2 different", "'a', 'a'"),
