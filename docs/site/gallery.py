@@ -4,10 +4,10 @@ import html
 from pathlib import Path
 
 from docs.site.markdown import Heading, Page
-from taichi_dem.kit.study.results_page import read_entries
+from taichi_dem.kit.study.entries import ENTRIES, read_entries
 
 #: Texts of the experiments, and the folder of their small pictures, from the root.
-TEXTS, PICTURES = "experiments/_gallery_pages.txt", "docs/pictures"
+TEXTS, PICTURES = f"experiments/{ENTRIES}", "docs/pictures"
 
 
 def gallery_page(root):
