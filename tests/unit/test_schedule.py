@@ -70,7 +70,7 @@ def test_moves_keep_the_list_exact_at_every_level():
     for _ in range(500):
         member = int(random.integers(60))
         keys[member] = random.integers(0, MAX_LEVEL + 1)
-        sorter.move(member, keys[member])
+        sorter.move(member, int(keys[member]))
         sorter.check(keys)
 
 
