@@ -61,6 +61,10 @@ def bad(row):
         raise SimulationDiverged("the run diverged at 1 s")
     if row["how"] == "bug":
         return {"x": row["not there"]}
+    if row["how"] == "leaves":
+        os._exit(79)
+    if row["how"] == "no file":
+        raise InputError("no file \udc80\0")
     if row["how"] == "killed":
         os.kill(os.getpid(), signal.SIGKILL)
     return {"x": 1.0} if row["how"] == "well" else row["how"]

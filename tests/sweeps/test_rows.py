@@ -53,6 +53,12 @@ def test_a_grid_has_all_combinations_the_last_column_fastest():
         ({"x": ["", "a"]}, "row 0 has an empty cell under 'x'"),
         ({"x": [1j]}, "x of row 0 must be a number or text, got 1j"),
         ({"x": [[1]]}, r"x of row 0 must be a number or text, got \[1\]"),
+        ({"x": np.ones((2, 2))}, r"x of row 0 must be a number or text, got array"),
+        ([{"x": np.ones(3)}], r"x of row 0 must be a number or text, got array"),
+        ({"x": np.array(1.0)}, "column x must be a list of values, got array"),
+        ({"x": ["\udc80"]}, "x of row 0 must be text without NUL that UTF-8 can hold"),
+        ({"x": ["a\0"]}, "x of row 0 must be text without NUL"),
+        (np.array(1.0), "a table must be rows"),
         ({"x": [2**63]}, "x of row 0 must be a number or text, got 9223372036854775808"),
         ({"error": [1]}, "a column of a table must have a name other than error, version"),
         ([{1: 2}], "must have a name other than .*, got 1"),
@@ -95,3 +101,19 @@ def test_a_grid_with_a_defect_is_one_sentence():
     for columns, words in (({}, "at least one column"), ({"x": 1}, "must be a list of values")):
         with pytest.raises(InputError, match=words):
             parameter_grid(**columns)
+
+
+def test_frames_that_would_lose_a_column_or_are_none_are_refused():
+    pandas = pytest.importorskip("pandas")
+    double = pandas.DataFrame([[1, 2]], columns=["x", "x"])
+    with pytest.raises(InputError, match="a table must name each column once, got 'x' twice"):
+        checked_rows(double)
+    with pytest.raises(InputError, match="a table must be rows, columns or the name of a CSV"):
+        checked_rows(pandas.Series([1, 2]))
+    with pytest.raises(InputError, match="row 1 has an empty cell under 'x'"):
+        checked_rows(pandas.DataFrame({"x": pandas.array([1, None], dtype="Int64")}))
+
+
+def test_text_with_an_underscore_is_no_number(tmp_path):
+    (tmp_path / "t.csv").write_text("x,y\n1_000,2024_01\n")
+    assert checked_rows(tmp_path / "t.csv") == [{"x": "1_000", "y": "2024_01"}]

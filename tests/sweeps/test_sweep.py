@@ -13,6 +13,7 @@ import pytest
 
 from taichi_dem import InputError, sweep
 from taichi_dem.kit import files
+from taichi_dem.kit.sweeps import local
 from taichi_dem.kit.sweeps.job import jobs_of, run_job
 from taichi_dem.kit.sweeps.journal import Journal
 from taichi_dem.kit.sweeps.rows import checked_rows
@@ -110,10 +111,10 @@ def test_a_sweep_that_is_killed_goes_on_to_the_same_bits(tmp_path):
 
 
 def test_failures_are_rows_and_only_what_may_end_otherwise_is_run_again(tmp_path):
-    how = ["well", "input", "diverged", "bug", "killed", "text"]
+    how = ["well", "input", "diverged", "bug", "killed", "text", "leaves", "no file"]
     found = sweep(jobs.bad, {"how": how}, workers=2, out=tmp_path, **QUIET)
     assert found["how"].tolist() == how
-    assert np.array_equal(found["x"], [1.0, *5 * [np.nan]], equal_nan=True)
+    assert np.array_equal(found["x"], [1.0, *7 * [np.nan]], equal_nan=True)
     assert found["error"].tolist() == [
         "",
         "sand must be dry, got wet",
@@ -121,8 +122,10 @@ def test_failures_are_rows_and_only_what_may_end_otherwise_is_run_again(tmp_path
         "KeyError: 'not there'",
         "its process was lost 3 times, the last time by SIGKILL",
         "the function of a sweep must return a dict, got 'text'",
+        "its process was lost 3 times, the last time by exit code 79",
+        r"no file \udc80\0",
     ]
-    assert len(list((tmp_path / "jobs").iterdir())) == 4
+    assert len(list((tmp_path / "jobs").iterdir())) == 5
 
 
 def test_results_that_no_table_holds_are_sentences():
@@ -180,6 +183,21 @@ def test_workers_out_of_range_are_refused(value):
         sweep(jobs.squared, {"x": [1]}, workers=value, **QUIET)
 
 
+def test_more_workers_than_processes_start_is_a_sentence_and_ends_those_that_run(monkeypatch):
+    made, start = [], local.multiprocessing.context.SpawnProcess.start
+
+    def full(process):
+        if len(made) == 2:
+            raise OSError(errno.EMFILE, "Too many open files")
+        start(process)
+        made.append(process)
+
+    monkeypatch.setattr(local.multiprocessing.context.SpawnProcess, "start", full)
+    with pytest.raises(InputError, match=r"^workers must be so few .*, got: Too many open files$"):
+        sweep(jobs.squared, {"x": range(9)}, workers=5, **QUIET)
+    assert len(made) == 2 and not any(process.is_alive() for process in made)
+
+
 @pytest.mark.parametrize("seed", [-1, 2**63 + 1, 0.5, "0", None])
 def test_seeds_out_of_range_are_refused(seed):
     with pytest.raises(InputError, match="seed must be a whole number from 0 to"):
@@ -208,6 +226,20 @@ def test_a_script_without_its_guard_ends_in_one_sentence(tmp_path):
     assert done.stdout == (
         'the call of sweep must stand below if __name__ == "__main__": in the script\n'
     )
+
+
+def test_a_file_that_starts_taichi_when_it_is_imported_is_refused(tmp_path):
+    text = (
+        "from taichi_dem import runtime, sweep\n\nruntime.start(threads=2)\n\n"
+        "def f(row):\n    return {}\n\nif __name__ == '__main__':\n    try:\n"
+        "        sweep(f, {'x': [1]}, workers=1)\n"
+        "    except ValueError as error:\n        print(error)\n"
+    )
+    (tmp_path / "script.py").write_text(text)
+    line = [sys.executable, "script.py"]
+    environment = users_environment(PYTHONPATH=ROOT)
+    done = subprocess.run(line, cwd=tmp_path, env=environment, capture_output=True, text=True)
+    assert done.stdout.startswith("Taichi must run on one thread in a worker of a sweep, got 2: ")
 
 
 def test_table_writes_csv_and_gives_pandas(tmp_path):

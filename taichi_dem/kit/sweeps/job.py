@@ -104,6 +104,12 @@ def run_job(work: Work, row: Row) -> Record:
 
 def run_in_worker(work: Work, row: Row, arch: str) -> Record:
     """Run one job with Taichi started on one CPU thread, by the thread of the worker."""
+    settings = runtime.settings()
+    if settings and settings.threads != 1:
+        raise InputError(
+            f"Taichi must run on one thread in a worker of a sweep, got {settings.threads}: the "
+            'file of the function must call runtime.start() below if __name__ == "__main__": only'
+        )
     runtime.start(arch, threads=1)
     runtime.check_thread("job of a sweep")
     hide_bars()
@@ -133,7 +139,9 @@ def _checked_values(values, row):
 
 
 def _in_one_line(failure):
-    return " ".join(str(failure).split())
+    """Words of an exception, as a table and a file can hold them: names of files may be no text."""
+    words = " ".join(str(failure).replace("\0", r"\0").split())
+    return words.encode(errors="backslashreplace").decode()
 
 
 def _main_file():

@@ -32,9 +32,15 @@ class _Worker:
 
     def __init__(self, name: str, arch: str):
         context = multiprocessing.get_context("spawn")
-        self.connection, theirs = context.Pipe()
-        self.process = context.Process(target=_serve, args=(theirs, name, arch))
-        self.process.start()
+        try:
+            self.connection, theirs = context.Pipe()
+            self.process = context.Process(target=_serve, args=(theirs, name, arch))
+            self.process.start()
+        except OSError as error:
+            reason = error.strerror or error
+            raise InputError(
+                f"workers must be so few that their processes start, got: {reason}"
+            ) from None
         theirs.close()
         self.ready = False
         self.job: Optional[Job] = None
@@ -83,9 +89,11 @@ def run_locally(
     name: of the function, as of ``checked_work``. Raises InputError where processes do not start.
     """
     waiting, tries = deque(jobs), Counter[str]()
-    workers = [_Worker(name, arch) for _ in range(min(count, len(waiting)))]
+    workers: list[_Worker] = []
     early = 0
     try:
+        for _ in range(min(count, len(waiting))):
+            workers.append(_Worker(name, arch))
         while waiting or any(worker.job for worker in workers):
             for k, worker in enumerate(workers):
                 message = worker.answer()
@@ -134,7 +142,7 @@ def _lost(job, code, waiting, tries):
 
 
 def _check_start(code, early):
-    if code == _UNGUARDED:
+    if early and code == _UNGUARDED:
         raise InputError(_GUARD)
     if early == TRIES:
         raise InputError(f"no process of the sweep starts: the last one ended by {_cause(code)}")

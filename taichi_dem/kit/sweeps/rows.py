@@ -65,8 +65,8 @@ def checked_rows(table: TableLike) -> list[Row]:
     """
     if isinstance(table, (str, os.PathLike)):
         rows = read_rows(table)
-    elif hasattr(table, "to_dict"):
-        rows = _of_columns(table.to_dict("list"))
+    elif hasattr(table, "columns") and hasattr(table, "to_dict"):
+        rows = _of_columns(_columns_of_frame(table))
     elif isinstance(table, Mapping):
         rows = _of_columns(table)
     else:
@@ -122,18 +122,38 @@ def plain_value(name: str, value: Any) -> Value:
         value = value.item()
     if isinstance(value, bool):
         return value
-    for kind in (float, str):
-        if isinstance(value, kind):
-            return kind(value)
+    if isinstance(value, float):
+        return float(value)
+    if isinstance(value, str):
+        return _plain_text(name, value)
     if isinstance(value, numbers.Integral) and -_MOST_WHOLE <= int(value) < _MOST_WHOLE:
         return int(value)
     raise InputError(f"{name} must be a number or text, got {shown(value)}")
 
 
+def _plain_text(name, text):
+    """Text that files and arrays hold as it is; InputError for other text."""
+    if "\0" in text or text.encode(errors="replace").decode() != text:
+        raise InputError(f"{name} must be text without NUL that UTF-8 can hold, got {text[:40]!a}")
+    return str(text)
+
+
 def _values(name, values):
-    if isinstance(values, (str, bytes, Mapping)) or not hasattr(values, "__iter__"):
+    if isinstance(values, (str, bytes, Mapping)) or not _has_items(values):
         raise InputError(f"column {name} must be a list of values, got {shown(values)}")
     return list(values)
+
+
+def _has_items(values):
+    """Whether values can be listed; arrays of no dimension say that they can, and cannot."""
+    return hasattr(values, "__iter__") and getattr(values, "ndim", 1) > 0
+
+
+def _columns_of_frame(frame):
+    """Columns of a DataFrame, which may have several of one name; InputError where it has."""
+    names = list(frame.columns)
+    _check_once("a table", names)
+    return {name: frame[name].to_list() for name in names}
 
 
 def _of_columns(columns):
@@ -145,7 +165,7 @@ def _of_columns(columns):
 
 
 def _of_dicts(table):
-    listed = hasattr(table, "__iter__") and not isinstance(table, (bytes, set, frozenset))
+    listed = _has_items(table) and not isinstance(table, (bytes, set, frozenset))
     rows = list(table) if listed else [table]
     for row in rows:
         if not isinstance(row, Mapping):
@@ -158,9 +178,13 @@ def _of_dicts(table):
 def _check_header(name, header):
     if "" in header:
         raise InputError(f"table {name} must name each column, got an empty name")
-    double = [column for k, column in enumerate(header) if column in header[:k]]
+    _check_once(f"table {name}", header)
+
+
+def _check_once(table, names):
+    double = [name for k, name in enumerate(names) if name in names[:k]]
     if double:
-        raise InputError(f"table {name} must name each column once, got {double[0]!r} twice")
+        raise InputError(f"{table} must name each column once, got {double[0]!r} twice")
 
 
 def _check_columns(first, row, number):
@@ -176,13 +200,24 @@ def _check_columns(first, row, number):
         if name not in first:
             raise InputError(f"row {number} has the unknown column {name!r}, which row 0 lacks")
     for name in first:
-        value = row.get(name)
-        if value is None or value == "" or value != value:
+        if _is_empty(row.get(name)):
             raise InputError(f"row {number} has an empty cell under {name!r}")
 
 
+def _is_empty(value):
+    """Whether a cell holds nothing: no value, no text, NaN, or NA of pandas."""
+    if value is None or isinstance(value, str):
+        return not value
+    try:
+        return bool(value != value)
+    except (TypeError, ValueError) as error:
+        # NA is neither equal nor unequal; arrays are refused as values later.
+        return isinstance(error, TypeError)
+
+
 def _number_or_text(cell):
-    for kind in (int, float):
+    # Python would read 2024_01 as 202401.
+    for kind in () if "_" in cell else (int, float):
         try:
             return kind(cell)
         except ValueError:
