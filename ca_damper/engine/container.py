@@ -137,14 +137,13 @@ class SprungContainer(SpringContainer):
         """Take the container over the step; the last slope serves again unless the load changed."""
         if action.impulse != self.impulse[s] or action.carried != self.carried[s]:
             self._set_action(s, action)
-        forcing = self._forcing(s, action)
-        dt, rtol, atol = self.table.dt[s], self.tolerance[0], self.tolerance[1]
+        forcing, dt = self._forcing(s, action), self.table.dt[s]
+        bounds = self.tolerance[0], self.tolerance[1], MOST_ATTEMPTS
         y, change, error = self._whole_step(s, forcing)
         attempts = 1
         if not error <= 1.0:
             y, change, attempts = rk45.integrate(
-                *(slope, forcing, 0.0, dt, self.state[s], self.slope[s], dt, rtol, atol),
-                MOST_ATTEMPTS,
+                slope, forcing, 0.0, dt, self.state[s], self.slope[s], dt, *bounds
             )
         self.state[s], self.slope[s] = y, change
         self.impulse_velocity[s] = action.impulse / (dt * (self.table.mass[s] + action.carried))
@@ -156,8 +155,8 @@ class SprungContainer(SpringContainer):
         phase = [self.phase[s, k] for k in ti.static(range(len(_STAGES)))]
         y, dt = self.state[s], self.table.dt[s]
         y_new, change, gap = rk45.stages(
-            *(slope_at_phase, forcing, phase[0], phase[1], phase[2], phase[3], phase[4]),
-            *(y, self.slope[s], dt),
+            slope_at_phase,
+            *(forcing, phase[0], phase[1], phase[2], phase[3], phase[4], y, self.slope[s], dt),
         )
         error = rk45.scaled_norm(gap, y, y_new, self.tolerance[0], self.tolerance[1])
         return y_new, change, error

@@ -111,9 +111,9 @@ class ExcitedContainer(SpringContainer):
         if action.impulse != self.impulse[s] or action.carried != self.carried[s]:
             self._set_action(s, action)
         load, dt = self._load(s, action), self.table.dt[s]
+        bounds = self.tolerance[0], self.tolerance[1], MOST_ATTEMPTS
         y, change, attempts = rk45.integrate(
-            *(self._change, load, 0.0, dt, self.state[s], self.slope[s], dt),
-            *(self.tolerance[0], self.tolerance[1], MOST_ATTEMPTS),
+            self._change, load, 0.0, dt, self.state[s], self.slope[s], dt, *bounds
         )
         self.state[s], self.slope[s] = y, change
         self.elapsed[s] = self.elapsed[s] + 1

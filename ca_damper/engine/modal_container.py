@@ -141,10 +141,9 @@ class ModalContainer(IntegratedContainer):
         if self.changed[first] != 0:
             self._renew_load(first)
             self._renew_slope(first)
-        dt = self.table.dt[first]
+        dt, bounds = self.table.dt[first], (self.tolerance[0], self.tolerance[1], MOST_ATTEMPTS)
         y, change, attempts = rk45.integrate(
-            *(self._change, first, 0.0, dt, self.state[first], self.slope[first], dt),
-            *(self.tolerance[0], self.tolerance[1], MOST_ATTEMPTS),
+            self._change, first, 0.0, dt, self.state[first], self.slope[first], dt, *bounds
         )
         self.state[first], self.slope[first] = y, change
         self._see(first, dt)
