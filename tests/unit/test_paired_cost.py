@@ -79,7 +79,7 @@ def test_the_watch_for_missing_effects_is_that_of_the_scene(scene, less, states)
     for one in (scene, less):
         frozen = FrozenScene(one, METHOD, states, substeps=1)
         frozen.seconds(1)
-        limits.append(frozen.simulation.state.limits.to_numpy()[0])
+        limits.append(frozen.simulation.state.limits.to_numpy()[0, 0])
     assert limits == [np.inf, CONCRETE.tensile_strength]
 
 
