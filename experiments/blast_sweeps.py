@@ -29,7 +29,7 @@ from taichi_dem.simulate import run_simulation
 
 NAME = "blast_sweeps"
 SETTINGS = {"times": ((2e-5, 1e-4, 2e-4, 4e-4), (5e-6, 2e-5))}
-#: Way -> (words, colour); the first is that of the method with solved dashpots.
+#: Way -> (words, colour, dashes); the first is that of the method with solved dashpots.
 WAYS = {
     "gauss_seidel": ("Gauss-Seidel by colours", STYLES["implicit"].colour, "-"),
     "jacobi": ("Jacobi, split masses", BROWN, "--"),
@@ -105,13 +105,13 @@ def run(options):
     rows = [
         {"t": 1e6 * time_s, "way": words, **{t: sweeps_to(found[way], t) for t in TOLERANCES}}
         for time_s, found in solving.found.items()
-        for way, (words, _) in WAYS.items()
+        for way, (words, *_) in WAYS.items()
     ]
     tolerances = {f"to {100 * t:g} %": (t, "") for t in TOLERANCES}
     study.show_rows(rows, {"t [us]": ("t", ".0f"), "way": ("way", ""), **tolerances})
     most = {
         f"sweeps_{way}_{t:g}": (max(row[t] for row in rows if row["way"] == words), "1")
-        for way, (words, _) in WAYS.items()
+        for way, (words, *_) in WAYS.items()
         for t in TOLERANCES
     }
     study.finish(options, NAME, most, [report])
