@@ -67,7 +67,9 @@ def test_a_worker_in_this_process_is_refused_as_taichi_runs_on_another_thread():
     options = {"n_workers": 1, "threads_per_worker": 1, "dashboard_address": ":0"}
     with distributed.LocalCluster(**options, processes=False) as cluster:
         with distributed.Client(cluster) as client:
-            with pytest.raises(InputError, match="Taichi must run on one thread in a worker of a sweep"):
+            with pytest.raises(
+                InputError, match="Taichi must run on one thread in a worker of a sweep"
+            ):
                 sweep(jobs.squared, {"x": [1]}, client=client, **QUIET)
 
 
