@@ -16,7 +16,7 @@ import pytest
 #: Longest time of one test [s]; the longest takes two minutes on a busy machine.
 MOST_SECONDS = 900
 
-_DIED = pytest.StashKey()
+_DIED, _SCHEDULING = pytest.StashKey(), pytest.StashKey()
 
 
 @pytest.hookimpl(wrapper=True)
@@ -57,17 +57,28 @@ def pytest_xdist_make_scheduler(config, log):
 
         def _reschedule(self, node):
             """Give a worker files until it has two tests, which it needs to begin, if there are."""
+            if node not in self.registered_collections:
+                return  # It has just begun in the place of another.
             super()._reschedule(node)
             while not node.shutting_down and self._pending_of(self.assigned_work[node]) < 2:
                 super()._reschedule(node)
 
     config.stash[_DIED] = []
-    return CrashSafeScheduling(config, log)
+    config.stash[_SCHEDULING] = CrashSafeScheduling(config, log)
+    return config.stash[_SCHEDULING]
 
 
 def _unfinished(files):
     """Files with a test that is not done."""
     return {name: tests for name, tests in files.items() if not all(tests.values())}
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish(session):
+    """Let no session pass that has left tests out."""
+    scheduling = session.config.stash.get(_SCHEDULING, None)
+    if scheduling is not None and scheduling.has_pending and session.exitstatus == 0:
+        session.exitstatus = 1
 
 
 def pytest_terminal_summary(terminalreporter, config):
