@@ -10,7 +10,8 @@ import numpy as np
 
 from taichi_dem.kit import runtime
 from taichi_dem.kit.plot_style import BLACK, GREY, picture, styles_of
-from taichi_dem.kit.study.summary import processor, versions
+from taichi_dem.kit.provenance import processor
+from taichi_dem.kit.study.summary import versions
 from taichi_dem.kit.study.work_precision import Point
 
 _SMALL = 8.5
