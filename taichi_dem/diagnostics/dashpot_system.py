@@ -43,16 +43,16 @@ class DashpotSystem:
 
     def __init__(self, simulation: Any):
         solver, model = simulation.advance.solver, simulation.model
-        pairs = solver.bonds.bodies.to_numpy()
-        holds = pairs[:, 0] >= 0
-        self.bodies = pairs[holds].T
+        read = solver.bonds.read()
+        holds = read["masters"] != solver.velocities.spare
+        self.bodies = np.stack([read["masters"][holds], read["slaves"][holds]])
         self.colours = edge_colours(self.bodies.T, model.body_count)
-        self.onto = self._jacobians(solver.bonds.branch.to_numpy()[holds])
+        self.onto = self._jacobians(read["branch"][holds])
+        self.last, solved = read["last"][holds], read["block"][holds]
+        turn = solver.velocities.turn.to_numpy()[: model.body_count]
         self.gives = np.zeros((model.body_count, 6, 6))
         self.gives[:, :3, :3] = (1.0 / model.body_mass)[:, None, None] * np.eye(3)
-        self.gives[:, 3:, 3:] = solver.velocities.turn.to_numpy()
-        a, b, c = (f.to_numpy()[holds] for f in (solver.bonds.a, solver.bonds.b, solver.bonds.c))
-        solved = np.block([[a, b], [b.swapaxes(1, 2), c]])
+        self.gives[:, 3:, 3:] = turn
         self.law = np.linalg.inv(solved) - sum(self._mobilities())
 
     @staticmethod

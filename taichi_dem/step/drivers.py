@@ -213,7 +213,7 @@ class SolvedStep(Step):
         pairs: Phases = ()
         if solver.has_bonds:
             first = solver.bonds.colour_first
-            bonds = tuple((Colour(first, c), solver.bond) for c in range(BOND_COLOURS))
+            bonds = tuple((Colour(first, c), solver.bonds_of) for c in range(BOND_COLOURS))
         if self.has_contact:
             pairs = tuple((PairColour(solver.pairs, c), solver.pair) for c in range(COLOURS))
             pairs += ((Once(), solver.last_pairs),)

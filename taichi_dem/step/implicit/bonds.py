@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import taichi as ti
 
-from taichi_dem.kit.allocation import assign
+from taichi_dem.kit.allocation import assign, values
+from taichi_dem.kit.lanes import LANES, by_lane, cross, product, squares, transposed_product
 from taichi_dem.kit.types import real, vec3, vec6
 from taichi_dem.methods import ImplicitDashpots
 from taichi_dem.physics.wrench import inverse, mobility, plus, point_block, zero_block
@@ -32,11 +33,14 @@ class BondDashpots:
     need not be stored.
 
     theta: where in the step dashpots take their velocity, and (1 - theta) / theta. refresh_every:
-    steps between two renewals of the blocks. colour_first: first place of each colour. index: of a
-    bond in the order. bodies: master and slave, -1 once released. branch: from the master's centre
-    to the slave's [m].
+    steps between two renewals of the blocks. colour_first: first group of each colour. index: place
+    of a bond in the order. masters, slaves: its bodies. branch: from the master's centre to the
+    slave's [m].
     a, b, c: the block (C'^-1 + G)^-1, C' = theta C, G the mobility of the pair. start: s0. last:
     the s1 that the present y satisfies. Velocities in m/s, spins in rad/s, world.
+    Bonds are visited by fours, one a lane (``kit.lanes``): place k is lane k % LANES of group k //
+    LANES, and fields are those of groups. Groups are of one colour; lanes that are left over, and
+    those of released bonds, belong to the spare body, and their twist and impulse stay zero.
     """
 
     constant_fields = ("theta", "refresh_every", "index", "colour_first")
@@ -50,30 +54,52 @@ class BondDashpots:
         self.theta = ti.field(real, shape=2)
         self.refresh_every = ti.field(ti.i64, shape=())
         self.index = ti.field(ti.i32, shape=bonds)
-        self.bodies = ti.Vector.field(2, ti.i32, shape=bonds)
-        self.branch = ti.Vector.field(3, real, shape=bonds)
-        self.a, self.b, self.c = (ti.Matrix.field(3, 3, real, shape=bonds) for _ in range(3))
-        self.start = ti.Vector.field(6, real, shape=bonds)
-        self.last = ti.Vector.field(6, real, shape=bonds)
         self.colour_first = ti.field(ti.i32, shape=BOND_COLOURS + 1)
+        self.masters, self.slaves = (ti.Vector.field(LANES, ti.i32) for _ in range(2))
+        self.branch = ti.Matrix.field(3, LANES, real)
+        self.start, self.last = (ti.Matrix.field(6, LANES, real) for _ in range(2))
+        self.a, self.b, self.c = (
+            tuple(ti.Matrix.field(3, LANES, real) for _ in range(3)) for _ in range(3)
+        )
+        visited = self.masters, self.slaves, self.branch, self.last, *self.a, *self.b, *self.c
+        groups = ti.root.dense(ti.i, bonds // LANES + BOND_COLOURS)
+        groups.place(*visited)
+        groups.place(self.start)
 
     def load(self, model: "Model", method: ImplicitDashpots) -> None:
         """Colour the bonds of a model and take the numbers of a method."""
         assign(self.theta, np.array([method.theta, (1.0 - method.theta) / method.theta]))
         assign(self.refresh_every, max(1, round(method.refresh / method.dt)))
         colours = model.bond_colours
-        place = np.empty(model.bond_count, dtype=np.int32)
-        place[np.argsort(colours, kind="stable")] = np.arange(model.bond_count, dtype=np.int32)
-        assign(self.index, place)
-        assign(self.bodies, np.full((model.bond_count, 2), -1))
         counts = np.bincount(colours, minlength=BOND_COLOURS)
-        assign(self.colour_first, np.cumsum([0, *counts]))
+        first = np.cumsum([0, *-(-counts // LANES)])
+        # Places of a colour begin with a group, whatever the colour before has left over.
+        begin = LANES * first[:-1] - np.cumsum([0, *counts[:-1]])
+        order = np.argsort(colours, kind="stable")
+        place = np.empty(model.bond_count, dtype=np.int32)
+        place[order] = np.arange(model.bond_count) + begin[colours[order]]
+        assign(self.index, place)
+        assign(self.colour_first, first)
+        for bodies in (self.masters, self.slaves):
+            assign(bodies, self.velocities.spare)
+
+    def read(self) -> dict[str, np.ndarray]:
+        """Arrays by place: masters, slaves (n,), branch (n, 3), last (n, 6), block (n, 6, 6)."""
+        names = ("masters", "slaves", "branch", "last")
+        found = {name: by_lane(values(getattr(self, name))) for name in names}
+        a, b, c = (
+            np.stack([by_lane(values(row)) for row in rows], axis=1)
+            for rows in (self.a, self.b, self.c)
+        )
+        return {**found, "block": np.block([[a, b], [b.swapaxes(1, 2), c]])}
 
     @ti.func
     def mean(self, b, motion):
         """A bond's motion with the twist that its dashpots answered in the step before."""
-        k = self.index[b]
-        twist = self.theta[0] * (self.last[k] + self.theta[1] * self.start[k])
+        g, n = self._place(b)
+        twist = vec6(0.0)
+        for k in ti.static(range(6)):
+            twist[k] = self.theta[0] * (self.last[g][k, n] + self.theta[1] * self.start[g][k, n])
         motion.velocity = motion.axes @ twist[0:3]
         motion.spin = motion.axes @ twist[3:6]
         return motion
@@ -81,23 +107,34 @@ class BondDashpots:
     @ti.func
     def begin(self, b, i, j, branch):
         """Load the present twist of an intact bond and, at intervals, its block."""
-        k = self.index[b]
-        self.bodies[k], self.branch[k] = [i, j], branch
+        g, n = self._place(b)
+        self.masters[g][n], self.slaves[g][n] = i, j
         now = self._twist(i, j, branch)
-        self.last[k] = self.last[k] + self.theta[1] * (self.start[k] - now)
-        self.start[k] = now
+        for k in ti.static(range(3)):
+            self.branch[g][k, n] = branch[k]
+        for k in ti.static(range(6)):
+            change = self.theta[1] * (self.start[g][k, n] - now[k])
+            self.last[g][k, n] = self.last[g][k, n] + change
+            self.start[g][k, n] = now[k]
         if (self.state.tick[None] // MACRO_TICKS) % self.refresh_every[None] == 0:
-            self._refresh(b, k, i, j)
+            self._refresh(b, g, n, i, j, branch)
 
     @ti.func
     def first(self, b):
         """Set the first guess of a run: a constant twist in the first step."""
-        slots, k = self.tables.bond_slots[b], self.index[b]
+        slots = self.tables.bond_slots[b]
         i, j = slots[0] >> 2, slots[1] >> 2
         if self.state.broken_tick[b] < 0:
-            branch = self.state.position[j] - self.state.position[i]
-            self.start[k] = self._twist(i, j, branch)
-            self.last[k] = self.start[k]
+            g, n = self._place(b)
+            now = self._twist(i, j, self.state.position[j] - self.state.position[i])
+            for k in ti.static(range(6)):
+                self.start[g][k, n] = now[k]
+                self.last[g][k, n] = now[k]
+
+    @ti.func
+    def _place(self, b):
+        """Group and lane of a bond."""
+        return self.index[b] // LANES, self.index[b] % LANES
 
     @ti.func
     def _twist(self, i, j, branch):
@@ -110,29 +147,39 @@ class BondDashpots:
     @ti.func
     def end(self, b):
         """Remove a released bond from the sweeps."""
-        self.bodies[self.index[b]] = [-1, -1]
+        g, n = self._place(b)
+        self.masters[g][n], self.slaves[g][n] = self.velocities.spare, self.velocities.spare
+        for k in ti.static(range(6)):
+            self.last[g][k, n] = 0.0
 
     @ti.func
-    def visit(self, k):
-        """Solve the bond at place k against its bodies; square of the velocity it changed."""
-        change2 = 0.0
-        i, j = self.bodies[k][0], self.bodies[k][1]
-        if i >= 0:
-            branch, last = self.branch[k], self.last[k]
-            linear, angular = self.velocities.apart(i, j, branch)
-            linear -= last[0:3]
-            angular -= last[3:6]
-            change2 = linear.norm_sqr()
-            force = self.a[k] @ linear + self.b[k] @ angular
-            moment = self.b[k].transpose() @ linear + self.c[k] @ angular
-            self.velocities.pull(i, j, branch, force, moment)
-            linear, angular = self.velocities.apart(i, j, branch)
-            for q in ti.static(range(3)):
-                self.last[k][q], self.last[k][3 + q] = linear[q], angular[q]
+    def visit(self, g):
+        """Solve the bonds of group g against their bodies; largest squared velocity it changed."""
+        i, j, branch = self.masters[g], self.slaves[g], self.branch[g]
+        velocity_i, spin_i = self.velocities.of_lanes(i)
+        velocity_j, spin_j = self.velocities.of_lanes(j)
+        last = self.last[g]
+        linear = velocity_j - velocity_i - cross(spin_i, branch) - last[0:3, :]
+        angular = spin_j - spin_i - last[3:6, :]
+        change2 = squares(linear).max()
+        force = product(self.a, g, linear) + product(self.b, g, angular)
+        moment = transposed_product(self.b, g, linear) + product(self.c, g, angular)
+        around = moment + cross(branch, force)
+        velocity_i, spin_i = self.velocities.pushed_lanes(i, velocity_i, spin_i, force, around)
+        velocity_j, spin_j = self.velocities.pushed_lanes(j, velocity_j, spin_j, -force, -moment)
+        linear = velocity_j - velocity_i - cross(spin_i, branch)
+        angular = spin_j - spin_i
+        for k in ti.static(range(3)):
+            for n in ti.static(range(LANES)):
+                last[k, n], last[3 + k, n] = linear[k, n], angular[k, n]
+        # Before what goes to bodies: the compiler makes vectors from the first row that it finds.
+        self.last[g] = last
+        self.velocities.assign_lanes(i, velocity_i, spin_i, force, around)
+        self.velocities.assign_lanes(j, velocity_j, spin_j, -force, -moment)
         return change2
 
     @ti.func
-    def _refresh(self, b, k, i, j):
+    def _refresh(self, b, g, n, i, j, branch):
         dt = self.schedule.step_seconds[0]
         axes = self.tables.bond_frame[b] @ self.state.rotation[i].transpose()
         along = self.tables.dashpot.traction(b, vec3(1.0, 1.0, 1.0))
@@ -153,7 +200,11 @@ class BondDashpots:
             self.velocities.turn[i],
             self.velocities.slack(j),
             self.velocities.turn[j],
-            self.branch[k],
+            branch,
         )
         solved = inverse(plus(inverse(block), free))
-        self.a[k], self.b[k], self.c[k] = solved.a, solved.b, solved.c
+        for r in ti.static(range(3)):
+            for c in ti.static(range(3)):
+                self.a[r][g][c, n] = solved.a[r, c]
+                self.b[r][g][c, n] = solved.b[r, c]
+                self.c[r][g][c, n] = solved.c[r, c]

@@ -9,7 +9,7 @@ from taichi_dem.contact_search.contacts import Contacts
 from taichi_dem.kit.allocation import assign, raise_to
 from taichi_dem.kit.types import real
 from taichi_dem.methods import ImplicitDashpots
-from taichi_dem.step.implicit.bonds import BondDashpots
+from taichi_dem.step.implicit.bonds import BOND_COLOURS, BondDashpots
 from taichi_dem.step.implicit.ground import GroundSweeps
 from taichi_dem.step.implicit.pairs import COLOURS, PairDashpots
 from taichi_dem.step.implicit.velocities import Velocities
@@ -77,14 +77,15 @@ class Solver:
         self.sweeps[None] = 0
         self.unsolved[None] = 1
         self.change2[None], self.speed2[None] = 0.0, 0.0
+        self.velocities.rest_spare()
 
     @ti.func
     def solve(self, one):
         """All sweeps of a step, one member after the other."""
         while self.unsolved[None] == 1:
             if ti.static(self.has_bonds):
-                for k in range(self.tables.bond_count[None]):
-                    self.bond(k)
+                for g in range(self.bonds.colour_first[BOND_COLOURS]):
+                    self.bonds_of(g)
             if ti.static(self.has_contact):
                 for a in range(self.pairs.count[None]):
                     self.pair(self.pairs.order[a])
@@ -94,9 +95,9 @@ class Solver:
             self.check_convergence(0)
 
     @ti.func
-    def bond(self, k):
-        """Visit the bond at place k."""
-        raise_to(self.change2, self.bonds.visit(k))
+    def bonds_of(self, g):
+        """Visit the bonds of group g."""
+        raise_to(self.change2, self.bonds.visit(g))
 
     @ti.func
     def pair(self, a):

@@ -4,7 +4,15 @@ from typing import TYPE_CHECKING
 
 import taichi as ti
 
-from taichi_dem.kit.types import real
+from taichi_dem.kit.lanes import (
+    LANES,
+    gathered,
+    gathered_numbers,
+    gathered_product,
+    row_of,
+    scaled,
+)
+from taichi_dem.kit.types import real, vec6
 from taichi_dem.physics.rotation import unit3
 
 if TYPE_CHECKING:
@@ -26,8 +34,8 @@ class Velocities:
     scratch_fields = ("twist", "given")
 
     def __init__(self, tables: "Tables", state: "State"):
-        n = tables.capacity.bodies
-        self.tables, self.state = tables, state
+        self.tables, self.state, self.spare = tables, state, tables.capacity.bodies
+        n = self.spare + 1
         self.twist, self.turn = ti.Vector.field(6, real), ti.Matrix.field(3, 3, real)
         self.lightness = ti.field(real)
         ti.root.dense(ti.i, n).place(self.twist, self.turn, self.lightness)
@@ -121,6 +129,39 @@ class Velocities:
             self.twist[i][3 + k] = self.twist[i][3 + k] + turned[k]
             self.twist[j][k] = self.twist[j][k] - second[k]
             self.twist[j][3 + k] = self.twist[j][3 + k] - back[k]
+
+    @ti.func
+    def rest_spare(self):
+        """Set the spare body at rest; nothing moves it."""
+        self.twist[self.spare] = vec6(0.0)
+
+    @ti.func
+    def of_lanes(self, i):
+        """Velocity and spin of the body of each lane."""
+        return gathered(self.twist, i, 0), gathered(self.twist, i, 3)
+
+    @ti.func
+    def pushed_lanes(self, i, linear, angular, force, moment):
+        """Velocity and spin of the body of each lane after an impulse and a moment."""
+        if ti.static(self.has_supports):
+            linear += gathered_product(self.hold, i, force)
+        else:
+            linear += scaled(gathered_numbers(self.lightness, i), force)
+        angular += gathered_product(self.turn, i, moment)
+        return linear, angular
+
+    @ti.func
+    def assign_lanes(self, i, linear, angular, force, moment):
+        """Set velocity and spin of the body of each lane, and note what has pushed it.
+
+        No two lanes may share a body, unless it is the spare one. A row at once: for each write
+        the compiler looks up anew where all fields lie.
+        """
+        for n in ti.static(range(LANES)):
+            self.twist[i[n]] = row_of(linear, angular, n)
+        if ti.static(self.has_supports):
+            for n in ti.static(range(LANES)):
+                self.given[i[n]] = self.given[i[n]] + row_of(force, moment, n)
 
     @ti.func
     def push(self, i, force, moment):
