@@ -60,9 +60,10 @@ def scaled(numbers, vectors):
 def gathered(field: ti.template(), members, first: ti.template()):
     """Three entries of a vector field at each lane's member, from component first on."""
     made = lane_vectors(0.0)
-    for k in ti.static(range(3)):
-        for n in ti.static(range(LANES)):
-            made[k, n] = field[members[n]][first + k]
+    for n in ti.static(range(LANES)):
+        entry = field[members[n]]
+        for k in ti.static(range(3)):
+            made[k, n] = entry[first + k]
     return made
 
 
@@ -79,12 +80,13 @@ def gathered_numbers(field: ti.template(), members):
 def gathered_product(field: ti.template(), members, vectors):
     """Products of the 3x3 matrix at each lane's member with the lane's vector."""
     made = lane_vectors(0.0)
-    for r in ti.static(range(3)):
-        for n in ti.static(range(LANES)):
+    for n in ti.static(range(LANES)):
+        entry = field[members[n]]
+        for r in ti.static(range(3)):
             made[r, n] = (
-                field[members[n]][r, 0] * vectors[0, n]
-                + field[members[n]][r, 1] * vectors[1, n]
-                + field[members[n]][r, 2] * vectors[2, n]
+                entry[r, 0] * vectors[0, n]
+                + entry[r, 1] * vectors[1, n]
+                + entry[r, 2] * vectors[2, n]
             )
     return made
 
