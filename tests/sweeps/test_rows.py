@@ -86,6 +86,7 @@ def test_a_table_with_a_defect_is_one_sentence(table, words):
         ("x,y\n1,2,3\n", "row 0 of table .* must have 2 cells, got 3"),
         ("x,y\n1, \n", "row 0 of table .* has an empty cell under 'y'"),
         ("x,y\n1,nan\n", "row 0 has an empty cell under 'y'"),
+        ("x,y\n1,-1e400\n", "numbers of a table must be below 1.8e308 in size, got -1e400"),
         ('x,y\n1,"2\n', "cannot be read"),
         (b"x\n\xff\n", "cannot be read"),
     ],

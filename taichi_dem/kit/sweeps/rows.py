@@ -5,6 +5,7 @@ A row is a dict of column name to number or text.
 
 import csv
 import itertools
+import math
 import numbers
 import os
 from collections.abc import Iterable, Mapping, Sequence
@@ -216,10 +217,13 @@ def _is_empty(value):
 
 
 def _number_or_text(cell):
-    # Python would read 2024_01 as 202401.
+    # Python would read 2024_01 as 202401, and 1e400 as infinity.
     for kind in () if "_" in cell else (int, float):
         try:
-            return kind(cell)
+            number = kind(cell)
         except ValueError:
             continue
+        if number in (math.inf, -math.inf) and "inf" not in cell.lower():
+            raise InputError(f"numbers of a table must be below 1.8e308 in size, got {cell}")
+        return number
     return cell
