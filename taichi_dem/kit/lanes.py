@@ -34,15 +34,11 @@ def cross(one, other):
 
 
 @ti.func
-def squares(vectors):
-    """Squared lengths, lane by lane."""
+def dot(one, other):
+    """Scalar products, lane by lane."""
     made = lane_numbers(0.0)
     for n in ti.static(range(LANES)):
-        made[n] = (
-            vectors[0, n] * vectors[0, n]
-            + vectors[1, n] * vectors[1, n]
-            + vectors[2, n] * vectors[2, n]
-        )
+        made[n] = one[0, n] * other[0, n] + one[1, n] * other[1, n] + one[2, n] * other[2, n]
     return made
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem.kit.allocation import assign, values
-from taichi_dem.kit.lanes import LANES, by_lane, cross, product, squares, transposed_product
+from taichi_dem.kit.lanes import LANES, by_lane, cross, dot, product, transposed_product
 from taichi_dem.kit.types import real, vec3, vec6
 from taichi_dem.methods import ImplicitDashpots
 from taichi_dem.physics.wrench import inverse, mobility, plus, point_block, zero_block
@@ -161,7 +161,7 @@ class BondDashpots:
         last = self.last[g]
         linear = velocity_j - velocity_i - cross(spin_i, branch) - last[0:3, :]
         angular = spin_j - spin_i - last[3:6, :]
-        change2 = squares(linear).max()
+        change2 = dot(linear, linear).max()
         force = product(self.a, g, linear) + product(self.b, g, angular)
         moment = transposed_product(self.b, g, linear) + product(self.c, g, angular)
         around = moment + cross(branch, force)

@@ -1,0 +1,129 @@
+"""Lanes compute what one member alone would, to the bit, and bonds are laid out one a lane."""
+
+import numpy as np
+import pytest
+import taichi as ti
+
+from taichi_dem import CONCRETE, ImplicitDashpots, Scene, Simulation, effects, runtime
+from taichi_dem.kit import lanes
+from taichi_dem.kit.allocation import values
+from taichi_dem.kit.lanes import LANES, by_lane
+from taichi_dem.mesh.shapes import bar
+
+BODIES = 11
+
+
+@ti.data_oriented
+class Operations:
+    """Vectors and matrices of some bodies, and what lanes make of them."""
+
+    def __init__(self):
+        self.vector = ti.Vector.field(6, ti.f64, shape=BODIES)
+        self.number = ti.field(ti.f64, shape=BODIES)
+        self.matrix = ti.Matrix.field(3, 3, ti.f64, shape=BODIES)
+        self.rows = tuple(ti.Matrix.field(3, LANES, ti.f64, shape=2) for _ in range(3))
+        self.made = {
+            name: ti.Matrix.field(3, LANES, ti.f64, shape=())
+            for name in ("cross", "scaled", "gathered", "turned", "product", "transposed")
+        }
+        self.dot = ti.Vector.field(LANES, ti.f64, shape=())
+        self.row = ti.Vector.field(6, ti.f64, shape=LANES)
+
+    @ti.kernel
+    def work(self, first: ti.i32):
+        """Apply every function to bodies first, first + 2 and so on."""
+        for _ in range(1):
+            members = lanes.lane_indices(0)
+            for n in ti.static(range(LANES)):
+                members[n] = first + 2 * n
+            one = lanes.gathered(self.vector, members, 0)
+            other = lanes.gathered(self.vector, members, 3)
+            self.made["gathered"][None] = other
+            self.made["cross"][None] = lanes.cross(one, other)
+            numbers = lanes.gathered_numbers(self.number, members)
+            self.made["scaled"][None] = lanes.scaled(numbers, one)
+            self.made["turned"][None] = lanes.gathered_product(self.matrix, members, one)
+            self.made["product"][None] = lanes.product(self.rows, 1, one)
+            self.made["transposed"][None] = lanes.transposed_product(self.rows, 1, one)
+            self.dot[None] = lanes.dot(one, other)
+            for n in ti.static(range(LANES)):
+                self.row[n] = lanes.row_of(one, other, n)
+
+
+@pytest.fixture(scope="module")
+def operations():
+    runtime.start()
+    made, random = Operations(), np.random.default_rng(3)
+    for field in (made.vector, made.number, made.matrix, *made.rows):
+        field.from_numpy(random.normal(size=field.to_numpy().shape))
+    made.work(1)
+    return made
+
+
+def applied(matrices, vectors):
+    """Matrices times vectors, summed from the first column to the last."""
+    total = matrices[..., 0] * vectors[:, 0, None]
+    for k in (1, 2):
+        total = total + matrices[..., k] * vectors[:, k, None]
+    return total
+
+
+def test_each_lane_has_the_bits_of_its_member(operations):
+    members = 1 + 2 * np.arange(LANES)
+    both = operations.vector.to_numpy()[members]
+    one, other = both[:, :3], both[:, 3:]
+    block = np.stack([by_lane(row.to_numpy())[LANES:] for row in operations.rows], axis=1)
+    following, third = np.roll(np.arange(3), -1), np.roll(np.arange(3), -2)
+    wanted = {
+        "gathered": other,
+        "cross": one[:, following] * other[:, third] - one[:, third] * other[:, following],
+        "scaled": operations.number.to_numpy()[members, None] * one,
+        "turned": applied(operations.matrix.to_numpy()[members], one),
+        "product": applied(block, one),
+        "transposed": applied(block.swapaxes(1, 2), one),
+    }
+    for name, values_wanted in wanted.items():
+        assert np.array_equal(operations.made[name].to_numpy().T, values_wanted), name
+    products = one * other
+    dots = products[:, 0] + products[:, 1] + products[:, 2]
+    assert np.array_equal(operations.dot.to_numpy(), dots)
+    assert np.array_equal(operations.row.to_numpy(), both)
+
+
+@pytest.fixture(scope="module")
+def simulation():
+    """A damped bar in motion that has broken some of its bonds."""
+    scene = Scene(bar(0.1, 0.05, (3, 2, 2)), CONCRETE, [effects.BondDamping(), effects.Softening()])
+    made = Simulation(scene, ImplicitDashpots(1e-7))
+    centre = made.model.centre
+    speeds = 20.0 * np.random.default_rng(1).normal(size=(2, *centre.shape))
+    made.state.set_motion(centre, np.tile([1.0, 0.0, 0.0, 0.0], (len(centre), 1)), *speeds)
+    made.start()
+    made.advance_to(60)
+    return made
+
+
+def test_a_group_has_one_colour_and_shares_no_body(simulation):
+    model, bonds = simulation.model, simulation.advance.solver.bonds
+    place = values(bonds.index)[: model.bond_count]
+    assert len(set(place)) == model.bond_count
+    first = values(bonds.colour_first)
+    colours = np.searchsorted(first, place // LANES, side="right") - 1
+    assert np.array_equal(colours, model.bond_colours)
+    for group in set(place // LANES):
+        bodies = model.bonds["slots"][place // LANES == group] >> 2
+        assert len(set(bodies.ravel())) == bodies.size
+
+
+def test_lanes_without_a_bond_belong_to_a_body_at_rest(simulation):
+    solver = simulation.advance.solver
+    holds = simulation.state.broken_tick.to_numpy()[: simulation.model.bond_count] < 0
+    assert holds.any() and not holds.all()
+    read = solver.bonds.read()
+    held = np.zeros(len(read["masters"]), dtype=bool)
+    held[values(solver.bonds.index)[: len(holds)][holds]] = True
+    spare = solver.velocities.spare
+    for name in ("masters", "slaves"):
+        assert np.array_equal(read[name] == spare, ~held)
+    assert np.all(read["last"][~held] == 0.0) and np.all(read["last"][held] != 0.0)
+    assert np.all(solver.velocities.twist.to_numpy()[spare] == 0.0)
