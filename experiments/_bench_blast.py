@@ -26,8 +26,8 @@ SWEEPS = 500
 #: By the words of a figure: method, runs in the full bench, bound of a whole run.
 RUNS = {
     "implicit": ("implicit", 5, "<= 0.9"),
-    "limited": ("explicit_limited", 3, "<= 5"),
-    "controlled": ("multirate_controlled", 3, "<= 8"),
+    "limited": ("explicit_limited", 2, "<= 5"),
+    "controlled": ("multirate_controlled", 2, "<= 8"),
     "l = 1e-07 m": ("paper_multirate", 1, "<= 20"),
 }
 

@@ -24,7 +24,7 @@ PARTICLE = Work(bytes=36, flops=4)
 #: is a product and a sum; four walls are as many differences. Its neighbours are left out.
 SPHERE = Work(bytes=64, flops=12)
 #: Fillings of the figure of the response, and the share of its frequencies that is run.
-RESPONSES, EVERY = ("dem", "ca_static", "ca_landing", "ca_ejection"), 4
+RESPONSES, EVERY = ("dem", "ca_static", "ca_landing", "ca_ejection"), 8
 
 
 def measure(quick):
@@ -44,7 +44,7 @@ def measure(quick):
     yield Figure(name, "million cells/s", found["scan"], ">= 500", CELL)
     name = "automaton, list, N = 50"
     yield Figure(name, "million particle steps/s", found["list"], ">= 100", PARTICLE)
-    gains = [least_gain(scan, listed, least) for _ in range(1 if quick else 3)]
+    gains = [least_gain(scan, listed, least) for _ in range(1 if quick else 2)]
     yield Figure("automaton, scan / list, least of N = 1 .. 120", "1", gains, "> 1")
     for number, wanted in WANTED.items():
         name, bound = f"spheres, N = {number}", f">= {wanted}"
@@ -78,7 +78,7 @@ def least_gain(scan, listed, least):
 def responses():
     """Yield the time of the response figure, by the wall and as half its CPU time.
 
-    It is measured at every fourth of its frequencies, and multiplied by all over those.
+    It is measured at every eighth of its frequencies, and multiplied by all over those.
     """
     found = call_in_process(response_seconds, threads=2, labels=RESPONSES)
     wall, half, steps = zip(*((one["wall"], 0.5 * one["cpu"], one["steps"]) for one in found))
@@ -86,7 +86,7 @@ def responses():
     parts = (("spheres", 60, slice(0, 1)), ("static", 12, slice(1, 2)))
     parts += (("all three", 240, slice(1, None)),)
     for (words, most, part), work in zip(parts, works):
-        title = f"response, {words}, from every fourth frequency"
+        title = f"response, {words}, from every eighth frequency"
         yield Figure(f"{title}, two threads", "s of wall", [sum(wall[part])], f"<= {most}")
         yield Figure(f"{title}, half its CPU", "s", [sum(half[part])], f"<= {most}", work * 0.5)
 
