@@ -89,9 +89,9 @@ def test_gain_of_a_second_thread_is_that_of_the_busiest(monkeypatch):
 
 def test_the_finest_run_is_extrapolated_by_its_evaluations(monkeypatch):
     monkeypatch.setattr(_bench_blast, "EVALUATIONS", 100)
-    runs = [SimpleNamespace(seconds=2.0, evaluations=10, work=Work(bytes=8))]
+    runs = [SimpleNamespace(seconds=2.0, evaluations=5, work=Work(bytes=8))]
     early, whole = _bench_blast.finest_run(runs)
-    assert early.values == [2.0] and whole.values == [20.0]
+    assert early.values == [2.0] and whole.values == [40.0]
     # The share of the floor stays that of what was run.
     assert whole.share(RATES) == early.share(RATES) == 0.5
 
@@ -162,7 +162,7 @@ HISTORY = [run_at("6bcd734", 2.0, 0.1), run_at("373f0b8", 1.0, 0.3), run_at("b63
 
 
 def test_the_last_run_of_each_commit_is_shown_if_it_can_be_compared():
-    other = [run_at("6bcd734", 9.0, 0.9, quick=True), run_at("6bcd734", 9.0, 0.9, threads=2)]
+    other = [run_at("4be5758", 9.0, 0.9, quick=True), run_at("057f332", 9.0, 0.9, threads=2)]
     again = run_at("6bcd734", 5.0, 0.1)
     assert _bench_history.alike([*HISTORY, *other, again]) == [*HISTORY[1:], again]
 
