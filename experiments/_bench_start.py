@@ -6,11 +6,14 @@ import time
 
 import numpy as np
 
+from _bench_figure import Figure
 from _blast import paper_effects, paper_scene
 from taichi_dem import CONCRETE, ImplicitDashpots, Multirate, Scene, Simulation, effects, simulate
 from taichi_dem.kit.study import call_in_process, clock
 from taichi_dem.mesh.shapes import bar
 
+#: Processes of each kind, and of those of ten scenes that are timed.
+ROUNDS, TEN = 2, 1
 #: Gas peaks of the ten scenes [Pa], their end [s]; the step of all scenes here [s].
 PEAKS = np.linspace(400e6, 650e6, 10)
 UNTIL, STEP = 1e-4, 4e-7
@@ -49,13 +52,13 @@ def ten_scenes():
 
 
 def measure(quick):
-    """Yield the waits: name, unit, values, bound; quick: of one process, and not of ten scenes.
+    """Yield the waits; quick: of one process, and not of ten scenes.
 
     A cold process has an empty cache of kernels of its own, a warm one that of a process before.
     """
     first, second, step = {}, {}, {}
     with tempfile.TemporaryDirectory() as folder:
-        for k in range(1 if quick else 5):
+        for k in range(1 if quick else ROUNDS):
             cache = os.path.join(folder, f"cache-{k}")
             for state in ("cold", "warm"):
                 waits = call_in_process(two_scenes, cache=cache)
@@ -65,11 +68,11 @@ def measure(quick):
                     wait = call_in_process(first_step, cache=cache, begun=time.time())
                     step.setdefault(state, []).append(wait)
         for state, bound, wall in (("cold", "<= 10", "<= 15"), ("warm", "<= 3", "<= 3")):
-            yield f"first_scene_{state}_seconds", "s", first[state], bound
+            yield Figure(f"first_scene_{state}_seconds", "s", first[state], bound)
             if not quick:
-                yield f"first step, {state} cache", "s", step[state], wall
-        yield "second_scene_seconds", "s", second["warm"], "<= 0.1"
+                yield Figure(f"first step, {state} cache", "s", step[state], wall)
+        yield Figure("second_scene_seconds", "s", second["warm"], "<= 0.1")
         if not quick:
-            ten = [call_in_process(ten_scenes, cache=cache) for _ in range(6)]
+            ten = [call_in_process(ten_scenes, cache=cache) for _ in range(1 + TEN)]
             # The first of them fills the cache.
-            yield "ten_scenes_seconds", "s", ten[1:], "<= 10"
+            yield Figure("ten_scenes_seconds", "s", ten[1:], "<= 10")

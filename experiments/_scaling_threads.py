@@ -4,12 +4,13 @@ import time
 
 import numpy as np
 
+from _bench_work import counts_of, work_since
 from _blast import METHODS, paper_effects
-from taichi_dem import CONCRETE, InputError, Scene, Simulation, effects, read_mesh
+from taichi_dem import CONCRETE, InputError, Scene, Simulation, effects, read_mesh, runtime
 from taichi_dem.kit.checkpoint import digest
-from taichi_dem.kit.field_memory import FieldMemory
 from taichi_dem.kit.study import call_in_process
-from taichi_dem.kit.study.machine import busiest_seconds, memory_bandwidth, thread_seconds
+from taichi_dem.kit.study.floors import Copy
+from taichi_dem.kit.study.machine import busiest_seconds, thread_seconds
 from taichi_dem.mesh.reorder import in_space_order
 from taichi_dem.mesh.shapes import bar
 
@@ -19,33 +20,41 @@ ROUNDS = 2
 BAR = (2.0, 1.0)
 
 
-def thread_job(mesh, cells, method, threads, steps, repeats):
+def thread_job(mesh, cells, methods, threads, steps, repeats):
     """Result of ``whole_steps`` in a process of its own: threads cannot change within one."""
-    job = {"mesh": mesh, "cells": cells, "method": method, "steps": steps, "repeats": repeats}
+    job = {"mesh": mesh, "cells": cells, "methods": [*methods], "steps": steps, "repeats": repeats}
     return call_in_process(whole_steps, threads=threads, title=f"on {threads} threads", **job)
 
 
-def thread_gain(mesh, cells, method, steps, rounds, repeats):
-    """Time of one thread over that of two, a row of figures; the bits must be the same.
+def thread_gains(mesh, cells, methods, steps, rounds, repeats):
+    """Time of one thread over that of two, a dict of figures by method; the bits must be the same.
 
     Runs on one and on two threads take turns, as what else keeps the cores busy changes. busy: the
     same of what the busiest thread took of the cores, None where the system does not tell. seconds:
-    those of a step on two threads.
+    those of a step on two threads; work: the least of such a step.
     """
     turns = (1, 2) * rounds
-    found = [thread_job(mesh, cells, method, threads, steps, repeats) for threads in turns]
-    if len({one["digest"] for one in found}) > 1:
+    found = [thread_job(mesh, cells, methods, threads, steps, repeats) for threads in turns]
+    return {
+        name: gain_of(*([one[name] for one in found[k::2]] for k in (0, 1))) for name in methods
+    }
+
+
+def gain_of(single, double):
+    """Figures of ``thread_gains``; single, double: results of runs on one and on two threads."""
+    if len({one["digest"] for one in (*single, *double)}) > 1:
         raise InputError("one thread and two threads must give the same bits, and do not")
 
-    def least(name, first):
-        return min(value for one in found[first::2] for value in one[name])
+    def gain(name):
+        least = [min(value for one in runs for value in one[name]) for runs in (single, double)]
+        return least[0] / least[1]
 
-    told = None not in found[0]["busy"]
+    told = None not in single[0]["busy"]
     return {
-        **{key: found[-1][key] for key in ("bodies", "bytes", "bandwidth")},
-        "gain": least("seconds", 0) / least("seconds", 1),
-        "busy": least("busy", 0) / least("busy", 1) if told else None,
-        "seconds": [value for one in found[1::2] for value in one["seconds"]],
+        **{key: double[-1][key] for key in ("bodies", "work", "bandwidth")},
+        "gain": gain("seconds"),
+        "busy": gain("busy") if told else None,
+        "seconds": [value for one in double for value in one["seconds"]],
     }
 
 
@@ -58,35 +67,39 @@ def scene_of(mesh, cells):
     return Scene(in_space_order(bar(*BAR, cells)), CONCRETE, [*blown, gas])
 
 
-def whole_steps(mesh, cells, method, steps, repeats):
-    """Seconds of whole steps by the parallel driver, two of them to warm up; for a JSON file.
+def whole_steps(mesh, cells, methods, steps, repeats):
+    """Whole steps by the parallel driver, two of them to warm up; for a JSON file.
 
-    seconds: of a step, one a repeat. busy: the same of what the busiest thread took of the cores.
-    digest: of where bodies end.
+    By method, seconds: of a step, one a repeat. busy: the same of what the busiest thread took of
+    the cores. work: least bytes and operations of a step. digest: of where bodies end. bandwidth:
+    of a copy in memory by these threads [B/s]. One method after the other, as 100,000 bodies take
+    2.4 GB.
     """
-    make, step = METHODS[method]
-    simulation = Simulation(scene_of(mesh, cells), make(step), "parallel")
+    scene, copy, found = scene_of(mesh, cells), Copy(), {}
+    for name in methods:
+        make, step = METHODS[name]
+        simulation = Simulation(scene, make(step), "parallel")
+        found[name] = {**timed_steps(simulation, steps, repeats), "bandwidth": copy.bandwidth()}
+        runtime.clear()
+    return found
+
+
+def timed_steps(simulation, steps, repeats):
+    """Steps of a simulation from the second on, see ``whole_steps``."""
     simulation.advance_to(2)
-    seconds, busy = [], []
+    seconds, busy, counts = [], [], counts_of(simulation)
     for k in range(repeats):
         started, before = time.perf_counter(), thread_seconds()
         simulation.advance_to(2 + (k + 1) * steps)
         seconds.append((time.perf_counter() - started) / steps)
         spent = busiest_seconds(before, thread_seconds())
         busy.append(None if spent is None else spent / steps)
-    motion = simulation.state.motion()
+    motion, work = simulation.state.motion(), work_since(simulation, counts)
+    each = 1.0 / (steps * repeats)
     return {
         "seconds": seconds,
         "busy": busy,
         "bodies": simulation.model.body_count,
-        "bytes": bytes_a_step(simulation.loan.engine),
-        "bandwidth": memory_bandwidth(),
+        "work": [each * work.bytes, each * work.flops],
         "digest": digest(*(np.ascontiguousarray(motion[key]) for key in ("position", "velocity"))),
     }
-
-
-def bytes_a_step(engine):
-    """Bytes that a step of all bodies must move at least: the model read, the state written too."""
-    kept = FieldMemory(engine.tables, "constant"), FieldMemory(engine.state, "saved")
-    read, written = (sum(array.nbytes for array in part.read().values()) for part in kept)
-    return read + 2 * written

@@ -26,7 +26,7 @@ from functools import partial
 import numpy as np
 
 from _blast import blast_parser, paper_scene
-from _scaling_threads import ROUNDS, thread_gain
+from _scaling_threads import ROUNDS, thread_gains
 from taichi_dem import Multirate, ProgressBar
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv
@@ -46,6 +46,8 @@ SETTINGS = {
     "rounds": (ROUNDS, 1),
 }
 DT0 = 1e-8
+#: Method of the threads' times.
+METHOD = "paper_multirate"
 #: Workers of the paper's Fig 15, and the share of one's time that is not contact.
 PAPER_WORKERS, PAPER_SERIAL = 24, 0.05
 #: By way of sharing: longest over shortest time of a worker in Fig 15, and minutes of one process
@@ -88,7 +90,8 @@ def measured(options):
     with ProgressBar("two threads") as bar:
         for mesh, cells, steps in (("", options.cells, 10), (options.mesh, None, 400)):
             bar.count(len(gains), 2)
-            gains.append(thread_gain(mesh, cells, "paper_multirate", steps, *often))
+            found = thread_gains(mesh, cells, [METHOD], steps, *often)
+            gains.append(found[METHOD])
     return gains
 
 

@@ -1,12 +1,9 @@
-"""The machine under a measurement: CPU seconds of each thread, bandwidth of the memory."""
+"""The machine under a measurement: CPU seconds of each thread."""
 
 import glob
 import os
-import time
 from collections.abc import Mapping
 from typing import Optional
-
-import taichi as ti
 
 
 def thread_seconds() -> dict[int, float]:
@@ -29,22 +26,3 @@ def busiest_seconds(before: Mapping[int, float], after: Mapping[int, float]) -> 
         return None
     main_thread = spent.pop(os.getpid())
     return main_thread + max(spent.values(), default=0.0)
-
-
-@ti.kernel
-def _copy(a: ti.template(), b: ti.template()):  # type: ignore[valid-type]
-    for k in a:  # type: ignore[attr-defined]
-        b[k] = a[k]  # type: ignore[index]
-
-
-def memory_bandwidth(entries: int = 1 << 24, repeats: int = 5) -> float:
-    """Bytes a second that a copy of numbers reads and writes, the best of some repeats."""
-    a, b = (ti.field(ti.f64, shape=entries) for _ in range(2))
-    best = 0.0
-    for _ in range(repeats + 1):
-        ti.sync()
-        started = time.perf_counter()
-        _copy(a, b)
-        ti.sync()
-        best = max(best, 16.0 * entries / (time.perf_counter() - started))
-    return best

@@ -1,0 +1,144 @@
+"""Speed of the blast of the paper's block: rates, the visit of a bond, and whole runs."""
+
+from statistics import median
+from types import SimpleNamespace
+
+import taichi as ti
+
+from _bench_figure import Figure, by_turns
+from _bench_work import VISIT, bytes_a_step, work_since
+from _blast import METHODS, paper_scene
+from taichi_dem import Multirate, Simulation, Uniform
+from taichi_dem.kit import study
+from taichi_dem.kit.study import on_device
+from taichi_dem.kit.study.floors import Work
+from taichi_dem.simulation import macro_steps
+
+#: Ends of the short and of the whole run [s].
+SHORT, WHOLE = 1e-4, 5e-4
+#: Step and displacement limit of the paper, end of its run here [s], and the evaluations of bonds
+#: and pairs that this method makes to the end of the whole run, counted in one.
+FINEST, EARLY, EVALUATIONS = (1e-8, 1e-8), 1e-4, 1_278_384_011
+#: Step of the bonded phase [s], and its steps that are timed together.
+STEP, STEPS = 1e-9, 4000
+#: Visits of all bonds in a call.
+SWEEPS = 500
+#: By the words of a figure: method, runs in the full bench, bound of a whole run.
+RUNS = {
+    "implicit": ("implicit", 5, "<= 0.9"),
+    "limited": ("explicit_limited", 2, "<= 5"),
+    "controlled": ("multirate_controlled", 2, "<= 8"),
+    "l = 1e-07 m": ("paper_multirate", 1, "<= 20"),
+}
+
+
+def measure(quick):
+    """Yield the blast's contact units a second, and the paper's problem by several methods."""
+    yield from bonded_phase(3 if quick else 7)
+    yield from visits(3 if quick else 7)
+    yield from short_runs(quick)
+    if not quick:
+        yield from whole_runs()
+
+
+def driver():
+    """The driver of one core, where there is a core."""
+    return "auto" if on_device() else "resident"
+
+
+def bonded_phase(repeats):
+    """Yield million contact units a second while all bonds hold: whole steps with the bodies."""
+    simulation = Simulation(paper_scene(), Uniform(STEP), driver())
+    simulation.advance_to(STEPS)
+    bonds = simulation.model.bond_count
+    # Three units a bond.
+    work = Work(bytes_a_step(simulation.loan.engine) / (3 * bonds))
+    ends = [(k + 2) * STEPS for k in range(repeats)]
+    seconds = [study.seconds_of(simulation.advance_to, end) for end in ends]
+    values = [3e-6 * bonds * STEPS / one for one in seconds]
+    yield Figure("bonded phase", "million units/s", values, ">= 30", work)
+
+
+def visits(repeats):
+    """Yield the time of a visit of an intact bond in a sweep, after a run to 0.1 ms."""
+    if on_device():
+        return
+    method = METHODS["implicit"][0](METHODS["implicit"][1])
+    simulation = Simulation(paper_scene(), method, driver())
+    simulation.advance_to(macro_steps(SHORT, method.dt0))
+    # A broken bond is no visit, although its place is looked at.
+    broken = simulation.state.broken_tick.to_numpy()[: simulation.model.bond_count] >= 0
+    count, solver = SWEEPS * int((~broken).sum()), simulation.loan.engine.advance.solver
+    sweep_bonds(solver, 1)
+    seconds = [study.seconds_of(sweep_bonds, solver, SWEEPS) for _ in range(repeats)]
+    yield Figure("visit of a bond", "ns", [1e9 * one / count for one in seconds], "", VISIT)
+
+
+@ti.kernel
+def sweep_bonds(solver: ti.template(), times: ti.i32):
+    """Visit all bonds one after the other, in their order, several times."""
+    ti.loop_config(serialize=True)
+    for _ in range(times):
+        for k in range(solver.tables.bond_count[None]):
+            solver.bond(k)
+
+
+def short_runs(quick):
+    """Yield the time of runs to 0.1 ms, in the quick bench of a second method too."""
+    works = {"implicit": run_of("implicit", SHORT, 3 if quick else 7)}
+    if quick:
+        works["limited"] = run_of("explicit_limited", SHORT, 1)
+    for words, runs in by_turns(works).items():
+        yield timed(f"paper's problem to 0.1 ms, {words}", runs)
+
+
+def whole_runs():
+    """Yield the time of whole runs, and what different steps save over one step for all."""
+    works = {words: run_of(name, WHOLE, repeats) for words, (name, repeats, _) in RUNS.items()}
+    # One step for all of equal accuracy is that of the finest body in the controlled run.
+    step = METHODS["multirate_controlled"][1] / 8.0
+    works["uniform"] = run_of("explicit_limited", WHOLE, 1, step)
+    works["finest"] = lambda: paper_run(Multirate(*FINEST), EARLY), 1
+    found = by_turns(works)
+    uniform, finest = found.pop("uniform"), found.pop("finest")
+    for words, runs in found.items():
+        yield timed(f"paper's problem, {words}", runs, RUNS[words][2])
+    controlled = found["controlled"]
+    yield Figure("controlled, ideal gain", "1", [controlled[0].gain])
+    gain = median(one.seconds for one in uniform) / median(one.seconds for one in controlled)
+    yield Figure("controlled, realised gain", "1", [gain], ">= 3")
+    yield from finest_run(finest)
+
+
+def finest_run(runs):
+    """Yield the time of early runs by the paper's own displacement limit, and what it foretells.
+
+    Evaluations of bonds and pairs cost alike early and late: the whole run takes as many times
+    longer as it evaluates more.
+    """
+    words = "l = 1e-08 m"
+    yield timed(f"paper's problem to {1e3 * EARLY:g} ms, {words}", runs)
+    values = [one.seconds * EVALUATIONS / one.evaluations for one in runs]
+    work = runs[0].work * (EVALUATIONS / runs[0].evaluations)
+    yield Figure(f"paper's problem, {words}, extrapolated", "s", values, "<= 130", work)
+
+
+def run_of(name, until, repeats, step=None):
+    """A function that runs a method to a time [s], and how often it is called."""
+    make, usual = METHODS[name]
+    return lambda: paper_run(make(step or usual), until), repeats
+
+
+def paper_run(method, until):
+    """Seconds of a run of the paper's problem without compiling, its least work and ideal gain."""
+    simulation = Simulation(paper_scene(), method, driver())
+    simulation.advance_to(macro_steps(until, method.dt0))
+    report = simulation.report()
+    seconds = report.run_seconds if on_device() else report.run_cpu_seconds
+    made = {"seconds": seconds, "gain": report.ideal_gain, "work": work_since(simulation)}
+    return SimpleNamespace(**made, evaluations=simulation.evaluations())
+
+
+def timed(name, runs, bound=""):
+    """Figure of the seconds of runs."""
+    return Figure(name, "s", [one.seconds for one in runs], bound, runs[0].work)
