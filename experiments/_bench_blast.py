@@ -13,6 +13,7 @@ from taichi_dem.kit import study
 from taichi_dem.kit.study import on_device
 from taichi_dem.kit.study.floors import Work
 from taichi_dem.simulation import macro_steps
+from taichi_dem.step.implicit.bonds import BOND_COLOURS
 
 #: Ends of the short and of the whole run [s].
 SHORT, WHOLE = 1e-4, 5e-4
@@ -79,8 +80,8 @@ def sweep_bonds(solver: ti.template(), times: ti.i32):
     """Visit all bonds one after the other, in their order, several times."""
     ti.loop_config(serialize=True)
     for _ in range(times):
-        for k in range(solver.tables.bond_count[None]):
-            solver.bond(k)
+        for g in range(solver.bonds.colour_first[BOND_COLOURS]):
+            solver.bonds_of(g)
 
 
 def short_runs(quick):

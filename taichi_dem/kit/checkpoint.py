@@ -26,7 +26,7 @@ from taichi_dem.kit.validation import FileName, path_name, plain_fields, positiv
 from taichi_dem.kit.version import __version__, taichi_version
 
 #: Of the file; another one cannot be read.
-FORMAT = 5
+FORMAT = 6
 _ABOUT = "about"
 _MOST_STEPS = 2**53
 _MOST_MARKS = 1_000_000
