@@ -93,8 +93,8 @@ def picture_errors(
             for method, pairs in by_method.items():
                 height = [max(error, bottom) for _, error in pairs]
                 axis.plot([cost for cost, _ in pairs], height, label=method, **looks[method])
-            axis.set(xscale="log", yscale="log", title=words, xlabel=time_name)
-            axis.set_ylabel("error [1]")
+            axis.set(xscale="log", yscale="log", title=words, ylabel="error [1]")
+            axis.set_xlabel(textwrap.fill(time_name, 28))
         figure.legend(*_legend(axes[0], titles), loc="outside upper left", ncols=2)
         _write_below(figure, caption)
 
