@@ -126,7 +126,9 @@ def _stack(axes, time, history, terms):
     given = history["load_work_J"] + history["support_work_J"] + history["injected_J"]
     words = "work done + injected"
     axes.plot(time, 1e-3 * given, color="black", linestyle="--", linewidth=1.2, label=words)
-    axes.set(ylabel="energy [kJ]", title="Held and lost, stacked")
+    # Room for the legend above a work that rises early.
+    top = 1.1 * axes.get_ylim()[1]
+    axes.set(ylabel="energy [kJ]", title="Held and lost, stacked", ylim=(None, top))
     axes.legend(handles=axes.lines, loc="upper left")
 
 
