@@ -37,7 +37,7 @@ def plot_deep_cracks(
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
     look = _colours_by_time(1e3 * time_s)
     with picture(path, 0, size=(9.2, 3.9)) as (figure, _):
-        grid = figure.add_gridspec(1, 3, width_ratios=(1.25, 1.0, 0.8), wspace=0.25)
+        grid = figure.add_gridspec(1, 3, width_ratios=(1.25, 1.0, 0.8), wspace=0.14)
         whole = figure.add_subplot(grid[0], projection="3d")
         _in_space(whole, triangles, time_ms, low, high, look)
         whole.set_title(f"{len(broken)} broken faces at {1e3 * time_s:.3g} ms")
