@@ -63,7 +63,8 @@ def picture_work_precision(
             axes[cost].set(xlabel=name, ylabel=error_name)
         if residual_names:
             _draw_residuals(axes["residual"], points, looks, step_unit)
-            axes["residual"].set(xlabel=residual_names[0], ylabel=residual_names[1])
+            axes["residual"].set_xlabel(residual_names[0])
+            axes["residual"].set_ylabel(textwrap.fill(residual_names[1], 36))
         figure.legend(*_legend(axes["seconds"], titles), loc="outside upper left", ncols=2)
         marks = "At the points: what is swept. Bars: to the slowest repeat."
         _write_below(figure, f"{caption} {marks}")
