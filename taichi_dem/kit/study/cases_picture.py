@@ -84,7 +84,7 @@ def _draw_case(axis, own, looks):
     if shown:
         axis.locator_params(axis="x", nbins=5)
     else:
-        said = textwrap.fill(f"“{own[0].words}”", 38)
+        said = textwrap.fill(f"“{own[0].words}”", 32)
         axis.set(xticks=[], yticks=[])
         axis.text(0.03, 0.92, said, fontsize=8.5, va="top", transform=axis.transAxes)
     lowest, highest = axis.get_ylim()
@@ -93,7 +93,7 @@ def _draw_case(axis, own, looks):
     failed = any(trial.status == FAILED for trial in own)
     title = f"{case_title(own[0].case.name)}: {_verdict(own)}"
     look = {"fontsize": 9.0, "color": RED if failed else BLACK}
-    axis.set_title(textwrap.fill(title, 36), **look)
+    axis.set_title(textwrap.fill(title, 32), **look)
 
 
 def _verdict(own):
