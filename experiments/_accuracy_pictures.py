@@ -44,10 +44,11 @@ def draw_calibration(path, judged, coverage):
     with picture(path, size=(6.6, 4.2)) as (_, axes):
         axes.axvspan(-1.0, 1.0, color=GREY, alpha=0.15, label="inside the bar")
         found = [np.clip(deviation, -FARTHEST, FARTHEST) for deviation in judged.values()]
-        names = [f"{name}, {len(deviation)} answers" for name, deviation in judged.items()]
+        names = [f"{len(deviation)} of the {name}" for name, deviation in judged.items()]
         axes.hist(found, edges, stacked=True, label=names, color=[BLUE, ORANGE][: len(found)])
-        axes.set_xlabel("(value - true value) / half-width of the bar [1]; beyond 3 at the ends")
+        axes.set_xlabel("(value − true value) / half-width of the bar [1]; beyond 3 at the ends")
         axes.set_ylabel("answers [1]")
+        axes.locator_params(axis="y", integer=True)
         axes.set_title(f"{coverage:.1f} % of the bars hold the true value (95 % meant)")
         axes.legend(fontsize=8)
 

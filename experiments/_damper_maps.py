@@ -16,7 +16,7 @@ def picture_jump(path, maps):
         size, gap = np.array(first.amplitudes), float(first.gaps[0, 0])
         fine = np.linspace(gap / np.pi * (1.0 + 1e-9), max(size.max(), 0.4 * gap), FINE)
         theory = collect_and_collide(fine, gap)
-        words = "energy taken in a cycle\nby N m A² ω² [1]", "apparent mass by N m [1]"
+        words = "energy taken in a cycle\n/ (N m A² ω²) [1]", "apparent mass / (N m) [1]"
         for axis, name, label in zip(axes, ("energy", "mass_share"), words):
             curve = theory.energy if name == "energy" else theory.mass
             axis.plot(np.pi * fine / gap, curve, color=BLACK, lw=1.0, label="collect and collide")
@@ -27,7 +27,7 @@ def picture_jump(path, maps):
                 look = {"color": style.colour, "marker": style.marker, "ms": 4, "lw": 1.0}
                 axis.errorbar(np.pi * size / gap, middle, bars, label=style.label, **look)
             axis.axvline(1.0, color=BLACK, lw=0.8, ls=":", label="jump of the theory")
-            axis.set(xlabel="amplitude by gap / π [1]", ylabel=label)
+            axis.set(xlabel="π × amplitude / gap [1]", ylabel=label)
         axes[0].set_ylim(0.0, None)
         figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper left", ncols=4)
 
@@ -36,7 +36,7 @@ def picture_maps(path, maps, gravity):
     """Loss and apparent mass over frequency and amplitude: a column a filling."""
     rows = (
         ("loss", "loss\nc / (N m ω) [1]", "viridis"),
-        ("mass_share", "apparent mass\nby N m [1]", "cividis"),
+        ("mass_share", "apparent mass\n/ (N m) [1]", "cividis"),
     )
     with picture(path, 2, len(maps), (9.2, 7.0), sharex=True, sharey=True) as (figure, axes):
         for panels, (name, words, colours) in zip(axes, rows):

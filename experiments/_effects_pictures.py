@@ -38,7 +38,7 @@ def draw_costs(axes, effects):
         digits = int(abs(cost) < 10.0)
         # A zero has no sign.
         words = f"  {round(cost, digits) + 0.0:.{digits}f} %" + ", not resolved" * hidden
-        axes.text(max(most, 0.0), place, words, va="center", fontsize=8.5)
+        axes.text(max(most, 0.0), place, words.replace("-", "−"), va="center", fontsize=8.5)
     names = [f"{name}\n(added)" if sign < 0.0 else name for name, _, sign in effects]
     names = [name.replace("_", " ").replace(" and ", "\nand ") for name in names]
     axes.set(yticks=range(len(names)), yticklabels=names)

@@ -22,7 +22,8 @@ def draw(path, slept, whole, length):
         left.axhline(length, color=GREY, linestyle="--", label="end of the pile")
         left.set(xlabel="time [ms]", ylabel="distance from the head [m]", ylim=(0.0, 1.08 * length))
         left.legend(loc="center left")
-        right.plot(others, [row["cpu_s"] for row in whole], color=GREY, label="all evaluated")
+        look = {"color": GREY, "linestyle": "-.", "label": "all evaluated"}
+        right.plot(others, [row["cpu_s"] for row in whole], **look)
         right.plot(times, [row["cpu_s"] for row in slept], color=BLUE, label="asleep until reached")
         right.set(xlabel="time [ms]", ylabel="CPU time of stepping [s]", ylim=(0.0, None))
         right.legend(loc="upper left")

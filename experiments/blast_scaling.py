@@ -138,7 +138,7 @@ def draw(path, shared, chosen, workload, measured):
         draw_cuts(axes["cuts"], chosen["rebalanced"], workload.time)
         axes["cuts"].set_title("Lines: where simulated workers' shares begin (Fig 9)")
         words = "Lines: simulated workers that share the work of one recorded run"
-        figure.suptitle(f"{words}; points: measured times of processes or threads")
+        figure.suptitle(f"{words};\npoints: measured times of processes or threads")
 
 
 if __name__ == "__main__":

@@ -74,7 +74,7 @@ def picture_cycle(path: FileName, measures: Any, amplitude: float) -> None:
         panels[1, 0].legend(handles=keys, loc="upper right")
         keys, _ = panels[0, 0].get_legend_handles_labels()
         keys.append(area_key("± standard deviation of the cycles", fc=GREY, alpha=0.3))
-        figure.legend(handles=keys, loc="outside upper left", ncols=len(keys))
+        figure.legend(handles=keys, loc="outside upper left", ncols=2)
 
 
 def _draw_measures(top, bottom, one, style):

@@ -39,9 +39,15 @@ def picture_film_strips(
             line[0].text(-0.08, 0.5, styles_of(films)[name].label, **look)
         for axes, frame in zip(panels[0], frames):
             axes.set_title(f"{1e3 * (frame.time_s - frames[0].time_s):.0f} ms", loc="center")
-        words = "one cycle of the container; arrows: its velocity, where it is not slow"
-        figure.supxlabel(words, fontsize=9)
+        figure.supxlabel(_caption(box), fontsize=9)
         figure.colorbar(drawn.particles, ax=panels, label=_SPEED, aspect=45, pad=0.01)
+
+
+def _caption(box):
+    """What the strips show; the size is the panels' only scale."""
+    inside = f"{1e3 * box.width:.0f} × {1e3 * box.height:.0f} mm"
+    arrows = "arrows: its velocity, where it is not slow"
+    return f"one cycle of the container, {inside} inside; {arrows}"
 
 
 def _mark_motion(axes, box, lift, share):

@@ -180,7 +180,7 @@ def _draw_peaks(place, height, responses, particle_mass=None):
     height.set(title="its height; bars: seeds", xlabel="particles N [1]")
     height.set(ylabel="peak RMS displacement [mm]", ylim=(0, None))
     keys, labels = place.get_legend_handles_labels()
-    height.legend(keys, labels, loc="lower left")
+    height.figure.legend(keys, labels, loc="outside lower right", ncols=3)
     for axis in (place, height):
         axis.set_xticks(first.particles)
 

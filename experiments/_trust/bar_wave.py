@@ -69,6 +69,6 @@ def draw(axes, cells, speed):
     axes.plot(waves, error.T, "o", color=RED, ms=4)
     axes.plot([], [], "o", color=RED, label="a random mesh")
     axes.plot(waves, error.mean(axis=0), "_", color=BLACK, ms=16, label="mean")
-    axes.set(xlabel="elements in a wave length", ylabel="error of the speed [%]")
+    axes.set(xlabel="elements in a wave length [1]", ylabel="error of the speed [%]")
     axes.set_xticks(waves, map("{:g}".format, waves))
     axes.legend(loc="lower right")

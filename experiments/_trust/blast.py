@@ -99,7 +99,7 @@ def draw(axes, sieved):
     law = -np.expm1(-np.exp(level) * sieves**n)
     axes.loglog(1e3 * sieves, law, color=BLACK, lw=0.8, ls=":", label="Rosin and Rammler")
     low, high = 1e3 * sieves[0], 1e3 * sieves[-1]
-    axes.set(xlabel="size of a fragment [mm]", ylabel="share of the mass below", ylim=(1e-4, 1))
-    axes.set_xlim(low, high)
+    axes.set(xlabel="size of a fragment [mm]", xlim=(low, high))
+    axes.set(ylabel="share of the mass below [1]", ylim=(1e-4, 1))
     axes.axvspan(low, 1e3 * limit, color=GREY, alpha=0.3, label="the mesh's own sizes")
     axes.legend(loc="lower right")

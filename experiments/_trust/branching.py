@@ -126,11 +126,12 @@ def forked(place, when, edge):
 
 def draw(axes, cracks):
     """Broken faces ahead of the notch, a colour and a mark for each mesh."""
-    axes.plot([0.0, 1e3 * NOTCH], [0.0, 0.0], color=BLACK, lw=1.5)
+    axes.plot([0.0, 1e3 * NOTCH], [0.0, 0.0], color=BLACK, lw=1.5, label="notch")
     looks = zip((RED, BLUE, GREEN, ORANGE, GREY), "osD^v")
-    for one, (colour, mark) in zip(cracks, itertools.cycle(looks)):
-        look = {"color": colour, "marker": mark, "ms": 2.5, "ls": "none"}
+    for k, (one, (colour, mark)) in enumerate(zip(cracks, itertools.cycle(looks)), 1):
+        look = {"color": colour, "marker": mark, "ms": 2.5, "ls": "none", "label": f"mesh {k}"}
         axes.plot(*1e3 * (one.place - [0.0, 0.5 * HEIGHT]).T, **look)
     reach = 500.0 * HEIGHT
     axes.set(xlabel="x [mm]", ylabel="y [mm]", xlim=(40.0, 1e3 * LENGTH), ylim=(-reach, reach))
     axes.set_aspect("equal")
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, markerscale=2.0)

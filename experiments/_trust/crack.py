@@ -111,7 +111,6 @@ def draw(axes, edges, area):
     axes.plot(1e3 * np.array(edges), area.T, "o", color=RED, ms=4)
     axes.plot([], [], "o", color=RED, label="a random mesh")
     axes.axhline(1.0, color=BLACK, lw=0.8, label="a plane")
-    axes.set(
-        xlabel="edge of an element [mm]", ylabel="broken area / area of the plane", xscale="log"
-    )
+    axes.set(xlabel="edge of an element [mm]", xscale="log")
+    axes.set_ylabel("broken area / area of the plane [1]")
     axes.legend()

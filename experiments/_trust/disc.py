@@ -59,10 +59,9 @@ def strength(test, seed):
 def draw(axes, tension, brazilian):
     """Both strengths of every mesh, and the ratio of granite."""
     ends = np.array([0.0, 1.15 * tension.max()])
-    axes.fill_between(
-        ends, RATIO * (1 - ALLOWED) * ends, RATIO * (1 + ALLOWED) * ends, color=GREY, alpha=0.25
-    )
-    axes.plot(ends, RATIO * ends, color=BLACK, lw=0.8, label="granite, within 15 %")
+    near = (RATIO * (1.0 + way) * ends for way in (-ALLOWED, ALLOWED))
+    axes.fill_between(ends, *near, color=GREY, alpha=0.25, label=f"within {100 * ALLOWED:.0f} %")
+    axes.plot(ends, RATIO * ends, color=BLACK, lw=0.8, label="ratio of granite")
     axes.plot(tension, brazilian, "o", color=RED, ms=4, label="a random mesh")
     axes.set(
         xlabel="direct tension [MPa]", ylabel="Brazilian test, arcs of 10 degrees [MPa]", xlim=ends

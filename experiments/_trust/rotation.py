@@ -84,5 +84,6 @@ def draw(axes, spin):
     closed = line - 2.5 * (1.0 + RESTITUTION)
     axes.plot(line, closed, color=BLACK, lw=1.0, label="sliding, closed form")
     axes.plot(SPINS / unit, spin / unit, "o", color=RED, ms=5, label="spheres")
-    axes.set(xlabel=r"spin before, $R\omega/(\mu v)$", ylabel=r"spin after, $R\omega/(\mu v)$")
+    axes.set_xlabel(r"spin before, $R\omega/(\mu v)$ [1]")
+    axes.set_ylabel(r"spin after, $R\omega/(\mu v)$ [1]")
     axes.legend(loc="upper left")

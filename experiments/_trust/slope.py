@@ -102,6 +102,6 @@ def draw(axes, curves):
     for (words, moved), colour, form in zip(curves.items(), (BLUE, RED), ("o-", "s--")):
         axes.plot(SHARES, 1e3 * moved.T, form, color=colour, ms=4, lw=0.8)
         axes.plot([], [], form, color=colour, label=words)
-    axes.axvline(1.0, color=BLACK, lw=0.8, ls=":")
-    axes.set(xlabel="tangent of the slope by its limit", ylabel="way after 0.12 s [mm]")
-    axes.legend(loc="lower right")
+    axes.axvline(1.0, color=BLACK, lw=0.8, ls=":", label="limit")
+    axes.set(xlabel="tangent of the slope / its limit [1]", ylabel="way after 0.12 s [mm]")
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0))

@@ -83,10 +83,14 @@ def run(mesh, material, peak, laws):
 
 def draw(axes, ends):
     """Where the bars came apart."""
+    look = {"color": RED, "ms": 14}
     for k, places in enumerate(ends):
-        axes.plot(
-            1e3 * (LENGTH - np.array(places)), np.full(len(places), k + 1.0), "|", color=RED, ms=14
-        )
+        from_end = 1e3 * (LENGTH - np.array(places))
+        axes.plot(from_end, np.full(len(places), k + 1.0), "|", **look)
+    axes.plot([], [], "|", label="end of a piece", **look)
     for k in range(1, 5):
-        axes.axvline(1e3 * k * DEPTH, color=BLACK, lw=0.8, ls=":")
-    axes.set(xlabel="distance from the free end [mm]", ylabel="mesh", ylim=(0.4, len(ends) + 0.6))
+        words = "" if k > 1 else "planes of the formula"
+        axes.axvline(1e3 * k * DEPTH, color=BLACK, lw=0.8, ls=":", label=words)
+    axes.set(xlabel="distance from the free end [mm]", ylabel="random mesh [1]")
+    axes.set(yticks=range(1, len(ends) + 1), ylim=(0.4, len(ends) + 0.6))
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)

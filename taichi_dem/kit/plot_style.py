@@ -72,7 +72,7 @@ STYLES = {
     "ca_ejection": MethodStyle("automaton, landing + ejection", GREEN, "s", "-."),
     "ca_landing": MethodStyle("automaton, landing", ORANGE, "D"),
     "dem": MethodStyle("spheres", RED, "^", "--"),
-    "dem_printed": MethodStyle("spheres, damping as printed", PURPLE, "v"),
+    "dem_printed": MethodStyle("spheres, damping as printed", PURPLE, "v", _LONG_DASHES),
     "dem_soft": MethodStyle("spheres, modulus / 100", SKY, "P"),
     "combined": MethodStyle("spheres and long flights", OLIVE, "v"),
     "empty": MethodStyle("empty container", LIGHT_GREY, "X", ":"),

@@ -28,8 +28,9 @@ def plot_attenuation(path: Optional[FileName], attenuation: Any, nearest: float)
         if np.isfinite(slope):
             ends = np.array([nearest, distance[fitted].max()])
             fit, wave = level * ends**slope, (ends / ends[0]) ** -0.5
-            axes.plot(ends, fit, color=BLACK, label=f"power {slope:.2f} ({words})")
-            axes.plot(ends, fit[0] * wave, ":", color=BLACK, label="power -0.5 (cylindrical wave)")
+            label = f"power {slope:.2f} ({words})".replace("-", "−")
+            axes.plot(ends, fit, color=BLACK, label=label)
+            axes.plot(ends, fit[0] * wave, ":", color=BLACK, label="power −0.5 (cylindrical wave)")
         positive = speed[speed > 0.0]
         axes.set(
             xscale="log",

@@ -37,7 +37,7 @@ def plot_deep_cracks(
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
     look = _colours_by_time(1e3 * time_s)
     with picture(path, 0, size=(9.2, 3.9)) as (figure, _):
-        grid = figure.add_gridspec(1, 3, width_ratios=(1.25, 1.0, 0.8), wspace=0.1)
+        grid = figure.add_gridspec(1, 3, width_ratios=(1.25, 1.0, 0.8), wspace=0.14)
         whole = figure.add_subplot(grid[0], projection="3d")
         _in_space(whole, triangles, time_ms, low, high, look)
         whole.set_title(f"{len(broken)} broken faces at {1e3 * time_s:.3g} ms")
@@ -67,6 +67,8 @@ def _in_space(axes, triangles, time_ms, low, high, look):
     axes.set(xlabel="x [m]", ylabel="z [m]", zlabel="y [m]")
     axes.view_init(elev=22.0, azim=-55.0)
     axes.locator_params(nbins=4)
+    if np.ptp(box[:, 1]) < 0.5 * np.ptp(box, axis=0).max():
+        axes.locator_params(axis="y", nbins=2)
 
 
 def _edges(box):
@@ -87,6 +89,7 @@ def _section(axes, triangles, time_ms, normal, place, bounds, look):
     axes.set(xlim=(low[across], high[across]), ylim=(low[up], high[up]))
     axes.set(xlabel=f"{_AXES[across]} [m]", ylabel=f"{_AXES[up]} [m]")
     axes.set_aspect("equal")
+    axes.locator_params(nbins=5)
     axes.set_title(f"Section at {_AXES[normal]} = {place:.3g} m")
     for side in ("top", "right"):
         axes.spines[side].set_visible(True)

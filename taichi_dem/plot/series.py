@@ -84,10 +84,19 @@ def plot_history(path: Optional[FileName], history: Mapping[str, np.ndarray]) ->
         top.set(ylabel="displacement [mm]", ylim=(0.0, None))
         middle.step(time, history["broken_faces"], where="post", color=BLUE)
         middle.set(ylabel="broken faces [1]", ylim=(0.0, None))
-        bottom.step(time, 1e9 * history["smallest_step_s"], where="post", color=GREEN)
-        bottom.set(xlabel="time [ms]", ylabel="smallest step [ns]", yscale="log")
-        _span(bottom, time)
+        _smallest_step(bottom, time, 1e9 * history["smallest_step_s"])
     return figure
+
+
+def _smallest_step(axes, time, step_ns):
+    """Steps that differ by powers of two on a logarithm; one step for all from zero on."""
+    axes.step(time, step_ns, where="post", color=GREEN)
+    axes.set(xlabel="time [ms]", ylabel="smallest step [ns]")
+    if np.ptp(step_ns) > 0.0:
+        axes.set_yscale("log")
+    else:
+        axes.set_ylim(0.0, 1.5 * step_ns[0])
+    _span(axes, time)
 
 
 def plot_energy(path: Optional[FileName], history: Mapping[str, np.ndarray]) -> Figure:
@@ -117,7 +126,9 @@ def _stack(axes, time, history, terms):
     given = history["load_work_J"] + history["support_work_J"] + history["injected_J"]
     words = "work done + injected"
     axes.plot(time, 1e-3 * given, color="black", linestyle="--", linewidth=1.2, label=words)
-    axes.set(ylabel="energy [kJ]", title="Held and lost, stacked")
+    # Room for the legend above a work that rises early.
+    top = 1.1 * axes.get_ylim()[1]
+    axes.set(ylabel="energy [kJ]", title="Held and lost, stacked", ylim=(None, top))
     axes.legend(handles=axes.lines, loc="upper left")
 
 

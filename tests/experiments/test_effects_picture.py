@@ -29,7 +29,7 @@ def axes(script):
 
 def test_a_cost_whose_interval_holds_zero_is_pale_and_says_so(axes):
     words = [text.get_text().strip() for text in axes.texts]
-    assert words == ["0.0 %, not resolved", "24 %", "-20 %", "14 %"]
+    assert words == ["0.0 %, not resolved", "24 %", "−20 %", "14 %"]
     colours = [to_hex(bar.get_facecolor()).lower() for bar in axes.patches]
     assert colours == [colour.lower() for colour in (SKY, BLUE, BLUE, BLUE)]
 

@@ -85,7 +85,7 @@ def test_attenuation_is_fitted_to_what_there_is():
     figure = fall.plot.attenuation()
     figure.canvas.draw()
     words = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
-    assert "power -1.50 (fitted to all bodies)" in words
+    assert "power −1.50 (fitted to all bodies)" in words
     assert defects(figure) == []
 
 

@@ -49,7 +49,7 @@ def picture_cases(
     cases, looks = _distinct(trials, "case"), _looks_of(trials, alias)
     # The first are thick, so that all are seen.
     for k, look in enumerate(looks.values()):
-        look.update(lw=max(0.8, 3.0 - 0.45 * k), marker=None)
+        look.update(lw=max(0.8, 3.0 - 0.45 * k))
     alone = len(cases) == 1
     columns = 1 if alone else columns
     rows = -(-len(cases) // columns)
@@ -61,7 +61,7 @@ def picture_cases(
             own = [trial for trial in trials if trial.case is case]
             _draw_case(axis, own, looks)
         shown = dict.fromkeys(trial.method for trial in trials if trial.curve)
-        keys = [line_key(**looks[method]) for method in shown]
+        keys = [line_key(**{**looks[method], "marker": None}) for method in shown]
         place = "lower center" if alone else "upper left"
         figure.legend(handles=keys, loc=f"outside {place}", ncols=2)
         if alone:
@@ -75,23 +75,25 @@ def _draw_case(axis, own, looks):
     for trial in shown:
         curve, look = trial.curve, dict(looks[trial.method])
         if curve.dots:
-            look.update(ls="none", marker="o", ms=1.6 * look["lw"] + 1.0, mfc="none", lw=1.0)
+            look.update(ls="none", ms=1.6 * look["lw"] + 1.0, mfc="none", lw=1.0)
+        else:
+            look.update(marker=None)
         for y in curve.lines:
             axis.plot(curve.x, y, **look)
         axis.set(xlabel=curve.xlabel, ylabel=curve.ylabel)
     if shown:
         axis.locator_params(axis="x", nbins=5)
     else:
-        said = textwrap.fill(f"“{own[0].words}”", 38)
+        said = textwrap.fill(f"“{own[0].words}”", 32)
         axis.set(xticks=[], yticks=[])
         axis.text(0.03, 0.92, said, fontsize=8.5, va="top", transform=axis.transAxes)
     lowest, highest = axis.get_ylim()
     if 0.0 < lowest < 0.95 * highest:
-        axis.set_ylim(0.0, highest)
+        axis.set_ylim(0.0, 1.05 * highest)
     failed = any(trial.status == FAILED for trial in own)
     title = f"{case_title(own[0].case.name)}: {_verdict(own)}"
     look = {"fontsize": 9.0, "color": RED if failed else BLACK}
-    axis.set_title(textwrap.fill(title, 36), **look)
+    axis.set_title(textwrap.fill(title, 32), **look)
 
 
 def _verdict(own):
@@ -102,7 +104,9 @@ def _verdict(own):
     said = [f"{n} {'FAILED' if word == FAILED else word}" for word, n in counts.items() if n]
     least = min((trial.margin for trial in own if trial.worst), default=math.inf)
     if math.isfinite(least):
-        said.append(f"margin {power(least) if least >= 100.0 else format(least, '.2g')}")
+        margin = f"margin {power(least) if least >= 100.0 else format(least, '.2g')}"
+        # A line of the title shall not end within it.
+        said.append(margin.replace(" ", "\N{NO-BREAK SPACE}"))
     return ", ".join(said)
 
 

@@ -63,7 +63,8 @@ def picture_work_precision(
             axes[cost].set(xlabel=name, ylabel=error_name)
         if residual_names:
             _draw_residuals(axes["residual"], points, looks, step_unit)
-            axes["residual"].set(xlabel=residual_names[0], ylabel=residual_names[1])
+            axes["residual"].set_xlabel(residual_names[0])
+            axes["residual"].set_ylabel(textwrap.fill(residual_names[1], 36))
         figure.legend(*_legend(axes["seconds"], titles), loc="outside upper left", ncols=2)
         marks = "At the points: what is swept. Bars: to the slowest repeat."
         _write_below(figure, f"{caption} {marks}")
@@ -93,8 +94,8 @@ def picture_errors(
             for method, pairs in by_method.items():
                 height = [max(error, bottom) for _, error in pairs]
                 axis.plot([cost for cost, _ in pairs], height, label=method, **looks[method])
-            axis.set(xscale="log", yscale="log", title=words, xlabel=time_name)
-            axis.set_ylabel("error [1]")
+            axis.set(xscale="log", yscale="log", title=words, ylabel="error [1]")
+            axis.set_xlabel(textwrap.fill(time_name, 28))
         figure.legend(*_legend(axes[0], titles), loc="outside upper left", ncols=2)
         _write_below(figure, caption)
 
