@@ -77,7 +77,11 @@ if [ -n "$packages" ]; then
     [ -z "$packages" ] || refuse "Still missing for $python after apt-get: $packages"
 fi
 
-# 3. The environment.
+# 3. The environment. What a link leads to may be in use elsewhere, and --clear would empty it.
+if [ -L .venv ]; then
+    refuse ".venv is a link to $(readlink .venv) and older than requirements.txt: remove the link, or" \
+        "bring what it leads to up to date and type touch .venv/stamp"
+fi
 say "Setting up .venv: about 140 MB to download, usually less than a minute."
 "$python" -m venv --clear .venv
 bin=.venv/bin
