@@ -47,6 +47,9 @@ SAMPLE_UNITS = {
 }
 
 _NOT_A_NUMBER = complex(np.nan, np.nan)
+#: A peak is far above the highest point of a curve where (point / peak)^2 is less than the first:
+#: its parabola must then come within the second, a factor, of the next points.
+_FAR_ABOVE, _OFF = 0.5, 2.0
 
 
 def column_of(measure: str) -> str:
@@ -348,7 +351,8 @@ def peak(frequency_ratio: ArrayLike, response: ArrayLike) -> tuple[float, float]
     By the parabola of 1 / response^2 over ratio^2 through the highest point and its neighbours,
     whatever their spacing: exact for a linear oscillator but for (2 damping ratio)^2. NaN, NaN for
     a peak outside: where the highest point is an end of the curve or stands beside NaN, nothing
-    says how much higher the curve rises.
+    says how much higher the curve rises. A parabola that rises far above that point and misses the
+    next ones goes through noise: the top is then that of the parabola of the response itself.
     """
     x, y = np.asarray(frequency_ratio, dtype=float), np.asarray(response, dtype=float)
     k = -1 if np.isnan(y).all() else int(np.nanargmax(y))
@@ -356,13 +360,24 @@ def peak(frequency_ratio: ArrayLike, response: ArrayLike) -> tuple[float, float]
         return np.nan, np.nan
     # Relative to the highest point, so that no square leaves the range of numbers.
     with np.errstate(divide="ignore"):
-        low = (y[k] / y[k - 1 : k + 2]) ** 2
-    square, lowest = vertex(x[k - 1 : k + 2] ** 2, low)
-    if not lowest > 0.0:
-        # Too far apart for a resonance between them; the curve itself is the smoother one.
-        square, height = vertex(x[k - 1 : k + 2] ** 2, -y[k - 1 : k + 2])
+        low = (y[k] / y) ** 2
+    near = slice(k - 1, k + 2)
+    square, lowest = vertex(x[near] ** 2, low[near])
+    if not lowest > 0.0 or (lowest < _FAR_ABOVE and _misses(x**2, low, k)):
+        # No resonance between the points; the curve itself is the smoother one.
+        square, height = vertex(x[near] ** 2, -y[near])
         return float(np.sqrt(square)), float(-height)
     return float(np.sqrt(square)), float(y[k] / np.sqrt(lowest))
+
+
+def _misses(x, low, k):
+    """Whether the parabola about point k is off by a factor at a point next to the three."""
+    x0, x1, x2 = x[k - 1 : k + 2]
+    left = (low[k] - low[k - 1]) / (x1 - x0)
+    bend = ((low[k + 1] - low[k]) / (x2 - x1) - left) / (x2 - x0)
+    beyond = [j for j in (k - 2, k + 2) if 0 <= j < len(x) and np.isfinite(low[j])]
+    found = [(low[k - 1] + (x[j] - x0) * (left + bend * (x[j] - x1))) / low[j] for j in beyond]
+    return any(not 1.0 / _OFF < share < _OFF for share in found)
 
 
 def vertex(x: ArrayLike, y: ArrayLike) -> tuple[float, float]:

@@ -157,6 +157,15 @@ def test_peak_of_points_too_far_apart_for_one_resonance():
     assert 0.5 < ratio < 1.1 and 1.0 <= height < 2.0
 
 
+def test_noise_is_no_resonance_between_the_points():
+    """Points of a noisy curve [mm] that a narrow resonance would put at 27 mm, but for the next."""
+    curve = [8.85, 4.13, 11.55, 10.93, 7.31]
+    ratios = np.linspace(0.96, 1.04, 5)
+    assert peak(ratios[1:4], curve[1:4])[1] > 2.0 * max(curve)
+    ratio, height = peak(ratios, curve)
+    assert 1.0 < ratio < 1.02 and max(curve) < height < 1.1 * max(curve)
+
+
 def test_no_peak_without_numbers():
     assert np.isnan(peak([1.0, 2.0], [math.nan, math.nan])).all()
 
