@@ -96,7 +96,7 @@ class BondDashpots:
     @ti.func
     def mean(self, b, motion):
         """A bond's motion with the twist that its dashpots answered in the step before."""
-        g, n = self._place(b)
+        g, n = self._group_and_lane(b)
         twist = vec6(0.0)
         for k in ti.static(range(6)):
             twist[k] = self.theta[0] * (self.last[g][k, n] + self.theta[1] * self.start[g][k, n])
@@ -107,7 +107,7 @@ class BondDashpots:
     @ti.func
     def begin(self, b, i, j, branch):
         """Load the present twist of an intact bond and, at intervals, its block."""
-        g, n = self._place(b)
+        g, n = self._group_and_lane(b)
         self.masters[g][n], self.slaves[g][n] = i, j
         now = self._twist(i, j, branch)
         for k in ti.static(range(3)):
@@ -125,14 +125,14 @@ class BondDashpots:
         slots = self.tables.bond_slots[b]
         i, j = slots[0] >> 2, slots[1] >> 2
         if self.state.broken_tick[b] < 0:
-            g, n = self._place(b)
+            g, n = self._group_and_lane(b)
             now = self._twist(i, j, self.state.position[j] - self.state.position[i])
             for k in ti.static(range(6)):
                 self.start[g][k, n] = now[k]
                 self.last[g][k, n] = now[k]
 
     @ti.func
-    def _place(self, b):
+    def _group_and_lane(self, b):
         """Group and lane of a bond."""
         return self.index[b] // LANES, self.index[b] % LANES
 
@@ -147,7 +147,7 @@ class BondDashpots:
     @ti.func
     def end(self, b):
         """Remove a released bond from the sweeps."""
-        g, n = self._place(b)
+        g, n = self._group_and_lane(b)
         self.masters[g][n], self.slaves[g][n] = self.velocities.spare, self.velocities.spare
         for k in ti.static(range(6)):
             self.last[g][k, n] = 0.0
