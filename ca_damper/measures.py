@@ -359,7 +359,7 @@ def peak(frequency_ratio: ArrayLike, response: ArrayLike) -> tuple[float, float]
     if not 0 < k < len(y) - 1 or not (y[k] > 0.0 and y[k - 1] == y[k - 1] and y[k + 1] == y[k + 1]):
         return np.nan, np.nan
     # Relative to the highest point, so that no square leaves the range of numbers.
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", over="ignore"):
         low = (y[k] / y) ** 2
     near = slice(k - 1, k + 2)
     square, lowest = vertex(x[near] ** 2, low[near])

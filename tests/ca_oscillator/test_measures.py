@@ -164,6 +164,9 @@ def test_noise_is_no_resonance_between_the_points():
     assert peak(ratios[1:4], curve[1:4])[1] > 2.0 * max(curve)
     ratio, height = peak(ratios, curve)
     assert 1.0 < ratio < 1.02 and max(curve) < height < 1.1 * max(curve)
+    # A point near rest farther away leaves the range of numbers, and changes nothing.
+    far = peak([0.9, *ratios], [1e-200, *curve])
+    assert far == (ratio, height)
 
 
 def test_no_peak_without_numbers():
