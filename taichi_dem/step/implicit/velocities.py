@@ -29,6 +29,7 @@ class Velocities:
     contiguously, 128 bytes a body: a sweep visits bodies out of order, and large blocks wait for
     memory. With supports, hold: velocity per impulse [1/kg], and given: total impulse and moment on
     a body in the step [N s, N m s].
+    spare: number of a body that is none and stays at rest, for lanes without a bond.
     """
 
     scratch_fields = ("twist", "given")
