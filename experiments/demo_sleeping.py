@@ -61,7 +61,7 @@ def row_of(simulation):
         "front_m": place[speed > 0.01 * speed.max()].max(),
         "awake_m": place[np.isfinite(awake)].max(),
         "awake_percent": 100.0 * np.isfinite(awake).mean(),
-        "cpu_s": simulation.cpu_seconds(),
+        "cpu_s": simulation.run_cpu_seconds,
     }
 
 

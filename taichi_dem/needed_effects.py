@@ -125,10 +125,10 @@ def _role(result, name):
 
 def _difference(result, names):
     """Largest relative difference of a run without some effects; infinite where it fails."""
-    effects = result.scene.effects
-    kept = ChosenEffects(_without(effects, names), effects.word)
+    scene = result.scene
+    kept = _without(scene.effects, names, may_be_silent=not scene.on_demand)
     try:
-        scene = replace(result.scene, effects=kept, loads=())
+        scene = replace(scene, effects=ChosenEffects(kept, scene.effects.word), loads=())
         simulation = Simulation(scene, result.method, result.report.driver.split("+")[0])
         if result.start is not None:
             simulation.state.set_motion(**result.start)
@@ -140,12 +140,25 @@ def _difference(result, names):
     return recorded_difference(result, again)
 
 
-def _without(effects, names):
-    """Effects of a list without those of some names; silent friction goes with its contact."""
-    kept = [effect for effect in effects if effect.name not in names]
+def _without(effects, names, may_be_silent):
+    """Effects of a list without those of some names; silent friction goes with its contact.
+
+    Of these, those that can stay as silent copies: the same bits, and nothing is compiled anew.
+    """
+    kept = []
+    for effect in effects:
+        if effect.name not in names:
+            kept.append(effect)
+        elif may_be_silent and _can_be_silent(effect):
+            kept.append(effect.silent())
     if any(effect.role == "contact" for effect in kept):
         return kept
     return [effect for effect in kept if effect.name or effect.role != "friction"]
+
+
+def _can_be_silent(effect):
+    """Whether its class itself says how: one that it derives from may not know its law."""
+    return "harmless" in vars(type(effect))
 
 
 def recorded_difference(first: Result, second: Result) -> float:

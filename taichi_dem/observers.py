@@ -312,12 +312,12 @@ class RunView(Uncopied):
     @property
     def cpu_seconds(self) -> float:
         """CPU time spent stepping so far [s]."""
-        return self._parts[0].cpu_seconds()
+        return self._parts[0].run_cpu_seconds
 
     @property
     def wall_seconds(self) -> float:
         """Wall time spent stepping so far [s]."""
-        return self._parts[0].running_seconds()
+        return self._parts[0].run_seconds
 
     def motion(self) -> dict:
         """Motion of the bodies.

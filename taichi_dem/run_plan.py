@@ -53,7 +53,7 @@ class RunProgress(Progress):
 
 def progress_of(simulation: Simulation, until: float) -> RunProgress:
     """RunProgress of a simulation towards a time [s]."""
-    done, seconds = simulation.evaluations(), simulation.running_seconds()
+    done, seconds = simulation.evaluations(), simulation.run_seconds
     rate = simulation.evaluation_rate()
     time_s = simulation.time_s
     return RunProgress(min(1.0, time_s / until), seconds, time_s, until, done, rate)

@@ -73,6 +73,8 @@ class Simulation(Uncopied):
     cut_short : str
         What an exception or Ctrl-C interrupted, in words, so that its bits would not be those of an
         undisturbed run; ``""`` otherwise.
+    run_seconds, run_cpu_seconds : float
+        Wall and CPU time spent in steps so far [s], without compiling and without readings.
 
     Raises
     ------
@@ -141,7 +143,6 @@ class Simulation(Uncopied):
                 self.state.set_motion(self.model.centre, **self.scene.initial_motion)
             self.energy_balance = None
             self.run_seconds = self.run_cpu_seconds = 0.0
-            self.started = None
             self.first_motion: dict[str, np.ndarray] = {}
 
     @contextlib.contextmanager
@@ -304,19 +305,24 @@ class Simulation(Uncopied):
         runtime.check_session(self.loan.session, "simulation")
         end = whole("macro_step", macro_step, 0, MOST_STEPS) * MACRO_TICKS
         self.start()
-        self.started, self.started_cpu = time.perf_counter(), time.process_time()
+        while self.state.tick[None] < end:
+            with self._undivided("it stepped"), self._timed():
+                self.driver.run(end)
+            # A runaway fills the lists: it is named first.
+            self.divergence_check.check(hurried=self.state.tick[None] < end)
+            self._check_capacity()
+            if on_call is not None:
+                on_call()
+
+    @contextlib.contextmanager
+    def _timed(self):
+        """Count the time; checks between calls are not in it, as their first ones are compiled."""
+        wall, cpu = time.perf_counter(), time.process_time()
         try:
-            while self.state.tick[None] < end:
-                with self._undivided("it stepped"):
-                    self.driver.run(end)
-                # A runaway fills the lists: it is named first.
-                self.divergence_check.check(hurried=self.state.tick[None] < end)
-                self._check_capacity()
-                if on_call is not None:
-                    on_call()
+            yield
         finally:
-            self.run_seconds, self.run_cpu_seconds = self.running_seconds(), self.cpu_seconds()
-            self.started = None
+            self.run_seconds += time.perf_counter() - wall
+            self.run_cpu_seconds += time.process_time() - cpu
 
     def _check_capacity(self):
         if self.contacts is not None:
@@ -329,7 +335,7 @@ class Simulation(Uncopied):
 
     def saved(self) -> dict[str, np.ndarray]:
         """Data for a checkpoint beside the fields, arrays by name."""
-        return {"cost": np.array([self.running_seconds(), self.cpu_seconds()])}
+        return {"cost": np.array([self.run_seconds, self.run_cpu_seconds])}
 
     def resume(self, saved: Mapping[str, np.ndarray]) -> None:
         """Restore the data that ``saved`` returned."""
@@ -355,28 +361,6 @@ class Simulation(Uncopied):
         """
         solver = self.advance.solver
         return int(solver.total_sweeps[None]) if solver is not None else 0
-
-    def running_seconds(self) -> float:
-        """Wall time spent stepping so far, without compile time.
-
-        Returns
-        -------
-        float
-            Time [s].
-        """
-        present = time.perf_counter() - self.started if self.started is not None else 0.0
-        return self.run_seconds + present
-
-    def cpu_seconds(self) -> float:
-        """CPU time spent stepping so far, without compile time.
-
-        Returns
-        -------
-        float
-            Time [s].
-        """
-        present = time.process_time() - self.started_cpu if self.started is not None else 0.0
-        return self.run_cpu_seconds + present
 
     def evaluation_rate(self) -> float:
         """Bonds and pairs to evaluate in a simulated second, if all levels stay as they are.

@@ -84,4 +84,4 @@ def deceleration(body, speed, angle, friction, divisions=5, kind=effects.SphereC
         height = simulation.state.position.to_numpy()[own, 1] - first
         rise = max(rise, float(mass @ height) / mass.sum())
     present = mass @ simulation.state.velocity.to_numpy()[own] @ direction / mass.sum()
-    return (speed - present) / time, rise, simulation.cpu_seconds() * STEP / time
+    return (speed - present) / time, rise, simulation.run_cpu_seconds * STEP / time

@@ -231,6 +231,11 @@ class Effect(Sealed):
         if given is not None:
             self.__dict__["_given"] = vars(given)
 
+    @property
+    def stands_silent(self) -> bool:
+        """Whether the effect that this bound one stands for is silent."""
+        return bool(self._given.get("is_silent"))
+
     def load_scene(self, model: "Model") -> None:
         """Load the numbers of the effect that this bound one stands for.
 
@@ -239,7 +244,7 @@ class Effect(Sealed):
         model : Model
             Arrays of the scene.
         """
-        if self._given.get("is_silent"):
+        if self.stands_silent:
             model = model.harmless(self)
         if self._count:
             assign(self.law, _numbers_of(self, model.materials))

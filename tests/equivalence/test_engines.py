@@ -1,5 +1,6 @@
 """Engines: a structure is compiled once; a scene in one has the bits of a scene alone."""
 
+import contextlib
 import threading
 from dataclasses import replace
 
@@ -25,6 +26,7 @@ from taichi_dem.engine.engine import ENGINES
 from taichi_dem.kit import allocation
 from taichi_dem.mesh.shapes import bar, single
 from taichi_dem.physics.rotation import zero3
+from taichi_dem.timeline import NEVER
 from tests.slow import slow_but
 
 #: Largest steps of a run: bonds break at the left end, and what they held touches.
@@ -142,6 +144,35 @@ def test_other_numbers_compile_nothing_and_leave_no_trace(kind, compilations, co
     assert compilations == [] and ENGINES.count == 1
     ENGINES._engines = {}
     assert same(run_alone(*drawn[0]), first)
+
+
+@pytest.mark.parametrize(
+    "method",
+    slow_but([ImplicitDashpots(2e-7), Uniform(2e-8), Multirate(2e-8)], ImplicitDashpots(2e-7)),
+    ids=lambda method: method.name,
+)
+def test_nothing_is_compiled_in_the_time_of_steps(method, compilations, compiled_anew, monkeypatch):
+    """Readings of contacts are compiled between steps, once a bar has broken."""
+    torn = effects.PrescribedMotion("right", (2.0, 1.0, 0.0), 900.0)
+    laws = [effects.Softening(), effects.ShearSlip(), effects.SphereContact(), effects.Friction()]
+    scene = Scene(bar(0.2, 0.1, (2, 1, 1)), CONCRETE, [*laws, effects.Fixed("left"), torn])
+    simulation = Simulation(scene, method)
+    counts, timed = [], simulation._timed
+
+    @contextlib.contextmanager
+    def counted():
+        before = len(compilations)
+        with timed():
+            yield
+        counts.append(len(compilations) - before)
+
+    monkeypatch.setattr(simulation, "_timed", counted)
+    simulation.start()
+    started = len(compilations)
+    simulation.advance_to(round(2e-4 / method.dt0))
+    assert (simulation.state.broken_tick.to_numpy() != NEVER).any()
+    assert len(compilations) > started and set(counts) == {0}
+    assert simulation.run_cpu_seconds > 0.0
 
 
 @pytest.mark.slow

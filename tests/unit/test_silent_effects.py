@@ -2,9 +2,19 @@
 
 import pytest
 
-from taichi_dem import CONCRETE, InputError, Scene, Uniform, effects, needed_effects, simulate
+from taichi_dem import (
+    CONCRETE,
+    ImplicitDashpots,
+    InputError,
+    Scene,
+    Uniform,
+    effects,
+    needed_effects,
+    simulate,
+)
 from taichi_dem.engine.engine import ENGINES
 from taichi_dem.mesh.shapes import bar, pair
+from taichi_dem.needed_effects import _without
 from tests.slow import slow_but
 
 CAN = {
@@ -13,22 +23,25 @@ CAN = {
     "bond_damping": effects.BondDamping,
     "friction": effects.Friction,
 }
+SOME = ("softening", "shear_slip")
+METHODS = Uniform(1e-7), ImplicitDashpots(2e-7)
 
 
-def pulled(*listed):
+def pulled(*listed, method=METHODS[0]):
     """A bar whose end is pulled until it breaks where it can."""
     held = [effects.Fixed("left"), effects.PrescribedMotion("right", (2.0, 1.0, 0.0), 900.0)]
     scene = Scene(bar(0.2, 0.1, (2, 1, 1)), CONCRETE, [*listed, effects.SphereContact(), *held])
     looks = {"samples": 4, "frames": 4, "progress": None}
-    return simulate(scene, method=Uniform(1e-7), until=4e-4, **looks)
+    return simulate(scene, method=method, until=4e-4, **looks)
 
 
-@pytest.mark.parametrize(
-    "acting", slow_but([(), ("bond_damping",), ("softening", "shear_slip")], ("bond_damping",))
-)
-def test_a_silent_effect_leaves_every_bit_and_report_of_a_scene_without_it(acting):
-    silent = pulled(*(kind() if name in acting else kind().silent() for name, kind in CAN.items()))
-    without = pulled(*(CAN[name]() for name in acting))
+@pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
+@pytest.mark.parametrize("acting", slow_but([(), ("bond_damping",), SOME], SOME))
+def test_a_silent_effect_leaves_every_bit_and_report_of_a_scene_without_it(method, acting):
+    loud = {name: kind() for name, kind in CAN.items()}
+    mixed = [effect if name in acting else effect.silent() for name, effect in loud.items()]
+    silent = pulled(*mixed, method=method)
+    without = pulled(*(CAN[name]() for name in acting), method=method)
     for key, values in silent.history.items():
         assert values.tobytes() == without.history[key].tobytes(), key
     for frame, other in zip(silent.frames, without.frames):
@@ -57,3 +70,33 @@ def test_a_silent_effect_is_not_listed():
     loud = effects.Softening()
     scene = Scene(pair(), CONCRETE, [loud.silent()])
     assert not scene.has("softening") and loud.name == "softening"
+
+
+class OwnSoftening(effects.Softening):
+    """A law of a user's own, of which the class it derives from knows nothing."""
+
+
+def test_advice_tries_what_can_be_silent_on_the_engine_of_the_run():
+    """A pair that falls freely needs no law of its bond; contact is left out in another engine."""
+    laws = [kind() for name, kind in CAN.items() if name != "friction"]
+    scene = Scene(pair(), CONCRETE, [*laws, effects.Gravity()])
+    result = simulate(scene, method=Uniform(1e-7), until=1e-5)
+    before = len(ENGINES._engines)
+    advice = needed_effects(result)
+    assert len(ENGINES._engines) == before
+    assert set(advice.droppable) == {"softening", "shear_slip", "bond_damping"}
+
+
+def test_advice_leaves_out_what_cannot_be_silent():
+    """A class that only inherits how to be silent may have a law that acts all the same."""
+    listed = [effects.Softening(), OwnSoftening(), effects.SphereContact(), effects.Friction()]
+    for name, may, kept in [
+        ("softening", True, ["", "sphere_contact", "friction"]),
+        ("softening", False, ["sphere_contact", "friction"]),
+        ("sphere_contact", True, ["softening", "softening", "friction"]),
+        ("friction", True, ["softening", "softening", "sphere_contact", ""]),
+    ]:
+        left = _without(listed, (name,), may)
+        assert [effect.name for effect in left] == kept
+    both = _without(listed, ("sphere_contact", "friction"), True)
+    assert [effect.name for effect in both] == ["softening", "softening"]

@@ -79,7 +79,8 @@ class BondDashpots:
         place = np.empty(model.bond_count, dtype=np.int32)
         place[order] = np.arange(model.bond_count) + begin[colours[order]]
         assign(self.index, place)
-        assign(self.colour_first, first)
+        # Of silent dashpots, none is visited: what they change would decide about further sweeps.
+        assign(self.colour_first, 0 * first if self.tables.dashpot.stands_silent else first)
         for bodies in (self.masters, self.slaves):
             assign(bodies, self.velocities.spare)
 
