@@ -95,7 +95,9 @@ class Model:
     @cached_property
     def dashpot_rates(self) -> np.ndarray:
         """Rate of the dashpots of every body for each subset of its bonds [1/s], (n, 16)."""
-        return self._subset_rates(dashpots_of(self.materials))
+        silent = [e for e in self.by_role["dashpot"] if getattr(e, "is_silent", False)]
+        acting = self.harmless(silent[0]) if silent else self
+        return self._subset_rates(dashpots_of(acting.materials))
 
     @cached_property
     def spring_rates(self) -> np.ndarray:

@@ -61,16 +61,17 @@ class ContactLimits:
 
     A sphere pair counts once it could touch within some steps of the finer of its bodies: it is
     evaluated once a step, and the coarser body is woken before the next time. count: number of the
-    sphere pairs of a body pair that count.
+    sphere pairs of a body pair that count. slides: 1 without friction, or where it is silent.
     """
 
-    constant_fields = ("ahead", "root_mass", "root_inertia")
+    constant_fields = ("ahead", "root_mass", "root_inertia", "slides")
 
     def __init__(self, tables: "Tables", state: "State", contacts: "Contacts"):
         self.tables, self.state, self.contacts = tables, state, contacts
         self.store = contacts.store
         self.ahead = ti.field(real, shape=MAX_LEVEL + 1)
         self.count = self.store.column("count_within_margin", ti.i32)
+        self.slides = ti.field(ti.i32, shape=())
         # M^-1/2 as 1 / sqrt(m) and I^-1/2 in the body frame.
         self.root_mass = ti.field(real, shape=tables.capacity.bodies)
         self.root_inertia = ti.Matrix.field(3, 3, real, shape=tables.capacity.bodies)
@@ -81,6 +82,8 @@ class ContactLimits:
         root = inverse_root(model.body_mass, model.body_inertia)
         assign(self.root_mass, root[:, 0, 0])
         assign(self.root_inertia, root[:, 3:, 3:])
+        friction = self.tables.friction
+        assign(self.slides, not friction.name or friction.stands_silent)
 
     @ti.func
     def margin(self, i, j):
@@ -163,7 +166,7 @@ class ContactLimits:
     def _contact(self, i, arm, normal):
         """Blocks of one contact at an arm from the centre of body i, in its frame."""
         along = normal.outer_product(normal)
-        if ti.static(bool(self.tables.friction.name)):
+        if self.slides[None] == 0:
             along = unit3()
         root = self.root_mass[i]
         lever = self.root_inertia[i] @ cross_matrix(arm) @ along

@@ -6,7 +6,9 @@ from taichi_dem import (
     CONCRETE,
     ImplicitDashpots,
     InputError,
+    Multirate,
     Scene,
+    StepControl,
     Uniform,
     effects,
     needed_effects,
@@ -24,7 +26,12 @@ CAN = {
     "friction": effects.Friction,
 }
 SOME = ("softening", "shear_slip")
-METHODS = Uniform(1e-7), ImplicitDashpots(2e-7)
+METHODS = (
+    Uniform(1e-7),
+    ImplicitDashpots(2e-7),
+    Multirate(8e-8, 1e-5, control=StepControl(), dashpot="limited"),
+    Uniform(2.5e-8, dashpot="limited"),
+)
 
 
 def pulled(*listed, method=METHODS[0]):
@@ -35,7 +42,7 @@ def pulled(*listed, method=METHODS[0]):
     return simulate(scene, method=method, until=4e-4, **looks)
 
 
-@pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
+@pytest.mark.parametrize("method", slow_but(METHODS, *METHODS[:3]), ids=lambda method: method.name)
 @pytest.mark.parametrize("acting", slow_but([(), ("bond_damping",), SOME], SOME))
 def test_a_silent_effect_leaves_every_bit_and_report_of_a_scene_without_it(method, acting):
     loud = {name: kind() for name, kind in CAN.items()}
