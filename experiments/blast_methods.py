@@ -12,8 +12,9 @@ The reference is the implicit method at a sixteenth of its step. Displacement: m
 wall. The largest stable step is found by doubling, in runs to --stable-until that must end within
 10 % of the reference. A bond on the edge of
 breaking near 2e-4 s makes some runs go another way from there on, one per cent apart at the end.
-Times are CPU seconds of stepping alone. Writes methods.png, the table as CSV, the history of every
-method and summary.json to results/blast_methods/.
+Times are CPU seconds of stepping alone. Writes methods.png, for every method with a step for each
+body levels_NAME.png, who needs which step, the table as CSV, the history of every method and
+summary.json to results/blast_methods/.
 """
 
 import sys
@@ -28,7 +29,7 @@ from taichi_dem import ImplicitDashpots, ProgressBar, SimulationDiverged, plot, 
 from taichi_dem.kit import study
 from taichi_dem.kit.files import write_csv
 from taichi_dem.kit.validation import choice
-from taichi_dem.output.run_costs import RunCosts
+from taichi_dem.output.run_costs import RunCosts, level_shares
 
 NAME = "blast_methods"
 REFERENCE = "reference", partial(ImplicitDashpots, sweeps=(6, 40)), 2.5e-8
@@ -66,6 +67,9 @@ def follow(scene, name, make, step, options):
     series = {**result.history, **costs.columns}
     write_csv(f"{options.out}/history_{name}.csv", series)
     made = {"report": result.report, "series": series, "moved": float(series[MOVED][-1])}
+    if not method.uniform:
+        shares, path = level_shares(costs.levels), f"{options.out}/levels_{name}.png"
+        plot.plot_levels(path, series["time_s"], shares, step)
     return SimpleNamespace(name=name, make=make, step=step, **made)
 
 
