@@ -33,7 +33,7 @@ def _(lesson, mo, sliders):
         {name: mo.ui.switch(value=True, label=words) for name, (_, words) in lesson.EFFECTS.items()}
     )
     chosen = sliders(mo, {"speed": (lesson.SPEEDS, 2.0, "the right end starts with [m/s]")})
-    measure = mo.ui.run_button(label="measure what this choice costs (compiles it, some seconds)")
+    measure = mo.ui.run_button(label="measure what this choice costs (compiles it first)")
     _left, _right = list(listed.elements.values()), [chosen.elements["speed"], measure]
     mo.hstack([mo.vstack(_left), mo.vstack(_right)], justify="start", gap=3)
     return chosen, listed, measure
@@ -74,10 +74,10 @@ def _(guesses, mo, questions):
     allow, but they are solved, not stepped. The step is not what to worry about here: an effect
     that is missing makes a thousand times that difference, and no shorter step brings it back.
 
-    Friction costs less than 2 % of a step. How far elsewhere do bodies end without it, at 2 m/s? ::
-    by less than 2 % | by about 10 % | *by about 90 % :: Cost and use are two things: dashpots and
-    contact cost 13 to 14 % of a step each, and without them bodies end 36 and 144 % elsewhere;
-    without slip, at 3 %, they end 0.5 % elsewhere. Leave out one at a time and press the button.
+    Friction costs some 2 % of a step. How far elsewhere do bodies end without it, at 2 m/s? ::
+    by less than 2 % | by about 10 % | *by about 90 % :: Cost and use are two things: dashpots cost
+    a third of a step and contact a sixth, and without them bodies end 39 and 144 % elsewhere;
+    without slip, at 2 %, they end 0.5 % elsewhere. Leave out one at a time and press the button.
 
     Fracture takes 2 % of the energy. Can it go? :: *no | yes | only if 2 % of error will do :: It
     *steers*: it takes little and decides where everything goes. The program never drops such an
