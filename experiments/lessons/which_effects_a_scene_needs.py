@@ -71,8 +71,8 @@ def _(guesses, mo, questions):
 
     Take half the time step. How far elsewhere do bodies end, at 2 m/s? :: *by 0.02 % | by 2 % |
     by as much as without friction :: A step of 0.2 µs is ten times as long as the dashpots would
-    allow, but they are solved, not stepped. The step is not what to worry about here: an effect
-    that is missing makes a thousand times that difference, and no shorter step brings it back.
+    allow, but they are solved, not stepped. The step is not what to worry about here: friction that
+    is missing makes over a thousand times that difference, and no shorter step brings it back.
 
     Friction costs some 2 % of a step. How far elsewhere do bodies end without it, at 2 m/s? ::
     by less than 2 % | by about 10 % | *by about 90 % :: Cost and use are two things: dashpots cost
