@@ -28,7 +28,7 @@ def measure(quick):
         title = f"block of {one['bodies']}, {name}, two threads over one"
         # By the busiest thread: other programs may have kept the cores busy.
         gain = one["gain"] if one["busy"] is None else one["busy"]
-        yield Figure(title, "1", [gain], ">= 1.7")
+        yield Figure(title, "1", [gain], ">= 1.8")
     yield Figure(BOTH, "GB/s", [1e-9 * median(one["bandwidth"] for one in found.values())])
     yield from speeds(found, ", two threads", BOTH)
 

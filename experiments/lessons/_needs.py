@@ -3,7 +3,7 @@
 Every choice of effects is a program of its own, and to compile one takes seconds. So answers come
 from two programs, with contact and without, in which the other effects are silent: the same bits.
 The cost of a choice is measured with its own program, on demand. Dashpots are solved, so that a
-step may be ten times as long as they would allow. All runs on the thread of the session.
+step may be twenty times as long as they would allow. All runs on the thread of the session.
 """
 
 import numpy as np
@@ -19,7 +19,7 @@ from taichi_dem.simulate import result_of, simulate
 LENGTH = 0.3
 BAR = bar(LENGTH, 0.1, (3, 2, 2))
 UNTIL, LOOKS = 9e-4, 10
-METHOD = dem.ImplicitDashpots(2e-7)
+METHOD = dem.ImplicitDashpots(4e-7)
 #: Runs of each program to measure a cost.
 TURNS = 5
 #: The right end goes with v cos(2 pi f t), and sideways at half of it: v [m/s] to choose, f [Hz].
@@ -39,16 +39,19 @@ ALL, WITHOUT_CONTACT = tuple(EFFECTS), tuple(EFFECTS)[:3]
 
 
 class Answer:
-    """Results for one choice, of the effects chosen and of all; speed: of the right end [m/s].
+    """Results for one choice, of the effects chosen and of all.
 
+    names: of the effects chosen. speed: of the right end [m/s].
     stroke: largest displacement of that end [m]. change: mean distance of the bodies from where all
-    effects bring them, by how far that is; None where a run did not come to its end. step_s: CPU
-    seconds of a step of both, each with a program of its own; None if not measured.
+    effects bring them, by how far that is; None where a run did not come to its end. advice: what
+    the program advises on the effects chosen. step_s: CPU seconds of a step of both, each with a
+    program of its own; None if not measured.
     """
 
-    def __init__(self, speed, chosen, complete, step_s=None):
+    def __init__(self, names, speed, chosen, complete, step_s=None):
         self.chosen, self.complete, self.step_s = chosen, complete, step_s
         self.stroke, self.change = speed / (2.0 * np.pi * FREQUENCY), None
+        self.advice = advice(names, speed)
         both = chosen, complete
         if not any(one.diverged for one in both):
             here, there = (one.frames[LOOKS].displacement for one in both)
@@ -84,9 +87,15 @@ def outcome(names, speed):
     return measured(names, speed, ALL if "sphere_contact" in names else WITHOUT_CONTACT)
 
 
+@session.remember
+def advice(names, speed):
+    """Advice on a choice of effects; runs it again without those that did nothing."""
+    return dem.needed_effects(outcome(names, speed))
+
+
 def answer(names, speed):
     """The Answer to a choice: effects by name, as ``allowed`` gives them, and one of SPEEDS."""
-    return Answer(speed, outcome(names, speed), outcome(ALL, speed))
+    return Answer(names, speed, outcome(names, speed), outcome(ALL, speed))
 
 
 def price(names, speed):
@@ -95,7 +104,7 @@ def price(names, speed):
     both = [[measured(listed, speed) for listed in (names, ALL)] for _ in range(TURNS)]
     reports = [[result.report for result in pair] for pair in both]
     spent = [[one.run_cpu_seconds / max(1, one.substeps) for one in pair] for pair in reports]
-    return Answer(speed, *both[0], np.min(spent, axis=0))
+    return Answer(names, speed, *both[0], np.min(spent, axis=0))
 
 
 def compile_all():
@@ -107,9 +116,9 @@ def compile_all():
 
 def verdicts(answer):
     """A row for every effect: (words, whether listed, what it did, what the program advises)."""
-    advice, listed = dem.needed_effects(answer.chosen), answer.chosen.report.effects
+    listed = answer.chosen.report.effects
     return [
-        (words, name in listed, *advice.verdict(name, kind.__name__))
+        (words, name in listed, *answer.advice.verdict(name, kind.__name__))
         for name, (kind, words) in EFFECTS.items()
     ]
 

@@ -70,6 +70,8 @@ class Effect(Sealed):
     activation = ""
     #: Whether it stands for no effect, which no report lists.
     is_null = False
+    #: Whether it is compiled and never acts (``silent``).
+    is_silent = False
 
     def __init_subclass__(cls, **options: Any) -> None:
         """Name a class that has no name: reports list effects by it."""

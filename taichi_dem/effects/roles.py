@@ -242,7 +242,7 @@ _DOES = {
 
 def check_activation(effect: Any) -> None:
     """Raise InputError for a law that has no rule for effects="auto"; loads and supports act."""
-    if effect.role in ("tension", "shear") and getattr(effect, "is_silent", False):
+    if effect.role in ("tension", "shear") and effect.is_silent:
         raise InputError(
             "effects 'auto' must have laws of bonds that act, as it looks for no limit beside "
             f"theirs, got a silent {type(effect).name}: list the effects, or take 'all'"

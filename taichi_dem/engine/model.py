@@ -95,7 +95,7 @@ class Model:
     @cached_property
     def dashpot_rates(self) -> np.ndarray:
         """Rate of the dashpots of every body for each subset of its bonds [1/s], (n, 16)."""
-        silent = [e for e in self.by_role["dashpot"] if getattr(e, "is_silent", False)]
+        silent = [effect for effect in self.by_role["dashpot"] if effect.is_silent]
         acting = self.harmless(silent[0]) if silent else self
         return self._subset_rates(dashpots_of(acting.materials))
 

@@ -65,33 +65,35 @@ def inverse(matrices: np.ndarray) -> np.ndarray:
 def largest_eigenvalues(matrices: np.ndarray) -> np.ndarray:
     """Largest eigenvalue of every symmetric matrix, shape (n, m, m)."""
     parts = range(0, len(matrices), _AT_A_TIME)
-    found = [_diagonal(matrices[first : first + _AT_A_TIME])[0] for first in parts]
+    found = [_diagonal(matrices[first : first + _AT_A_TIME]) for first in parts]
     return np.concatenate([np.empty(0), *(values.max(axis=0) for values in found)])
 
 
 def weakest_direction(matrix: np.ndarray) -> np.ndarray:
     """Unit eigenvector of the smallest eigenvalue of a symmetric matrix, shape (m, m)."""
-    values, axes = _diagonal(matrix[None])
+    axes = np.eye(len(matrix))[:, :, None]
+    values = _diagonal(matrix[None], axes)
     return axes[:, values[:, 0].argmin(), 0]
 
 
-def _diagonal(matrices):
-    """Eigenvalues (m, n) and unit eigenvectors (m, m, n), columns, by Jacobi's rotations."""
+def _diagonal(matrices, *axes):
+    """Eigenvalues (m, n) by Jacobi's rotations; axes: unit matrices (m, m, n) that turn along.
+
+    Their columns are then unit eigenvectors.
+    """
     a = np.moveaxis(matrices, 0, -1).copy()
     size = range(len(a))
-    axes = np.zeros_like(a)
-    axes[size, size] = 1.0
     for _ in range(_SWEEPS):
         for p in size:
             for q in size[p + 1 :]:
                 _rotate(a, axes, p, q)
-    return a[size, size], axes
+    return a[size, size]
 
 
 def _rotate(a, axes, p, q):
     """Turn the axes p and q of matrices (m, m, n) such that their entry (p, q) vanishes.
 
-    Golub and Van Loan, Matrix Computations, algorithm 8.4.1.
+    axes: arrays whose columns turn too. Golub and Van Loan, Matrix Computations, algorithm 8.4.1.
     """
     twice, apart = 2.0 * a[p, q], a[q, q] - a[p, p]
     # A denominator of zero belongs to an entry that has vanished.
@@ -99,7 +101,15 @@ def _rotate(a, axes, p, q):
     t = np.where(apart < 0.0, -twice, twice) / root
     c = 1.0 / np.sqrt(1.0 + t * t)
     s = t * c
-    a[p], a[q] = c * a[p] - s * a[q], s * a[p] + c * a[q]
-    for columns in (a, axes):
-        first, second = columns[:, p], columns[:, q]
-        columns[:, p], columns[:, q] = c * first - s * second, s * first + c * second
+    _turn(a[p], a[q], c, s)
+    for columns in (a, *axes):
+        _turn(columns[:, p], columns[:, q], c, s)
+
+
+def _turn(first, second, c, s):
+    """Turn pairs of entries in place, by cosine c and sine s."""
+    turned = s * first
+    turned += c * second
+    first *= c
+    first -= s * second
+    second[:] = turned

@@ -140,7 +140,8 @@ class StabilityLimits:
             self.contact_limits.load(model, rule.ahead * method.dt0)
         if self.tables.dashpot.name:
             assign(self.dashpot_table, model.dashpot_rates)
-        assign(self.spring_table, model.spring_rates)
+        if self.controlled:
+            assign(self.spring_table, model.spring_rates)
 
     @ti.func
     def count(self, low):

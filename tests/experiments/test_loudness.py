@@ -72,16 +72,24 @@ def ended(tmp_path, capsys):
     return start
 
 
+@pytest.mark.filterwarnings("always")
 def test_json_is_the_summary_and_nothing_else(ended):
-    with pytest.warns(UserWarning, match="a warning"):
-        assert ended(loud, "--json") == (0, '{"figures": {}}\n', "of an error\n")
+    errors = "Warning: a warning\nof an error\n"
+    assert ended(loud, "--json") == (0, '{"figures": {}}\n', errors)
 
 
 def test_quiet_leaves_errors_alone(ended):
     assert ended(loud, "--quiet") == (0, "", "of an error\n")
     assert ended(loud, "--quiet", "--json") == (0, '{"figures": {}}\n', "of an error\n")
-    with pytest.warns(UserWarning):
-        assert ended(loud)[1].splitlines()[0] == "What for?"
+
+
+@pytest.mark.filterwarnings("always")
+def test_a_warning_is_a_sentence_unless_it_is_of_other_code(ended):
+    code, said, errors = ended(loud)
+    assert code == 0 and said.splitlines()[0] == "What for?"
+    assert "Warning: a warning\n" in errors and __file__ not in errors
+    with pytest.warns(RuntimeWarning, match="of a library"):
+        ended(lambda _: warnings.warn("of a library", RuntimeWarning, stacklevel=1))
 
 
 @pytest.mark.parametrize("options", [["--quiet"], ["--json"]])

@@ -231,6 +231,14 @@ def test_a_hard_pull_misses_what_is_left_out(engine):
     assert said["fracture"] == "list it" and said["slip in shear"] == "list it"
 
 
+def test_a_page_that_tells_an_answer_runs_nothing(engine, monkeypatch):
+    """Pages have threads of their own, and only that of the session may use Taichi."""
+    answer = engine.ask(_needs.answer, _needs.ALL, 0.2)
+    monkeypatch.setattr(Simulation, "__init__", lambda *_: pytest.fail("a page ran a scene"))
+    assert "drop it" in {says for _, _, _, says in _needs.verdicts(answer)}
+    assert "**" in _needs.words(answer)
+
+
 def test_friction_is_listed_with_contact_only():
     assert _needs.allowed(("friction", "softening")) == ("softening",)
     assert _needs.allowed(reversed(_needs.ALL)) == _needs.ALL

@@ -245,14 +245,23 @@ def main_of_tool(
 def _loudness(options):
     """Discard prints in the block for --json and --quiet, for --quiet also bars and warnings."""
     with contextlib.ExitStack() as stack:
+        stack.enter_context(warnings.catch_warnings())
+        warnings.showwarning = functools.partial(_show_warning, warnings.showwarning)
         if options.quiet or getattr(options, "json", False):
             nowhere = stack.enter_context(open(os.devnull, "w", encoding="utf-8"))
             stack.enter_context(contextlib.redirect_stdout(nowhere))
         if options.quiet:
             stack.enter_context(no_bars())
-            stack.enter_context(warnings.catch_warnings())
             warnings.simplefilter("ignore")
         yield
+
+
+def _show_warning(usual, message, category, *place, **more):
+    """Show a warning about a scene as a sentence, without the line of code that gave it."""
+    if category is UserWarning:
+        print(f"Warning: {message}", file=sys.stderr)
+    else:
+        usual(message, category, *place, **more)
 
 
 def _summary(options):
