@@ -195,7 +195,7 @@ class StabilityLimits:
             if b >= 0:
                 if self.state.broken_tick[b] < 0:
                     intact |= 1 << f
-        dashpot, spring = self.dashpot_table[i, intact], self.spring_table[i, intact]
+        dashpot = self.dashpot_table[i, intact]
         contact_c, contact_k = 0.0, 0.0
         if ti.static(self.has_contact):
             share = self.contact_limits.eigenvalue(i)
@@ -203,7 +203,7 @@ class StabilityLimits:
             contact_c, contact_k = largest[0] * share, largest[1] * share
         self.bond_damping[i], self.contact_damping[i] = dashpot, contact_c
         if ti.static(self.controlled):
-            self._limit(i, dashpot, contact_c, spring, contact_k)
+            self._limit(i, dashpot, contact_c, self.spring_table[i, intact], contact_k)
 
     @ti.func
     def _limit(self, i, bond_c, contact_c, bond_k, contact_k):

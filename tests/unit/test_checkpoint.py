@@ -289,7 +289,7 @@ def test_field_memory_reads_and_writes_what_taichi_does():
     assert set(read) == set(memory.views)
     for name, field in fields.items():
         assert np.array_equal(read[name], first[name])
-        field.fill(7)
+        field.from_numpy(np.full_like(first[name], 7))
     memory.write(read)
     for name, field in fields.items():
         assert np.array_equal(field.to_numpy(), first[name])
