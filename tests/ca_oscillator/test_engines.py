@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from taichi.lang import impl
-from taichi.lang.kernel_impl import Kernel
 
 from ca_damper import Automaton, Batch, Empty, InputError, RigidMass, SceneTable, Spheres, runtime
 from ca_damper.engine.damper_engine import _POOL
@@ -22,21 +21,6 @@ from tests.slow import slow_but
 def fresh_engines():
     """No engine of another test is left."""
     runtime.clear()
-
-
-@pytest.fixture
-def compiled(monkeypatch):
-    """Names of the kernels that are compiled from here on."""
-    names, materialize = [], Kernel.materialize
-
-    def noted(self, key=None, *arguments, **named):
-        before = len(self.compiled_kernels)
-        result = materialize(self, key, *arguments, **named)
-        names.extend([self.func.__name__] * (len(self.compiled_kernels) - before))
-        return result
-
-    monkeypatch.setattr(Kernel, "materialize", noted)
-    return names
 
 
 def some_automaton(draw):
@@ -121,18 +105,18 @@ def digest(*arrays):
 
 @pytest.mark.parametrize("mount", slow_but(["spring", "base"], "spring"))
 @pytest.mark.parametrize("make", FILLINGS)
-def test_a_second_batch_compiles_nothing_and_has_its_bits_as_alone(make, mount, compiled):
+def test_a_second_batch_compiles_nothing_and_has_its_bits_as_alone(make, mount, compilations):
     first = some_batch(make, 0, mount)
     lived(first)
     first.report()
-    assert "advance" in compiled
-    compiled.clear()
+    assert "advance" in compilations
+    compilations.clear()
     found = []
     for seed in (1, 2, 3):
         batch = some_batch(make, seed, mount)
         found.append(lived(batch))
         assert batch.report().compile_seconds == 0.0
-    assert compiled == []
+    assert compilations == []
     assert _POOL.count == 1
     runtime.clear()
     assert found[2] == lived(some_batch(make, 3, mount))

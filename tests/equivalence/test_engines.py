@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import taichi as ti
-from taichi.lang.kernel_impl import Kernel
 
 from taichi_dem import (
     CONCRETE,
@@ -113,21 +112,6 @@ def run_alone(scene, method, driver="resident"):
     simulation = Simulation(scene, method, driver)
     simulation.advance_to(STEPS)
     return outcome(simulation)
-
-
-@pytest.fixture
-def compilations(monkeypatch):
-    """A list that grows by every kernel that is compiled."""
-    made, materialize = [], Kernel.materialize
-
-    def counting(self, *arguments, **options):
-        before = len(self.compiled_kernels)
-        result = materialize(self, *arguments, **options)
-        made.extend([self.func.__qualname__] * (len(self.compiled_kernels) - before))
-        return result
-
-    monkeypatch.setattr(Kernel, "materialize", counting)
-    return made
 
 
 @pytest.mark.parametrize("kind", slow_but(KINDS, fixed), ids=lambda kind: kind.__name__)

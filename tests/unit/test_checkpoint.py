@@ -300,7 +300,7 @@ def test_field_memory_reads_and_writes_what_taichi_does():
 )
 def test_arrays_of_other_fields_do_not_fit(change):
     memory = FieldMemory(part := Part())
-    part.vector.fill(1.0)
+    part.vector.from_numpy(np.ones_like(part.vector.to_numpy()))
     arrays = memory.read()
     assert memory.misfit({**arrays, "vector": change(arrays["vector"])}) == "vector"
     assert memory.misfit({k: a for k, a in arrays.items() if k != "record"}) == "record"
