@@ -39,19 +39,18 @@ ALL, WITHOUT_CONTACT = tuple(EFFECTS), tuple(EFFECTS)[:3]
 
 
 class Answer:
-    """Results for one choice, of the effects chosen and of all.
+    """Results for one choice, of the effects chosen and of all; speed: of the right end [m/s].
 
-    names: of the effects chosen. speed: of the right end [m/s].
     stroke: largest displacement of that end [m]. change: mean distance of the bodies from where all
     effects bring them, by how far that is; None where a run did not come to its end. advice: what
     the program advises on the effects chosen. step_s: CPU seconds of a step of both, each with a
     program of its own; None if not measured.
     """
 
-    def __init__(self, names, speed, chosen, complete, step_s=None):
-        self.chosen, self.complete, self.step_s = chosen, complete, step_s
+    def __init__(self, speed, chosen, complete, advice, step_s=None):
+        self.chosen, self.complete = chosen, complete
+        self.advice, self.step_s = advice, step_s
         self.stroke, self.change = speed / (2.0 * np.pi * FREQUENCY), None
-        self.advice = advice(names, speed)
         both = chosen, complete
         if not any(one.diverged for one in both):
             here, there = (one.frames[LOOKS].displacement for one in both)
@@ -95,7 +94,7 @@ def advice(names, speed):
 
 def answer(names, speed):
     """The Answer to a choice: effects by name, as ``allowed`` gives them, and one of SPEEDS."""
-    return Answer(names, speed, outcome(names, speed), outcome(ALL, speed))
+    return Answer(speed, outcome(names, speed), outcome(ALL, speed), advice(names, speed))
 
 
 def price(names, speed):
@@ -104,7 +103,7 @@ def price(names, speed):
     both = [[measured(listed, speed) for listed in (names, ALL)] for _ in range(TURNS)]
     reports = [[result.report for result in pair] for pair in both]
     spent = [[one.run_cpu_seconds / max(1, one.substeps) for one in pair] for pair in reports]
-    return Answer(names, speed, *both[0], np.min(spent, axis=0))
+    return Answer(speed, *both[0], advice(names, speed), np.min(spent, axis=0))
 
 
 def compile_all():

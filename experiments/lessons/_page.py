@@ -1,15 +1,10 @@
 """Parts of a page: sliders, an answer with its picture, and questions to guess at."""
 
-import io
 from typing import NamedTuple
 
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-
 from taichi_dem import InputError, SimulationDiverged
+from taichi_dem.kit.plot_style import png_as_laid_out
 from taichi_dem.kit.session_thread import session
-
-#: Pixels of a picture per inch.
-DPI = 110
 
 #: A scene of a lesson is too small for two threads: they wait for each other longer than they work.
 session.threads = 1
@@ -70,11 +65,7 @@ def png_like_the_first(figure, name):
     figure.set_layout_engine("none")
     for axes, place in zip(figure.axes, places):
         axes.set_position(place)
-    figure.set_dpi(DPI)
-    content = io.BytesIO()
-    # What saves a figure draws it twice, the first time to lay it out.
-    FigureCanvasAgg(figure).print_png(content)
-    return content.getvalue()
+    return png_as_laid_out(figure)
 
 
 class Question(NamedTuple):

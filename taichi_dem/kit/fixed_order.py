@@ -62,10 +62,14 @@ def inverse(matrices: np.ndarray) -> np.ndarray:
     return product(transposed(factor), factor)
 
 
+def parts_in_cache(count: int) -> list[slice]:
+    """Slices of ``count`` matrices, each of which stays in the cache of a processor."""
+    return [slice(first, first + _AT_A_TIME) for first in range(0, count, _AT_A_TIME)]
+
+
 def largest_eigenvalues(matrices: np.ndarray) -> np.ndarray:
     """Largest eigenvalue of every symmetric matrix, shape (n, m, m)."""
-    parts = range(0, len(matrices), _AT_A_TIME)
-    found = [_diagonal(matrices[first : first + _AT_A_TIME]) for first in parts]
+    found = [_diagonal(matrices[part]) for part in parts_in_cache(len(matrices))]
     return np.concatenate([np.empty(0), *(values.max(axis=0) for values in found)])
 
 

@@ -37,6 +37,8 @@ STYLE = {
     "ytick.labelsize": 8.5,
 }
 
+#: Pixels of a PNG picture in a notebook or on a page, per inch.
+PNG_DPI = 110
 #: Okabe and Ito's colours, which colour-blind readers can distinguish.
 BLUE, RED, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
 ORANGE, SKY, BLACK, GREY = "#E69F00", "#56B4E9", "#222222", "#8A8A8A"
@@ -181,10 +183,18 @@ def _write_plain_numbers(figure):
                 give(_PlainLogFormatter())
 
 
-def png_of(figure: Figure, dpi: float = 110) -> bytes:
+def png_of(figure: Figure, dpi: float = PNG_DPI) -> bytes:
     """A figure as PNG, in bytes; within the block of ``styled``."""
     content = io.BytesIO()
     figure.savefig(content, format="png", dpi=dpi)
+    return content.getvalue()
+
+
+def png_as_laid_out(figure: Figure) -> bytes:
+    """The same where all parts have their places; ``savefig`` draws once more, to lay them out."""
+    content = io.BytesIO()
+    figure.set_dpi(PNG_DPI)
+    FigureCanvasAgg(figure).print_png(content)
     return content.getvalue()
 
 

@@ -12,15 +12,13 @@ from taichi_dem.kit.fixed_order import (
     inverse_factor,
     largest_eigenvalues,
     length,
+    parts_in_cache,
     product,
     transposed,
 )
 from taichi_dem.mesh import tetrahedra as geometry
 from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.topology import Topology, body_properties, face_vertices
-
-#: Bodies taken at a time, so that their matrices stay in the cache.
-_AT_A_TIME = 4096
 
 
 def dashpots_of(material: AnyMaterial) -> tuple[Constant, Constant]:
@@ -66,11 +64,10 @@ def subset_rates(
     blocks[body, face] = _face_blocks(mesh, body, face, centre[body], laws)
     root = inverse_root(mass, inertia)
     rates = np.zeros((mesh.body_count, len(subsets)))
-    for first in range(0, mesh.body_count, _AT_A_TIME):
-        some = slice(first, first + _AT_A_TIME)
+    for part in parts_in_cache(mesh.body_count):
         for column, subset in enumerate(subsets):
-            total = _sum_of(blocks[some], subset)
-            rates[some, column] = scaled_eigenvalues(root[some], total)
+            total = _sum_of(blocks[part], subset)
+            rates[part, column] = scaled_eigenvalues(root[part], total)
     return np.maximum(rates, 0.0)
 
 

@@ -74,7 +74,7 @@ def ended(tmp_path, capsys):
 
 @pytest.mark.filterwarnings("always")
 def test_json_is_the_summary_and_nothing_else(ended):
-    errors = "Warning: a warning\nof an error\n"
+    errors = "warning: a warning\nof an error\n"
     assert ended(loud, "--json") == (0, '{"figures": {}}\n', errors)
 
 
@@ -87,7 +87,7 @@ def test_quiet_leaves_errors_alone(ended):
 def test_a_warning_is_a_sentence_unless_it_is_of_other_code(ended):
     code, said, errors = ended(loud)
     assert code == 0 and said.splitlines()[0] == "What for?"
-    assert "Warning: a warning\n" in errors and __file__ not in errors
+    assert "warning: a warning\n" in errors and __file__ not in errors
     with pytest.warns(RuntimeWarning, match="of a library"):
         ended(lambda _: warnings.warn("of a library", RuntimeWarning, stacklevel=1))
 

@@ -259,7 +259,7 @@ def _loudness(options):
 def _show_warning(usual, message, category, *place, **more):
     """Show a warning about a scene as a sentence, without the line of code that gave it."""
     if category is UserWarning:
-        print(f"Warning: {message}", file=sys.stderr)
+        print(f"warning: {message}", file=sys.stderr)
     else:
         usual(message, category, *place, **more)
 
