@@ -12,6 +12,7 @@ from taichi_dem.contact_search.lengths import SPARE_PAIRS, SPARE_SPHERES
 from taichi_dem.contact_search.pair_store import PairStore
 from taichi_dem.effects.sphere_contact import ONCE_BROKEN
 from taichi_dem.kit.allocation import assign
+from taichi_dem.kit.products import matvec, stacked, transposed_matmul, transposed_matvec
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.methods import Method
 
@@ -70,16 +71,19 @@ class Contacts:
     @ti.func
     def cluster_centre(self, i, face):
         """Centre of the ball around the spheres of a face of body i now [m]."""
-        return self.state.position[i] + self.state.rotation[i] @ self.tables.cluster[face].xyz
+        return self.state.position[i] + matvec(
+            self.state.rotation[i], self.tables.cluster[face].xyz
+        )
 
     @ti.func
     def gap(self, i, j, a, b):
         """Gap between bodies i and j by an entry (a, b) of the pair store [m]."""
         gap = 0.0
         if ti.static(self.law.meets_faces):
-            back = self.state.rotation[i].transpose()
-            offset = back @ (self.state.position[j] - self.state.position[i])
-            near = self.law.nearest(a, b, back @ self.state.rotation[j], offset)
+            rotation = self.state.rotation[i]
+            branch = self.state.position[j] - self.state.position[i]
+            turn = transposed_matmul(rotation, self.state.rotation[j])
+            near = self.law.nearest(a, b, turn, transposed_matvec(rotation, branch))
             gap = near.apart.norm() - near.reach
             if near.can_meet == 0:
                 gap = AWAY
@@ -89,8 +93,8 @@ class Contacts:
 
     @ti.func
     def _gap_of_spheres(self, i, j, a, b):
-        on_first = self.state.rotation[i] @ self.tables.sphere[a].xyz
-        on_second = self.state.rotation[j] @ self.tables.sphere[b].xyz
+        on_first = matvec(self.state.rotation[i], self.tables.sphere[a].xyz)
+        on_second = matvec(self.state.rotation[j], self.tables.sphere[b].xyz)
         apart = self.state.position[j] + on_second - self.state.position[i] - on_first
         return apart.norm() - self.tables.sphere[a][3] - self.tables.sphere[b][3]
 
@@ -128,9 +132,7 @@ class Contacts:
         """Add an impulse [N s] and its moment [N m s] to the pending ones of a body of a pair."""
         slot = 2 * p + side
         self.store.waiting[p][side] = 1
-        for k in ti.static(range(3)):
-            self.store.impulse[slot][k] = self.store.impulse[slot][k] + linear[k]
-            self.store.impulse[slot][3 + k] = self.store.impulse[slot][3 + k] + angular[k]
+        self.store.impulse[slot] = self.store.impulse[slot] + stacked(linear, angular)
 
     @ti.func
     def book_friction(self, p, energy):

@@ -3,6 +3,7 @@
 import taichi as ti
 
 from taichi_dem.contact_search.contacts import Contacts
+from taichi_dem.kit.products import matvec
 from taichi_dem.kit.types import real, vec4
 from taichi_dem.physics.triangle import closest_point
 
@@ -38,11 +39,11 @@ class NarrowPhase:
             if self.state.exposed_tick[face] >= 0:
                 for s in range(size * face, size * face + size):
                     sphere = self.tables.sphere[s]
-                    place = position + rotation @ sphere.xyz
+                    place = position + matvec(rotation, sphere.xyz)
                     self.sphere[s] = vec4(place[0], place[1], place[2], sphere[3])
                 if ti.static(self.law.meets_faces):
                     for k in range(3 * face, 3 * face + 3):
-                        self.corner[k] = position + rotation @ self.law.corner[k]
+                        self.corner[k] = position + matvec(rotation, self.law.corner[k])
 
     @ti.func
     def compare(self, i, j, faces, start, write):

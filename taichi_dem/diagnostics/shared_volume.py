@@ -284,6 +284,9 @@ def _shares(
             point = vec3(0.0)
             for c in ti.static(range(4)):
                 point += points[m, c] * _corner(corners, small, c)
-            height = planes @ vec4(point[0], point[1], point[2], 1.0)
-            count += ti.cast(height.min() > 0.0, ti.i32)
+            inside = 1
+            for f in ti.static(range(4)):
+                height = vec3(planes[f, 0], planes[f, 1], planes[f, 2]).dot(point) + planes[f, 3]
+                inside &= ti.cast(height > 0.0, ti.i32)
+            count += inside
         share[a] = count / ti.cast(points.shape[0], ti.f64)

@@ -9,6 +9,7 @@ import taichi as ti
 from taichi_dem.effects.sphere_contact import SphereContact
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.fixed_order import dot, length
+from taichi_dem.kit.products import matvec, transposed_matvec
 from taichi_dem.kit.types import real, vec4
 from taichi_dem.mesh.contact_spheres import ContactSpheres
 from taichi_dem.mesh.tetrahedra import all_faces, area_vectors
@@ -118,12 +119,12 @@ class FaceContact(SphereContact):
         The other index is -1 - face. Only with the nearest of a body's faces can the sphere meet.
         """
         sphere, face = self.tables.sphere[ti.max(a, b)], -1 - ti.min(a, b)
-        centre = turn @ sphere.xyz + offset
+        centre = matvec(turn, sphere.xyz) + offset
         if b < 0:
-            centre = turn.transpose() @ (sphere.xyz - offset)
+            centre = transposed_matvec(turn, sphere.xyz - offset)
         found = self._nearest(centre, sphere[3], face)
         if b < 0:
-            found.first, found.apart = sphere, -(turn @ found.apart)
+            found.first, found.apart = sphere, -matvec(turn, found.apart)
         return found
 
     @ti.func

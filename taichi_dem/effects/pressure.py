@@ -10,6 +10,7 @@ from taichi_dem.effects.base import Effect
 from taichi_dem.effects.history import History, history_points
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.products import matvec
 from taichi_dem.kit.validation import finite, positive, shown, word
 from taichi_dem.materials import Material
 from taichi_dem.mesh.tetrahedra import area_vectors
@@ -75,7 +76,7 @@ class FacePressure(Effect):
             push = -pressure * self.area[k]
             force += push
             torque += self.arm[k].cross(push)
-        return motion.rotation @ force, motion.rotation @ torque
+        return matvec(motion.rotation, force), matvec(motion.rotation, torque)
 
 
 @ti.data_oriented

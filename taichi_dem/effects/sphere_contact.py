@@ -6,6 +6,7 @@ import taichi as ti
 
 from taichi_dem.effects.base import Effect
 from taichi_dem.kit.errors import InputError
+from taichi_dem.kit.products import matvec
 from taichi_dem.kit.validation import between, flag, shown, whole
 from taichi_dem.materials import Material
 from taichi_dem.mesh.contact_spheres import ContactSpheres, spheres_of_faces
@@ -115,7 +116,7 @@ class SphereContact(Effect):
         turn, offset: rotation and place of the second body in the frame of the first [m].
         """
         first, second = self.tables.sphere[a], self.tables.sphere[b]
-        apart = turn @ second.xyz + offset - first.xyz
+        apart = matvec(turn, second.xyz) + offset - first.xyz
         size = first[3] + second[3]
         return Nearest(first=first, apart=apart, reach=size, size=size, can_meet=1)
 

@@ -11,6 +11,7 @@ from taichi_dem.effects.body_motion import BodyMotion
 from taichi_dem.engine.model import Model
 from taichi_dem.engine.tables import Tables
 from taichi_dem.kit.allocation import assign, values
+from taichi_dem.kit.products import matvec, transposed_matvec
 from taichi_dem.kit.types import real, vec3, vec4
 from taichi_dem.mesh.topology import Topology
 from taichi_dem.physics.fracture import coulomb_limit
@@ -191,9 +192,8 @@ class State:
             self.velocity[i] = vec3(velocity[i, 0], velocity[i, 1], velocity[i, 2])
             w = vec3(spin[i, 0], spin[i, 1], spin[i, 2])
             self.spin[i] = w
-            self.angular_momentum[i] = rotation @ (
-                self.tables.inertia[i] @ (rotation.transpose() @ w)
-            )
+            own = transposed_matvec(rotation, w)
+            self.angular_momentum[i] = matvec(rotation, matvec(self.tables.inertia[i], own))
 
     @property
     def body_count(self) -> int:

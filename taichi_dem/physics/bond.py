@@ -7,6 +7,8 @@ vertex on both bodies and the relative velocity is taken there: angular momentum
 
 import taichi as ti
 
+from taichi_dem.kit.products import matmul, matmul_transposed, matvec
+
 
 @ti.dataclass
 class BondMotion:
@@ -33,21 +35,21 @@ def bond_motion(frame, branch, rotation_i, rotation_j, velocity, spin_i, spin_j)
     frame: rows normal, xi, eta in the master's body frame. branch: world vector between the
     centres [m]. velocity: slave's minus master's [m/s].
     """
-    axes = frame @ rotation_i.transpose()
+    axes = matmul_transposed(frame, rotation_i)
     return BondMotion(
         axes=axes,
         branch=branch,
-        offset=axes @ branch,
-        turn=axes @ rotation_j,
-        velocity=axes @ (velocity - spin_i.cross(branch)),
-        spin=axes @ (spin_j - spin_i),
+        offset=matvec(axes, branch),
+        turn=matmul(axes, rotation_j),
+        velocity=matvec(axes, velocity - spin_i.cross(branch)),
+        spin=matvec(axes, spin_j - spin_i),
     )
 
 
 @ti.func
 def unit_arm(motion, vertex_slave):
     """Slave's vertex from the slave's centre, in the face frame [m]."""
-    return motion.turn @ vertex_slave
+    return matvec(motion.turn, vertex_slave)
 
 
 @ti.func

@@ -2,6 +2,7 @@
 
 import taichi as ti
 
+from taichi_dem.kit.products import matvec, transposed_matvec
 from taichi_dem.physics.rotation import unit3
 from taichi_dem.physics.wrench import Block, inverse, plus
 
@@ -30,6 +31,6 @@ def braked_twist(mass, inertia, resistance, momentum, spin_momentum, dt):
 def twist_of(block, first, second):
     """Product of a block and a pair of vectors: a twist from a wrench, or the reverse."""
     return (
-        block.a @ first + block.b @ second,
-        block.b.transpose() @ first + block.c @ second,
+        matvec(block.a, first) + matvec(block.b, second),
+        transposed_matvec(block.b, first) + matvec(block.c, second),
     )

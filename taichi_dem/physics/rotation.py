@@ -3,6 +3,7 @@
 import taichi as ti
 
 from taichi_dem.kit.elementary import sine_and_cosine
+from taichi_dem.kit.products import matvec, transposed_matvec
 from taichi_dem.kit.types import mat3, vec3, vec4
 
 # A chain of divisions would take as long as all else that turns a body.
@@ -58,7 +59,8 @@ def turned(q, spin, dt):
 @ti.func
 def spin_of(rotation, inertia_inverse, angular_momentum):
     """World spin R I^-1 R^T L [rad/s]; inertia_inverse [1/(kg m^2)] in the body frame."""
-    return rotation @ (inertia_inverse @ (rotation.transpose() @ angular_momentum))
+    own = matvec(inertia_inverse, transposed_matvec(rotation, angular_momentum))
+    return matvec(rotation, own)
 
 
 @ti.func

@@ -2,6 +2,8 @@
 
 import taichi as ti
 
+from taichi_dem.kit.products import matvec
+
 #: Bits of ``State.active_effects`` beside those of loads and supports: of sphere contact and of its
 #: friction.
 CONTACT, RUBBED = 1 << 61, 1 << 60
@@ -102,8 +104,8 @@ def meeting(first, reach, apart, rotation):
     """
     distance = ti.max(apart.norm(), 1e-30)
     overlap = reach - distance
-    normal = rotation @ apart / distance
-    arm = rotation @ first.xyz + (first[3] - 0.5 * overlap) * normal
+    normal = matvec(rotation, apart) / distance
+    arm = matvec(rotation, first.xyz) + (first[3] - 0.5 * overlap) * normal
     return Meeting(overlap=overlap, normal=normal, arm=arm)
 
 

@@ -6,6 +6,7 @@ A twist is (velocity, spin), a wrench (force, moment), both at one point. Blocks
 
 import taichi as ti
 
+from taichi_dem.kit.products import matmul, matmul_transposed, transposed_matmul
 from taichi_dem.kit.types import mat3
 
 
@@ -36,8 +37,8 @@ def point_block(arm, law):
 
     arm: from where the twist is taken to the point [m]. law: symmetric, force per velocity.
     """
-    lever = law @ cross_matrix(arm)
-    return Block(a=law, b=-lever, c=cross_matrix(arm).transpose() @ lever)
+    lever = matmul(law, cross_matrix(arm))
+    return Block(a=law, b=-lever, c=transposed_matmul(cross_matrix(arm), lever))
 
 
 @ti.func
@@ -48,8 +49,10 @@ def mobility(mass_inverse_i, turn_i, mass_inverse_j, turn_j, branch):
     i's centre to j's [m].
     """
     across = cross_matrix(branch)
-    lever = across @ turn_i
-    return Block(a=mass_inverse_i + mass_inverse_j - lever @ across, b=-lever, c=turn_i + turn_j)
+    lever = matmul(across, turn_i)
+    return Block(
+        a=mass_inverse_i + mass_inverse_j - matmul(lever, across), b=-lever, c=turn_i + turn_j
+    )
 
 
 @ti.func
@@ -62,7 +65,7 @@ def plus(one, other):
 def inverse(block):
     """Inverse of a positive definite block, by its Schur complement."""
     first = block.a.inverse()
-    across = first @ block.b
-    last = (block.c - block.b.transpose() @ across).inverse()
-    b = -across @ last
-    return Block(a=first - b @ across.transpose(), b=b, c=last)
+    across = matmul(first, block.b)
+    last = (block.c - transposed_matmul(block.b, across)).inverse()
+    b = -matmul(across, last)
+    return Block(a=first - matmul_transposed(b, across), b=b, c=last)

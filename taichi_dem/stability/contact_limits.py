@@ -7,6 +7,7 @@ import taichi as ti
 from numpy.typing import ArrayLike
 
 from taichi_dem.kit.allocation import assign
+from taichi_dem.kit.products import matmul, matmul_transposed, transposed_matmul, transposed_matvec
 from taichi_dem.kit.types import mat3, real
 from taichi_dem.physics.rotation import unit3
 from taichi_dem.physics.sphere_pair import is_within
@@ -46,8 +47,11 @@ def largest_eigenvalue(a, b, c):
     if scale > 0.0:
         a, b, c = a / scale, b / scale, c / scale
         for _ in range(SQUARINGS):
-            across = b.transpose()
-            a, b, c = a @ a + across @ b, b @ a + c @ b, b @ across + c @ c
+            a, b, c = (
+                matmul(a, a) + transposed_matmul(b, b),
+                matmul(b, a) + matmul(c, b),
+                matmul_transposed(b, b) + matmul(c, c),
+            )
         root = a.trace() + c.trace()
         for _ in range(SQUARINGS):
             root = ti.sqrt(root)
@@ -142,9 +146,9 @@ class ContactLimits:
         i, j = self.store.body[p][0], self.store.body[p][1]
         if side == 1:
             i, j = j, i
-        back, margin = self.state.rotation[i].transpose(), self.margin(i, j)
-        turn = back @ self.state.rotation[j]
-        offset = back @ (self.state.position[j] - self.state.position[i])
+        rotation, margin = self.state.rotation[i], self.margin(i, j)
+        turn = transposed_matmul(rotation, self.state.rotation[j])
+        offset = transposed_matvec(rotation, self.state.position[j] - self.state.position[i])
         for k in range(self.store.first[p], self.store.last[p]):
             near = self._nearest(k, side, turn, offset)
             if is_within(near, margin):
@@ -169,8 +173,8 @@ class ContactLimits:
         if self.slides[None] == 0:
             along = unit3()
         root = self.root_mass[i]
-        lever = self.root_inertia[i] @ cross_matrix(arm) @ along
-        return along * root * root, lever * root, lever @ lever.transpose()
+        lever = matmul(matmul(self.root_inertia[i], cross_matrix(arm)), along)
+        return along * root * root, lever * root, matmul_transposed(lever, lever)
 
 
 __all__ = ["ContactLimits", "largest_eigenvalue"]

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Optional
 import taichi as ti
 
 from taichi_dem.contact_search.contacts import Contacts
+from taichi_dem.kit.products import stacked, transposed_matvec
 from taichi_dem.kit.types import real, vec2, vec3
 from taichi_dem.physics.bond import bond_motion, unit_arm, unit_opening, unit_velocity
 from taichi_dem.physics.rotation import mean_spin, rotation_matrix, spin_of, turned, zero3
@@ -170,16 +171,14 @@ class Advance(BondLaws, ContactForce):
     @ti.func
     def _pull_together(self, slots, motion, impulse, moment):
         """Add opposite impulses to master and slave; moment is about the slave's centre."""
-        turn_back = motion.axes.transpose()
-        linear, angular = turn_back @ impulse, turn_back @ moment
+        linear = transposed_matvec(motion.axes, impulse)
+        angular = transposed_matvec(motion.axes, moment)
         self._add(slots[0], linear, angular + motion.branch.cross(linear))
         self._add(slots[1], -linear, -angular)
 
     @ti.func
     def _add(self, slot, linear, angular):
-        for k in ti.static(range(3)):
-            self.state.slot[slot][k] = self.state.slot[slot][k] + linear[k]
-            self.state.slot[slot][3 + k] = self.state.slot[slot][3 + k] + angular[k]
+        self.state.slot[slot] = self.state.slot[slot] + stacked(linear, angular)
 
     @ti.func
     def _stored(self, b, motion):
@@ -391,7 +390,5 @@ class Advance(BondLaws, ContactForce):
         """Book work [J] to an account, and impulse and moment about the origin to body i."""
         self.state.load_work[i][account] = self.state.load_work[i][account] + work
         twist += self.state.position[i].cross(push)
-        for k in ti.static(range(3)):
-            self.state.load_impulse[i][k] = self.state.load_impulse[i][k] + push[k]
-            self.state.load_impulse[i][3 + k] = self.state.load_impulse[i][3 + k] + twist[k]
+        self.state.load_impulse[i] = self.state.load_impulse[i] + stacked(push, twist)
         self.state.impulse_sizes[i] = self.state.impulse_sizes[i] + vec2(push.norm(), twist.norm())

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Optional
 import taichi as ti
 
 from taichi_dem.contact_search.contacts import Contacts
+from taichi_dem.kit.products import matvec, transposed_matvec
 
 if TYPE_CHECKING:
     from taichi_dem.engine.state import State
@@ -40,18 +41,18 @@ class TangentialSprings:
     @ti.func
     def follow(self, k, rotation, normal, way):
         """Stretch the spring of sphere pair k by ``way`` [m]."""
-        back = rotation.transpose()
-        self.friction.follow(k, back @ normal, back @ way)
+        across = transposed_matvec(rotation, normal)
+        self.friction.follow(k, across, transposed_matvec(rotation, way))
 
     @ti.func
     def slip(self, m, k, rotation, bound, way):
         """Shorten the spring of sphere pair k to a bound [N] after ``way`` [m]; energy [J]."""
-        return self.friction.slip(m, k, bound, rotation.transpose() @ way)
+        return self.friction.slip(m, k, bound, transposed_matvec(rotation, way))
 
     @ti.func
     def force(self, m, k, rotation):
         """Force of the spring of sphere pair k on the second sphere [N]."""
-        return rotation @ self.friction.spring(m, k)
+        return matvec(rotation, self.friction.spring(m, k))
 
     @ti.func
     def part(self, m, k):

@@ -259,6 +259,23 @@ def section_lines(source):
     return found
 
 
+def on_device(function):
+    """Whether a function is compiled by Taichi."""
+    wrappers = {ast.unparse(one).split("(")[0] for one in function.decorator_list}
+    return bool(wrappers & {"ti.func", "ti.kernel", "ti.pyfunc"})
+
+
+def products_are_our_own(source):
+    """Taichi's ``@`` computes and stores more than its sums: slower to run and to compile."""
+    if source.package not in LAYERS:
+        return
+    compiled = [n for n in ast.walk(source.tree) if isinstance(n, FUNCTIONS) and on_device(n)]
+    for function in compiled:
+        for node in ast.walk(function):
+            if isinstance(node, (ast.BinOp, ast.AugAssign)) and isinstance(node.op, ast.MatMult):
+                yield node.lineno, "@ in a kernel: use kit/products.py"
+
+
 def files_stay_short(source):
     count = len(source.text.splitlines()) - section_lines(source)
     if count > FILE_LINES:
@@ -301,6 +318,7 @@ RULES = (
     taichi_is_started_in_one_place,
     fast_math_stays_off,
     no_atomic_sums,
+    products_are_our_own,
     files_stay_short,
     shown_scripts_stay_short,
     functions_stay_short,
@@ -383,6 +401,8 @@ BAD = [
     (no_atomic_sums, PHYSICS, "ti.atomic_add(x[0], 1.0)", "atomic_add"),
     (no_atomic_sums, PHYSICS, "ti.atomic_add(x[0], y)", "atomic_add"),
     (no_atomic_sums, PHYSICS, "from taichi import atomic_sub as s", "atomic_sub"),
+    (products_are_our_own, PHYSICS, "@ti.func\ndef f(a, b):\n    return a @ b", "kit/products"),
+    (products_are_our_own, PHYSICS, "@ti.kernel\ndef f():\n    a @= b", "kit/products"),
     (files_stay_short, SCRIPT, "x = 1\n" * (FILE_LINES + 1), "401 lines"),
     (shown_scripts_stay_short, DEMO, "x = 1\n" * (SHOWN_LINES + 1), "101 lines"),
     (shown_scripts_stay_short, LESSON, "x = 1\n" * (SHOWN_LINES + 1), "101 lines"),
@@ -403,6 +423,7 @@ DOCUMENTED = '"""One.\n' + "Long.\n" * 100 + '"""\n'
 GOOD = {
     STARTER: "import taichi as ti\nti.init(fast_math=False)\nimport taichi_dem.kit.errors",
     PHYSICS: "from taichi_dem.kit.types import x\nfrom . import rotation\nti.atomic_add(n[0], 1)",
+    "taichi_dem/closed_forms.py": "def _f(a, b):\n    return a @ b",
     "taichi_dem/contact_search/reach.py": "if TYPE_CHECKING:\n    from ..engine.state import State",
     "taichi_dem/engine/model.py": "from ..physics.bond import f\nfrom taichi_dem import materials",
     "taichi_dem/kit/plot_style.py": "import matplotlib\ndef _hidden():\n    pass",

@@ -7,6 +7,7 @@ import taichi as ti
 
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.kit.lanes import LANES, by_lane, cross, dot, product, transposed_product
+from taichi_dem.kit.products import matmul_transposed, matvec, transposed_matmul
 from taichi_dem.kit.types import real, vec3, vec6
 from taichi_dem.methods import ImplicitDashpots
 from taichi_dem.physics.wrench import inverse, mobility, plus, point_block, zero_block
@@ -101,8 +102,8 @@ class BondDashpots:
         twist = vec6(0.0)
         for k in ti.static(range(6)):
             twist[k] = self.theta[0] * (self.last[g][k, n] + self.theta[1] * self.start[g][k, n])
-        motion.velocity = motion.axes @ twist[0:3]
-        motion.spin = motion.axes @ twist[3:6]
+        motion.velocity = matvec(motion.axes, twist[0:3])
+        motion.spin = matvec(motion.axes, twist[3:6])
         return motion
 
     @ti.func
@@ -182,7 +183,7 @@ class BondDashpots:
     @ti.func
     def _refresh(self, b, g, n, i, j, branch):
         dt = self.schedule.step_seconds[0]
-        axes = self.tables.bond_frame[b] @ self.state.rotation[i].transpose()
+        axes = matmul_transposed(self.tables.bond_frame[b], self.state.rotation[i])
         along = self.tables.dashpot.traction(b, vec3(1.0, 1.0, 1.0))
         # A trace of the springs keeps the block invertible where a coefficient is zero.
         stiffness = self.tables.bond_stiffness[b]
@@ -191,10 +192,10 @@ class BondDashpots:
         for r in ti.static(range(3)):
             for c in ti.static(range(3)):
                 scaled[r, c] = axes[r, c] * along[r]
-        law = (self.theta[0] * dt * self.tables.unit_area[b]) * (axes.transpose() @ scaled)
+        law = (self.theta[0] * dt * self.tables.unit_area[b]) * transposed_matmul(axes, scaled)
         block = zero_block()
         for q in range(3):
-            arm = self.state.rotation[j] @ self.tables.vertex_slave[3 * b + q]
+            arm = matvec(self.state.rotation[j], self.tables.vertex_slave[3 * b + q])
             block = plus(block, point_block(arm, law))
         free = mobility(
             self.velocities.slack(i),

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 import taichi as ti
 
+from taichi_dem.kit.products import matmul, matmul_transposed, matvec
 from taichi_dem.kit.types import real
 from taichi_dem.physics.ground import braked_twist, twist_of
 from taichi_dem.step.implicit.velocities import Velocities
@@ -48,7 +49,7 @@ class GroundSweeps:
         dt, resistance = self.schedule.step_seconds[0], self.tables.ground[e].resistance(i)
         twist, mass = self.velocities.twist[i], self.tables.mass[i]
         rotation = self.state.rotation[i]
-        inertia = rotation @ self.tables.inertia[i] @ rotation.transpose()
+        inertia = matmul_transposed(matmul(rotation, self.tables.inertia[i]), rotation)
         force, moment = twist_of(
             resistance,
             0.5 * (self.state.velocity[i] + twist[0:3]),
@@ -59,7 +60,7 @@ class GroundSweeps:
             force[k] -= self.impulse[i][e, k]
             moment[k] -= self.impulse[i][e, 3 + k]
         velocity, spin = braked_twist(mass, inertia, resistance, force, moment, dt)
-        force, moment = mass * velocity, inertia @ spin
+        force, moment = mass * velocity, matvec(inertia, spin)
         self.velocities.push(i, force, moment)
         for k in ti.static(range(3)):
             self.impulse[i][e, k] = self.impulse[i][e, k] + force[k]

@@ -6,6 +6,7 @@ import taichi as ti
 
 from taichi_dem.contact_search.cell_grid import group
 from taichi_dem.contact_search.contacts import Contacts
+from taichi_dem.kit.products import matvec, transposed_matmul, transposed_matvec
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.physics.rotation import unit3, zero3
 from taichi_dem.physics.sphere_pair import active_bits, add_within, cut_to, is_within, meeting
@@ -122,8 +123,9 @@ class PairDashpots:
         i, j = pair[0], pair[1]
         dt = self.schedule.step_seconds[0]
         branch = self.state.position[j] - self.state.position[i]
-        back = self.state.rotation[i].transpose()
-        turn, offset = back @ self.state.rotation[j], back @ branch
+        rotation = self.state.rotation[i]
+        turn = transposed_matmul(rotation, self.state.rotation[j])
+        offset = transposed_matvec(rotation, branch)
         ahead, m = dt * self.contacts.approach(i, j), self.tables.pair(i, j)
         force, moment, deepest, parted = zero3(), zero3(), 0.0, 0.0
         elapsed = 0.0
@@ -178,16 +180,15 @@ class PairDashpots:
         slack = self.velocities.slack(i) + self.velocities.slack(j)
         # trace([r]x^T A [r]x) and n [r]x^T A [r]x n, for both bodies.
         first, second = other.cross(normal), arm.cross(normal)
-        along = normal.dot(slack @ normal)
-        along += first.dot(self.velocities.turn[i] @ first) + second.dot(
-            self.velocities.turn[j] @ second
-        )
+        along = normal.dot(matvec(slack, normal))
+        turn_i, turn_j = self.velocities.turn[i], self.velocities.turn[j]
+        along += first.dot(matvec(turn_i, first)) + second.dot(matvec(turn_j, second))
         across = slack.trace()
         for c in ti.static(range(3)):
             axis = unit3()[:, c]
             first, second = other.cross(axis), arm.cross(axis)
-            across += first.dot(self.velocities.turn[i] @ first)
-            across += second.dot(self.velocities.turn[j] @ second)
+            across += first.dot(matvec(turn_i, first))
+            across += second.dot(matvec(turn_j, second))
         return ti.Vector([along, across - along])
 
     @ti.func
@@ -283,9 +284,10 @@ class PairDashpots:
         """Mean forces of the last step, at the spheres' present places, a ``PairForces``."""
         pair, dt = self.store.body[p], self.schedule.step_seconds[0]
         i, j = pair[0], pair[1]
-        back = self.state.rotation[i].transpose()
+        rotation = self.state.rotation[i]
         branch = self.state.position[j] - self.state.position[i]
-        turn, offset = back @ self.state.rotation[j], back @ branch
+        turn = transposed_matmul(rotation, self.state.rotation[j])
+        offset = transposed_matvec(rotation, branch)
         m = self.tables.pair(i, j)
         force, moment_i, moment_j, dragged, rubbed = zero3(), zero3(), zero3(), 0.0, 0.0
         for k in range(self.store.first[p], self.store.last[p]):

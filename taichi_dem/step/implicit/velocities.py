@@ -12,6 +12,7 @@ from taichi_dem.kit.lanes import (
     row_of,
     scaled,
 )
+from taichi_dem.kit.products import matmul, matmul_transposed, matvec, stacked, transposed_matvec
 from taichi_dem.kit.types import real, vec6
 from taichi_dem.physics.rotation import unit3
 
@@ -58,7 +59,7 @@ class Velocities:
         """Compute the velocity per impulse of body i in its present orientation."""
         rotation = self.state.rotation[i]
         self.lightness[i] = self.tables.mass_inverse[i]
-        self.turn[i] = rotation @ self.tables.inertia_inverse[i] @ rotation.transpose()
+        self.turn[i] = matmul_transposed(matmul(rotation, self.tables.inertia_inverse[i]), rotation)
         if ti.static(self.has_supports):
             self._support(i, advance)
 
@@ -71,7 +72,7 @@ class Velocities:
             axis = unit[:, k]
             velocity, _ = advance.allowed(i, self.tables.mass_inverse[i] * axis, 0.0 * axis)
             _, momentum = advance.allowed(i, 0.0 * axis, axis)
-            spin = turn @ (momentum - rest_turn)
+            spin = matvec(turn, momentum - rest_turn)
             for r in ti.static(range(3)):
                 self.hold[i][r, k] = velocity[r] - rest[r]
                 self.turn[i][r, k] = spin[r]
@@ -80,15 +81,13 @@ class Velocities:
     def predict(self, i, advance, linear, angular):
         """Apply an impulse [N s] and a moment [N m s] to body i, as its supports allow."""
         velocity = self.state.velocity[i] + self.tables.mass_inverse[i] * linear
-        spin = self.state.spin[i] + self.turn[i] @ angular
+        spin = self.state.spin[i] + matvec(self.turn[i], angular)
         if ti.static(self.has_supports):
             momentum = self.state.angular_momentum[i] + angular
-            for k in ti.static(range(3)):
-                self.given[i][k], self.given[i][3 + k] = linear[k], angular[k]
+            self.given[i] = stacked(linear, angular)
             velocity, momentum = advance.allowed(i, velocity, momentum)
             spin = advance.spin(i, momentum)
-        for k in ti.static(range(3)):
-            self.twist[i][k], self.twist[i][3 + k] = velocity[k], spin[k]
+        self.twist[i] = stacked(velocity, spin)
 
     @ti.func
     def found(self, i):
@@ -98,8 +97,10 @@ class Velocities:
         """
         twist, rotation = self.twist[i], self.state.rotation[i]
         velocity = twist[0:3]
-        change = rotation.transpose() @ (twist[3:6] - self.state.spin[i])
-        momentum = self.state.angular_momentum[i] + rotation @ (self.tables.inertia[i] @ change)
+        change = transposed_matvec(rotation, twist[3:6] - self.state.spin[i])
+        momentum = self.state.angular_momentum[i] + matvec(
+            rotation, matvec(self.tables.inertia[i], change)
+        )
         if ti.static(self.has_supports):
             given = self.given[i]
             velocity = self.state.velocity[i] + self.tables.mass_inverse[i] * given[0:3]
@@ -116,20 +117,17 @@ class Velocities:
     @ti.func
     def pull(self, i, j, branch, force, moment):
         """Apply an impulse and a moment at j's centre to body i, and the opposite to j."""
-        turned = self.turn[i] @ (moment + branch.cross(force))
-        back = self.turn[j] @ moment
+        turned = matvec(self.turn[i], moment + branch.cross(force))
+        back = matvec(self.turn[j], moment)
         first, second = force, force
         if ti.static(self.has_supports):
-            first, second = self.hold[i] @ force, self.hold[j] @ force
+            first, second = matvec(self.hold[i], force), matvec(self.hold[j], force)
             self._add_impulse(i, force, moment + branch.cross(force))
             self._add_impulse(j, -force, -moment)
         else:
             first, second = self.lightness[i] * force, self.lightness[j] * force
-        for k in ti.static(range(3)):
-            self.twist[i][k] = self.twist[i][k] + first[k]
-            self.twist[i][3 + k] = self.twist[i][3 + k] + turned[k]
-            self.twist[j][k] = self.twist[j][k] - second[k]
-            self.twist[j][3 + k] = self.twist[j][3 + k] - back[k]
+        self.twist[i] = self.twist[i] + stacked(first, turned)
+        self.twist[j] = self.twist[j] - stacked(second, back)
 
     @ti.func
     def rest_spare(self):
@@ -167,15 +165,11 @@ class Velocities:
     @ti.func
     def push(self, i, force, moment):
         """Apply an impulse and a moment at its centre to body i."""
-        velocity, spin = self.slack(i) @ force, self.turn[i] @ moment
+        velocity, spin = matvec(self.slack(i), force), matvec(self.turn[i], moment)
         if ti.static(self.has_supports):
             self._add_impulse(i, force, moment)
-        for k in ti.static(range(3)):
-            self.twist[i][k] = self.twist[i][k] + velocity[k]
-            self.twist[i][3 + k] = self.twist[i][3 + k] + spin[k]
+        self.twist[i] = self.twist[i] + stacked(velocity, spin)
 
     @ti.func
     def _add_impulse(self, i, impulse, moment):
-        for k in ti.static(range(3)):
-            self.given[i][k] = self.given[i][k] + impulse[k]
-            self.given[i][3 + k] = self.given[i][3 + k] + moment[k]
+        self.given[i] = self.given[i] + stacked(impulse, moment)
