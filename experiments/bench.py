@@ -1,6 +1,6 @@
 """How fast is it? Rates of both packages, the papers' problems, and the first wait.
 
-    make bench                          # about 12 minutes on two quiet cores
+    make bench                          # about 8 minutes on two quiet cores
     python experiments/bench.py --quick # a minute
 
 Figures are CPU time of one core unless they say otherwise, with --arch cuda time of the wall;

@@ -47,7 +47,7 @@ def test_waits_are_those_of_a_cold_and_of_a_warm_process(processes):
     # Of a warm process too.
     assert found["second_scene_seconds"] == [2.0] * rounds
     assert len({cache for _, cache, _ in processes}) == rounds
-    # Of the runs of ten scenes the first fills the cache and is not counted.
+    # A run of one scene fills the cache and is not counted.
     assert len(found["ten_scenes_seconds"]) == _bench_start.TEN
     assert [function for function, *_ in processes].count("ten_scenes") == _bench_start.TEN + 1
 
