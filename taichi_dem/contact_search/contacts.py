@@ -12,9 +12,10 @@ from taichi_dem.contact_search.lengths import SPARE_PAIRS, SPARE_SPHERES
 from taichi_dem.contact_search.pair_store import PairStore
 from taichi_dem.effects.sphere_contact import ONCE_BROKEN
 from taichi_dem.kit.allocation import assign
-from taichi_dem.kit.products import matvec, stacked, transposed_matmul, transposed_matvec
+from taichi_dem.kit.products import matvec, stacked
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.methods import Method
+from taichi_dem.physics.rotation import place_in
 
 if TYPE_CHECKING:
     from taichi_dem.engine.model import Model
@@ -80,10 +81,9 @@ class Contacts:
         """Gap between bodies i and j by an entry (a, b) of the pair store [m]."""
         gap = 0.0
         if ti.static(self.law.meets_faces):
-            rotation = self.state.rotation[i]
             branch = self.state.position[j] - self.state.position[i]
-            turn = transposed_matmul(rotation, self.state.rotation[j])
-            near = self.law.nearest(a, b, turn, transposed_matvec(rotation, branch))
+            turn, offset = place_in(self.state.rotation[i], self.state.rotation[j], branch)
+            near = self.law.nearest(a, b, turn, offset)
             gap = near.apart.norm() - near.reach
             if near.can_meet == 0:
                 gap = AWAY

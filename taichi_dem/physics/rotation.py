@@ -3,7 +3,13 @@
 import taichi as ti
 
 from taichi_dem.kit.elementary import sine_and_cosine
-from taichi_dem.kit.products import matvec, transposed_matvec
+from taichi_dem.kit.products import (
+    matmul,
+    matmul_transposed,
+    matvec,
+    transposed_matmul,
+    transposed_matvec,
+)
 from taichi_dem.kit.types import mat3, vec3, vec4
 
 # A chain of divisions would take as long as all else that turns a body.
@@ -61,6 +67,22 @@ def spin_of(rotation, inertia_inverse, angular_momentum):
     """World spin R I^-1 R^T L [rad/s]; inertia_inverse [1/(kg m^2)] in the body frame."""
     own = matvec(inertia_inverse, transposed_matvec(rotation, angular_momentum))
     return matvec(rotation, own)
+
+
+@ti.func
+def world_tensor(rotation, tensor):
+    """A tensor of the body frame, as of inertia, in the world frame: R A R^T."""
+    return matmul_transposed(matmul(rotation, tensor), rotation)
+
+
+@ti.func
+def place_in(rotation, other, branch):
+    """Rotation and place of a body in the frame of another: R^T R' and R^T d.
+
+    rotation: R, of the frame. other: R', of the body. branch: d, from the frame's origin to the
+    body's centre, world [m].
+    """
+    return transposed_matmul(rotation, other), transposed_matvec(rotation, branch)
 
 
 @ti.func

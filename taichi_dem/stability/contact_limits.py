@@ -7,9 +7,9 @@ import taichi as ti
 from numpy.typing import ArrayLike
 
 from taichi_dem.kit.allocation import assign
-from taichi_dem.kit.products import matmul, matmul_transposed, transposed_matmul, transposed_matvec
+from taichi_dem.kit.products import matmul, matmul_transposed, transposed_matmul
 from taichi_dem.kit.types import mat3, real
-from taichi_dem.physics.rotation import unit3
+from taichi_dem.physics.rotation import place_in, unit3
 from taichi_dem.physics.sphere_pair import is_within
 from taichi_dem.physics.wrench import cross_matrix
 from taichi_dem.stability.mesh_limits import inverse_root
@@ -146,9 +146,8 @@ class ContactLimits:
         i, j = self.store.body[p][0], self.store.body[p][1]
         if side == 1:
             i, j = j, i
-        rotation, margin = self.state.rotation[i], self.margin(i, j)
-        turn = transposed_matmul(rotation, self.state.rotation[j])
-        offset = transposed_matvec(rotation, self.state.position[j] - self.state.position[i])
+        branch, margin = self.state.position[j] - self.state.position[i], self.margin(i, j)
+        turn, offset = place_in(self.state.rotation[i], self.state.rotation[j], branch)
         for k in range(self.store.first[p], self.store.last[p]):
             near = self._nearest(k, side, turn, offset)
             if is_within(near, margin):

@@ -2,9 +2,8 @@
 
 import taichi as ti
 
-from taichi_dem.kit.products import transposed_matmul, transposed_matvec
 from taichi_dem.kit.types import real, vec3
-from taichi_dem.physics.rotation import zero3
+from taichi_dem.physics.rotation import place_in, zero3
 from taichi_dem.physics.sphere_pair import active_bits, add_within, is_within, meeting
 from taichi_dem.stability.body_limits import HIT
 
@@ -76,9 +75,7 @@ class ContactForce:
         i, j = pair[0], pair[1]
         branch = self.state.position[j] - self.state.position[i]
         # Most candidates do not touch: tested in the first body's frame, at half the cost.
-        rotation = self.state.rotation[i]
-        turn = transposed_matmul(rotation, self.state.rotation[j])
-        offset = transposed_matvec(rotation, branch)
+        turn, offset = place_in(self.state.rotation[i], self.state.rotation[j], branch)
         force, moment_i, moment_j = zero3(), zero3(), zero3()
         dragged, rubbed, slipped, deepest = 0.0, 0.0, 0.0, 0.0
         scale, near_count, active, m = 1.0, 0, ti.i64(0), self.tables.pair(i, j)

@@ -4,9 +4,9 @@ from typing import TYPE_CHECKING
 
 import taichi as ti
 
-from taichi_dem.kit.products import matmul, matmul_transposed
 from taichi_dem.kit.types import real, vec3
 from taichi_dem.physics.ground import braked_twist, twist_of
+from taichi_dem.physics.rotation import world_tensor
 from taichi_dem.physics.wrench import plus, zero_block
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ class GroundDashpots:
             rotation, mass = self.state.rotation[i], self.tables.mass[i]
             velocity, spin = braked_twist(
                 mass,
-                matmul_transposed(matmul(rotation, self.tables.inertia[i]), rotation),
+                world_tensor(rotation, self.tables.inertia[i]),
                 total,
                 mass * self.state.velocity[i] + 0.5 * linear,
                 self.state.angular_momentum[i] + 0.5 * angular,

@@ -7,7 +7,7 @@ import taichi as ti
 
 from taichi_dem.kit.allocation import assign, values
 from taichi_dem.kit.lanes import LANES, by_lane, cross, dot, product, transposed_product
-from taichi_dem.kit.products import matmul_transposed, matvec, transposed_matmul
+from taichi_dem.kit.products import matmul_transposed, matvec, stacked, transposed_matmul
 from taichi_dem.kit.types import real, vec3, vec6
 from taichi_dem.methods import ImplicitDashpots
 from taichi_dem.physics.wrench import inverse, mobility, plus, point_block, zero_block
@@ -144,7 +144,7 @@ class BondDashpots:
         spin = self.state.spin[i]
         linear = self.state.velocity[j] - self.state.velocity[i] - spin.cross(branch)
         angular = self.state.spin[j] - spin
-        return vec6(linear[0], linear[1], linear[2], angular[0], angular[1], angular[2])
+        return stacked(linear, angular)
 
     @ti.func
     def end(self, b):

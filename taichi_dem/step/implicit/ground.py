@@ -4,9 +4,10 @@ from typing import TYPE_CHECKING
 
 import taichi as ti
 
-from taichi_dem.kit.products import matmul, matmul_transposed, matvec
+from taichi_dem.kit.products import matvec
 from taichi_dem.kit.types import real
 from taichi_dem.physics.ground import braked_twist, twist_of
+from taichi_dem.physics.rotation import world_tensor
 from taichi_dem.step.implicit.velocities import Velocities
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ class GroundSweeps:
         dt, resistance = self.schedule.step_seconds[0], self.tables.ground[e].resistance(i)
         twist, mass = self.velocities.twist[i], self.tables.mass[i]
         rotation = self.state.rotation[i]
-        inertia = matmul_transposed(matmul(rotation, self.tables.inertia[i]), rotation)
+        inertia = world_tensor(rotation, self.tables.inertia[i])
         force, moment = twist_of(
             resistance,
             0.5 * (self.state.velocity[i] + twist[0:3]),

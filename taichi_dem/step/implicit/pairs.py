@@ -6,9 +6,9 @@ import taichi as ti
 
 from taichi_dem.contact_search.cell_grid import group
 from taichi_dem.contact_search.contacts import Contacts
-from taichi_dem.kit.products import matvec, transposed_matmul, transposed_matvec
+from taichi_dem.kit.products import matvec
 from taichi_dem.kit.types import real, vec3
-from taichi_dem.physics.rotation import unit3, zero3
+from taichi_dem.physics.rotation import place_in, unit3, zero3
 from taichi_dem.physics.sphere_pair import active_bits, add_within, cut_to, is_within, meeting
 from taichi_dem.step.contact_force import PairForces
 from taichi_dem.step.implicit.velocities import Velocities
@@ -123,9 +123,7 @@ class PairDashpots:
         i, j = pair[0], pair[1]
         dt = self.schedule.step_seconds[0]
         branch = self.state.position[j] - self.state.position[i]
-        rotation = self.state.rotation[i]
-        turn = transposed_matmul(rotation, self.state.rotation[j])
-        offset = transposed_matvec(rotation, branch)
+        turn, offset = place_in(self.state.rotation[i], self.state.rotation[j], branch)
         ahead, m = dt * self.contacts.approach(i, j), self.tables.pair(i, j)
         force, moment, deepest, parted = zero3(), zero3(), 0.0, 0.0
         elapsed = 0.0
@@ -284,10 +282,8 @@ class PairDashpots:
         """Mean forces of the last step, at the spheres' present places, a ``PairForces``."""
         pair, dt = self.store.body[p], self.schedule.step_seconds[0]
         i, j = pair[0], pair[1]
-        rotation = self.state.rotation[i]
         branch = self.state.position[j] - self.state.position[i]
-        turn = transposed_matmul(rotation, self.state.rotation[j])
-        offset = transposed_matvec(rotation, branch)
+        turn, offset = place_in(self.state.rotation[i], self.state.rotation[j], branch)
         m = self.tables.pair(i, j)
         force, moment_i, moment_j, dragged, rubbed = zero3(), zero3(), zero3(), 0.0, 0.0
         for k in range(self.store.first[p], self.store.last[p]):

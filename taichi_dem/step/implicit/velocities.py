@@ -12,9 +12,9 @@ from taichi_dem.kit.lanes import (
     row_of,
     scaled,
 )
-from taichi_dem.kit.products import matmul, matmul_transposed, matvec, stacked, transposed_matvec
+from taichi_dem.kit.products import matvec, stacked, transposed_matvec
 from taichi_dem.kit.types import real, vec6
-from taichi_dem.physics.rotation import unit3
+from taichi_dem.physics.rotation import unit3, world_tensor
 
 if TYPE_CHECKING:
     from taichi_dem.engine.state import State
@@ -59,7 +59,7 @@ class Velocities:
         """Compute the velocity per impulse of body i in its present orientation."""
         rotation = self.state.rotation[i]
         self.lightness[i] = self.tables.mass_inverse[i]
-        self.turn[i] = matmul_transposed(matmul(rotation, self.tables.inertia_inverse[i]), rotation)
+        self.turn[i] = world_tensor(rotation, self.tables.inertia_inverse[i])
         if ti.static(self.has_supports):
             self._support(i, advance)
 
