@@ -110,7 +110,7 @@ def draw_figure(axis, name, runs):
     places, values = zip(*(shares_of if of_floor else speeds_of)(name, runs))
     axis.plot(places, values, ms=3, lw=1.0, **look)
     axis.set(ylim=(0.0, 1.25 * max(values)), xlim=(-0.5, len(runs) - 0.5))
-    axis.set_xticks(range(len(runs)), [run["commit"] for run in runs], rotation=90)
+    axis.set_xticks(range(len(runs)), [f"@{run['commit']}" for run in runs], rotation=90)
     axis.locator_params(axis="y", nbins=3)
     axis.tick_params(labelsize=SMALL, length=2.0)
     axis.set_ylabel("[%]", fontsize=SMALL, labelpad=1.0)

@@ -1,7 +1,7 @@
 """Cases of damper_validity.py: what is measured in each, and the impact damper in closed form."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -25,11 +25,19 @@ IMPACT_SHARE, IMPACT_CELLS = 0.1, 2
 
 @dataclass(frozen=True)
 class Effort:
-    """What is spent: seeds, cycles left out and cycles measured."""
+    """What is spent: seeds, cycles left out, cycles measured; batches and reports made so far."""
 
     seeds: int
     transient: int
     cycles: int
+    made: list = field(default_factory=list)
+
+    def batch(self, filling, table, **options):
+        """A batch that has been started."""
+        batch = Batch(filling, table, **options)
+        self.made.append(batch)
+        batch.start()
+        return batch
 
 
 def scenes(filling, dt, particles, effort, **numbers):
@@ -40,8 +48,7 @@ def scenes(filling, dt, particles, effort, **numbers):
 def mean_height(filling, dt, particles, effort):
     """Mean height of the grains [mm] over the phases of the swinging container, and the phases."""
     table = scenes(filling, dt, particles, effort, frequency=SWING[1], base_amplitude=SWING[0])
-    batch, box = Batch(filling, table, mount="base"), Box.of(filling)
-    batch.start()
+    batch, box = effort.batch(filling, table, mount="base"), Box.of(filling)
     batch.run(effort.transient, 0)
     steps, frames = int(batch.steps_per_cycle[0]), []
     phase = np.arange(FRAMES) * (steps // FRAMES) / steps
@@ -68,8 +75,7 @@ def driven(filling, dt, particles, amplitude, frequency, effort):
     amplitude, frequency, count = (np.repeat(one, effort.seeds) for one in both)
     seed = np.tile(np.arange(effort.seeds) + 1, len(both[0]))
     table = SceneTable(count, seed, dt, frequency, amplitude)
-    batch = Batch(filling, table, mount="base", measured_cycles=effort.cycles)
-    batch.start()
+    batch = effort.batch(filling, table, mount="base", measured_cycles=effort.cycles)
     return batch.run(effort.transient, effort.cycles)
 
 
@@ -117,11 +123,10 @@ def impact_grain(filling):
     return replace(filling, gravity=0.0, particle_mass=mass, **box)
 
 
-def impact_rms(filling, dt):
+def impact_rms(filling, dt, effort):
     """RMS of the structure with an impact damper at its natural frequency [mm]."""
     table = SceneTable(1, 1, dt, Oscillator().natural_frequency, Oscillator().base_amplitude)
-    batch = Batch(impact_grain(filling), table, measured_cycles=50)
-    batch.start()
+    batch = effort.batch(impact_grain(filling), table, measured_cycles=50)
     return 1e3 * float(batch.run(400, 50).rms[0])
 
 
@@ -145,6 +150,7 @@ def peak_of(filling, dt, particles, ratios, effort):
         measured_cycles=effort.cycles,
         progress=None,
     )
+    effort.made.append(response.report)
     ratio, rms = peak(ratios, np.median(response.rms[0], axis=1))
     return ratio, 1e3 * rms
 
@@ -157,8 +163,7 @@ def late_by_early(filling, dt, effort, cycles):
         **{"frequency": 0.985 * own.natural_frequency, "base_amplitude": own.base_amplitude},
     )
     measured = max(1, cycles // 8)
-    batch = Batch(filling, table, measured_cycles=measured)
-    batch.start()
+    batch = effort.batch(filling, table, measured_cycles=measured)
     early = batch.run(effort.transient, measured).rms.mean()
     late = batch.run(cycles - effort.transient - 2 * measured, measured).rms.mean()
     return float(late / early)

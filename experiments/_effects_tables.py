@@ -22,7 +22,27 @@ WHY = {
     "static contact": "particles that would be held have to fly and collide",
     "ejection and static contact": "particles that would be held have to fly and collide",
 }
-HIDDEN = ("group", "failed", "spared_s", "run_s", "run_step_ms", "run_step_ms_most")
+#: What is printed of a row: header, name of the column, format. Files have all columns.
+SHOWN = {
+    "scene": ("scene", ""),
+    "step [ms]": ("step_ms", ".3g"),
+    "spares [%]": ("spared_percent", ".3g"),
+    "at least": ("spared_least_percent", ".3g"),
+    "at most": ("spared_most_percent", ".3g"),
+    "hole [mm]": ("hole_mm", ".4g"),
+    "peak [mm]": ("peak_mm", ".4g"),
+    "broken faces": ("broken_faces", ""),
+    "change [%]": ("change_percent", ".3g"),
+}
+
+SHOWN_OF_LISTS = {
+    "scene": ("scene", ""),
+    "effects": ("list", ""),
+    "step [ms]": ("step_ms", ".3g"),
+    "beyond [%]": ("over_best_percent", ".3g"),
+    "at least": ("over_best_least_percent", ".3g"),
+    "at most": ("over_best_most_percent", ".3g"),
+}
 
 
 def row_of(group, scene, repeats, complete, known):
@@ -159,9 +179,7 @@ def figures_of_effect(group, name, row, complete, sign):
 def show(rows, title):
     """Print the rows, why some of them failed, and why some cost time to leave out."""
     print(f"\n{title}")
-    forms = {"scene": "", "broken_faces": "", "rounds": ""}
-    names = [name for name in rows[0] if name not in HIDDEN]
-    study.show_rows(rows, {name: (name, forms.get(name, ".3g")) for name in names})
+    study.show_rows(rows, {name: form for name, form in SHOWN.items() if form[0] in rows[0]})
     for row in rows:
         if row["failed"]:
             print(f"{row['scene']}: {row['failed']}")
@@ -211,5 +229,4 @@ def overhead_of_auto(rows):
 def show_lists(rows):
     """Print what a step costs beyond that with the best list of effects."""
     print("\nScenes whose shortest list of effects is known: what a step costs beyond it")
-    forms = {"scene": "", "list": "", "rounds": ""}
-    study.show_rows(rows, {name: (name, forms.get(name, ".3g")) for name in rows[0]})
+    study.show_rows(rows, SHOWN_OF_LISTS)

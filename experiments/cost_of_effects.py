@@ -94,7 +94,7 @@ def run(options):
     folder = study.begin(options)
     calls = {**blasts(options), **dampers(options)}
     workers = options.threads or min(2, os.cpu_count() or 1)
-    with ProgressBar("measuring") as bar:
+    with ProgressBar("compiling, measuring") as bar:
         results = study.call_rounds(calls, options.repeats, workers, bar.count)
     with ProgressBar("comparing") as bar:
         known = costs_of(cost_jobs(options, calls, results), workers, bar.count)
@@ -104,7 +104,10 @@ def run(options):
     study.write_rows(folder / "blast.csv", tables["blast"])
     study.write_rows(folder / "damper.csv", rows)
     picture_effects(folder / "effects.png", tables)
-    show(tables["blast"], "The blast: hole's displacement [mm] and broken faces")
+    show(
+        tables["blast"],
+        "The blast: cost of a step, what leaving effects out spares, and what it changes",
+    )
     show(rows, "The damper: peak of the response [mm]; first rows: what two seeds may differ by")
     listed = list_rows(known["lists"])
     study.write_rows(folder / "lists.csv", listed)

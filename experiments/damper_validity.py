@@ -15,6 +15,7 @@ results/damper_validity/.
 """
 
 import sys
+from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
@@ -100,14 +101,15 @@ def run(options):
     write_text(folder / "validity.md", page_of(rows))
     write_trust(folder / "trust.csv", options, apart)
     picture_trust(folder / "trust.png", options, apart)
-    study.finish(options, NAME, figures_of(rows, apart), 0.0)
+    study.finish(options, NAME, figures_of(rows, apart), effort.made)
 
 
 def swing_rows(options, effort):
     """Mean height of the grains in a container that moves by +-24 mm at 6 Hz."""
     for count, wanted in SWINGS.items():
         # Five grains meet seldom, and their seeds differ most.
-        spent = Effort((4 if count == 5 else 1) * effort.seeds, effort.transient // 5, 8)
+        seeds = (4 if count == 5 else 1) * effort.seeds
+        spent = replace(effort, seeds=seeds, transient=effort.transient // 5, cycles=8)
         curves = {name: mean_height(*one, count, spent) for name, one in FILLINGS.items()}
         apart = [swing_apart(curves[name], curves["dem"]) for name in ("paper", "place")]
         for k, (key, words, unit) in enumerate(
@@ -132,12 +134,12 @@ def impact_rows(options, effort):
     own = FILLINGS["place"][0]
     exact = exact_impact_rms(own.wall_restitution, IMPACT_CELLS * own.width)
     title = "impact damper, 0.1 M, clearance 12 mm, no gravity, at f0: RMS"
-    yield Row("impact_rms_mm", title, "mm", exact, *both(impact_rms), 1.04, 1.10)
+    yield Row("impact_rms_mm", title, "mm", exact, *both(impact_rms, effort), 1.04, 1.10)
 
 
 def loss_rows(options, effort):
     """Loss and apparent mass of a low heap that is shaken at 50 Hz."""
-    spent = Effort(effort.seeds, effort.transient, 3 * effort.cycles)
+    spent = replace(effort, cycles=3 * effort.cycles)
     for gravity, mass_range in ((2.0, (0.85, 1.15)), (5.0, None)):
         exact, *found = (
             loss_and_mass(*FILLINGS[name], gravity, spent) for name in ("dem", "paper", "place")
@@ -156,7 +158,7 @@ def loss_rows(options, effort):
 
 def plug_rows(options, effort):
     """Energy of grains without gravity, which gather to a plug from some amplitude on."""
-    spent = Effort(max(2, effort.seeds // 2), 30, 10)
+    spent = replace(effort, seeds=max(2, effort.seeds // 2), transient=30, cycles=10)
     amplitudes = np.concatenate([JUMP, [16e-3, 20e-3, 24e-3, 30e-3]])
     found = {name: plug_energy(*one, amplitudes, spent) for name, one in FILLINGS.items()}
     names, count = ("dem", "paper", "place"), len(JUMP)
@@ -174,9 +176,9 @@ def plug_rows(options, effort):
 
 def peak_rows(options, effort):
     """Peaks of the damped structure."""
-    spent = Effort(max(1, effort.seeds // 4), effort.transient, effort.cycles)
+    spent = replace(effort, seeds=max(1, effort.seeds // 4))
     for count in (30, 50):
-        dem = Effort(1, spent.transient, spent.cycles)
+        dem = replace(effort, seeds=1)
         exact = peak_of(*FILLINGS["dem"], count, options.ratios, dem)
         found = both(peak_of, count, options.ratios, spent)
         limits = exact[0] - 0.003, exact[0] + 0.003
@@ -189,7 +191,7 @@ def peak_rows(options, effort):
 
 def lasting_rows(options, effort):
     """Whether a motion goes on: the response after a long time, over that after the transient."""
-    spent = Effort(min(4, effort.seeds), options.transient, 0)
+    spent = replace(effort, seeds=min(4, effort.seeds))
     values = both(late_by_early, spent, options.long)
     title = f"N = 10 near resonance: RMS after {options.long} cycles / that after {spent.transient}"
     yield Row("late_by_early_N10", title, "1", 1.0, *values, 0.97, 1.03)
@@ -197,7 +199,8 @@ def lasting_rows(options, effort):
 
 def trust(options, effort):
     """Difference of the impedance from that of spheres, by number of grains and rules."""
-    spent = Effort(max(1, effort.seeds // 4), min(60, effort.transient), effort.cycles)
+    few = {"seeds": max(1, effort.seeds // 4), "transient": min(60, effort.transient)}
+    spent = replace(effort, **few)
     axes = options.accelerations, options.frequencies
     return {count: impedance_apart(FILLINGS, count, *axes, spent) for count in options.grains}
 

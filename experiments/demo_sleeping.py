@@ -21,6 +21,7 @@ import numpy as np
 import taichi_dem as dem
 from _sleeping import caption, draw, write
 from taichi_dem.kit import study
+from taichi_dem.kit.progress.progress_bar import ProgressBar
 from taichi_dem.mesh.shapes import bar
 
 NAME = "demo_sleeping"
@@ -45,10 +46,12 @@ def struck(mesh, sleep, until):
     blow = dem.effects.GasPressure("left", peak=3e6, rise=1e-4, decay_ratio=1.0)
     scene = dem.Scene(mesh, dem.CONCRETE, "auto", loads=[blow], sleep=sleep)
     simulation, rows = dem.Simulation(scene, dem.ImplicitDashpots(STEP)), []
-    simulation.start()
-    for k in range(1, LOOKS + 1):
-        simulation.advance_to(round(until / STEP * k / LOOKS))
-        rows.append(row_of(simulation))
+    with ProgressBar("with sleep" if sleep else "without sleep") as progress:
+        simulation.start()
+        for k in range(1, LOOKS + 1):
+            simulation.advance_to(round(until / STEP * k / LOOKS))
+            rows.append(row_of(simulation))
+            progress.at(k / LOOKS)
     return rows, simulation
 
 

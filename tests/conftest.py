@@ -81,9 +81,14 @@ def _return_memory():
 
 @pytest.fixture
 def compiled_anew(monkeypatch):
-    """Engines of this test alone: for constants of kernels that a test changes."""
-    for pool in (ENGINES, damper_engine._POOL):
-        monkeypatch.setattr(pool, "_engines", {})
+    """Engines of this test alone: for constants of kernels that a test changes; calls drop them."""
+
+    def drop():
+        for pool in (ENGINES, damper_engine._POOL):
+            monkeypatch.setattr(pool, "_engines", {})
+
+    drop()
+    return drop
 
 
 def _skipping():

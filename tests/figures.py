@@ -29,6 +29,8 @@ PROGRAM_NUMBER = re.compile(r"\d[eE][-+]?\d+(?![0-9a-zA-Z])")
 COMMIT = re.compile(r"commit \w+")
 MATHS = re.compile(r"\$[^$]*\$")
 UNIT = re.compile(r"\[[^\]]+\]")
+#: What no number has: two letters side by side, or the sign before a commit.
+NAME = re.compile("[a-z]{2}|^@")
 #: The program's own sentences are quoted as they are.
 QUOTE = re.compile(r"“[^”]*”", re.DOTALL)
 #: Width of a page [inch], and the smallest letters on it [pt].
@@ -251,10 +253,10 @@ def missing_units(axes):
 
 
 def has_numbers(axis):
-    """Whether an axis shows numbers at its ticks; words need no unit."""
+    """Whether an axis shows numbers at its ticks; words need no unit, nor the name of a commit."""
     ticks = [label for label in axis.get_ticklabels() if label.get_visible()]
     words = [label.get_text() for label in ticks if label.get_text()]
-    return bool(words) and not any(re.search(r"[a-z]{2}", MATHS.sub("", word)) for word in words)
+    return bool(words) and not any(NAME.search(MATHS.sub("", word)) for word in words)
 
 
 def watch(report):

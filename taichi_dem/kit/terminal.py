@@ -10,6 +10,8 @@ from typing import Any
 _WIDE = 100
 #: Cells of a table that say nothing.
 BLANK = ("", "None", "nan")
+#: Blanks between two columns.
+_GAP = 2
 
 
 def show_heading(text: str) -> None:
@@ -33,27 +35,57 @@ def print_table(rows: Sequence[Sequence[Any]], header: Sequence[str]) -> None:
     Parameters
     ----------
     rows, header
-        Cells and names of the columns, as many in each row. On a terminal that is too narrow, long
-        cells go on in further lines of their column.
+        Cells and names of the columns, as many in each row. On a terminal that is too narrow, cells
+        go on in further lines of their column; where even words do not fit, columns go on in
+        further tables, each with the first column.
     """
-    cells = [["-" if str(cell) in BLANK else str(cell) for cell in row] for row in rows]
-    console = _console()
+    blank = [["-" if str(cell) in BLANK else str(cell) for cell in row] for row in rows]
+    cells, console = [[*header], *blank], _console()
     if console is None:
-        _show_aligned([[*header], *cells])
+        _show_aligned(cells)
         return
+    least = [max(len(word) for row in cells for word in [*row[k].split(), ""]) for k in _of(cells)]
+    # A name that takes more than half of a line is cut.
+    least = [min(width, (console.width - _GAP) // 2) for width in least]
+    for number, part in enumerate(_parts(least, console.width)):
+        print(end="\n" if number else "")
+        _show_styled(console, [[row[k] for k in part] for row in cells], [least[k] for k in part])
+
+
+def _of(cells):
+    """Numbers of the columns."""
+    return range(len(cells[0]))
+
+
+def _parts(least, width):
+    """Numbers of the columns of each table, as many as fit at their least widths."""
+    parts = [[0]]
+    for k in range(1, len(least)):
+        if sum(least[i] + _GAP for i in parts[-1]) + least[k] > width and len(parts[-1]) > 1:
+            parts.append([0])
+        parts[-1].append(k)
+    return parts
+
+
+def _show_styled(console, cells, least):
+    """A table by rich, its widest columns as narrow as the terminal asks for."""
     from rich.table import Table
     from rich.text import Text
 
-    table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 2, 0, 0))
-    for name in header:
-        table.add_column(Text(name), overflow="fold")
-    for row in cells:
+    widths = [max(len(row[k]) for row in cells) for k in _of(cells)]
+    while sum(widths) + _GAP * (len(widths) - 1) > console.width and widths != least:
+        widest = max(_of(cells), key=lambda k: widths[k] if widths[k] > least[k] else -1)
+        widths[widest] -= 1
+    table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, _GAP, 0, 0))
+    for name, width in zip(cells[0], widths):
+        table.add_column(Text(name), overflow="fold", width=width)
+    for row in cells[1:]:
         table.add_row(*map(Text, row))
     console.print(table)
 
 
 def _show_aligned(cells):
-    widths = [max(len(row[k]) for row in cells) for k in range(len(cells[0]))]
+    widths = [max(len(row[k]) for row in cells) for k in _of(cells)]
     for row in cells:
         print("  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip())
 

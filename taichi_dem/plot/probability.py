@@ -6,7 +6,6 @@ import matplotlib
 import numpy as np
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import ListedColormap, Normalize
-from matplotlib.patches import Rectangle
 
 from taichi_dem.engine.model import Model
 from taichi_dem.kit.plot_style import picture
@@ -29,7 +28,7 @@ def plot_crack_probability(path: FileName, model: Model, probability: np.ndarray
         Of each bond to be broken [1]; faces at 0 are not drawn.
     """
     view = View()
-    with picture(path, 1, 2, size=(9.4, 4.3), sharey=True) as (figure, panels):
+    with picture(path, 1, 2, size=(9.0, 4.1), sharey=True) as (figure, panels):
         drawn = _on_front(panels[0], view, model, probability)
         panels[0].set_title("On the front face")
         _half_way(panels[1], view, model, probability)
@@ -58,7 +57,8 @@ def _half_way(axes, view, model, probability):
     middle = 0.5 * float(low[2] + high[2])
     segments, which = crossings(model.mesh.points[model.topology.vertices], 2, middle)
     segments, found = view.project(segments), probability[which]
-    axes.add_patch(Rectangle(low[:2], *(high - low)[:2], facecolor=STONE, edgecolor=JOINT))
+    whole = np.array([low, (high[0], low[1], 0.0), high, (low[0], high[1], 0.0)])[:, :2]
+    axes.add_collection(PolyCollection([whole], facecolor=STONE, edgecolor=JOINT))
     axes.add_collection(LineCollection(segments, colors=JOINT, linewidth=0.4))
     axes.set_title(f"In the section at z = {middle:.3g} m")
     return _lines(axes, segments[found > 0.0], found[found > 0.0])

@@ -8,7 +8,6 @@ import taichi as ti
 
 from taichi_dem import Scene
 from taichi_dem.effects import ShearSlip, Softening
-from taichi_dem.engine.engine import ENGINES
 from taichi_dem.kit.allocation import assign
 from taichi_dem.step import audit
 from taichi_dem.step.audit import KINDS
@@ -30,7 +29,7 @@ def rate(monkeypatch, compiled_anew):
 
     def change(value):
         monkeypatch.setattr(audit, "RATE", value)
-        monkeypatch.setattr(ENGINES, "_engines", {})
+        compiled_anew()
 
     return change
 

@@ -87,6 +87,7 @@ def test_skin_changes_no_bit_where_steps_depend_on_what_is_near(monkeypatch, com
     method = Multirate(4e-8, 1e-6, control=control, dashpot="limited")
     wide, simulation = state_after(method, steps=1500)
     monkeypatch.setattr(contacts, "STEPS", 0.0)
+    compiled_anew()
     thin, other = state_after(method, steps=1500, skin=1.2e-3)
     assert other.searches > 2 * simulation.searches
     assert simulation.report().broken_faces > 100

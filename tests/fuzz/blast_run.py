@@ -116,6 +116,8 @@ def interrupted(trial, until, seconds):
     options = {"method": trial.method, "until": until, "driver": "resident", "samples": SAMPLES}
     options.update(frames=1, progress=None)
     whole = simulate(trial.scene, **options, observers=[WallClock(seconds)])
+    # A shell may have its background jobs ignore Ctrl-C.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "saved.npz")
         saving = {"checkpoint": Checkpoint(path)} if trial.draws.chance(0.7) else {}

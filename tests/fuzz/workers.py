@@ -1,7 +1,6 @@
 """Processes that run scenes: one that crashes or hangs loses its scene, and is replaced."""
 
 import os
-import signal
 import subprocess
 import sys
 import tempfile
@@ -49,8 +48,6 @@ def serve(threads, seconds):
         # What a library below prints belongs to no answer, and is found.
         os.dup2(said.fileno(), 1)
         os.dup2(said.fileno(), 2)
-        # A shell may have its background jobs ignore Ctrl-C.
-        signal.signal(signal.SIGINT, signal.default_int_handler)
         runtime.start(threads=threads)
         for line in sys.stdin:
             began = os.lseek(said.fileno(), 0, os.SEEK_END)

@@ -39,7 +39,7 @@ ORE = replace(
 IMPLICIT = ImplicitDashpots(4e-7)
 METHODS = [
     pytest.param(IMPLICIT, 150, id="implicit"),
-    pytest.param(CONTROLLED, 5, id="controlled", marks=pytest.mark.slow),
+    pytest.param(CONTROLLED, 375, id="controlled", marks=pytest.mark.slow),
     pytest.param(Uniform(2e-8, dashpot="limited"), 1500, id="uniform", marks=pytest.mark.slow),
 ]
 

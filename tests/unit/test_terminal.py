@@ -5,6 +5,7 @@ import os
 import re
 import time
 
+import numpy as np
 import pytest
 
 from taichi_dem.kit import terminal
@@ -65,6 +66,31 @@ def test_a_table_fits_its_terminal_and_loses_nothing(shown, columns):
     assert max(map(len, text.splitlines())) <= columns
     for k, column in enumerate(cells_of(text, HEADER)):
         assert column == letters("".join([HEADER[k], *(str(row[k] or "-") for row in ROWS)]))
+
+
+@pytest.mark.parametrize("columns", [30, 60, 80])
+@pytest.mark.parametrize("seed", range(5))
+def test_words_of_a_table_stay_whole_and_further_columns_have_tables_of_their_own(
+    shown, columns, seed
+):
+    """Of any table whose words take less than half a line; each row is there once a table."""
+    random = np.random.default_rng(seed)
+
+    def cell(k):
+        return " ".join("x" * n + str(k) for n in random.integers(1, columns // 2 - 2, 2))
+
+    header = [f"name{k}" for k in range(random.integers(2, 12))]
+    rows = [[f"first{i}", *(cell(k) for k in range(1, len(header)))] for i in range(4)]
+    stream = shown(columns)
+    terminal.print_table(rows, header)
+    lines = without_orders(stream.getvalue()).splitlines()
+    assert max(map(len, lines)) <= columns
+    words = " ".join(lines).split()
+    tables = words.count("name0")
+    wanted = [word for row in (header, *rows) for cell in row[1:] for word in cell.split()]
+    firsts = ["name0", *(row[0] for row in rows)]
+    assert sorted(words) == sorted(wanted + tables * firsts)
+    assert tables == 1 + lines.count("")
 
 
 @pytest.mark.parametrize("columns", [40, 120])

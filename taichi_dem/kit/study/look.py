@@ -19,9 +19,9 @@ def show_opening(description: Optional[str], entry: Optional[Entry], quick: bool
     line = entry.question if entry else (description or "").strip().partition("\n")[0]
     show_heading(line)
     if quick:
-        print("Takes less than a minute (--quick).\n")
+        print("Takes two minutes at most (--quick).\n")
     elif entry:
-        smaller = "" if entry.time.endswith(" s") else "; with --quick less than a minute"
+        smaller = "" if entry.time.endswith(" s") else "; with --quick two minutes at most"
         print(f"Takes about {entry.expected_time}{smaller}.\n")
 
 
