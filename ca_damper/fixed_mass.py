@@ -8,6 +8,7 @@ import taichi as ti
 
 from ca_damper.filling import Action, Filling, Structure
 from ca_damper.scenes.scene_fields import SceneFields
+from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.effect_usage import EffectUse
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import plain_fields, positive, shown, whole
@@ -106,11 +107,7 @@ class FixedMass:
 
     def load(self, filling: Filling) -> None:
         """Take over the mass of a particle."""
-        self._load(filling.particle_mass)
-
-    @ti.kernel
-    def _load(self, particle_mass: ti.f64):
-        self.particle_mass[None] = particle_mass
+        assign(self.particle_mass, filling.particle_mass)
 
     @ti.func
     def mass(self, s):

@@ -12,6 +12,7 @@ import numpy as np
 import taichi as ti
 
 from ca_damper.scenes.scene_fields import SceneFields
+from taichi_dem.kit.allocation import assign, assign_members
 
 #: Content of a cell: a particle that moves in one of six directions, clockwise from up ...
 UP, UP_RIGHT, DOWN_RIGHT, DOWN, DOWN_LEFT, UP_LEFT = range(6)
@@ -21,8 +22,6 @@ KINDS = 9
 DIRECTIONS = 6
 
 _ANGLE = np.deg2rad(60.0) * np.arange(DIRECTIONS)
-_TABLE = ti.types.ndarray(dtype=ti.i32, ndim=2)
-_COSINES = ti.types.ndarray(dtype=ti.f64, ndim=2)
 
 
 def alignments() -> np.ndarray:
@@ -127,35 +126,24 @@ class Lattice:
         """Take over the tables of a geometry."""
         cosines = np.zeros((KINDS, DIRECTIONS))
         cosines[:DIRECTIONS] = alignments()
-        self._load_size(geometry.columns, geometry.rows)
-        self._load(geometry.neighbours(), geometry.blank()[:, None], cosines)
+        height = geometry.rows + 2
+        sizes = {"columns": geometry.columns, "rows": geometry.rows, "height": height}
+        cells = (geometry.columns + 2) * height
+        ends = {"first": height + 1, "end": geometry.columns * height + geometry.rows + 1}
+        assign_members(self.size, cells=cells, **sizes, **ends)
+        column, row = np.divmod(np.arange(cells + 1), height)
+        assign(self.level, row - 0.5 + 0.5 * (column % 2))
+        assign(self.bottom, column * height)
+        assign(self.raised, column % 2)
+        assign(self.blank, geometry.blank())
+        assign(self.neighbour, geometry.neighbours())
+        assign(self.cosine, cosines)
 
     @property
     def geometry(self) -> Geometry:
         """The geometry that is loaded."""
         size = self.size[None]
         return Geometry(int(size.columns), int(size.rows))
-
-    @ti.kernel
-    def _load_size(self, columns: ti.i32, rows: ti.i32):
-        height = rows + 2
-        self.size[None] = LatticeSize(
-            columns, rows, height, (columns + 2) * height, height + 1, columns * height + rows + 1
-        )
-
-    @ti.kernel
-    def _load(self, neighbours: _TABLE, blank: _TABLE, cosines: _COSINES):
-        for cell in range(blank.shape[0]):
-            height = self.size[None].height
-            column, row = cell // height, cell % height
-            self.level[cell] = row - 0.5 + 0.5 * (column % 2)
-            self.bottom[cell] = ti.cast(cell - row, ti.i16)
-            self.raised[cell] = ti.cast(column % 2, ti.i8)
-            self.blank[cell] = ti.cast(blank[cell, 0], ti.i8)
-            for kind in range(KINDS):
-                self.neighbour[cell, kind] = ti.cast(neighbours[cell, kind], ti.i16)
-        for kind, direction in ti.ndrange(KINDS, DIRECTIONS):
-            self.cosine[kind, direction] = cosines[kind, direction]
 
     @ti.func
     def cell_count(self):

@@ -54,7 +54,7 @@ def _elastic(mesh: Mesh, stripped: Any) -> Callable[[int], Any]:
         advance = stripped(engine.tables, engine.state, engine.schedule, None)
         driver = Resident(Step(advance, engine.schedule, None))
     driver.prepare()
-    return lambda substeps: driver._run(1 << 60, substeps)
+    return lambda substeps: driver.few(1 << 60, substeps)
 
 
 @ti.data_oriented

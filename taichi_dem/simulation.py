@@ -226,7 +226,7 @@ class Simulation(Uncopied):
         if self.energy_balance is not None:
             return
         started = time.perf_counter()
-        compiling("first step", 0.2)
+        compiling("time step", 0.2)
         with self._undivided("it was started"):
             self._start()
         self.compile_seconds += time.perf_counter() - started
@@ -237,10 +237,9 @@ class Simulation(Uncopied):
         self.first_motion = {name: motion[name] for name in names}
         if self.model.has_contact:
             self.state.expose(self.model.topology, self.model.contact.outer_faces is True)
-        self.step.prime()
+        self.driver.begin()
         if self.contacts is not None:
             self.broad_phase.ask(everywhere=True)
-        compiling("time step", 0.35)
         self.driver.prepare()
         self._check_capacity()
         compiling("energy balance", 0.85)

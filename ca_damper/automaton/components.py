@@ -15,6 +15,7 @@ from ca_damper.automaton.static_contact import NoStaticContact, StaticContact
 from ca_damper.automaton.traversal import traversal_of
 from ca_damper.lattice import Lattice
 from ca_damper.scenes.scene_fields import SceneFields
+from taichi_dem.kit.allocation import assign
 
 
 @ti.data_oriented
@@ -33,24 +34,18 @@ class Parameters:
 
     def load(self, options: Any) -> None:
         """Take the values from the options."""
-        self._load(options.width, options.particle_mass, options.gravity)
-        self._load_collisions(
-            options.restitution, options.wall_restitution, options.static_threshold
-        )
-        self._load_friction(*options.frictions)
-
-    @ti.kernel
-    def _load(self, width: ti.f64, mass: ti.f64, gravity: ti.f64):
-        self.width[None], self.mass[None], self.gravity[None] = width, mass, gravity
-
-    @ti.kernel
-    def _load_collisions(self, particle: ti.f64, wall: ti.f64, threshold: ti.f64):
-        self.particle[None], self.wall[None] = particle, wall
-        self.threshold[None] = threshold
-
-    @ti.kernel
-    def _load_friction(self, friction: ti.f64, wall_friction: ti.f64):
-        self.friction[None], self.wall_friction[None] = friction, wall_friction
+        friction, wall_friction = options.frictions
+        for field, value in (
+            (self.width, options.width),
+            (self.mass, options.particle_mass),
+            (self.gravity, options.gravity),
+            (self.particle, options.restitution),
+            (self.wall, options.wall_restitution),
+            (self.threshold, options.static_threshold),
+            (self.friction, friction),
+            (self.wall_friction, wall_friction),
+        ):
+            assign(field, value)
 
 
 @dataclass(frozen=True, eq=False)

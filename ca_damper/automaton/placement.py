@@ -2,11 +2,11 @@
 
 from typing import Any
 
-import numpy as np
 import taichi as ti
 
 from ca_damper.random_numbers import START, uniform
 from ca_damper.scenes.scene_fields import SceneFields
+from taichi_dem.kit.allocation import assign
 
 
 @ti.data_oriented
@@ -53,14 +53,8 @@ class NamedCells:
     def load(self, named: Any) -> None:
         """Take over the user's cells: (column, row) of each."""
         geometry = self.cells.lattice.geometry
-        self._load(np.array([geometry.cell_of(*cell) for cell in named], dtype=np.int32))
-
-    @ti.kernel
-    def _load(self, chosen: ti.types.ndarray(dtype=ti.i32, ndim=1)):
-        for _ in range(1):
-            self.count[None] = chosen.shape[0]
-        for k in range(chosen.shape[0]):
-            self.named[k] = chosen[k]
+        assign(self.count, len(named))
+        assign(self.named, [geometry.cell_of(*cell) for cell in named])
 
     @ti.func
     def fill(self, s):

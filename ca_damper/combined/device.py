@@ -16,6 +16,7 @@ from ca_damper.filling import Action, Motion
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.bodies import vec2
 from ca_damper.spheres.dynamics import DeviceSpheres
+from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.audit import Audit
 from taichi_dem.kit.effect_usage import EffectUse
 
@@ -40,11 +41,7 @@ class DeviceCombined:
     def load(self, options: Any) -> None:
         """Take over the numbers of grains of the same structure."""
         self.spheres.load(options)
-        self._load(options.substeps)
-
-    @ti.kernel
-    def _load(self, substeps: ti.i32):
-        self.substeps[None] = substeps
+        assign(self.substeps, options.substeps)
 
     @ti.func
     def reset(self, s):

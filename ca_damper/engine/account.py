@@ -4,6 +4,7 @@ import numpy as np
 import taichi as ti
 
 from ca_damper.scenes.scene_fields import SceneFields
+from taichi_dem.kit.allocation import assign
 
 
 @ti.data_oriented
@@ -22,10 +23,9 @@ class MomentumAccount:
         for name in ("expected", "late", "exchanged"):
             setattr(self, name, table.field(ti.f64))
 
-    @ti.kernel
-    def load(self, weight: ti.f64):
+    def load(self, weight: float) -> None:
         """Take over the weight of a particle [N]."""
-        self.weight[None] = weight
+        assign(self.weight, weight)
 
     @ti.func
     def begin(self, s, momentum, late):

@@ -14,6 +14,7 @@ from ca_damper.filling import Action, Motion
 from ca_damper.oscillator import Forcing, sine_and_cosine, slope, slope_at_phase
 from ca_damper.scenes.clock import Clock
 from ca_damper.scenes.scene_fields import SceneFields
+from taichi_dem.kit.allocation import assign
 
 #: Attempts within one step of the filling after which the container counts as lost.
 MOST_ATTEMPTS = 1000
@@ -35,11 +36,10 @@ class IntegratedContainer:
         self.gravity = ti.field(ti.f64, shape=())
         self.tolerance = ti.field(ti.f64, shape=2)
 
-    @ti.kernel
-    def load(self, gravity: ti.f64, rtol: ti.f64, atol: ti.f64):
+    def load(self, gravity: float, rtol: float, atol: float) -> None:
         """Take over the numbers of a batch."""
-        self.gravity[None] = gravity
-        self.tolerance[0], self.tolerance[1] = rtol, atol
+        assign(self.gravity, gravity)
+        assign(self.tolerance, [rtol, atol])
 
 
 @ti.data_oriented

@@ -13,6 +13,7 @@ from ca_damper.engine.account import MomentumAccount
 from ca_damper.scenes.clock import Clock
 from ca_damper.scenes.scene_fields import SceneFields
 from taichi_dem.kit import runtime
+from taichi_dem.kit.allocation import assign
 
 #: Status of a scene whose container has no finite motion any more; fillings use codes above zero.
 LOST = -1
@@ -56,10 +57,9 @@ class Coupling:
         self.sums, self.extremes = table.vector(SUM_COUNT, ti.f64), table.vector(2, ti.f64)
         self.record = table.field(ti.f64, "cycles", len(measures.COLUMNS))
 
-    @ti.kernel
-    def load(self, gravity: ti.f64):
+    def load(self, gravity: float) -> None:
         """Take over the gravity that acts on the particles."""
-        self.gravity[None] = gravity
+        assign(self.gravity, gravity)
 
     @ti.kernel
     def start(self, initial: _F64):

@@ -4,6 +4,7 @@ The modes of a group belong to its first scene, and RK45 takes them over a step 
 ``set_action`` of every scene and the motion after ``advance``.
 """
 
+import numpy as np
 import taichi as ti
 
 from ca_damper import rk45
@@ -14,8 +15,7 @@ from ca_damper.excitation.excitation import Excitation, ExcitationKind
 from ca_damper.filling import Motion
 from ca_damper.scenes.clock import Clock
 from ca_damper.scenes.scene_fields import SceneFields
-
-_F64 = ti.types.ndarray(dtype=ti.f64, ndim=2)
+from taichi_dem.kit.allocation import assign
 
 
 @ti.data_oriented
@@ -53,27 +53,16 @@ class ModalContainer(IntegratedContainer):
 
     def hang(self, mount: ModalMount) -> None:
         """Take over the structure of a batch and the places of its boxes."""
-        self._hang_modes(mount.of_modes(), mount.of_force()[None], len(mount.places))
-        self._hang_scenes(mount.of_scenes())
-
-    @ti.kernel
-    def _hang_modes(self, rows: _F64, force: _F64, boxes: ti.i32):
-        for _ in range(1):
-            self.boxes[None] = boxes
-            for k in range(rows.shape[1]):
-                self.mass[k], self.stiffness[k] = rows[0, k], rows[1, k]
-                self.damping[k], self.share[k] = rows[2, k], rows[3, k]
-                self.pushed[k] = force[0, k]
-
-    @ti.kernel
-    def _hang_scenes(self, rows: _F64):
-        for _ in range(1):
-            self.group[None] = rows.shape[0]
-        for s in range(self.table.scenes[None]):
-            row = s % rows.shape[0]
-            for k in range(self.modes):
-                self.shape[s, k], self.lift[s, k] = rows[row, k], rows[row, self.modes + k]
-            self.residual[s] = rows[row, 2 * self.modes]
+        modes = self.mass, self.stiffness, self.damping, self.share
+        for field, row in zip((*modes, self.pushed), (*mount.of_modes(), mount.of_force())):
+            assign(field, row)
+        rows = mount.of_scenes()
+        assign(self.boxes, len(mount.places))
+        assign(self.group, len(rows))
+        every = rows[np.arange(self.table.scene_count) % len(rows)]
+        assign(self.shape, every[:, : self.modes])
+        assign(self.lift, every[:, self.modes : -1])
+        assign(self.residual, every[:, -1])
 
     @ti.func
     def first(self, s):

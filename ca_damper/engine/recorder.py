@@ -6,6 +6,7 @@ import numpy as np
 import taichi as ti
 
 from ca_damper.scenes.scene_fields import SceneFields
+from taichi_dem.kit.allocation import assign
 
 #: Quantities of a sample: of container and base, and the filling's mean force since the last one.
 SAMPLED = ("x", "v", "y", "force")
@@ -38,11 +39,9 @@ class Recorder:
         self.samples = table.vector(len(SAMPLED), ti.f64, "samples")
         self.pushed = table.field(ti.f64)
 
-    @ti.kernel
-    def aim(self, every: ti.i32):
+    def aim(self, every: int) -> None:
         """Set the steps between samples of the next run, 0 for none."""
-        for _ in range(1):
-            self.every[None] = every
+        assign(self.every, every)
 
     @ti.func
     def note(self, s, step, motion, y, force):

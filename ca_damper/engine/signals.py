@@ -14,9 +14,8 @@ from ca_damper.excitation.excitation import Excitation, packed
 from ca_damper.oscillator import sine_and_cosine as of_small
 from ca_damper.scenes.clock import Clock, added
 from ca_damper.scenes.scene_fields import SceneFields
+from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.elementary import sine_and_cosine
-
-_F64 = ti.types.ndarray(dtype=ti.f64, ndim=2)
 
 
 @ti.data_oriented
@@ -38,16 +37,9 @@ class SignalTable:
     def load(self, excitation: Excitation, scenes: int) -> None:
         """Take over the signals of a batch."""
         nodes, rows = packed(excitation.signals(self.role, scenes))
-        self._load(np.ascontiguousarray(nodes), np.ascontiguousarray(rows))
-
-    @ti.kernel
-    def _load(self, nodes: _F64, rows: _F64):
-        for k in range(nodes.shape[0]):
-            self.nodes[k] = ti.Vector([nodes[k, 0], nodes[k, 1]])
-        for s in range(rows.shape[0]):
-            first, count = ti.cast(rows[s, 0], ti.i32), ti.cast(rows[s, 1], ti.i32)
-            self.place[s] = ti.Vector([first, count - 2])
-            self.step[s] = rows[s, 2]
+        assign(self.nodes, nodes)
+        assign(self.place, rows[:, :2] - [0, 2])
+        assign(self.step, rows[:, 2])
 
     @ti.func
     def spline(self, s, time):
@@ -143,12 +135,8 @@ class DeviceSineForce:
     def load(self, excitation: Excitation, scenes: int) -> None:
         """Take over the numbers of a batch."""
         force: Any = excitation.force
-        self._load(np.ascontiguousarray(force.rows(scenes), dtype=np.float64))
-
-    @ti.kernel
-    def _load(self, rows: _F64):
-        for s in range(rows.shape[1]):
-            self.wave[s] = ti.Vector([rows[0, s], 2.0 * ti.math.pi * rows[1, s], rows[2, s]])
+        amplitude, frequency, phase = force.rows(scenes)
+        assign(self.wave, np.column_stack([amplitude, 2.0 * np.pi * frequency, phase]))
 
     @ti.func
     def at(self, s, start, t):

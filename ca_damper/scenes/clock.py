@@ -6,6 +6,7 @@ import numpy as np
 import taichi as ti
 
 from ca_damper.scenes.scene_fields import SceneFields
+from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.elementary import sine_and_cosine
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.validation import positive
@@ -56,20 +57,9 @@ class Clock:
     def set(self, steps: np.ndarray) -> None:
         """Set the steps a cycle of every scene, (scenes,); the phase stays as it is."""
         angle = 2.0 * np.pi / np.asarray(steps, dtype=np.float64)
-        turns = [(*sine_and_cosine(a), *sine_and_cosine(a / 2)) for a in angle.tolist()]
-        columns = np.ascontiguousarray(np.reshape(turns, (-1, 4)).T)
-        self._set(np.ascontiguousarray(steps, dtype=np.int32), columns)
-
-    @ti.kernel
-    def _set(
-        self,
-        steps: ti.types.ndarray(dtype=ti.i32, ndim=1),
-        turns: ti.types.ndarray(dtype=ti.f64, ndim=2),
-    ):
-        for s in range(steps.shape[0]):
-            self.steps[s] = steps[s]
-            self.turn[s] = ti.Vector([turns[0, s], turns[1, s]])
-            self.half_turn[s] = ti.Vector([turns[2, s], turns[3, s]])
+        assign(self.steps, steps)
+        for field, share in ((self.turn, 1), (self.half_turn, 2)):
+            assign(field, [sine_and_cosine(a / share) for a in angle.tolist()])
 
     @ti.func
     def start(self, s):

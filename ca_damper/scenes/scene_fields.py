@@ -12,9 +12,7 @@ import taichi as ti
 from taichi.lang import impl
 
 from ca_damper.scenes.table import SceneTable
-from taichi_dem.kit.allocation import array_of, values
-
-_ROWS = ti.types.ndarray(dtype=ti.f64, ndim=2)
+from taichi_dem.kit.allocation import array_of, assign, values
 
 #: Length of an axis of a field: a number, or the name of one of the sizes.
 Length = Union[int, str]
@@ -79,8 +77,9 @@ class SceneFields:
 
     def load(self, table: SceneTable) -> None:
         """Take over the rows of a table that fits."""
-        rows = [table.column(name) for name in SceneTable.COLUMNS]
-        self._load(np.stack(rows).astype(np.float64))
+        assign(self.scenes, table.count)
+        for name in SceneTable.COLUMNS:
+            assign(getattr(self, name), table.column(name))
 
     def in_use(self, field: ti.Field) -> np.ndarray:
         """Rows of the scenes in use, of a field whose first axis is that of the scenes."""
@@ -98,19 +97,7 @@ class SceneFields:
         """Number of scenes in use, in Python."""
         return int(values(self.scenes))
 
-    @ti.kernel
-    def _load(self, rows: _ROWS):
-        for _ in range(1):
-            self.scenes[None] = rows.shape[1]
-        for s in range(rows.shape[1]):
-            self.particles[s] = ti.cast(rows[0, s], ti.i32)
-            self.seed[s] = ti.cast(rows[1, s], ti.i32)
-            self.dt[s], self.frequency[s] = rows[2, s], rows[3, s]
-            self.base_amplitude[s], self.mass[s] = rows[4, s], rows[5, s]
-            self.stiffness[s], self.damping[s] = rows[6, s], rows[7, s]
-
-    @ti.kernel
-    def drive(self, pair: _ROWS):
+    def drive(self, pair: np.ndarray) -> None:
         """Change frequency [Hz] and step [s] of all scenes: pair[0] and pair[1], (scenes,) each."""
-        for s in range(pair.shape[1]):
-            self.frequency[s], self.dt[s] = pair[0, s], pair[1, s]
+        assign(self.frequency, pair[0])
+        assign(self.dt, pair[1])

@@ -7,7 +7,7 @@ import taichi as ti
 
 from ca_damper.random_numbers import uniform
 from ca_damper.scenes.scene_fields import SceneFields
-from taichi_dem.kit.allocation import values
+from taichi_dem.kit.allocation import assign, assign_members, values
 
 # Purposes of the random numbers drawn here; the automaton has those before.
 _CHOOSE, _SHIFT, _STIR, _SIZE = 4, 5, 6, 8
@@ -69,32 +69,19 @@ class Bodies:
 
     def load(self, options: Any) -> None:
         """Write the numbers of the options to the device."""
-        self._load(options.radius, options.particle_mass, *options.fall)
-        self._load_box(options.width, options.height, *options.lattice)
+        across, down = options.fall
+        columns, rows = options.lattice
+        sphere = {"radius": options.radius, "mass": options.particle_mass}
+        box = {"width": options.width, "height": options.height, "columns": columns, "rows": rows}
+        assign_members(self.body, **sphere, pull=(0.0 - across, down), **box)
         if self.kinds > 1:
-            for k, (count, _) in enumerate(options.sizes):
-                self.radii[k], self.masses[k] = options.radii[k], options.masses[k]
-                self.counts[k] = count
+            assign(self.radii, options.radii)
+            assign(self.masses, options.masses)
+            assign(self.counts, [count for count, _ in options.sizes])
         if self.given:
-            self._load_pairs(self.start, np.array(options.start).reshape(-1, 2))
+            assign(self.start, np.reshape(options.start, (-1, 2)))
         if self.thrown:
-            velocity = np.array(options.start_velocity).reshape(-1, 2)
-            self._load_pairs(self.start_velocity, velocity)
-
-    @ti.kernel
-    def _load(self, radius: ti.f64, mass: ti.f64, across: ti.f64, down: ti.f64):
-        self.body[None].radius, self.body[None].mass = radius, mass
-        self.body[None].pull = vec2(0.0 - across, down)
-
-    @ti.kernel
-    def _load_box(self, width: ti.f64, height: ti.f64, columns: ti.i32, rows: ti.i32):
-        self.body[None].width, self.body[None].height = width, height
-        self.body[None].columns, self.body[None].rows = columns, rows
-
-    @ti.kernel
-    def _load_pairs(self, field: ti.template(), pairs: ti.types.ndarray(dtype=ti.f64, ndim=2)):
-        for k in range(pairs.shape[0]):
-            field[k] = vec2(pairs[k, 0], pairs[k, 1])
+            assign(self.start_velocity, np.reshape(options.start_velocity, (-1, 2)))
 
     @ti.func
     def first(self, s):

@@ -1,12 +1,14 @@
 """Contact forces between two spheres, or a sphere and a wall (paper, eqs 3 to 6)."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
 import taichi as ti
 
 from ca_damper.spheres.restitution import damping
+from taichi_dem.kit.allocation import assign_members
 from taichi_dem.kit.elementary import fifth_root
 
 if TYPE_CHECKING:
@@ -149,19 +151,24 @@ class ContactLaw:
         return ratio
 
     def load(
-        self, field: ti.Field, k: int, numbers: Mapping[str, float], tangential_share: float
+        self, field: ti.Field, kinds: Sequence[Mapping[str, float]], tangential_share: float
     ) -> None:
-        """Write the numbers of a contact, before a step is known, to entry k of a Contact field.
+        """Write the numbers of contacts, before a step is known, to a Contact field.
 
-        tangential_share: part of the effective mass that resists a tangential impulse.
+        kinds: numbers of each entry. tangential_share: part of the effective mass that resists a
+        tangential impulse.
         """
-        for name in ("stiffness", "damping", "friction", "reach"):
-            setattr(field[k], name, numbers[name])
-        field[k].yielding = 0.5 / numbers["mass"]
-        field[k].grip = SLIP_SHARE * tangential_share * numbers["mass"]
-        # The normal stiffness at an overlap is 3/2 k d^(1/2).
-        field[k].shear = 1.5 * numbers["shear_ratio"] * numbers["stiffness"]
-        field[k].shear_damping = math.sqrt(tangential_share * numbers["shear_ratio"])
+        found = {name: np.array([one[name] for one in kinds]) for name in kinds[0]}
+        given = {name: found[name] for name in ("stiffness", "damping", "friction", "reach")}
+        assign_members(
+            field,
+            **given,
+            yielding=0.5 / found["mass"],
+            grip=SLIP_SHARE * tangential_share * found["mass"],
+            # The normal stiffness at an overlap is 3/2 k d^(1/2).
+            shear=1.5 * found["shear_ratio"] * found["stiffness"],
+            shear_damping=np.sqrt(tangential_share * found["shear_ratio"]),
+        )
 
     @ti.func
     def over_step(self, contact, dt, since):

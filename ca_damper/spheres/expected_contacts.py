@@ -16,6 +16,7 @@ from ca_damper.random_numbers import bits, stream
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.bodies import Bodies, vec2
 from ca_damper.spheres.search import EXPECTED, TOUCHING, AllPairs, CellList
+from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.audit import Audit
 
 vec2i = ti.types.vector(2, ti.i32)
@@ -69,10 +70,9 @@ class ExpectedContacts:
         self.cells.load(options)
         self.tighten(1.0)
 
-    @ti.kernel
-    def tighten(self, share: ti.f64):
+    def tighten(self, share: float) -> None:
         """List a share of what has to be listed: a fault, for tests of the audit."""
-        self.tightness[None] = share
+        assign(self.tightness, share)
 
     @ti.func
     def clear(self, s):

@@ -43,9 +43,9 @@ class PairContacts:
 
     def load(self, options: Any) -> None:
         """Take over the numbers of spheres of the same structure."""
-        for k in range(self.kinds * self.kinds):
-            numbers = pair_numbers(options, *divmod(k, self.kinds))
-            self.law.load(self.contact, k, numbers, self.share)
+        pairs = [divmod(k, self.kinds) for k in range(self.kinds * self.kinds)]
+        numbers = [pair_numbers(options, *pair) for pair in pairs]
+        self.law.load(self.contact, numbers, self.share)
 
     @ti.func
     def over_step(self, dt, since):

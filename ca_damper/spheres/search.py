@@ -10,6 +10,7 @@ import taichi as ti
 
 from ca_damper.scenes.scene_fields import SceneFields
 from ca_damper.spheres.bodies import Bodies, vec2
+from taichi_dem.kit.allocation import assign_members
 
 # Pairs near each other per sphere. Discs of one size have three, at most five with the skin.
 _PAIRS_PER_SPHERE = 8
@@ -132,11 +133,9 @@ class CellList:
 
     def load(self, options: Any) -> None:
         """Write the skin and the grid to the device."""
-        self._load(skin_of(options), *grid_of(options), listed_pairs(options.capacity))
-
-    @ti.kernel
-    def _load(self, skin: ti.f64, columns: ti.i32, rows: ti.i32, pairs: ti.i32):
-        self.grid[None] = Grid(skin, columns, rows, pairs)
+        columns, rows = grid_of(options)
+        grid = {"skin": skin_of(options), "columns": columns, "rows": rows}
+        assign_members(self.grid, pairs=listed_pairs(options.capacity), **grid)
 
     @ti.func
     def _list_end(self, s):

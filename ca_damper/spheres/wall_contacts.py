@@ -33,8 +33,8 @@ class WallContacts:
 
     def load(self, options: Any) -> None:
         """Take over the numbers of spheres of the same structure."""
-        for k in range(self.bodies.kinds):
-            self.law.load(self.contact, k, wall_numbers(options, k), self.share)
+        numbers = [wall_numbers(options, k) for k in range(self.bodies.kinds)]
+        self.law.load(self.contact, numbers, self.share)
 
     @ti.func
     def reset(self, s):

@@ -170,7 +170,7 @@ class EnergyBalance:
 
     def momentum(self) -> np.ndarray:
         """Linear [N s] and angular momentum about the origin [N m s], less external impulses."""
-        return _own(self._momentum_rows())
+        return _own(self.readings.momentum())
 
     def momentum_errors(self) -> tuple[float, float]:
         """Errors of linear and angular momentum, relative to the momentum exchanged.
@@ -179,7 +179,7 @@ class EnergyBalance:
         larger; at least a millionth of the impulses of loads and supports added by their sizes, of
         which nothing is left where a support takes what a load gives.
         """
-        rows = self._momentum_rows()
+        rows = self.readings.momentum()
         # The squares of a run that has diverged may be beyond all numbers.
         with np.errstate(over="ignore", invalid="ignore"):
             lost = _own(rows) - self.start_momentum
@@ -188,12 +188,7 @@ class EnergyBalance:
 
     def momentum_exchanged(self) -> float:
         """Sum over the bodies of the size of momentum, or of load impulse if larger [N s]."""
-        return _exchanged(self._momentum_rows())[0]
-
-    def _momentum_rows(self):
-        rows = np.zeros((self.model.body_count, 14))
-        self.readings.momentum(rows)
-        return rows
+        return _exchanged(self.readings.momentum())[0]
 
 
 def _own(rows):

@@ -168,18 +168,16 @@ class Readings:
                 if e == index and self.tables.supports[e].acts_on(i):
                     marks[i] = 1
 
-    @ti.kernel
-    def momentum(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
-        """Momentum of every body; impulses of loads and supports, their sums and sizes."""
-        for i in range(self.tables.body_count[None]):
-            linear = self.tables.mass[i] * self.state.velocity[i]
-            angular = self.state.angular_momentum[i] + self.state.position[i].cross(linear)
-            for k in ti.static(range(3)):
-                table[i, k], table[i, 3 + k] = linear[k], angular[k]
-            for k in ti.static(range(6)):
-                table[i, 6 + k] = self.state.load_impulse[i][k]
-            for k in ti.static(range(2)):
-                table[i, 12 + k] = self.state.impulse_sizes[i][k]
+    def momentum(self) -> np.ndarray:
+        """Momentum of every body; impulses of loads and supports, their sums and sizes, (n, 14)."""
+        state, here = self.state, slice(int(values(self.tables.body_count)))
+        names = "velocity", "angular_momentum", "position", "load_impulse", "impulse_sizes"
+        velocity, spun, place, given, sizes = (values(getattr(state, n), here) for n in names)
+        # Numbers of a run that has diverged may be beyond all.
+        with np.errstate(over="ignore", invalid="ignore"):
+            linear = values(self.tables.mass, here)[:, None] * velocity
+            angular = spun + np.cross(place, linear)
+        return np.column_stack([linear, angular, given, sizes])
 
     @ti.kernel
     def left_out(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):

@@ -251,10 +251,11 @@ class EnginePool(Uncopied):
 
     def _forget(self):
         self._forget_other_session()
-        for engines in self._engines.values():
+        # Out of the pool first: an interrupt must leave no engine there whose memory is gone.
+        known, self._engines = self._engines, {}
+        for engines in known.values():
             for engine in engines:
                 engine.tree.destroy()
-        self._engines = {}
 
     def _forget_other_session(self):
         """Drop engines of a session that has ended, whose memory is gone already."""

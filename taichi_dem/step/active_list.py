@@ -1,4 +1,4 @@
-"""List by falling level, in which the members active at a tick come first."""
+"""Lists of members for a phase: those active at a tick, by falling level; all; one."""
 
 import taichi as ti
 
@@ -9,6 +9,39 @@ from taichi_dem.timeline import MAX_LEVEL
 def itself(a):
     """Member function of lists whose members are 0 .. count - 1."""
     return a
+
+
+@ti.data_oriented
+class Once:
+    """List of one member, for phases that run once a substep."""
+
+    @ti.func
+    def count(self, low):
+        """One."""
+        return 1
+
+    @ti.func
+    def pick(self, a):
+        """The place itself, which is not used."""
+        return a
+
+
+@ti.data_oriented
+class Everyone:
+    """List of all bodies or bonds of a scene, active or not. number: field of how many."""
+
+    def __init__(self, number: ti.Field):
+        self.number = number
+
+    @ti.func
+    def count(self, low):
+        """Number of all."""
+        return self.number[None]
+
+    @ti.func
+    def pick(self, a):
+        """The place itself."""
+        return a
 
 
 @ti.data_oriented

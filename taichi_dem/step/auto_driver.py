@@ -75,6 +75,10 @@ class AutoDriver:
         """Name of the chosen driver, marked as measured."""
         return f"{self.chosen} (measured)"
 
+    def begin(self) -> None:
+        """Run the phases of the start."""
+        self.drivers[Resident.name].begin()
+
     def prepare(self) -> None:
         """Make a requested search, without a step; compiles both drivers."""
         for driver in self.drivers.values():

@@ -6,14 +6,16 @@ every item writes its own slots, and every sum has a fixed order.
 
 import time
 from collections.abc import Callable
-from typing import Any, Optional, Protocol
+from typing import Optional, Protocol
 
 import taichi as ti
 
 from taichi_dem.contact_search.search import BroadPhase
 from taichi_dem.kit.allocation import values
+from taichi_dem.step.active_list import Once
 from taichi_dem.step.advance import Advance
 from taichi_dem.step.audit import Audit
+from taichi_dem.step.begin import Begin, Phases, SolvedBegin, joined
 from taichi_dem.step.implicit.bonds import BOND_COLOURS
 from taichi_dem.step.implicit.pairs import COLOURS, PairDashpots
 from taichi_dem.step.schedule import Schedule
@@ -26,25 +28,8 @@ CALL_SECONDS = 0.2
 #: The resident one is kept near this long [s]: its kernel cannot be interrupted.
 _KERNEL_SECONDS = 0.1
 _MAX_SUBSTEPS = 1 << 24
-#: Pairs of an active list and the function that is called with each active member.
-Phases = tuple[tuple[Any, Callable[..., Any]], ...]
 #: Bit that a parallel substep sets in its result when a search is requested.
 _SEARCH = 2
-
-
-@ti.data_oriented
-class Once:
-    """List of one member, for phases that run once a substep."""
-
-    @ti.func
-    def count(self, low):
-        """One."""
-        return 1
-
-    @ti.func
-    def pick(self, a):
-        """The place itself, which is not used."""
-        return a
 
 
 @ti.data_oriented
@@ -54,8 +39,11 @@ class Step:
     A substep begins with the contacts of the present tick, whose bonds are evaluated already, and
     ends with the bonds of the next: between substeps the contact lists can be renewed.
 
-    search: the ``BroadPhase`` that does so, None for a scene without contact.
+    search: the ``BroadPhase`` that does so, None for a scene without contact. first_phases: those
+    of the start of a run.
     """
+
+    begin: type[Begin] = Begin
 
     def __init__(self, advance: Advance, schedule: Schedule, search: Optional[BroadPhase]):
         self.advance, self.schedule, self.search = advance, schedule, search
@@ -66,6 +54,7 @@ class Step:
             self.audit = Audit(self.advance.tables, self.state, self.schedule, self.advance)
         self.parts = self._parts()
         self.phases = self._phases()
+        self.first_phases = self.begin(advance, schedule).phases()
 
     def _phases(self):
         """All phases of a substep in a row, for one serial kernel."""
@@ -114,27 +103,6 @@ class Step:
             phases += ((limits, WakeUp(self.advance, self.schedule).wake_up),)
         return (*phases, (Once(), self.schedule.apply_changes))
 
-    @ti.kernel
-    def prime(self):
-        """Choose the first levels, fill the lists and evaluate the bonds of the first tick."""
-        for _ in range(1):
-            self.schedule.low[None] = 0
-            self.schedule.wanted[None] = 0
-        if ti.static(self.schedule.has_limits):
-            for i in range(self.advance.tables.body_count[None]):
-                self.schedule.limits.refresh(i)
-        if ti.static(self.schedule.sleeps):
-            for i in range(self.advance.tables.body_count[None]):
-                self.state.sleeping.begin(i, self.advance)
-            for i in range(self.advance.tables.body_count[None]):
-                self.state.sleeping.begin_beside(i)
-        for i in range(self.advance.tables.body_count[None]):
-            self.schedule.choose_level(i, self.state.velocity[i].norm_sqr())
-        for _ in range(1):
-            self.schedule.start_all()
-        for b in range(self.advance.tables.bond_count[None]):
-            self.advance.bond(b)
-
     @ti.func
     def halted(self):
         """1 when the host must act: a body left its bounds, or a list its room."""
@@ -180,6 +148,8 @@ class PairColour(Colour):
 class SolvedStep(Step):
     """The phases of a substep in which all dashpots are solved together."""
 
+    begin = SolvedBegin
+
     def _phases(self):
         before, _, after = self.parts
         return (*before, (Once(), self.advance.solver.solve), *after)
@@ -224,34 +194,6 @@ class SolvedStep(Step):
         """Whether a part, the sweep, is called for once more."""
         return part == 1 and values(self.advance.solver.unsolved) == 1
 
-    @ti.kernel
-    def prime(self):
-        """Fill the lists, guess the dashpots' first impulses and evaluate the bonds."""
-        for _ in range(1):
-            self.schedule.low[None] = 0
-            self.schedule.wanted[None] = 0
-        if ti.static(self.schedule.sleeps):
-            for i in range(self.advance.tables.body_count[None]):
-                self.state.sleeping.begin(i, self.advance)
-            for i in range(self.advance.tables.body_count[None]):
-                self.state.sleeping.begin_beside(i)
-        for i in range(self.advance.tables.body_count[None]):
-            self.schedule.choose_level(i, self.state.velocity[i].norm_sqr())
-            self.advance.solver.velocities.update_inertia(i, self.advance)
-        for _ in range(1):
-            self.schedule.start_all()
-        if ti.static(self.advance.solver.has_bonds):
-            for b in range(self.advance.tables.bond_count[None]):
-                self.advance.solver.bonds.first(b)
-        for b in range(self.advance.tables.bond_count[None]):
-            self.advance.bond(b)
-            # It booked a step before the start.
-            if ti.static(self.advance.tables.has_bond_heat):
-                self.state.bond_heat[b] = 0.0 * self.state.bond_heat[b]
-            if ti.static(self.schedule.sleeps and self.advance.solver.has_bonds):
-                if self.schedule.bonds.key[b] < 0:
-                    self.advance.solver.bonds.end(b)
-
 
 class Driver(Protocol):
     """One way to run the phases of a ``Step``; all ways give the same bits."""
@@ -260,6 +202,9 @@ class Driver(Protocol):
 
     def load(self) -> None:
         """Begin with another scene."""
+
+    def begin(self) -> None:
+        """Run the phases of the start; compiles their kernels."""
 
     def prepare(self) -> None:
         """Make a requested search, without a step; compiles the kernels."""
@@ -279,24 +224,29 @@ class Resident:
 
     def __init__(self, step: Step):
         self.step = step
+        self.phases = joined(step.first_phases, step.phases, step.advance.bond)
         self.load()
 
     def load(self) -> None:
         """Begin with short calls, as the cost of a step is not known yet."""
         self.substeps = 4
 
+    def begin(self) -> None:
+        """Run the phases of the start; compiles the kernel."""
+        self._run(1, 0, 1)
+
     def prepare(self) -> None:
-        """Make a requested search, without a step; compiles the kernel."""
-        self._run(0, 0)
+        """Make a requested search, without a step."""
+        self._run(0, 0, 0)
 
     def few(self, end_tick: int, substeps: int) -> None:
         """Advance some substeps, or to a tick or the next halt."""
-        self._run(end_tick, substeps)
+        self._run(0, end_tick, substeps)
 
     def run(self, end_tick: int) -> None:
         """Advance to a tick, to the next halt, or for about _KERNEL_SECONDS."""
         start = time.perf_counter()
-        done = self._run(end_tick, self.substeps)
+        done = self._run(0, end_tick, self.substeps)
         seconds = max(time.perf_counter() - start, 1e-5)
         if done == self.substeps:
             grown = int(done * _KERNEL_SECONDS / seconds)
@@ -304,22 +254,23 @@ class Resident:
             self.substeps = max(1, min(4 * self.substeps, grown, _MAX_SUBSTEPS))
 
     @ti.kernel
-    def _run(self, end_tick: ti.i64, substeps: ti.i32) -> ti.i32:
+    def _run(self, begin: ti.i32, end_tick: ti.i64, substeps: ti.i32) -> ti.i32:
+        # The start and a substep share what takes long to compile: the bonds.
         done = 0
         low = ti.static(self.step.schedule.low)
         ti.loop_config(serialize=True)
         for s in range(substeps + 1):
             if ti.static(self.step.has_contact):
-                while self.step.search.is_requested() == 1:
+                while begin == 0 and self.step.search.is_requested() == 1:
                     for count, item in ti.static(self.step.search.phases):
                         for a in range(count()):
                             item(a)
             finished = self.step.state.tick[None] >= end_tick or self.step.halted() == 1
-            if s == substeps or finished:
+            if s == substeps or (finished and begin == 0):
                 break
-            for active, item in ti.static(self.step.phases):
-                for a in range(active.count(low[None])):
-                    item(active.pick(a))
+            for members, item in ti.static(self.phases):
+                for a in range(members.count(begin, low[None])):
+                    item(members.pick(begin, a))
             done = s + 1
         return done
 
@@ -335,6 +286,16 @@ class Parallel:
 
     def load(self) -> None:
         """Nothing depends on the scene."""
+
+    def begin(self) -> None:
+        """Run the phases of the start; compiles their kernel."""
+        self._begin()
+
+    @ti.kernel
+    def _begin(self):
+        for members, item in ti.static(self.step.first_phases):
+            for a in range(members.count(0)):
+                item(members.pick(a))
 
     def prepare(self) -> None:
         """Make a requested search, without a step; compiles the kernels."""

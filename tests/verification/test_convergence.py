@@ -68,7 +68,7 @@ class MovingBar:
         dt0 = UNTIL / steps
         for k in range(MAX_LEVEL + 1):
             simulation.schedule.step_seconds[k] = dt0 / 2.0**k
-        simulation.step.prime()
+        simulation.driver.begin()
         simulation.advance_to(steps)
         assert np.array_equal(state.level.to_numpy(), levels)
         return state.motion()["position"]

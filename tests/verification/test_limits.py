@@ -51,7 +51,7 @@ class Rig:
         self.state.slot.fill(0.0)
         self.state.tick[None] = 0
         self.state.last_tick.fill(0)
-        self.simulation.step.prime()
+        self.simulation.driver.begin()
         if self.simulation.contacts is not None:
             self.simulation.broad_phase.search()
         while self.state.tick[None] < steps * MACRO_TICKS:

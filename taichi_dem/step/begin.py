@@ -1,0 +1,169 @@
+"""The start of a run: first levels, full lists, bonds of the first tick."""
+
+from collections.abc import Callable
+from typing import Any
+
+import taichi as ti
+
+from taichi_dem.step.active_list import Everyone, Once
+from taichi_dem.step.advance import Advance
+from taichi_dem.step.schedule import Schedule
+
+#: Pairs of a list and the function that is called with each member that is active.
+Phases = tuple[tuple[Any, Callable[..., Any]], ...]
+
+
+@ti.data_oriented
+class Begin:
+    """Phases of the start of a run, pairs as those of a ``Step``; advance.bond is in both."""
+
+    def __init__(self, advance: Advance, schedule: Schedule):
+        self.advance, self.schedule, self.state = advance, schedule, advance.state
+        self.bodies = Everyone(advance.tables.body_count)
+        self.bonds = Everyone(advance.tables.bond_count)
+
+    def phases(self) -> Phases:
+        """All of them, in their order."""
+        schedule = self.schedule
+        asleep: Phases = ()
+        limited: Phases = ()
+        if schedule.has_limits:
+            limited = ((self.bodies, schedule.limits.refresh),)
+        if schedule.sleeps:
+            asleep = (self.bodies, self.stir), (self.bodies, self.state.sleeping.begin_beside)
+        return (
+            (Once(), self.reset),
+            *limited,
+            *asleep,
+            (self.bodies, self.choose_level),
+            (Once(), self.fill_lists),
+            # Those that sleep act once, and are listed later.
+            (self.bonds if schedule.sleeps else schedule.bonds, self.advance.bond),
+        )
+
+    @ti.func
+    def reset(self, one):
+        """All levels are active, and none is wanted yet."""
+        self.schedule.low[None] = 0
+        self.schedule.wanted[None] = 0
+
+    @ti.func
+    def stir(self, i):
+        """Wake body i where something acts on it."""
+        self.state.sleeping.begin(i, self.advance)
+
+    @ti.func
+    def choose_level(self, i):
+        """Choose the first level of body i."""
+        self.schedule.choose_level(i, self.state.velocity[i].norm_sqr())
+
+    @ti.func
+    def fill_lists(self, one):
+        """Fill all lists."""
+        self.schedule.start_all()
+
+
+@ti.data_oriented
+class SolvedBegin(Begin):
+    """The same where all dashpots are solved together: with their first guesses."""
+
+    def phases(self) -> Phases:
+        """All of them, in their order."""
+        *before, bonds = super().phases()
+        guessed: Phases = ()
+        if self.advance.solver.has_bonds:
+            guessed = ((self.bonds, self.advance.solver.bonds.first),)
+        return (*before, *guessed, bonds, (self.bonds, self.undo))
+
+    @ti.func
+    def choose_level(self, i):
+        """Choose the first level of body i, and find its inertia."""
+        self.schedule.choose_level(i, self.state.velocity[i].norm_sqr())
+        self.advance.solver.velocities.update_inertia(i, self.advance)
+
+    @ti.func
+    def undo(self, b):
+        """Book no heat of bond b, whose evaluation booked a step before the start."""
+        if ti.static(self.advance.tables.has_bond_heat):
+            self.state.bond_heat[b] = 0.0 * self.state.bond_heat[b]
+        if ti.static(self.schedule.sleeps and self.advance.solver.has_bonds):
+            if self.schedule.bonds.key[b] < 0:
+                self.advance.solver.bonds.end(b)
+
+
+@ti.data_oriented
+class AtStart:
+    """Members of a phase of the start alone."""
+
+    def __init__(self, members: Any):
+        self.members = members
+
+    @ti.func
+    def count(self, begin, low):
+        """Number of members; begin: 1 at the start, 0 in a substep."""
+        return begin * self.members.count(low)
+
+    @ti.func
+    def pick(self, begin, a):
+        """Member at place a."""
+        return self.members.pick(a)
+
+
+@ti.data_oriented
+class InSubsteps(AtStart):
+    """Members of a phase of substeps alone."""
+
+    @ti.func
+    def count(self, begin, low):
+        """Number of members; begin: 1 at the start, 0 in a substep."""
+        return (1 - begin) * self.members.count(low)
+
+
+@ti.data_oriented
+class InBoth(AtStart):
+    """Members of a phase of both, the same in either."""
+
+    @ti.func
+    def count(self, begin, low):
+        """Number of members."""
+        return self.members.count(low)
+
+
+@ti.data_oriented
+class OthersInBoth:
+    """Members of a phase of both; first: those at the start."""
+
+    def __init__(self, first: Any, members: Any):
+        self.first, self.members = first, members
+
+    @ti.func
+    def count(self, begin, low):
+        """Number of members; begin: 1 at the start, 0 in a substep."""
+        return begin * self.first.count(low) + (1 - begin) * self.members.count(low)
+
+    @ti.func
+    def pick(self, begin, a):
+        """Member at place a."""
+        return begin * self.first.pick(a) + (1 - begin) * self.members.pick(a)
+
+
+def joined(first: Phases, phases: Phases, common: Callable[..., Any]) -> Phases:
+    """Phases of the start and of a substep in a row, for one kernel; a function of both is once.
+
+    So the bonds, which take longest to compile, are compiled once. Counts and places depend on
+    whether the run begins. common: that function; what is before and after it keeps its order.
+    """
+    (place,) = (k for k, (_, item) in enumerate(first) if item == common)
+    before, after = (
+        tuple((AtStart(members), item) for members, item in part)
+        for part in (first[:place], first[place + 1 :])
+    )
+    steps = tuple(
+        (_in_both(first[place][0], active) if item == common else InSubsteps(active), item)
+        for active, item in phases
+    )
+    return (*before, *steps, *after)
+
+
+def _in_both(first, members):
+    return InBoth(members) if first is members else OthersInBoth(first, members)
