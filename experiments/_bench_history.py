@@ -31,6 +31,7 @@ WORDS = {
     "explicit_limited": "limited",
     "l = 1e-07 m": "l = 0.1 µm",
     "l = 1e-08 m": "l = 0.01 µm",
+    "0.8 us": "0.8 µs",
 }
 
 
