@@ -39,8 +39,8 @@ def print_table(rows: Sequence[Sequence[Any]], header: Sequence[str]) -> None:
         go on in further lines of their column; where even words do not fit, columns go on in
         further tables, each with the first column.
     """
-    blank = [["-" if str(cell) in BLANK else str(cell) for cell in row] for row in rows]
-    cells, console = [[*header], *blank], _console()
+    filled = [["-" if str(cell) in BLANK else str(cell) for cell in row] for row in rows]
+    cells, console = [[*header], *filled], _console()
     if console is None:
         _show_aligned(cells)
         return
