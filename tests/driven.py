@@ -125,7 +125,7 @@ class Driven:
     def drive(self, frequency, dt):
         """Change frequency [Hz] and step [s] of all scenes."""
         rows = [np.broadcast_to(x, self.count) for x in (frequency, dt)]
-        self.table.drive(np.ascontiguousarray(np.stack(rows), dtype=np.float64))
+        self.table.drive(np.stack(rows))
 
     def traces(self):
         """The trace so far, NumPy, (steps, scenes, 4)."""

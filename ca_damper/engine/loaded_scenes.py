@@ -243,7 +243,7 @@ class LoadedScenes(Uncopied):
 
     def _load_pace(self) -> None:
         engine = self.engine
-        engine.table.drive(np.ascontiguousarray(self.numbers.pace()))
+        engine.table.drive(self.numbers.pace())
         engine.clock.set(self.steps_per_cycle)
 
     def _check_divergence(self) -> None:

@@ -73,12 +73,12 @@ class SolvedBegin(Begin):
         guessed: Phases = ()
         if self.advance.solver.has_bonds:
             guessed = ((self.bonds, self.advance.solver.bonds.first),)
-        return (*before, *guessed, bonds, (self.bonds, self.undo))
+        inertia = self.bodies, self.update_inertia
+        return (*before, inertia, *guessed, bonds, (self.bonds, self.undo))
 
     @ti.func
-    def choose_level(self, i):
-        """Choose the first level of body i, and find its inertia."""
-        self.schedule.choose_level(i, self.state.velocity[i].norm_sqr())
+    def update_inertia(self, i):
+        """Find the inertia of body i in the world frame."""
         self.advance.solver.velocities.update_inertia(i, self.advance)
 
     @ti.func
@@ -92,78 +92,53 @@ class SolvedBegin(Begin):
 
 
 @ti.data_oriented
-class AtStart:
-    """Members of a phase of the start alone."""
+class Members:
+    """Members of a phase at the start and in a substep; None where it has none.
 
-    def __init__(self, members: Any):
-        self.members = members
+    begin in its functions: 1 at the start, 0 in a substep.
+    """
 
-    @ti.func
-    def count(self, begin, low):
-        """Number of members; begin: 1 at the start, 0 in a substep."""
-        return begin * self.members.count(low)
-
-    @ti.func
-    def pick(self, begin, a):
-        """Member at place a."""
-        return self.members.pick(a)
-
-
-@ti.data_oriented
-class InSubsteps(AtStart):
-    """Members of a phase of substeps alone."""
-
-    @ti.func
-    def count(self, begin, low):
-        """Number of members; begin: 1 at the start, 0 in a substep."""
-        return (1 - begin) * self.members.count(low)
-
-
-@ti.data_oriented
-class InBoth(AtStart):
-    """Members of a phase of both, the same in either."""
+    def __init__(self, first: Any, active: Any):
+        self.first, self.active = first, active
+        self.at_start, self.in_substeps = first is not None, active is not None
+        self.alike = first is active
 
     @ti.func
     def count(self, begin, low):
         """Number of members."""
-        return self.members.count(low)
-
-
-@ti.data_oriented
-class OthersInBoth:
-    """Members of a phase of both; first: those at the start."""
-
-    def __init__(self, first: Any, members: Any):
-        self.first, self.members = first, members
-
-    @ti.func
-    def count(self, begin, low):
-        """Number of members; begin: 1 at the start, 0 in a substep."""
-        return begin * self.first.count(low) + (1 - begin) * self.members.count(low)
+        count = 0
+        if ti.static(self.alike):
+            count = self.first.count(low)
+        else:
+            if ti.static(self.at_start):
+                count += begin * self.first.count(low)
+            if ti.static(self.in_substeps):
+                count += (1 - begin) * self.active.count(low)
+        return count
 
     @ti.func
     def pick(self, begin, a):
         """Member at place a."""
-        return begin * self.first.pick(a) + (1 - begin) * self.members.pick(a)
+        member = 0
+        if ti.static(self.alike or not self.in_substeps):
+            member = self.first.pick(a)
+        elif ti.static(not self.at_start):
+            member = self.active.pick(a)
+        else:
+            member = begin * self.first.pick(a) + (1 - begin) * self.active.pick(a)
+        return member
 
 
 def joined(first: Phases, phases: Phases, common: Callable[..., Any]) -> Phases:
     """Phases of the start and of a substep in a row, for one kernel; a function of both is once.
 
-    So the bonds, which take longest to compile, are compiled once. Counts and places depend on
-    whether the run begins. common: that function; what is before and after it keeps its order.
+    So the bonds, which take longest to compile, are compiled once. common: that function; what is
+    before and after it keeps its order.
     """
     (place,) = (k for k, (_, item) in enumerate(first) if item == common)
-    before, after = (
-        tuple((AtStart(members), item) for members, item in part)
-        for part in (first[:place], first[place + 1 :])
-    )
-    steps = tuple(
-        (_in_both(first[place][0], active) if item == common else InSubsteps(active), item)
+    alone = [(Members(members, None), item) for members, item in first]
+    steps = (
+        (Members(first[place][0] if item == common else None, active), item)
         for active, item in phases
     )
-    return (*before, *steps, *after)
-
-
-def _in_both(first, members):
-    return InBoth(members) if first is members else OthersInBoth(first, members)
+    return (*alone[:place], *steps, *alone[place + 1 :])

@@ -19,9 +19,9 @@ def show_opening(description: Optional[str], entry: Optional[Entry], quick: bool
     line = entry.question if entry else (description or "").strip().partition("\n")[0]
     show_heading(line)
     if quick:
-        print("Takes two minutes at most (--quick).\n")
+        print("Takes up to about two minutes (--quick).\n")
     elif entry:
-        smaller = "" if entry.time.endswith(" s") else "; with --quick two minutes at most"
+        smaller = "" if entry.time.endswith(" s") else "; with --quick up to about two minutes"
         print(f"Takes about {entry.expected_time}{smaller}.\n")
 
 
