@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import re
 import subprocess
 import sys
 import time
@@ -195,13 +196,14 @@ def test_prints_stay_where_they_go_and_titles_are_no_markup(stays, tmp_path):
 def test_a_narrow_terminal_keeps_what_matters(job, tmp_path):
     seen = run_in_terminal(job(), columns=50, cwd=tmp_path)
     assert seen.returncode == 0, seen.text
-    assert "simulating  35 %, compiling time step kernels" in seen.text
+    assert re.search(r"simulating +\d+ %, compiling time step kernels", seen.text)
 
 
 def test_a_terminal_without_a_cursor_gets_lines(job, tmp_path):
     seen = run_in_terminal(job(), term="dumb", cwd=tmp_path)
     assert seen.returncode == 0, seen.text
-    assert "simulating:  35 %, compiling time step kernels, the next start is faster" in seen.text
+    words = "compiling time step kernels, the next start is faster"
+    assert re.search(rf"^simulating: +\d+ %, {words}$", seen.text, re.MULTILINE)
     assert seen.text.endswith("\nbroken faces: 0\n")
     assert "\x1b" not in seen.raw and "\n\n" not in seen.text
 
