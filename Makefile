@@ -4,8 +4,8 @@
 
 PYTHON ?=
 DEMO_OPTIONS ?=
-# One worker a core; tests of a file share what they build.
-TEST := -m pytest -q -n 2 --dist loadfile
+# One worker a core; tests of a file, and mostly of a folder, share what they build.
+TEST := -m pytest -q -n 2 --dist loadfile --no-loadscope-reorder
 TEST_OPTIONS ?=
 BENCH_OPTIONS ?=
 ATTACK_OPTIONS ?=

@@ -12,14 +12,12 @@ from pathlib import Path
 
 import pytest
 
-from ca_damper.engine import damper_engine
 from taichi_dem import InputError, runtime
-from taichi_dem.engine.engine import ENGINES
 from taichi_dem.kit.allocation import field_bytes, tree_count
 from taichi_dem.step.auto_driver import CPU_ONLY
 from tests import arch
 
-pytest_plugins = ("tests.attacks", "tests.compilations", "tests.crash_safe")
+pytest_plugins = ("tests.attacks", "tests.compilations", "tests.crash_safe", "tests.own_engines")
 
 
 def pytest_addoption(parser):
@@ -77,18 +75,6 @@ def _return_memory():
     gc.collect()
     with contextlib.suppress(OSError, AttributeError):
         ctypes.CDLL(None).malloc_trim(0)
-
-
-@pytest.fixture
-def compiled_anew(monkeypatch):
-    """Engines of this test alone: for constants of kernels that a test changes; calls drop them."""
-
-    def drop():
-        for pool in (ENGINES, damper_engine._POOL):
-            monkeypatch.setattr(pool, "_engines", {})
-
-    drop()
-    return drop
 
 
 def _skipping():

@@ -3,9 +3,8 @@
 The scheduler of pytest-xdist 3.8 gives the files of a dead worker to others, those that are done as
 well: a worker that is given a file without a test left waits for ever, and the session with it.
 
-The test in which a worker died runs once more in another worker, and the summary names it: Taichi
-has ended a worker of a quarter of an hour about once in five sessions, in different tests. A test
-in which a second worker dies has failed.
+The test in which a worker died runs once more in another worker, and the summary names it: what it
+died of may be left from the tests before. A test in which a second worker dies has failed.
 A test that hangs, also in a kernel, ends its worker after ``MOST_SECONDS``.
 """
 
@@ -39,7 +38,16 @@ def pytest_xdist_make_scheduler(config, log):
     from xdist.scheduler import LoadFileScheduling
 
     class CrashSafeScheduling(LoadFileScheduling):
-        """Files by worker; of a dead worker's files, tests that are not done run in others."""
+        """Files by worker; of a dead worker's files, tests that are not done run in others.
+
+        Every second worker takes the last file instead of the first: files of one folder, whose
+        scenes have much in common, then mostly run in one worker and compile their kernels once.
+        """
+
+        def _assign_work_unit(self, node):
+            if self.nodes.index(node) % 2:
+                self.workqueue.move_to_end(next(reversed(self.workqueue)), last=False)
+            super()._assign_work_unit(node)
 
         def remove_node(self, node):
             """Take a worker away; return the test that has killed two, None without one."""

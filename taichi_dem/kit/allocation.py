@@ -90,9 +90,6 @@ class FieldTree(Uncopied):
         self._tree = self._builder.finalize(raise_warning=False)
         if impl.current_cfg().arch != ti.cuda:
             address = _address(self._anchor) - _offset(self._anchor.snode.ptr)[1]
-            if address == 0:
-                # Any use of its fields would end the process.
-                raise CapacityError(f"Taichi gave the fields no memory: {self.advice}")
             _base(self._builder.root.ptr)
             _bases[self._builder.root.ptr.id] = address
 

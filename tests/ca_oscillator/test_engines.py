@@ -1,6 +1,5 @@
 """Engines of the damper: compiled once for a structure, for batches of any size and any numbers."""
 
-import gc
 import hashlib
 import os
 import threading
@@ -264,28 +263,6 @@ def test_a_batch_too_large_for_the_memory_is_refused_before_anything_is_allocate
         Batch(Automaton(), SceneTable(1, range(4000), 1e-4))
     assert impl.get_runtime().prog.get_snode_tree_size() == trees
     assert _POOL.count == 0
-    lived(some_batch(some_mass, 1))
-
-
-def test_an_engine_that_gets_no_memory_takes_that_of_idle_ones(monkeypatch):
-    """As if Taichi gave it none without a word: any use of its fields would end the process."""
-    known, failing = allocation._address, [False]
-
-    def address(field):
-        return allocation._offset(field.snode.ptr)[1] if failing.pop() else known(field)
-
-    monkeypatch.setattr(allocation, "_address", address)
-    some_batch(some_mass, 1)
-    gc.collect()
-    failing += [False, True]
-    lived(some_batch(some_automaton, 1))
-    assert _POOL.count == 1 and failing == []
-    runtime.clear()
-    failing.append(True)
-    with pytest.raises(InputError, match="Taichi gave the fields no memory: run fewer scenes"):
-        some_batch(some_mass, 1)
-    assert _POOL.count == 0
-    failing.append(False)
     lived(some_batch(some_mass, 1))
 
 
