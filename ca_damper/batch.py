@@ -252,9 +252,7 @@ class Batch(LoadedScenes):
         steps = self.steps_per_cycle.astype(np.int64)
         self._set_recorder((transient + measured) * steps, record_every)
         self._go((transient + measured) * steps, transient * steps, progress)
-        record = np.empty((self.count, measured, len(measures.COLUMNS)))
-        if measured:
-            self.engine.coupling.read(record)
+        record = self.engine.coupling.read(measured)
         cycles = measures.Cycles(self.table.column("frequency"), self.steps_per_cycle, record)
         self.periods = periods_of(cycles)
         return cycles
@@ -286,8 +284,7 @@ class Batch(LoadedScenes):
         counts = for_all("cycles", cycles, self.count, self.measured_cycles).astype(np.int64)
         self._check_cycle_is_full()
         self._go(counts * self.steps_per_cycle, np.zeros_like(counts), progress)
-        record = np.empty((self.count, max(1, int(counts.max())), len(measures.COLUMNS)))
-        self.engine.coupling.read(record)
+        record = self.engine.coupling.read(int(counts.max()))
         return tuple(one[:count].copy() for one, count in zip(record, counts))
 
     def advance(self, steps: Any, progress: Optional[Listener] = None) -> None:
@@ -429,7 +426,7 @@ class Batch(LoadedScenes):
         deal = dealt if self.modal is None else self.modal.order
         order = deal((1 + self.table.column("particles")) * steps, runtime.settings().threads)
         plan = np.stack([begin, begin + steps, begin + before_measuring, order])
-        self.engine.coupling.aim(plan.astype(np.int32))
+        self.engine.coupling.aim(plan)
         self.launches.begin()
 
     def _compile(self) -> None:

@@ -86,12 +86,10 @@ class FrozenBatch:
         begin = self._seen()[0]
         goal = begin + self.substeps
         plan = np.stack([begin, goal, goal, np.arange(self.batch.count)])
-        self.batch.engine.coupling.aim(plan.astype(np.int32))
+        self.batch.engine.coupling.aim(plan)
 
     def _seen(self):
-        seen = np.empty((3, self.batch.count), dtype=np.int32)
-        self.batch.engine.coupling.read_status(seen)
-        return seen
+        return self.batch.engine.coupling.read_status()
 
     def _check(self):
         if self._seen()[2].any():

@@ -4,8 +4,10 @@ One scene a thread, the whole time loop inside the kernel. All state is stored i
 launches, so that neither their number nor other scenes in the batch change a bit.
 """
 
+import math
 from typing import Any
 
+import numpy as np
 import taichi as ti
 
 from ca_damper import measures
@@ -21,11 +23,12 @@ LOST = -1
 _FAR = 1e12
 _CHECK_EVERY = 64
 SUM_COUNT = len(measures.SUMS)
+#: Largest and smallest displacement [m] of a cycle that has not begun.
+_NO_EXTREMES = [-math.inf, math.inf]
 # A parallel loop on a CPU gives each thread at least this many iterations, so there a scene takes
 # that many and uses one. On a GPU every iteration has a thread of its own.
 _CPU_BLOCK = 512
 
-_I32 = ti.types.ndarray(dtype=ti.i32, ndim=2)
 _F64 = ti.types.ndarray(dtype=ti.f64, ndim=2)
 
 
@@ -88,14 +91,14 @@ class Coupling:
         for s in range(self.table.scenes[None]):
             self.container.renew(s)
 
-    @ti.kernel
-    def aim(self, plan: _I32):
+    def aim(self, plan: np.ndarray) -> None:
         """Set from plan[:, s]: step to begin at, to end at, to measure from; and the k-th scene."""
-        for s in range(self.table.scenes[None]):
-            self.begin[s], self.goal[s], self.measure_from[s] = plan[0, s], plan[1, s], plan[2, s]
-            self.order[s] = plan[3, s]
-            self.cycle[s] = 0
-            self._clear(s)
+        count = plan.shape[1]
+        for field, row in zip((self.begin, self.goal, self.measure_from, self.order), plan):
+            assign(field, row)
+        assign(self.cycle, np.zeros(count))
+        assign(self.sums, np.zeros((count, SUM_COUNT)))
+        assign(self.extremes, np.tile(_NO_EXTREMES, (count, 1)))
 
     @ti.kernel
     def advance(self, share: ti.f64):
@@ -166,7 +169,7 @@ class Coupling:
     @ti.func
     def _clear(self, s):
         self.sums[s] = ti.Vector.zero(ti.f64, SUM_COUNT)
-        self.extremes[s] = ti.Vector([-ti.math.inf, ti.math.inf])
+        self.extremes[s] = ti.Vector(_NO_EXTREMES)
 
     @ti.func
     def _measure(self, s, motion, now, middle):
@@ -201,16 +204,11 @@ class Coupling:
             values[3, s], values[4, s] = self.container.base(s), self.force[s]
             values[5, s], values[6, s] = self.device.energy(s), self.device.momentum(s)
 
-    @ti.kernel
-    def read_status(self, seen: _I32):
-        """Fill seen[:, s] with step, position in the cycle, and status."""
-        for s in range(self.table.scenes[None]):
-            seen[0, s], seen[1, s] = self.step[s], self.clock.position[s]
-            seen[2, s] = self.status[s]
+    def read_status(self) -> np.ndarray:
+        """Step, position in the cycle, and status of all scenes, (3, scenes)."""
+        fields = self.step, self.clock.position, self.status
+        return np.stack([self.table.in_use(field) for field in fields])
 
-    @ti.kernel
-    def read(self, cycles: ti.types.ndarray(dtype=ti.f64, ndim=3)):
-        """Copy the first cycles[s, c] of the record, all columns."""
-        for s in range(self.table.scenes[None]):
-            for c, k in ti.ndrange(cycles.shape[1], cycles.shape[2]):
-                cycles[s, c, k] = self.record[s, c, k]
+    def read(self, cycles: int) -> np.ndarray:
+        """The first cycles of the record, (scenes, cycles, columns)."""
+        return self.table.in_use(self.record)[:, :cycles]

@@ -222,9 +222,7 @@ class LoadedScenes(Uncopied):
 
     def _read_status(self) -> np.ndarray:
         """Step, position in the cycle, and status of all scenes, (3, scenes)."""
-        seen = np.empty((3, self.count), dtype=np.int32)
-        self.engine.coupling.read_status(seen)
-        return seen
+        return self.engine.coupling.read_status()
 
     def _check_started(self) -> None:
         self.loan.activate()

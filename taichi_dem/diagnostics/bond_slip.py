@@ -86,9 +86,7 @@ class BondSlips:
         """Update the figures at a recording time [s]."""
         if not self.present:
             return
-        slip = np.zeros(self.model.bond_count)
-        self.readings.residual_slip(slip)
-        share = slip / self.shortest
+        share = self.readings.residual_slip() / self.shortest
         self.most = max(self.most, int((share > MOST_SLIP).sum()))
         if share.max() > self.share:
             self.bond, self.time_s = int(share.argmax()), time_s

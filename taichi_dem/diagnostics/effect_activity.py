@@ -49,9 +49,7 @@ def effect_activity(
     state = energy_balance.state
     given = abs(account["load_work"]) + abs(account["support_work"]) + energy_balance.start_energy
     rounding = _Rounding(substeps * _EPSILON * given, bond_rounding(model, state, substeps))
-    marks = np.zeros((model.bond_count, 2), dtype=np.int32)
-    readings.active_bonds(marks)
-    active = state.active_effects.to_numpy()[: model.body_count], marks
+    active = state.active_effects.to_numpy()[: model.body_count], readings.active_bonds()
     found = [
         _by_role(model, energy_balance, tables, active, rounding, effect)
         for effect in _listed(model)

@@ -130,10 +130,8 @@ class EnergyBalance:
         bond: strain, dashpot, slip, release, softening. A row a pair: strain, dashpots, friction,
         injected, so far as its first body has not taken them.
         """
-        bond = np.zeros((self.model.bond_count, 5))
-        self.readings.bonds(bond)
         with self.readings.held():
-            return self.readings.bodies(), bond, self.readings.pairs()
+            return self.readings.bodies(), self.readings.bonds(), self.readings.pairs()
 
     def _residual(self, terms):
         given = terms["load_work"] + terms["support_work"] + terms["injected"] + self.start_energy

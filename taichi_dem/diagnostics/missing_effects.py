@@ -147,13 +147,9 @@ class MissingEffects:
         if self.volume.sample(time_s):
             self._see_bodies(self.needed, self.volume, time_s)
         if self.model.bond_count and "contact" in self.needed:
-            marks = np.zeros(self.model.bond_count, dtype=np.int32)
-            self.readings.pressed(marks)
-            self.needed["contact"].see(np.flatnonzero(marks), time_s)
+            self.needed["contact"].see(np.flatnonzero(self.readings.pressed()), time_s)
         if self.model.bond_count and "dashpot" in self.needed:
-            table = np.zeros((self.model.bond_count, 5))
-            self.readings.bonds(table)
-            self.strain = np.maximum(self.strain, table[:, 0])
+            self.strain = np.maximum(self.strain, self.readings.bonds()[:, 0])
         if "friction" in self.needed:
             active = self.state.active_effects.to_numpy()[: self.model.body_count]
             self.needed["friction"].see(np.flatnonzero(active & CONTACT), time_s)

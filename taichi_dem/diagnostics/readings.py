@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 class Readings:
     """Kernels that read booked terms, or compute others by the laws of the step.
 
-    Every method fills arrays of the counts of the scene.
+    Arrays that methods fill or return have the counts of the scene.
     """
 
     def __init__(self, tables: "Tables", state: "State", advance: Advance):
@@ -130,18 +130,68 @@ class Readings:
                 table[i, 1] = table[i, 1] + table[i, 15 + e]
             table[i, 2] = table[i, ti.static(15 + len(self.tables.loads))]
 
+    def bonds(self) -> np.ndarray:
+        """Strain, dashpot, slip, release and softening energy of every bond [J], (n, 5)."""
+        return self._bonds()[:, :5]
+
+    def damage(self) -> np.ndarray:
+        """Mean damage of the units of every bond, 1 once it is released, (n,)."""
+        return self._bonds()[:, 5]
+
+    def active_bonds(self) -> np.ndarray:
+        """Whether a unit of every bond has softened, and whether one has slipped, (n, 2)."""
+        return self._bonds()[:, 6:8] > 0.0
+
+    def residual_slip(self) -> np.ndarray:
+        """Largest residual slip of the units of every bond that holds [m], (n,).
+
+        Zero for released bonds, and for shear laws that keep none.
+        """
+        return self._bonds()[:, 8]
+
+    def pressed(self) -> np.ndarray:
+        """Whether every bond is released and its faces overlap, (n,)."""
+        return self._bonds()[:, 9] > 0.0
+
+    def _bonds(self):
+        return self._once("bonds", self._bond_table)
+
+    def _bond_table(self):
+        table = np.zeros((int(values(self.tables.bond_count)), 10))
+        self._visit_bonds(table)
+        return table
+
     @ti.kernel
-    def bonds(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
-        """Strain, dashpot, slip, release and softening energy of every bond [J]."""
+    def _visit_bonds(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
+        """Fill in all that is read of bonds; one kernel, as each takes its time to compile."""
         for b in range(self.tables.bond_count[None]):
             table[b, 0] = self.advance.bond_energy(b)
             if ti.static(self.tables.has_bond_heat):
                 for k in ti.static(range(3)):
                     table[b, 1 + k] = self.state.bond_heat[b][k]
                 table[b, 1] = table[b, 1] + self.half_step.bond_heat(b)
+            holds = self.state.broken_tick[b] < 0
             for q in range(3):
-                spent = self.tables.tension.spent(b, 3 * b + q)
+                u = 3 * b + q
+                spent = self.tables.tension.spent(b, u)
                 table[b, 4] = table[b, 4] + self.tables.unit_area[b] * spent
+                if holds:
+                    table[b, 5] = table[b, 5] + self.tables.tension.damage(b, u) / 3.0
+                self._note_laws(table, b, u, holds)
+            if not holds:
+                table[b, 5] = 1.0
+                table[b, 9] = ti.cast(self.advance.bond_opening(b)[0] < 0.0, ti.f64)
+
+    @ti.func
+    def _note_laws(self, table: ti.template(), b, u, holds):
+        """Note whether unit u of bond b has softened or slipped, and how far it has slipped."""
+        if ti.static(hasattr(self.tables.tension, "is_active")):
+            table[b, 6] = ti.max(table[b, 6], ti.cast(self.tables.tension.is_active(b, u), ti.f64))
+        if ti.static(hasattr(self.tables.shear, "is_active")):
+            table[b, 7] = ti.max(table[b, 7], ti.cast(self.tables.shear.is_active(b, u), ti.f64))
+        if ti.static(self.tables.shear.remembers_slip):
+            if holds:
+                table[b, 8] = ti.max(table[b, 8], self.tables.shear.residual_slip(u).norm())
 
     def pairs(self) -> np.ndarray:
         """Strain, and heats that the first body has not taken, of every pair [J], (pairs, 4)."""
@@ -188,48 +238,6 @@ class Readings:
             if not self.state.sleeping.both_awake(slots[0] >> 2, slots[1] >> 2):
                 found = self.advance.schedule.woken.left_out(b, False)
             table[b, 0], table[b, 1] = found[0], found[1]
-
-    @ti.kernel
-    def pressed(self, marks: ti.types.ndarray(dtype=ti.i32, ndim=1)):
-        """Mark released bonds of which the faces overlap."""
-        for b in range(self.tables.bond_count[None]):
-            if self.state.broken_tick[b] >= 0:
-                marks[b] = ti.cast(self.advance.bond_opening(b)[0] < 0.0, ti.i32)
-
-    @ti.kernel
-    def active_bonds(self, marks: ti.types.ndarray(dtype=ti.i32, ndim=2)):
-        """Mark bonds of which a unit has softened, and of which one has slipped."""
-        for b in range(self.tables.bond_count[None]):
-            for u in range(3 * b, 3 * b + 3):
-                if ti.static(hasattr(self.tables.tension, "is_active")):
-                    marks[b, 0] = marks[b, 0] | self.tables.tension.is_active(b, u)
-                if ti.static(hasattr(self.tables.shear, "is_active")):
-                    marks[b, 1] = marks[b, 1] | self.tables.shear.is_active(b, u)
-
-    @ti.kernel
-    def residual_slip(self, slip: ti.types.ndarray(dtype=ti.f64, ndim=1)):
-        """Largest residual slip [m] of the units of every bond that holds.
-
-        Zero for released bonds, and for shear laws that keep none.
-        """
-        for b in range(self.tables.bond_count[None]):
-            largest = 0.0
-            if ti.static(self.tables.shear.remembers_slip):
-                if self.state.broken_tick[b] < 0:
-                    for q in range(3):
-                        found = self.tables.shear.residual_slip(3 * b + q).norm()
-                        largest = ti.max(largest, found)
-            slip[b] = largest
-
-    @ti.kernel
-    def damage(self, damage: ti.types.ndarray(dtype=ti.f64, ndim=1)):
-        """Mean damage of the units of every bond, 1 once it is released."""
-        for b in range(self.tables.bond_count[None]):
-            damage[b] = 1.0
-            if self.state.broken_tick[b] < 0:
-                damage[b] = 0.0
-                for q in range(3):
-                    damage[b] = damage[b] + self.tables.tension.damage(b, 3 * b + q) / 3.0
 
     @ti.kernel
     def bond_shares(self, share: ti.types.ndarray(dtype=ti.f64, ndim=1)):

@@ -11,14 +11,16 @@ from taichi_dem.effects.body_motion import BodyMotion
 from taichi_dem.engine.model import Model
 from taichi_dem.engine.tables import Tables
 from taichi_dem.kit.allocation import assign, values
-from taichi_dem.kit.products import matvec, transposed_matvec
-from taichi_dem.kit.types import real, vec3, vec4
+from taichi_dem.kit.types import real
 from taichi_dem.mesh.topology import Topology
 from taichi_dem.physics.fracture import coulomb_limit
-from taichi_dem.physics.rotation import rotation_matrix, spin_of
+from taichi_dem.physics.rotation_arrays import spins, turned_bodies
 from taichi_dem.step.activity import Activity
 from taichi_dem.step.sleeping import Sleeping
 from taichi_dem.timeline import NEVER
+
+#: Motion of a body that is given, by name.
+_GIVEN = ("position", "orientation", "velocity", "spin")
 
 
 def unserved_limits(model: Model) -> np.ndarray:
@@ -131,7 +133,12 @@ class State:
         rows = [still if part is None else part for part, still in zip(given, rest)]
         shapes = [(self.body_count, len(still)) for still in rest]
         shaped = [np.broadcast_to(part, shape) for part, shape in zip(rows, shapes)]
-        self._write_motion(*(np.ascontiguousarray(part, dtype=np.float64) for part in shaped))
+        whole = [np.ascontiguousarray(part, dtype=np.float64) for part in shaped]
+        inertia = values(self.tables.inertia, slice(self.body_count))
+        found = turned_bodies(whole[1], whole[3], inertia)
+        names = (*_GIVEN, "rotation", "angular_momentum")
+        for name, part in zip(names, (*whole, *found)):
+            assign(getattr(self, name), part)
 
     @ti.func
     def note_active(self, i, bits):
@@ -173,28 +180,6 @@ class State:
             step=step,
         )
 
-    @ti.kernel
-    def _write_motion(
-        self,
-        position: ti.types.ndarray(dtype=ti.f64, ndim=2),
-        orientation: ti.types.ndarray(dtype=ti.f64, ndim=2),
-        velocity: ti.types.ndarray(dtype=ti.f64, ndim=2),
-        spin: ti.types.ndarray(dtype=ti.f64, ndim=2),
-    ):
-        for i in range(self.tables.body_count[None]):
-            self.position[i] = vec3(position[i, 0], position[i, 1], position[i, 2])
-            turn = vec4(0.0)
-            for k in ti.static(range(4)):
-                turn[k] = orientation[i, k]
-            self.orientation[i] = turn
-            rotation = rotation_matrix(turn)
-            self.rotation[i] = rotation
-            self.velocity[i] = vec3(velocity[i, 0], velocity[i, 1], velocity[i, 2])
-            w = vec3(spin[i, 0], spin[i, 1], spin[i, 2])
-            self.spin[i] = w
-            own = transposed_matvec(rotation, w)
-            self.angular_momentum[i] = matvec(rotation, matvec(self.tables.inertia[i], own))
-
     @property
     def body_count(self) -> int:
         """Bodies of the scene."""
@@ -215,32 +200,13 @@ class State:
         position, velocity, spin, angular_momentum (n, 3), orientation (n, 4), rotation (n, 3, 3)
         and level (n,).
         """
-        table = np.zeros((self.body_count, 26))
-        self._read_motion(table)
-        widths = (("position", 3), ("orientation", 4), ("velocity", 3), ("spin", 3))
-        parts, start = {}, 0
-        for name, width in (*widths, ("angular_momentum", 3), ("rotation", 9), ("level", 1)):
-            parts[name] = table[:, start : start + width].copy()
-            start += width
-        parts["rotation"] = parts["rotation"].reshape(-1, 3, 3)
-        parts["level"] = parts["level"][:, 0].astype(np.int32)
-        return parts
-
-    @ti.kernel
-    def _read_motion(self, table: ti.types.ndarray(dtype=ti.f64, ndim=2)):
-        for i in range(self.tables.body_count[None]):
-            rotation = self.rotation[i]
-            spin = spin_of(rotation, self.tables.inertia_inverse[i], self.angular_momentum[i])
-            for k in ti.static(range(3)):
-                table[i, k] = self.position[i][k]
-                table[i, 7 + k] = self.velocity[i][k]
-                table[i, 10 + k] = spin[k]
-                table[i, 13 + k] = self.angular_momentum[i][k]
-            for k in ti.static(range(4)):
-                table[i, 3 + k] = self.orientation[i][k]
-            for r, c in ti.static(ti.ndrange(3, 3)):
-                table[i, 16 + 3 * r + c] = rotation[r, c]
-            table[i, 25] = ti.cast(self.level[i], ti.f64)
+        here = slice(self.body_count)
+        names = (*_GIVEN, "angular_momentum", "rotation", "level")
+        found = {name: values(getattr(self, name), here) for name in names}
+        # The stored spin is that of the orientation before the last turn.
+        inverse = values(self.tables.inertia_inverse, here)
+        found["spin"] = spins(found["rotation"], inverse, found["angular_momentum"])
+        return found
 
     def fields(self) -> dict[str, ti.Field]:
         """Every field that changes, by name, the bound effects' state included."""

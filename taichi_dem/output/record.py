@@ -141,8 +141,6 @@ class Recorder:
     def frame(self) -> Frame:
         """The block as it is now, a Frame."""
         motion = self.simulation.motion()
-        damage = np.zeros(max(1, self.model.bond_count))
-        self.simulation.readings.damage(damage)
         return Frame(
             time_s=self.simulation.time_s,
             position=motion["position"],
@@ -150,7 +148,7 @@ class Recorder:
             displacement=motion["position"] - self.model.centre,
             velocity=motion["velocity"],
             level=motion["level"],
-            damage=self._body_damage(damage),
+            damage=self._body_damage(self.simulation.readings.damage()),
             bound=self.state.bound.to_numpy(),
             angular_momentum=motion["angular_momentum"],
         )
@@ -179,7 +177,8 @@ class Recorder:
 
     def _body_damage(self, damage):
         bond = self.model.topology.body_bond
-        own = np.where(bond >= 0, damage[np.maximum(bond, 0)], 0.0)
+        # A face without a bond has the number -1, the place of the zero.
+        own = np.append(damage, 0.0)[bond]
         return own.sum(axis=1) / np.maximum(1, (bond >= 0).sum(axis=1))
 
     def history(self) -> Table:

@@ -113,7 +113,9 @@ def used(listed, bits=0, marked=0, heat=0.0, mesh=None, works=None, **account):
     balance = SimpleNamespace(state=state, start_energy=0.0)
     balance.support_works = lambda index: works
     balance.load_works = lambda index: np.zeros(model.body_count)
-    readings = SimpleNamespace(active_bonds=lambda marks: marks[: min(1, marked)].fill(1))
+    marks = np.zeros((model.bond_count, 2), dtype=bool)
+    marks[: min(1, marked)] = True
+    readings = SimpleNamespace(active_bonds=lambda: marks)
     filled = {**dict.fromkeys(TERMS, 0.0), **account}
     return {u.effect: u for u in effect_activity(model, balance, readings, tables, filled, 100)}
 

@@ -124,12 +124,10 @@ class Parts:
     def run(self, step):
         """Go to UNTIL; what the tests below ask for, by name."""
         self.restart(step)
-        first = np.zeros((self.model.bond_count, 5))
-        self.again.simulation.readings.bonds(first)
+        first = self.again.simulation.readings.bonds()
         away = self.again.run(round(UNTIL / step)) - self.place
         simulation = self.again.simulation
-        bonds = np.zeros((self.model.bond_count, 5))
-        simulation.readings.bonds(bonds)
+        bonds = simulation.readings.bonds()
         # Half a step of the dashpots is booked at the start.
         bonds[:, 1] -= first[:, 1]
         return {
