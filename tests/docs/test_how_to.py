@@ -31,10 +31,13 @@ APART = ("README.md", "docs/long_runs.md", "docs/hard_cases.md")
 BLOCKS = [
     (page, number) for page in PAGES if page not in APART for number in range(len(blocks(page)))
 ]
-#: Pages whose blocks take longer: of runs to an accuracy, of several kinds of structures.
+#: Pages whose blocks take longer: runs to an accuracy, several kinds of structures, pages of HTML.
 LONG = [
     f"docs/{name}.md"
-    for name in ("accuracy", "boundaries", "damper_engineering", "effects_auto", "tutorial")
+    for name in (
+        *("accuracy", "boundaries", "damper_engineering", "effects_auto", "look", "material"),
+        "tutorial",
+    )
 ]
 COLLISION = "docs/tutorial.md", 1
 QUICK = [block for block in BLOCKS if block[0] not in LONG or block == COLLISION]

@@ -12,11 +12,12 @@ from taichi_dem.kit.study.cases import assess
 from tests.figures import UNIT
 
 LEAST_ALIKE = ("multirate_drifted", "implicit")
-#: Cases with effects, methods or limits of their own compile an engine.
+#: Cases with effects, methods or limits of their own compile an engine; the pyramid is large.
 OF_ITS_OWN = (
     *("jump_of_ten_levels", "stiffness_ratio_1e4", "many_steps_at_rest", "step_beyond_all_limits"),
     *("sudden_pressure_on_sleepers", "step_ratio_resonance", "step_ratio_beyond_resonance"),
     *("funnel", "levels_that_flip", "vertices_at_coarse_faces", "vertices_between_spheres"),
+    "pyramid_100",
 )
 
 

@@ -15,6 +15,7 @@ from taichi_dem import (
 )
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.step.sleeping import ASLEEP
+from tests.slow import slow_but
 
 METHODS = [
     ImplicitDashpots(4e-7),
@@ -38,12 +39,8 @@ def begun(method, driver, sleep):
     return simulation
 
 
-#: One method in every run of the tests, the others in that of the slow ones.
-SOME = [METHODS[0], *(pytest.param(method, marks=pytest.mark.slow) for method in METHODS[1:])]
-
-
 @pytest.mark.parametrize("sleep", [pytest.param(0.0, marks=pytest.mark.slow), 1e-6])
-@pytest.mark.parametrize("method", SOME, ids=lambda method: method.name)
+@pytest.mark.parametrize("method", slow_but(METHODS, METHODS[3]), ids=lambda method: method.name)
 def test_both_drivers_begin_with_the_same_bits(method, sleep):
     first, second = (begun(method, driver, sleep) for driver in ("resident", "parallel"))
     found, other = (
@@ -55,7 +52,7 @@ def test_both_drivers_begin_with_the_same_bits(method, sleep):
     assert np.abs(found["slot"][:4]).max() > 0.0
 
 
-@pytest.mark.parametrize("method", SOME[:3], ids=lambda method: method.name)
+@pytest.mark.parametrize("method", slow_but(METHODS[:3], METHODS[1]), ids=lambda m: m.name)
 def test_a_bond_that_sleeps_acts_at_the_start(method):
     """What it holds by rounding is given to its bodies, though they sleep and it is not listed."""
     simulation = begun(method, "resident", 1e-6)
