@@ -14,6 +14,7 @@ from ca_damper.engine.damper_engine import _POOL
 from ca_damper.fixed_mass import FixedMass
 from taichi_dem.kit import allocation
 from tests.ca_oscillator.kicks import Kicks
+from tests.own_engines import set_aside
 from tests.slow import slow_but
 
 
@@ -254,6 +255,19 @@ def test_a_batch_of_a_stopped_session_is_refused_in_a_sentence():
         with pytest.raises(InputError, match="Taichi session that has been stopped"):
             use()
     lived(some_batch(some_mass, 1))
+
+
+@pytest.mark.parametrize("goes_on", [True, False])
+def test_engines_set_aside_come_back_only_while_their_session_goes_on(goes_on):
+    engine, settings = some_batch(some_mass, 1).loan.engine, runtime.settings()
+    with pytest.MonkeyPatch.context() as patch:
+        set_aside(patch)
+        assert some_batch(some_mass, 1).loan.engine is not engine
+        if not goes_on:
+            runtime.stop()
+            runtime.start(settings.arch, settings.threads)
+            some_batch(some_mass, 1)
+    assert (some_batch(some_mass, 1).loan.engine is engine) == goes_on
 
 
 def test_a_batch_too_large_for_the_memory_is_refused_before_anything_is_allocated(monkeypatch):
