@@ -1,5 +1,7 @@
 """Engines of one test alone, as a fixture."""
 
+import functools
+
 import pytest
 
 from ca_damper.engine import damper_engine
@@ -9,12 +11,8 @@ from taichi_dem.engine.engine import ENGINES
 @pytest.fixture
 def compiled_anew(monkeypatch):
     """Engines of this test alone: for constants of kernels that a test changes; calls drop them."""
-
-    def drop():
-        set_aside(monkeypatch)
-
-    drop()
-    return drop
+    set_aside(monkeypatch)
+    return functools.partial(set_aside, monkeypatch)
 
 
 def set_aside(monkeypatch):
