@@ -99,6 +99,6 @@ class AmplitudeResponse(Tabulated):
         InputError
             Where xarray is not installed.
         """
-        xarray = optional("xarray", "tables")
+        xarray = optional("xarray")
         axis = xarray.Variable("base_amplitude", list(self.amplitudes), {"units": "m"})
         return xarray.concat([one.to_xarray() for one in self.responses], axis)

@@ -60,6 +60,7 @@ _ENTRY = Entry(
     question="What does a handful of grains in a box do to its vibration?",
     look="",
     time="10 s",
+    quick="10 s",
     pictures=("damper.gif", "view.html", "motion.png"),
     figures=("amplitude*", "damping*", "apparent*", "loss*"),
 )

@@ -67,7 +67,7 @@ class Sweep:
         InputError
             Where xarray is not installed.
         """
-        xarray = optional("xarray", "tables")
+        xarray = optional("xarray")
         axis = xarray.Variable("direction", ["up", "down"])
         return xarray.concat([self.up.to_xarray(), self.down.to_xarray()], axis)
 

@@ -7,7 +7,8 @@
 
 Open results/index.html: it needs no server. Ends with exit code 1 and a list when an experiment
 failed or is missing from the page. A new experiment gets an entry in _gallery_pages.txt; --readme
-then renews the table of README.md.
+then renews the table of README.md. --pictures takes small pictures and figures of full runs into
+docs; --readme writes these figures into the sentences of the pages.
 """
 
 import os
@@ -15,6 +16,7 @@ import re
 import sys
 from pathlib import Path
 
+from _figures_in_text import fill_figures, keep_figures
 from taichi_dem import InputError
 from taichi_dem.kit.files import output_folder, write_text
 from taichi_dem.kit.study import bare_parser, main_of_tool, several
@@ -35,8 +37,8 @@ SMALL_PICTURES, SMALL = "docs/pictures", (960, 256)
 FLAGS = {
     "quick": "run smaller jobs of under a minute",
     "reuse": "run only what has no result yet",
-    "readme": "renew README.md, run nothing",
-    "pictures": f"renew {SMALL_PICTURES}, run nothing",
+    "readme": "renew the table of README.md and figures in all pages, run nothing",
+    "pictures": f"renew {SMALL_PICTURES} and the figures kept for the pages, run nothing",
 }
 
 
@@ -55,6 +57,7 @@ def _work(options):
     if options.readme:
         return renew_readme(HERE.parent)
     if options.pictures:
+        keep_figures(options.out, HERE.parent, [page.name for page in pages()])
         return print("\n".join(shrink_pictures(options.out, HERE.parent / SMALL_PICTURES)))
     amiss = build(options)
     if amiss:
@@ -96,7 +99,10 @@ def shrink_pictures(out, folder):
 
 
 def renew_readme(root):
-    """Renew the table of README.md in a folder, and show pictures whose place was kept for them."""
+    """Renew the table of README.md in a folder, show pictures whose place was kept for them.
+
+    Figures in the sentences of all pages become those that are kept.
+    """
     path, table = Path(root, "README.md"), markdown_table(pages(), HERE.parent, SMALL_PICTURES)
 
     def show(place):
@@ -105,6 +111,11 @@ def renew_readme(root):
     text = path.read_text(encoding="utf-8")
     text = re.sub(r"\| question \|.*?\n\n", lambda _: f"{table}\n", text, flags=re.DOTALL)
     write_text(path, re.sub(r"<!-- (!\[[^]]+\]\((.+?)\)) -->", show, text))
+    for page in (path, *sorted(Path(root, "docs").glob("*.md"))):
+        text = page.read_text(encoding="utf-8")
+        filled = fill_figures(text, root)
+        if filled != text:
+            write_text(page, filled)
 
 
 if __name__ == "__main__":

@@ -45,6 +45,7 @@ _ENTRY = Entry(
     question="How does a block of concrete break when a hole in it is blasted?",
     look="",
     time="20 s",
+    quick="15 s",
     pictures=("cracks.png", "view.html", "blast.gif"),
     figures=("hole_radial*", "monitor*", "broken_faces", "ledger*"),
 )

@@ -217,7 +217,7 @@ def from_surface(path: FileName, *, element: float, scale: float = 1.0) -> Mesh:
     ------
     InputError
         The file is missing, cannot be read, or is not closed, or gmsh is not installed:
-        ``pip install "taichi-dem[mesh]"``.
+        ``pip install gmsh``.
 
     Examples
     --------

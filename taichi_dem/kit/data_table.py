@@ -15,8 +15,6 @@ from taichi_dem.kit.optional import optional
 from taichi_dem.kit.units import unit_of, without_unit
 from taichi_dem.kit.validation import FileName
 
-#: Extra that installs pandas and xarray.
-_EXTRA = "tables"
 #: Rows that are shown at the top and at the bottom of a long table.
 _SHOWN = 5
 #: Letters of a printed line.
@@ -87,7 +85,7 @@ class Table(dict[str, np.ndarray]):
         InputError
             Where pandas is not installed.
         """
-        frame = optional("pandas", _EXTRA).DataFrame(self.arrays())
+        frame = optional("pandas").DataFrame(self.arrays())
         frame.attrs["units"] = dict(self.units)
         return frame
 
@@ -268,7 +266,7 @@ def dataset(
     InputError
         Where xarray is not installed.
     """
-    xarray = optional("xarray", _EXTRA)
+    xarray = optional("xarray")
     return xarray.Dataset(
         {name: (dims, values, {"units": u}) for name, (dims, values, u) in variables.items()},
         {name: ((name,), np.asarray(v), {"units": u}) for name, (v, u) in axes.items()},

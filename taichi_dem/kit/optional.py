@@ -6,15 +6,13 @@ from typing import Any
 from taichi_dem.kit.errors import InputError
 
 
-def optional(module: str, extra: str) -> Any:
+def optional(module: str) -> Any:
     """Import a library that need not be installed.
 
     Parameters
     ----------
     module : str
         Name of the library, as it is imported.
-    extra : str
-        The extra of this package that installs it.
 
     Returns
     -------
@@ -30,5 +28,5 @@ def optional(module: str, extra: str) -> Any:
         return importlib.import_module(module)
     except ImportError:
         raise InputError(
-            f'{module} must be installed for this: pip install "taichi-dem[{extra}]"'
+            f"{module} must be installed for this: pip install {module}"
         ) from None

@@ -85,7 +85,7 @@ def stand_ins(tmp_path, monkeypatch):
         for name in names:
             (tmp_path / f"{name}.py").write_text(SCRIPT)
         made = [
-            Entry(n, "Part", f"What of {n}?", "Look.", "1 s", ("first.png",), ("steps",))
+            Entry(n, "Part", f"What of {n}?", "Look.", "1 s", "1 s", ("first.png",), ("steps",))
             for n in names
         ]
         monkeypatch.setattr(gallery, "HERE", tmp_path)

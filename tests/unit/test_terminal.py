@@ -126,22 +126,24 @@ def test_a_paragraph_is_as_wide_as_the_terminal_but_no_wider_than_a_page(shown, 
 
 
 def entry(**fields):
-    texts = {"name": "x", "part": "", "question": "Why?", "look": "", "time": "15 s"}
+    texts = {"name": "x", "part": "", "question": "Why?", "look": "", "time": "15 s", "quick": "9 s"}
     return Entry(**{**texts, "pictures": ("b.png", "a.gif"), **fields})
 
 
 @pytest.mark.parametrize(
     ("time", "words"),
     [
-        ("15 s", "about 15 s on two cores.\n"),
-        ("about 6 min", "about 6 min on two cores; with --quick"),
-        ("5 min on one", "about 5 min on one core; with --quick"),
+        ("15 s", "about 15 s on two cores; with --quick 9 s.\n"),
+        ("about 6 min", "about 6 min on two cores; with --quick 9 s.\n"),
+        ("5 min on one", "about 5 min on one core; with --quick 9 s.\n"),
     ],
 )
 def test_the_time_to_expect_is_a_sentence(capsys, time, words):
     look.show_opening("ignored", entry(time=time))
     said = capsys.readouterr().out
     assert said.startswith("Why?\n") and words in said
+    look.show_opening("ignored", entry(time=time), quick=True)
+    assert capsys.readouterr().out == "Why?\nTakes about 9 s on two cores.\n\n"
     look.show_opening("First line.\n\nMore.", None)
     assert capsys.readouterr().out == "First line.\n"
 

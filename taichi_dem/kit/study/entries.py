@@ -10,6 +10,8 @@ from typing import Any, Optional, Union
 
 #: File of the entries in the folder of the scripts.
 ENTRIES = "_gallery_pages.txt"
+#: Python as a user types it in a checkout: no environment has to be active.
+PYTHON = ".venv/bin/python"
 
 
 @dataclass(frozen=True)
@@ -17,10 +19,11 @@ class Entry:
     """Description of one study.
 
     name: of the script. part: heading under which it stands. question: that it answers. look:
-    what to read off its pictures. time: of the full run on two cores, in words. pictures: names
-    of its pictures and films, the most telling first; what else it writes is linked. figures:
-    patterns of the key figures in summary.json; figures with a paper's value are always shown.
-    paper: what the paper says of it, empty where it does not ask this. options: of the command.
+    what to read off its pictures. time, quick: of the full run and of the smaller job on two cores,
+    in words. pictures: names of its pictures and films, the most telling first; what else it writes
+    is linked. figures: patterns of the key figures in summary.json; figures with a paper's value
+    are always shown. paper: what the paper says of it, empty where it does not ask this. options:
+    of the command.
     """
 
     name: str
@@ -28,6 +31,7 @@ class Entry:
     question: str
     look: str
     time: str
+    quick: str
     pictures: tuple
     figures: tuple = ()
     paper: str = ""
@@ -36,12 +40,11 @@ class Entry:
     @property
     def command(self) -> str:
         """Command line of a user."""
-        return " ".join(filter(None, [f"python experiments/{self.name}.py", self.options]))
+        return " ".join(filter(None, [f"{PYTHON} experiments/{self.name}.py", self.options]))
 
-    @property
-    def expected_time(self) -> str:
-        """Time of the full run in words, such as "20 s on two cores" or "5 min on one core"."""
-        words = self.time.removeprefix("about ")
+    def expected_time(self, quick: bool) -> str:
+        """Time in words, such as "20 s on two cores" or "5 min on one core"."""
+        words = (self.quick if quick else self.time).removeprefix("about ")
         return f"{words} core" if words.endswith(" on one") else f"{words} on two cores"
 
 

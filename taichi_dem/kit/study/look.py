@@ -18,11 +18,10 @@ def show_opening(description: Optional[str], entry: Optional[Entry], quick: bool
     """Print what a program does, and how long it is expected to take where that is known."""
     line = entry.question if entry else (description or "").strip().partition("\n")[0]
     show_heading(line)
-    if quick:
-        print("Takes up to about two minutes (--quick).\n")
-    elif entry:
-        smaller = "" if entry.time.endswith(" s") else "; with --quick up to about two minutes"
-        print(f"Takes about {entry.expected_time}{smaller}.\n")
+    if entry:
+        smaller = "" if quick else f"; with --quick {entry.quick}"
+        # A pipe or a file shows it before the work, too.
+        print(f"Takes about {entry.expected_time(quick)}{smaller}.\n", flush=True)
 
 
 def print_figures(figures: Mapping[str, dict], entry: Optional[Entry] = None) -> None:

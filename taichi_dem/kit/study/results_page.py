@@ -17,7 +17,7 @@ from PIL import Image
 
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.files import output_folder, write_text, write_whole
-from taichi_dem.kit.study.entries import Entry, is_key_figure
+from taichi_dem.kit.study.entries import PYTHON, Entry, is_key_figure
 from taichi_dem.kit.study.look import value_in_words
 
 _HERE = Path(__file__).resolve().parent
@@ -124,7 +124,7 @@ def _shown(page, root, failed):
     return SimpleNamespace(
         page=page,
         folder=quote(page.name),
-        command=f"python {command}",
+        command=f"{PYTHON} {command}",
         # Summaries of older versions have the command alone.
         quick=summary.get("quick", "--quick" in command.split()),
         pictures=pictures,

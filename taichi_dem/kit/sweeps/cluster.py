@@ -45,7 +45,7 @@ def run_on_cluster(
 
 
 def _dask():
-    return optional("distributed", "sweeps")
+    return optional("distributed")
 
 
 def _submitted(client, work, job, arch):

@@ -45,7 +45,7 @@ def write_vtkhdf(
     -----
     Format: VTK File Formats, section VTKHDF, unstructured grid over time, version 2.0.
     """
-    h5py = optional("h5py", "hdf")
+    h5py = optional("h5py")
     # In memory: HDF5 on a full disk fails when it closes the file, and then again at the end.
     content = io.BytesIO()
     with h5py.File(content, "w") as file:
