@@ -63,6 +63,7 @@ SETTINGS = {
     "left_out": (ORDER, ("sphere_contact", "friction")),
     "added": (ORDER, ()),
     "again": (100, 40),
+    "contacts": (CONTACTS, {}),
 }
 #: Substeps that the elastic block is timed over at a time, and fewest rounds of turns.
 SUBSTEPS, FEWEST = 150, 8
@@ -84,6 +85,8 @@ FILLINGS = {
         "ejection and static contact": {"accounting": "landing"},
     },
 }
+#: Of these in the quick job, where every scene compiles in a process of its own.
+QUICK_FILLINGS = {"spheres": ("spheres as they are", "friction of spheres")}
 SEEDS, PARTICLES = (1, 2), 30
 #: Threads are processes side by side.
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)
@@ -100,7 +103,7 @@ def run(options):
         known = costs_of(cost_jobs(options, calls, results), workers, bar.count)
     elastic = study.call_in_process(absent, substeps=SUBSTEPS, repeats=options.again)
     tables = tables_of(calls, results, known)
-    rows = tables["spheres"] + tables["automaton"]
+    rows = [row for filling in fillings(options) for row in tables[filling]]
     study.write_rows(folder / "blast.csv", tables["blast"])
     study.write_rows(folder / "damper.csv", rows)
     picture_effects(folder / "effects.png", tables)
@@ -134,12 +137,18 @@ def blasts(options):
         scene: (blast, {**shared, "names": ["gas_pressure", *names]})
         for names, scene in scenes.items()
     }
-    for scene, contact in CONTACTS.items():
+    for scene, contact in options.contacts.items():
         names = [contact if name == "sphere_contact" else name for name in ORDER]
         calls[scene] = blast, {**shared, "names": ["gas_pressure", *names]}
     if options.chance:
         calls[LAST_BIT] = blast, {**calls[ALL][1], "ulps": 1}
     return calls
+
+
+def fillings(options):
+    """Scenes of FILLINGS that are asked for."""
+    chosen = QUICK_FILLINGS if options.quick else FILLINGS
+    return {name: {scene: FILLINGS[name][scene] for scene in chosen[name]} for name in chosen}
 
 
 def dampers(options):
@@ -148,7 +157,7 @@ def dampers(options):
     shared.update(ratios=options.ratios, cycles=options.cycles)
     return {
         scene: (damper, {"filling": filling, "step": STEPS[filling], "options": chosen, **shared})
-        for filling, scenes in FILLINGS.items()
+        for filling, scenes in fillings(options).items()
         for scene, chosen in scenes.items()
     }
 
@@ -171,7 +180,7 @@ def cost_jobs(options, calls, results):
         "blast": (blast_costs, {"scenes": blown, **stepped, **shared}),
         "lists": (list_costs, {"scenes": options.lists, **stepped, **shared}),
     }
-    for filling, scenes in FILLINGS.items():
+    for filling, scenes in fillings(options).items():
         asked = {"filling": filling, "cycles": options.cycles, "substeps": TENTH[filling], **shared}
         asked["scenes"] = {scene: chosen for scene, chosen in scenes.items() if scene in good}
         table = {"particles": PARTICLES, "seeds": SEEDS, "ratios": options.ratios}

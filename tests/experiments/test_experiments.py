@@ -46,10 +46,7 @@ FIGURES = {
     },
     "blast_methods": {
         f"{what}_{method}"
-        for method in (
-            *("paper_uniform", "paper_multirate", "multirate_controlled"),
-            *("explicit_limited", "implicit"),
-        )
+        for method in ("explicit_limited", "implicit")
         for what in (
             *("seconds", "displacement_error", "broken_faces", "ledger_residual_fraction"),
             "largest_stable_step_s",
@@ -89,8 +86,7 @@ FIGURES = {
             for what in ("seconds", "memory_MB", "compiled_kB", "displacement_change_percent")
         ),
         *(f"friction_step{end}_percent" for end in ("", "_low", "_high")),
-        "spheres_rotation_seconds",
-        "automaton_static_contact_response_change_percent",
+        "spheres_friction_of_spheres_seconds",
         *("auto_overhead_percent", "fracture_evaluations_ratio", "asleep_percent"),
     },
     "cost_of_accuracy_blast": {
