@@ -51,33 +51,57 @@ def _got(given):
 class History:
     """Values over time on the device; before the first and after the last time they stay."""
 
-    constant_fields = ("count", "times", "values")
+    constant_fields = ("count", "times", "values", "integral")
 
     def __init__(self):
         self.count = ti.field(ti.i32, shape=())
         self.times = ti.field(real, shape=MOST_POINTS)
         self.values = ti.field(real, shape=MOST_POINTS)
+        self.integral = ti.field(real, shape=MOST_POINTS)
 
     def load(self, times: tuple[float, ...], values: tuple[float, ...]) -> None:
-        """Take over points of ``history_points``."""
-        assign(self.count, len(times))
-        assign(self.times, np.array(times))
-        assign(self.values, np.array(values))
+        """Take over points of ``history_points``; one that never changes needs none."""
+        t, v = np.array(times), np.array(values)
+        areas = 0.5 * (v[1:] + v[:-1]) * np.diff(t)
+        assign(self.count, 0 if (v == v[0]).all() else len(t))
+        assign(self.times, t)
+        assign(self.values, v)
+        assign(self.integral, np.array([0.0, *np.cumsum(areas)]))
 
     @ti.func
-    def at(self, t):
-        """Value at a time [s]."""
-        low, high = 0, self.count[None] - 1
-        found = self.values[0]
-        if t >= self.times[high]:
-            found = self.values[high]
-        elif t > self.times[0]:
-            while high - low > 1:
-                middle = (low + high) // 2
-                if self.times[middle] <= t:
-                    low = middle
-                else:
-                    high = middle
-            share = (t - self.times[low]) / (self.times[high] - self.times[low])
-            found = self.values[low] + share * (self.values[high] - self.values[low])
+    def mean(self, since, until):
+        """Mean value from a time to a later one [s]; of one time the value.
+
+        Within a piece it is the value in the middle, which no difference of integrals spoils.
+        """
+        first = self._passed(since, 0)
+        last = self._passed(until, first)
+        found = self._value(first, 0.5 * (since + until))
+        if first < last:
+            begin, end = self.times[first], self.times[last - 1]
+            area = self.integral[last - 1] - self.integral[first]
+            area += (begin - since) * self._value(first, 0.5 * (since + begin))
+            area += (until - end) * self._value(last, 0.5 * (end + until))
+            found = area / (until - since)
+        return found
+
+    @ti.func
+    def _passed(self, t, low):
+        """Number of points up to a time [s], at least low."""
+        high = self.count[None]
+        while low < high:
+            middle = (low + high) // 2
+            if self.times[middle] <= t:
+                low = middle + 1
+            else:
+                high = middle
+        return low
+
+    @ti.func
+    def _value(self, passed, t):
+        """Value at a time [s] after a number of points."""
+        found = self.values[ti.max(passed - 1, 0)]
+        if 0 < passed and passed < self.count[None]:
+            before, after = self.times[passed - 1], self.times[passed]
+            found += (t - before) / (after - before) * (self.values[passed] - found)
         return found

@@ -26,19 +26,21 @@ if TYPE_CHECKING:
 class FacePressure(Effect):
     """Base of loads that push on the faces of a group along their current normal.
 
-    A derived class has ``pressure(t)``, in Pa at a time [s]. The area stays the mesh's.
+    A derived class has ``mean_pressure(since, until)``, in Pa. The area stays the mesh's.
     """
 
     role = "load"
 
     @abstractmethod
-    def pressure(self, t: Any) -> Any:
-        """Pressure at a time; a ti.func.
+    def mean_pressure(self, since: Any, until: Any) -> Any:
+        """Mean pressure from a time to a later one; a ti.func.
 
         Parameters
         ----------
-        t : float
+        since : float
             Time [s].
+        until : float
+            Later time [s].
 
         Returns
         -------
@@ -70,7 +72,7 @@ class FacePressure(Effect):
     @ti.func
     def wrench(self, i, motion):
         """Force [N] and torque about the centre [N m] on body i in a motion."""
-        pressure = self.pressure(motion.time)
+        pressure = self.mean_pressure(motion.since, motion.until)
         force, torque = zero3(), zero3()
         for k in range(self.first[i], self.first[i + 1]):
             push = -pressure * self.area[k]
@@ -159,6 +161,6 @@ class Pressure(FacePressure):
         self.history.load(self.times, self.values)
 
     @ti.func
-    def pressure(self, t):
-        """Pressure [Pa] at a time [s]."""
-        return self.history.at(t)
+    def mean_pressure(self, since, until):
+        """Mean pressure [Pa] from a time to a later one [s]."""
+        return self.history.mean(since, until)

@@ -162,7 +162,10 @@ class Load(Protocol):
         """Nonzero for a body on which it acts."""
 
     def wrench(self, i: int, motion: BodyMotion) -> tuple[ti.Vector, ti.Vector]:
-        """Force [N] and torque about the centre [N m]; motion: a ``body_motion.BodyMotion``."""
+        """Mean force [N] and torque about the centre [N m] from motion.since to motion.until.
+
+        motion: a ``body_motion.BodyMotion``. A load that does not depend on time ignores both.
+        """
 
 
 class Support(Protocol):
@@ -175,11 +178,15 @@ class Support(Protocol):
         self,
         i: int,
         t: float,
+        step: float,
         rotation: ti.Matrix,
         velocity: ti.Vector,
         angular_momentum: ti.Vector,
     ) -> tuple[ti.Vector, ti.Vector]:
-        """Velocity [m/s] and angular momentum [kg m^2/s] that it allows at a time [s]."""
+        """Mean velocity [m/s] and angular momentum [kg m^2/s] that it allows in a step [s].
+
+        t: middle of the step [s]; a step of 0 asks for the values at that time.
+        """
 
 
 class Ground(Protocol):

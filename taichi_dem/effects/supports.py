@@ -80,7 +80,7 @@ class Fixed(_Support):
     name = "fixed"
 
     @ti.func
-    def held(self, i, t, rotation, velocity, angular_momentum):
+    def held(self, i, t, step, rotation, velocity, angular_momentum):
         """Zero velocity and angular momentum."""
         return zero3(), zero3()
 
@@ -140,7 +140,7 @@ class Roller(_Support):
         assign(self.turns, turns)
 
     @ti.func
-    def held(self, i, t, rotation, velocity, angular_momentum):
+    def held(self, i, t, step, rotation, velocity, angular_momentum):
         """Velocity within the plane, spin about its normal."""
         normal = self.across[i]
         kept = zero3()
@@ -261,11 +261,11 @@ class PrescribedMotion(_Support):
         return tuple(-x for x in swing), tuple(swing)
 
     @ti.func
-    def held(self, i, t, rotation, velocity, angular_momentum):
-        """The prescribed velocity at time t [s] and no spin."""
+    def held(self, i, t, step, rotation, velocity, angular_momentum):
+        """The prescribed velocity, its shares as a mean over the step, and no spin."""
         amplitude = vec3(self.law[0], self.law[1], self.law[2])
         _, swing = sine_and_cosine(self.law[3] * t)
-        return amplitude * swing * self.shares.at(t), zero3()
+        return amplitude * swing * self.shares.mean(t - 0.5 * step, t + 0.5 * step), zero3()
 
 
 def _shares(ramp, history):

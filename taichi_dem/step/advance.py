@@ -313,9 +313,17 @@ class Advance(BondLaws, ContactForce):
 
     @ti.func
     def _loaded(self, i, elapsed, linear, angular):
-        """Impulse and moment with those of the loads added, and a row for each of ``drives``."""
+        """Impulse and moment with those of the loads added, and a row for each of ``drives``.
+
+        Loads act by their mean over an interval as long as the step, which begins where the last
+        one ended: no pulse is lost at any step, and one that does not change balances springs.
+        Where steps do not change, it is half a step to either side of the positions: the leapfrog,
+        whose velocities are half a step earlier, of second order without dashpots.
+        """
         kick = ti.Matrix.zero(real, ti.static(max(1, len(self.tables.drives))), 6)
-        motion = self.state.body_motion(i, self._load_time(elapsed), elapsed)
+        begin = self.schedule.seconds(self.state.tick[None]) - elapsed
+        since = begin - self.state.lag[i]
+        motion = self.state.body_motion(i, begin, elapsed, since, since + elapsed)
         for e in ti.static(range(len(self.tables.loads))):
             if self.tables.loads[e].acts_on(i):
                 force, torque = self.tables.loads[e].wrench(i, motion)
@@ -324,16 +332,6 @@ class Advance(BondLaws, ContactForce):
                 for k in ti.static(range(3)):
                     kick[e, k], kick[e, 3 + k] = force[k] * elapsed, torque[k] * elapsed
         return linear, angular, kick
-
-    @ti.func
-    def _load_time(self, elapsed):
-        """Time at which loads are evaluated: the beginning of the step [s].
-
-        Velocities change by the forces there, and positions by the new velocities: the leapfrog,
-        whose velocities are half a step earlier, of second order without dashpots. The middle of
-        the step would be half a step ahead of the springs, an error of first order.
-        """
-        return self.schedule.seconds(self.state.tick[None]) - elapsed
 
     def _support_bit(self, effect):
         """Bit of a support in ``State.active_effects``."""
@@ -370,7 +368,7 @@ class Advance(BondLaws, ContactForce):
             if effect.acts_on(i):
                 before, spun = velocity, momentum
                 velocity, momentum = effect.held(
-                    i, half, self.state.rotation[i], velocity, momentum
+                    i, half, elapsed, self.state.rotation[i], velocity, momentum
                 )
                 held = 1
                 if (velocity - before).norm_sqr() + (momentum - spun).norm_sqr() > 0.0:

@@ -57,8 +57,8 @@ class HalfStep:
             angular += 0.5 * self.state.slot[4 * i + f][3:6]
         half = 0.5 * self.schedule.own_step(i)
         kick = ti.Matrix.zero(real, ti.static(max(1, len(self.tables.drives))), 6)
-        step = self.schedule.own_step(i)
-        motion = self.state.body_motion(i, self.schedule.seconds(self.state.tick[None]), step)
+        step, now = self.schedule.own_step(i), self.schedule.seconds(self.state.tick[None])
+        motion = self.state.body_motion(i, now, step, now - self.state.lag[i], now)
         for e in ti.static(range(len(self.tables.loads))):
             if self.tables.loads[e].acts_on(i):
                 push, twist = self.tables.loads[e].wrench(i, motion)
@@ -80,7 +80,9 @@ class HalfStep:
         now = self.schedule.seconds(self.state.tick[None])
         for effect in ti.static(self.tables.supports):
             if effect.acts_on(i):
-                velocity, momentum = effect.held(i, now, self.state.rotation[i], velocity, momentum)
+                velocity, momentum = effect.held(
+                    i, now, 0.0, self.state.rotation[i], velocity, momentum
+                )
         return velocity, momentum
 
     @ti.func
@@ -94,6 +96,9 @@ class HalfStep:
         account = ti.Vector.zero(real, ti.static(len(self.tables.drives) + 1))
         before, spun = self.state.velocity[i], self.state.angular_momentum[i]
         velocity, momentum = before, spun
+        if ti.static(self.staggered):
+            if back == 1:
+                self.state.lag[i] = 0.5 * self.schedule.own_step(i)
         if self.is_due(i) == 1:
             linear, angular, kick = self.impulse(i, pushed, turned, back)
             linear *= self.tables.mass_inverse[i]
