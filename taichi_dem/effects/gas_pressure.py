@@ -115,6 +115,16 @@ class GasPressure(FacePressure):
         """The peak pressure."""
         return self.peak
 
+    def change_time(self) -> float:
+        """Time to the peak, or from there to zero."""
+        return self.rise * min(1.0, self.decay_ratio)
+
+    @ti.func
+    def changes(self, since, until):
+        """Nonzero where there is pressure between two times [s]."""
+        end = self.law[3] + (1.0 + self.law[2]) * self.law[1]
+        return since < end and self.law[3] < until
+
     @ti.func
     def mean_pressure(self, since, until):
         """Mean pressure [Pa] from a time to a later one [s]."""

@@ -1,5 +1,6 @@
 """Values over time, linear between given points, for loads and supports."""
 
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,31 @@ def history_points(times: Any, values: Any) -> tuple[tuple[float, ...], tuple[fl
     if first[0] < 0.0 or any(b <= a for a, b in zip(first, first[1:])):
         raise InputError(f"times must rise from 0 s or later, each above the last, {_got(times)}")
     return first, second
+
+
+def shortest_piece(times: tuple[float, ...], values: tuple[float, ...]) -> float:
+    """Shortest time between points of ``history_points`` [s]; infinite where nothing changes."""
+    return min((b - a for a, b in zip(times, times[1:])), default=inf) if _varies(values) else inf
+
+
+def _varies(values):
+    return any(value != values[0] for value in values)
+
+
+def unresolved_histories(effects: Any, step: float) -> tuple[str, ...]:
+    """A sentence about each load or support that changes within less than a step [s]."""
+    times = ((effect, effect.change_time()) for effect in effects)
+    return tuple(
+        f"{effect.name}{_where(effect)} changes within {time:.3g} s, less than the largest step, "
+        f"{step:.3g} s: its whole impulse or way is kept, but not its shape over time; steps of at "
+        f"most {time:.3g} s resolve it"
+        for effect, time in times
+        if time < step
+    )
+
+
+def _where(effect):
+    return f" on group {effect.group!r}" if hasattr(effect, "group") else ""
 
 
 def _numbers(name, given):
@@ -63,7 +89,7 @@ class History:
         """Take over points of ``history_points``; one that never changes needs none."""
         t, v = np.array(times), np.array(values)
         areas = 0.5 * (v[1:] + v[:-1]) * np.diff(t)
-        assign(self.count, 0 if (v == v[0]).all() else len(t))
+        assign(self.count, len(t) if _varies(values) else 0)
         assign(self.times, t)
         assign(self.values, v)
         assign(self.integral, np.array([0.0, *np.cumsum(areas)]))
@@ -84,6 +110,15 @@ class History:
             area += (until - end) * self._value(last, 0.5 * (end + until))
             found = area / (until - since)
         return found
+
+    @ti.func
+    def changes(self, since, until):
+        """Nonzero where the value changes between two times [s]."""
+        passed = self._passed(since, 0)
+        changes = self._passed(until, passed) > passed
+        if 0 < passed and passed < self.count[None]:
+            changes = changes or self.values[passed] != self.values[passed - 1]
+        return changes
 
     @ti.func
     def _passed(self, t, low):

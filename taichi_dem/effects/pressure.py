@@ -7,7 +7,7 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem.effects.base import Effect
-from taichi_dem.effects.history import History, history_points
+from taichi_dem.effects.history import History, history_points, shortest_piece
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.products import matvec
@@ -26,10 +26,12 @@ if TYPE_CHECKING:
 class FacePressure(Effect):
     """Base of loads that push on the faces of a group along their current normal.
 
-    A derived class has ``mean_pressure(since, until)``, in Pa. The area stays the mesh's.
+    A derived class has ``mean_pressure(since, until)``, in Pa, and ``changes(since, until)``,
+    nonzero where it changes between two times [s]. The area stays the mesh's.
     """
 
     role = "load"
+    varies = True
 
     @abstractmethod
     def mean_pressure(self, since: Any, until: Any) -> Any:
@@ -150,6 +152,10 @@ class Pressure(FacePressure):
         """The largest pressure."""
         return max(map(abs, self.values))
 
+    def change_time(self) -> float:
+        """Shortest time between two points of the history."""
+        return shortest_piece(self.times, self.values)
+
     def declare(self, capacity: "Capacity") -> None:
         """The loaded faces, and the history."""
         super().declare(capacity)
@@ -159,6 +165,11 @@ class Pressure(FacePressure):
         """Find the loaded faces and load the history; InputError for an unknown group."""
         super().load(model)
         self.history.load(self.times, self.values)
+
+    @ti.func
+    def changes(self, since, until):
+        """Nonzero where the pressure changes between two times [s]."""
+        return self.history.changes(since, until)
 
     @ti.func
     def mean_pressure(self, since, until):

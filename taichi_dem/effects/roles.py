@@ -156,16 +156,23 @@ class FrictionMemory(Protocol):
 
 
 class Load(Protocol):
-    """Force on bodies; role "load"."""
+    """Force on bodies; role "load".
+
+    One with ``varies = True`` also keeps the contract ``VaryingLoad``.
+    """
 
     def acts_on(self, i: int) -> int:
         """Nonzero for a body on which it acts."""
 
     def wrench(self, i: int, motion: BodyMotion) -> tuple[ti.Vector, ti.Vector]:
-        """Mean force [N] and torque about the centre [N m] from motion.since to motion.until.
+        """Force [N] and torque about the centre [N m]; motion: a ``body_motion.BodyMotion``."""
 
-        motion: a ``body_motion.BodyMotion``. A load that does not depend on time ignores both.
-        """
+
+class VaryingLoad(Protocol):
+    """A load whose ``wrench`` is its mean from motion.since to motion.until."""
+
+    def changes(self, since: float, until: float) -> int:
+        """Nonzero where it changes between two times [s]."""
 
 
 class Support(Protocol):
@@ -234,7 +241,12 @@ CONTRACTS = {
 
 
 #: Contracts that an effect keeps beside that of its role, by the attribute that says so.
-FURTHER = {"remembers": FrictionMemory, "remembers_slip": SlipMemory, "releases": ShearFailure}
+FURTHER = {
+    "remembers": FrictionMemory,
+    "remembers_slip": SlipMemory,
+    "releases": ShearFailure,
+    "varies": VaryingLoad,
+}
 
 
 #: What a law does, by role: a class that changes it has to say anew when it begins to act.

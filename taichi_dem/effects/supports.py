@@ -8,7 +8,7 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem.effects.base import Effect, Travel
-from taichi_dem.effects.history import History, history_points
+from taichi_dem.effects.history import History, history_points, shortest_piece
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.elementary import sine_and_cosine
 from taichi_dem.kit.errors import InputError
@@ -247,6 +247,11 @@ class PrescribedMotion(_Support):
     def numbers(self, material: Material) -> tuple[float, ...]:
         """Velocity [m/s], three components, and angular frequency [rad/s]."""
         return (*self._velocity, 2.0 * math.pi * self._frequency)
+
+    def change_time(self) -> float:
+        """Shortest time between two points of the history, or half a period."""
+        half = 0.5 / self._frequency if self._frequency else math.inf
+        return min(half, shortest_piece(*self._points)) if any(self._velocity) else math.inf
 
     def travel(self) -> Travel:
         """As far as it swings, or without end along a constant velocity."""

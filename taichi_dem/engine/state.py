@@ -47,8 +47,8 @@ class State:
     m^2/s] in world axes; rotation (matrix) and spin [rad/s] follow from them and are stored so that
     neighbours need not compute them. A body's motion is that of its own last tick.
     level: step dt0 / 2^level. bound: its criterion, an index into ``step_control.CRITERIA``.
-    last_tick: when the body was last advanced. lag: time [s] by which the loads it has taken are
-    behind its position, half of its first step.
+    last_tick: when the body was last advanced. lag: time [s] by which what it has taken of each
+    load is behind its position.
     slot: impulse [N s] and its moment about the body's centre [N m s] that face f of body i has
     gathered since then, entry 4 i + f.
     broken_tick: when a bond was released, NEVER while it holds. exposed_tick: since when a face
@@ -83,7 +83,7 @@ class State:
         self.level = ti.field(ti.i32, shape=n)
         self.bound = ti.field(ti.i32, shape=n)
         self.last_tick = ti.field(ti.i64, shape=n)
-        self.lag = ti.field(real, shape=n)
+        self.lag = ti.Vector.field(max(1, len(tables.loads)), real, shape=n)
         self.slot = ti.Vector.field(6, real, shape=tables.capacity.faces)
         self.broken_tick = ti.field(ti.i64, shape=bonds)
         if tables.has_bond_heat:

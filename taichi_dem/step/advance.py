@@ -19,6 +19,7 @@ from taichi_dem.stability.body_limits import RELEASE
 from taichi_dem.step.bond_laws import BondLaws
 from taichi_dem.step.contact_force import ContactForce
 from taichi_dem.step.ground import GroundDashpots
+from taichi_dem.step.load_times import LoadTimes
 from taichi_dem.step.tangential_springs import TangentialSprings
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ class Advance(BondLaws, ContactForce):
         self.on_demand = state.activity.laws if tables.on_demand else (False, False)
         # Where both laws act on demand, none is missing and none is to be watched for.
         self.notes_limits = not all(self.on_demand)
-        self.ground = GroundDashpots(tables, state)
+        self.load_times, self.ground = LoadTimes(tables, state), GroundDashpots(tables, state)
         self.solver, self.solves = solver, solver is not None
         self.solves_bonds = self.solves and solver.has_bonds
         self.contacts = contacts
@@ -313,24 +314,17 @@ class Advance(BondLaws, ContactForce):
 
     @ti.func
     def _loaded(self, i, elapsed, linear, angular):
-        """Impulse and moment with those of the loads added, and a row for each of ``drives``.
-
-        Loads act by their mean over an interval as long as the step, which begins where the last
-        one ended: no pulse is lost at any step, and one that does not change balances springs.
-        Where steps do not change, it is half a step to either side of the positions: the leapfrog,
-        whose velocities are half a step earlier, of second order without dashpots.
-        """
+        """Impulse and moment with those of the loads added, and a row for each of ``drives``."""
         kick = ti.Matrix.zero(real, ti.static(max(1, len(self.tables.drives))), 6)
         begin = self.schedule.seconds(self.state.tick[None]) - elapsed
-        since = begin - self.state.lag[i]
-        motion = self.state.body_motion(i, begin, elapsed, since, since + elapsed)
         for e in ti.static(range(len(self.tables.loads))):
             if self.tables.loads[e].acts_on(i):
+                motion, length = self.load_times.of_step(i, e, begin, elapsed)
                 force, torque = self.tables.loads[e].wrench(i, motion)
-                linear += force * elapsed
-                angular += torque * elapsed
+                linear += force * length
+                angular += torque * length
                 for k in ti.static(range(3)):
-                    kick[e, k], kick[e, 3 + k] = force[k] * elapsed, torque[k] * elapsed
+                    kick[e, k], kick[e, 3 + k] = force[k] * length, torque[k] * length
         return linear, angular, kick
 
     def _support_bit(self, effect):

@@ -55,21 +55,20 @@ class HalfStep:
         for f in range(4):
             linear += 0.5 * self.state.slot[4 * i + f][0:3]
             angular += 0.5 * self.state.slot[4 * i + f][3:6]
-        half = 0.5 * self.schedule.own_step(i)
         kick = ti.Matrix.zero(real, ti.static(max(1, len(self.tables.drives))), 6)
         step, now = self.schedule.own_step(i), self.schedule.seconds(self.state.tick[None])
-        motion = self.state.body_motion(i, now, step, now - self.state.lag[i], now)
         for e in ti.static(range(len(self.tables.loads))):
             if self.tables.loads[e].acts_on(i):
+                motion, length = self.advance.load_times.up_to(i, e, now, step)
                 push, twist = self.tables.loads[e].wrench(i, motion)
-                linear += push * half
-                angular += twist * half
+                linear += push * length
+                angular += twist * length
                 for k in ti.static(range(3)):
-                    kick[e, k], kick[e, 3 + k] = push[k] * half, twist[k] * half
+                    kick[e, k], kick[e, 3 + k] = push[k] * length, twist[k] * length
         if ti.static(self.ground.present):
             rows = 0.5 * self.ground.impulses(i, step, 2.0 * linear, 2.0 * angular)
             if back == 1:
-                rows = self.ground.impulses_before(i, half)
+                rows = self.ground.impulses_before(i, 0.5 * step)
             pushed, turned = self.ground.total(rows)
             linear, angular, kick = linear + pushed, angular + turned, self.ground.noted(kick, rows)
         return linear, angular, kick
@@ -98,7 +97,7 @@ class HalfStep:
         velocity, momentum = before, spun
         if ti.static(self.staggered):
             if back == 1:
-                self.state.lag[i] = 0.5 * self.schedule.own_step(i)
+                self.advance.load_times.start(i, 0.5 * self.schedule.own_step(i))
         if self.is_due(i) == 1:
             linear, angular, kick = self.impulse(i, pushed, turned, back)
             linear *= self.tables.mass_inverse[i]
