@@ -143,7 +143,7 @@ class Result(RunExports):
         report, model, history = self.report, self.model, self.history
         parts = counted(model.body_count, "body"), counted(model.bond_count, "bond")
         work = report.energy_balance["load_work"] + report.energy_balance["support_work"]
-        injected = injected_words(report.energy_balance)
+        injected = injected_words(report.energy_balance, report.round_off_J)
         rows = [
             ("simulated", f"{report.until_s:.4g} s"),
             ("method", f"{report.method}, {report.driver} driver"),

@@ -60,14 +60,15 @@ def unexplained_share(account: Mapping[str, float], round_off: float = 0.0) -> f
     return abs(account["residual"]) / max(through, 100.0 * round_off, 1e-300)
 
 
-def injected_words(account: Mapping[str, float]) -> str:
+def injected_words(account: Mapping[str, float], round_off: float = 0.0) -> str:
     """Energy that releases injected, in words, from ``NOTED`` of the energy put in on; else "".
 
     Put in: work of loads and supports, and the energy at the start, which the residual leaves.
+    round_off: energy [J] up to which all may be rounding.
     """
     start = sum(value if name in _SPENT else -value for name, value in account.items())
     put_in = abs(account["load_work"]) + abs(account["support_work"]) + abs(start)
-    if account["injected"] < NOTED * put_in or not account["injected"]:
+    if account["injected"] < NOTED * put_in or account["injected"] <= round_off:
         return ""
     share = 100.0 * account["injected"] / max(put_in, 1e-300)
     return (

@@ -218,7 +218,7 @@ class Report:
 
     def _injected_row(self):
         """Row with the energy that breaking faces injected, where it counts."""
-        words = injected_words(self.energy_balance)
+        words = injected_words(self.energy_balance, self.round_off_J)
         return (("injected", words),) if words else ()
 
     def _certificate_rows(self):
