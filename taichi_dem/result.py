@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Optional
 import numpy as np
 
 from taichi_dem.diagnostics.certificate import Certificate
+from taichi_dem.diagnostics.energy_balance import injected_words
 from taichi_dem.diagnostics.report import Report
 from taichi_dem.engine.model import Model
 from taichi_dem.kit.data_table import Table
@@ -142,6 +143,7 @@ class Result(RunExports):
         report, model, history = self.report, self.model, self.history
         parts = counted(model.body_count, "body"), counted(model.bond_count, "bond")
         work = report.energy_balance["load_work"] + report.energy_balance["support_work"]
+        injected = injected_words(report.energy_balance, report.round_off_J)
         rows = [
             ("simulated", f"{report.until_s:.4g} s"),
             ("method", f"{report.method}, {report.driver} driver"),
@@ -152,6 +154,7 @@ class Result(RunExports):
             ("largest speed", f"{np.fmax.reduce(self.peak_speed, initial=np.nan):.4g} m/s"),
             ("work put in", f"{work:.4g} J"),
             ("energy not explained", report.unexplained),
+            *((("energy injected", injected),) if injected else ()),
             ("time", f"{report.compile_seconds:.1f} s compiling, {report.run_seconds:.1f} s run"),
         ]
         for hole, moved in outward_columns(history).items():

@@ -7,6 +7,7 @@ from typing import Any, Optional, Union
 
 import numpy as np
 
+from taichi_dem.effects.history import unresolved_histories
 from taichi_dem.kit.checkpoint import Checkpoint, digest, identity_of, version_text
 from taichi_dem.kit.engine_pool import LoanMemory
 from taichi_dem.kit.errors import InputError, SimulationDiverged
@@ -94,7 +95,8 @@ def simulate(
 
     Notes
     -----
-    A UserWarning before the first step says what the scene cannot do (``scene_warnings``).
+    A UserWarning before the first step says what the scene cannot do (``scene_warnings``), and
+    which of its histories change within less than a step.
 
     Examples
     --------
@@ -109,7 +111,7 @@ def simulate(
     arrays = _opened(scene, method, checkpoint, resume, last)
     if output is not None:
         output_folder(output)
-    for sentence in scene_warnings(scene):
+    for sentence in (*scene_warnings(scene), *unresolved_histories(scene.effects, method.dt0)):
         warnings.warn(sentence, stacklevel=2)
     with reporting(progress, title) as report_progress:
         simulation, recorder = _started(Simulation(scene, method, driver))

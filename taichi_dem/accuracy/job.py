@@ -12,8 +12,9 @@ from taichi_dem.stability.mesh_limits import bond_rates, springs_of
 from taichi_dem.stability.stable_step import spring_step
 from taichi_dem.stability.step_report import step_report
 
-#: Fewest steps of a run.
-_FEWEST = 8
+#: Fewest steps of a run, and how many times shorter than springs bear they begin at most where the
+#: history of a load or support is to be resolved.
+_FEWEST, _MOST_TIMES = 8, 64
 #: Sweeps of a step at most, and by how much better they agree to see their error.
 _MOST_SWEEPS, _TIGHT = 1000, 8
 #: Rows of the time series of the coarsest run in which an extreme is looked for, and of any run.
@@ -36,8 +37,13 @@ class Job:
         present = {effect.role for effect in scene.effects if effect.name}
         damped = "dashpot" in present and material.has_bond_damping
         damped |= "contact" in present and material.has_contact_damping
-        steps = max(_FEWEST, math.ceil(self.until / self._longest_step()))
-        return Methods(ImplicitDashpots if damped else Uniform, self.until, steps)
+        change = min((effect.change_time() for effect in scene.effects), default=math.inf)
+        longest = self._longest_step()
+        step = max(min(longest, change), longest / _MOST_TIMES)
+        steps = max(_FEWEST, math.ceil(self.until / step))
+        # A pulse within a step is a kick, which lies between the steps of two levels by chance.
+        order = 2.0 if step <= change else 1.0
+        return Methods(ImplicitDashpots if damped else Uniform, self.until, steps, order)
 
     def _longest_step(self):
         """Longest step that all springs bear [s]: solved dashpots leave no other limit.

@@ -87,9 +87,11 @@ def _by_role(model, energy_balance, tables, active, rounding, effect):
         count = _with_bit(bits, 1 << len(model.loads) + len(model.supports) + place)
         return effect, "bodies braked", count, heat
     damped = _count(bond[:, 1] > rounding.heat)
+    # A shear law may release bonds where no law of tension is listed.
+    alone = not any(one.role == "tension" for one in _listed(model))
     return {
         "tension": (effect, "bonds softened", _count(marks[:, 0]), ("softening", "release")),
-        "shear": (effect, "bonds slipped", _count(marks[:, 1]), ("slip",)),
+        "shear": (effect, "bonds slipped", _count(marks[:, 1]), ("slip", *("release",) * alone)),
         "dashpot": (effect, "bonds damped", damped, ("bond_dashpot",)),
         "contact": (
             *(effect, "bodies touched", _with_bit(bits, CONTACT)),

@@ -41,8 +41,12 @@ TERMS = (
 _HELD = ("kinetic", "bond_strain", "sphere_strain", "residual")
 
 
+#: Terms that the energy put in and injected goes into.
+_SPENT = tuple(name for name in TERMS if name not in ("injected", "load_work", "support_work"))
 #: Share of the energy beyond which an account counts as open.
 OPEN = 0.5
+#: Share of the energy put in from which on injected energy is told.
+NOTED = 0.01
 #: Share of all impulses of loads and supports, by their sizes, below which no momentum is a scale.
 _LEAST_SHARE = 1e-6
 
@@ -54,6 +58,23 @@ def unexplained_share(account: Mapping[str, float], round_off: float = 0.0) -> f
     """
     through = sum(abs(value) for name, value in account.items() if name != "residual")
     return abs(account["residual"]) / max(through, 100.0 * round_off, 1e-300)
+
+
+def injected_words(account: Mapping[str, float], round_off: float = 0.0) -> str:
+    """Energy that releases injected, in words, from ``NOTED`` of the energy put in on; else "".
+
+    Put in: work of loads and supports, and the energy at the start, which the residual leaves.
+    round_off: energy [J] up to which all may be rounding.
+    """
+    start = sum(value if name in _SPENT else -value for name, value in account.items())
+    put_in = abs(account["load_work"]) + abs(account["support_work"]) + abs(start)
+    if account["injected"] < NOTED * put_in or account["injected"] <= round_off:
+        return ""
+    share = 100.0 * account["injected"] / max(put_in, 1e-300)
+    return (
+        f"{account['injected']:.6g} J by overlaps of faces as they broke, {share:.3g} % of the "
+        "energy put in, which no load gave (docs/limits.md)"
+    )
 
 
 def open_account(account: Mapping[str, float], round_off: float) -> tuple[str, ...]:
@@ -135,11 +156,7 @@ class EnergyBalance:
 
     def _residual(self, terms):
         given = terms["load_work"] + terms["support_work"] + terms["injected"] + self.start_energy
-        return given - sum(
-            terms[name]
-            for name in TERMS
-            if name not in ("load_work", "support_work", "injected", "residual")
-        )
+        return given - sum(terms[name] for name in _SPENT if name != "residual")
 
     def load_work(self, index: int) -> float:
         """Work of one load [J], by its place in the scene's list of loads."""

@@ -4,6 +4,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, Optional
 
 from taichi_dem.diagnostics.certificate import Certificate
+from taichi_dem.diagnostics.energy_balance import injected_words
 from taichi_dem.diagnostics.shared_volume import Interpenetration
 from taichi_dem.kit.display import in_brief
 
@@ -215,6 +216,11 @@ class Report:
         words = f"{self.sweeps:,}, {self.sweeps / self.substeps:.2f} a substep"
         return (("sweeps", f"{words}, {self.unconverged_steps:,} substeps unconverged"),)
 
+    def _injected_row(self):
+        """Row with the energy that breaking faces injected, where it counts."""
+        words = injected_words(self.energy_balance, self.round_off_J)
+        return (("injected", words),) if words else ()
+
     def _certificate_rows(self):
         """Rows with what was left out; what acted stands among the effects."""
         if self.certificate is None:
@@ -254,6 +260,7 @@ class Report:
                 f"{self.energy_balance['load_work'] + self.energy_balance['support_work']:.6g} J",
             ),
             ("energy residual", self.unexplained),
+            *self._injected_row(),
             *self._error_rows(),
             *self._certificate_rows(),
             (

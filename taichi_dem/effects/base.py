@@ -62,6 +62,8 @@ class Effect(Sealed):
     remembers_slip = False
     #: Whether a shear law may release a face (``roles.ShearFailure``).
     releases = False
+    #: Whether a load acts by its mean from a time to a later one (``roles.VaryingLoad``).
+    varies = False
     law: ti.Field
     tables: "Tables"
     _count: int
@@ -209,6 +211,18 @@ class Effect(Sealed):
             Stress [Pa]; NaN where it is not known.
         """
         return np.nan
+
+    def change_time(self) -> float:
+        """Shortest time within which a load or support changes; longer steps lose its shape.
+
+        Infinite by default.
+
+        Returns
+        -------
+        float
+            Time [s].
+        """
+        return np.inf
 
     def travel(self) -> Travel:
         """Bounds of the displacement that a load or support may cause along x, y and z.

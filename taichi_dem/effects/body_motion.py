@@ -11,6 +11,8 @@ class BodyMotion:
 
     position: of the centre [m]. rotation: from the body frame to the world. velocity [m/s] and spin
     [rad/s]: those of the leapfrog, half a step before. time [s]; step: length of the step [s].
+    since, until: times [s] from and up to which a load that varies acts by its mean; those of a
+    body's steps follow each other without a gap.
     """
 
     position: vec3
@@ -19,3 +21,5 @@ class BodyMotion:
     spin: vec3
     time: real
     step: real
+    since: real
+    until: real

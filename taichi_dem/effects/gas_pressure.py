@@ -7,7 +7,7 @@ import taichi as ti
 from numpy.typing import ArrayLike
 
 from taichi_dem.effects.pressure import FacePressure
-from taichi_dem.kit.elementary import sine_and_cosine
+from taichi_dem.kit.elementary import sine_and_cosine, sine_shortfall
 from taichi_dem.kit.validation import positive, word
 from taichi_dem.materials import Material
 
@@ -24,6 +24,27 @@ def pulse(peak, rise, decay_ratio, t):
         _, swing = sine_and_cosine(0.5 * math.pi * s / decay_ratio)
         pressure = peak * swing
     return pressure
+
+
+@ti.func
+def mean_pulse(peak, rise, decay_ratio, since, until):
+    """Mean of ``pulse`` [Pa] from a time to a later one.
+
+    The mean of a cosine is its value in the middle times sin(w) / w, w half of the angle, which
+    for a short time is 1: nothing is lost to rounding at any step.
+    """
+    end, mean = (1.0 + decay_ratio) * rise, 0.0
+    low, high = ti.max(since, 0.0), ti.min(until, rise)
+    if low < high:
+        less = sine_shortfall(0.5 * math.pi * (high - low) / rise)
+        middle = pulse(peak, rise, decay_ratio, 0.5 * (low + high))
+        mean += (high - low) / (until - since) * (middle - less * (middle - 0.5 * peak))
+    low, high = ti.max(since, rise), ti.min(until, end)
+    if low < high:
+        less = sine_shortfall(0.25 * math.pi * (high - low) / (decay_ratio * rise))
+        middle = pulse(peak, rise, decay_ratio, 0.5 * (low + high))
+        mean += (high - low) / (until - since) * (1.0 - less) * middle
+    return mean
 
 
 @ti.data_oriented
@@ -94,10 +115,21 @@ class GasPressure(FacePressure):
         """The peak pressure."""
         return self.peak
 
+    def change_time(self) -> float:
+        """Time to the peak, or from there to zero."""
+        return self.rise * min(1.0, self.decay_ratio)
+
     @ti.func
-    def pressure(self, t):
-        """Pressure [Pa] at a time [s]."""
-        return pulse(self.law[0], self.law[1], self.law[2], t - self.law[3])
+    def changes(self, since, until):
+        """Nonzero where there is pressure between two times [s]."""
+        end = self.law[3] + (1.0 + self.law[2]) * self.law[1]
+        return since < end and self.law[3] < until
+
+    @ti.func
+    def mean_pressure(self, since, until):
+        """Mean pressure [Pa] from a time to a later one [s]."""
+        start = self.law[3]
+        return mean_pulse(self.law[0], self.law[1], self.law[2], since - start, until - start)
 
     def pressure_at(self, times: ArrayLike) -> np.ndarray:
         """Pressure at given times, for pictures.

@@ -1,5 +1,6 @@
 """Values over time, linear between given points, for loads and supports."""
 
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,31 @@ def history_points(times: Any, values: Any) -> tuple[tuple[float, ...], tuple[fl
     return first, second
 
 
+def shortest_piece(times: tuple[float, ...], values: tuple[float, ...]) -> float:
+    """Shortest time between points of ``history_points`` [s]; infinite where nothing changes."""
+    return min((b - a for a, b in zip(times, times[1:])), default=inf) if _varies(values) else inf
+
+
+def _varies(values):
+    return any(value != values[0] for value in values)
+
+
+def unresolved_histories(effects: Any, step: float) -> tuple[str, ...]:
+    """A sentence about each load or support that changes within less than a step [s]."""
+    times = ((effect, effect.change_time()) for effect in effects)
+    return tuple(
+        f"{effect.name}{_where(effect)} changes within {time:.3g} s, less than the largest step, "
+        f"{step:.3g} s: its whole impulse or way is kept, but not its shape over time; steps of at "
+        f"most {time:.3g} s resolve it"
+        for effect, time in times
+        if time < step
+    )
+
+
+def _where(effect):
+    return f" on group {effect.group!r}" if hasattr(effect, "group") else ""
+
+
 def _numbers(name, given):
     try:
         found = list(given)
@@ -51,33 +77,66 @@ def _got(given):
 class History:
     """Values over time on the device; before the first and after the last time they stay."""
 
-    constant_fields = ("count", "times", "values")
+    constant_fields = ("count", "times", "values", "integral")
 
     def __init__(self):
         self.count = ti.field(ti.i32, shape=())
         self.times = ti.field(real, shape=MOST_POINTS)
         self.values = ti.field(real, shape=MOST_POINTS)
+        self.integral = ti.field(real, shape=MOST_POINTS)
 
     def load(self, times: tuple[float, ...], values: tuple[float, ...]) -> None:
-        """Take over points of ``history_points``."""
-        assign(self.count, len(times))
-        assign(self.times, np.array(times))
-        assign(self.values, np.array(values))
+        """Take over points of ``history_points``; one that never changes needs none."""
+        t, v = np.array(times), np.array(values)
+        areas = 0.5 * (v[1:] + v[:-1]) * np.diff(t)
+        assign(self.count, len(t) if _varies(values) else 0)
+        assign(self.times, t)
+        assign(self.values, v)
+        assign(self.integral, np.array([0.0, *np.cumsum(areas)]))
 
     @ti.func
-    def at(self, t):
-        """Value at a time [s]."""
-        low, high = 0, self.count[None] - 1
-        found = self.values[0]
-        if t >= self.times[high]:
-            found = self.values[high]
-        elif t > self.times[0]:
-            while high - low > 1:
-                middle = (low + high) // 2
-                if self.times[middle] <= t:
-                    low = middle
-                else:
-                    high = middle
-            share = (t - self.times[low]) / (self.times[high] - self.times[low])
-            found = self.values[low] + share * (self.values[high] - self.values[low])
+    def mean(self, since, until):
+        """Mean value from a time to a later one [s]; of one time the value.
+
+        Within a piece it is the value in the middle, which no difference of integrals spoils.
+        """
+        first = self._passed(since, 0)
+        last = self._passed(until, first)
+        found = self._value(first, 0.5 * (since + until))
+        if first < last:
+            begin, end = self.times[first], self.times[last - 1]
+            area = self.integral[last - 1] - self.integral[first]
+            area += (begin - since) * self._value(first, 0.5 * (since + begin))
+            area += (until - end) * self._value(last, 0.5 * (end + until))
+            found = area / (until - since)
+        return found
+
+    @ti.func
+    def changes(self, since, until):
+        """Nonzero where the value changes between two times [s]."""
+        passed = self._passed(since, 0)
+        changes = self._passed(until, passed) > passed
+        if 0 < passed and passed < self.count[None]:
+            changes = changes or self.values[passed] != self.values[passed - 1]
+        return changes
+
+    @ti.func
+    def _passed(self, t, low):
+        """Number of points up to a time [s], at least low."""
+        high = self.count[None]
+        while low < high:
+            middle = (low + high) // 2
+            if self.times[middle] <= t:
+                low = middle + 1
+            else:
+                high = middle
+        return low
+
+    @ti.func
+    def _value(self, passed, t):
+        """Value at a time [s] after a number of points."""
+        found = self.values[ti.max(passed - 1, 0)]
+        if 0 < passed and passed < self.count[None]:
+            before, after = self.times[passed - 1], self.times[passed]
+            found += (t - before) / (after - before) * (self.values[passed] - found)
         return found

@@ -7,7 +7,7 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem.effects.base import Effect
-from taichi_dem.effects.history import History, history_points
+from taichi_dem.effects.history import History, history_points, shortest_piece
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.errors import InputError
 from taichi_dem.kit.products import matvec
@@ -26,19 +26,23 @@ if TYPE_CHECKING:
 class FacePressure(Effect):
     """Base of loads that push on the faces of a group along their current normal.
 
-    A derived class has ``pressure(t)``, in Pa at a time [s]. The area stays the mesh's.
+    A derived class has ``mean_pressure(since, until)``, in Pa, and ``changes(since, until)``,
+    nonzero where it changes between two times [s]. The area stays the mesh's.
     """
 
     role = "load"
+    varies = True
 
     @abstractmethod
-    def pressure(self, t: Any) -> Any:
-        """Pressure at a time; a ti.func.
+    def mean_pressure(self, since: Any, until: Any) -> Any:
+        """Mean pressure from a time to a later one; a ti.func.
 
         Parameters
         ----------
-        t : float
+        since : float
             Time [s].
+        until : float
+            Later time [s].
 
         Returns
         -------
@@ -70,7 +74,7 @@ class FacePressure(Effect):
     @ti.func
     def wrench(self, i, motion):
         """Force [N] and torque about the centre [N m] on body i in a motion."""
-        pressure = self.pressure(motion.time)
+        pressure = self.mean_pressure(motion.since, motion.until)
         force, torque = zero3(), zero3()
         for k in range(self.first[i], self.first[i + 1]):
             push = -pressure * self.area[k]
@@ -148,6 +152,10 @@ class Pressure(FacePressure):
         """The largest pressure."""
         return max(map(abs, self.values))
 
+    def change_time(self) -> float:
+        """Shortest time between two points of the history."""
+        return shortest_piece(self.times, self.values)
+
     def declare(self, capacity: "Capacity") -> None:
         """The loaded faces, and the history."""
         super().declare(capacity)
@@ -159,6 +167,11 @@ class Pressure(FacePressure):
         self.history.load(self.times, self.values)
 
     @ti.func
-    def pressure(self, t):
-        """Pressure [Pa] at a time [s]."""
-        return self.history.at(t)
+    def changes(self, since, until):
+        """Nonzero where the pressure changes between two times [s]."""
+        return self.history.changes(since, until)
+
+    @ti.func
+    def mean_pressure(self, since, until):
+        """Mean pressure [Pa] from a time to a later one [s]."""
+        return self.history.mean(since, until)

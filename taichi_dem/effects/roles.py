@@ -156,13 +156,23 @@ class FrictionMemory(Protocol):
 
 
 class Load(Protocol):
-    """Force on bodies; role "load"."""
+    """Force on bodies; role "load".
+
+    One with ``varies = True`` also keeps the contract ``VaryingLoad``.
+    """
 
     def acts_on(self, i: int) -> int:
         """Nonzero for a body on which it acts."""
 
     def wrench(self, i: int, motion: BodyMotion) -> tuple[ti.Vector, ti.Vector]:
         """Force [N] and torque about the centre [N m]; motion: a ``body_motion.BodyMotion``."""
+
+
+class VaryingLoad(Protocol):
+    """A load whose ``wrench`` is its mean from motion.since to motion.until."""
+
+    def changes(self, since: float, until: float) -> int:
+        """Nonzero where it changes between two times [s]."""
 
 
 class Support(Protocol):
@@ -175,11 +185,15 @@ class Support(Protocol):
         self,
         i: int,
         t: float,
+        step: float,
         rotation: ti.Matrix,
         velocity: ti.Vector,
         angular_momentum: ti.Vector,
     ) -> tuple[ti.Vector, ti.Vector]:
-        """Velocity [m/s] and angular momentum [kg m^2/s] that it allows at a time [s]."""
+        """Mean velocity [m/s] and angular momentum [kg m^2/s] that it allows in a step [s].
+
+        t: middle of the step [s]; a step of 0 asks for the values at that time.
+        """
 
 
 class Ground(Protocol):
@@ -227,7 +241,12 @@ CONTRACTS = {
 
 
 #: Contracts that an effect keeps beside that of its role, by the attribute that says so.
-FURTHER = {"remembers": FrictionMemory, "remembers_slip": SlipMemory, "releases": ShearFailure}
+FURTHER = {
+    "remembers": FrictionMemory,
+    "remembers_slip": SlipMemory,
+    "releases": ShearFailure,
+    "varies": VaryingLoad,
+}
 
 
 #: What a law does, by role: a class that changes it has to say anew when it begins to act.

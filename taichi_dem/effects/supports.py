@@ -8,7 +8,7 @@ import numpy as np
 import taichi as ti
 
 from taichi_dem.effects.base import Effect, Travel
-from taichi_dem.effects.history import History, history_points
+from taichi_dem.effects.history import History, history_points, shortest_piece
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.elementary import sine_and_cosine
 from taichi_dem.kit.errors import InputError
@@ -80,7 +80,7 @@ class Fixed(_Support):
     name = "fixed"
 
     @ti.func
-    def held(self, i, t, rotation, velocity, angular_momentum):
+    def held(self, i, t, step, rotation, velocity, angular_momentum):
         """Zero velocity and angular momentum."""
         return zero3(), zero3()
 
@@ -140,7 +140,7 @@ class Roller(_Support):
         assign(self.turns, turns)
 
     @ti.func
-    def held(self, i, t, rotation, velocity, angular_momentum):
+    def held(self, i, t, step, rotation, velocity, angular_momentum):
         """Velocity within the plane, spin about its normal."""
         normal = self.across[i]
         kept = zero3()
@@ -248,6 +248,11 @@ class PrescribedMotion(_Support):
         """Velocity [m/s], three components, and angular frequency [rad/s]."""
         return (*self._velocity, 2.0 * math.pi * self._frequency)
 
+    def change_time(self) -> float:
+        """Shortest time between two points of the history, or half a period."""
+        half = 0.5 / self._frequency if self._frequency else math.inf
+        return min(half, shortest_piece(*self._points)) if any(self._velocity) else math.inf
+
     def travel(self) -> Travel:
         """As far as it swings, or without end along a constant velocity."""
         times, shares = (np.array(points) for points in self._points)
@@ -261,11 +266,11 @@ class PrescribedMotion(_Support):
         return tuple(-x for x in swing), tuple(swing)
 
     @ti.func
-    def held(self, i, t, rotation, velocity, angular_momentum):
-        """The prescribed velocity at time t [s] and no spin."""
+    def held(self, i, t, step, rotation, velocity, angular_momentum):
+        """The prescribed velocity, its shares as a mean over the step, and no spin."""
         amplitude = vec3(self.law[0], self.law[1], self.law[2])
         _, swing = sine_and_cosine(self.law[3] * t)
-        return amplitude * swing * self.shares.at(t), zero3()
+        return amplitude * swing * self.shares.mean(t - 0.5 * step, t + 0.5 * step), zero3()
 
 
 def _shares(ramp, history):

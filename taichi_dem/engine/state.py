@@ -47,7 +47,8 @@ class State:
     m^2/s] in world axes; rotation (matrix) and spin [rad/s] follow from them and are stored so that
     neighbours need not compute them. A body's motion is that of its own last tick.
     level: step dt0 / 2^level. bound: its criterion, an index into ``step_control.CRITERIA``.
-    last_tick: when the body was last advanced.
+    last_tick: when the body was last advanced. lag: time [s] by which what it has taken of each
+    load is behind its position.
     slot: impulse [N s] and its moment about the body's centre [N m s] that face f of body i has
     gathered since then, entry 4 i + f.
     broken_tick: when a bond was released, NEVER while it holds. exposed_tick: since when a face
@@ -82,6 +83,7 @@ class State:
         self.level = ti.field(ti.i32, shape=n)
         self.bound = ti.field(ti.i32, shape=n)
         self.last_tick = ti.field(ti.i64, shape=n)
+        self.lag = ti.Vector.field(max(1, len(tables.loads)), real, shape=n)
         self.slot = ti.Vector.field(6, real, shape=tables.capacity.faces)
         self.broken_tick = ti.field(ti.i64, shape=bonds)
         if tables.has_bond_heat:
@@ -169,8 +171,8 @@ class State:
             self.passed[b][limit] = self.tick[None]
 
     @ti.func
-    def body_motion(self, i, time, step):
-        """Present motion of body i, for loads that act at a time over a step [s]."""
+    def body_motion(self, i, time, step, since, until):
+        """Present motion of body i, for loads in a step [s] from a time: ``BodyMotion``."""
         return BodyMotion(
             position=self.position[i],
             rotation=self.rotation[i],
@@ -178,6 +180,8 @@ class State:
             spin=self.spin[i],
             time=time,
             step=step,
+            since=since,
+            until=until,
         )
 
     @property

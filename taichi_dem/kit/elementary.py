@@ -52,6 +52,15 @@ def sine_and_cosine(angle):
 
 
 @ti.pyfunc
+def sine_shortfall(angle):
+    """1 - sin(angle) / angle of an angle [rad] of at most pi / 2, without a difference."""
+    square, rest = angle * angle, 1.0
+    for k in ti.static(range(10, 0, -1)):
+        rest = 1.0 - square / ((2.0 * k + 2.0) * (2.0 * k + 3.0)) * rest
+    return square / 6.0 * rest
+
+
+@ti.pyfunc
 def fifth_root(value):
     """Fifth root of a number that is not negative, by Newton's method."""
     rest, scale = 1.0 * value, 1.0

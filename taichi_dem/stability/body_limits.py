@@ -261,7 +261,8 @@ class StabilityLimits:
         """
         push2, step = 0.0, self.rule[0]
         for ahead in ti.static(range(2)):
-            motion = self.state.body_motion(i, now + ahead * step, step)
+            time = now + ahead * step
+            motion = self.state.body_motion(i, time, step, time - 0.5 * step, time + 0.5 * step)
             for e in ti.static(range(len(self.tables.loads))):
                 if self.tables.loads[e].acts_on(i):
                     force, _ = self.tables.loads[e].wrench(i, motion)

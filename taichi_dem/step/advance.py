@@ -19,6 +19,7 @@ from taichi_dem.stability.body_limits import RELEASE
 from taichi_dem.step.bond_laws import BondLaws
 from taichi_dem.step.contact_force import ContactForce
 from taichi_dem.step.ground import GroundDashpots
+from taichi_dem.step.load_times import LoadTimes
 from taichi_dem.step.tangential_springs import TangentialSprings
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ class Advance(BondLaws, ContactForce):
         self.on_demand = state.activity.laws if tables.on_demand else (False, False)
         # Where both laws act on demand, none is missing and none is to be watched for.
         self.notes_limits = not all(self.on_demand)
-        self.ground = GroundDashpots(tables, state)
+        self.load_times, self.ground = LoadTimes(tables, state), GroundDashpots(tables, state)
         self.solver, self.solves = solver, solver is not None
         self.solves_bonds = self.solves and solver.has_bonds
         self.contacts = contacts
@@ -315,25 +316,16 @@ class Advance(BondLaws, ContactForce):
     def _loaded(self, i, elapsed, linear, angular):
         """Impulse and moment with those of the loads added, and a row for each of ``drives``."""
         kick = ti.Matrix.zero(real, ti.static(max(1, len(self.tables.drives))), 6)
-        motion = self.state.body_motion(i, self._load_time(elapsed), elapsed)
+        begin = self.schedule.seconds(self.state.tick[None]) - elapsed
         for e in ti.static(range(len(self.tables.loads))):
             if self.tables.loads[e].acts_on(i):
+                motion, length = self.load_times.of_step(i, e, begin, elapsed)
                 force, torque = self.tables.loads[e].wrench(i, motion)
-                linear += force * elapsed
-                angular += torque * elapsed
+                linear += force * length
+                angular += torque * length
                 for k in ti.static(range(3)):
-                    kick[e, k], kick[e, 3 + k] = force[k] * elapsed, torque[k] * elapsed
+                    kick[e, k], kick[e, 3 + k] = force[k] * length, torque[k] * length
         return linear, angular, kick
-
-    @ti.func
-    def _load_time(self, elapsed):
-        """Time at which loads are evaluated: the beginning of the step [s].
-
-        Velocities change by the forces there, and positions by the new velocities: the leapfrog,
-        whose velocities are half a step earlier, of second order without dashpots. The middle of
-        the step would be half a step ahead of the springs, an error of first order.
-        """
-        return self.schedule.seconds(self.state.tick[None]) - elapsed
 
     def _support_bit(self, effect):
         """Bit of a support in ``State.active_effects``."""
@@ -370,7 +362,7 @@ class Advance(BondLaws, ContactForce):
             if effect.acts_on(i):
                 before, spun = velocity, momentum
                 velocity, momentum = effect.held(
-                    i, half, self.state.rotation[i], velocity, momentum
+                    i, half, elapsed, self.state.rotation[i], velocity, momentum
                 )
                 held = 1
                 if (velocity - before).norm_sqr() + (momentum - spun).norm_sqr() > 0.0:

@@ -55,21 +55,20 @@ class HalfStep:
         for f in range(4):
             linear += 0.5 * self.state.slot[4 * i + f][0:3]
             angular += 0.5 * self.state.slot[4 * i + f][3:6]
-        half = 0.5 * self.schedule.own_step(i)
         kick = ti.Matrix.zero(real, ti.static(max(1, len(self.tables.drives))), 6)
-        step = self.schedule.own_step(i)
-        motion = self.state.body_motion(i, self.schedule.seconds(self.state.tick[None]), step)
+        step, now = self.schedule.own_step(i), self.schedule.seconds(self.state.tick[None])
         for e in ti.static(range(len(self.tables.loads))):
             if self.tables.loads[e].acts_on(i):
+                motion, length = self.advance.load_times.up_to(i, e, now, step)
                 push, twist = self.tables.loads[e].wrench(i, motion)
-                linear += push * half
-                angular += twist * half
+                linear += push * length
+                angular += twist * length
                 for k in ti.static(range(3)):
-                    kick[e, k], kick[e, 3 + k] = push[k] * half, twist[k] * half
+                    kick[e, k], kick[e, 3 + k] = push[k] * length, twist[k] * length
         if ti.static(self.ground.present):
             rows = 0.5 * self.ground.impulses(i, step, 2.0 * linear, 2.0 * angular)
             if back == 1:
-                rows = self.ground.impulses_before(i, half)
+                rows = self.ground.impulses_before(i, 0.5 * step)
             pushed, turned = self.ground.total(rows)
             linear, angular, kick = linear + pushed, angular + turned, self.ground.noted(kick, rows)
         return linear, angular, kick
@@ -80,7 +79,9 @@ class HalfStep:
         now = self.schedule.seconds(self.state.tick[None])
         for effect in ti.static(self.tables.supports):
             if effect.acts_on(i):
-                velocity, momentum = effect.held(i, now, self.state.rotation[i], velocity, momentum)
+                velocity, momentum = effect.held(
+                    i, now, 0.0, self.state.rotation[i], velocity, momentum
+                )
         return velocity, momentum
 
     @ti.func
@@ -94,6 +95,9 @@ class HalfStep:
         account = ti.Vector.zero(real, ti.static(len(self.tables.drives) + 1))
         before, spun = self.state.velocity[i], self.state.angular_momentum[i]
         velocity, momentum = before, spun
+        if ti.static(self.staggered):
+            if back == 1:
+                self.advance.load_times.start(i, 0.5 * self.schedule.own_step(i))
         if self.is_due(i) == 1:
             linear, angular, kick = self.impulse(i, pushed, turned, back)
             linear *= self.tables.mass_inverse[i]

@@ -78,7 +78,7 @@ class Mover(Marked):
         return (*self.vector, self.start)
 
     @ti.func
-    def held(self, i, t, rotation, velocity, angular_momentum):
+    def held(self, i, t, step, rotation, velocity, angular_momentum):
         """Velocity at a time and no spin."""
         allowed = zero3()
         if t > self.law[3]:

@@ -21,21 +21,40 @@ class Probe:
         self.history = History()
 
     @ti.kernel
-    def sample(self, times: ti.types.ndarray(dtype=ti.f64), found: ti.types.ndarray(dtype=ti.f64)):
-        """Values at some times."""
-        for k in range(times.shape[0]):
-            found[k] = self.history.at(times[k])
+    def sample(
+        self,
+        since: ti.types.ndarray(dtype=ti.f64),
+        until: ti.types.ndarray(dtype=ti.f64),
+        found: ti.types.ndarray(dtype=ti.f64),
+    ):
+        """Means between some times."""
+        for k in range(since.shape[0]):
+            found[k] = self.history.mean(since[k], until[k])
+
+    def means(self, since, until):
+        """The same, as an array."""
+        found = np.zeros(len(since))
+        self.sample(since, until, found)
+        return found
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 7, MOST_POINTS])
 def test_values_are_linear_between_the_points_and_constant_beyond(count):
+    """Values at a time, and means over short and long times by the trapezoidal rule in pieces."""
     draw = np.random.default_rng(count)
     times, values = np.cumsum(draw.uniform(0.1, 2.0, count)), draw.normal(size=count)
     asked = np.concatenate([times, draw.uniform(-1.0, times[-1] + 1.0, 200), [0.0, 1e9]])
-    probe, found = Probe(), np.zeros(len(asked))
+    probe = Probe()
     probe.history.load(tuple(times), tuple(values))
-    probe.sample(asked, found)
-    assert np.abs(found - np.interp(asked, times, values)).max() < 1e-12
+    assert np.abs(probe.means(asked, asked) - np.interp(asked, times, values)).max() < 1e-12
+    since = draw.uniform(-1.0, times[-1] + 1.0, 50)
+    until = since + 10.0 ** draw.uniform(-9.0, 2.0, 50)
+    for mean, begin, end in zip(probe.means(since, until), since, until):
+        inside = times[(times > begin) & (times < end)]
+        t = np.array([0.0, *(inside - begin), end - begin])
+        v = np.interp([begin, *inside, end], times, values)
+        area = (0.5 * (v[1:] + v[:-1]) * np.diff(t)).sum()
+        assert mean == pytest.approx(area / (end - begin), abs=1e-11)
 
 
 def moved(mesh, listed, steps, method=None, **options):

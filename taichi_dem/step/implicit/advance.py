@@ -56,9 +56,11 @@ class SolvedAdvance(Advance):
         """Velocity and angular momentum that the supports of body i allow; nothing is booked."""
         for effect in ti.static(self.tables.supports):
             if effect.acts_on(i):
-                now = self.schedule.seconds(self.state.tick[None])
-                half = now - 0.5 * self.schedule.step_seconds[0]
+                now, step = (
+                    self.schedule.seconds(self.state.tick[None]),
+                    self.schedule.step_seconds[0],
+                )
                 velocity, momentum = effect.held(
-                    i, half, self.state.rotation[i], velocity, momentum
+                    i, now - 0.5 * step, step, self.state.rotation[i], velocity, momentum
                 )
         return velocity, momentum

@@ -1,0 +1,150 @@
+"""A load gives its whole impulse, and a prescribed motion its whole way, at any step."""
+
+import math
+import warnings
+
+import numpy as np
+import pytest
+
+from taichi_dem import (
+    CONCRETE,
+    ImplicitDashpots,
+    Multirate,
+    Scene,
+    Simulation,
+    StepControl,
+    Uniform,
+    effects,
+    simulate,
+)
+from taichi_dem.accuracy.job import Job
+from taichi_dem.mesh.mesh import checked_mesh
+from taichi_dem.mesh.shapes import bar
+from taichi_dem.mesh.tetrahedra import area_vectors
+
+EPS = np.finfo(float).eps
+STEP, STEPS = 7e-7, 40
+POINTS = np.array([[0, 0, 0], [0.06, 0.01, 0], [0.01, 0.05, 0], [0.02, 0.01, 0.055]])
+MESH = checked_mesh(POINTS, [[0, 1, 2, 3]], {"face": [[1, 2, 3]]})
+METHODS = {
+    "uniform": Uniform(STEP),
+    "solved": ImplicitDashpots(STEP),
+    "multirate": Multirate(STEP, 1e-8),
+    "controlled": Multirate(STEP, 1e-8, control=StepControl()),
+}
+
+
+def pulses():
+    """Triangles of 20 ns that push and pull, wherever they fall in steps: times [s] and values."""
+    begins = np.arange(2, STEPS - 2, 3) + np.random.default_rng(5).random(12)
+    times = (STEP * begins[:, None] + [0.0, 1e-8, 2e-8]).ravel()
+    signs = np.where(np.arange(len(begins)) % 3 == 1, -1.0, 0.75)
+    return times, (signs[:, None] * [0.0, 1e9, 0.0]).ravel()
+
+
+def body(load, method):
+    """A free body that does not turn, so that the force keeps its direction."""
+    made = Simulation(Scene(MESH, CONCRETE, [load]), method)
+    made.tables.inertia_inverse.fill(0.0)
+    return made
+
+
+def pushes(load, method):
+    """Impulse on the body over the area of its face, after each largest step; and its levels."""
+    simulation = body(load, method)
+    push = -area_vectors(MESH.points, MESH.groups["face"])[0]
+    mass, found, levels = simulation.model.body_mass[0], [], set()
+    for step in range(1, STEPS + 1):
+        simulation.advance_to(step)
+        velocity = simulation.state.velocity.to_numpy()[0]
+        found.append(mass * velocity @ push / (push @ push))
+        levels.add(int(simulation.state.level.to_numpy()[0]))
+    account = simulation.energy_balance.account()
+    assert account["load_work"] == pytest.approx(account["kinetic"], rel=1e3 * EPS)
+    return np.array(found), levels
+
+
+def plateau():
+    """A pressure that sets in and ends within steps, and stays over many: times [s] and values."""
+    return STEP * np.array([1.3, 1.4, 20.3, 20.6]), np.array([0.0, 1e7, 1e7, 0.0])
+
+
+@pytest.mark.parametrize("history", [pulses, plateau])
+@pytest.mark.parametrize("name", METHODS)
+def test_no_pulse_is_lost(name, history):
+    """The impulse is the area of the history, also where it changes the steps of the body.
+
+    Each step rounds a difference of times to their own rounding.
+    """
+    times, values = history()
+    found, levels = pushes(effects.Pressure("face", values, times), METHODS[name])
+    areas = 0.5 * (values[1:] + values[:-1]) * np.diff(times)
+    rounding = 4.0 * len(areas) * times[-1] / np.diff(times).min() * EPS * np.abs(areas).sum()
+    assert abs(found[-1] - areas.sum()) < rounding
+    if name in ("multirate", "controlled"):
+        assert len(levels) > 2
+
+
+@pytest.mark.parametrize("rise", [0.11 * STEP, 6.3 * STEP])
+def test_the_gas_gives_the_integral_of_its_pulse_up_to_half_a_step_after_each(rise):
+    """By the integrals of a squared cosine and a cosine, for a pulse within a step and over many.
+
+    The last impulse is that of the step that begins before the present: its interval ends half a
+    step before.
+    """
+    peak, ratio, start = 1e9, 2.75, 1.3 * STEP
+    gas = effects.GasPressure("face", peak, rise, ratio, start)
+    found, _ = pushes(gas, METHODS["uniform"])
+    s = ((np.arange(STEPS) + 0.5) * STEP - start) / rise
+    up, down = np.clip(s, 0.0, 1.0), np.clip(s - 1.0, 0.0, ratio)
+    wanted = 0.5 * up - np.sin(np.pi * up) / (2.0 * np.pi)
+    wanted += 2.0 * ratio / np.pi * np.sin(0.5 * np.pi * down / ratio)
+    assert np.abs(found - peak * rise * wanted).max() < 16 * STEPS * EPS * found.max()
+
+
+def test_a_prescribed_motion_goes_its_whole_way():
+    """Shares that pulse within a step: the way is the velocity times their area."""
+    times, values = pulses()
+    shares = (times, 1e-9 * values)
+    for method in (METHODS["uniform"], METHODS["solved"]):
+        drive = effects.PrescribedMotion("face", (3.0, 0.0, 0.0), history=shares)
+        simulation = body(drive, method)
+        simulation.advance_to(STEPS)
+        way = simulation.state.position.to_numpy()[0, 0] - simulation.model.centre[0, 0]
+        assert way == pytest.approx(3.0 * 1e-8 * shares[1][1::3].sum(), abs=STEPS * EPS * 0.1)
+
+
+@pytest.mark.parametrize(
+    ("listed", "change"),
+    [
+        (effects.Pressure.triangle("face", 1e6, 2e-8, 3e-8), 2e-8),
+        (effects.Pressure("face", [1e6, 1e6], times=[0.0, 1e-8]), math.inf),
+        (effects.GasPressure("face", rise=8e-8, decay_ratio=0.5), 4e-8),
+        (effects.PrescribedMotion("face", (1.0, 0.0, 0.0), frequency=1e7), 5e-8),
+        (effects.Gravity(), math.inf),
+    ],
+)
+def test_a_history_that_the_step_cannot_follow_is_named_once_before_the_run(listed, change):
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        simulate(Scene(MESH, CONCRETE, [listed]), method=Uniform(STEP), until=STEP, progress=None)
+    wanted = f"changes within {change:.3g} s, less than the largest step, {STEP:.3g} s"
+    assert [wanted in str(one.message) for one in told] == [True] * math.isfinite(change)
+
+
+def test_solve_begins_with_steps_that_resolve_the_load():
+    """Unless they are 64 times shorter than springs bear; then only first order is trusted."""
+    mesh = bar(0.1, 0.05, (3, 2, 2))
+
+    def steps(rise):
+        pulse = effects.Pressure.triangle("left", 1e6, rise, 2.0 * rise)
+        scene = Scene(mesh, CONCRETE, [pulse])
+        methods = Job(scene, 1e-4, None, 0.01, 0.95).methods()
+        return methods.at(0).dt0, methods.declared
+
+    longest, _ = steps(1.0)
+    for rise in (longest / 2.0, longest / 60.0):
+        step, order = steps(rise)
+        assert 0.9 * rise < step <= rise and order == 2.0
+    step, order = steps(longest / 200.0)
+    assert 0.9 * longest / 64.0 < step and order == 1.0
