@@ -93,8 +93,8 @@ def estimated_effects(scene: Scene, until: float) -> tuple[Estimate, ...]:
     instance("scene", scene, Scene)
     model = Model(scene.mesh, scene.body_materials, scene.effects)
     until, part = positive("until", until), parts_of(scene.mesh)
-    meeting = int(part.max() + 1) if may_meet(scene, part) else 0
-    return estimates_before(model, until, scene.initial_motion.get("velocity"), meeting)
+    velocity = scene.initial_motion.get("velocity")
+    return estimates_before(model, until, part, velocity, may_meet(scene, part))
 
 
 def differences(result: Result, names: Iterable[str], tolerance: float) -> dict[str, float]:
