@@ -64,7 +64,7 @@ class Certificate:
     all_law_evaluations : int
         Evaluations that effects="all" makes.
     sleep : float
-        Bound that was asked for, see ``Scene``.
+        Share that was asked for [-], see ``Scene``.
     asleep : float
         Share of bodies times time that were asleep.
     impulse : float
@@ -95,7 +95,7 @@ class Certificate:
 
     @property
     def holds(self) -> bool:
-        """Whether no audit found a miss, and in no part more impulse was left out than asked for."""
+        """Whether no audit found a miss, and no part left out more impulse than asked for."""
         return not any(audit.misses for audit in self.audits) and self.impulse <= self.sleep
 
     def __repr__(self):

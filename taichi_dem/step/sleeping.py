@@ -144,7 +144,10 @@ class Sleeping:
 
     @ti.func
     def _opens(self, i, is_fast, advance):
-        """Whether body i opens a bond to a body that slept until now by more than is allowed."""
+        """Whether body i opens a bond to a body that slept until now by more than is allowed.
+
+        is_fast: whether any opening beyond rounding is.
+        """
         state, found = advance.state, False
         for f in range(4):
             b = self.tables.face_bond[4 * i + f]
@@ -153,23 +156,28 @@ class Sleeping:
                 # Whether another thread has woken it in this substep must not matter.
                 slept = self.since[j] < 0 or self.since[j] == state.tick[None]
                 if slept and state.broken_tick[b] < 0:
-                    energy, begins = advance.at_rest(
-                        b, 1.0 / self.share[None], self.rounding(i, state)
-                    )
-                    lighter = ti.min(self.tables.mass[i], self.tables.mass[j])
-                    if is_fast and energy > 0.0:
-                        found = True
-                    if begins != 0 or 2.0 * energy > lighter * self.bound2[self.part[i]]:
+                    energy, is_more = self._held(b, i, j, self.bound2[self.part[i]], advance)
+                    if is_more or (is_fast and energy > 0.0):
                         found = True
         return found
 
     @ti.func
     def leaves_out(self, b, i, j, advance):
-        """Whether the springs of a sleeping bond hold more than is allowed: a miss."""
-        energy, begins = advance.at_rest(b, 1.0 / self.share[None], self.rounding(i, advance.state))
+        """Whether the springs of a sleeping bond hold more than is allowed."""
         speed = self.share[None] * self.mean[self.part[i]]
+        _, is_more = self._held(b, i, j, speed * speed, advance)
+        return is_more
+
+    @ti.func
+    def _held(self, b, i, j, speed2, advance):
+        """Energy that the springs of a bond hold [J], and whether that is more than allowed.
+
+        It is where a law would begin at the opening over the share, or the lighter body would get
+        more than a speed from it; speed2: its square [(m/s)^2].
+        """
+        energy, begins = advance.at_rest(b, 1.0 / self.share[None], self.rounding(i, advance.state))
         lighter = ti.min(self.tables.mass[i], self.tables.mass[j])
-        return begins != 0 or 2.0 * energy > lighter * speed * speed
+        return energy, begins != 0 or 2.0 * energy > lighter * speed2
 
     @ti.func
     def awaken(self, j, state):
@@ -181,7 +189,7 @@ class Sleeping:
 
     @ti.func
     def is_due(self, tick):
-        """Whether the mean momentum is found anew at a tick."""
+        """Whether the mean speeds are found anew at a tick."""
         step = tick // MACRO_TICKS
         due = tick % MACRO_TICKS == 0 and (step < _EARLY or step % _EVERY == 0)
         return due and self.share[None] > 0.0
