@@ -92,9 +92,8 @@ def estimated_effects(scene: Scene, until: float) -> tuple[Estimate, ...]:
     """
     instance("scene", scene, Scene)
     model = Model(scene.mesh, scene.body_materials, scene.effects)
-    until, part = positive("until", until), parts_of(scene.mesh)
-    velocity = scene.initial_motion.get("velocity")
-    return estimates_before(model, until, part, velocity, may_meet(scene, part))
+    until, velocity = positive("until", until), scene.initial_motion.get("velocity")
+    return estimates_before(model, until, velocity, may_meet(scene, parts_of(scene.mesh)))
 
 
 def differences(result: Result, names: Iterable[str], tolerance: float) -> dict[str, float]:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Optional
 import numpy as np
 
 from taichi_dem.diagnostics.part_scales import WEIGHT, PartScales
+from taichi_dem.mesh.parts import parts_of
 
 if TYPE_CHECKING:
     from taichi_dem.engine.model import Model
@@ -66,20 +67,20 @@ class Estimate:
 def estimates_before(
     model: "Model",
     until: float,
-    part: np.ndarray,
     velocity: Optional[np.ndarray] = None,
     meet: bool = False,
 ) -> tuple[Estimate, ...]:
     """Estimates of all effects of a scene before a run, by dimensionless groups.
 
-    model: the scene's arrays. until: end of the run [s]. part: connected part of each body, as from
-    ``parts_of``. velocity: of the bodies at the start [m/s], (body_count, 3), None at rest. meet:
-    whether parts may meet. Each part is judged by its own numbers, and the one that needs an effect
-    most decides. The stress is that of the loads and supports on a part (``Effect.stress``) and of
-    the motion at the start, of all parts where they may meet; the speed is that of a wave of this
-    stress, stress / (density wave speed), or the largest at the start, of the part alone. Of
-    several materials in a part the least strengths and the largest friction count.
+    model: the scene's arrays. until: end of the run [s]. velocity: of the bodies at the start
+    [m/s], (body_count, 3), None at rest. meet: whether parts may meet. Each connected part is
+    judged by its own numbers, and the one that needs an effect most decides. The stress is that of
+    the loads and supports on a part (``Effect.stress``) and of the motion at the start, of all
+    parts where they may meet; the speed is that of a wave of this stress, stress / (density wave
+    speed), or the largest at the start, of the part alone. Of several materials in a part the least
+    strengths and the largest friction count.
     """
+    part = parts_of(model.mesh)
     scales, drives = PartScales(model, part), (*model.loads, *model.supports)
     beside, rim, fastest = _speeds(model, velocity, part)
     # An unknown load is NaN, and with it all that follows.
@@ -142,8 +143,8 @@ def _weight_before(scales, speed, until, meet):
 
 
 def _bent(scales, until, borne):
-    """Group of the stress of weight in parts that something bears."""
-    stress = np.where(borne, scales.weight_stress(until), 0.0)
+    """Group of the stress of weight in bonded parts that something bears."""
+    stress = np.where(borne & scales.is_bonded, scales.weight_stress(until), 0.0)
     return stress / scales.of_materials("tensile_strength", np.minimum), _BENDS
 
 

@@ -23,8 +23,9 @@ class PartScales:
     """Numbers of connected parts, arrays (count,).
 
     part: of each body, as from ``parts_of``. first: its lowest body. mass [kg], density [kg/m^3],
-    size: longest side of its box [m], spacing: of its bodies [m]; wave: speed of sound [m/s],
-    damping: share of its energy that a bond between bodies of mean size loses in a cycle.
+    size: longest side of its box [m], spacing: of its bodies [m]; of_bonds: part of each bond,
+    is_bonded: whether a part has any; wave: speed of sound [m/s]; damping: share of its energy that
+    a bond between bodies of mean size loses in a cycle.
     """
 
     def __init__(self, model: "Model", part: np.ndarray):
@@ -57,6 +58,7 @@ class PartScales:
         """Stiffness and damping of the bonds of each part: medians, where bonds differ."""
         model, bonds = self.model, self.model.bond_count
         self.of_bonds = self.part[model.topology.master]
+        self.is_bonded = np.bincount(self.of_bonds, minlength=self.count) > 0
         normal = np.full(self.count, self._stiffness_of_all())
         self.damping = np.zeros(self.count)
         if bonds:
@@ -72,9 +74,10 @@ class PartScales:
         self.wave = np.sqrt(normal * self.spacing / self.density)
 
     def _stiffness_of_all(self):
-        """Normal stiffness per area [Pa/m] where a part has no bond."""
+        """Normal stiffness per area [Pa/m] where a part has no bond; NaN where only bonds have."""
         if not self.model.bond_count:
-            return float(self.model.material.normal_stiffness)
+            given = self.model.material.normal_stiffness
+            return float(given) if isinstance(given, (int, float)) else math.nan
         return float(np.median(self.model.bond_stiffness[:, 0]))
 
     def of_materials(self, name: str, choose: Any) -> np.ndarray:
