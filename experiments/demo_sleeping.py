@@ -1,11 +1,10 @@
 """How far does a blow reach, and need the rest be computed?
 
 A pile of 100,000 tetrahedra is struck on its head. With effects="auto" a body sleeps until a
-neighbour moves by more than a share of the mean speed, or of what strains the bond between them to
-its limit, and the bonds beyond are not evaluated. Expect
-the zone that is awake to grow a little faster than the wave runs, as dashpots spread momentum
-ahead of it; steps many times cheaper, the more so the longer the pile; and the same displacement to
-some 1e-8 where the bound is 1e-6. In the paper's block of 2 m nothing sleeps for long.
+neighbour moves by more than a share of the mean speed or of a bond's limit, and the bonds beyond
+are not evaluated. Expect the zone that is awake to grow a little faster than the wave runs, as
+dashpots spread momentum ahead of it; steps many times cheaper, the more so the longer the pile; the
+same displacement to some 1e-8. In the paper's block of 2 m nothing sleeps for long.
 
     python experiments/demo_sleeping.py                  # a quarter of an hour, most of it without
     python experiments/demo_sleeping.py --cells 60       # a pile of 23,000: three minutes
