@@ -35,7 +35,8 @@ def caption(figures):
         figures[key][0] for key in ("asleep_percent", "speedup_by_sleep", "error_by_sleep_percent")
     )
     return (
-        f"A blow on the head of a pile. Bodies sleep until the momentum of a neighbour exceeds a "
-        f"share of the mean: {share:.0f} % of all bodies times time asleep, steps {gain:.1f} times "
-        f"cheaper in all, and displacements that differ by {error:.1g} % of the largest."
+        f"A blow on the head of a pile. Bodies sleep until a neighbour moves by more than a share "
+        f"of the mean speed, or of a bond's limit: {share:.0f} % of all bodies times time asleep, "
+        f"steps {gain:.1f} times cheaper in all, and displacements that differ by {error:.1g} % of "
+        f"the largest."
     )

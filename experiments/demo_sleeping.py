@@ -1,10 +1,10 @@
 """How far does a blow reach, and need the rest be computed?
 
-A pile of 100,000 tetrahedra is struck on its head. With effects="auto" a body sleeps until the
-momentum of a neighbour exceeds a share of the mean, and the bonds beyond are not evaluated. Expect
-the zone that is awake to grow a little faster than the wave runs, as dashpots spread momentum
-ahead of it; steps many times cheaper, the more so the longer the pile; and the same displacement to
-some 1e-8 where the bound is 1e-6. In the paper's block of 2 m nothing sleeps for long.
+A pile of 100,000 tetrahedra is struck on its head. With effects="auto" a body sleeps until a
+neighbour moves by more than a share of the mean speed or of a bond's limit, and the bonds beyond
+are not evaluated. Expect the zone that is awake to grow a little faster than the wave runs, as
+dashpots spread momentum ahead of it; steps many times cheaper, the more so the longer the pile; the
+same displacement to some 1e-8. In the paper's block of 2 m nothing sleeps for long.
 
     python experiments/demo_sleeping.py                  # a quarter of an hour, most of it without
     python experiments/demo_sleeping.py --cells 60       # a pile of 23,000: three minutes
@@ -28,7 +28,7 @@ NAME = "demo_sleeping"
 SETTINGS = {
     "cells": (260, 40, study.whole(10, 2000), "boxes along the pile, 0.1 m each, 260"),
     "until": (5e-4, 1e-4, study.number(0, 1), "simulated time [s], 5e-4"),
-    "sleep": (1e-6, 1e-6, study.number(0, 0.01), "bound of the momentum that wakes, 1e-6"),
+    "sleep": (1e-6, 1e-6, study.number(0, 0.01), "share of speed and opening that wakes, 1e-6"),
     "across": (8, 2),
 }
 options_parser = partial(study.parser, NAME, __doc__, settings=SETTINGS)

@@ -5,7 +5,7 @@ An effect is said to be droppable only where a run without it has been made and 
 
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import Any, Optional
+from typing import Any, Optional, Union
 
 import numpy as np
 
@@ -92,9 +92,8 @@ def estimated_effects(scene: Scene, until: float) -> tuple[Estimate, ...]:
     """
     instance("scene", scene, Scene)
     model = Model(scene.mesh, scene.body_materials, scene.effects)
-    until, part = positive("until", until), parts_of(scene.mesh)
-    meeting = int(part.max() + 1) if may_meet(scene, part) else 0
-    return estimates_before(model, until, scene.initial_motion.get("velocity"), meeting)
+    until, velocity = positive("until", until), scene.initial_motion.get("velocity")
+    return estimates_before(model, until, velocity, may_meet(scene, parts_of(scene.mesh)))
 
 
 def differences(result: Result, names: Iterable[str], tolerance: float) -> dict[str, float]:
@@ -164,14 +163,15 @@ def _can_be_silent(effect):
 def recorded_difference(first: Result, second: Result) -> float:
     """Largest difference of all columns, speeds and times of fracture of two runs.
 
-    A share of the largest value of each; of energies, of the largest of all of them; zero where
-    rounding explains it. Infinite where columns have other lengths.
+    A share of the largest value of each; of energies, of the largest of all of them; of speeds, of
+    the largest in the connected part to which a body belongs; zero where rounding explains it.
+    Infinite where columns have other lengths.
     """
     joules = [name for name in first.history if name.endswith("_J") and name != "residual_J"]
     energy = max((np.abs(first.history[name]).max(initial=0.0) for name in joules), default=0.0)
     rounding = _rounding(first)
     found = [
-        _apart(first.peak_speed, second.peak_speed, rounding["_m_s"]),
+        _apart(first.peak_speed, second.peak_speed, rounding["_m_s"], _fastest_beside(first)),
         _broken_apart(first.broken_time, second.broken_time),
     ]
     for name in first.history:
@@ -180,6 +180,14 @@ def recorded_difference(first: Result, second: Result) -> float:
             columns = first.history[name], second.history.get(name)
             found.append(_apart(*columns, unexplained, energy if name in joules else None))
     return float(max(found, default=0.0))
+
+
+def _fastest_beside(result):
+    """Largest speed in the part of each body [m/s]."""
+    part = parts_of(result.model.mesh)
+    fastest = np.zeros(part.max() + 1)
+    np.maximum.at(fastest, part, result.peak_speed)
+    return fastest[part]
 
 
 def _rounding(result):
@@ -204,14 +212,15 @@ def _apart(
     one: np.ndarray,
     other: Optional[np.ndarray],
     rounding: float = 0.0,
-    scale: Optional[float] = None,
+    scale: Union[float, np.ndarray, None] = None,
 ) -> float:
-    """Largest difference of two arrays, over the largest value of the first or a given scale.
+    """Largest difference of two arrays, over the largest value of the first or given scales.
 
     Zero up to the difference that rounding explains.
     """
     if other is None or np.shape(one) != np.shape(other):
         return np.inf
     largest = np.abs(one).max(initial=0.0) if scale is None else scale
-    apart = np.abs(np.asarray(one, dtype=np.float64) - other).max(initial=0.0)
-    return 0.0 if apart <= rounding else float(apart / max(largest, 1e-300))
+    apart = np.abs(np.asarray(one, dtype=np.float64) - other)
+    shares = np.where(apart <= rounding, 0.0, apart) / np.maximum(largest, 1e-300)
+    return float(shares.max(initial=0.0))

@@ -21,7 +21,7 @@ from taichi_dem.mesh.mesh import Mesh
 from taichi_dem.mesh.parts import may_meet, parts_of
 from taichi_dem.mesh.topology import check_free
 
-#: Bound of the momentum of a body that wakes no neighbour, as a share of the mean of all.
+#: Share of an opening at which a law begins, and of a mean speed, at which no body wakes others.
 SLEEP = 1e-6
 #: Option that lets bodies touch at outer faces.
 REMEDY = "SphereContact(outer_faces=True)"
@@ -45,8 +45,9 @@ class Scene:
     loads : iterable of Effect, default ()
         Loads and supports, and laws instead of the usual ones, beside a word.
     sleep : float, optional
-        With ``"auto"``: largest momentum of a body, as a share of the mean of all, at which its
-        neighbours still count as not reached by a wave. None: 1e-6; at most 0.01, 0 for no sleep.
+        With ``"auto"``: share up to which the neighbours of a body count as not reached by a wave,
+        of the opening at which a law of the bond between them begins, and of the mean speed of the
+        connected part to which they belong. None: 1e-6; at most 0.01, 0 for no sleep.
     unbonded : iterable of str, default ()
         Names of groups of inner faces without bonds from the start, as a notch or an open joint.
         Both sides are free, and carry contact spheres as broken faces do.
@@ -280,7 +281,7 @@ def _locked(array):
 
 
 def _sleep_of(scene):
-    """Share of the mean momentum below which a body wakes no neighbour."""
+    """Share below which a body wakes no neighbour."""
     if scene.sleep is None:
         return SLEEP if scene.on_demand else 0.0
     sleep = between("sleep", scene.sleep, 0.0, 0.01)

@@ -6,9 +6,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from taichi_dem.diagnostics.estimates import Estimate, estimates_after
+from taichi_dem.diagnostics.missing_effects import bond_rounding
+from taichi_dem.diagnostics.part_scales import PartScales
 from taichi_dem.kit.audit import Audit
 from taichi_dem.kit.display import in_brief
 from taichi_dem.kit.effect_usage import EffectUse
+from taichi_dem.mesh.parts import parts_of
+from taichi_dem.physics.sphere_pair import CONTACT
 from taichi_dem.step.activity import LATER, SLIP, SOFTENING
 from taichi_dem.step.audit import KINDS
 from taichi_dem.timeline import MACRO_TICKS, NEVER
@@ -60,13 +64,14 @@ class Certificate:
     all_law_evaluations : int
         Evaluations that effects="all" makes.
     sleep : float
-        Bound that was asked for, a share of the mean momentum, see ``Scene``.
+        Share that was asked for [-], see ``Scene``.
     asleep : float
         Share of bodies times time that were asleep.
     impulse : float
-        Bound of the impulse that sleeping bonds left out, as a share of all momentum.
+        Bound of the impulse that sleeping bonds of a connected part left out, as a share of the
+        momentum of that part; of the part where this is largest.
     energy : float
-        Bound of the energy that sleeping bonds left out, as a share of the energy put in.
+        Bound of the energy that they left out, as a share of the energy of that part, likewise.
     audits : tuple of Audit
         Audit of each kind of skipped evaluation.
     left_out : tuple of Estimate
@@ -90,7 +95,7 @@ class Certificate:
 
     @property
     def holds(self) -> bool:
-        """Whether no audit found a miss, and no more impulse was left out than asked for."""
+        """Whether no audit found a miss, and no part left out more impulse than asked for."""
         return not any(audit.misses for audit in self.audits) and self.impulse <= self.sleep
 
     def __repr__(self):
@@ -138,7 +143,7 @@ class Certificate:
             return "asleep: no body, as sleep is 0"
         return (
             f"asleep: {100.0 * self.asleep:.3g} % of body-steps (left out: at most "
-            f"{self.impulse:.1g} of the impulse, {self.energy:.1g} of the energy; "
+            f"{self.impulse:.1g} of the impulse, {self.energy:.1g} of the energy of a part; "
             f"{self.sleep:g} asked)"
         )
 
@@ -175,7 +180,9 @@ def certificate_of(run: Any, report: Any) -> Certificate:
     evaluated, laws = _law_evaluations(model, state, schedule)
     skipped = *(laws - evaluated), _bond_steps_asleep(model, since["awake"], now, schedule)
     awake = np.nan_to_num(since["awake"], nan=now)
-    energy, impulse, left_energy = _left_out(run, report)
+    scales = PartScales(model, parts_of(model.mesh))
+    energy = _energy(run, scales)
+    impulse, left_energy = _left_out(run, scales, energy)
     return Certificate(
         acting=tuple(_acting(model, use, since) for use in report.effect_activity),
         law_evaluations=int(evaluated.sum()),
@@ -185,7 +192,7 @@ def certificate_of(run: Any, report: Any) -> Certificate:
         impulse=impulse,
         energy=left_energy,
         audits=_audits(run.step.audit, skipped),
-        left_out=_not_served(run, energy),
+        left_out=_not_served(run, scales, energy),
     )
 
 
@@ -196,22 +203,37 @@ def _law_evaluations(model, state, schedule):
     return evaluated, units * np.array(state.activity.laws, dtype=np.int64)
 
 
-def _left_out(run, report):
-    """Energy put in [J]; impulse and energy that sleep left out, as shares."""
-    account, table = report.energy_balance, np.zeros((max(1, run.model.bond_count), 2))
+def _energy(run, scales):
+    """Energy that each part got [J]: from loads and supports, or what it has and took if more.
+
+    Zero where it is no more than rounding leaves.
+    """
+    body, bond, _ = run.energy_balance.tables()
+    given = sum(np.abs(scales.sum(column)) for column in body[:, 1:3].T)
+    taken = scales.sum(body[:, 0]) + scales.sum_of_bonds(bond.sum(axis=1))
+    substeps = int(run.schedule.evaluations[0])
+    rounding = scales.sum_of_bonds(bond_rounding(run.model, run.state, substeps))
+    energy = np.maximum(given, taken)
+    return np.where(energy > rounding, energy, 0.0)
+
+
+def _left_out(run, scales, energy):
+    """Largest shares of impulse and energy of a part that sleep left out there."""
+    table = np.zeros((max(1, run.model.bond_count), 2))
     run.readings.left_out(table)
-    given = abs(account["load_work"]) + abs(account["support_work"])
-    energy = given + run.energy_balance.start_energy
-    impulse = table[:, 0].sum() / run.energy_balance.momentum_exchanged()
-    return energy, float(impulse), float(table[:, 1].sum() / max(energy, 1e-300))
+    left = [scales.sum_of_bonds(column) for column in table[: run.model.bond_count].T]
+    wholes = run.energy_balance.momentum_exchanged(scales.sum), energy
+    return [float((part / np.maximum(whole, 1e-300)).max()) for part, whole in zip(left, wholes)]
 
 
-def _not_served(run, energy):
+def _not_served(run, scales, energy):
     """Estimates of what no law of the scene serves."""
-    motion = run.motion()
+    motion, model = run.motion(), run.model
     moved = motion["position"] - run.first_motion["position"]
     speed = np.linalg.norm(motion["velocity"], axis=1)
-    return estimates_after(run.model, moved, speed, run.time_s, energy)
+    touched = run.state.active_effects.to_numpy()[: model.body_count] & np.int64(CONTACT)
+    borne = scales.under((*model.supports, *model.ground)) | (scales.sum(touched) > 0)
+    return estimates_after(scales, moved, speed, run.time_s, energy, borne)
 
 
 def _acting(model, use, since):

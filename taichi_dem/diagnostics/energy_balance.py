@@ -5,7 +5,7 @@ work of loads and supports + energy at the start = kinetic + bond strain + spher
 - injected + residual.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Optional
 
 import numpy as np
@@ -201,9 +201,14 @@ class EnergyBalance:
             linear, angular = _exchanged(rows)
             return np.linalg.norm(lost[:3]) / linear, np.linalg.norm(lost[3:]) / angular
 
-    def momentum_exchanged(self) -> float:
-        """Sum over the bodies of the size of momentum, or of load impulse if larger [N s]."""
-        return _exchanged(self.readings.momentum())[0]
+    def momentum_exchanged(self, total: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        """Size of the momentum of bodies, or of their load impulse if larger [N s], summed.
+
+        total: sum of a number of each body over every part.
+        """
+        rows = self.readings.momentum()
+        sizes = (np.linalg.norm(rows[:, k : k + 3], axis=1) for k in (0, 6))
+        return np.max([total(one) for one in (*sizes, _LEAST_SHARE * rows[:, 12])], axis=0)
 
 
 def _own(rows):

@@ -34,11 +34,14 @@ _LEAP = 1.0
 def bond_rounding(model: "Model", state: "State", substeps: int) -> np.ndarray:
     """Heat that rounding alone may leave in each bond's dashpots [J], (bond_count,).
 
-    A bond's opening is the difference of coordinates of up to X [m], so it is known to eps X. In
+    A bond's opening is the difference of its bodies' coordinates of up to X [m], known to eps X. In
     every substep rounding may thus put into the bond the energy of such an opening,
     A (k_n + k_s) (eps X)^2 / 2, which its dashpots then take.
     """
-    reach = max(np.abs(model.mesh.points).max(), np.abs(state.position.to_numpy()).max())
+    corners = np.abs(model.mesh.points[model.mesh.tetrahedra]).max(axis=(1, 2))
+    places = np.abs(state.position.to_numpy()[: model.body_count]).max(axis=1)
+    far = np.maximum(corners, places)
+    reach = np.maximum(far[model.topology.master], far[model.topology.slave])
     area = 3.0 * model.bonds["area"]
     stiffness = model.bond_stiffness.sum(axis=1)
     return 0.5 * substeps * area * stiffness * (_EPSILON * reach) ** 2

@@ -72,7 +72,7 @@ def may_meet(scene: Any, part: np.ndarray) -> bool:
     low, high = part_boxes(scene.mesh.points[scene.mesh.tetrahedra], part)
     reach = NEARNESS * (high - low).max(axis=1, keepdims=True)
     low, high = low - reach + flights[0], high + reach + flights[1]
-    acts = np.array([_parts_under(scene.mesh, effect, part) for effect in drives], dtype=bool)
+    acts = np.array([parts_under(scene.mesh, effect, part) for effect in drives], dtype=bool)
     acts = acts.reshape(-1, part.max() + 1)
     alike = (acts == acts[:, :1]).all()
     for travel, on in zip(travels[anywhere] if alike else travels, acts[anywhere | ~alike]):
@@ -97,8 +97,8 @@ def _flights(scene, part):
     return flights
 
 
-def _parts_under(mesh, effect, part):
-    """Whether a load or support acts on each part, (part_count,)."""
+def parts_under(mesh: Mesh, effect: Any, part: np.ndarray) -> np.ndarray:
+    """Whether a load, support or ground acts on each part, (part_count,)."""
     marks = np.zeros(part.max() + 1, dtype=bool)
     body: Union[slice, np.ndarray] = slice(None)
     if hasattr(effect, "group"):

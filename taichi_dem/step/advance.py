@@ -267,7 +267,7 @@ class Advance(BondLaws, ContactForce):
         self.state.position[i] = self.state.position[i] + elapsed * velocity
         self.state.last_tick[i] = self.state.tick[None]
         if ti.static(self.tables.on_demand):
-            self.state.sleeping.stir(i, self.state, elapsed, velocity, momentum)
+            self.state.sleeping.stir(i, self, elapsed, velocity, momentum)
         if ti.static(self.has_contact):
             self.contacts.moved(i, velocity, spin, elapsed)
         speed2 = velocity.norm_sqr()

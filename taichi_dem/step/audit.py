@@ -41,9 +41,9 @@ class Audit:
     """List of the bonds that are looked at in a substep, and what was found.
 
     audited, misses: by kind, see KINDS. A law is missed where it would have given other bits, or a
-    unit would have failed. A bond asleep is missed where its springs would have given its bodies
-    more, in a step, than the momentum at which a body wakes others. aside: memory of a law before
-    it was evaluated.
+    unit would have failed. A bond asleep is missed where it is opened by more than the share at
+    which a body wakes others, or its springs hold more than the energy at the speed that wakes
+    them. aside: memory of a law before it was evaluated.
     """
 
     scratch_fields = ("first",)
@@ -81,7 +81,9 @@ class Audit:
             if self.schedule.bonds.key[b] >= self.schedule.low[None]:
                 self._laws(a, b)
             elif not self.sleeping.both_awake(slots[0] >> 2, slots[1] >> 2):
-                self._asleep(b)
+                self._book(
+                    _ASLEEP, self.sleeping.leaves_out(b, slots[0] >> 2, slots[1] >> 2, self.advance)
+                )
 
     @ti.func
     def _laws(self, a, b):
@@ -108,17 +110,6 @@ class Audit:
                     other = law[0] != straight[0] or law[1] != straight[1] or spent != 0.0
                     self._book(SLIP, other)
             self._remember(3 * a + q, u, False)
-
-    @ti.func
-    def _asleep(self, b):
-        """Compare the impulse of a sleeping bond's springs in a step with the bound."""
-        slots = self.tables.bond_slots[b]
-        step = self.schedule.pair_step(slots[0] >> 2, slots[1] >> 2)
-        stiffness = self.tables.bond_stiffness[b]
-        most = 3.0 * self.tables.unit_area[b] * ti.max(stiffness[0], stiffness[1])
-        allowed = self.sleeping.share[None] * self.sleeping.mean[None]
-        allowed += step * most * self.sleeping.rounding[None]
-        self._book(_ASLEEP, step * self.advance.linear_force(b).norm() > allowed)
 
     @ti.func
     def _book(self, kind: ti.template(), is_miss):

@@ -8,6 +8,13 @@ from taichi_dem.physics.rotation import zero3
 from taichi_dem.step.activity import SLIP, SOFTENING
 
 
+@ti.func
+def beyond(opening, rounding):
+    """An opening [m], shorter by a rounding; zero where it is no longer."""
+    length = opening.norm()
+    return opening * (ti.max(0.0, length - rounding) / ti.max(length, 1e-300))
+
+
 @ti.data_oriented
 class BondLaws:
     """Base of ``Advance``, which owns all that is used here.
@@ -46,41 +53,39 @@ class BondLaws:
         return self._motion(b, self.tables.bond_slots[b])
 
     @ti.func
-    def linear_force(self, b):
-        """Force of a bond as if its springs were linear [N]."""
-        stiffness, force = self.tables.bond_stiffness[b], zero3()
-        motion = self.motion_of(b)
+    def at_rest(self, b, factor, rounding):
+        """Energy that the springs of a bond hold [J], and 1 where one of its laws would begin.
+
+        Of what the bond is opened beyond a rounding [m]; a law begins at this opening times a
+        factor, pressed as pulled, and sheared without pressure.
+        """
+        stiffness, m = self.tables.bond_stiffness[b], self.tables.bond_pair[b]
+        motion, energy, begins = self.motion_of(b), 0.0, 0
         for u in range(3 * b, 3 * b + 3):
             arm = unit_arm(motion, self.tables.vertex_slave[u])
-            opening = unit_opening(motion, arm, self.tables.vertex_master[u])
-            force += vec3(stiffness[0], stiffness[1], stiffness[1]) * opening
-        return self.tables.unit_area[b] * force
+            opening = beyond(unit_opening(motion, arm, self.tables.vertex_master[u]), rounding)
+            pull, sliding = ti.abs(opening[0]), vec2(opening[1], opening[2])
+            energy += 0.5 * (stiffness[0] * pull * pull + stiffness[1] * sliding.norm_sqr())
+            if ti.static(self.on_demand[SOFTENING]):
+                begins |= self.tables.tension.begins(m, stiffness[0], factor * pull)
+            if ti.static(self.on_demand[SLIP]):
+                begins |= self.tables.shear.begins(m, stiffness[1], factor * sliding, 0.0)
+        return self.tables.unit_area[b] * energy, begins
 
     @ti.func
-    def is_strained(self, b, rounding):
-        """Whether a unit of a bond is opened by more than a rounding [m]."""
-        motion, strained = self.motion_of(b), False
-        for u in range(3 * b, 3 * b + 3):
-            arm = unit_arm(motion, self.tables.vertex_slave[u])
-            opening = unit_opening(motion, arm, self.tables.vertex_master[u])
-            if opening.norm_sqr() > rounding * rounding:
-                strained = True
-        return strained
-
-    @ti.func
-    def withheld(self, b, elapsed, last):
+    def withheld(self, b, elapsed, last, rounding):
         """Impulse [N s] and energy [J] of a bond that was not evaluated for a time [s].
 
         last: time [s] since the last evaluation that it missed. The springs' force has grown to
         what it was then; the dashpots' impulse is that of the mean velocity. Energy: what springs
-        hold now, less the work of a leapfrog's coming step.
+        hold now, less the work of a leapfrog's coming step. Of what exceeds a rounding [m].
         """
         stiffness, force, energy = self.tables.bond_stiffness[b], zero3(), 0.0
         motion = self.motion_of(b)
         for u in range(3 * b, 3 * b + 3):
             arm = unit_arm(motion, self.tables.vertex_slave[u])
             opening = unit_opening(motion, arm, self.tables.vertex_master[u])
-            before = opening - last * unit_velocity(motion, arm)
+            before = beyond(opening - last * unit_velocity(motion, arm), rounding)
             pull = vec3(stiffness[0], stiffness[1], stiffness[1]) * before
             force += pull + self.tables.dashpot.traction(b, before / elapsed)
             energy += 0.5 * pull.dot(opening)

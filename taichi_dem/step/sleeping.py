@@ -1,9 +1,10 @@
 """Bodies that no wave has reached sleep: neither they nor their bonds are evaluated.
 
-A body wakes its neighbours once its momentum exceeds a share of the mean momentum of all bodies. A
-bond acts from the time at which both of its bodies are awake, with its whole opening: momentum is
-exact, as the impulses that it left out before are equal and opposite. These are small, as neither
-body had more than that share; they are bounded and booked when the bond wakes.
+A body wakes its neighbours once what a sleeping bond leaves out is more than a share of what counts
+there: of the opening at which a law of that bond begins, or of the mean speed of the connected part
+that the body belongs to. Other parts do not count, however large or fast. A bond acts from the time
+at which both of its bodies are awake, with its whole opening: momentum is exact, as the impulses
+that it left out before are equal and opposite. They are bounded and booked when the bond wakes.
 """
 
 from typing import TYPE_CHECKING
@@ -13,6 +14,7 @@ import taichi as ti
 
 from taichi_dem.kit.allocation import assign
 from taichi_dem.kit.types import real, vec2
+from taichi_dem.mesh.parts import parts_of
 from taichi_dem.timeline import MACRO_TICKS, NEVER
 
 if TYPE_CHECKING:
@@ -36,11 +38,12 @@ class Sleeping:
 
     awake: ASLEEP, AWAKE, or STIRRED once the body has woken its neighbours. since: tick at which it
     woke, NEVER while asleep. stride: step [s] in which it woke others. woken: bodies that wait to
-    be listed, woken_count of them. unsorted: bodies listed out of order since. share: of the mean
-    momentum, at which a body wakes its neighbours; 0 where none sleeps. bound2: square of that
-    momentum now [(N s)^2]. mean: of the momenta of all bodies [N s]. rounding: opening that a bond
-    at rest may show [m]. sums: of the momenta, a chunk of bodies each [N s]. left_out: bound of the
-    impulse [N s] and the energy [J] that each bond left out before it woke.
+    be listed, woken_count of them. unsorted: bodies listed out of order since. share: of an opening
+    or a speed, at which a body wakes its neighbours; 0 where none sleeps. part: connected part of
+    each body. mean: speed of each part, its momenta by size over its mass [m/s], mass [kg]. bound2:
+    square of the speed that wakes now [(m/s)^2], of each part. members: bodies by part; chunks of
+    them in a row, chunk_count, begin at chunk_first; sums: of the momenta of each [N s]. left_out:
+    bound of the impulse [N s] and the energy [J] that each bond left out before it woke.
     """
 
     def __init__(self, tables: "Tables"):
@@ -53,17 +56,31 @@ class Sleeping:
         self.woken_count = ti.field(ti.i32, shape=())
         self.unsorted = ti.field(ti.i32, shape=())
         self.share = ti.field(real, shape=())
-        self.bound2, self.mean = ti.field(real, shape=()), ti.field(real, shape=())
-        self.rounding = ti.field(real, shape=())
-        self.sums = ti.field(real, shape=n // _CHUNK + 1)
+        self.part, self.members = (ti.field(ti.i32, shape=n) for _ in range(2))
+        self.mass, self.mean, self.bound2 = (ti.field(real, shape=n) for _ in range(3))
+        self.chunk_count = ti.field(ti.i32, shape=())
+        self.chunk_first = ti.field(ti.i32, shape=n + 1)
+        self.sums = ti.field(real, shape=n)
         self.left_out = ti.Vector.field(2, real, shape=tables.capacity.bonds)
 
     def load(self, model: "Model", share: float) -> None:
         """Begin with all bodies asleep; all fields are zero before."""
         assign(self.since, np.full(model.body_count, NEVER))
         assign(self.share, share)
-        # A few roundings of the coordinates of its corners.
-        assign(self.rounding, _ROUNDINGS * np.finfo(float).eps * np.abs(model.mesh.points).max())
+        if share:
+            self._load_parts(parts_of(model.mesh), model.body_mass)
+
+    def _load_parts(self, part, mass):
+        """Lay the bodies out in chunks, each of bodies of one part."""
+        members = np.argsort(part, kind="stable")
+        ends = np.cumsum(np.bincount(part))
+        begins = ends - np.bincount(part)
+        first = np.concatenate([np.arange(a, b, _CHUNK) for a, b in zip(begins, ends)])
+        for field, array in ((self.part, part), (self.members, members)):
+            assign(field, array)
+        assign(self.mass, np.bincount(part, mass))
+        assign(self.chunk_count, len(first))
+        assign(self.chunk_first, np.append(first, len(part)))
 
     @ti.func
     def begin(self, i, advance):
@@ -75,7 +92,8 @@ class Sleeping:
         for f in range(4):
             b = self.tables.face_bond[4 * i + f]
             if b >= 0:
-                if advance.is_strained(b, self.rounding[None]):
+                energy, _ = advance.at_rest(b, 1.0, self.rounding(i, state))
+                if energy > 0.0:
                     stirred = True
         for effect in ti.static(self.acting):
             if effect.acts_on(i) != 0:
@@ -102,18 +120,64 @@ class Sleeping:
         return self.awake[i] != ASLEEP and self.awake[j] != ASLEEP
 
     @ti.func
-    def stir(self, i, state, elapsed, velocity, angular_momentum):
-        """Wake the neighbours of a body once its momentum exceeds the bound; elapsed: step [s]."""
+    def rounding(self, i, state):
+        """Opening [m] that a bond of body i may show at rest: a few roundings of coordinates."""
+        place = ti.abs(state.position[i]).max() + self.tables.radius[i]
+        return ti.static(_ROUNDINGS * np.finfo(float).eps) * place
+
+    @ti.func
+    def stir(self, i, advance, elapsed, velocity, angular_momentum):
+        """Wake the neighbours of a body that moves by more than may be left out.
+
+        advance: with the new position of the body. elapsed: its step [s].
+        """
         if self.awake[i] == AWAKE:
-            spin = angular_momentum.norm() / self.tables.radius[i]
-            momentum2 = (self.tables.mass[i] ** 2) * velocity.norm_sqr() + spin * spin
-            if momentum2 > self.bound2[None]:
+            spin = angular_momentum.norm() * self.tables.mass_inverse[i] / self.tables.radius[i]
+            is_fast = velocity.norm_sqr() + spin * spin > self.bound2[self.part[i]]
+            if self._opens(i, is_fast, advance):
                 self.awake[i], self.stride[i] = STIRRED, elapsed
                 for f in range(4):
                     b = self.tables.face_bond[4 * i + f]
                     if b >= 0:
-                        if state.broken_tick[b] < 0:
-                            self.awaken(self.tables.neighbour[4 * i + f], state)
+                        if advance.state.broken_tick[b] < 0:
+                            self.awaken(self.tables.neighbour[4 * i + f], advance.state)
+
+    @ti.func
+    def _opens(self, i, is_fast, advance):
+        """Whether body i opens a bond to a body that slept until now by more than is allowed.
+
+        is_fast: whether any opening beyond rounding is.
+        """
+        state, found = advance.state, False
+        for f in range(4):
+            b = self.tables.face_bond[4 * i + f]
+            if b >= 0:
+                j = self.tables.neighbour[4 * i + f]
+                # Whether another thread has woken it in this substep must not matter.
+                slept = self.since[j] < 0 or self.since[j] == state.tick[None]
+                if slept and state.broken_tick[b] < 0:
+                    energy, is_more = self._held(b, i, j, self.bound2[self.part[i]], advance)
+                    if is_more or (is_fast and energy > 0.0):
+                        found = True
+        return found
+
+    @ti.func
+    def leaves_out(self, b, i, j, advance):
+        """Whether the springs of a sleeping bond hold more than is allowed."""
+        speed = self.share[None] * self.mean[self.part[i]]
+        _, is_more = self._held(b, i, j, speed * speed, advance)
+        return is_more
+
+    @ti.func
+    def _held(self, b, i, j, speed2, advance):
+        """Energy that the springs of a bond hold [J], and whether that is more than allowed.
+
+        It is where a law would begin at the opening over the share, or the lighter body would get
+        more than a speed from it; speed2: its square [(m/s)^2].
+        """
+        energy, begins = advance.at_rest(b, 1.0 / self.share[None], self.rounding(i, advance.state))
+        lighter = ti.min(self.tables.mass[i], self.tables.mass[j])
+        return energy, begins != 0 or 2.0 * energy > lighter * speed2
 
     @ti.func
     def awaken(self, j, state):
@@ -125,7 +189,7 @@ class Sleeping:
 
     @ti.func
     def is_due(self, tick):
-        """Whether the mean momentum is found anew at a tick."""
+        """Whether the mean speeds are found anew at a tick."""
         step = tick // MACRO_TICKS
         due = tick % MACRO_TICKS == 0 and (step < _EARLY or step % _EVERY == 0)
         return due and self.share[None] > 0.0
@@ -133,26 +197,29 @@ class Sleeping:
     @ti.func
     def chunk(self, c, state):
         """Sum the momenta of a chunk of bodies [N s]."""
-        total, first = 0.0, c * _CHUNK
-        for i in range(first, ti.min(first + _CHUNK, self.tables.body_count[None])):
+        total = 0.0
+        for a in range(self.chunk_first[c], self.chunk_first[c + 1]):
+            i = self.members[a]
             if self.awake[i] != ASLEEP:
                 total += self.tables.mass[i] * state.velocity[i].norm()
         self.sums[c] = total
 
     @ti.func
-    def chunks(self):
-        """Number of chunks."""
-        return (self.tables.body_count[None] + (_CHUNK - 1)) // _CHUNK
-
-    @ti.func
     def renew_bound(self):
-        """Set the bound from the sums of the chunks."""
+        """Set the mean speed and the bound of each part from the sums of its chunks."""
         total = 0.0
-        for c in range(self.chunks()):
+        for c in range(self.chunk_count[None]):
             total += self.sums[c]
-        self.mean[None] = total / self.tables.body_count[None]
-        bound = self.share[None] * self.mean[None]
-        self.bound2[None] = bound * bound
+            end = self.chunk_first[c + 1]
+            p = self.part[self.members[end - 1]]
+            last = end == self.tables.body_count[None]
+            if not last:
+                last = self.part[self.members[end]] != p
+            if last:
+                self.mean[p] = total / self.mass[p]
+                bound = self.share[None] * self.mean[p]
+                self.bound2[p] = bound * bound
+                total = 0.0
 
 
 @ti.data_oriented
@@ -167,7 +234,7 @@ class Chunks:
         """Number of chunks now."""
         count = 0
         if self.sleeping.is_due(self.state.tick[None]):
-            count = self.sleeping.chunks()
+            count = self.sleeping.chunk_count[None]
         return count
 
     @ti.func
@@ -240,5 +307,6 @@ class WokenLists:
             last = self.sleeping.stride[i]
         if 0 <= first and first < self.state.tick[None]:
             elapsed = self.schedule.seconds(self.state.tick[None] - first)
-            found = self.advance.withheld(b, elapsed, last)
+            rounding = self.sleeping.rounding(i, self.state)
+            found = self.advance.withheld(b, elapsed, last, rounding)
         return found

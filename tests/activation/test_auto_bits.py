@@ -41,7 +41,7 @@ def found(simulation):
     state, audit = simulation.state, simulation.step.audit
     fields = dict(state.fields())
     parts = ((state.activity, "since evaluated touched"), (audit, "audited misses"))
-    parts += ((state.sleeping, "awake since stride left_out bound2 mean"),)
+    parts += ((state.sleeping, "awake since stride left_out bound2 mean sums"),)
     for part, names in parts:
         fields.update({f"{part!r} {name}": getattr(part, name) for name in names.split()})
     return {name: field.to_numpy() for name, field in fields.items()}

@@ -22,11 +22,13 @@ from taichi_dem import (
     simulate,
     solve,
 )
-from taichi_dem.diagnostics.estimates import NEEDED, NEGLIGIBLE, UNCLEAR, WEIGHT, estimates_after
+from taichi_dem.diagnostics.estimates import NEEDED, NEGLIGIBLE, UNCLEAR, estimates_after
+from taichi_dem.diagnostics.part_scales import WEIGHT, PartScales
 from taichi_dem.effects.base import Effect
 from taichi_dem.effects.chosen import ChosenEffects
 from taichi_dem.engine.model import Model
 from taichi_dem.kit.audit import Audit
+from taichi_dem.mesh.parts import parts_of
 from taichi_dem.mesh.shapes import bar
 from taichi_dem.timeline import NEVER
 
@@ -204,16 +206,35 @@ def test_a_material_without_dashpots_needs_no_damping():
     assert estimate(Scene(BAR, CONCRETE, "auto"), "bond damping").verdict == NEEDED
 
 
+def weight_after(model, moved, speed, time_s, energy, borne=False):
+    """Estimates after a run of one part."""
+    scales = PartScales(model, parts_of(model.mesh))
+    found = np.array([energy]), np.array([borne])
+    return estimates_after(scales, moved, speed, time_s, *found)
+
+
 def test_the_weight_left_out_is_bounded_by_its_work():
     """A block that falls by itself gets m g h and has m v^2 / 2: all of that was left out."""
     model = Model(BAR, CONCRETE, [])
     height, time_s, mass = 2.0, 0.1, model.body_mass.sum()
     moved, speed = np.full((model.body_count, 3), [0.0, -height, 0.0]), np.zeros(model.body_count)
-    weight = estimates_after(model, moved, speed, time_s, energy=1.0)[0]
+    weight = weight_after(model, moved, speed, time_s, 1.0)[0]
     least = mass * WEIGHT * height
     assert weight.group == pytest.approx(least + 0.5 * mass * (WEIGHT * time_s) ** 2, 1e-12)
     listed = Model(BAR, CONCRETE, [effects.Gravity()])
-    assert [e.effect for e in estimates_after(listed, moved, speed, time_s, 1.0)] == ["air drag"]
+    found = weight_after(listed, moved, speed, time_s, 1.0)
+    assert [e.effect for e in found] == ["air drag"]
+
+
+def test_weight_left_out_of_a_part_that_is_borne_is_judged_by_its_stress():
+    """A cantilever at rest, 3 density g L^2 / h: twice that, as its weight sets in at once."""
+    for length, verdict in ((8.0, NEEDED), (0.5, NEGLIGIBLE)):
+        model = Model(bar(length, 0.25, (4, 1, 1)), CONCRETE, [])
+        still = np.zeros((model.body_count, 3))
+        weight = weight_after(model, still, still[:, 0], 10.0, 0.0, borne=True)[0]
+        stress = 6.0 * CONCRETE.density * WEIGHT * length**2 / 0.25
+        assert weight.group == pytest.approx(stress / CONCRETE.tensile_strength, 1e-9)
+        assert weight.verdict == verdict
 
 
 @pytest.mark.parametrize("until", [0.0, -1.0, np.nan, "long"])

@@ -12,21 +12,22 @@ from taichi_dem import (
     Simulation,
     Uniform,
     effects,
+    join,
     needed_effects,
     simulate,
 )
 from taichi_dem.kit.effect_usage import Advice, EffectUse
-from taichi_dem.mesh.shapes import pair
+from taichi_dem.mesh.shapes import pair, single
 from taichi_dem.simulate import run_simulation
 from tests.scenes import apart
 
-STEP = 1e-7
+STEP, TWO = 1e-7, join(single(), single().moved(by=(1.0, 0.0, 0.0)))
 IDLE = EffectUse("softening", "bonds softened", 0, 10, 0.0, 0.0, steers=True)
 module = sys.modules[needed_effects.__module__]
 
 
-def recorded(energy=(1.0, 2.0), heat=(0.0, 1e-3), broken=(np.nan, 1e-5, 2e-5), speed=3.0):
-    """A result of two samples; of three bonds two broke, by default."""
+def recorded(energy=(1.0, 2.0), heat=(0.0, 1e-3), broken=(np.nan, 1e-5, 2e-5), speed=3.0, slow=1.0):
+    """A result of two samples and parts, one slow; of three bonds two broke, by default."""
     history = {
         "time_s": np.array([0.0, 1.0]),
         "kinetic_J": np.array(energy),
@@ -36,10 +37,10 @@ def recorded(energy=(1.0, 2.0), heat=(0.0, 1e-3), broken=(np.nan, 1e-5, 2e-5), s
         "hole_radial_displacement_mm": np.array([0.0, speed]),
     }
     report = SimpleNamespace(round_off_J=2e-10, until_s=1.0)
-    model = SimpleNamespace(body_mass=np.array([1.0, 4.0]))
+    model = SimpleNamespace(body_mass=np.array([1.0, 4.0]), mesh=TWO)
     return SimpleNamespace(
         history=history,
-        peak_speed=np.array([speed]),
+        peak_speed=np.array([speed, slow]),
         broken_time=np.array(broken),
         report=report,
         model=model,
@@ -62,6 +63,8 @@ def recorded(energy=(1.0, 2.0), heat=(0.0, 1e-3), broken=(np.nan, 1e-5, 2e-5), s
         ({"energy": (1.0, 2.0 + 3e-10)}, 1.5e-10),
         ({"speed": 3.0 + 1.9e-5}, 0.0),
         ({"speed": 3.0 + 2.1e-5}, 7e-6),
+        # Beside a faster part a slow one is judged by its own speed.
+        ({"slow": 1.01}, 0.01),
     ],
 )
 def test_difference_of_runs_is_a_share_of_what_was_recorded(other, share):

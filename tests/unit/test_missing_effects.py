@@ -1,12 +1,18 @@
 """What a run says of effects that were left out: where they would have acted, and nothing else."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from taichi_dem import CONCRETE, Multirate, Scene, Simulation, Uniform, checked_mesh, effects
-from taichi_dem.diagnostics.missing_effects import LEAST_OVERLAP, MissingEffects, unserved
+from taichi_dem import CONCRETE, Multirate, Scene, Simulation, Uniform, checked_mesh, effects, join
+from taichi_dem.diagnostics.missing_effects import (
+    LEAST_OVERLAP,
+    MissingEffects,
+    bond_rounding,
+    unserved,
+)
 from taichi_dem.diagnostics.shared_volume import SharedVolume
 from taichi_dem.engine.model import Model
 from taichi_dem.mesh.contact_spheres import spheres_of_faces
@@ -268,3 +274,14 @@ def test_nothing_is_missed_in_bodies_that_fly_apart():
     looked = Watched(apart(3, EDGE))
     assert looked.look(2.0 * looked.model.centre) == {}
     assert looked.findings() == ()
+
+
+def test_rounding_of_a_bond_is_that_of_its_own_coordinates():
+    """Bodies that have flown 10 km make no other bond rounder."""
+    model = Model(join(pair(), pair().moved(by=(1.0, 0.0, 0.0))), CONCRETE, ())
+    near, far = (model.centre + flown * (model.centre > 0.5) for flown in (0.0, 1e4))
+    first, second = (
+        bond_rounding(model, SimpleNamespace(position=SimpleNamespace(to_numpy=place.copy)), 1)
+        for place in (near, far)
+    )
+    assert first[0] == second[0] and first[1] < 1e-6 * second[1]
