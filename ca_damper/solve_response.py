@@ -274,5 +274,6 @@ def _expenses(job, done, made):
         return
     for tolerance in sorted({*_ASKED_OFTEN, job.tolerance}, reverse=True):
         is_paid = tolerance == job.tolerance and made.reached
-        more = max(1.0, (made.share / tolerance) ** 2)
+        wider = made.share / tolerance
+        more = max(1.0, wider * wider)
         yield Expense(tolerance, paid if is_paid else fixed + (paid - fixed) * more, is_paid)

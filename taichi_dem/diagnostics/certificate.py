@@ -91,7 +91,24 @@ class Certificate:
     @property
     def holds(self) -> bool:
         """Whether no audit found a miss, and no more impulse was left out than asked for."""
-        return not any(audit.misses for audit in self.audits) and self.impulse <= self.sleep
+        return not self.failure
+
+    @property
+    def failure(self) -> str:
+        """Why the certificate does not hold, in words; ``""`` where it holds."""
+        missed = [
+            f"an audit of {audit.audited:,} skipped {audit.what} found {audit.misses:,} misses"
+            for audit in self.audits
+            if audit.misses
+        ]
+        if not self.impulse <= self.sleep:
+            missed.append(f"sleep left out {self.impulse:.2g} of the impulse, {self.sleep:g} asked")
+        return ", and ".join(missed)
+
+    @property
+    def remedy(self) -> str:
+        """What settles what it leaves open, in words."""
+        return "run the scene with effects='all'"
 
     def __repr__(self):
         return in_brief(self, *map(str, self.acting), "" if self.holds else "does not hold")
@@ -130,7 +147,7 @@ class Certificate:
             *(f"audit: {audit}" for audit in self.audits if audit.skipped),
         ]
         if not self.holds:
-            lines.append("this certificate does not hold: run the scene with effects='all'")
+            lines.append(f"this certificate does not hold, as {self.failure}: {self.remedy}")
         return "\n".join(lines)
 
     def _sleep_line(self):
