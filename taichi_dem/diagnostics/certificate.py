@@ -96,11 +96,7 @@ class Certificate:
     @property
     def failure(self) -> str:
         """Why the certificate does not hold, in words; ``""`` where it holds."""
-        missed = [
-            f"an audit of {audit.audited:,} skipped {audit.what} found {audit.misses:,} misses"
-            for audit in self.audits
-            if audit.misses
-        ]
+        missed = [audit.failure for audit in self.audits if audit.misses]
         if not self.impulse <= self.sleep:
             missed.append(f"sleep left out {self.impulse:.2g} of the impulse, {self.sleep:g} asked")
         return ", and ".join(missed)
