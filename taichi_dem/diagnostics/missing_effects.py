@@ -10,6 +10,7 @@ import numpy as np
 from taichi_dem.diagnostics.readings import Readings
 from taichi_dem.diagnostics.shared_volume import SharedVolume
 from taichi_dem.mesh.contact_spheres import ContactSpheres, spheres_of_faces
+from taichi_dem.mesh.tetrahedra import penetration
 from taichi_dem.physics.sphere_pair import CONTACT
 from taichi_dem.scene import REMEDY, remedy
 from taichi_dem.step.schedule import Schedule
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     from taichi_dem.engine.state import State
 
 _EPSILON = np.finfo(np.float64).eps
+#: Roundings of a coordinate by which two bodies side by side may seem to overlap.
+_ROUNDINGS = 16.0
 #: Overlap of two spheres, as a share of the distance at which they touch, below which they count
 #: as apart: coordinates of a mesh file may be rounded to seven digits.
 LEAST_OVERLAP = 1e-4
@@ -147,12 +150,21 @@ class MissingEffects:
         if self.volume.sample(time_s):
             self._see_bodies(self.needed, self.volume, time_s)
         if self.model.bond_count and "contact" in self.needed:
-            self.needed["contact"].see(np.flatnonzero(self.readings.pressed()), time_s)
+            self.needed["contact"].see(self._pressed(), time_s)
         if self.model.bond_count and "dashpot" in self.needed:
             self.strain = np.maximum(self.strain, self.readings.bonds()[:, 0])
         if "friction" in self.needed:
             active = self.state.active_effects.to_numpy()[: self.model.body_count]
             self.needed["friction"].see(np.flatnonzero(active & CONTACT), time_s)
+
+    def _pressed(self):
+        """Released bonds whose bodies are within each other, by more than rounding."""
+        top, (place, turn) = self.model.topology, self.volume.now()
+        bonds = np.flatnonzero(self.state.broken_tick.to_numpy()[: self.model.bond_count] != NEVER)
+        ends = top.master[bonds], top.slave[bonds]
+        depth = penetration(*(self.volume.corners(place, turn, bodies) for bodies in ends))
+        reach = np.abs(place).max() + self.model.body_radius.max()
+        return bonds[depth > _ROUNDINGS * _EPSILON * reach]
 
     def _see_bodies(self, needed, volume, time_s):
         """Take in the bodies within each other of a look."""

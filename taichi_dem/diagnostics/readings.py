@@ -149,15 +149,11 @@ class Readings:
         """
         return self._bonds()[:, 8]
 
-    def pressed(self) -> np.ndarray:
-        """Whether every bond is released and its faces overlap, (n,)."""
-        return self._bonds()[:, 9] > 0.0
-
     def _bonds(self):
         return self._once("bonds", self._bond_table)
 
     def _bond_table(self):
-        table = np.zeros((int(values(self.tables.bond_count)), 10))
+        table = np.zeros((int(values(self.tables.bond_count)), 9))
         self._visit_bonds(table)
         return table
 
@@ -180,7 +176,6 @@ class Readings:
                 self._note_laws(table, b, u, holds)
             if not holds:
                 table[b, 5] = 1.0
-                table[b, 9] = ti.cast(self.advance.bond_opening(b)[0] < 0.0, ti.f64)
 
     @ti.func
     def _note_laws(self, table: ti.template(), b, u, holds):
