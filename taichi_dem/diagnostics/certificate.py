@@ -71,6 +71,8 @@ class Certificate:
         Audit of each kind of skipped evaluation.
     left_out : tuple of Estimate
         Estimate of each effect that no law of the scene serves.
+    missing : tuple of MissingEffect, default ()
+        Effects that were left out and would have acted.
     """
 
     acting: tuple[Acting, ...]
@@ -82,6 +84,7 @@ class Certificate:
     energy: float
     audits: tuple[Audit, ...]
     left_out: tuple[Estimate, ...]
+    missing: tuple[Any, ...] = ()
 
     @property
     def law_ratio(self) -> float:
@@ -90,7 +93,7 @@ class Certificate:
 
     @property
     def holds(self) -> bool:
-        """Whether no audit found a miss, and no more impulse was left out than asked for."""
+        """Whether no audit found a miss, sleep left out no more than asked, nothing is missed."""
         return not self.failure
 
     @property
@@ -99,12 +102,14 @@ class Certificate:
         missed = [audit.failure for audit in self.audits if audit.misses]
         if not self.impulse <= self.sleep:
             missed.append(f"sleep left out {self.impulse:.2g} of the impulse, {self.sleep:g} asked")
-        return ", and ".join(missed)
+        return ", and ".join([*missed, *(one.what for one in self.missing)])
 
     @property
     def remedy(self) -> str:
         """What settles what it leaves open, in words."""
-        return "run the scene with effects='all'"
+        if not self.missing:
+            return "run the scene with effects='all'"
+        return f"list {', '.join(one.effect for one in self.missing)}"
 
     def __repr__(self):
         return in_brief(self, *map(str, self.acting), "" if self.holds else "does not hold")
@@ -199,6 +204,7 @@ def certificate_of(run: Any, report: Any) -> Certificate:
         energy=left_energy,
         audits=_audits(run.step.audit, skipped),
         left_out=_not_served(run, energy),
+        missing=report.missing_effects,
     )
 
 

@@ -53,7 +53,7 @@ class Watched:
         (CONCRETE, [*BONDS, effects.SphereContact()], {"friction"}),
         (CONCRETE, [*BONDS, effects.SphereContact(outer_faces=False)], {"friction", "bare"}),
         (LOSSLESS, [*BONDS, effects.SphereContact()], set()),
-        (CONCRETE, [*BONDS, effects.SphereContact(), effects.Friction()], set()),
+        (CONCRETE, [*BONDS, effects.SphereContact(), effects.Friction()], {"creep"}),
         (CONCRETE, [*BONDS, effects.SphereContact(), effects.StickingFriction()], set()),
         (CONCRETE, [effects.Softening().silent(), *BONDS[::2]], {"tension", "contact", "bodies"}),
     ],
