@@ -12,6 +12,8 @@ from taichi_dem.kit.display import counted, in_brief
 EFFECTS = ("listed", "auto")
 #: Verdicts of an estimate.
 NEGLIGIBLE, UNCLEAR, NEEDED = "negligible", "unclear", "needed"
+#: What makes all contact tests.
+_REMEDY = "run it with search='cells', which skips no contact test"
 #: Shares below which an effect is negligible, and from which on it is needed.
 _NEGLIGIBLE, _NEEDED = 1e-3, 1e-2
 
@@ -143,6 +145,17 @@ class Certificate:
     audit: Optional[Audit] = None
     periods: Optional[Periods] = None
 
+    @property
+    def failure(self) -> str:
+        """Why the certificate does not hold, and what would settle it; ``""`` where it holds."""
+        missed = "" if self.audit is None else self.audit.failure
+        return missed and f"the certificate does not hold, as {missed}: {_REMEDY}"
+
+    @property
+    def holds(self) -> bool:
+        """Whether no audit found a miss."""
+        return not self.failure
+
     def rows(self) -> list[tuple[str, str]]:
         """Lines of a report.
 
@@ -156,6 +169,7 @@ class Certificate:
         found += [("estimated", f"{one.effect}, {one}") for one in self.estimates]
         audit = self.audit if self.audit is not None and self.audit.skipped else None
         found += [("audit", str(audit))] if audit else []
+        found += [("", self.failure)] if self.failure else []
         found += [("periodic", str(self.periods))] if self.periods is not None else []
         return found
 

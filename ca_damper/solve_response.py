@@ -25,7 +25,7 @@ from ca_damper.goals import Goal
 from ca_damper.oscillator import Oscillator
 from ca_damper.progress import OpenEnded
 from ca_damper.response import Grid
-from taichi_dem.kit.accuracy.answer import Answer, ErrorParts, Expense, Plan
+from taichi_dem.kit.accuracy.answer import Answer, ErrorParts, Expense, Plan, doubted
 from taichi_dem.kit.accuracy.branches import BranchedAnswer, branches_of, clusters_of, sentence
 from taichi_dem.kit.accuracy.student import t_quantile
 from taichi_dem.kit.display import counted
@@ -116,7 +116,9 @@ def solve_response(
         question.listener = OpenEnded(listener)
         reduction, estimates = _answered(question)
         question.listener.end()
-    answers = tuple(_answer(question, reduction, found) for found in estimates)
+    failures = reduction.runs.failures
+    made = (_answer(question, reduction, found) for found in estimates)
+    answers = tuple(doubted(answer, *failures) for answer in made)
     return answers if isinstance(goal, (list, tuple)) else answers[0]
 
 
@@ -274,5 +276,6 @@ def _expenses(job, done, made):
         return
     for tolerance in sorted({*_ASKED_OFTEN, job.tolerance}, reverse=True):
         is_paid = tolerance == job.tolerance and made.reached
-        more = max(1.0, (made.share / tolerance) ** 2)
+        wider = made.share / tolerance
+        more = max(1.0, wider * wider)
         yield Expense(tolerance, paid if is_paid else fixed + (paid - fixed) * more, is_paid)

@@ -103,8 +103,8 @@ def batch_means(series: np.ndarray, batches: int = BATCHES) -> tuple[np.ndarray,
 def correlation(series: np.ndarray) -> float:
     """Correlation of neighbours in a series, in [0, 0.98], corrected for its length."""
     apart = series - series.mean()
-    total = float(apart @ apart)
-    if total <= (_ROUNDING * abs(float(series.mean()))) ** 2 * len(series):
+    total, rounding = float(apart @ apart), _ROUNDING * abs(float(series.mean()))
+    if total <= rounding * rounding * len(series):
         return 0.0
     found = float(apart[1:] @ apart[:-1]) / total
     return min(_MOST_CORRELATED, max(0.0, found + (1.0 + 3.0 * found) / len(series)))

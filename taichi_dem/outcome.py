@@ -3,6 +3,7 @@
 Two methods that solve one scene are compared by their outcomes.
 """
 
+import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -95,7 +96,7 @@ def outcome_of(
 def displacement_error(run: Outcome, reference: Outcome) -> float:
     """RMS over all bodies of the difference in displacement, as a share of the reference's RMS."""
     true = np.array(reference.moved)
-    return float(np.linalg.norm(np.array(run.moved) - true) / np.linalg.norm(true))
+    return _over(float(np.linalg.norm(np.array(run.moved) - true)), float(np.linalg.norm(true)))
 
 
 def faces_error(run: Outcome, reference: Outcome) -> float:
@@ -110,4 +111,9 @@ def energy_error(run: Outcome, reference: Outcome) -> float:
     Half, as what is missing in one term is too much in another.
     """
     apart = sum(abs(run.energy[name] - reference.energy[name]) for name in SPLIT)
-    return 0.5 * apart / abs(reference.energy["load_work"])
+    return _over(0.5 * apart, abs(reference.energy["load_work"]))
+
+
+def _over(apart, whole):
+    """A difference over the size of a reference; infinite where only the reference is zero."""
+    return apart / whole if whole else math.inf if apart else 0.0

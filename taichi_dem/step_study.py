@@ -78,5 +78,6 @@ class StepStudy:
         """Evaluations of a failed run: those of the next finer by steps, or its own to the end."""
         near = max((at for at, run in self.runs.items() if not run.failure), default=None)
         if near is None:
-            return failed.evaluations * self.until / failed.reached_s
+            gone = failed.reached_s / self.until
+            return failed.evaluations / gone if gone else failed.evaluations
         return self.runs[near].evaluations * near / step

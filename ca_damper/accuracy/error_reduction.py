@@ -255,7 +255,7 @@ class Reduction:
                 self.dt /= 2.0
                 return True
             source = "chance" if _seeds_blur(found) else "cycles"
-        factor = min(2.5, max(1.25, excess**2))
+        factor = min(2.5, max(1.25, excess * excess))
         if source == "grid":
             self.lattice.level += 1
         elif source == "cycles":

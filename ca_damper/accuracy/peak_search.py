@@ -82,8 +82,10 @@ class PeakSearch:
         self._measure([self.lattice.ratio(k, 0) for k in ends])
         while True:
             ratio, wanted = self._peak()
-            level = max(0, math.ceil(math.log2(self.lattice.spacing / wanted)))
-            step = min(level, _DEEPEST, self.lattice.level + 3)
+            # A plateau wants no finer spacing; beside a zero or no number, none is fine enough.
+            widest = self.lattice.spacing
+            wanted = min(widest, max(widest / 2.0**_DEEPEST, wanted))
+            step = min(math.ceil(math.log2(widest / wanted)), self.lattice.level + 3)
             self.lattice.level = max(self.lattice.level, step)
             missing = [one for one in self.lattice.around(ratio) if one not in self.found]
             if not missing:

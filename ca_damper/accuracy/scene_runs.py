@@ -49,6 +49,12 @@ class SceneRuns:
         """Number of scenes that were started."""
         return len(self._records)
 
+    @property
+    def failures(self) -> list[str]:
+        """Why certificates of the runs do not hold, and what would settle it."""
+        batches = {id(batch): batch for batch, _ in self._homes.values()}
+        return sorted({batch.certificate.failure for batch in batches.values()})
+
     def cycles(self, key: SceneKey) -> int:
         """Number of cycles that a scene has gone."""
         return len(self._records[key]) if key in self._records else 0

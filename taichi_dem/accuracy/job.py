@@ -17,8 +17,9 @@ from taichi_dem.stability.step_report import step_report
 _FEWEST, _MOST_TIMES = 8, 64
 #: Sweeps of a step at most, and by how much better they agree to see their error.
 _MOST_SWEEPS, _TIGHT = 1000, 8
-#: Rows of the time series of the coarsest run in which an extreme is looked for, and of any run.
-_ROWS, _MOST_ROWS = 100, 6400
+#: Rows of the time series of the coarsest run in which an extreme is looked for, of any run, and of
+#: one without an extreme: its report finds at them what is missing or creeps.
+_ROWS, _MOST_ROWS, _LOOKS = 100, 6400, 4
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,7 @@ class Job:
 
     def rows(self, level: int) -> int:
         """Rows of the time series of a run at a level, of which an extreme needs ever more."""
-        return min(_MOST_ROWS, _ROWS * 2**level) if self.goal.kind == "extreme" else 1
+        return min(_MOST_ROWS, _ROWS * 2**level) if self.goal.kind == "extreme" else _LOOKS
 
 
 @dataclass(frozen=True)

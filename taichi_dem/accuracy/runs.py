@@ -15,6 +15,7 @@ from taichi_dem.result import Result
 from taichi_dem.simulate import result_of, run_simulation
 from taichi_dem.simulation import Simulation
 
+_EPSILON = np.finfo(np.float64).eps
 #: How far a twin's bodies are displaced at the start, as a share of the size of the solid.
 _ROUNDING = 1e-12
 #: Share of the whole that the first run is taken for.
@@ -84,7 +85,7 @@ class Runs:
     def peak_change(self, coarse: int, fine: int) -> float:
         """Difference of a usual body's largest speed at two levels, as a share of the finer."""
         slower, faster = (self.results[level].peak_speed for level in (coarse, fine))
-        return _share(np.abs(slower - faster), faster)
+        return _share(np.abs(slower - faster), faster, _EPSILON * faster.max())
 
     def leap(self, coarse: int, fine: int) -> float:
         """Change of a number of broken faces between two levels that may go unseen, as a share.
@@ -143,15 +144,17 @@ def _apart(frame, finer):
     """Difference of the displacements of a usual body, as a share of a usual one."""
     ways = finer.displacement, frame.displacement - finer.displacement
     moved, apart = (np.linalg.norm(way, axis=1) for way in ways)
-    return _share(apart, moved)
+    return _share(apart, moved, _EPSILON * np.abs(finer.position).max())
 
 
-def _share(apart, whole):
+def _share(apart, whole, rounding):
     """Difference of a usual body as a share of a usual value.
 
-    Usual: in the middle of all, so that a few fragments that fly elsewhere do not count.
+    Usual: in the middle of all, so that a few fragments that fly elsewhere do not count. rounding:
+    of a value; a difference within it is none.
     """
-    return float(np.median(apart)) / max(float(np.median(whole)), 1e-300)
+    usual = float(np.median(apart))
+    return 0.0 if usual <= rounding else usual / max(float(np.median(whole)), rounding)
 
 
 def _displaced(simulation, seed):

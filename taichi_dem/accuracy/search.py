@@ -9,10 +9,11 @@ import numpy as np
 
 from taichi_dem.accuracy.job import Job
 from taichi_dem.accuracy.runs import Runs
-from taichi_dem.kit.accuracy.answer import Answer, ErrorParts, Expense, Plan
+from taichi_dem.diagnostics.energy_balance import open_account
+from taichi_dem.kit.accuracy.answer import Answer, ErrorParts, Expense, Plan, doubted
 from taichi_dem.kit.accuracy.branches import BranchedAnswer, branches_of, clusters_of, sentence
 from taichi_dem.kit.accuracy.step_error import StepError, step_error
-from taichi_dem.kit.accuracy.student import t_quantile
+from taichi_dem.kit.accuracy.student import mean_and_deviation, t_quantile
 from taichi_dem.kit.errors import InputError, SimulationDiverged
 
 #: Halvings of the step until one is stable, and from there on; of one refinement.
@@ -24,6 +25,10 @@ _NEGLIGIBLE, _TWO = 0.25, 2.8
 _FEW, _MANY = 6, 96
 #: Runs there must be of each end, on average, to call it one: more ends are a distribution.
 _OF_EACH = 3
+#: Spread over what is allowed from which on no mean of runs has it, and halvings that none affords.
+_HOPELESS, _BEYOND = 1e6, 1000
+#: Share of all bodies that a run with all effects is compared with, at least.
+_LEAST_AWAKE = 1e-3
 #: Tolerances of which the cost is told.
 _TOLERANCES = (0.1, 0.03, 0.01, 0.003)
 
@@ -66,7 +71,8 @@ class Search:
             cost_curve=tuple(self._cost_curve()),
             shortfall=self._shortfall(),
         )
-        return self._branched(made) if parts.chance > self._allowed else made
+        made = self._branched(made) if parts.chance > self._allowed else made
+        return doubted(made, *self._doubts(self.runs.results[last].report))
 
     def _branched(self, made: Answer) -> Answer:
         """The answer with its branches, where twins come to a few ends; else as it is."""
@@ -114,8 +120,9 @@ class Search:
 
     def _value(self, level):
         """Value at a level; where one run means little, the mean over a run and its twins."""
-        many = self.job.goal.averaged
-        return float(np.mean(self._sample(level) if many else [self._single(level)]))
+        if not self.job.goal.averaged:
+            return self._single(level)
+        return mean_and_deviation(self._sample(level))[0]
 
     def _step(self, count: Optional[int] = None) -> StepError:
         """Error of the step, and of sweeps whose tolerance falls with it; count: of levels."""
@@ -145,7 +152,7 @@ class Search:
         tight = self.runs.value(first, 0, True)
         sweeps = math.inf if tight is None else abs(tight - self._single(first))
         sweeps = min(step, sweeps * 2.0 ** (first - self.levels[-1]))
-        return ErrorParts(step=math.sqrt(step**2 - sweeps**2), solver=sweeps, chance=chance)
+        return ErrorParts(step=_beside(step, sweeps), solver=sweeps, chance=chance)
 
     def _spread(self):
         """Half-width by which runs that differ by one rounding spread, of one or of their mean.
@@ -170,9 +177,10 @@ class Search:
         if self.count < _FEW - 1 and self._affords(_FEW - 1.0 - self.count, coarse):
             self.count = _FEW - 1
         found = self._sample(coarse)
-        if len(found) < 2:
+        if len(found) <= self.count:
             return math.inf
-        spread = float(np.std(found, ddof=1)) * t_quantile(self.job.confidence, len(found) - 1)
+        _, spread = mean_and_deviation(found)
+        spread *= t_quantile(self.job.confidence, len(found) - 1)
         return spread / math.sqrt(len(found)) if averaged else spread
 
     @property
@@ -198,11 +206,11 @@ class Search:
     def _chaotic(self):
         """Why no single run answers, and what would."""
         found = self._sample(self.twins_at)
-        if len(found) < 2:
+        if len(found) <= self.count:
             return f"runs that differ by one rounding diverged: {self.runs.failure}"
-        width = t_quantile(self.job.confidence, math.inf) * float(np.std(found, ddof=1))
+        width = t_quantile(self.job.confidence, math.inf) * mean_and_deviation(found)[1]
         words = f"runs that differ by one rounding spread by {self._percent(width)}"
-        if not self._allowed:
+        if not self._allowed or not width / self._allowed < _HOPELESS:
             return words
         needed = max(2, math.ceil(2.0 * (width / self._allowed) ** 2))
         seconds = needed * sum(self.runs.cost[level] for level in self.levels[:2])
@@ -224,8 +232,8 @@ class Search:
             self._give_up(f"half of a step of {self.methods.at(last).dt0:.2g} s changes as much")
             return
         if not self._eventful:
-            wanted = math.log2(parts.total / max(self._allowed, 1e-300)) / self.methods.declared
-            more = min(_MOST_AT_ONCE, max(1, math.ceil(wanted)))
+            wanted = _halvings(parts.total, self._allowed, self.methods.declared)
+            more = int(min(_MOST_AT_ONCE, max(1, wanted)))
         while more > 1 and not self._affords(2.0**more, last):
             more, self.why = more - 1, ""
         if self._affords(2.0**more * (self.count + 1 if self.job.goal.averaged else 1), last):
@@ -252,6 +260,17 @@ class Search:
         unit = self.job.goal.unit
         return f"{100.0 * error / size:.2g} %" if size else f"{error:.2g} {unit} about zero"
 
+    def _doubts(self, report):
+        """Reasons to doubt the finest run, and what would settle each."""
+        yield from open_account(report.energy_balance, report.round_off_J)
+        found = report.certificate
+        if found is not None and not found.holds:
+            seconds = self.runs.seconds / max(_LEAST_AWAKE, 1.0 - found.asleep)
+            yield (
+                f"the certificate of its run does not hold, as {found.failure}: {found.remedy}, "
+                f"about {seconds:.2g} s"
+            )
+
     def _shortfall(self):
         return f"{100.0 * self.job.tolerance:g} % was not reached: {self.why}" if self.why else ""
 
@@ -266,6 +285,21 @@ class Search:
             step, seconds = stages[-1]
             unseen = 1.0 if self._eventful else self.methods.declared
             order = step.order if step.regular else unseen
-            ratio = step.error / max(tolerance * size, 1e-300)
-            predicted = seconds * 2.0 ** math.ceil(math.log2(max(1.0, ratio)) / order)
+            more = _halvings(step.error, tolerance * size, order)
+            predicted = seconds * (2.0**more if more < _BEYOND else math.inf)
             yield Expense(tolerance, float(enough[0] if enough else predicted), bool(enough))
+
+
+def _beside(whole, part):
+    """Root of the difference of two squares, without squares, which may be beyond all numbers."""
+    if whole == part:
+        return 0.0
+    return math.sqrt(whole - part) * math.hypot(math.sqrt(whole), math.sqrt(part))
+
+
+def _halvings(error, allowed, order):
+    """Halvings of a step, 0 or more, that bring an error of an order to what is allowed."""
+    if error <= allowed:
+        return 0
+    ratio = error / allowed if allowed else math.inf
+    return math.inf if math.isinf(ratio) else math.ceil(math.log2(ratio) / order)

@@ -322,15 +322,19 @@ def _next(history, name, target):
     """Constant that is expected to give a strength: by the power law through the last two rounds.
 
     In proportion after the first, or where the constant hardly changed, as the strength then rather
-    follows the other constants. Powers lie from 1/3 to 3, so that noise leads nowhere far.
+    follows the other constants. Powers lie from 1/3 to 3, so that noise leads nowhere far. NaN for
+    a specimen that showed no strength.
     """
     value, found = history[-1][name]
+    if not found > 0.0:
+        return math.nan
     power = 1.0
     if len(history) > 1:
         before, shown = history[-2][name]
         if abs(value / before - 1.0) > 0.05:
             power = np.clip(np.log(found / shown) / np.log(value / before), 1.0 / 3.0, 3.0)
-    return float(value * (target / found) ** (1.0 / power))
+    with np.errstate(over="ignore"):
+        return float(value * np.float64(target / found) ** (1.0 / power))
 
 
 def with_moduli(material: Material, normal: float, shear: float) -> Material:

@@ -76,6 +76,8 @@ class Certificate:
         Audit of each kind of skipped evaluation.
     left_out : tuple of Estimate
         Estimate of each effect that no law of the scene serves.
+    missing : tuple of MissingEffect, default ()
+        Effects that were left out and would have acted.
     """
 
     acting: tuple[Acting, ...]
@@ -87,6 +89,7 @@ class Certificate:
     energy: float
     audits: tuple[Audit, ...]
     left_out: tuple[Estimate, ...]
+    missing: tuple[Any, ...] = ()
 
     @property
     def law_ratio(self) -> float:
@@ -95,8 +98,25 @@ class Certificate:
 
     @property
     def holds(self) -> bool:
-        """Whether no audit found a miss, and no part left out more impulse than asked for."""
-        return not any(audit.misses for audit in self.audits) and self.impulse <= self.sleep
+        """Whether no audit found a miss, no part left out more than asked, nothing is missed."""
+        return not self.failure
+
+    @property
+    def failure(self) -> str:
+        """Why the certificate does not hold, in words; ``""`` where it holds."""
+        missed = [audit.failure for audit in self.audits if audit.misses]
+        if not self.impulse <= self.sleep:
+            missed.append(
+                f"sleep left out {self.impulse:.2g} of a part's impulse, {self.sleep:g} asked"
+            )
+        return ", and ".join([*missed, *(one.what for one in self.missing)])
+
+    @property
+    def remedy(self) -> str:
+        """What settles what it leaves open, in words."""
+        if not self.missing:
+            return "run the scene with effects='all'"
+        return f"list {', '.join(one.effect for one in self.missing)}"
 
     def __repr__(self):
         return in_brief(self, *map(str, self.acting), "" if self.holds else "does not hold")
@@ -135,7 +155,7 @@ class Certificate:
             *(f"audit: {audit}" for audit in self.audits if audit.skipped),
         ]
         if not self.holds:
-            lines.append("this certificate does not hold: run the scene with effects='all'")
+            lines.append(f"this certificate does not hold, as {self.failure}: {self.remedy}")
         return "\n".join(lines)
 
     def _sleep_line(self):
@@ -193,6 +213,7 @@ def certificate_of(run: Any, report: Any) -> Certificate:
         energy=left_energy,
         audits=_audits(run.step.audit, skipped),
         left_out=_not_served(run, scales, energy),
+        missing=report.missing_effects,
     )
 
 

@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Optional, Union
 
 import numpy as np
 
+from taichi_dem.diagnostics.creep import Creep
 from taichi_dem.diagnostics.readings import Readings
 from taichi_dem.diagnostics.shared_volume import SharedVolume
 from taichi_dem.mesh.contact_spheres import ContactSpheres, spheres_of_faces
+from taichi_dem.mesh.tetrahedra import penetration
 from taichi_dem.physics.sphere_pair import CONTACT
 from taichi_dem.scene import REMEDY, remedy
 from taichi_dem.step.schedule import Schedule
@@ -20,6 +22,8 @@ if TYPE_CHECKING:
     from taichi_dem.engine.state import State
 
 _EPSILON = np.finfo(np.float64).eps
+#: Roundings of a coordinate by which two bodies side by side may seem to overlap.
+_ROUNDINGS = 16.0
 #: Overlap of two spheres, as a share of the distance at which they touch, below which they count
 #: as apart: coordinates of a mesh file may be rounded to seven digits.
 LEAST_OVERLAP = 1e-4
@@ -85,6 +89,8 @@ _NEEDS = {
     "dashpot": ("BondDamping", "the material has damping and bonds are strained", "bond"),
     "contact": ("SphereContact", "bodies overlap where a bond has been released", "bond"),
     "friction": ("Friction", "the material has friction and bodies press on each other", "body"),
+    # The words tell the figures, once they are known.
+    "creep": ("StickingFriction", "", "body"),
     "bodies": ("SphereContact", "pairs of bodies are within each other", "body"),
     "bare": (
         REMEDY,
@@ -104,6 +110,7 @@ def unserved(model: "Model") -> dict[str, MissingEffect]:
         "dashpot": "dashpot" not in roles and material.has_bond_damping,
         "contact": "contact" not in roles,
         "friction": "contact" in roles and "friction" not in roles and material.friction > 0.0,
+        "creep": any(material.friction > 0.0 and not e.remembers for e in _friction(model)),
         "bodies": "contact" not in roles,
         "bare": "contact" in roles and not model.contact.outer_faces,
     }
@@ -118,6 +125,11 @@ def unserved(model: "Model") -> dict[str, MissingEffect]:
         # Friction is a dashpot's force up to a limit: without a dashpot springs alone hold.
         found["friction"].effect = "StickingFriction"
     return found
+
+
+def _friction(model):
+    """The law of friction of a model, if one is listed."""
+    return [effect for effect in model.effects if effect.name and effect.role == "friction"]
 
 
 class MissingEffects:
@@ -139,6 +151,7 @@ class MissingEffects:
         self.model, self.state, self.readings = model, state, readings
         self.volume, self.schedule, self.last_s = volume, schedule, -1.0
         self.needed = unserved(model)
+        self.creep = Creep(model, state, readings) if "creep" in self.needed else None
         self.strain, self.leap = np.zeros(model.bond_count), 0.0
 
     def sample(self, time_s: float) -> None:
@@ -150,12 +163,24 @@ class MissingEffects:
         if self.volume.sample(time_s):
             self._see_bodies(self.needed, self.volume, time_s)
         if self.model.bond_count and "contact" in self.needed:
-            self.needed["contact"].see(np.flatnonzero(self.readings.pressed()), time_s)
+            self.needed["contact"].see(self._pressed(), time_s)
         if self.model.bond_count and "dashpot" in self.needed:
             self.strain = np.maximum(self.strain, self.readings.bonds()[:, 0])
         if "friction" in self.needed:
             active = self.state.active_effects.to_numpy()[: self.model.body_count]
             self.needed["friction"].see(np.flatnonzero(active & CONTACT), time_s)
+
+        if self.creep is not None:
+            self.needed["creep"].see(self.creep.sample(time_s), time_s)
+
+    def _pressed(self):
+        """Released bonds whose bodies are within each other, by more than rounding."""
+        top, (place, turn) = self.model.topology, self.volume.now()
+        bonds = np.flatnonzero(self.state.broken_tick.to_numpy()[: self.model.bond_count] != NEVER)
+        ends = top.master[bonds], top.slave[bonds]
+        depth = penetration(*(self.volume.corners(place, turn, bodies) for bodies in ends))
+        reach = np.abs(place).max() + self.model.body_radius.max()
+        return bonds[depth > _ROUNDINGS * _EPSILON * reach]
 
     def _see_bodies(self, needed, volume, time_s):
         """Take in the bodies within each other of a look."""
@@ -210,6 +235,7 @@ class MissingEffects:
             "needed": np.array(rows, dtype=np.float64).reshape(-1, 3),
             "looks": np.array([self.last_s, self.leap]),
             "strain": self.strain.copy(),
+            **(self.creep.saved() if self.creep is not None else {}),
         }
 
     def resume(self, saved: Mapping[str, np.ndarray]) -> None:
@@ -218,6 +244,8 @@ class MissingEffects:
             finding.count, finding.where, finding.first_s = int(row[0]), int(row[1]), row[2]
         self.last_s, self.leap = saved["looks"].tolist()
         self.strain = saved["strain"].copy()
+        if self.creep is not None:
+            self.creep.resume(saved)
 
     def findings(self, volume: Optional[SharedVolume] = None) -> tuple[MissingEffect, ...]:
         """A ``MissingEffect`` for each effect that would have acted; a tuple, empty for none.
@@ -236,6 +264,8 @@ class MissingEffects:
             substeps = int(self.schedule.evaluations[0])
             rounding = bond_rounding(self.model, self.state, substeps)
             needed["dashpot"].see(np.flatnonzero(self.strain > rounding), self.last_s)
+        if self.creep is not None:
+            needed["creep"].what = self.creep.words()
         found = [finding for finding in needed.values() if finding.count]
         return tuple(replace(one, place_m=self._position_of(one)) for one in found)
 

@@ -47,18 +47,28 @@ class Readings:
             self._held[name] = read()
         return self._held[name]
 
+    def rubbing(self) -> tuple[np.ndarray, np.ndarray]:
+        """Both bodies of every pair near each other, (pairs, 2), and of their contacts, (3, pairs).
+
+        Sums of friction, of its limit [N], and of its power [W].
+        """
+        _, table = self.pushes()
+        bodies = self.contacts.store.near_bodies() if len(table) else np.zeros((0, 2), np.int32)
+        return bodies, table[:, 2:].T
+
     def pushes(self) -> tuple[np.ndarray, np.ndarray]:
         """Impulses [N s] and moments [N m s] of contacts in half a step, (body_count, 6).
 
         Summed in the order of the pairs, so that no thread changes a bit. Also the heat of each
-        pair's dashpots and friction by which the booked one is behind [J], (pairs, 2).
+        pair's dashpots and friction by which the booked one is behind [J], and the sums of
+        ``rubbing``, (pairs, 5).
         """
         return self._once("pushes", self._pushes)
 
     def _pushes(self):
         pushed = np.zeros((int(values(self.tables.body_count)), 6))
         count = int(values(self.contacts.store.near_count)) if self.contacts is not None else 0
-        table = np.zeros((count, 14))
+        table = np.zeros((count, 17))
         if count:
             bodies = self.contacts.store.near_bodies()
             self._push(table)
@@ -76,6 +86,7 @@ class Readings:
                 table[a, k], table[a, 3 + k] = -half * found.force[k], half * found.moment_i[k]
                 table[a, 6 + k], table[a, 9 + k] = half * found.force[k], half * found.moment_j[k]
             table[a, 12], table[a, 13] = half * found.dragged, half * found.rubbed
+            table[a, 14], table[a, 15], table[a, 16] = found.rub, found.bound, found.rubbed
 
     def bodies(self) -> np.ndarray:
         """Kinetic energy, work of loads, supports, contact heats, ground's heat [J], (n, 7)."""
@@ -149,15 +160,11 @@ class Readings:
         """
         return self._bonds()[:, 8]
 
-    def pressed(self) -> np.ndarray:
-        """Whether every bond is released and its faces overlap, (n,)."""
-        return self._bonds()[:, 9] > 0.0
-
     def _bonds(self):
         return self._once("bonds", self._bond_table)
 
     def _bond_table(self):
-        table = np.zeros((int(values(self.tables.bond_count)), 10))
+        table = np.zeros((int(values(self.tables.bond_count)), 9))
         self._visit_bonds(table)
         return table
 
@@ -180,7 +187,6 @@ class Readings:
                 self._note_laws(table, b, u, holds)
             if not holds:
                 table[b, 5] = 1.0
-                table[b, 9] = ti.cast(self.advance.bond_opening(b)[0] < 0.0, ti.f64)
 
     @ti.func
     def _note_laws(self, table: ti.template(), b, u, holds):
@@ -199,7 +205,7 @@ class Readings:
         table = np.zeros((len(heats), 4))
         if len(heats):
             self._pairs(table)
-            table[:, 1:3] += heats
+            table[:, 1:3] += heats[:, :2]
         return table
 
     @ti.kernel

@@ -6,7 +6,7 @@ apart: no contact, faces without spheres, or contact that is too soft or too spa
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import taichi as ti
@@ -83,20 +83,24 @@ class SharedVolume:
         way = self.way()
         if way <= (0.0 if finished else MOVED):
             return False
-        place, turn = self.seen = self._now()
-        self._compare(place[:, None] + np.einsum("nij,ncj->nci", turn, self.arms))
+        self.seen = self.now()
+        self._compare(self.corners(*self.seen))
         self._note(time_s)
         return True
 
     def way(self) -> float:
         """Longest way of a body since the last look, as a share of its radius."""
-        place, turn = self._now()
+        place, turn = self.now()
         # A motion whose square is no number is that of a runaway, which the divergence check names.
         with np.errstate(over="ignore"):
             way = np.linalg.norm(place - self.seen[0], axis=1) / self.model.body_radius
             return float((way + np.linalg.norm(turn - self.seen[1], axis=(1, 2))).max())
 
-    def _now(self):
+    def corners(self, place: np.ndarray, turn: np.ndarray, bodies: Any = slice(None)) -> np.ndarray:
+        """Corners of some bodies [m], (n, 4, 3), from places and rotations of all."""
+        return place[bodies, None] + np.einsum("nij,ncj->nci", turn[bodies], self.arms[bodies])
+
+    def now(self) -> tuple[np.ndarray, np.ndarray]:
         """Positions [m] and rotations of the bodies."""
         count = self.model.body_count
         return self.state.position.to_numpy()[:count], self.state.rotation.to_numpy()[:count]

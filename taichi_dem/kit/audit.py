@@ -64,6 +64,14 @@ class Audit:
         """Upper bound of the share of misses, with a confidence of 95 %."""
         return misses_bound(self.misses, self.audited)
 
+    @property
+    def failure(self) -> str:
+        """What it found missed, in words; ``""`` where nothing was."""
+        if not self.misses:
+            return ""
+        misses = f"{self.misses:,} miss{'' if self.misses == 1 else 'es'}"
+        return f"an audit of {self.audited:,} skipped {self.what} found {misses}"
+
     def as_dict(self) -> dict[str, Any]:
         """All figures, for a JSON file.
 

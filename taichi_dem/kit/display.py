@@ -69,7 +69,8 @@ def counted(count: int, what: str) -> str:
 
 def prefixed(value: float, unit: str) -> str:
     """A number with its unit, from nano to giga: "20 ms", "3.2 M evaluations/s"."""
-    power = min(3, max(-3, math.floor(math.log10(value) / 3.0 + 1e-9))) if value > 0.0 else 0
+    thousands = math.log10(value) / 3.0 if 0.0 < value < math.inf else 0.0
+    power = min(3, max(-3, math.floor(thousands + 1e-9)))
     prefix = ("n", "µ", "m", "", "k", "M", "G")[power + 3]
     gap = " " if prefix and len(unit) > 3 else ""
     return f"{value / 1e3**power:.3g} {prefix}{gap}{unit}"

@@ -217,16 +217,6 @@ class Advance(BondLaws, ContactForce):
         return power * self.tables.unit_area[b]
 
     @ti.func
-    def bond_opening(self, b):
-        """Normal and shear opening of a bond's face at its middle [m], released or not."""
-        motion = self._motion(b, self.tables.bond_slots[b])
-        mean = zero3()
-        for q in range(3):
-            arm = unit_arm(motion, self.tables.vertex_slave[3 * b + q])
-            mean += unit_opening(motion, arm, self.tables.vertex_master[3 * b + q]) / 3.0
-        return vec2(mean[0], ti.sqrt(mean[1] ** 2 + mean[2] ** 2))
-
-    @ti.func
     def _release(self, b, slots):
         """Release a bond with a failed unit: its faces carry contact spheres from now on."""
         tick = self.state.tick[None]

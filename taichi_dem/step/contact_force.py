@@ -14,8 +14,9 @@ class PairForces:
 
     force: on the second [N]. moment_i, moment_j: about the centre of each [N m]. dragged, rubbed:
     power that dashpots and friction take [W]. slipped: energy of springs that slipped or parted
-    [J]. deepest: largest overlap over the sum of the radii. near_count: spheres within a margin.
-    active: CONTACT and RUBBED, where spheres push and rub.
+    [J]. rub, bound: sums of the sizes of friction and of its limits [N]. deepest: largest overlap
+    over the sum of the radii. near_count: spheres within a margin. active: CONTACT and RUBBED,
+    where spheres push and rub.
     """
 
     force: vec3
@@ -24,6 +25,8 @@ class PairForces:
     dragged: real
     rubbed: real
     slipped: real
+    rub: real
+    bound: real
     deepest: real
     near_count: ti.i32
     active: ti.i64
@@ -78,6 +81,7 @@ class ContactForce:
         turn, offset = place_in(self.state.rotation[i], self.state.rotation[j], branch)
         force, moment_i, moment_j = zero3(), zero3(), zero3()
         dragged, rubbed, slipped, deepest = 0.0, 0.0, 0.0, 0.0
+        all_rub, all_bound = 0.0, 0.0
         scale, near_count, active, m = 1.0, 0, ti.i64(0), self.tables.pair(i, j)
         if ti.static(self.limited):
             scale = self.contact_share(i, j)
@@ -103,6 +107,8 @@ class ContactForce:
                 dragged += (self.contacts.law.elastic(m, overlap) - push) * rate
                 rubbed -= (rub - stuck).dot(slide)
                 slipped += spent
+                all_rub += rub.norm()
+                all_bound += self.tables.friction.limit(m, push)
                 deepest = ti.max(deepest, overlap / near.size)
             elif ti.static(stepping):
                 slipped += self.springs.part(m, k)
@@ -113,6 +119,8 @@ class ContactForce:
             dragged=dragged,
             rubbed=rubbed,
             slipped=slipped,
+            rub=all_rub,
+            bound=all_bound,
             deepest=deepest,
             near_count=near_count,
             active=active,

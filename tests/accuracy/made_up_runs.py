@@ -12,10 +12,12 @@ class MadeUpRuns:
     """Stands for ``taichi_dem.accuracy.runs.Runs``.
 
     formula(level, twin): a value, None for a run that diverges. change: of a usual body between two
-    levels. events: whether anything broke. A run at level k takes 2^k seconds.
+    levels. events: whether anything broke. certificate: of each run. residual: energy [J] that it
+    leaves unexplained, of 1 J. A run at level k takes 2^k seconds.
     """
 
     formula, change_between, events = None, staticmethod(lambda a, b: 0.0), False
+    certificate, residual = None, 0.0
 
     def __init__(self, job, methods, listen):
         self.seconds, self.count, self.failure = 0.0, 0, "it diverged"
@@ -28,7 +30,13 @@ class MadeUpRuns:
             self.known[key] = type(self).formula(level, twin)
             self.cost[level] = 2.0**level
             report = SimpleNamespace(
-                broken_faces=int(self.events), pair_evaluations=0, bond_slip=None
+                broken_faces=int(self.events),
+                pair_evaluations=0,
+                bond_slip=None,
+                certificate=self.certificate,
+                energy_balance={"kinetic": 1.0, "residual": self.residual},
+                round_off_J=0.0,
+                needs=(),
             )
             self.results[level] = SimpleNamespace(report=report)
         return self.known[key]

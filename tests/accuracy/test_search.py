@@ -6,6 +6,8 @@ import pytest
 
 from taichi_dem import BranchedAnswer, InputError, SimulationDiverged, goals
 from taichi_dem.accuracy.job import Job
+from taichi_dem.diagnostics.certificate import Certificate
+from taichi_dem.kit.audit import Audit
 from tests.accuracy.made_up_runs import scattered, searched
 from tests.accuracy.small_bar import UNTIL, struck_bar
 
@@ -56,6 +58,59 @@ def test_twins_that_scatter_get_no_single_number(monkeypatch):
     assert "goal.mean()" in answer.shortfall and answer.plan.parting_s == 0.5
     # Half-width of single runs: about twice the standard deviation, and more for few of them.
     assert 0.3 < answer.parts.chance < 3.0
+
+
+def certified(impulse=0.0, misses=0):
+    """Certificate of a run of which half of all bodies slept."""
+    audit = Audit(1000, 10, misses, "bonds asleep")
+    return Certificate((), 1, 1, 1e-6, 0.5, impulse, 0.0, (audit,), ())
+
+
+@pytest.mark.parametrize("value", [0.0, 3.0])
+@pytest.mark.parametrize(
+    ("certificate", "why"),
+    [
+        (certified(), ""),
+        (certified(impulse=2e-6), "sleep left out 2e-06 of the impulse, 1e-06 asked"),
+        (certified(misses=1), "an audit of 10 skipped bonds asleep found 1 miss"),
+    ],
+)
+def test_a_certificate_that_does_not_hold_is_never_reached(monkeypatch, value, certificate, why):
+    """All levels agree: the bar is zero. Half of the bodies slept: all of them take twice as long.
+
+    The two runs take 1 and 2 s.
+    """
+    answer = searched(monkeypatch, job(), lambda level, twin: value, certificate=certificate)
+    assert answer.error == 0.0 and answer.reached == certificate.holds == (not why)
+    advice = "run the scene with effects='all', about 6 s"
+    words = f"the certificate of its run does not hold, as {why}: {advice}"
+    assert answer.shortfall == (words if why else "")
+
+
+def test_branches_of_runs_in_doubt_tell_both(monkeypatch):
+    more = {"events": True, "change_between": lambda a, b: 0.1, "certificate": certified(1.0)}
+    formula = lambda level, twin: 3.0 if twin % 3 else 4.0  # noqa: E731
+    answer = searched(monkeypatch, job(0.01), formula, **more)
+    assert "came to 2 ends" in answer.shortfall and "does not hold" in answer.shortfall
+
+
+def test_an_answer_whose_energy_is_lost_is_not_reached(monkeypatch):
+    """Of the joule that went through the run, less than half is missing, or more."""
+    for residual, reached in ((0.4, True), (0.6, False)):
+        answer = searched(monkeypatch, job(), lambda level, twin: 3.0, residual=residual)
+        assert answer.reached == reached
+    assert "leaves 0.6 J unexplained" in answer.shortfall
+
+
+def test_twins_of_which_some_diverge_have_no_spread(monkeypatch):
+    """Two of five are lost; those that are left are within a tenth of what is allowed."""
+    answer = searched(
+        monkeypatch,
+        job(0.01),
+        lambda level, twin: None if twin > 3 else 3.0 + 0.003 * (twin > 0),
+        events=True,
+    )
+    assert not answer.reached and "diverged: it diverged" in answer.shortfall
 
 
 def test_the_mean_of_runs_that_scatter_is_found(monkeypatch):

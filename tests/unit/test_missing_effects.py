@@ -19,6 +19,7 @@ from taichi_dem.mesh.contact_spheres import spheres_of_faces
 from taichi_dem.mesh.shapes import bar, pair, single
 from tests.probe import BondProbe
 from tests.scenes import apart, beside, quaternions
+from tests.unit.test_shared_volume import common_volume
 
 EDGE, STEP = 0.05, 1e-7
 TWO = beside(single(EDGE), single(EDGE), [1.0, 0.0, 0.0])
@@ -58,7 +59,7 @@ class Watched:
         (CONCRETE, [*BONDS, effects.SphereContact()], {"friction"}),
         (CONCRETE, [*BONDS, effects.SphereContact(outer_faces=False)], {"friction", "bare"}),
         (LOSSLESS, [*BONDS, effects.SphereContact()], set()),
-        (CONCRETE, [*BONDS, effects.SphereContact(), effects.Friction()], set()),
+        (CONCRETE, [*BONDS, effects.SphereContact(), effects.Friction()], {"creep"}),
         (CONCRETE, [*BONDS, effects.SphereContact(), effects.StickingFriction()], set()),
         (CONCRETE, [effects.Softening().silent(), *BONDS[::2]], {"tension", "contact", "bodies"}),
     ],
@@ -285,3 +286,37 @@ def test_rounding_of_a_bond_is_that_of_its_own_coordinates():
         for place in (near, far)
     )
     assert first[0] == second[0] and first[1] < 1e-6 * second[1]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_released_bonds_are_named_where_their_bodies_share_volume_and_nowhere_else(seed):
+    """Two bodies in drawn poses, against the exact intersection of both; one may have turned."""
+    random, counts = np.random.default_rng(seed), [0, 0]
+    looked = Watched(pair(EDGE))
+    looked.state.broken_tick.fill(0)
+    for _ in range(60):
+        position = looked.model.centre + 0.4 * EDGE * random.standard_normal((2, 3))
+        turn, rotation = quaternions(random, 2)
+        arms = looked.watch.volume.arms
+        first, second = position[:, None] + np.einsum("nij,ncj->nci", rotation, arms)
+        looked.watch.needed = unserved(looked.model)
+        found = looked.look(position, turn, time_s=random.random())
+        meet = common_volume(first, second) > 0.0
+        assert ("contact" in found) == meet
+        counts[meet] += 1
+    assert min(counts) > 10
+
+
+def test_a_body_that_has_turned_its_back_on_its_neighbour_does_not_overlap_it():
+    """By half a turn about z, so that its free corner points at the other, 4.9 mm away.
+
+    Along its turned normal the mean opening of the released bond is 2 h / 4 + 4.9 mm, negative.
+    """
+    looked = Watched(pair(EDGE))
+    looked.state.broken_tick.fill(0)
+    height = EDGE * np.sqrt(2.0 / 3.0)
+    back = np.array([[0.0, 0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0]])
+    for gap, expected in ((4.9e-3, 0), (-4.9e-3, 1)):
+        position = looked.model.centre + np.outer([0.0, 1.0], [0.5 * height + gap, 0.0, 0.0])
+        found = looked.look(position, back, time_s=gap)
+        assert found.get("contact", looked.watch.needed["contact"]).count == expected, gap

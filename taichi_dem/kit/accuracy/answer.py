@@ -2,13 +2,19 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
+from functools import reduce
 from typing import Any, Union
 
 import numpy as np
 
 from taichi_dem.kit.display import by_fields, counted, in_brief
 
+#: Digits that a number has, and unit of the last of them below which it is written with a power of
+#: ten.
+_MOST_DIGITS, _LEAST_UNIT = 17, 1e-15
+#: Least power of ten that is a number.
+_LEAST_POWER = -323
 #: A number, or one for each place of a curve.
 Values = Union[float, np.ndarray]
 
@@ -39,7 +45,7 @@ class ErrorParts:
     @property
     def total(self) -> Values:
         """Half-width of the whole bar, in the unit of the value."""
-        return sum(getattr(self, part.name) ** 2 for part in fields(self)) ** 0.5
+        return _total([getattr(self, part.name) for part in fields(self)])
 
     def __repr__(self):
         return by_fields(self)
@@ -139,7 +145,8 @@ class Answer:
     cost_curve : sequence of Expense, optional
         What other tolerances would cost.
     shortfall : str, default ""
-        Why the error is larger than asked, and what would help; ``""`` where it is not.
+        Why the answer is not what was asked for, and what would help: the error is larger, or the
+        run itself is in doubt. ``""`` where it is neither.
 
     Examples
     --------
@@ -172,19 +179,25 @@ class Answer:
     def share(self) -> float:
         """Largest half-width as a share of the largest value; infinite where that is zero."""
         size = largest(self.value)
-        return largest(self.error) / size if size else math.inf * largest(self.error)
+        error = largest(self.error)
+        return error / size if size else math.inf if error else 0.0
 
     @property
     def reached(self) -> bool:
-        """Whether the bar is as narrow as asked."""
+        """Whether the bar is as narrow as asked, and no run is in doubt."""
         return not self.shortfall
 
     def __repr__(self):
         return in_brief(self, self.goal, self._bar(), self.shortfall)
 
     def __str__(self):
-        line = f"{self._bar()} ({self.parts}); {self.plan}"
-        return f"{line}\n{self.shortfall}" if self.shortfall else line
+        lines = [f"{self._bar()} ({self.parts}); {self.plan}", self.shortfall]
+        lines += [f"warning: {need}" for need in self._needs()]
+        return "\n".join(filter(None, lines))
+
+    def _needs(self):
+        """What the report of the finest run warns of; a Response has none."""
+        return getattr(getattr(self.result, "report", None), "needs", ())
 
     def _bar(self):
         if isinstance(self.value, np.ndarray):
@@ -196,6 +209,19 @@ class Answer:
         return f"{rounded(self.value, unit)} +- {rounded(size, unit)}{ends}"
 
 
+def doubted(answer: Answer, *reasons: str) -> Answer:
+    """The answer, which is not reached where there are reasons to doubt its run."""
+    return replace(answer, shortfall="; ".join(filter(None, (answer.shortfall, *reasons))))
+
+
+def _total(parts):
+    """Root of the sum of squares, of numbers of any size."""
+    # Not math.hypot, which gives NaN close to the largest number.
+    with np.errstate(over="ignore"):
+        total = reduce(np.hypot, parts)
+    return total if isinstance(total, np.ndarray) else float(total)
+
+
 def largest(values: Values) -> float:
     """Largest magnitude of a value or a curve."""
     return float(np.abs(values).max(initial=0.0))
@@ -205,13 +231,15 @@ def rounded(value: float, unit: float) -> str:
     """A number to a power of ten that its error leaves certain; to six digits for unit 0."""
     if unit == 0.0 or not math.isfinite(value):
         return f"{value:.6g}"
-    if 0.0 < abs(value) < 1e-4 or unit >= 1e5:
-        digits = math.floor(math.log10(abs(value) / unit)) + 1 if value else 1
-        return f"{value:.{max(1, digits)}g}"
+    if 0.0 < abs(value) < 1e-4 or not _LEAST_UNIT <= unit < 1e5:
+        digits = math.floor(math.log10(abs(value)) - math.log10(unit)) + 1 if value else 1
+        return f"{value:.{min(_MOST_DIGITS, max(1, digits))}g}"
     return f"{value:.{max(0, round(-math.log10(unit)))}f}"
 
 
 def _places(error):
     """Power of ten of the second digit of an error, of the first where that is at least 3."""
-    power = math.floor(math.log10(error))
+    if not math.isfinite(error):
+        return -math.inf
+    power = max(_LEAST_POWER, math.floor(math.log10(error)))
     return power if error / 10.0**power >= 3.0 else power - 1

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichi_dem.kit.accuracy.answer import Answer
-from taichi_dem.kit.accuracy.student import t_quantile
+from taichi_dem.kit.accuracy.student import mean_and_deviation, t_quantile
 from taichi_dem.kit.display import counted
 
 #: Seeds below which no clusters are looked for.
@@ -86,6 +86,12 @@ def clusters_of(values: Sequence[float], error: float, least: float) -> list[np.
     order = np.argsort(x, kind="stable")
     if len(x) < LEAST_SEEDS or not np.isfinite(x).all():
         return [order]
+    with np.errstate(over="ignore"):
+        return _clusters(x, order, error, least)
+
+
+def _clusters(x, order, error, least):
+    """Clusters of values by their order."""
     gaps = np.diff(x[order])
     for count in range(_MOST_BRANCHES, 1, -1):
         ends = np.sort(np.argsort(-gaps, kind="stable")[: count - 1]) + 1
@@ -107,12 +113,12 @@ def branches_of(
 def _branch(values, part, seeds, error, t):
     count, share = len(part), len(part) / len(seeds)
     half = t * error / math.sqrt(count)
+    mean, deviation = mean_and_deviation(values)
     if count > 1:
-        apart = t_quantile(0.95, count - 1) * float(values.std(ddof=1)) / math.sqrt(count)
-        half = max(half, apart)
+        half = max(half, t_quantile(0.95, count - 1) * deviation / math.sqrt(count))
     width = _share_error(count, len(seeds))
     named = tuple(seeds[k] for k in sorted(part.tolist()))
-    return Branch(float(values.mean()), half, share, width, named)
+    return Branch(mean, half, share, width, named)
 
 
 def _share_error(count, total):

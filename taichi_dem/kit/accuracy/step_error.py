@@ -72,14 +72,14 @@ def step_error(
 def _order(values, steps, most):
     """Order that three values at falling steps show, NaN for none in (0, most]."""
     before, after = values[1] - values[0], values[2] - values[1]
-    if before * after <= 0.0:
+    if after == 0.0:
         return math.nan
-    low, high = 1e-3, most
-    if not _ratio(steps, low) <= before / after <= _ratio(steps, high):
+    found, low, high = before / after, 1e-3, most
+    if not _ratio(steps, low) <= found <= _ratio(steps, high):
         return math.nan
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if _ratio(steps, middle) < before / after else (low, middle)
+        low, high = (middle, high) if _ratio(steps, middle) < found else (low, middle)
     return high
 
 

@@ -1,8 +1,21 @@
 """Student's t and Fisher's F: how far chance takes a mean, and a ratio of two variances."""
 
 import math
+from collections.abc import Sequence
+
+import numpy as np
 
 _EPSILON, _TINY, _MOST_TERMS = 1e-15, 1e-300, 1000
+
+
+def mean_and_deviation(values: Sequence[float]) -> tuple[float, float]:
+    """Mean and standard deviation of numbers of any size; no deviation of a single one."""
+    x = np.asarray(values, dtype=np.float64)
+    # By a power of two, which changes no bit, so that no square is beyond all numbers.
+    scale = 2.0 ** (math.frexp(float(np.abs(x).max()))[1] - 1)
+    shares = x / scale
+    deviation = float(shares.std(ddof=1)) if len(x) > 1 else 0.0
+    return float(shares.mean()) * scale, deviation * scale
 
 
 def t_quantile(confidence: float, freedom: float) -> float:

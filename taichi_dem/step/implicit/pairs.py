@@ -286,6 +286,7 @@ class PairDashpots:
         turn, offset = place_in(self.state.rotation[i], self.state.rotation[j], branch)
         m = self.tables.pair(i, j)
         force, moment_i, moment_j, dragged, rubbed = zero3(), zero3(), zero3(), 0.0, 0.0
+        all_rub, all_bound = 0.0, 0.0
         for k in range(self.store.first[p], self.store.last[p]):
             pushed = self.impulse[k] / dt
             a, b = self.store.sphere[k][0], self.store.sphere[k][1]
@@ -306,6 +307,8 @@ class PairDashpots:
             if ti.static(self.springs.present):
                 rub -= self.springs.force(m, k, self.state.rotation[i])
             rubbed -= rub.dot(velocity)
+            all_rub += rub.norm()
+            all_bound += self.tables.friction.limit(m, pressed)
         return PairForces(
             force=force,
             moment_i=moment_i,
@@ -313,6 +316,8 @@ class PairDashpots:
             dragged=dragged,
             rubbed=rubbed,
             slipped=0.0,
+            rub=all_rub,
+            bound=all_bound,
             deepest=0.0,
             near_count=0,
             active=0,
