@@ -291,7 +291,8 @@ def frequency_response(
     InputError
         An argument is out of its range, or the filling refuses a scene.
     SimulationDiverged
-        A scene left the range in which its numbers mean anything.
+        All scenes left the range in which their numbers mean anything. Where some did, a warning
+        tells which, and their results are nan.
 
     Examples
     --------
@@ -331,7 +332,7 @@ def _sampling(cycles):
 
     None where no mean is known: of a single cycle, or of a container at rest.
     """
-    highest = int(np.argmax(cycles.rms))
+    highest = int(np.nanargmax(cycles.rms))
     one = slice(highest, highest + 1)
     series = Cycles(cycles.frequency[one], cycles.steps[one], cycles.record[one]).rms_by_cycle[0]
     mean, error, freedom = mean_and_error(series)
