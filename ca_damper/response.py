@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 _MOST_SHOWN = 8
 #: In tables, of a peak at an end of the ratios, where its height cannot be known.
 OUTSIDE = "outside"
+#: Likewise, of a curve with a scene that diverged.
+DIVERGED = "diverged"
 #: Of the sampling error in a report.
 _CONFIDENCE = 0.95
 
@@ -149,7 +151,8 @@ class Response(Tabulated):
             middle, spread = np.median(ratio), 1e3 * rms
             cells = f"{middle:.4f}", f"{natural * middle:.4g}", f"{np.median(spread):.4g}"
             ends = f"{spread.min():.4g} to {spread.max():.4g}"
-            row = (*cells, ends) if math.isfinite(middle) else (OUTSIDE,) * 4
+            unknown = DIVERGED if np.isnan(self.rms[k]).any() else OUTSIDE
+            row = (*cells, ends) if math.isfinite(middle) else (unknown,) * 4
             found.append((f"{self.particles[k]}", *row))
         return found
 

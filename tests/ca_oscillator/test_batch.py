@@ -296,6 +296,7 @@ def test_results_over_several_scenes_are_nan_where_one_diverged():
             found = call(kicks, seeds=seeds, **job)
         alone = call(kicks, seeds=[1, 2], **job)
         some = (found, alone) if call is frequency_response else (found.down, alone.down)
+        assert ">diverged</td>" in some[0]._repr_html_()
         assert np.isnan(some[0].rms[:, :, 1]).all()
         assert np.array_equal(some[0].rms[:, :, [0, 2]], some[1].rms)
         assert found.report.diverged
